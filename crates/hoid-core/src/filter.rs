@@ -1,0 +1,120 @@
+//! Rational filters over slices.
+//!
+//! A monic polynomial `D(q^-1) = 1 + d_1 q^-1 + ... + d_n q^-n` is given by its coefficients `[d_1, ..., d_n]`; the leading
+//! one is never stored. All filters start at rest (zeros before the first sample).
+
+/// All-pole filter in place: `x <- x / D(q^-1)`, that is `y(t) = x(t) - d_1 y(t-1) - ... - d_n y(t-n)`.
+pub fn divide_in_place(d: &[f64], x: &mut [f64]) {
+    match *d {
+        [] => {}
+        [d1] => {
+            let mut y1 = 0.0;
+            for value in x {
+                y1 = *value - d1 * y1;
+                *value = y1;
+            }
+        }
+        [d1, d2] => {
+            let (mut y1, mut y2) = (0.0, 0.0);
+            for value in x {
+                // The older term first: only the last product waits for the previous sample.
+                let y = (*value - d2 * y2) - d1 * y1;
+                y2 = y1;
+                y1 = y;
+                *value = y;
+            }
+        }
+        _ => {
+            for t in 0..x.len() {
+                let mut y = x[t];
+                for (i, di) in d.iter().enumerate().take(t) {
+                    y -= di * x[t - 1 - i];
+                }
+                x[t] = y;
+            }
+        }
+    }
+}
+
+/// Monic FIR filter: `y = D(q^-1) x`, that is `y(t) = x(t) + d_1 x(t-1) + ... + d_n x(t-n)`.
+///
+/// # Panics
+/// If `x` and `y` differ in length.
+pub fn multiply(d: &[f64], x: &[f64], y: &mut [f64]) {
+    assert_eq!(x.len(), y.len(), "input and output of a filter have the same length");
+    y.copy_from_slice(x);
+    for (i, &di) in d.iter().enumerate() {
+        let lag = i + 1;
+        if lag >= x.len() {
+            break;
+        }
+        for (yt, xt) in y[lag..].iter_mut().zip(x) {
+            *yt += di * xt;
+        }
+    }
+}
+
+/// FIR filter with all its coefficients: `y = B(q^-1) q^-nk x`, `b = [b_0, ..., b_{nb-1}]`.
+///
+/// # Panics
+/// If `x` and `y` differ in length.
+pub fn moving_sum(b: &[f64], nk: usize, x: &[f64], y: &mut [f64]) {
+    assert_eq!(x.len(), y.len(), "input and output of a filter have the same length");
+    y.fill(0.0);
+    for (j, &bj) in b.iter().enumerate() {
+        let lag = nk + j;
+        if lag >= x.len() {
+            break;
+        }
+        for (yt, xt) in y[lag..].iter_mut().zip(x) {
+            *yt += bj * xt;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::{vec, vec::Vec};
+
+    fn wave(n: usize) -> Vec<f64> {
+        (0..n).map(|t| sample(t as f64)).collect()
+    }
+
+    fn sample(t: f64) -> f64 {
+        (0.37 * t).sin() + 0.2 * (1.7 * t).cos()
+    }
+
+    #[test]
+    fn division_undoes_multiplication_for_every_order() {
+        let d = [-0.7, 0.31, -0.12, 0.05];
+        let x = wave(200);
+        for n in 0..=d.len() {
+            let mut y = vec![0.0; x.len()];
+            multiply(&d[..n], &x, &mut y);
+            divide_in_place(&d[..n], &mut y);
+            for (a, b) in x.iter().zip(&y) {
+                assert!((a - b).abs() < 1e-12, "order {n}: {a} and {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn moving_sum_delays_and_weighs() {
+        let mut y = [0.0; 5];
+        moving_sum(&[2.0, 3.0], 1, &[1.0, 10.0, 0.0, 0.0, 0.0], &mut y);
+        assert_eq!(y, [0.0, 2.0, 23.0, 30.0, 0.0]);
+        // A delay longer than the record leaves nothing, and does not panic.
+        moving_sum(&[2.0], 9, &[1.0; 5], &mut y);
+        assert_eq!(y, [0.0; 5]);
+    }
+
+    #[test]
+    fn empty_and_short_slices_pass() {
+        divide_in_place(&[0.5, 0.2, 0.1], &mut []);
+        let mut one = [1.0];
+        divide_in_place(&[0.5, 0.2, 0.1], &mut one);
+        assert_eq!(one, [1.0]);
+        multiply(&[0.5], &[], &mut []);
+    }
+}

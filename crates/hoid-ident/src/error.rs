@@ -1,0 +1,95 @@
+//! Why an identification cannot give a result.
+
+use hoid_model::ModelError;
+use thiserror::Error;
+
+/// Everything that stops a fit. How a search *ended* is data in the fit ([`crate::Termination`]), not an error.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum IdentError {
+    /// The model or a record is wrong by itself.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// No record at all.
+    #[error("no record was given; a fit needs at least one")]
+    NoRecords,
+    /// Records that were sampled differently cannot share a discrete model.
+    #[error(
+        "record {label} has the sample time {found} s, the first record {expected} s; resample one of them, or fit them separately"
+    )]
+    MixedSampling {
+        /// The record that differs.
+        label: String,
+        /// Its sample time, s.
+        found: f64,
+        /// That of the first record, s.
+        expected: f64,
+    },
+    /// Fewer residuals than unknowns.
+    #[error(
+        "record {label} has {samples} samples; {orders} with its delay and initial states needs more than {needed}; take a longer record or lower orders"
+    )]
+    TooFewSamples {
+        /// The record.
+        label: String,
+        /// Samples that it has.
+        samples: usize,
+        /// The orders.
+        orders: String,
+        /// Samples that are used up before the first degree of freedom is left.
+        needed: usize,
+    },
+    /// A delay that leaves nothing of the record.
+    #[error("the delay nk = {nk} is not shorter than record {label} with {samples} samples; check nk and the sampling")]
+    DelayTooLong {
+        /// The delay in samples.
+        nk: usize,
+        /// The record.
+        label: String,
+        /// Samples that it has.
+        samples: usize,
+    },
+    /// A signal that does not move.
+    #[error(
+        "{channel} of record {label} is {value} in every sample: there is nothing to identify; check the column and the span"
+    )]
+    NoExcitation {
+        /// Name of the channel.
+        channel: String,
+        /// The record.
+        label: String,
+        /// Its constant value.
+        value: f64,
+    },
+    /// Regressors that depend on each other.
+    #[error(
+        "the regressors are singular: {columns}; the record does not excite so many parameters: lower the orders or use a record with more frequencies"
+    )]
+    SingularRegressors {
+        /// The dependent columns by name.
+        columns: String,
+    },
+    /// An information matrix that has no inverse.
+    #[error(
+        "the data do not determine {parameters}: the information matrix is singular (a pole and a zero that cancel, or too little excitation); lower the orders"
+    )]
+    SingularInformation {
+        /// The parameters of the undetermined combination.
+        parameters: String,
+    },
+    /// A start that the search cannot use.
+    #[error("the start cannot be used: {reason}")]
+    BadStart {
+        /// What is wrong with it, and the remedy.
+        reason: String,
+    },
+    /// Not one start led to a finite loss.
+    #[error("no start of the search gave a finite loss; check the scale of the data and the orders")]
+    NoFiniteLoss,
+    /// An empty range of orders.
+    #[error("the range {range} is empty; write LO..HI with LO <= HI")]
+    EmptyRange {
+        /// The range as given.
+        range: String,
+    },
+}

@@ -1,0 +1,259 @@
+//! The result of an estimation: the model, its uncertainty, and how it was found.
+
+use hoid_model::{
+    NotConvertible, Orders, PolynomialModel, Record,
+    remnant::RemnantDiscretisation,
+    uncertainty::{Estimate, OperatorEstimate, RemnantEstimate, operator_estimate, remnant_estimate, variance_along},
+};
+
+use crate::{
+    IdentError, InitialState, Termination,
+    prediction_error::{Criterion, Data, first_residual, output_error_form},
+};
+
+/// A fitted model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit {
+    pub(crate) model: PolynomialModel,
+    pub(crate) covariance: Option<Vec<f64>>,
+    pub(crate) loss: f64,
+    pub(crate) innovation_variance: f64,
+    pub(crate) residuals: usize,
+    pub(crate) states: usize,
+    pub(crate) initial_state: InitialState,
+    pub(crate) termination: Termination,
+    pub(crate) start: String,
+}
+
+/// Values on the time axis of a record, from sample `first` on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Index of the first sample that has a value.
+    pub first: usize,
+    /// One value a sample from there to the end of the record.
+    pub values: Vec<f64>,
+}
+
+/// Frequency response from e to u with its uncertainty.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResponsePoint {
+    /// Frequency, rad/s.
+    pub omega_rad_s: f64,
+    /// Magnitude in dB.
+    pub magnitude_db: Estimate,
+    /// Phase in deg, principal value in (-180, 180]; the caller unwraps it along frequency.
+    pub phase_deg: Estimate,
+}
+
+impl Fit {
+    /// The model with its coefficients.
+    pub fn model(&self) -> &PolynomialModel {
+        &self.model
+    }
+
+    /// The orders.
+    pub fn orders(&self) -> Orders {
+        self.model.orders()
+    }
+
+    /// Covariance of theta by rows, `sigma^2 (psi' psi)^-1` with the initial states eliminated; `None` for an exact fit, whose
+    /// residuals say nothing about the noise.
+    pub fn covariance(&self) -> Option<&[f64]> {
+        self.covariance.as_deref()
+    }
+
+    /// Name, value and standard error of each coefficient.
+    pub fn parameters(&self) -> Vec<(String, Estimate)> {
+        let theta = self.model.theta();
+        let p = theta.len();
+        self.orders()
+            .parameter_names()
+            .into_iter()
+            .enumerate()
+            .map(|(i, name)| {
+                let estimate = match &self.covariance {
+                    Some(c) => Estimate::with_variance(theta[i], c[i * p + i]),
+                    None => Estimate::fixed(theta[i]),
+                };
+                (name, estimate)
+            })
+            .collect()
+    }
+
+    /// Loss `V = sum eps^2 / n` over the n residuals that count.
+    pub fn loss(&self) -> f64 {
+        self.loss
+    }
+
+    /// Unbiased innovation variance `sum eps^2 / (n - p - s)` with p parameters and s estimated initial states.
+    pub fn innovation_variance(&self) -> f64 {
+        self.innovation_variance
+    }
+
+    /// Number n of residuals.
+    pub fn residual_count(&self) -> usize {
+        self.residuals
+    }
+
+    /// Number s of initial states that were estimated, over all records.
+    pub fn state_count(&self) -> usize {
+        self.states
+    }
+
+    /// What was assumed about the time before the records.
+    pub fn initial_state(&self) -> InitialState {
+        self.initial_state
+    }
+
+    /// How the search ended.
+    pub fn termination(&self) -> Termination {
+        self.termination
+    }
+
+    /// The start that won.
+    pub fn start(&self) -> &str {
+        &self.start
+    }
+
+    /// Akaike's criterion `n ln V + 2 p`.
+    pub fn aic(&self) -> f64 {
+        self.residuals as f64 * self.loss.ln() + 2.0 * self.parameter_count()
+    }
+
+    /// Schwarz's (Bayesian) criterion `n ln V + p ln n`.
+    pub fn bic(&self) -> f64 {
+        let n = self.residuals as f64;
+        n * self.loss.ln() + self.parameter_count() * n.ln()
+    }
+
+    /// Akaike's final prediction error `V (1 + p/n) / (1 - p/n)`.
+    pub fn fpe(&self) -> f64 {
+        let ratio = self.parameter_count() / self.residuals as f64;
+        self.loss * (1.0 + ratio) / (1.0 - ratio)
+    }
+
+    fn parameter_count(&self) -> f64 {
+        self.model.theta().len() as f64
+    }
+
+    /// The operator's parameters with standard errors.
+    ///
+    /// # Errors
+    /// [`NotConvertible`] with the reason.
+    pub fn operator(&self) -> Result<OperatorEstimate, NotConvertible> {
+        let p = self.model.theta().len();
+        match &self.covariance {
+            Some(covariance) => operator_estimate(&self.model, covariance),
+            None => operator_estimate(&self.model, &vec![f64::NAN; p * p]),
+        }
+    }
+
+    /// T_n and K_n of the remnant filter that the noise model stands for.
+    ///
+    /// # Errors
+    /// [`NotConvertible`] with the reason.
+    pub fn remnant(&self, how: RemnantDiscretisation) -> Result<RemnantEstimate, NotConvertible> {
+        let variance_of_sd = self.innovation_variance / (2.0 * self.residuals as f64);
+        remnant_estimate(
+            &self.model,
+            self.covariance.as_deref(),
+            self.innovation_variance.sqrt(),
+            variance_of_sd,
+            how,
+        )
+    }
+
+    /// One-step-ahead residuals on a record, initial states treated as in the fit.
+    ///
+    /// # Errors
+    /// [`IdentError::MixedSampling`], [`IdentError::TooFewSamples`].
+    pub fn residuals(&self, record: &Record) -> Result<Series, IdentError> {
+        self.errors_of(self.orders(), self.model.theta(), record)
+    }
+
+    /// One-step-ahead prediction of the output.
+    ///
+    /// # Errors
+    /// As [`Fit::residuals`].
+    pub fn predict(&self, record: &Record) -> Result<Series, IdentError> {
+        Ok(output_less(record, self.residuals(record)?))
+    }
+
+    /// Simulated output: the response of `B/(A F)` to the input alone, without noise model. Where the fit estimated initial
+    /// states, those of the simulation are estimated too (least squares of the simulation error).
+    ///
+    /// # Errors
+    /// As [`Fit::residuals`].
+    pub fn simulate(&self, record: &Record) -> Result<Series, IdentError> {
+        let (orders, theta) = output_error_form(&self.model);
+        Ok(output_less(record, self.errors_of(orders, &theta, record)?))
+    }
+
+    fn errors_of(&self, orders: Orders, theta: &[f64], record: &Record) -> Result<Series, IdentError> {
+        let (ours, theirs) = (self.model.sample_time(), record.sample_time());
+        if !ours.matches(theirs) {
+            return Err(IdentError::MixedSampling {
+                label: record.label().to_owned(),
+                found: theirs.s(),
+                expected: ours.s(),
+            });
+        }
+        let first = first_residual(&orders, self.initial_state);
+        let needed = first + orders.nf + orders.nc;
+        if record.len() <= needed {
+            return Err(IdentError::TooFewSamples {
+                label: record.label().to_owned(),
+                samples: record.len(),
+                orders: orders.to_string(),
+                needed,
+            });
+        }
+        let data = Data {
+            e: record.input(),
+            u: record.output(),
+        };
+        let criterion = Criterion {
+            orders,
+            data: vec![data],
+            initial: self.initial_state,
+            first,
+        };
+        Ok(Series {
+            first,
+            values: criterion.residuals_of(theta, data),
+        })
+    }
+
+    /// Frequency response with standard errors by the delta method: with `dH` the gradient, `d ln|H| = Re(dH/H)` and
+    /// `d arg H = Im(dH/H)`.
+    pub fn frequency_response(&self, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
+        let to_db = 20.0 / std::f64::consts::LN_10;
+        omega_rad_s
+            .iter()
+            .map(|&omega| {
+                let (h, gradient) = self.model.response_and_gradient(omega);
+                let relative: Vec<_> = gradient.iter().map(|g| g / h).collect();
+                let estimate = |value: f64, direction: Vec<f64>| match &self.covariance {
+                    Some(c) => Estimate::with_variance(value, variance_along(&direction, c)),
+                    None => Estimate::fixed(value),
+                };
+                ResponsePoint {
+                    omega_rad_s: omega,
+                    magnitude_db: estimate(to_db * h.norm().ln(), relative.iter().map(|r| to_db * r.re).collect()),
+                    phase_deg: estimate(
+                        h.arg().to_degrees(),
+                        relative.iter().map(|r| r.im.to_degrees()).collect(),
+                    ),
+                }
+            })
+            .collect()
+    }
+}
+
+fn output_less(record: &Record, errors: Series) -> Series {
+    let output = &record.output()[errors.first..];
+    Series {
+        first: errors.first,
+        values: output.iter().zip(&errors.values).map(|(u, e)| u - e).collect(),
+    }
+}

@@ -1,0 +1,245 @@
+//! Choice of orders and delay.
+//!
+//! Every combination of the given ranges is fitted on the same samples (the residuals of all candidates start where the most
+//! demanding one can), and the criterion decides: the loss for the delay alone, BIC where the number of parameters differs.
+//! The chosen model is then fitted once more on all the samples that its own orders leave.
+
+use std::ops::RangeInclusive;
+
+use hoid_model::{Orders, Record, Structure};
+use rayon::prelude::*;
+
+use crate::{Estimator, Fit, IdentError, prediction_error::first_residual};
+
+/// A range for each order and for the delay.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OrderRanges {
+    /// Coefficients of A.
+    pub na: RangeInclusive<usize>,
+    /// Coefficients of B.
+    pub nb: RangeInclusive<usize>,
+    /// Coefficients of C.
+    pub nc: RangeInclusive<usize>,
+    /// Coefficients of D.
+    pub nd: RangeInclusive<usize>,
+    /// Coefficients of F.
+    pub nf: RangeInclusive<usize>,
+    /// Delay of b0 in samples.
+    pub nk: RangeInclusive<usize>,
+}
+
+impl From<Orders> for OrderRanges {
+    fn from(o: Orders) -> Self {
+        let one = |n: usize| n..=n;
+        Self {
+            na: one(o.na),
+            nb: one(o.nb),
+            nc: one(o.nc),
+            nd: one(o.nd),
+            nf: one(o.nf),
+            nk: one(o.nk),
+        }
+    }
+}
+
+impl OrderRanges {
+    fn named(&self) -> [(&'static str, &RangeInclusive<usize>); 6] {
+        [
+            ("na", &self.na),
+            ("nb", &self.nb),
+            ("nc", &self.nc),
+            ("nd", &self.nd),
+            ("nf", &self.nf),
+            ("nk", &self.nk),
+        ]
+    }
+
+    /// All combinations, the delay running fastest.
+    ///
+    /// # Errors
+    /// [`IdentError::EmptyRange`].
+    pub fn combinations(&self) -> Result<Vec<Orders>, IdentError> {
+        if let Some((name, range)) = self.named().into_iter().find(|(_, r)| r.is_empty()) {
+            return Err(IdentError::EmptyRange {
+                range: format!("{name}={}..{}", range.start(), range.end()),
+            });
+        }
+        let mut all = vec![Orders::default()];
+        let mut vary = |range: &RangeInclusive<usize>, set: fn(&mut Orders, usize)| {
+            all = all
+                .iter()
+                .flat_map(|o| {
+                    range.clone().map(move |n| {
+                        let mut next = *o;
+                        set(&mut next, n);
+                        next
+                    })
+                })
+                .collect();
+        };
+        vary(&self.na, |o, n| o.na = n);
+        vary(&self.nb, |o, n| o.nb = n);
+        vary(&self.nc, |o, n| o.nc = n);
+        vary(&self.nd, |o, n| o.nd = n);
+        vary(&self.nf, |o, n| o.nf = n);
+        vary(&self.nk, |o, n| o.nk = n);
+        Ok(all)
+    }
+}
+
+/// What decides between candidates; the smallest value wins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Criterion {
+    /// The loss itself: right only for candidates with the same number of parameters.
+    Loss,
+    /// Akaike.
+    Aic,
+    /// Schwarz.
+    #[default]
+    Bic,
+}
+
+/// One candidate of a search.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Its orders.
+    pub orders: Orders,
+    /// Its figures, or why it could not be fitted.
+    pub outcome: Result<CandidateFigures, IdentError>,
+}
+
+/// What candidates are compared by, all on the same samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CandidateFigures {
+    /// Loss V.
+    pub loss: f64,
+    /// Akaike's criterion.
+    pub aic: f64,
+    /// Schwarz's criterion.
+    pub bic: f64,
+    /// True when the search reached a minimum.
+    pub converged: bool,
+}
+
+impl CandidateFigures {
+    fn value(&self, criterion: Criterion) -> f64 {
+        match criterion {
+            Criterion::Loss => self.loss,
+            Criterion::Aic => self.aic,
+            Criterion::Bic => self.bic,
+        }
+    }
+}
+
+/// The chosen fit and the table it was chosen from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// The chosen model, fitted on all its samples.
+    pub fit: Fit,
+    /// All candidates in the order of [`OrderRanges::combinations`].
+    pub candidates: Vec<Candidate>,
+    /// What decided.
+    pub criterion: Criterion,
+}
+
+/// Fits every combination of orders and returns the best. `template` gives the options; its orders and start are not used.
+///
+/// # Errors
+/// [`IdentError::EmptyRange`]; the error of the first candidate when none could be fitted.
+pub fn choose_orders(
+    template: &Estimator,
+    ranges: &OrderRanges,
+    criterion: Criterion,
+    records: &[Record],
+) -> Result<Choice, IdentError> {
+    let combinations = ranges.combinations()?;
+    for orders in &combinations {
+        orders.check(template.structure)?;
+    }
+    let first = combinations
+        .iter()
+        .map(|o| first_residual(o, template.initial_state_in_use()))
+        .max()
+        .unwrap_or(0);
+    // Collected by index: the table does not depend on the number of threads.
+    let candidates: Vec<Candidate> = combinations
+        .into_par_iter()
+        .map(|orders| Candidate {
+            orders,
+            outcome: template
+                .with_orders(orders)
+                .fit_from(records, first)
+                .map(|fit| CandidateFigures {
+                    loss: fit.loss(),
+                    aic: fit.aic(),
+                    bic: fit.bic(),
+                    converged: fit.termination().converged(),
+                }),
+        })
+        .collect();
+    let best = candidates
+        .iter()
+        .filter_map(|c| c.outcome.as_ref().ok().map(|f| (c.orders, f.value(criterion))))
+        .min_by(|a, b| a.1.total_cmp(&b.1));
+    let orders = match best {
+        Some((orders, _)) => orders,
+        None => {
+            let reason = candidates.into_iter().find_map(|c| c.outcome.err());
+            return Err(reason.unwrap_or(IdentError::NoFiniteLoss));
+        }
+    };
+    Ok(Choice {
+        fit: template.with_orders(orders).fit(records)?,
+        candidates,
+        criterion,
+    })
+}
+
+/// Delays from 0.05 to 0.6 s, as people have them, in samples: the default range of nk.
+pub fn default_delay_range(sample_time: hoid_model::SampleTime) -> RangeInclusive<usize> {
+    // tau_e = (nk - 1) Ts.
+    let samples = |delay_s: f64| (delay_s / sample_time.s()).round() as usize + 1;
+    samples(0.05)..=samples(0.6)
+}
+
+/// The operator's orders with the defaults of the command line: nk searched, and nd over 1 to 4 for Box-Jenkins.
+pub fn default_operator_ranges(structure: Structure, sample_time: hoid_model::SampleTime) -> OrderRanges {
+    let mut ranges = OrderRanges::from(structure.operator_orders(1));
+    ranges.nk = default_delay_range(sample_time);
+    if structure == Structure::BoxJenkins {
+        ranges.nd = 1..=4;
+    }
+    ranges
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::SampleTime;
+
+    use super::*;
+
+    #[test]
+    fn combinations_run_through_all_and_empty_ranges_are_refused() {
+        let mut ranges = OrderRanges::from(Structure::BoxJenkins.operator_orders(29));
+        assert_eq!(
+            ranges.combinations().unwrap(),
+            [Structure::BoxJenkins.operator_orders(29)]
+        );
+        ranges.nk = 27..=30;
+        ranges.nd = 1..=3;
+        let all = ranges.combinations().unwrap();
+        assert_eq!(all.len(), 12);
+        assert_eq!(
+            (all[0].nd, all[0].nk, all[1].nk, all[11].nd, all[11].nk),
+            (1, 27, 28, 3, 30)
+        );
+        ranges.nk = RangeInclusive::new(5, 4);
+        assert!(matches!(ranges.combinations(), Err(IdentError::EmptyRange { range }) if range == "nk=5..4"));
+    }
+
+    #[test]
+    fn default_delays_are_those_of_people() {
+        assert_eq!(default_delay_range(SampleTime::new(0.01).unwrap()), 6..=61);
+        assert_eq!(default_delay_range(SampleTime::new(1.0 / 60.0).unwrap()), 4..=37);
+    }
+}

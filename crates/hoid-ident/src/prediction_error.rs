@@ -1,0 +1,757 @@
+//! The prediction-error criterion of the general model, its gradient and its Gauss-Newton matrix.
+//!
+//! For `A u = (B/F) q^-nk e + (C/D) eps` and given theta
+//!
+//! `w = (B/F) q^-nk e`,  `v = A u - w`,  `eps = (D/C) v`                                            (eq. 5.4)
+//!
+//! and the negative gradient `psi = -d eps/d theta` is made of shifts of one filtered signal each (Ljung, *System
+//! Identification*, 1999, eq. 10.53; with the signs of this notation):
+//!
+//! | parameter | psi(t) |
+//! |---|---|
+//! | `a_j` | `-(D/C) u(t-j)` |
+//! | `b_j` | `(D/(C F)) e(t-nk-j)` |
+//! | `c_j` | `(1/C) eps(t-j)` |
+//! | `d_j` | `-(1/C) v(t-j)` |
+//! | `f_j` | `-(D/(C F)) w(t-j)` |
+//!
+//! **Initial states.** With [`InitialState::Zero`] everything before the record is zero and all residuals count. With
+//! [`InitialState::Estimate`] nothing is assumed: residuals are used from the first sample at which every input and output
+//! in the regression lies inside the record, and what then remains unknown, the nf past values of w and the nc past values of
+//! eps, is estimated in each record. eps is affine in these states, so that they are eliminated exactly for each theta
+//! (variable projection; G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432): with the orthonormal basis Q of
+//! their responses, `eps = (I - Q Q') eps_0`. The loss is then a function of theta alone, its gradient is `-psi' eps` exactly
+//! (the states are optimal), and the Gauss-Newton matrix is `psi' (I - Q Q') psi` (the approximation of L. Kaufman, *BIT* 15
+//! (1975) 49-57). A shifted signal differs from the true derivative only by a free response of 1/F or 1/C, which lies in the
+//! span of Q: shifting stays exact.
+
+use hoid_core::{filter::divide_in_place, stability::roots_inside};
+use hoid_model::{Orders, PolynomialModel};
+
+use crate::least_squares::{dot, solve_symmetric};
+
+/// What is assumed about the time before a record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum InitialState {
+    /// Input, output and innovations were zero.
+    Zero,
+    /// Nothing is assumed: the initial states of each record are estimated with the parameters.
+    #[default]
+    Estimate,
+}
+
+/// Input and output of one record.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Data<'a> {
+    pub e: &'a [f64],
+    pub u: &'a [f64],
+}
+
+/// The criterion over one or several records with a common theta.
+#[derive(Debug, Clone)]
+pub(crate) struct Criterion<'a> {
+    pub orders: Orders,
+    pub data: Vec<Data<'a>>,
+    pub initial: InitialState,
+    /// First sample whose residual counts, in each record; at least [`first_residual`].
+    pub first: usize,
+}
+
+/// First sample whose residual can be had under the rule of the module, for these orders.
+pub(crate) fn first_residual(orders: &Orders, initial: InitialState) -> usize {
+    match initial {
+        InitialState::Zero => 0,
+        InitialState::Estimate => orders.first_regressed_sample() + orders.nd,
+    }
+}
+
+/// Sum of squares, `psi' eps` and the projected `psi' psi` (by rows).
+#[derive(Debug, Clone)]
+pub(crate) struct Linearisation {
+    pub sum_of_squares: f64,
+    pub descent: Vec<f64>,
+    pub gram: Vec<f64>,
+}
+
+/// Signals of one record at one theta. Each has `pad` zeros in front, so that a shift needs no case distinction.
+#[derive(Debug, Default)]
+pub(crate) struct Workspace {
+    pad: usize,
+    w: Vec<f64>,
+    v: Vec<f64>,
+    eps: Vec<f64>,
+    filtered: [Vec<f64>; 5],
+    scratch: Vec<f64>,
+}
+
+/// Polynomials of theta.
+#[derive(Debug, Clone, Copy)]
+struct Parts<'t> {
+    a: &'t [f64],
+    b: &'t [f64],
+    c: &'t [f64],
+    d: &'t [f64],
+    f: &'t [f64],
+}
+
+impl<'t> Parts<'t> {
+    fn split(orders: &Orders, theta: &'t [f64]) -> Self {
+        let (a, rest) = theta.split_at(orders.na);
+        let (b, rest) = rest.split_at(orders.nb);
+        let (c, rest) = rest.split_at(orders.nc);
+        let (d, f) = rest.split_at(orders.nd);
+        Self { a, b, c, d, f }
+    }
+}
+
+/// Orthonormal basis of the responses to the initial states of a record, and the way back to the states.
+#[derive(Debug, Default)]
+struct FreeResponses {
+    /// Basis vectors from the first residual on; what follows their end is zero.
+    q: Vec<Vec<f64>>,
+    /// `G[:, kept[k]] = sum over l <= k of Q_l r[k][l]`.
+    r: Vec<Vec<f64>>,
+    kept: Vec<usize>,
+    /// Impulse response of 1/F.
+    h: Vec<f64>,
+    /// Number of states of 1/F; those of 1/C come after them.
+    nf: usize,
+}
+
+impl Criterion<'_> {
+    /// Number of residuals over all records.
+    pub fn residuals(&self) -> usize {
+        self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
+    }
+
+    /// Number of initial states over all records.
+    pub fn states(&self) -> usize {
+        match self.initial {
+            InitialState::Zero => 0,
+            InitialState::Estimate => self.data.len() * (self.orders.nf + self.orders.nc),
+        }
+    }
+
+    /// True when the predictor is stable: roots of C and F inside the unit circle.
+    pub fn is_feasible(&self, theta: &[f64]) -> bool {
+        let parts = Parts::split(&self.orders, theta);
+        theta.iter().all(|v| v.is_finite()) && roots_inside(parts.f, 1.0) && roots_inside(parts.c, 1.0)
+    }
+
+    /// Sum of squared residuals; not finite when a filter diverges.
+    pub fn sum_of_squares(&self, theta: &[f64], workspace: &mut Workspace) -> f64 {
+        self.data
+            .iter()
+            .map(|data| {
+                self.residual_pass(theta, *data, workspace);
+                let eps = &workspace.eps[workspace.pad + self.first..];
+                dot(eps, eps)
+            })
+            .sum()
+    }
+
+    /// Sum of squares with its derivatives.
+    pub fn linearise(&self, theta: &[f64], workspace: &mut Workspace) -> Linearisation {
+        let p = theta.len();
+        let mut total = Linearisation {
+            sum_of_squares: 0.0,
+            descent: vec![0.0; p],
+            gram: vec![0.0; p * p],
+        };
+        for data in &self.data {
+            let free = self.residual_pass(theta, *data, workspace);
+            self.gradient_pass(theta, *data, workspace);
+            let columns = self.columns(data.u.len(), workspace, &Block::ALL);
+            self.accumulate(&free, &columns, data.u.len(), workspace, &mut total);
+        }
+        total
+    }
+
+    /// B of least squares for the other coefficients of theta, in one step because the residual is affine in B, and the sum of
+    /// squares there. `None` when the regressors are singular or the loss is not finite.
+    pub fn best_gains(&self, theta: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, f64)> {
+        let (at, nb) = (self.orders.na, self.orders.nb);
+        let mut theta = theta.to_vec();
+        theta[at..at + nb].fill(0.0);
+        let mut total = Linearisation {
+            sum_of_squares: 0.0,
+            descent: vec![0.0; nb],
+            gram: vec![0.0; nb * nb],
+        };
+        for data in &self.data {
+            let free = self.residual_pass(&theta, *data, workspace);
+            self.filter_input(&Parts::split(&self.orders, &theta), *data, workspace);
+            let columns = self.columns(data.u.len(), workspace, &[Block::B]);
+            self.accumulate(&free, &columns, data.u.len(), workspace, &mut total);
+        }
+        let b = solve_symmetric(&total.gram, &total.descent)?;
+        let gained = dot(&b, &total.descent);
+        let value = total.sum_of_squares - gained;
+        value.is_finite().then_some((b, value))
+    }
+
+    /// Residuals of one record, from [`Criterion::first`] on.
+    pub fn residuals_of(&self, theta: &[f64], data: Data<'_>) -> Vec<f64> {
+        let mut workspace = Workspace::default();
+        self.residual_pass(theta, data, &mut workspace);
+        workspace.eps[workspace.pad + self.first..].to_vec()
+    }
+
+    /// First sample at which w and v are computed.
+    fn first_regressed(&self) -> usize {
+        match self.initial {
+            InitialState::Zero => 0,
+            InitialState::Estimate => self.first - self.orders.nd,
+        }
+    }
+
+    fn residual_pass(&self, theta: &[f64], data: Data<'_>, ws: &mut Workspace) -> FreeResponses {
+        let parts = Parts::split(&self.orders, theta);
+        let n = data.u.len();
+        let o = &self.orders;
+        let pad = o.na.max(o.nb).max(o.nc).max(o.nd).max(o.nf);
+        ws.reset(pad, n);
+        let regressed = self.first_regressed();
+        let start = match self.initial {
+            InitialState::Zero => 0,
+            InitialState::Estimate => self.first,
+        };
+
+        for (j, &bj) in parts.b.iter().enumerate() {
+            let lag = o.nk + j;
+            let from = regressed.max(lag);
+            if from < n {
+                add_scaled(&mut ws.w[pad + from..], bj, &data.e[from - lag..n - lag]);
+            }
+        }
+        divide_in_place(parts.f, &mut ws.w[pad + regressed..]);
+
+        for t in regressed..n {
+            ws.v[pad + t] = data.u[t] - ws.w[pad + t];
+        }
+        for (i, &ai) in parts.a.iter().enumerate() {
+            let from = regressed.max(i + 1);
+            if from < n {
+                add_scaled(&mut ws.v[pad + from..], ai, &data.u[from - i - 1..n - i - 1]);
+            }
+        }
+        whiten(parts.c, parts.d, &ws.v, &mut ws.eps, pad + start);
+
+        match self.initial {
+            InitialState::Zero => FreeResponses::default(),
+            InitialState::Estimate => {
+                let free = FreeResponses::of(&parts, o.nd, n - self.first);
+                free.eliminate(ws, pad, regressed, self.first);
+                free
+            }
+        }
+    }
+
+    /// The signals whose shifts are the columns of psi.
+    fn gradient_pass(&self, theta: &[f64], data: Data<'_>, ws: &mut Workspace) {
+        let parts = Parts::split(&self.orders, theta);
+        let (o, pad) = (&self.orders, ws.pad);
+        let regressed = self.first_regressed();
+        self.filter_input(&parts, data, ws);
+        let [xa, _, xc, xd, xf] = &mut ws.filtered;
+        if o.na > 0 {
+            ws.scratch[pad..].copy_from_slice(data.u);
+            whiten(parts.c, parts.d, &ws.scratch, xa, pad);
+        }
+        if o.nc > 0 {
+            xc.copy_from_slice(&ws.eps);
+            divide_in_place(parts.c, &mut xc[pad..]);
+        }
+        if o.nd > 0 {
+            xd.copy_from_slice(&ws.v);
+            divide_in_place(parts.c, &mut xd[pad..]);
+        }
+        if o.nf > 0 {
+            ws.scratch.copy_from_slice(&ws.w);
+            divide_in_place(parts.f, &mut ws.scratch[pad + regressed..]);
+            whiten(parts.c, parts.d, &ws.scratch, xf, pad + regressed);
+        }
+    }
+
+    /// `(D/(C F)) e(t-nk)`.
+    fn filter_input(&self, parts: &Parts<'_>, data: Data<'_>, ws: &mut Workspace) {
+        let (nk, pad, n) = (self.orders.nk, ws.pad, data.u.len());
+        if self.orders.nb == 0 || nk >= n {
+            return;
+        }
+        ws.scratch[..pad + nk].fill(0.0);
+        ws.scratch[pad + nk..].copy_from_slice(&data.e[..n - nk]);
+        divide_in_place(parts.f, &mut ws.scratch[pad + nk..]);
+        whiten(
+            parts.c,
+            parts.d,
+            &ws.scratch,
+            &mut ws.filtered[Block::B as usize],
+            pad + nk,
+        );
+    }
+
+    /// Columns of psi with their signs, in the order of theta, from the first residual on.
+    fn columns<'w>(&self, n: usize, ws: &'w Workspace, blocks: &[Block]) -> Vec<(&'w [f64], f64)> {
+        let (first, end) = (ws.pad + self.first, ws.pad + n);
+        blocks
+            .iter()
+            .flat_map(|&block| {
+                let (from, count, sign) = block.shifts(&self.orders);
+                let signal = &ws.filtered[block as usize];
+                (from..from + count).map(move |j| (&signal[first - j..end - j], sign))
+            })
+            .collect()
+    }
+
+    /// Adds one record to the normal equations of these columns.
+    fn accumulate(
+        &self,
+        free: &FreeResponses,
+        columns: &[(&[f64], f64)],
+        n: usize,
+        ws: &Workspace,
+        total: &mut Linearisation,
+    ) {
+        let eps = &ws.eps[ws.pad + self.first..ws.pad + n];
+        total.sum_of_squares += dot(eps, eps);
+        let p = columns.len();
+        // Components of each column in the space of the initial states.
+        let inside: Vec<Vec<f64>> = columns
+            .iter()
+            .map(|(column, sign)| free.q.iter().map(|q| sign * dot(q, &column[..q.len()])).collect())
+            .collect();
+        for i in 0..p {
+            let (column, sign) = columns[i];
+            total.descent[i] += sign * dot(column, eps);
+            for j in 0..=i {
+                let (other, other_sign) = columns[j];
+                let product = sign * other_sign * dot(column, other) - dot(&inside[i], &inside[j]);
+                total.gram[i * p + j] += product;
+                if i != j {
+                    total.gram[j * p + i] += product;
+                }
+            }
+        }
+    }
+}
+
+/// The polynomials as blocks of theta; the number is the place of their signal in the workspace.
+#[derive(Debug, Clone, Copy)]
+enum Block {
+    A,
+    B,
+    C,
+    D,
+    F,
+}
+
+impl Block {
+    const ALL: [Self; 5] = [Self::A, Self::B, Self::C, Self::D, Self::F];
+
+    /// First shift, number of shifts, sign of psi.
+    fn shifts(self, o: &Orders) -> (usize, usize, f64) {
+        match self {
+            Self::A => (1, o.na, -1.0),
+            Self::B => (0, o.nb, 1.0),
+            Self::C => (1, o.nc, 1.0),
+            Self::D => (1, o.nd, -1.0),
+            Self::F => (1, o.nf, -1.0),
+        }
+    }
+}
+
+impl Workspace {
+    fn reset(&mut self, pad: usize, n: usize) {
+        self.pad = pad;
+        for signal in [&mut self.w, &mut self.v, &mut self.eps, &mut self.scratch]
+            .into_iter()
+            .chain(&mut self.filtered)
+        {
+            signal.clear();
+            signal.resize(pad + n, 0.0);
+        }
+    }
+}
+
+impl FreeResponses {
+    /// Responses of the residuals, from the first one on, to the nf initial values of w and the nc of eps.
+    ///
+    /// Any free response of 1/F is a combination of its impulse response `h` started at the first nf samples (that basis stays
+    /// independent even where f_nf = 0).
+    fn of(parts: &Parts<'_>, nd: usize, rows: usize) -> Self {
+        let mut columns: Vec<Vec<f64>> = Vec::new();
+        let mut h = Vec::new();
+        if !parts.f.is_empty() {
+            h = impulse_response(parts.f, rows + nd);
+            let mut s = vec![0.0; (h.len() + nd).min(rows + nd)];
+            for (t, st) in s.iter_mut().enumerate() {
+                *st = h.get(t).copied().unwrap_or(0.0);
+                for (i, di) in parts.d.iter().enumerate().take(t) {
+                    *st += di * h.get(t - 1 - i).copied().unwrap_or(0.0);
+                }
+            }
+            if !parts.c.is_empty() {
+                s.resize(rows + nd, 0.0);
+                divide_in_place(parts.c, &mut s);
+            }
+            // w grows with a state, the residual falls with w.
+            s.iter_mut().for_each(|v| *v = -*v);
+            for i in 0..parts.f.len() {
+                // The state enters i samples after w starts, nd samples before the first residual.
+                columns.push(shifted(&s, i, nd, rows));
+            }
+        }
+        if !parts.c.is_empty() {
+            let k = impulse_response(parts.c, rows);
+            for j in 0..parts.c.len() {
+                columns.push(shifted(&k, j, 0, rows));
+            }
+        }
+        let mut free = Self {
+            h,
+            nf: parts.f.len(),
+            ..Self::default()
+        };
+        for (index, column) in columns.into_iter().enumerate() {
+            free.orthonormalise(index, column);
+        }
+        free
+    }
+
+    /// Modified Gram-Schmidt, twice for orthogonality to rounding; a column without a part of its own is dropped.
+    fn orthonormalise(&mut self, index: usize, mut column: Vec<f64>) {
+        let size = dot(&column, &column).sqrt();
+        let mut r = vec![0.0; self.q.len()];
+        for _ in 0..2 {
+            for (q, rk) in self.q.iter().zip(&mut r) {
+                let common = q.len().min(column.len());
+                let component = dot(&q[..common], &column[..common]);
+                *rk += component;
+                if column.len() < q.len() {
+                    column.resize(q.len(), 0.0);
+                }
+                add_scaled(&mut column[..q.len()], -component, q);
+            }
+        }
+        let rest = dot(&column, &column).sqrt();
+        if rest.is_nan() || rest <= 1e-10 * size {
+            return;
+        }
+        column.iter_mut().for_each(|v| *v /= rest);
+        r.push(rest);
+        self.q.push(column);
+        self.r.push(r);
+        self.kept.push(index);
+    }
+
+    /// Takes the best initial states into w, v and eps.
+    fn eliminate(&self, ws: &mut Workspace, pad: usize, regressed: usize, first: usize) {
+        let components: Vec<f64> = self
+            .q
+            .iter()
+            .map(|q| dot(q, &ws.eps[pad + first..pad + first + q.len()]))
+            .collect();
+        for (q, &component) in self.q.iter().zip(&components) {
+            add_scaled(&mut ws.eps[pad + first..pad + first + q.len()], -component, q);
+        }
+        // R x = -Q' eps by back substitution.
+        let mut states: Vec<f64> = components.iter().map(|c| -c).collect();
+        for k in (0..states.len()).rev() {
+            states[k] /= self.r[k][k];
+            for l in 0..k {
+                states[l] -= self.r[k][l] * states[k];
+            }
+        }
+        // States of C do not act on w.
+        for (&index, &x) in self.kept.iter().zip(&states).filter(|(index, _)| **index < self.nf) {
+            let from = pad + regressed + index;
+            if from >= ws.w.len() {
+                continue;
+            }
+            let end = (from + self.h.len()).min(ws.w.len());
+            add_scaled(&mut ws.w[from..end], x, &self.h[..end - from]);
+            add_scaled(&mut ws.v[from..end], -x, &self.h[..end - from]);
+        }
+    }
+}
+
+/// `response(t + lead - delay)` for t = 0 .. rows, cut where the response has ended.
+fn shifted(response: &[f64], delay: usize, lead: usize, rows: usize) -> Vec<f64> {
+    let mut column = vec![0.0; delay.saturating_sub(lead).min(rows)];
+    let from = lead.saturating_sub(delay).min(response.len());
+    column.extend_from_slice(&response[from..]);
+    column.truncate(rows);
+    column
+}
+
+/// Impulse response of `1/D`, until it has died away (1e-20 of its largest value) or `longest` is reached.
+fn impulse_response(d: &[f64], longest: usize) -> Vec<f64> {
+    let mut h: Vec<f64> = Vec::with_capacity(longest.min(4096));
+    let mut largest = 0.0_f64;
+    let mut quiet = 0;
+    for t in 0..longest {
+        let mut y = f64::from(u8::from(t == 0));
+        for (i, di) in d.iter().enumerate().take(t) {
+            y -= di * h[t - 1 - i];
+        }
+        h.push(y);
+        largest = largest.max(y.abs());
+        quiet = if y.abs() < 1e-20 * largest { quiet + 1 } else { 0 };
+        if quiet > d.len() {
+            break;
+        }
+    }
+    h
+}
+
+/// `y = (D/C) x` from index `from` on, zero state of 1/C, x as it is before.
+fn whiten(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
+    if from >= x.len() {
+        return;
+    }
+    y[from..].copy_from_slice(&x[from..]);
+    for (i, &di) in d.iter().enumerate() {
+        let lag = i + 1;
+        let start = from.max(lag);
+        if start < x.len() {
+            add_scaled(&mut y[start..], di, &x[start - lag..x.len() - lag]);
+        }
+    }
+    divide_in_place(c, &mut y[from..]);
+}
+
+/// `y += k x`.
+fn add_scaled(y: &mut [f64], k: f64, x: &[f64]) {
+    for (yi, xi) in y.iter_mut().zip(x) {
+        *yi += k * xi;
+    }
+}
+
+/// Orders and theta of the output-error model `u = B/(A F) q^-nk e + eps` with the same system: its residual is the
+/// simulation error of the model.
+pub(crate) fn output_error_form(model: &PolynomialModel) -> (Orders, Vec<f64>) {
+    use hoid_model::{polynomial::product, polynomial_model::monic};
+    let orders = model.orders();
+    let den = product(&monic(model.a()), &monic(model.f()));
+    let theta = model.b().iter().chain(&den[1..]).copied().collect();
+    let form = Orders {
+        nb: orders.nb,
+        nf: orders.na + orders.nf,
+        nk: orders.nk,
+        ..Orders::default()
+    };
+    (form, theta)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A closed-loop-like record with coloured noise and a start away from rest.
+    fn record(n: usize) -> (Vec<f64>, Vec<f64>) {
+        let mut state = 12345_u64;
+        let mut noise = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let e: Vec<f64> = (0..n)
+            .map(|t| (0.05 * t as f64 + 1.0).sin() + 0.4 * (0.31 * t as f64).cos() + 0.3 * noise())
+            .collect();
+        let mut u = vec![0.3, 0.2, -0.1];
+        let mut colour = 0.0;
+        for t in 3..n {
+            colour = 0.8 * colour + 0.05 * noise();
+            let w = 1.6 * u[t - 1] - 0.7 * u[t - 2] + 0.2 * e[t - 3];
+            u.push(w + colour - 0.8 * 0.05 * noise());
+        }
+        (e, u)
+    }
+
+    fn cases() -> Vec<(Orders, Vec<f64>)> {
+        let base = Orders {
+            nb: 2,
+            nk: 3,
+            ..Orders::default()
+        };
+        vec![
+            (Orders { nd: 1, nf: 2, ..base }, vec![0.2, -0.1, -0.5, -1.5, 0.62]),
+            (
+                Orders { nd: 4, nf: 2, ..base },
+                vec![0.2, -0.1, -0.5, 0.2, -0.1, 0.05, -1.5, 0.62],
+            ),
+            (
+                Orders {
+                    nc: 2,
+                    nd: 1,
+                    nf: 2,
+                    ..base
+                },
+                vec![0.2, -0.1, 0.3, 0.1, -0.5, -1.5, 0.62],
+            ),
+            (
+                Orders { nc: 1, nf: 3, ..base },
+                vec![0.2, -0.1, -0.6, -1.5, 0.62, -0.05],
+            ),
+            (Orders { na: 2, ..base }, vec![-1.5, 0.6, 0.2, -0.1]),
+            (
+                Orders {
+                    na: 1,
+                    nc: 1,
+                    nd: 1,
+                    nf: 1,
+                    ..base
+                },
+                vec![-0.6, 0.2, -0.1, 0.4, -0.3, -0.8],
+            ),
+            (
+                Orders {
+                    nb: 1,
+                    nk: 0,
+                    nf: 1,
+                    nd: 2,
+                    ..Orders::default()
+                },
+                vec![0.3, -0.4, 0.1, -0.9],
+            ),
+        ]
+    }
+
+    fn criterion<'a>(orders: Orders, data: Vec<Data<'a>>, initial: InitialState) -> Criterion<'a> {
+        Criterion {
+            first: first_residual(&orders, initial),
+            orders,
+            data,
+            initial,
+        }
+    }
+
+    #[test]
+    fn gradient_agrees_with_finite_differences_in_both_modes() {
+        let (e, u) = record(300);
+        for initial in [InitialState::Zero, InitialState::Estimate] {
+            for (orders, theta) in cases() {
+                let data = vec![
+                    Data { e: &e, u: &u },
+                    Data {
+                        e: &e[40..170],
+                        u: &u[40..170],
+                    },
+                ];
+                let c = criterion(orders, data, initial);
+                let mut ws = Workspace::default();
+                let exact = c.linearise(&theta, &mut ws);
+                assert!((exact.sum_of_squares - c.sum_of_squares(&theta, &mut ws)).abs() < 1e-10);
+                for i in 0..theta.len() {
+                    let h = 1e-5;
+                    let mut at = |delta: f64| {
+                        let mut shifted = theta.clone();
+                        shifted[i] += delta;
+                        c.sum_of_squares(&shifted, &mut ws)
+                    };
+                    // Fourth order: truncation h^4, rounding eps V/h = 1e-9 V.
+                    let slope = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
+                    let ours = -2.0 * exact.descent[i];
+                    let scale = exact.gram[i * theta.len() + i].sqrt() * exact.sum_of_squares.sqrt();
+                    assert!(
+                        (slope - ours).abs() < 1e-7 * scale,
+                        "{initial:?} {orders} {}: {ours} and {slope}",
+                        orders.parameter_names()[i]
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn residuals_obey_the_model_equation() {
+        let (e, u) = record(120);
+        let theta = vec![0.2, -0.1, 0.3, -0.5, -1.5, 0.62];
+        let orders = Orders {
+            nb: 2,
+            nc: 1,
+            nd: 1,
+            nf: 2,
+            nk: 3,
+            ..Orders::default()
+        };
+        let c = criterion(orders, vec![Data { e: &e, u: &u }], InitialState::Zero);
+        let eps = c.residuals_of(&theta, c.data[0]);
+        // Written out sample by sample with zeros before the record.
+        let get = |x: &[f64], t: usize, lag: usize| if t >= lag { x[t - lag] } else { 0.0 };
+        let (mut w, mut v, mut r) = (vec![], vec![], vec![]);
+        for t in 0..u.len() {
+            let wt = 0.2 * get(&e, t, 3) - 0.1 * get(&e, t, 4) + 1.5 * get(&w, t, 1) - 0.62 * get(&w, t, 2);
+            w.push(wt);
+            v.push(u[t] - wt);
+            r.push(v[t] - 0.5 * get(&v, t, 1) - 0.3 * get(&r, t, 1));
+            assert!((r[t] - eps[t]).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn estimated_states_leave_nothing_to_gain() {
+        // Shifting w by any free response must not lower the loss: the residual is orthogonal to the basis.
+        let (e, u) = record(300);
+        for (orders, theta) in cases() {
+            let c = criterion(orders, vec![Data { e: &e, u: &u }], InitialState::Estimate);
+            let eps = c.residuals_of(&theta, c.data[0]);
+            let parts = Parts::split(&orders, &theta);
+            let free = FreeResponses::of(&parts, orders.nd, eps.len());
+            assert_eq!(free.q.len(), orders.nf + orders.nc, "{orders}");
+            for q in &free.q {
+                assert!(dot(q, &eps[..q.len()]).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn estimated_states_of_a_noise_free_record_are_exact() {
+        // The record is cut out of a longer one: its past is unknown, and the residuals are still zero.
+        let (e, _) = record(400);
+        let mut u = vec![0.5, -0.3, 0.1, 0.2];
+        for t in 4..400 {
+            u.push(1.6 * u[t - 1] - 0.7 * u[t - 2] + 0.2 * e[t - 3] - 0.12 * e[t - 4]);
+        }
+        let theta = vec![0.2, -0.12, -0.4, -1.6, 0.7];
+        let orders = Orders {
+            nb: 2,
+            nd: 1,
+            nf: 2,
+            nk: 3,
+            ..Orders::default()
+        };
+        let data = Data {
+            e: &e[100..],
+            u: &u[100..],
+        };
+        let c = criterion(orders, vec![data], InitialState::Estimate);
+        assert!(c.residuals_of(&theta, data).iter().all(|v| v.abs() < 1e-13));
+        let zero = criterion(orders, vec![data], InitialState::Zero);
+        assert!(zero.residuals_of(&theta, data).iter().any(|v| v.abs() > 1e-2));
+    }
+
+    #[test]
+    fn a_later_first_residual_leaves_the_gradient_exact() {
+        let (e, u) = record(300);
+        let (orders, theta) = cases().remove(1);
+        let data = vec![Data { e: &e, u: &u }];
+        let late = Criterion {
+            first: 40,
+            ..criterion(orders, data, InitialState::Estimate)
+        };
+        assert_eq!(late.residuals(), 260);
+        let mut ws = Workspace::default();
+        let exact = late.linearise(&theta, &mut ws);
+        let h = 1e-5;
+        let mut at = |delta: f64| {
+            let mut shifted = theta.clone();
+            shifted[7] += delta;
+            late.sum_of_squares(&shifted, &mut ws)
+        };
+        let slope = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
+        assert!((slope + 2.0 * exact.descent[7]).abs() < 1e-6 * slope.abs());
+    }
+}

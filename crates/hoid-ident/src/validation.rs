@@ -1,0 +1,243 @@
+//! How well a model describes a record.
+//!
+//! - `VAF = max(0, 1 - sum (u - u^)^2 / sum u^2) 100 %` (eq. 39): no mean is removed;
+//! - `NRMSE fit = (1 - |u - u^| / |u - mean u|) 100 %`: the mean is removed, may be negative (the fit percent of most tools);
+//! - residual autocorrelation `r_eps(k) / r_eps(0)`, bounds `+- z / sqrt n` for white residuals;
+//! - cross-correlation of residuals and input, `r_eps,e(k) / sqrt(r_eps(0) r_e(0))`, with the bounds
+//!   `+- z sqrt( (1/n) sum_k rho_eps(k) rho_e(k) )` that hold when the residuals need not be white (Ljung, *System
+//!   Identification*, 1999, eq. 16.56). At positive lags it tells of dynamics that the model missed; at negative lags
+//!   (the residual leads the input) of feedback, which a closed loop always has.
+
+use hoid_model::Record;
+
+use crate::{Fit, IdentError, least_squares::dot};
+
+/// Largest lag of the residual tests, in samples.
+pub const LARGEST_LAG: usize = 50;
+
+/// 99 % point of the normal distribution, two sided.
+const Z_99: f64 = 2.575_829_303_548_901;
+
+/// Fit percentages on one record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quality {
+    /// VAF of the simulated output, %.
+    pub vaf_simulation: f64,
+    /// VAF of the one-step-ahead prediction, %.
+    pub vaf_prediction: f64,
+    /// NRMSE fit of the simulated output, %.
+    pub nrmse_simulation: f64,
+    /// NRMSE fit of the one-step-ahead prediction, %.
+    pub nrmse_prediction: f64,
+}
+
+/// A correlation over lags with its 99 % bound.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Correlation {
+    /// Lags in samples.
+    pub lags: Vec<i64>,
+    /// Normalised correlation at each lag.
+    pub values: Vec<f64>,
+    /// Bound that 99 % of the values keep when there is no correlation.
+    pub bound_99: f64,
+}
+
+/// Simulated and predicted output of a model on a record, with what follows from them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Validation {
+    /// First sample that all of the series below cover.
+    pub first: usize,
+    /// Simulated output.
+    pub simulated: Vec<f64>,
+    /// One-step-ahead prediction.
+    pub predicted: Vec<f64>,
+    /// VAF and NRMSE.
+    pub quality: Quality,
+    /// Residual autocorrelation, lags 1 to [`LARGEST_LAG`].
+    pub autocorrelation: Correlation,
+    /// Cross-correlation of residuals and input, lags from minus to plus [`LARGEST_LAG`].
+    pub cross_correlation: Correlation,
+}
+
+impl Fit {
+    /// Compares the model with a record, the one it was fitted on or another.
+    ///
+    /// # Errors
+    /// As [`Fit::residuals`].
+    pub fn validate(&self, record: &Record) -> Result<Validation, IdentError> {
+        let (simulated, predicted) = (self.simulate(record)?, self.predict(record)?);
+        let first = simulated.first.max(predicted.first);
+        let simulated = simulated.values[first - simulated.first..].to_vec();
+        let predicted = predicted.values[first - predicted.first..].to_vec();
+        let output = &record.output()[first..];
+        let input = &record.input()[first..];
+        let residuals: Vec<f64> = output.iter().zip(&predicted).map(|(u, p)| u - p).collect();
+        Ok(Validation {
+            quality: Quality {
+                vaf_simulation: vaf(output, &simulated),
+                vaf_prediction: vaf(output, &predicted),
+                nrmse_simulation: nrmse_fit(output, &simulated),
+                nrmse_prediction: nrmse_fit(output, &predicted),
+            },
+            autocorrelation: autocorrelation(&residuals, LARGEST_LAG),
+            cross_correlation: cross_correlation(&residuals, input, LARGEST_LAG),
+            first,
+            simulated,
+            predicted,
+        })
+    }
+}
+
+/// Variance accounted for (eq. 39), %. Zero where the measured signal is zero.
+pub fn vaf(measured: &[f64], model: &[f64]) -> f64 {
+    let power = dot(measured, measured);
+    if power == 0.0 {
+        return 0.0;
+    }
+    (100.0 * (1.0 - squared_distance(measured, model) / power)).max(0.0)
+}
+
+/// NRMSE fit, %. Zero where the measured signal is constant.
+pub fn nrmse_fit(measured: &[f64], model: &[f64]) -> f64 {
+    let mean = measured.iter().sum::<f64>() / measured.len() as f64;
+    let spread: f64 = measured.iter().map(|m| (m - mean) * (m - mean)).sum();
+    if spread == 0.0 {
+        return 0.0;
+    }
+    100.0 * (1.0 - (squared_distance(measured, model) / spread).sqrt())
+}
+
+fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum()
+}
+
+/// `sum_t x(t) y(t - k)` over the overlap, for `|k|` below the length.
+fn covariance_at(x: &[f64], y: &[f64], lag: i64) -> f64 {
+    let k = lag.unsigned_abs() as usize;
+    if k >= x.len() {
+        return 0.0;
+    }
+    if lag >= 0 {
+        dot(&x[k..], &y[..y.len() - k])
+    } else {
+        dot(&x[..x.len() - k], &y[k..])
+    }
+}
+
+fn centred(x: &[f64]) -> Vec<f64> {
+    let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
+    x.iter().map(|v| v - mean).collect()
+}
+
+fn autocorrelation(residuals: &[f64], largest: usize) -> Correlation {
+    let x = centred(residuals);
+    let power = covariance_at(&x, &x, 0);
+    let lags: Vec<i64> = (1..=largest.min(x.len().saturating_sub(1)) as i64).collect();
+    Correlation {
+        values: lags
+            .iter()
+            .map(|&k| {
+                if power > 0.0 {
+                    covariance_at(&x, &x, k) / power
+                } else {
+                    0.0
+                }
+            })
+            .collect(),
+        lags,
+        bound_99: Z_99 / (x.len() as f64).sqrt(),
+    }
+}
+
+fn cross_correlation(residuals: &[f64], input: &[f64], largest: usize) -> Correlation {
+    let (x, y) = (centred(residuals), centred(input));
+    let (power_x, power_y) = (covariance_at(&x, &x, 0), covariance_at(&y, &y, 0));
+    let size = (power_x * power_y).sqrt();
+    let largest = largest.min(x.len().saturating_sub(1)) as i64;
+    let lags: Vec<i64> = (-largest..=largest).collect();
+    let values = lags
+        .iter()
+        .map(|&k| {
+            if size > 0.0 {
+                covariance_at(&x, &y, k) / size
+            } else {
+                0.0
+            }
+        })
+        .collect();
+    // The residuals are nearly white, so that few lags carry the sum.
+    let reach = (4 * largest).min(x.len() as i64 - 1);
+    let sum: f64 = (-reach..=reach)
+        .map(|k| covariance_at(&x, &x, k) * covariance_at(&y, &y, k))
+        .sum();
+    let variance = if size > 0.0 {
+        (sum / (size * size)).max(0.0) / x.len() as f64
+    } else {
+        0.0
+    };
+    Correlation {
+        lags,
+        values,
+        bound_99: Z_99 * variance.sqrt(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vaf_and_nrmse_of_known_signals() {
+        let u = [1.0, 3.0, 1.0, 3.0];
+        assert_eq!(vaf(&u, &u), 100.0);
+        assert_eq!(nrmse_fit(&u, &u), 100.0);
+        // Error of 1 in each sample: sum of squares 4 of 20, and as large as the spread around the mean.
+        let off = [2.0, 2.0, 2.0, 2.0];
+        assert!((vaf(&u, &off) - 80.0).abs() < 1e-12);
+        assert!(nrmse_fit(&u, &off).abs() < 1e-12);
+        assert_eq!(vaf(&u, &[-9.0; 4]), 0.0);
+        assert!(nrmse_fit(&u, &[-9.0; 4]) < 0.0);
+        assert_eq!(vaf(&[0.0; 3], &[1.0; 3]), 0.0);
+        assert_eq!(nrmse_fit(&[2.0; 3], &[1.0; 3]), 0.0);
+    }
+
+    #[test]
+    fn correlation_of_white_noise_keeps_its_bounds_and_a_delay_shows() {
+        let mut state = 5_u64;
+        let mut draw = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let x: Vec<f64> = (0..20_000).map(|_| draw()).collect();
+        let own = autocorrelation(&x, 50);
+        let outside = own.values.iter().filter(|v| v.abs() > own.bound_99).count();
+        // 50 values at 1 %: more than four outside has probability 1e-4.
+        assert!(outside <= 4, "{outside}");
+        // y leads x by seven samples: x(t) = y(t - 7).
+        let y: Vec<f64> = x[7..].to_vec();
+        let cross = cross_correlation(&x[..x.len() - 7], &y, 10);
+        let peak = cross.lags[cross
+            .values
+            .iter()
+            .enumerate()
+            .max_by(|a, b| a.1.total_cmp(b.1))
+            .unwrap()
+            .0];
+        assert_eq!(peak, 7);
+        assert!((cross.bound_99 - Z_99 / (x.len() as f64).sqrt()).abs() < 0.1 * cross.bound_99);
+    }
+
+    #[test]
+    fn short_and_silent_signals_do_not_panic() {
+        assert_eq!(autocorrelation(&[1.0], 50).values.len(), 0);
+        assert!(autocorrelation(&[0.0; 100], 5).values.iter().all(|v| *v == 0.0));
+        assert!(
+            cross_correlation(&[0.0; 10], &[1.0; 10], 5)
+                .values
+                .iter()
+                .all(|v| *v == 0.0)
+        );
+    }
+}

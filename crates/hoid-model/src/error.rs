@@ -1,0 +1,175 @@
+//! Everything that can be wrong with what a model is made of.
+
+use thiserror::Error;
+
+/// Why a model, a record or a conversion could not be made. Each message names the quantity, what was found, what was
+/// expected, and where it helps, the remedy.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// A number outside the range that has a meaning.
+    #[error("{quantity} is {found}, expected {expected}")]
+    OutOfRange {
+        /// What the number is, with its symbol and unit.
+        quantity: &'static str,
+        /// The value given.
+        found: f64,
+        /// The range that has a meaning.
+        expected: &'static str,
+    },
+    /// A name that stands for nothing.
+    #[error("there is no {quantity} {found}; expected {expected}")]
+    UnknownName {
+        /// What was asked for.
+        quantity: &'static str,
+        /// The name given.
+        found: String,
+        /// The names that exist.
+        expected: &'static str,
+    },
+    /// A sample that is NaN or infinite.
+    #[error(
+        "channel {channel}: the value at sample {index} is {value}, expected a finite number; remove or repair the sample before identification"
+    )]
+    NotFinite {
+        /// Name of the channel.
+        channel: String,
+        /// Index of the sample, from 0.
+        index: usize,
+        /// The value found.
+        value: f64,
+    },
+    /// Channels of one record that differ in length.
+    #[error("channel {channel} has {found} samples, expected {expected} as in channel {reference}")]
+    LengthMismatch {
+        /// The channel that differs.
+        channel: String,
+        /// Its length.
+        found: usize,
+        /// The length of the reference channel.
+        expected: usize,
+        /// The channel that it is compared with.
+        reference: String,
+    },
+    /// A record without a sample.
+    #[error("the record {label} has no samples; check the columns and the time span")]
+    EmptyRecord {
+        /// Label of the record.
+        label: String,
+    },
+    /// A channel name that is already taken.
+    #[error("channel {name} exists already; give each channel a name of its own")]
+    DuplicateChannel {
+        /// The name.
+        name: String,
+    },
+    /// A channel that the record does not have.
+    #[error("the record has no channel {name}; it has {available}")]
+    NoSuchChannel {
+        /// The name asked for.
+        name: String,
+        /// The names that exist.
+        available: String,
+    },
+    /// A time span that holds no samples of the record.
+    #[error("the span {from_s} to {to_s} s holds no samples: the record covers {start_s} to {end_s} s")]
+    EmptySpan {
+        /// Start of the span, s.
+        from_s: f64,
+        /// End of the span, s.
+        to_s: f64,
+        /// Start of the record, s.
+        start_s: f64,
+        /// End of the record, s.
+        end_s: f64,
+    },
+    /// Polynomial orders that contradict each other or the structure.
+    #[error("orders {found}: {expected}")]
+    Orders {
+        /// The orders as given.
+        found: String,
+        /// What is wrong, and the remedy.
+        expected: String,
+    },
+    /// A transfer function that the method cannot treat.
+    #[error("transfer function {found}: {expected}")]
+    TransferFunction {
+        /// The transfer function as given.
+        found: String,
+        /// What is wrong, and the remedy.
+        expected: String,
+    },
+    /// A discrete model without a continuous one.
+    #[error("not convertible: {0}")]
+    NotConvertible(#[from] NotConvertible),
+    /// A noise level that no remnant gain reaches.
+    #[error(
+        "noise level P_n = {demanded} = var(n)/var(u) cannot be reached with remnant order {order}: the largest reachable level is {largest:.4}; ask for less or use the definition var(u_n)/var(u)"
+    )]
+    UnreachableNoiseLevel {
+        /// The level asked for.
+        demanded: f64,
+        /// Order of the remnant filter.
+        order: usize,
+        /// The limit for an infinite gain.
+        largest: f64,
+    },
+    /// A closed loop that is not stable has no stationary variance and no margins.
+    #[error("the closed loop of operator and controlled element is not stable: {reason}")]
+    UnstableLoop {
+        /// How it was found.
+        reason: String,
+    },
+}
+
+/// Why a discrete model has no counterpart with physical meaning in continuous time.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum NotConvertible {
+    /// A pole on the closed negative real axis has no real logarithm.
+    #[error("the pole z = {pole:.6} lies on the closed negative real axis, so that no real continuous system has it")]
+    NegativeRealPole {
+        /// The pole.
+        pole: f64,
+    },
+    /// `omega_nm^2` would not be positive.
+    #[error(
+        "the continuous denominator s^2 + {a1:.4} s + {a2:.4} has no positive omega_nm^2: the poles are real and lie on both sides of (or at) the origin of s"
+    )]
+    NoNaturalFrequency {
+        /// Coefficient of s.
+        a1: f64,
+        /// Coefficient of 1.
+        a2: f64,
+    },
+    /// `b0 + b1 = 0`: no response to a constant error, so that T_L = K_e_dot / K_e does not exist.
+    #[error("the gain K_e is zero (b0 + b1 = 0), so that the lead time T_L = K_e_dot / K_e does not exist")]
+    ZeroGain,
+    /// Polynomials of other orders than those of the operator model.
+    #[error("the operator model has two coefficients in B and two poles, found nb = {nb} and {poles} poles")]
+    OtherOrders {
+        /// Coefficients in B.
+        nb: usize,
+        /// Poles of B/F (or B/A).
+        poles: usize,
+    },
+    /// A zero-order hold makes at least one sample of delay.
+    #[error("nk = 0: a zero-order hold delays by at least one sample, so that tau_e = (nk - 1) Ts would be negative")]
+    NoDelay,
+    /// A parameter that is not a finite number.
+    #[error("the coefficient {name} is {value}")]
+    NotFinite {
+        /// Name of the coefficient.
+        name: String,
+        /// Its value.
+        value: f64,
+    },
+    /// The noise polynomial does not look like a remnant filter.
+    #[error("the noise model has no remnant filter of order {order}: {reason}")]
+    NotARemnantFilter {
+        /// Order m.
+        order: usize,
+        /// What is wrong.
+        reason: String,
+    },
+}

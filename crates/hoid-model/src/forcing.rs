@@ -1,0 +1,228 @@
+//! The forcing function: the target signal as a sum of sinusoids.
+//!
+//! `f_t(t) = sum A_k sin(omega_k t + phi_k)`   (eq. 42), with t = 0 at the start of the measurement.
+//!
+//! The sinusoids also run before t = 0, so that the run-in settles on them. The reference frequencies are whole multiples of
+//! `2 pi / 81.92 s`: each sinusoid fits the measurement a whole number of times and does not leak into others.
+//!
+//! [`ForcingFunction::samples`] uses `sin(a + b) = sin a cos b + cos a sin b` with b from a table over one block: two products a
+//! sinusoid and sample instead of a sine, and no error that grows along the record as in a recurrence.
+
+use std::f64::consts::TAU;
+
+use crate::{ModelError, SampleTime, remnant_gain::Line};
+
+/// One term of the forcing function.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sinusoid {
+    /// Amplitude A_k, deg.
+    pub amplitude_deg: f64,
+    /// Frequency omega_k, rad/s.
+    pub omega_rad_s: f64,
+    /// Phase phi_k at t = 0, rad.
+    pub phase_rad: f64,
+}
+
+/// A sum of sinusoids.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ForcingFunction {
+    sinusoids: Vec<Sinusoid>,
+}
+
+/// Duration in s that the reference frequencies fit a whole number of times.
+pub const REFERENCE_PERIOD_S: f64 = 81.92;
+
+/// Table 1: n_t, A_k in deg, phi_k in rad.
+const TABLE_1: [(f64, f64, f64); 10] = [
+    (3.0, 1.186, -0.753),
+    (5.0, 1.121, 1.564),
+    (8.0, 0.991, 0.588),
+    (13.0, 0.756, -0.546),
+    (22.0, 0.447, 0.674),
+    (34.0, 0.245, -1.724),
+    (53.0, 0.123, -1.963),
+    (86.0, 0.061, -2.189),
+    (139.0, 0.036, 0.875),
+    (229.0, 0.025, 0.604),
+];
+
+/// Samples of one block of the table of angles: near the square root of a record, where both kinds of sine are fewest.
+const BLOCK: usize = 96;
+
+impl ForcingFunction {
+    /// A forcing function of any number of sinusoids; none is a target at rest.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] when a number is not finite, a frequency is not positive, or two frequencies are the same.
+    pub fn new(sinusoids: Vec<Sinusoid>) -> Result<Self, ModelError> {
+        let refuse = |quantity, found, expected| {
+            Err(ModelError::OutOfRange {
+                quantity,
+                found,
+                expected,
+            })
+        };
+        for (k, s) in sinusoids.iter().enumerate() {
+            if !s.amplitude_deg.is_finite() {
+                return refuse("amplitude of a sinusoid in deg", s.amplitude_deg, "a finite number");
+            }
+            if !s.phase_rad.is_finite() {
+                return refuse("phase of a sinusoid in rad", s.phase_rad, "a finite number");
+            }
+            let quantity = "frequency of a sinusoid in rad/s";
+            if !(s.omega_rad_s.is_finite() && s.omega_rad_s > 0.0) {
+                return refuse(quantity, s.omega_rad_s, "a positive finite number");
+            }
+            if sinusoids[..k].iter().any(|other| other.omega_rad_s == s.omega_rad_s) {
+                return refuse(
+                    quantity,
+                    s.omega_rad_s,
+                    "a frequency of its own for each sinusoid; merge those of equal frequency",
+                );
+            }
+        }
+        Ok(Self { sinusoids })
+    }
+
+    /// The ten sinusoids of Table 1, `omega_k = n_t 2 pi / 81.92` exactly.
+    pub fn reference() -> Self {
+        let term = |(multiple, amplitude_deg, phase_rad)| Sinusoid {
+            amplitude_deg,
+            omega_rad_s: multiple * TAU / REFERENCE_PERIOD_S,
+            phase_rad,
+        };
+        Self {
+            sinusoids: TABLE_1.into_iter().map(term).collect(),
+        }
+    }
+
+    /// The terms.
+    pub fn sinusoids(&self) -> &[Sinusoid] {
+        &self.sinusoids
+    }
+
+    /// Amplitudes and frequencies, as the remnant gain needs them.
+    pub fn lines(&self) -> Vec<Line> {
+        let line = |s: &Sinusoid| Line {
+            amplitude: s.amplitude_deg,
+            omega_rad_s: s.omega_rad_s,
+        };
+        self.sinusoids.iter().map(line).collect()
+    }
+
+    /// f_t(t) in deg.
+    pub fn value(&self, t_s: f64) -> f64 {
+        let term = |s: &Sinusoid| s.amplitude_deg * (s.omega_rad_s * t_s + s.phase_rad).sin();
+        self.sinusoids.iter().map(term).sum()
+    }
+
+    /// f_t in deg at `start_s + k Ts`, k from 0 to `n - 1`; the same as [`ForcingFunction::value`] to rounding, 20 times faster.
+    pub fn samples(&self, start_s: f64, sample_time: SampleTime, n: usize) -> Vec<f64> {
+        let mut values = vec![0.0; n];
+        for s in &self.sinusoids {
+            let mut table = [(0.0, 0.0); BLOCK];
+            for (j, angle) in table.iter_mut().enumerate().take(n) {
+                *angle = (s.omega_rad_s * (j as f64 * sample_time.s())).sin_cos();
+            }
+            for (i, block) in values.chunks_mut(BLOCK).enumerate() {
+                let t_s = start_s + (i * BLOCK) as f64 * sample_time.s();
+                let (sin, cos) = (s.omega_rad_s * t_s + s.phase_rad).sin_cos();
+                let (sin, cos) = (s.amplitude_deg * sin, s.amplitude_deg * cos);
+                for (value, (sin_on, cos_on)) in block.iter_mut().zip(&table) {
+                    *value += sin * cos_on + cos * sin_on;
+                }
+            }
+        }
+        values
+    }
+
+    /// Root mean square over a long time, deg.
+    pub fn rms_deg(&self) -> f64 {
+        let power: f64 = self.sinusoids.iter().map(|s| s.amplitude_deg.powi(2) / 2.0).sum();
+        power.sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ts() -> SampleTime {
+        SampleTime::new(0.01).unwrap()
+    }
+
+    #[test]
+    fn reference_frequencies_and_size() {
+        let f = ForcingFunction::reference();
+        // Table 1 prints omega_k to 1e-3, expected-values the rms to 1e-4.
+        let printed = [0.230, 0.384, 0.614, 0.997, 1.687, 2.608, 4.065, 6.596, 10.661, 17.564];
+        for (s, omega) in f.sinusoids().iter().zip(printed) {
+            assert!((s.omega_rad_s - omega).abs() < 5.1e-4);
+        }
+        assert!((f.rms_deg() - 1.4996).abs() < 5e-5);
+    }
+
+    #[test]
+    fn one_measurement_is_a_whole_number_of_periods() {
+        let f = ForcingFunction::reference();
+        let values = f.samples(0.0, ts(), 8192);
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let rms = (values.iter().map(|v| v * v).sum::<f64>() / n).sqrt();
+        // Orthogonal over a whole number of periods: only rounding is left.
+        assert!(mean.abs() < 1e-13);
+        assert!((rms - f.rms_deg()).abs() < 1e-13);
+        assert!((f.value(0.0) - f.value(REFERENCE_PERIOD_S)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn samples_are_the_values() {
+        let f = ForcingFunction::reference();
+        for (start, n) in [(-10.0, 9192), (0.0, 1), (3.217, 97), (0.0, 0)] {
+            let samples = f.samples(start, ts(), n);
+            assert_eq!(samples.len(), n);
+            for (k, value) in samples.into_iter().enumerate() {
+                let t = start + k as f64 * 0.01;
+                // Angles up to 1500 rad are rounded to 1e-13; they belong to an amplitude of 0.025 deg.
+                assert!((value - f.value(t)).abs() < 1e-13, "t = {t}");
+            }
+        }
+    }
+
+    #[test]
+    fn samples_of_many_blocks_keep_their_precision() {
+        let slow = Sinusoid {
+            amplitude_deg: 1.0,
+            omega_rad_s: 0.5,
+            phase_rad: 0.2,
+        };
+        let f = ForcingFunction::new(vec![slow]).unwrap();
+        let samples = f.samples(0.0, ts(), 1_000_000);
+        // The angle reaches 5000 rad, rounded to 5e-13.
+        let worst = (0..1_000_000).map(|k| (samples[k] - f.value(k as f64 * 0.01)).abs());
+        assert!(worst.fold(0.0, f64::max) < 2e-12);
+    }
+
+    #[test]
+    fn bad_sinusoids_are_refused() {
+        let with = |amplitude_deg, omega_rad_s, phase_rad| Sinusoid {
+            amplitude_deg,
+            omega_rad_s,
+            phase_rad,
+        };
+        for bad in [
+            with(f64::NAN, 1.0, 0.0),
+            with(1.0, 0.0, 0.0),
+            with(1.0, -1.0, 0.0),
+            with(1.0, f64::INFINITY, 0.0),
+            with(1.0, 1.0, f64::NAN),
+        ] {
+            assert!(ForcingFunction::new(vec![bad]).is_err(), "{bad:?}");
+        }
+        assert!(ForcingFunction::new(vec![with(1.0, 2.0, 0.0), with(3.0, 2.0, 1.0)]).is_err());
+        assert_eq!(
+            ForcingFunction::new(Vec::new()).unwrap().samples(0.0, ts(), 3),
+            [0.0; 3]
+        );
+    }
+}

@@ -1,0 +1,49 @@
+//! What hoid identifies, and the mathematics that needs no data: records, polynomial models, exact discretisation, the
+//! operator's parameters and the task in which a person is measured.
+//!
+//! Notation and units are those of the symbol table in the documentation (`docs/src/symbols.md`).
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`record`] | [`Record`]: evenly sampled input, output and what else was measured |
+//! | [`polynomial`] | polynomials in `q^-1`, their roots and stability |
+//! | [`structure`] | [`Structure`], [`Orders`], names of the parameters |
+//! | [`polynomial_model`] | `A u = (B/F) q^-nk e + (C/D) eps`: prediction, simulation, frequency response |
+//! | [`transfer_function`] | transfer functions in s and in z |
+//! | [`discretise`] | the discretisations of Table 5.2 for general transfer functions |
+//! | [`second_order`] | exact zero-order hold of second-order systems, both ways, with derivatives |
+//! | [`operator`] | [`OperatorParameters`] and their discrete model |
+//! | [`remnant`] | the remnant filter, its discretisations and its retrieval |
+//! | [`uncertainty`] | standard errors of derived quantities by the delta method |
+//! | [`controlled_element`], [`forcing`], [`schedule`], [`scenario`] | the task: plant, target signal, change over time, conditions C1-C6 |
+//! | [`margins`] | crossover frequency, phase and gain margin |
+//! | [`remnant_gain`] | the gain K_n that gives a demanded noise level |
+
+mod error;
+
+pub mod controlled_element;
+pub mod discretise;
+pub mod forcing;
+pub mod margins;
+pub mod operator;
+pub mod polynomial;
+pub mod polynomial_model;
+pub mod record;
+pub mod remnant;
+pub mod remnant_gain;
+pub mod sample_time;
+pub mod scenario;
+pub mod schedule;
+pub mod second_order;
+pub mod structure;
+pub mod transfer_function;
+pub mod uncertainty;
+
+pub use error::{ModelError, NotConvertible};
+pub use num_complex::Complex64;
+pub use operator::{DiscreteOperator, OperatorParameters};
+pub use polynomial_model::PolynomialModel;
+pub use record::{Channel, Detrend, Record};
+pub use sample_time::SampleTime;
+pub use structure::{Orders, Structure};
+pub use transfer_function::{ContinuousTransferFunction, DiscreteTransferFunction};

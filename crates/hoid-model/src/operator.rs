@@ -1,0 +1,412 @@
+//! The linear part of the human operator, in continuous and in discrete time.
+//!
+//! `H(s) = K_e (T_L s + 1) e^{-s tau_e} omega_nm^2 / (s^2 + 2 zeta_nm omega_nm s + omega_nm^2)`   (eq. 2)
+//!
+//! Behind a zero-order hold this is exactly `(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)` with `nk = tau_e/Ts + 1`
+//! (eq. 11). With `s = -2 zeta omega Ts`, `x = s^2/4 - omega^2 Ts^2`, `E = e^{s/2}`, `C = cosh sqrt x`, `S = sinh sqrt x / sqrt x`:
+//!
+//! - `f1 = -2 E C`, `f2 = E^2`;
+//! - `b0 = K_e_dot (omega^2 Ts) E S + K_e (1 - E C + (s/2) E S)`;
+//! - `b0 + b1 = K_e (1 + f1 + f2)`.
+//!
+//! C and S are entire in x, so that over- and underdamped operators are one formula; `dC/dx = S/2` and
+//! `G = dS/dx = (C - S)/(2x)` give the Jacobian in closed form.
+
+use nalgebra::{Matrix4, Vector4};
+
+use crate::{
+    ModelError, NotConvertible, SampleTime,
+    second_order::{HeldSecondOrder, SecondOrder},
+    transfer_function::ContinuousTransferFunction,
+};
+
+/// The parameters of the operator's response to the error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OperatorParameters {
+    /// Error gain K_e, deg/deg.
+    pub k_e: f64,
+    /// Lead time constant T_L, s.
+    pub t_l_s: f64,
+    /// Neuromuscular frequency omega_nm, rad/s.
+    pub omega_nm_rad_s: f64,
+    /// Neuromuscular damping ratio zeta_nm.
+    pub zeta_nm: f64,
+    /// Delay tau_e, s.
+    pub tau_e_s: f64,
+}
+
+/// The operator as the estimators see it: two coefficients in B, two poles, and a delay in samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DiscreteOperator {
+    /// `(b0 + b1 q^-1) q^-1 / (1 + f1 q^-1 + f2 q^-2)`.
+    pub held: HeldSecondOrder,
+    /// Delay of b0 in samples.
+    pub nk: usize,
+    /// Time between two samples.
+    pub sample_time: SampleTime,
+}
+
+/// Names of the physical parameters in the order of rows and columns of every Jacobian here.
+pub const PHYSICAL_NAMES: [&str; 4] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm"];
+
+impl OperatorParameters {
+    /// Error-rate gain `K_e_dot = K_e T_L`, s deg/deg.
+    pub fn k_e_dot(&self) -> f64 {
+        self.k_e * self.t_l_s
+    }
+
+    /// True when the neuromuscular poles lie in the open left half plane.
+    pub fn is_stable(&self) -> bool {
+        self.zeta_nm > 0.0
+    }
+
+    /// H(s) with its delay.
+    ///
+    /// # Errors
+    /// [`ModelError`] when a parameter is not finite or the delay is negative.
+    pub fn transfer_function(&self) -> Result<ContinuousTransferFunction, ModelError> {
+        let w2 = self.omega_nm_rad_s * self.omega_nm_rad_s;
+        ContinuousTransferFunction::new(
+            &[w2 * self.k_e_dot(), w2 * self.k_e],
+            &[1.0, 2.0 * self.zeta_nm * self.omega_nm_rad_s, w2],
+        )?
+        .with_delay(self.tau_e_s)
+    }
+
+    /// The exact discrete model for an error held over each sample.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] when omega_nm is not positive, a parameter is not finite, or the delay is no whole number
+    /// of samples.
+    pub fn discretise(&self, sample_time: SampleTime) -> Result<DiscreteOperator, ModelError> {
+        let checks = [
+            ("error gain K_e", self.k_e, true),
+            ("lead time T_L in s", self.t_l_s, true),
+            (
+                "neuromuscular frequency omega_nm in rad/s",
+                self.omega_nm_rad_s,
+                self.omega_nm_rad_s > 0.0,
+            ),
+            ("neuromuscular damping zeta_nm", self.zeta_nm, true),
+        ];
+        for (quantity, found, in_range) in checks {
+            if !(found.is_finite() && in_range) {
+                return Err(ModelError::OutOfRange {
+                    quantity,
+                    found,
+                    expected: "a finite number, positive for omega_nm",
+                });
+            }
+        }
+        let Some(delay) = sample_time.whole_samples(self.tau_e_s) else {
+            return Err(ModelError::OutOfRange {
+                quantity: "delay tau_e in s",
+                found: self.tau_e_s,
+                expected: "zero or more, and a whole number of samples: round it or change the sample time",
+            });
+        };
+        let w2 = self.omega_nm_rad_s * self.omega_nm_rad_s;
+        let continuous = SecondOrder {
+            b0: w2 * self.k_e_dot(),
+            b1: w2 * self.k_e,
+            a1: 2.0 * self.zeta_nm * self.omega_nm_rad_s,
+            a2: w2,
+        };
+        Ok(DiscreteOperator {
+            held: continuous.hold(sample_time)?,
+            nk: delay + 1,
+            sample_time,
+        })
+    }
+}
+
+impl DiscreteOperator {
+    /// The operator that has this discrete model (eq. 12).
+    ///
+    /// # Errors
+    /// [`NotConvertible`] with the reason; never a clipped number.
+    pub fn parameters(&self) -> Result<OperatorParameters, NotConvertible> {
+        if self.nk == 0 {
+            return Err(NotConvertible::NoDelay);
+        }
+        let c = self.held.unhold(self.sample_time)?;
+        if c.a2 <= 0.0 {
+            return Err(NotConvertible::NoNaturalFrequency { a1: c.a1, a2: c.a2 });
+        }
+        let omega = c.a2.sqrt();
+        let (k_e, k_e_dot) = (c.b1 / c.a2, c.b0 / c.a2);
+        if k_e == 0.0 {
+            return Err(NotConvertible::ZeroGain);
+        }
+        Ok(OperatorParameters {
+            k_e,
+            t_l_s: k_e_dot / k_e,
+            omega_nm_rad_s: omega,
+            zeta_nm: c.a1 / (2.0 * omega),
+            tau_e_s: self.sample_time.s() * (self.nk - 1) as f64,
+        })
+    }
+}
+
+/// Jacobian of `[b0, b1, f1, f2]` (rows) with respect to `[K_e, K_e_dot, omega_nm, zeta_nm]` (columns).
+pub fn discretisation_jacobian(operator: &OperatorParameters, sample_time: SampleTime) -> [[f64; 4]; 4] {
+    let ts = sample_time.s();
+    let (k_e, k_e_dot) = (operator.k_e, operator.k_e_dot());
+    let (omega, zeta) = (operator.omega_nm_rad_s, operator.zeta_nm);
+    let q = omega * omega * ts * ts;
+    let s = -2.0 * zeta * omega * ts;
+    let x = s * s / 4.0 - q;
+    let (ec, es, eg) = scaled_hyperbolics(s / 2.0, x);
+    let f2 = s.exp();
+    // Gains of b0 for K_e_dot and K_e, and 1 + f1 + f2.
+    let (rate, step, sum) = (q / ts * es, 1.0 - ec + s / 2.0 * es, 1.0 - 2.0 * ec + f2);
+
+    // Derivatives with respect to s and q; x_s = s/2, x_q = -1, E_s = E/2.
+    let (ec_s, ec_q) = (ec / 2.0 + es * s / 4.0, -es / 2.0);
+    let (es_s, es_q) = (es / 2.0 + eg * s / 2.0, -eg);
+    let (rate_s, rate_q) = (q / ts * es_s, es / ts + q / ts * es_q);
+    let (step_s, step_q) = (-ec_s + es / 2.0 + s / 2.0 * es_s, -ec_q + s / 2.0 * es_q);
+    let (f1_s, f1_q) = (-2.0 * ec_s, -2.0 * ec_q);
+    let (sum_s, sum_q) = (f1_s + f2, f1_q);
+
+    let along = |by_s: f64, by_q: f64| {
+        let by_omega = by_s * (-2.0 * zeta * ts) + by_q * (2.0 * omega * ts * ts);
+        let by_zeta = by_s * (-2.0 * omega * ts);
+        (by_omega, by_zeta)
+    };
+    let (b0_omega, b0_zeta) = along(k_e_dot * rate_s + k_e * step_s, k_e_dot * rate_q + k_e * step_q);
+    let (total_omega, total_zeta) = along(k_e * sum_s, k_e * sum_q);
+    let (f1_omega, f1_zeta) = along(f1_s, f1_q);
+    let (f2_omega, f2_zeta) = along(f2, 0.0);
+    [
+        [step, rate, b0_omega, b0_zeta],
+        [sum - step, -rate, total_omega - b0_omega, total_zeta - b0_zeta],
+        [0.0, 0.0, f1_omega, f1_zeta],
+        [0.0, 0.0, f2_omega, f2_zeta],
+    ]
+}
+
+/// Jacobian of `[K_e, K_e_dot, omega_nm, zeta_nm]` (rows) with respect to `[b0, b1, f1, f2]` (columns): the inverse of
+/// [`discretisation_jacobian`]. `None` when that is singular.
+pub fn retrieval_jacobian(operator: &OperatorParameters, sample_time: SampleTime) -> Option<[[f64; 4]; 4]> {
+    let forward = discretisation_jacobian(operator, sample_time);
+    let matrix = Matrix4::from_fn(|i, j| forward[i][j]);
+    // Columns scaled to unit size: the gains and omega_nm differ by orders of magnitude.
+    let scale = Vector4::from_fn(|j, _| matrix.column(j).norm());
+    if scale.iter().any(|s| *s == 0.0 || !s.is_finite()) {
+        return None;
+    }
+    let scaled = Matrix4::from_fn(|i, j| matrix[(i, j)] / scale[j]);
+    let inverse = scaled.lu().try_inverse()?;
+    let result = std::array::from_fn(|i| std::array::from_fn(|j| inverse[(i, j)] / scale[i]));
+    let finite = |rows: &[[f64; 4]; 4]| rows.iter().flatten().all(|v| v.is_finite());
+    finite(&result).then_some(result)
+}
+
+/// `e^h C(x)`, `e^h S(x)`, `e^h G(x)` with `C = cosh sqrt x`, `S = sinh sqrt x / sqrt x`, `G = dS/dx`.
+fn scaled_hyperbolics(h: f64, x: f64) -> (f64, f64, f64) {
+    let e = h.exp();
+    if x.abs() < 0.25 {
+        // Power series: C = sum x^k/(2k)!, S = sum x^k/(2k+1)!, G = sum (k+1) x^k/(2k+3)!.
+        let (mut c, mut s, mut g) = (0.0, 0.0, 0.0);
+        let mut term = 1.0; // x^k/(2k)!
+        for k in 0..10 {
+            let k = f64::from(k);
+            let odd = term / (2.0 * k + 1.0);
+            c += term;
+            s += odd;
+            g += (k + 1.0) * odd / ((2.0 * k + 2.0) * (2.0 * k + 3.0));
+            term *= x / ((2.0 * k + 1.0) * (2.0 * k + 2.0));
+        }
+        return (e * c, e * s, e * g);
+    }
+    let r = x.abs().sqrt();
+    let (ec, es) = if x < 0.0 {
+        (e * r.cos(), e * r.sin() / r)
+    } else {
+        // e^h inside the exponentials: cosh alone would overflow for a fast overdamped system.
+        let (up, down) = ((h + r).exp(), (h - r).exp());
+        ((up + down) / 2.0, (up - down) / (2.0 * r))
+    };
+    (ec, es, (ec - es) / (2.0 * x))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ts() -> SampleTime {
+        SampleTime::new(0.01).unwrap()
+    }
+
+    fn s1() -> OperatorParameters {
+        OperatorParameters {
+            k_e: 0.09,
+            t_l_s: 0.4,
+            omega_nm_rad_s: 11.25,
+            zeta_nm: 0.35,
+            tau_e_s: 0.28,
+        }
+    }
+
+    fn s2() -> OperatorParameters {
+        OperatorParameters {
+            k_e: 0.07,
+            t_l_s: 1.2,
+            ..s1()
+        }
+    }
+
+    fn others() -> Vec<OperatorParameters> {
+        let with = |omega, zeta| OperatorParameters {
+            omega_nm_rad_s: omega,
+            zeta_nm: zeta,
+            ..s1()
+        };
+        vec![
+            s1(),
+            s2(),
+            with(11.25, 1.0),
+            with(11.25, 1.0 + 1e-9),
+            with(11.25, 1.7),
+            with(60.0, 0.1),
+            with(60.0, 3.0),
+            with(2.0, 0.05),
+            with(150.0, 0.6),
+            OperatorParameters { t_l_s: -0.2, ..s1() },
+            OperatorParameters { k_e: -0.3, ..s1() },
+        ]
+    }
+
+    #[test]
+    fn discrete_parameters_of_both_states() {
+        // Independent values: expected-values, deterministic part.
+        let expected = [(s1(), 0.0442765923, -0.0431823806), (s2(), 0.1024498216, -0.1015987680)];
+        for (operator, b0, b1) in expected {
+            let d = operator.discretise(ts()).unwrap();
+            assert!((d.held.f1 + 1.9121130548).abs() < 5e-11);
+            assert!((d.held.f2 - 0.9242709633).abs() < 5e-11);
+            assert!((d.held.b0 - b0).abs() < 5e-11);
+            assert!((d.held.b1 - b1).abs() < 5e-11);
+            assert_eq!(d.nk, 29);
+        }
+    }
+
+    #[test]
+    fn parameters_undo_discretise() {
+        for operator in others() {
+            let back = operator.discretise(ts()).unwrap().parameters().unwrap();
+            // b0 + b1 cancels to about Ts omega_nm^2 Ts: K_e keeps 16 digits less that factor.
+            for (a, b) in [
+                (back.k_e, operator.k_e),
+                (back.t_l_s, operator.t_l_s),
+                (back.omega_nm_rad_s, operator.omega_nm_rad_s),
+                (back.zeta_nm, operator.zeta_nm),
+                (back.tau_e_s, operator.tau_e_s),
+            ] {
+                assert!((a - b).abs() < 1e-9 * b.abs(), "{operator:?}: {a} and {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn jacobian_agrees_with_finite_differences() {
+        for operator in others() {
+            let exact = discretisation_jacobian(&operator, ts());
+            let at = |p: [f64; 4]| {
+                let d = OperatorParameters {
+                    k_e: p[0],
+                    t_l_s: p[1] / p[0],
+                    omega_nm_rad_s: p[2],
+                    zeta_nm: p[3],
+                    tau_e_s: 0.28,
+                }
+                .discretise(ts())
+                .unwrap();
+                [d.held.b0, d.held.b1, d.held.f1, d.held.f2]
+            };
+            let p = [
+                operator.k_e,
+                operator.k_e_dot(),
+                operator.omega_nm_rad_s,
+                operator.zeta_nm,
+            ];
+            for j in 0..4 {
+                let h = 1e-5 * p[j].abs();
+                let (mut up, mut down) = (p, p);
+                up[j] += h;
+                down[j] -= h;
+                let (up, down) = (at(up), at(down));
+                for i in 0..4 {
+                    let difference = (up[i] - down[i]) / (2.0 * h);
+                    // Central differences: truncation h^2 and rounding eps/h, both below 1e-8 of the column.
+                    let scale = (0..4).map(|k| exact[k][j].abs()).fold(0.0, f64::max);
+                    assert!(
+                        (exact[i][j] - difference).abs() < 2e-8 * scale,
+                        "{operator:?} d{i}/d{}: {} and {difference}",
+                        PHYSICAL_NAMES[j],
+                        exact[i][j]
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn retrieval_jacobian_is_the_inverse() {
+        for operator in others() {
+            let forward = discretisation_jacobian(&operator, ts());
+            let back = retrieval_jacobian(&operator, ts()).unwrap();
+            for i in 0..4 {
+                for j in 0..4 {
+                    let product: f64 = (0..4).map(|k| forward[i][k] * back[k][j]).sum();
+                    let identity = f64::from(u8::from(i == j));
+                    assert!((product - identity).abs() < 1e-7, "{operator:?}: {product} at {i},{j}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_meaning_no_number() {
+        let model = |b: [f64; 2], f: [f64; 2], nk| DiscreteOperator {
+            held: HeldSecondOrder {
+                b0: b[0],
+                b1: b[1],
+                f1: f[0],
+                f2: f[1],
+            },
+            nk,
+            sample_time: ts(),
+        };
+        let reason = |b, f, nk| model(b, f, nk).parameters().unwrap_err();
+        assert!(matches!(
+            reason([1.0, 0.0], [-0.9, -0.05], 29),
+            NotConvertible::NegativeRealPole { .. }
+        ));
+        assert!(matches!(
+            reason([1.0, 0.0], [-2.0, 0.99], 29),
+            NotConvertible::NoNaturalFrequency { .. }
+        ));
+        assert!(matches!(
+            reason([1.0, -1.0], [-1.9, 0.92], 29),
+            NotConvertible::ZeroGain
+        ));
+        assert!(matches!(reason([1.0, 0.0], [-1.9, 0.92], 0), NotConvertible::NoDelay));
+        // An unstable complex pair converts; the result says that it is not stable.
+        let unstable = model([0.044, -0.043], [-1.95, 1.01], 29).parameters().unwrap();
+        assert!(!unstable.is_stable());
+    }
+
+    #[test]
+    fn bad_parameters_are_refused() {
+        let refused = |o: OperatorParameters| o.discretise(ts()).is_err();
+        assert!(refused(OperatorParameters { k_e: f64::NAN, ..s1() }));
+        assert!(refused(OperatorParameters {
+            omega_nm_rad_s: 0.0,
+            ..s1()
+        }));
+        assert!(refused(OperatorParameters { tau_e_s: 0.285, ..s1() }));
+        assert!(refused(OperatorParameters { tau_e_s: -0.01, ..s1() }));
+    }
+}

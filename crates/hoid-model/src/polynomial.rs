@@ -1,0 +1,187 @@
+//! Polynomials and their roots.
+//!
+//! Coefficients are stored in one order, `p[0] + p[1] x + ... + p[n] x^n` with `x = q^-1` for discrete time; transfer
+//! functions in s store descending powers and say so. Roots come from the eigenvalues of the balanced companion matrix
+//! (Edelman and Murakami, 1995) and one Newton step each.
+
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+
+/// Product of two polynomials (any order of powers, the same for both).
+pub fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
+    if a.is_empty() || b.is_empty() {
+        return Vec::new();
+    }
+    let mut p = vec![0.0; a.len() + b.len() - 1];
+    for (i, ai) in a.iter().enumerate() {
+        for (j, bj) in b.iter().enumerate() {
+            p[i + j] += ai * bj;
+        }
+    }
+    p
+}
+
+/// Value at `x` of `p[0] + p[1] x + ... + p[n] x^n`.
+pub fn value(p: &[f64], x: Complex64) -> Complex64 {
+    p.iter().rev().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * x + c)
+}
+
+/// Monic polynomial `z^n + p[1] z^{n-1} + ... + p[n]` with these roots, `p[0] = 1`. Complex roots must come in conjugate
+/// pairs; what is left of the imaginary parts by rounding is dropped.
+pub fn from_roots(roots: &[Complex64]) -> Vec<f64> {
+    let mut p = vec![Complex64::new(1.0, 0.0)];
+    for root in roots {
+        p.push(Complex64::new(0.0, 0.0));
+        for i in (1..p.len()).rev() {
+            let lower = p[i - 1];
+            p[i] -= root * lower;
+        }
+    }
+    p.into_iter().map(|c| c.re).collect()
+}
+
+/// Roots z of `p[0] z^n + p[1] z^{n-1} + ... + p[n]`, largest modulus first, conjugates next to each other.
+///
+/// For a polynomial in `q^-1` with `p[0] = 1` these are its zeros in z. Leading zero coefficients lower the degree; the zero
+/// polynomial and constants have no roots. `None` when a coefficient is not finite or the eigenvalue iteration fails.
+pub fn roots(p: &[f64]) -> Option<Vec<Complex64>> {
+    if p.iter().any(|c| !c.is_finite()) {
+        return None;
+    }
+    let leading = p.iter().position(|&c| c != 0.0);
+    let Some(leading) = leading else {
+        return Some(Vec::new());
+    };
+    let trailing = p.len() - p.iter().rposition(|&c| c != 0.0)? - 1;
+    let core = &p[leading..p.len() - trailing];
+    let degree = core.len() - 1;
+    let mut found = match degree {
+        0 => Vec::new(),
+        1 => vec![Complex64::new(-core[1] / core[0], 0.0)],
+        2 => quadratic(core[1] / core[0], core[2] / core[0]).to_vec(),
+        _ => by_companion(core)?,
+    };
+    found.extend(std::iter::repeat_n(Complex64::new(0.0, 0.0), trailing));
+    found.sort_by(|a, b| {
+        (b.norm().total_cmp(&a.norm()))
+            .then(b.re.total_cmp(&a.re))
+            .then(b.im.total_cmp(&a.im))
+    });
+    Some(found)
+}
+
+/// Roots of `z^2 + p z + q` without cancellation.
+fn quadratic(p: f64, q: f64) -> [Complex64; 2] {
+    let half = -p / 2.0;
+    let discriminant = half * half - q;
+    if discriminant < 0.0 {
+        let im = (-discriminant).sqrt();
+        [Complex64::new(half, im), Complex64::new(half, -im)]
+    } else {
+        let larger = half + discriminant.sqrt().copysign(half);
+        let smaller = if larger == 0.0 { 0.0 } else { q / larger };
+        [Complex64::new(larger, 0.0), Complex64::new(smaller, 0.0)]
+    }
+}
+
+fn by_companion(p: &[f64]) -> Option<Vec<Complex64>> {
+    let n = p.len() - 1;
+    let mut companion = DMatrix::zeros(n, n);
+    for j in 0..n {
+        companion[(0, j)] = -p[j + 1] / p[0];
+    }
+    for i in 1..n {
+        companion[(i, i - 1)] = 1.0;
+    }
+    nalgebra::linalg::balancing::balance_parlett_reinsch(&mut companion);
+    let schur = nalgebra::linalg::Schur::try_new(companion, f64::EPSILON, 10_000)?;
+    let polished = schur.complex_eigenvalues().iter().map(|&z| newton_step(p, z)).collect();
+    Some(polished)
+}
+
+/// One Newton step, kept only when it lowers the residual (it may not at a multiple root).
+fn newton_step(p: &[f64], z: Complex64) -> Complex64 {
+    let horner = |z: Complex64| {
+        let mut f = Complex64::new(0.0, 0.0);
+        let mut slope = Complex64::new(0.0, 0.0);
+        for &c in p {
+            slope = slope * z + f;
+            f = f * z + c;
+        }
+        (f, slope)
+    };
+    let (f, slope) = horner(z);
+    if slope.norm() == 0.0 {
+        return z;
+    }
+    let mut better = z - f / slope;
+    if z.im == 0.0 {
+        better.im = 0.0;
+    }
+    if horner(better).0.norm() < f.norm() { better } else { z }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn c(re: f64, im: f64) -> Complex64 {
+        Complex64::new(re, im)
+    }
+
+    #[test]
+    fn roots_undo_from_roots() {
+        let sets = [
+            vec![c(0.9, 0.2), c(0.9, -0.2)],
+            vec![c(0.95, 0.0), c(-0.4, 0.0), c(0.1, 0.0)],
+            vec![
+                c(1.2, 0.0),
+                c(0.97, 0.03),
+                c(0.97, -0.03),
+                c(0.5, 0.0),
+                c(0.0, 0.7),
+                c(0.0, -0.7),
+            ],
+        ];
+        for set in sets {
+            let p = from_roots(&set);
+            let found = roots(&p).unwrap();
+            assert_eq!(found.len(), set.len());
+            for root in &set {
+                let nearest = found.iter().map(|f| (f - root).norm()).fold(f64::INFINITY, f64::min);
+                assert!(nearest < 1e-11, "{root} is off by {nearest}");
+            }
+        }
+    }
+
+    #[test]
+    fn multiple_roots_are_found_to_the_accuracy_that_they_allow() {
+        // A root of multiplicity m is known to eps^(1/m) only.
+        let found = roots(&from_roots(&[c(0.85, 0.0); 4])).unwrap();
+        assert!(found.iter().all(|z| (z - 0.85).norm() < 5e-4));
+    }
+
+    #[test]
+    fn degenerate_polynomials() {
+        assert_eq!(roots(&[]), Some(vec![]));
+        assert_eq!(roots(&[0.0, 0.0]), Some(vec![]));
+        assert_eq!(roots(&[2.0]), Some(vec![]));
+        assert_eq!(roots(&[0.0, 2.0, -1.0]).unwrap(), vec![c(0.5, 0.0)]);
+        assert_eq!(roots(&[1.0, -0.5, 0.0]).unwrap(), vec![c(0.5, 0.0), c(0.0, 0.0)]);
+        assert_eq!(roots(&[1.0, f64::NAN]), None);
+        assert_eq!(roots(&[1.0, 0.0, 0.0, 0.0]).unwrap().len(), 3);
+    }
+
+    #[test]
+    fn quadratic_does_not_cancel() {
+        let found = roots(&[1.0, -1e8, 1.0]).unwrap();
+        assert!((found[1].re - 1e-8).abs() < 1e-22);
+    }
+
+    #[test]
+    fn product_and_value() {
+        assert_eq!(product(&[1.0, -0.5], &[1.0, 2.0, 3.0]), vec![1.0, 1.5, 2.0, -1.5]);
+        assert!(product(&[], &[1.0]).is_empty());
+        assert!((value(&[1.0, 2.0, 3.0], c(2.0, 0.0)) - 17.0).norm() < 1e-12);
+    }
+}

@@ -1,0 +1,306 @@
+//! An evenly sampled record of a person at work.
+//!
+//! A [`Record`] holds the input of the person (the tracking error e), the output (the control u) and any other channel that
+//! was measured or simulated with them. It is checked when it is made: all channels have the same length and every sample is
+//! finite, so that nothing behind it has to look again.
+
+use crate::{ModelError, SampleTime};
+
+/// One named signal of a record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    /// Name, as in the column of a file.
+    pub name: String,
+    /// Unit as text, empty when unknown.
+    pub unit: String,
+    /// One value a sample.
+    pub values: Vec<f64>,
+}
+
+impl Channel {
+    /// A channel with a unit.
+    pub fn new(name: impl Into<String>, unit: impl Into<String>, values: Vec<f64>) -> Self {
+        Self {
+            name: name.into(),
+            unit: unit.into(),
+            values,
+        }
+    }
+}
+
+/// What to take out of input and output before a fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Detrend {
+    /// Nothing: the data as they are.
+    #[default]
+    None,
+    /// The mean of each channel.
+    Mean,
+    /// The straight line of least squares of each channel.
+    Linear,
+}
+
+/// Evenly sampled input e, output u and further channels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    label: String,
+    sample_time: SampleTime,
+    start_s: f64,
+    input: Channel,
+    output: Channel,
+    others: Vec<Channel>,
+}
+
+impl Record {
+    /// A record of the input (tracking error) and the output (control), both with one value a sample.
+    ///
+    /// # Errors
+    /// [`ModelError::EmptyRecord`], [`ModelError::LengthMismatch`], [`ModelError::NotFinite`].
+    pub fn new(sample_time: SampleTime, input: Channel, output: Channel) -> Result<Self, ModelError> {
+        if input.values.is_empty() {
+            return Err(ModelError::EmptyRecord {
+                label: String::from("(unnamed)"),
+            });
+        }
+        check_finite(&input)?;
+        let record = Self {
+            label: String::new(),
+            sample_time,
+            start_s: 0.0,
+            input,
+            output: Channel::new("", "", Vec::new()),
+            others: Vec::new(),
+        };
+        record.check(&output)?;
+        Ok(Self { output, ..record })
+    }
+
+    /// The same record with a name for messages and reports.
+    pub fn labelled(mut self, label: impl Into<String>) -> Self {
+        self.label = label.into();
+        self
+    }
+
+    /// The same record with the time of its first sample in s.
+    pub fn starting_at(mut self, start_s: f64) -> Self {
+        self.start_s = start_s;
+        self
+    }
+
+    /// The same record with one more channel.
+    ///
+    /// # Errors
+    /// [`ModelError::DuplicateChannel`], [`ModelError::LengthMismatch`], [`ModelError::NotFinite`].
+    pub fn with_channel(mut self, channel: Channel) -> Result<Self, ModelError> {
+        self.check(&channel)?;
+        self.others.push(channel);
+        Ok(self)
+    }
+
+    fn check(&self, channel: &Channel) -> Result<(), ModelError> {
+        if self.channels().any(|known| known.name == channel.name) {
+            return Err(ModelError::DuplicateChannel {
+                name: channel.name.clone(),
+            });
+        }
+        if channel.values.len() != self.len() {
+            return Err(ModelError::LengthMismatch {
+                channel: channel.name.clone(),
+                found: channel.values.len(),
+                expected: self.len(),
+                reference: self.input.name.clone(),
+            });
+        }
+        check_finite(channel)
+    }
+
+    /// Name for messages and reports.
+    pub fn label(&self) -> &str {
+        &self.label
+    }
+
+    /// Time between two samples.
+    pub fn sample_time(&self) -> SampleTime {
+        self.sample_time
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.input.values.len()
+    }
+
+    /// Never true: a record without samples cannot be made.
+    pub fn is_empty(&self) -> bool {
+        self.input.values.is_empty()
+    }
+
+    /// Time of sample `k` in s.
+    pub fn time_s(&self, k: usize) -> f64 {
+        // From the index, not by summing up: no rounding error grows along the record.
+        self.start_s + k as f64 * self.sample_time.s()
+    }
+
+    /// Times of all samples in s.
+    pub fn times_s(&self) -> Vec<f64> {
+        (0..self.len()).map(|k| self.time_s(k)).collect()
+    }
+
+    /// Input e, one value a sample.
+    pub fn input(&self) -> &[f64] {
+        &self.input.values
+    }
+
+    /// Output u, one value a sample.
+    pub fn output(&self) -> &[f64] {
+        &self.output.values
+    }
+
+    /// The input with its name and unit.
+    pub fn input_channel(&self) -> &Channel {
+        &self.input
+    }
+
+    /// The output with its name and unit.
+    pub fn output_channel(&self) -> &Channel {
+        &self.output
+    }
+
+    /// All channels: input, output, then the others in the order in which they were added.
+    pub fn channels(&self) -> impl Iterator<Item = &Channel> {
+        [&self.input, &self.output].into_iter().chain(&self.others)
+    }
+
+    /// The values of a channel by its name.
+    pub fn channel(&self, name: &str) -> Option<&[f64]> {
+        self.channels().find(|c| c.name == name).map(|c| c.values.as_slice())
+    }
+
+    /// The samples with `from_s <= t < to_s`.
+    ///
+    /// # Errors
+    /// [`ModelError::EmptySpan`] when there are none.
+    pub fn span(&self, from_s: f64, to_s: f64) -> Result<Self, ModelError> {
+        let ts = self.sample_time.s();
+        // A bound that falls on a sample, up to rounding, takes that sample.
+        let index = |time_s: f64| ((time_s - self.start_s) / ts - 1e-6).ceil().max(0.0) as usize;
+        let (first, end) = (index(from_s), index(to_s).min(self.len()));
+        if from_s.is_nan() || to_s.is_nan() || first >= end {
+            return Err(ModelError::EmptySpan {
+                from_s,
+                to_s,
+                start_s: self.start_s,
+                end_s: self.time_s(self.len() - 1),
+            });
+        }
+        let cut = |c: &Channel| Channel::new(c.name.clone(), c.unit.clone(), c.values[first..end].to_vec());
+        Ok(Self {
+            label: self.label.clone(),
+            sample_time: self.sample_time,
+            start_s: self.time_s(first),
+            input: cut(&self.input),
+            output: cut(&self.output),
+            others: self.others.iter().map(cut).collect(),
+        })
+    }
+
+    /// The same record with the mean or the line taken out of input and output; other channels stay as they are.
+    pub fn detrended(mut self, how: Detrend) -> Self {
+        for channel in [&mut self.input, &mut self.output] {
+            take_out(how, &mut channel.values);
+        }
+        self
+    }
+}
+
+fn check_finite(channel: &Channel) -> Result<(), ModelError> {
+    match channel.values.iter().position(|v| !v.is_finite()) {
+        None => Ok(()),
+        Some(index) => Err(ModelError::NotFinite {
+            channel: channel.name.clone(),
+            index,
+            value: channel.values[index],
+        }),
+    }
+}
+
+fn take_out(how: Detrend, values: &mut [f64]) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let centre = (n - 1.0) / 2.0;
+    let slope = match how {
+        Detrend::None => return,
+        Detrend::Mean => 0.0,
+        Detrend::Linear if values.len() < 2 => 0.0,
+        Detrend::Linear => {
+            let moment: f64 = values.iter().enumerate().map(|(k, v)| (k as f64 - centre) * v).sum();
+            moment / (n * (n * n - 1.0) / 12.0)
+        }
+    };
+    for (k, value) in values.iter_mut().enumerate() {
+        *value -= mean + slope * (k as f64 - centre);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn channel(name: &str, values: &[f64]) -> Channel {
+        Channel::new(name, "deg", values.to_vec())
+    }
+
+    fn record(e: &[f64], u: &[f64]) -> Result<Record, ModelError> {
+        Record::new(SampleTime::new(0.01)?, channel("e", e), channel("u", u))
+    }
+
+    #[test]
+    fn is_checked_when_made() {
+        assert!(matches!(record(&[], &[]), Err(ModelError::EmptyRecord { .. })));
+        assert!(matches!(
+            record(&[1.0, 2.0], &[1.0]),
+            Err(ModelError::LengthMismatch {
+                found: 1,
+                expected: 2,
+                ..
+            })
+        ));
+        assert!(matches!(
+            record(&[1.0, f64::NAN], &[1.0, 2.0]),
+            Err(ModelError::NotFinite { index: 1, .. })
+        ));
+        let good = record(&[1.0, 2.0], &[1.0, 2.0]).unwrap();
+        assert!(matches!(
+            good.clone().with_channel(channel("u", &[0.0, 0.0])),
+            Err(ModelError::DuplicateChannel { .. })
+        ));
+        assert!(good.with_channel(channel("x", &[0.0, f64::INFINITY])).is_err());
+    }
+
+    #[test]
+    fn span_takes_the_samples_from_start_to_before_the_end() {
+        let values: Vec<f64> = (0..100).map(f64::from).collect();
+        let record = record(&values, &vec![0.0; 100]).unwrap().starting_at(-0.2);
+        let part = record.span(0.0, 0.3).unwrap();
+        assert_eq!(part.len(), 30);
+        assert_eq!(part.input()[0], 20.0);
+        assert!(part.time_s(0).abs() < 1e-12);
+        // 0.29 falls on a sample although 0.29 / 0.01 is not a whole number in floating point.
+        assert_eq!(record.span(0.09, 10.0).unwrap().input()[0], 29.0);
+        assert!(matches!(record.span(0.5, 0.5), Err(ModelError::EmptySpan { .. })));
+        assert!(record.span(9.0, 10.0).is_err());
+        assert!(record.span(f64::NAN, 1.0).is_err());
+    }
+
+    #[test]
+    fn detrending_removes_what_it_says() {
+        let line: Vec<f64> = (0..50).map(|k| 3.0 + 0.5 * f64::from(k)).collect();
+        let flat = vec![2.0; 50];
+        let record = record(&line, &flat).unwrap();
+        let linear = record.clone().detrended(Detrend::Linear);
+        assert!(linear.input().iter().all(|v| v.abs() < 1e-12));
+        let mean = record.clone().detrended(Detrend::Mean);
+        assert!((mean.input().iter().sum::<f64>()).abs() < 1e-10);
+        assert!((mean.input()[0] + 12.25).abs() < 1e-12);
+        assert_eq!(record.clone().detrended(Detrend::None), record);
+    }
+}

@@ -1,0 +1,74 @@
+//! The sample time, checked once.
+
+use crate::ModelError;
+
+/// Time between two samples, Ts in s: positive and finite.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+pub struct SampleTime(f64);
+
+impl SampleTime {
+    /// 0.01 s, the sample time of the reference task.
+    pub const HUNDREDTH: Self = Self(0.01);
+
+    /// A sample time in s.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] unless it is positive and finite.
+    pub fn new(ts_s: f64) -> Result<Self, ModelError> {
+        if ts_s.is_finite() && ts_s > 0.0 {
+            Ok(Self(ts_s))
+        } else {
+            Err(ModelError::OutOfRange {
+                quantity: "sample time Ts in s",
+                found: ts_s,
+                expected: "a positive finite number",
+            })
+        }
+    }
+
+    /// Ts in s.
+    pub fn s(self) -> f64 {
+        self.0
+    }
+
+    /// Half the sampling frequency in rad/s: `pi / Ts`.
+    pub fn nyquist_rad_s(self) -> f64 {
+        std::f64::consts::PI / self.0
+    }
+
+    /// A time in s as a whole number of samples, when it is one within `1e-6` of a sample.
+    ///
+    /// The quotient is rounded, never cut off: `0.29 / 0.01` is `28.999999999999996` in floating point and means 29.
+    pub fn whole_samples(self, time_s: f64) -> Option<usize> {
+        let samples = time_s / self.0;
+        let rounded = samples.round();
+        ((samples - rounded).abs() <= 1e-6 && (0.0..1e15).contains(&rounded)).then_some(rounded as usize)
+    }
+
+    /// True when two sample times are the same up to rounding (1e-6 relative): records with both can be fitted together.
+    pub fn matches(self, other: Self) -> bool {
+        (self.0 - other.0).abs() <= 1e-6 * self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn refuses_what_is_no_time() {
+        for bad in [0.0, -0.01, f64::NAN, f64::INFINITY] {
+            assert!(SampleTime::new(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn delay_is_rounded_and_not_cut() {
+        let ts = SampleTime::new(0.01).unwrap();
+        assert_eq!(ts.whole_samples(0.29), Some(29));
+        assert_eq!(ts.whole_samples(0.28), Some(28));
+        assert_eq!(ts.whole_samples(0.285), None);
+        assert_eq!(ts.whole_samples(-0.01), None);
+        assert_eq!(ts.whole_samples(f64::NAN), None);
+    }
+}

@@ -1,0 +1,430 @@
+//! Scenarios: who controls what, with which noise, and how it changes.
+//!
+//! The reference text's two states of adaptation (Table 2) and its six conditions (Table 4.4) are here as data:
+//!
+//! | condition | operator and controlled element | rate of change G |
+//! |---|---|---|
+//! | C1 | s1 throughout | - |
+//! | C2 | s2 throughout | - |
+//! | C3, C4 | s1 to s2 at 40.96 s | 0.5, 100 1/s |
+//! | C5, C6 | s2 to s1 at 40.96 s | 0.5, 100 1/s |
+//!
+//! The gains, time constants and frequencies of operator and controlled element and the remnant gain K_n follow one sigmoid
+//! (eq. 5); delay and remnant time constant are constant. The remnant gain of each state gives the demanded noise level in
+//! that state (eq. 43 or A.17).
+
+use std::{fmt, str::FromStr};
+
+use crate::{
+    ModelError, OperatorParameters, SampleTime,
+    controlled_element::ControlledElement,
+    forcing::{ForcingFunction, REFERENCE_PERIOD_S},
+    remnant::RemnantFilter,
+    remnant_gain::{NoiseDefinition, remnant_gain},
+    schedule::Schedule,
+};
+
+/// A state of adaptation: the operator and what he controls.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OperatingState {
+    /// The operator.
+    pub operator: OperatorParameters,
+    /// The controlled element.
+    pub controlled_element: ControlledElement,
+}
+
+impl OperatingState {
+    /// State s1 of Table 2: nearly a single integrator, crossover 1.56 rad/s.
+    pub fn s1() -> Self {
+        Self {
+            operator: OperatorParameters {
+                k_e: 0.09,
+                t_l_s: 0.4,
+                omega_nm_rad_s: 11.25,
+                zeta_nm: 0.35,
+                tau_e_s: 0.28,
+            },
+            controlled_element: ControlledElement {
+                k_c: 90.0,
+                omega_b_rad_s: 6.0,
+            },
+        }
+    }
+
+    /// State s2 of Table 2: nearly a double integrator, crossover 2.75 rad/s.
+    pub fn s2() -> Self {
+        let s1 = Self::s1();
+        Self {
+            operator: OperatorParameters {
+                k_e: 0.07,
+                t_l_s: 1.2,
+                ..s1.operator
+            },
+            controlled_element: ControlledElement {
+                k_c: 30.0,
+                omega_b_rad_s: 0.2,
+            },
+        }
+    }
+}
+
+/// The conditions of the reference text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[allow(missing_docs)]
+pub enum Condition {
+    C1,
+    C2,
+    C3,
+    C4,
+    C5,
+    C6,
+}
+
+impl Condition {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::C1, Self::C2, Self::C3, Self::C4, Self::C5, Self::C6];
+}
+
+impl fmt::Display for Condition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{self:?}")
+    }
+}
+
+impl FromStr for Condition {
+    type Err = ModelError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Self::ALL
+            .into_iter()
+            .find(|c| c.to_string().eq_ignore_ascii_case(text))
+            .ok_or_else(|| ModelError::UnknownName {
+                quantity: "condition",
+                found: text.to_owned(),
+                expected: "C1, C2, C3, C4, C5 or C6",
+            })
+    }
+}
+
+/// How strong the remnant is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RemnantStrength {
+    /// The gain that gives this noise level in each state.
+    Level {
+        /// Noise level P_n.
+        level: f64,
+        /// What P_n is a ratio of.
+        definition: NoiseDefinition,
+    },
+    /// The gain K_n itself, before and after the change.
+    Gain {
+        /// K_n of the initial state.
+        initial: f64,
+        /// K_n of the last state.
+        last: f64,
+    },
+}
+
+/// The remnant of the operator.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RemnantSetting {
+    /// Order m of the filter, 1 to 4.
+    pub order: usize,
+    /// Time constant T_n, s.
+    pub time_constant_s: f64,
+    /// How strong it is.
+    pub strength: RemnantStrength,
+}
+
+impl Default for RemnantSetting {
+    /// First order, T_n = 0.06 s, noise level 0.1 of the control variance.
+    fn default() -> Self {
+        Self {
+            order: 1,
+            time_constant_s: 0.06,
+            strength: RemnantStrength::Level {
+                level: 0.1,
+                definition: NoiseDefinition::Response,
+            },
+        }
+    }
+}
+
+/// Where K_c stands in the state-space form of the controlled element.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Realisation {
+    /// In the input matrix: the output x is continuous when K_c jumps.
+    #[default]
+    Input,
+    /// In the output matrix, as the controllable canonical form of the reference text has it: x jumps when K_c jumps.
+    Output,
+}
+
+/// One task: operator, controlled element, remnant, forcing function and change over time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scenario {
+    /// Name for tables and file names.
+    pub name: String,
+    /// State before the change.
+    pub initial: OperatingState,
+    /// State after the change.
+    pub last: OperatingState,
+    /// The change.
+    pub schedule: Schedule,
+    /// Target signal.
+    pub forcing: ForcingFunction,
+    /// Remnant.
+    pub remnant: RemnantSetting,
+    /// Time between two samples. Default 0.01 s.
+    pub sample_time: SampleTime,
+    /// Measurement time T_m, s. Default 81.92 s.
+    pub measurement_s: f64,
+    /// Run-in t_0 before the measurement, s. Default 10 s.
+    pub run_in_s: f64,
+    /// Realisation of the controlled element.
+    pub realisation: Realisation,
+}
+
+/// The parameters that are in force at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrueParameters {
+    /// Operator.
+    pub operator: OperatorParameters,
+    /// Controlled element.
+    pub controlled_element: ControlledElement,
+    /// Remnant gain K_n.
+    pub k_n: f64,
+    /// Remnant time constant T_n, s.
+    pub t_n_s: f64,
+}
+
+/// A scenario that has been checked, with everything computed once that a simulation needs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResolvedScenario {
+    scenario: Scenario,
+    k_n: [f64; 2],
+    delay_samples: usize,
+    run_in_samples: usize,
+    measurement_samples: usize,
+}
+
+impl Scenario {
+    /// A condition of the reference text with the default remnant.
+    pub fn condition(condition: Condition) -> Self {
+        let (s1, s2) = (OperatingState::s1(), OperatingState::s2());
+        let (initial, last, rate) = match condition {
+            Condition::C1 => (s1, s1, None),
+            Condition::C2 => (s2, s2, None),
+            Condition::C3 => (s1, s2, Some(0.5)),
+            Condition::C4 => (s1, s2, Some(100.0)),
+            Condition::C5 => (s2, s1, Some(0.5)),
+            Condition::C6 => (s2, s1, Some(100.0)),
+        };
+        Self {
+            name: condition.to_string(),
+            initial,
+            last,
+            schedule: rate.map_or(Schedule::Constant, |rate_per_s| Schedule::Sigmoid {
+                rate_per_s,
+                midpoint_s: REFERENCE_PERIOD_S / 2.0,
+            }),
+            forcing: ForcingFunction::reference(),
+            remnant: RemnantSetting::default(),
+            // 0.01 is a sample time.
+            sample_time: SampleTime::HUNDREDTH,
+            measurement_s: REFERENCE_PERIOD_S,
+            run_in_s: 10.0,
+            realisation: Realisation::default(),
+        }
+    }
+
+    /// Remnant gain of a state: the given one, or the one that gives the demanded noise level.
+    ///
+    /// # Errors
+    /// As [`remnant_gain`].
+    pub fn remnant_gain_of(&self, state: &OperatingState, given: f64) -> Result<f64, ModelError> {
+        let RemnantStrength::Level { level, definition } = self.remnant.strength else {
+            return Ok(given);
+        };
+        remnant_gain(
+            level,
+            definition,
+            self.remnant.order,
+            self.remnant.time_constant_s,
+            &state.operator.transfer_function()?,
+            &state.controlled_element.transfer_function()?,
+            &self.forcing.lines(),
+            self.sample_time,
+        )
+    }
+
+    /// Checks the scenario and computes what a simulation needs.
+    ///
+    /// # Errors
+    /// [`ModelError`] that names the parameter.
+    pub fn resolve(&self) -> Result<ResolvedScenario, ModelError> {
+        self.schedule.check()?;
+        let samples = |quantity: &'static str, time_s: f64| {
+            self.sample_time.whole_samples(time_s).ok_or(ModelError::OutOfRange {
+                quantity,
+                found: time_s,
+                expected: "zero or more, and a whole number of samples",
+            })
+        };
+        let measurement_samples = samples("measurement time T_m in s", self.measurement_s)?;
+        if measurement_samples == 0 {
+            return Err(ModelError::OutOfRange {
+                quantity: "measurement time T_m in s",
+                found: self.measurement_s,
+                expected: "at least one sample",
+            });
+        }
+        let run_in_samples = samples("run-in time t_0 in s", self.run_in_s)?;
+        if self.initial.operator.tau_e_s != self.last.operator.tau_e_s {
+            return Err(ModelError::OutOfRange {
+                quantity: "delay tau_e of the last state in s",
+                found: self.last.operator.tau_e_s,
+                expected: "the delay of the initial state: it does not change during a run",
+            });
+        }
+        let mut delay_samples = 0;
+        for state in [&self.initial, &self.last] {
+            let discrete = state.operator.discretise(self.sample_time)?;
+            delay_samples = discrete.nk - 1;
+            state.controlled_element.check()?;
+        }
+        let given = match self.remnant.strength {
+            RemnantStrength::Gain { initial, last } => [initial, last],
+            RemnantStrength::Level { .. } => [0.0; 2],
+        };
+        let k_n = [
+            self.remnant_gain_of(&self.initial, given[0])?,
+            self.remnant_gain_of(&self.last, given[1])?,
+        ];
+        for gain in k_n {
+            RemnantFilter::new(gain, self.remnant.time_constant_s, self.remnant.order)?;
+        }
+        Ok(ResolvedScenario {
+            scenario: self.clone(),
+            k_n,
+            delay_samples,
+            run_in_samples,
+            measurement_samples,
+        })
+    }
+}
+
+impl ResolvedScenario {
+    /// The scenario as it was described.
+    pub fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// Operator delay tau_e in samples.
+    pub fn delay_samples(&self) -> usize {
+        self.delay_samples
+    }
+
+    /// Samples before t = 0.
+    pub fn run_in_samples(&self) -> usize {
+        self.run_in_samples
+    }
+
+    /// Samples of the measurement.
+    pub fn measurement_samples(&self) -> usize {
+        self.measurement_samples
+    }
+
+    /// The parameters at time `t_s`; t = 0 is the start of the measurement.
+    pub fn parameters_at(&self, t_s: f64) -> TrueParameters {
+        let Scenario {
+            initial,
+            last,
+            schedule,
+            remnant,
+            ..
+        } = &self.scenario;
+        let between = |a: f64, b: f64| schedule.value(a, b, t_s);
+        let (a, b) = (&initial.operator, &last.operator);
+        let (c, d) = (&initial.controlled_element, &last.controlled_element);
+        TrueParameters {
+            operator: OperatorParameters {
+                k_e: between(a.k_e, b.k_e),
+                t_l_s: between(a.t_l_s, b.t_l_s),
+                omega_nm_rad_s: between(a.omega_nm_rad_s, b.omega_nm_rad_s),
+                zeta_nm: between(a.zeta_nm, b.zeta_nm),
+                tau_e_s: a.tau_e_s,
+            },
+            controlled_element: ControlledElement {
+                k_c: between(c.k_c, d.k_c),
+                omega_b_rad_s: between(c.omega_b_rad_s, d.omega_b_rad_s),
+            },
+            k_n: between(self.k_n[0], self.k_n[1]),
+            t_n_s: remnant.time_constant_s,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn conditions_go_where_the_table_says() {
+        let gain = |c: Condition, t: f64| Scenario::condition(c).resolve().unwrap().parameters_at(t).operator.k_e;
+        for (condition, start, end) in [
+            (Condition::C1, 0.09, 0.09),
+            (Condition::C2, 0.07, 0.07),
+            (Condition::C3, 0.09, 0.07),
+            (Condition::C4, 0.09, 0.07),
+            (Condition::C5, 0.07, 0.09),
+            (Condition::C6, 0.07, 0.09),
+        ] {
+            // The slow sigmoid is e^-20 away from its ends.
+            assert!((gain(condition, 0.0) - start).abs() < 1e-9, "{condition}");
+            assert!((gain(condition, 81.92) - end).abs() < 1e-9, "{condition}");
+            assert_eq!(condition.to_string().parse::<Condition>().unwrap(), condition);
+        }
+        assert_eq!("c4".parse::<Condition>().unwrap(), Condition::C4);
+        assert!("C7".parse::<Condition>().is_err());
+    }
+
+    #[test]
+    fn each_state_has_the_gain_of_its_noise_level() {
+        // Expected values: K_n for m = 1, P_n = 0.1 in s1 and s2.
+        let c4 = Scenario::condition(Condition::C4).resolve().unwrap();
+        assert!((c4.parameters_at(0.0).k_n - 0.07636).abs() < 5e-6);
+        assert!((c4.parameters_at(81.92).k_n - 0.13971).abs() < 5e-6);
+        assert_eq!(
+            (c4.delay_samples(), c4.run_in_samples(), c4.measurement_samples()),
+            (28, 1000, 8192)
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_simulated_is_refused() {
+        let refused = |change: fn(&mut Scenario)| {
+            let mut scenario = Scenario::condition(Condition::C4);
+            change(&mut scenario);
+            scenario.resolve().unwrap_err().to_string()
+        };
+        assert!(refused(|s| s.measurement_s = 0.0).contains("T_m"));
+        assert!(refused(|s| s.measurement_s = f64::NAN).contains("T_m"));
+        assert!(refused(|s| s.run_in_s = -1.0).contains("t_0"));
+        assert!(refused(|s| s.initial.operator.tau_e_s = 0.285).contains("tau_e"));
+        assert!(refused(|s| s.last.operator.tau_e_s = 0.2).contains("tau_e"));
+        assert!(refused(|s| s.initial.operator.omega_nm_rad_s = 0.0).contains("omega_nm"));
+        assert!(refused(|s| s.remnant.order = 5).contains("order"));
+        assert!(refused(|s| s.remnant.time_constant_s = 0.0).contains("T_n"));
+        assert!(
+            refused(|s| {
+                s.remnant.strength = RemnantStrength::Gain {
+                    initial: f64::NAN,
+                    last: 0.1,
+                };
+            })
+            .contains("K_n")
+        );
+        assert!(refused(|s| s.last.controlled_element.k_c = f64::INFINITY).contains("K_c"));
+    }
+}

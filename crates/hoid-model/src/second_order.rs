@@ -1,0 +1,510 @@
+//! Exact zero-order hold of second-order systems, both ways.
+//!
+//! The continuous system `(b0 s + b1) / (s^2 + a1 s + a2)` (eq. 12) driven by an input that is held over each sample Ts is,
+//! at the samples, `(b0 + b1 q^-1) q^-1 / (1 + f1 q^-1 + f2 q^-2)` exactly. With the poles `p1, p2` of the continuous system,
+//! `z_i = p_i Ts`, `s = z1 + z2 = -a1 Ts` and `q = z1 z2 = a2 Ts^2`:
+//!
+//! - `f1 = -(e^z1 + e^z2)`, `f2 = e^s`;
+//! - the impulse response of `1/(s^2 + a1 s + a2)` at Ts is `Ts phi1`, its step response `Ts^2 phi2`, with the divided
+//!   differences of the exponential `phi1 = exp[z1, z2]` and `phi2 = exp[0, z1, z2]`;
+//! - `b0_d = b0 Ts phi1 + b1 Ts^2 phi2` is the step response after one sample, and the gain at zero frequency gives
+//!   `b0_d + b1_d = b1 Ts^2 chi`, `chi = (1 + f1 + f2) / q = exp[0, z1] exp[0, z2]`.
+//!
+//! All of these are symmetric in the poles and entire in (s, q): complex, real, double poles and poles at the origin of s are
+//! the same formulas, only evaluated in different ways so that nothing cancels. This replaces the matrix exponential and
+//! logarithm of the extended matrix (eq. B.7); it gives the same numbers.
+//! The inverse exists when no pole in z lies on the closed negative real axis (then the logarithm is the principal one).
+//! Source: N. J. Higham, *Functions of Matrices*, 2008, sections 2.4 and B.16 (divided differences); eq. B.3-B.10 of the reference text.
+
+use num_complex::Complex64;
+
+use crate::{ModelError, NotConvertible, SampleTime};
+
+/// `(b0 s + b1) / (s^2 + a1 s + a2)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SecondOrder {
+    /// Coefficient of s in the numerator.
+    pub b0: f64,
+    /// Constant coefficient of the numerator.
+    pub b1: f64,
+    /// Coefficient of s in the denominator.
+    pub a1: f64,
+    /// Constant coefficient of the denominator.
+    pub a2: f64,
+}
+
+/// `(b0 + b1 q^-1) q^-1 / (1 + f1 q^-1 + f2 q^-2)`: a second-order system behind a zero-order hold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeldSecondOrder {
+    /// First coefficient of B.
+    pub b0: f64,
+    /// Second coefficient of B.
+    pub b1: f64,
+    /// First coefficient of F.
+    pub f1: f64,
+    /// Second coefficient of F.
+    pub f2: f64,
+}
+
+impl SecondOrder {
+    /// The exact discrete model for an input held over each sample.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] when the result is not finite (an unstable pole so fast that its exponential overflows, or
+    /// a coefficient that is not a finite number).
+    pub fn hold(self, sample_time: SampleTime) -> Result<HeldSecondOrder, ModelError> {
+        let ts = sample_time.s();
+        let poles = PolePair::from_sum_and_product(-self.a1 * ts, self.a2 * ts * ts);
+        let b0 = self.b0 * ts * poles.phi1() + self.b1 * ts * ts * poles.phi2();
+        let held = HeldSecondOrder {
+            b0,
+            b1: self.b1 * ts * ts * poles.chi() - b0,
+            f1: -poles.sum_of_exponentials(),
+            f2: poles.sum.exp(),
+        };
+        for (quantity, found) in [("b0", held.b0), ("b1", held.b1), ("f1", held.f1), ("f2", held.f2)] {
+            if !found.is_finite() {
+                return Err(ModelError::OutOfRange {
+                    quantity,
+                    found,
+                    expected: "a finite number; check the poles against the sample time",
+                });
+            }
+        }
+        Ok(held)
+    }
+}
+
+impl HeldSecondOrder {
+    /// The continuous system that has this exact discrete model.
+    ///
+    /// # Errors
+    /// [`NotConvertible::NegativeRealPole`], [`NotConvertible::NotFinite`].
+    pub fn unhold(self, sample_time: SampleTime) -> Result<SecondOrder, NotConvertible> {
+        for (name, value) in [("f1", self.f1), ("f2", self.f2), ("b0", self.b0), ("b1", self.b1)] {
+            if !value.is_finite() {
+                return Err(NotConvertible::NotFinite {
+                    name: name.to_owned(),
+                    value,
+                });
+            }
+        }
+        let ts = sample_time.s();
+        let poles = PolePair::from_discrete(self.f1, self.f2)?;
+        let b1 = (self.b0 + self.b1) / (ts * ts * poles.chi());
+        let b0 = (self.b0 - b1 * ts * ts * poles.phi2()) / (ts * poles.phi1());
+        Ok(SecondOrder {
+            b0,
+            b1,
+            a1: -poles.sum / ts,
+            a2: poles.product / (ts * ts),
+        })
+    }
+}
+
+/// The state space of `1/(s^2 + a1 s + a2)` in controllable canonical form (output and its rate) over one sample of held input:
+/// `x(t + Ts) = transition x(t) + input u(t)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeldStates {
+    /// `e^{A Ts}` by rows.
+    pub transition: [[f64; 2]; 2],
+    /// `integral of e^{A s} B ds` over one sample.
+    pub input: [f64; 2],
+}
+
+impl HeldStates {
+    /// With `h = Ts phi1` and `g = Ts^2 phi2`: transition `[[1 - a2 g, h], [-a2 h, 1 - a2 g - a1 h]]`, input `[g, h]`.
+    pub fn new(a1: f64, a2: f64, sample_time: SampleTime) -> Self {
+        let ts = sample_time.s();
+        let poles = PolePair::from_sum_and_product(-a1 * ts, a2 * ts * ts);
+        let (h, g) = (ts * poles.phi1(), ts * ts * poles.phi2());
+        let kept = 1.0 - a2 * g;
+        Self {
+            transition: [[kept, h], [-a2 * h, kept - a1 * h]],
+            input: [g, h],
+        }
+    }
+
+    /// One sample on.
+    #[inline]
+    pub fn step(&self, x: [f64; 2], u: f64) -> [f64; 2] {
+        let [[a, b], [c, d]] = self.transition;
+        [
+            a * x[0] + b * x[1] + self.input[0] * u,
+            c * x[0] + d * x[1] + self.input[1] * u,
+        ]
+    }
+}
+
+/// Direct feedthrough beside the strictly proper part: `d + (b0 s + b1)/(s^2 + a1 s + a2)`, numerator and denominator by
+/// descending powers.
+///
+/// The held system has the numerator `d + (d f1 + b0_d) q^-1 + (d f2 + b1_d) q^-2`.
+///
+/// # Errors
+/// As [`SecondOrder::hold`]; [`ModelError::TransferFunction`] when the leading coefficient of `den` is zero.
+pub fn hold_biproper(
+    num: [f64; 3],
+    den: [f64; 3],
+    sample_time: SampleTime,
+) -> Result<([f64; 3], [f64; 2]), ModelError> {
+    if den[0] == 0.0 {
+        return Err(ModelError::TransferFunction {
+            found: format!("{num:?} / {den:?}"),
+            expected: "a denominator of second order, with a leading coefficient that is not zero".to_owned(),
+        });
+    }
+    let [d, n1, n2] = num.map(|c| c / den[0]);
+    let (a1, a2) = (den[1] / den[0], den[2] / den[0]);
+    let proper = SecondOrder {
+        b0: n1 - d * a1,
+        b1: n2 - d * a2,
+        a1,
+        a2,
+    };
+    let held = proper.hold(sample_time)?;
+    Ok(([d, d * held.f1 + held.b0, d * held.f2 + held.b1], [held.f1, held.f2]))
+}
+
+/// The inverse of [`hold_biproper`]: numerator and monic denominator by descending powers of s.
+///
+/// # Errors
+/// As [`HeldSecondOrder::unhold`].
+pub fn unhold_biproper(
+    num: [f64; 3],
+    f: [f64; 2],
+    sample_time: SampleTime,
+) -> Result<([f64; 3], [f64; 3]), NotConvertible> {
+    let d = num[0];
+    let held = HeldSecondOrder {
+        b0: num[1] - d * f[0],
+        b1: num[2] - d * f[1],
+        f1: f[0],
+        f2: f[1],
+    };
+    let proper = held.unhold(sample_time)?;
+    Ok((
+        [d, proper.b0 + d * proper.a1, proper.b1 + d * proper.a2],
+        [1.0, proper.a1, proper.a2],
+    ))
+}
+
+/// Two poles times Ts: their sum, product, and the values themselves.
+#[derive(Debug, Clone, Copy)]
+struct PolePair {
+    sum: f64,
+    product: f64,
+    poles: Poles,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Poles {
+    /// The one nearer to zero first.
+    Real(f64, f64),
+    /// Real and (positive) imaginary part.
+    Complex(f64, f64),
+}
+
+impl PolePair {
+    fn from_sum_and_product(sum: f64, product: f64) -> Self {
+        let half = sum / 2.0;
+        let x = half * half - product;
+        let poles = if x < 0.0 {
+            Poles::Complex(half, (-x).sqrt())
+        } else {
+            let far = half + x.sqrt().copysign(half);
+            // The near pole from the product: the difference of half and root would cancel.
+            let near = if far == 0.0 { 0.0 } else { product / far };
+            Poles::Real(near, far)
+        };
+        Self { sum, product, poles }
+    }
+
+    /// Poles of `1 + f1 q^-1 + f2 q^-2`, taken back through the principal logarithm.
+    fn from_discrete(f1: f64, f2: f64) -> Result<Self, NotConvertible> {
+        let half = -f1 / 2.0;
+        let x = half * half - f2;
+        if x < 0.0 {
+            let beta = (-x).sqrt().atan2(half);
+            let alpha = f2.ln() / 2.0;
+            return Ok(Self {
+                sum: 2.0 * alpha,
+                product: alpha * alpha + beta * beta,
+                poles: Poles::Complex(alpha, beta),
+            });
+        }
+        let outer = half + x.sqrt().copysign(half);
+        let inner = if outer == 0.0 { 0.0 } else { f2 / outer };
+        let lowest = outer.min(inner);
+        if lowest <= 0.0 {
+            return Err(NotConvertible::NegativeRealPole { pole: lowest });
+        }
+        // A pole near z = 1 is a pole near the origin of s: its distance from 1 follows from the value of the polynomial at
+        // 1, which the coefficients give more accurately than the difference of the roots.
+        let at_one = 1.0 + f1 + f2;
+        let (far_z, near_z) = if (outer - 1.0).abs() > (inner - 1.0).abs() {
+            (outer, inner)
+        } else {
+            (inner, outer)
+        };
+        let near = if far_z == 1.0 || (near_z - 1.0).abs() > 0.1 {
+            near_z.ln()
+        } else {
+            (-at_one / (1.0 - far_z)).ln_1p()
+        };
+        let far = far_z.ln();
+        let pair = Self {
+            sum: f2.ln(),
+            product: near * far,
+            poles: Poles::Real(near, far),
+        };
+        Ok(pair)
+    }
+
+    fn sum_of_exponentials(self) -> f64 {
+        match self.poles {
+            Poles::Real(a, b) => a.exp() + b.exp(),
+            Poles::Complex(alpha, beta) => 2.0 * alpha.exp() * beta.cos(),
+        }
+    }
+
+    /// `exp[z1, z2]`.
+    fn phi1(self) -> f64 {
+        match self.poles {
+            Poles::Real(a, b) => a.min(b).exp() * expm1_ratio((a - b).abs()),
+            Poles::Complex(alpha, beta) => alpha.exp() * sin_ratio(beta),
+        }
+    }
+
+    /// `exp[0, z1] exp[0, z2]`.
+    fn chi(self) -> f64 {
+        match self.poles {
+            Poles::Real(a, b) => expm1_ratio(a) * expm1_ratio(b),
+            Poles::Complex(alpha, beta) => expm1_ratio_complex(Complex64::new(alpha, beta)).norm_sqr(),
+        }
+    }
+
+    /// `exp[0, z1, z2]`.
+    fn phi2(self) -> f64 {
+        let largest = match self.poles {
+            Poles::Real(a, b) => a.abs().max(b.abs()),
+            Poles::Complex(..) => self.product.sqrt(),
+        };
+        if largest <= 1.0 {
+            return self.phi2_by_series();
+        }
+        match self.poles {
+            Poles::Real(a, b) if (a - b).abs() > 0.5 => (expm1_ratio(b) - expm1_ratio(a)) / (b - a),
+            // Here |q| >= 1/4: the step response in closed form does not cancel.
+            Poles::Real(a, b) => {
+                let half = self.sum / 2.0;
+                let mean = 0.5 * (a.exp() + b.exp());
+                (1.0 - mean + half * self.phi1()) / self.product
+            }
+            Poles::Complex(alpha, beta) => (1.0 - alpha.exp() * (beta.cos() - alpha * sin_ratio(beta))) / self.product,
+        }
+    }
+
+    /// `sum over k of h_k / (k+2)!` with the complete symmetric polynomials `h_k = s h_{k-1} - q h_{k-2}`; for |z| <= 1 the
+    /// terms fall faster than `(k+1)/(k+2)!`.
+    fn phi2_by_series(self) -> f64 {
+        let (mut h, mut h_before, mut factorial, mut total) = (1.0, 0.0, 2.0, 0.0);
+        for k in 0..24 {
+            total += h / factorial;
+            (h, h_before) = (self.sum * h - self.product * h_before, h);
+            factorial *= f64::from(k + 3);
+        }
+        total
+    }
+}
+
+/// `(e^x - 1)/x`.
+fn expm1_ratio(x: f64) -> f64 {
+    if x.abs() < 1e-8 { 1.0 + x / 2.0 } else { x.exp_m1() / x }
+}
+
+/// `sin(x)/x`.
+fn sin_ratio(x: f64) -> f64 {
+    if x.abs() < 1e-4 { 1.0 - x * x / 6.0 } else { x.sin() / x }
+}
+
+/// `(e^z - 1)/z` for complex z.
+fn expm1_ratio_complex(z: Complex64) -> Complex64 {
+    if z.norm() < 1e-8 {
+        return 1.0 + z / 2.0;
+    }
+    let half_sine = (z.im / 2.0).sin();
+    let re = z.re.exp_m1() * z.im.cos() - 2.0 * half_sine * half_sine;
+    Complex64::new(re, z.re.exp() * z.im.sin()) / z
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+
+    fn ts() -> SampleTime {
+        SampleTime::new(0.01).unwrap()
+    }
+
+    fn with_poles(p1: Complex64, p2: Complex64) -> SecondOrder {
+        SecondOrder {
+            b0: 1.3,
+            b1: -2.1,
+            a1: -(p1 + p2).re,
+            a2: (p1 * p2).re,
+        }
+    }
+
+    /// Complex, real, nearly equal, double, at the origin, near the origin, unstable, fast.
+    fn cases() -> Vec<SecondOrder> {
+        let c = Complex64::new;
+        let r = |a: f64, b: f64| (c(a, 0.0), c(b, 0.0));
+        let pair = |re: f64, im: f64| (c(re, im), c(re, -im));
+        [
+            pair(-3.9, 10.5),
+            pair(-3.9, 1e-4),
+            pair(-80.0, 250.0),
+            pair(-0.001, 300.0),
+            pair(0.0, 5.0),
+            r(-4.0, -7.0),
+            r(-4.0, -4.0),
+            r(-4.0, -4.000_001),
+            r(-120.0, -119.9),
+            r(-150.0, -150.0),
+            r(0.0, -6.0),
+            r(0.0, 0.0),
+            r(-1e-7, -6.0),
+            r(-1e-7, -400.0),
+            r(1.5, -3.0),
+            r(2.0, 3.0),
+            r(-900.0, -2.0),
+        ]
+        .into_iter()
+        .map(|(a, b)| with_poles(a, b))
+        .collect()
+    }
+
+    /// The extended-matrix exponential of eq. B.7, forward.
+    fn by_matrix_exponential(c: SecondOrder, ts: f64) -> HeldSecondOrder {
+        let m = DMatrix::from_row_slice(3, 3, &[0.0, 1.0, 0.0, -c.a2, -c.a1, 1.0, 0.0, 0.0, 0.0]) * ts;
+        let e = m.exp();
+        let (a, b) = (e.view((0, 0), (2, 2)).into_owned(), e.view((0, 2), (2, 1)).into_owned());
+        let row = DMatrix::from_row_slice(1, 2, &[c.b1, c.b0]);
+        let f1 = -a.trace();
+        let first = (&row * &b)[(0, 0)];
+        let second = (&row * &a * &b)[(0, 0)];
+        HeldSecondOrder {
+            b0: first,
+            b1: second + f1 * first,
+            f1,
+            f2: a[(0, 0)] * a[(1, 1)] - a[(0, 1)] * a[(1, 0)],
+        }
+    }
+
+    #[test]
+    fn agrees_with_the_matrix_exponential_for_all_pole_cases() {
+        for case in cases() {
+            let exact = case.hold(ts()).unwrap();
+            let matrix = by_matrix_exponential(case, 0.01);
+            // The matrix way loses digits in b1 and f2 by cancellation: 1e-13 of the largest coefficient.
+            for (name, a, b) in [
+                ("b0", exact.b0, matrix.b0),
+                ("b1", exact.b1, matrix.b1),
+                ("f1", exact.f1, matrix.f1),
+                ("f2", exact.f2, matrix.f2),
+            ] {
+                assert!(
+                    (a - b).abs() < 4e-13 * (1.0 + b.abs()),
+                    "{name} of {case:?}: {a} and {b}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn unhold_inverts_hold_for_all_pole_cases() {
+        for case in cases() {
+            let back = case.hold(ts()).unwrap().unhold(ts()).unwrap();
+            // A held system knows its poles to eps/(Ts |p1 - p2|) and, at a double pole, to sqrt(eps)/Ts; the coefficients
+            // a1, a2, which are symmetric, keep more. Fast poles leave e^{p Ts} small and keep fewer digits.
+            for (name, a, b) in [
+                ("b0", back.b0, case.b0),
+                ("b1", back.b1, case.b1),
+                ("a1", back.a1, case.a1),
+                ("a2", back.a2, case.a2),
+            ] {
+                let scale = 1.0 + b.abs() + if name.starts_with('a') { case.a1.abs() } else { 0.0 };
+                assert!((a - b).abs() < 2e-8 * scale, "{name} of {case:?}: {a} and {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn held_states_are_the_matrix_exponential() {
+        for case in cases() {
+            let ours = HeldStates::new(case.a1, case.a2, ts());
+            let m = DMatrix::from_row_slice(3, 3, &[0.0, 1.0, 0.0, -case.a2, -case.a1, 1.0, 0.0, 0.0, 0.0]) * 0.01;
+            let e = m.exp();
+            for i in 0..2 {
+                for j in 0..2 {
+                    let scale = 1.0 + e[(i, j)].abs();
+                    assert!(
+                        (ours.transition[i][j] - e[(i, j)]).abs() < 1e-12 * scale,
+                        "{case:?} {i}{j}"
+                    );
+                }
+                assert!((ours.input[i] - e[(i, 2)]).abs() < 1e-14, "{case:?} input {i}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_pole_at_the_origin_stays_there() {
+        let integrator = with_poles(Complex64::new(0.0, 0.0), Complex64::new(-6.0, 0.0));
+        let held = integrator.hold(ts()).unwrap();
+        assert!((1.0 + held.f1 + held.f2).abs() < 1e-15);
+        assert!(held.unhold(ts()).unwrap().a2.abs() < 1e-9);
+    }
+
+    #[test]
+    fn poles_on_the_closed_negative_axis_do_not_convert() {
+        let held = |f1, f2| HeldSecondOrder {
+            b0: 1.0,
+            b1: 0.0,
+            f1,
+            f2,
+        };
+        assert!(matches!(
+            held(-0.4, -0.05).unhold(ts()),
+            Err(NotConvertible::NegativeRealPole { pole }) if (pole + 0.1).abs() < 1e-12
+        ));
+        assert!(held(0.9, 0.2).unhold(ts()).is_err());
+        assert!(held(-0.5, 0.0).unhold(ts()).is_err());
+        assert!(held(0.0, 0.0).unhold(ts()).is_err());
+        assert!(matches!(
+            held(f64::NAN, 0.2).unhold(ts()),
+            Err(NotConvertible::NotFinite { .. })
+        ));
+        // A complex pair always converts, also with f1 > 0.
+        assert!(held(0.5, 0.9).unhold(ts()).is_ok());
+    }
+
+    #[test]
+    fn feedthrough_survives_both_ways() {
+        let (num, f) = hold_biproper([0.7, 3.0, 11.0], [2.0, 4.0, 30.0], ts()).unwrap();
+        let (back, den) = unhold_biproper(num, f, ts()).unwrap();
+        for (a, b) in back.iter().zip([0.35, 1.5, 5.5]) {
+            assert!((a - b).abs() < 1e-10);
+        }
+        assert!((den[1] - 2.0).abs() < 1e-10 && (den[2] - 15.0).abs() < 1e-9);
+        assert!(hold_biproper([0.0, 1.0, 1.0], [0.0, 1.0, 1.0], ts()).is_err());
+    }
+
+    #[test]
+    fn overflow_is_an_error() {
+        let absurd = with_poles(Complex64::new(1e6, 0.0), Complex64::new(1e6, 0.0));
+        assert!(absurd.hold(ts()).is_err());
+    }
+}

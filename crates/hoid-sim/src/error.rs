@@ -1,0 +1,33 @@
+//! Why a simulation gives no record.
+
+use hoid_model::ModelError;
+use thiserror::Error;
+
+/// What can go wrong in a simulation.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum SimError {
+    /// The scenario is wrong by itself.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The closed loop is unstable and has left the range of numbers.
+    #[error(
+        "the loop diverges: {signal} is not finite at t = {time_s:.2} s; check gains, delay and controlled element of {scenario}"
+    )]
+    Diverged {
+        /// The signal.
+        signal: &'static str,
+        /// Time of the first bad sample, s.
+        time_s: f64,
+        /// Name of the scenario.
+        scenario: String,
+    },
+    /// Noise of another length than the run.
+    #[error("the noise has {found} samples, the run needs {expected} (run-in and measurement)")]
+    NoiseLength {
+        /// Samples given.
+        found: usize,
+        /// Samples needed.
+        expected: usize,
+    },
+}
