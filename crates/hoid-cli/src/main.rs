@@ -1,1 +1,36 @@
-fn main() {}
+//! The command line `hoid`. Only this crate prints: results to standard output, everything else to standard error.
+//!
+//! Exit code 0: done; 1: the data or the task cannot give a result; 2: wrong usage. `args` says what can be typed, `commands`
+//! what it does, one file a command; `json` and `text` are the two forms of a result.
+
+mod args;
+mod commands;
+mod error;
+mod json;
+mod orders;
+mod output;
+mod text;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::args::{Cli, Command};
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let outcome = match cli.command {
+        Command::Demo(args) => commands::demo::run(&args),
+        Command::Simulate(args) => commands::simulate::run(&args),
+        Command::Identify(args) => commands::identify::run(&args),
+        Command::Convert(args) => commands::convert::run(&args),
+        Command::Margins(args) => commands::margins::run(&args),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            output::complain(&format!("error: {error}"));
+            ExitCode::from(error.exit_code())
+        }
+    }
+}

@@ -25,6 +25,8 @@ pub struct Estimator {
     pub initial_state: InitialState,
     /// Limits of the search.
     pub search: SearchOptions,
+    /// Number of own starts from which the search runs to its end; the best minimum wins. Default 2.
+    pub starts: usize,
     /// Start of the search instead of the estimator's own; theta in the order of [`Orders::parameter_names`].
     pub start: Option<Vec<f64>>,
 }
@@ -37,6 +39,7 @@ impl Estimator {
             orders,
             initial_state: InitialState::default(),
             search: SearchOptions::default(),
+            starts: 2,
             start: None,
         }
     }
@@ -125,6 +128,7 @@ impl Estimator {
             Some(theta) => vec![("given".to_owned(), self.check_start(theta, criterion)?)],
             None => starts::propose(criterion, sample_time, &mut workspace)
                 .into_iter()
+                .take(self.starts.max(1))
                 .map(|s| (s.label, s.theta))
                 .collect(),
         };
@@ -297,4 +301,56 @@ fn inverse_information(gram: &[f64], names: &[String]) -> Result<Vec<f64>, Ident
         }
     }
     Ok(inverse)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `J' J` by rows of a Jacobian given by columns.
+    fn gram(columns: &[Vec<f64>]) -> Vec<f64> {
+        let product = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).map(|(x, y)| x * y).sum();
+        columns
+            .iter()
+            .flat_map(|a| columns.iter().map(move |b| product(a, b)))
+            .collect()
+    }
+
+    fn columns() -> Vec<Vec<f64>> {
+        let column = |w: f64, size: f64| (0..50).map(|t| size * (w * f64::from(t)).sin()).collect();
+        vec![column(0.1, 1e3), column(0.7, 1.0), column(1.9, 1e-4)]
+    }
+
+    fn names() -> Vec<String> {
+        ["b0", "d1", "f1"].map(String::from).to_vec()
+    }
+
+    #[test]
+    fn inverse_information_is_the_inverse_whatever_the_units() {
+        let g = gram(&columns());
+        let inverse = inverse_information(&g, &names()).unwrap();
+        for i in 0..3 {
+            for j in 0..3 {
+                let product: f64 = (0..3).map(|k| g[i * 3 + k] * inverse[k * 3 + j]).sum();
+                let scale = (g[i * 4] / g[j * 4]).sqrt();
+                assert!((product / scale - f64::from(u8::from(i == j))).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn an_undetermined_combination_is_named() {
+        let mut dependent = columns();
+        dependent[2] = dependent[0].iter().map(|v| -1e-6 * v).collect();
+        match inverse_information(&gram(&dependent), &names()) {
+            Err(IdentError::SingularInformation { parameters }) => assert_eq!(parameters, "b0, f1"),
+            other => panic!("expected singular information, found {other:?}"),
+        }
+        let mut silent = columns();
+        silent[1].fill(0.0);
+        match inverse_information(&gram(&silent), &names()) {
+            Err(IdentError::SingularInformation { parameters }) => assert_eq!(parameters, "d1"),
+            other => panic!("expected singular information, found {other:?}"),
+        }
+    }
 }

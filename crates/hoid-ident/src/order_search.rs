@@ -4,12 +4,12 @@
 //! demanding one can), and the criterion decides: the loss for the delay alone, BIC where the number of parameters differs.
 //! The chosen model is then fitted once more on all the samples that its own orders leave.
 
-use std::ops::RangeInclusive;
+use std::{fmt, ops::RangeInclusive};
 
 use hoid_model::{Orders, Record, Structure};
 use rayon::prelude::*;
 
-use crate::{Estimator, Fit, IdentError, prediction_error::first_residual};
+use crate::{Estimator, Fit, IdentError, SearchOptions, prediction_error::first_residual};
 
 /// A range for each order and for the delay.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -39,6 +39,21 @@ impl From<Orders> for OrderRanges {
             nf: one(o.nf),
             nk: one(o.nk),
         }
+    }
+}
+
+impl fmt::Display for OrderRanges {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut separator = "";
+        for (name, range) in self.named() {
+            match (*range.start(), *range.end()) {
+                (0, 0) if name != "nk" => continue,
+                (low, high) if low == high => write!(f, "{separator}{name}={low}")?,
+                (low, high) => write!(f, "{separator}{name}={low}..{high}")?,
+            }
+            separator = ", ";
+        }
+        Ok(())
     }
 }
 
@@ -122,7 +137,8 @@ pub struct CandidateFigures {
 }
 
 impl CandidateFigures {
-    fn value(&self, criterion: Criterion) -> f64 {
+    /// The figure that the criterion compares.
+    pub fn value(&self, criterion: Criterion) -> f64 {
         match criterion {
             Criterion::Loss => self.loss,
             Criterion::Aic => self.aic,
@@ -161,12 +177,21 @@ pub fn choose_orders(
         .map(|o| first_residual(o, template.initial_state_in_use()))
         .max()
         .unwrap_or(0);
+    // To rank candidates the loss need not be known to the last digit; the chosen one is fitted again with all care.
+    let quick = Estimator {
+        search: SearchOptions {
+            tolerance: template.search.tolerance.max(1e-8),
+            max_iterations: template.search.max_iterations.min(50),
+        },
+        starts: 1,
+        ..template.clone()
+    };
     // Collected by index: the table does not depend on the number of threads.
     let candidates: Vec<Candidate> = combinations
         .into_par_iter()
         .map(|orders| Candidate {
             orders,
-            outcome: template
+            outcome: quick
                 .with_orders(orders)
                 .fit_from(records, first)
                 .map(|fit| CandidateFigures {

@@ -10,8 +10,8 @@
 //! 3. `pole grid`: for two poles and more, neuromuscular frequencies from 3 to 24 rad/s with damping 0.15 to 1, as people
 //!    have them, through the exact zero-order hold.
 //!
-//! The proposals are ranked by their loss with the initial states eliminated; the search runs from the best two, and the
-//! better minimum wins.
+//! The proposals are ranked by their loss with the initial states eliminated; the search runs from the best of them, and the
+//! best minimum wins.
 
 use hoid_core::stability::roots_inside;
 use hoid_model::{Complex64, Orders, SampleTime, polynomial, polynomial_model::monic};
@@ -38,8 +38,6 @@ const EXTRA_POLE: f64 = 0.3;
 
 /// Proposals that are completed with a noise model of their own.
 const COMPLETED: usize = 4;
-/// Starts from which the search runs.
-const KEPT: usize = 2;
 
 /// The best starts, best first.
 ///
@@ -71,7 +69,7 @@ pub(crate) fn propose(criterion: &Criterion<'_>, sample_time: SampleTime, worksp
         })
         .collect();
     starts.sort_by(|a, b| a.1.total_cmp(&b.1));
-    starts.into_iter().take(KEPT).map(|(start, _)| start).collect()
+    starts.into_iter().map(|(start, _)| start).collect()
 }
 
 fn pole_proposals(criterion: &Criterion<'_>, sample_time: SampleTime) -> Vec<(String, Vec<f64>)> {

@@ -88,23 +88,57 @@ impl Fit {
     }
 }
 
+impl Fit {
+    /// VAF and NRMSE over several records together: the squared errors of all of them against the power (for NRMSE, the
+    /// spread around the mean of each record) of all of them.
+    ///
+    /// # Errors
+    /// As [`Fit::residuals`].
+    pub fn quality(&self, records: &[Record]) -> Result<Quality, IdentError> {
+        let (mut power, mut spread, mut of_simulation, mut of_prediction) = (0.0, 0.0, 0.0, 0.0);
+        for record in records {
+            let v = self.validate(record)?;
+            let output = &record.output()[v.first..];
+            let moved = centred(output);
+            power += dot(output, output);
+            spread += dot(&moved, &moved);
+            of_simulation += squared_distance(output, &v.simulated);
+            of_prediction += squared_distance(output, &v.predicted);
+        }
+        Ok(Quality {
+            vaf_simulation: vaf_of(of_simulation, power),
+            vaf_prediction: vaf_of(of_prediction, power),
+            nrmse_simulation: nrmse_of(of_simulation, spread),
+            nrmse_prediction: nrmse_of(of_prediction, spread),
+        })
+    }
+}
+
 /// Variance accounted for (eq. 39), %. Zero where the measured signal is zero.
 pub fn vaf(measured: &[f64], model: &[f64]) -> f64 {
-    let power = dot(measured, measured);
-    if power == 0.0 {
-        return 0.0;
-    }
-    (100.0 * (1.0 - squared_distance(measured, model) / power)).max(0.0)
+    vaf_of(squared_distance(measured, model), dot(measured, measured))
 }
 
 /// NRMSE fit, %. Zero where the measured signal is constant.
 pub fn nrmse_fit(measured: &[f64], model: &[f64]) -> f64 {
-    let mean = measured.iter().sum::<f64>() / measured.len() as f64;
-    let spread: f64 = measured.iter().map(|m| (m - mean) * (m - mean)).sum();
-    if spread == 0.0 {
-        return 0.0;
+    let moved = centred(measured);
+    nrmse_of(squared_distance(measured, model), dot(&moved, &moved))
+}
+
+fn vaf_of(squared_error: f64, power: f64) -> f64 {
+    if power == 0.0 {
+        0.0
+    } else {
+        (100.0 * (1.0 - squared_error / power)).max(0.0)
     }
-    100.0 * (1.0 - (squared_distance(measured, model) / spread).sqrt())
+}
+
+fn nrmse_of(squared_error: f64, spread: f64) -> f64 {
+    if spread == 0.0 {
+        0.0
+    } else {
+        100.0 * (1.0 - (squared_error / spread).sqrt())
+    }
 }
 
 fn squared_distance(a: &[f64], b: &[f64]) -> f64 {

@@ -116,7 +116,7 @@ impl ForcingFunction {
         self.sinusoids.iter().map(term).sum()
     }
 
-    /// f_t in deg at `start_s + k Ts`, k from 0 to `n - 1`; the same as [`ForcingFunction::value`] to rounding, 20 times faster.
+    /// f_t in deg at `start_s + k Ts`, k from 0 to `n - 1`: [`ForcingFunction::value`] to rounding, without its sines.
     pub fn samples(&self, start_s: f64, sample_time: SampleTime, n: usize) -> Vec<f64> {
         let mut values = vec![0.0; n];
         for s in &self.sinusoids {

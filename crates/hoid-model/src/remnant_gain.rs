@@ -96,6 +96,10 @@ pub fn remnant_gain(
             }
         }
     }
+    // Silence has no gain to find, in an unstable loop either.
+    if level == 0.0 {
+        return Ok(0.0);
+    }
     if !closed_loop_is_stable(&operator.series(controlled_element)) {
         return Err(ModelError::UnstableLoop {
             reason: "not all closed-loop poles lie in the open left half plane (Nyquist); lower the gain or the delay"
@@ -110,9 +114,6 @@ pub fn remnant_gain(
         .iter()
         .map(|l| 0.5 * (l.amplitude * closed.response_to_target(l.omega_rad_s)).powi(2))
         .sum();
-    if level == 0.0 {
-        return Ok(0.0);
-    }
     if !(forced.is_finite() && forced > 0.0) {
         return Err(ModelError::OutOfRange {
             quantity: "variance of u due to the forcing function",

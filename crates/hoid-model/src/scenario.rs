@@ -24,6 +24,9 @@ use crate::{
     schedule::Schedule,
 };
 
+/// Longest run, in samples: 11 days at 100 Hz. A slip in the exponent of a time is found before it asks for all the memory.
+const MOST_SAMPLES: usize = 100_000_000;
+
 /// A state of adaptation: the operator and what he controls.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OperatingState {
@@ -280,6 +283,13 @@ impl Scenario {
             });
         }
         let run_in_samples = samples("run-in time t_0 in s", self.run_in_s)?;
+        if run_in_samples + measurement_samples > MOST_SAMPLES {
+            return Err(ModelError::OutOfRange {
+                quantity: "run-in and measurement time in s",
+                found: self.run_in_s + self.measurement_s,
+                expected: "at most 1e8 samples: shorten the run or take a longer sample time",
+            });
+        }
         if self.initial.operator.tau_e_s != self.last.operator.tau_e_s {
             return Err(ModelError::OutOfRange {
                 quantity: "delay tau_e of the last state in s",
@@ -411,6 +421,7 @@ mod tests {
         assert!(refused(|s| s.measurement_s = 0.0).contains("T_m"));
         assert!(refused(|s| s.measurement_s = f64::NAN).contains("T_m"));
         assert!(refused(|s| s.run_in_s = -1.0).contains("t_0"));
+        assert!(refused(|s| s.measurement_s = 8.192e10).contains("1e8 samples"));
         assert!(refused(|s| s.initial.operator.tau_e_s = 0.285).contains("tau_e"));
         assert!(refused(|s| s.last.operator.tau_e_s = 0.2).contains("tau_e"));
         assert!(refused(|s| s.initial.operator.omega_nm_rad_s = 0.0).contains("omega_nm"));

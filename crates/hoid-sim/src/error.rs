@@ -30,4 +30,12 @@ pub enum SimError {
         /// Samples needed.
         expected: usize,
     },
+    /// Noise that is no number.
+    #[error("the noise at sample {index} is {value}, expected a finite number")]
+    NoiseNotFinite {
+        /// Index of the sample, from 0.
+        index: usize,
+        /// The value.
+        value: f64,
+    },
 }

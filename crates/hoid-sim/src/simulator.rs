@@ -103,19 +103,25 @@ impl Simulator {
     /// [`SimError::Diverged`].
     pub fn run(&self, stream: Stream, keep_run_in: bool) -> Result<Record, SimError> {
         let signals = self.signals(&stream.white_noise(self.samples()))?;
-        self.record(signals, keep_run_in)
+        self.record(&signals, keep_run_in)
     }
 
     /// The signals of a run driven by given white noise of unit variance, one value a sample.
     ///
     /// # Errors
-    /// [`SimError::NoiseLength`], [`SimError::Diverged`].
+    /// [`SimError::NoiseLength`], [`SimError::NoiseNotFinite`], [`SimError::Diverged`].
     pub fn signals(&self, noise: &[f64]) -> Result<Signals, SimError> {
         let samples = self.samples();
         if noise.len() != samples {
             return Err(SimError::NoiseLength {
                 found: noise.len(),
                 expected: samples,
+            });
+        }
+        if let Some(index) = noise.iter().position(|v| !v.is_finite()) {
+            return Err(SimError::NoiseNotFinite {
+                index,
+                value: noise[index],
             });
         }
         let mut signals = Signals {
@@ -147,15 +153,12 @@ impl Simulator {
         Ok(signals)
     }
 
-    /// Signals with time, units and truth.
-    ///
-    /// # Errors
-    /// [`SimError::Model`] for signals of another length than a run.
-    pub fn record(&self, signals: Signals, keep_run_in: bool) -> Result<Record, SimError> {
+    /// Signals of a whole run with time, units and truth.
+    fn record(&self, signals: &Signals, keep_run_in: bool) -> Result<Record, SimError> {
         let run_in = self.scenario.run_in_samples();
         let first = if keep_run_in { 0 } else { run_in };
         let ts = self.scenario.scenario().sample_time;
-        let cut = |values: &[f64]| values[first.min(values.len())..].to_vec();
+        let cut = |values: &[f64]| values[first..].to_vec();
         let truth = |get: &dyn Fn(&TrueParameters) -> f64| match self.parameters.as_slice() {
             [only] => vec![get(only); self.samples() - first],
             all => all[first..].iter().map(get).collect(),

@@ -4,6 +4,7 @@
 
 use hoid_model::{
     SampleTime,
+    remnant::{RemnantDiscretisation, RemnantFilter},
     remnant_gain::NoiseDefinition,
     scenario::{Condition, Realisation, RemnantStrength, Scenario},
 };
@@ -260,11 +261,59 @@ fn a_run_is_the_measurement_with_its_truth_and_is_repeatable() {
     assert_eq!(&whole.input()[1000..], record.input());
 }
 
-#[test]
-fn a_diverging_loop_is_an_error_and_not_a_row_of_nan() {
-    let mut scenario = Scenario::condition(Condition::C2);
+fn with_unstable_operator(mut scenario: Scenario) -> Scenario {
     scenario.initial.operator.k_e = 50.0;
     scenario.last = scenario.initial;
+    scenario
+}
+
+#[test]
+fn the_remnant_has_its_theoretical_variance() {
+    for order in 1..=4 {
+        let mut scenario = Scenario::condition(Condition::C1);
+        scenario.remnant.order = order;
+        let simulator = Simulator::new(&scenario).unwrap();
+        let k_n = simulator.scenario().parameters_at(0.0).k_n;
+        // Variance of the exact discrete filter: the sum of the squares of its impulse response.
+        let filter = RemnantFilter::new(k_n, 0.06, order).unwrap();
+        let h = filter
+            .discrete(scenario.sample_time, RemnantDiscretisation::ZeroOrderHold)
+            .unwrap();
+        let mut response: Vec<f64> = Vec::new();
+        for t in 0..2000_usize {
+            let mut y = h.num().get(t).copied().unwrap_or(0.0);
+            for (i, a) in h.den().iter().enumerate().skip(1).take(t) {
+                y -= a * response[t - i];
+            }
+            response.push(y);
+        }
+        let theory: f64 = response.iter().map(|y| y * y).sum();
+        let variances: Vec<f64> = (0..100)
+            .map(|replication| {
+                let noise = Stream {
+                    seed: 5,
+                    cell: order as u64,
+                    replication,
+                }
+                .white_noise(simulator.samples());
+                let n = simulator.signals(&noise).unwrap().n;
+                n[1000..].iter().map(|v| v * v).sum::<f64>() / 8192.0
+            })
+            .collect();
+        let mean = variances.iter().sum::<f64>() / 100.0;
+        let spread = (variances.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 99.0).sqrt();
+        // Four standard errors of the mean over 100 runs.
+        assert!(
+            (mean - theory).abs() < 4.0 * spread / 10.0,
+            "m={order}: {mean} and {theory} +- {}",
+            spread / 10.0
+        );
+    }
+}
+
+#[test]
+fn a_diverging_loop_is_an_error_and_not_a_row_of_nan() {
+    let mut scenario = with_unstable_operator(Scenario::condition(Condition::C2));
     scenario.remnant.strength = RemnantStrength::Gain {
         initial: 0.1,
         last: 0.1,
@@ -280,6 +329,9 @@ fn a_diverging_loop_is_an_error_and_not_a_row_of_nan() {
         definition: NoiseDefinition::Response,
     };
     assert!(Simulator::new(&scenario).is_err());
+    // Silence has no level to reach: the unstable loop can be looked at until it overflows.
+    let silent = with_unstable_operator(with_level(Condition::C2, 0.0));
+    assert!(Simulator::new(&silent).is_ok());
     let good = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
     assert!(matches!(
         good.signals(&[0.0; 3]),

@@ -1,0 +1,345 @@
+//! What can be typed. The texts here are the help pages; each option states its default and unit.
+
+use std::{ops::RangeInclusive, path::PathBuf};
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use hoid_ident::{InitialState, order_search::Criterion};
+use hoid_model::{
+    ContinuousTransferFunction, Detrend, Structure, discretise,
+    remnant::RemnantDiscretisation,
+    remnant_gain::NoiseDefinition,
+    scenario::{Condition, Realisation},
+};
+
+use crate::orders::{parse_numbers, parse_range};
+
+/// Human-operator identification: finds out how a person controls a machine.
+///
+/// From the tracking error e and the control output u it identifies gain, lead, delay and neuromuscular dynamics, with ARX and
+/// Box-Jenkins models and standard errors.
+#[derive(Debug, Parser)]
+#[command(name = "hoid", version, max_term_width = 110)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// The whole path on a simulated run: simulate, identify, write a report
+    Demo(DemoArgs),
+    /// Simulate one closed-loop run and write it as CSV
+    Simulate(SimulateArgs),
+    /// Identify a model and the operator's parameters from one or several records
+    Identify(Box<IdentifyArgs>),
+    /// Take discrete coefficients to operator parameters or back, or discretise a transfer function
+    Convert(ConvertArgs),
+    /// Crossover frequency, phase and gain margin of a scenario, and its remnant gains
+    Margins(MarginsArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// Directory for the record, the results and the report; it is made if it is not there
+    #[arg(long, value_name = "DIR", default_value = "hoid-demo")]
+    pub out: PathBuf,
+    /// Seed of the simulated run
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+}
+
+/// A condition of the reference text or a scenario file.
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+pub struct ScenarioChoice {
+    /// Condition of the reference text: C1 to C6
+    #[arg(long, value_name = "C1..C6")]
+    pub condition: Option<Condition>,
+    /// Scenario file (TOML)
+    #[arg(long, value_name = "FILE")]
+    pub scenario: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+pub struct SimulateArgs {
+    #[command(flatten)]
+    pub base: ScenarioChoice,
+    /// Order m of the remnant filter, 1 to 4 [default: 1, or the scenario's]
+    #[arg(long, value_name = "M")]
+    pub remnant_order: Option<usize>,
+    /// Noise level P_n; 0 is a run without remnant [default: 0.1, or the scenario's]
+    #[arg(long, value_name = "P_N")]
+    pub noise_level: Option<f64>,
+    /// What the noise level is a share of: var(u_n)/var(u) or var(n)/var(u) [default: response, or the scenario's]
+    #[arg(long, value_name = "WHICH")]
+    pub noise_definition: Option<NoiseDefinitionName>,
+    /// Remnant time constant T_n in s [default: 0.06, or the scenario's]
+    #[arg(long, value_name = "S")]
+    pub remnant_time_constant: Option<f64>,
+    /// Sample time Ts in s [default: 0.01, or the scenario's]
+    #[arg(long, value_name = "S")]
+    pub sample_time: Option<f64>,
+    /// Where K_c stands when it changes: in the input matrix (x stays continuous) or in the output matrix (as in the reference
+    /// text) [default: input, or the scenario's]
+    #[arg(long, value_name = "WHERE")]
+    pub realisation: Option<RealisationName>,
+    /// Seed of the random streams
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Replication: runs with the same seed and another replication are independent
+    #[arg(long, value_name = "R", default_value_t = 0)]
+    pub replication: u64,
+    /// Keep the run-in (t < 0) in the file
+    #[arg(long)]
+    pub keep_run_in: bool,
+    /// File to write
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+}
+
+/// How record files are read.
+#[derive(Debug, Args)]
+pub struct ReadArgs {
+    /// Column of the input (tracking error): a name, -name, or a difference such as r-y
+    #[arg(long, value_name = "COLUMN", default_value = "e", allow_hyphen_values = true)]
+    pub input: String,
+    /// Column of the output (control): a name, -name, or a difference
+    #[arg(long, value_name = "COLUMN", default_value = "u", allow_hyphen_values = true)]
+    pub output: String,
+    /// Sampling frequency in Hz; without it column t (in s) gives the sampling
+    #[arg(long, value_name = "HZ")]
+    pub fs: Option<f64>,
+    /// Start of the span to use, s
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    pub from: Option<f64>,
+    /// End of the span to use (not included), s
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    pub to: Option<f64>,
+    /// Bring unevenly sampled data onto an even grid by linear interpolation
+    #[arg(long)]
+    pub resample: bool,
+    /// Bridge missing values (empty, NaN) by linear interpolation
+    #[arg(long)]
+    pub fill: bool,
+    /// Take out the mean or the straight line of input and output
+    #[arg(long, value_name = "HOW", default_value = "none")]
+    pub detrend: DetrendName,
+}
+
+#[derive(Debug, Args)]
+pub struct IdentifyArgs {
+    /// Record files (CSV); several share one model and have initial states of their own
+    #[arg(required = true, value_name = "RECORD")]
+    pub records: Vec<PathBuf>,
+    #[command(flatten)]
+    pub read: ReadArgs,
+    /// Model structure
+    #[arg(long, value_name = "NAME", default_value = "bj")]
+    pub structure: StructureName,
+    /// Orders, each a number or a range to search, as nb=2,nc=0,nd=1..4,nf=2; nb counts b0, b1, ...
+    /// [default: the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2]
+    #[arg(long, value_name = "LIST")]
+    pub orders: Option<String>,
+    /// Delay of b0 in samples, a number or a range to search [default: 0.05 to 0.6 s]
+    #[arg(long, value_name = "N|LO..HI", value_parser = parse_range)]
+    pub nk: Option<RangeInclusive<usize>>,
+    /// What decides between candidates when something is searched
+    #[arg(long, value_name = "NAME", default_value = "bic")]
+    pub criterion: CriterionName,
+    /// Initial states of each record; auto estimates them
+    #[arg(long, value_name = "RULE", default_value = "auto")]
+    pub initial_state: InitialStateName,
+    /// Start of the search, all coefficients as f1=-1.9,f2=.92,b0=.04,... [default: own starts]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub start: Option<String>,
+    /// Largest number of search steps from each start
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    pub max_iterations: usize,
+    /// Discretisation that is inverted to get T_n and K_n from the noise model
+    #[arg(long, value_name = "NAME", default_value = "zoh")]
+    pub remnant_discretisation: RemnantDiscretisationName,
+    /// Controlled element NUM/DEN by descending powers of s, as 90/1,6,0: adds crossover frequency and margins
+    #[arg(long, value_name = "NUM/DEN", value_parser = parse_transfer_function, allow_hyphen_values = true)]
+    pub controlled_element: Option<ContinuousTransferFunction>,
+    /// Another record to judge the model on
+    #[arg(long, value_name = "FILE")]
+    pub validate: Option<PathBuf>,
+    /// Write a report (HTML) into this directory
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
+    /// Print one JSON object instead of tables
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(group(clap::ArgGroup::new("what").required(true).args(["f", "operator", "transfer_function"])))]
+pub struct ConvertArgs {
+    /// F of the discrete operator: f1,f2
+    #[arg(
+        long,
+        value_name = "F1,F2",
+        value_delimiter = ',',
+        num_args = 1,
+        allow_hyphen_values = true,
+        requires = "b"
+    )]
+    pub f: Option<Vec<f64>>,
+    /// B of the discrete operator: b0,b1
+    #[arg(
+        long,
+        value_name = "B0,B1",
+        value_delimiter = ',',
+        num_args = 1,
+        allow_hyphen_values = true,
+        requires = "f"
+    )]
+    pub b: Option<Vec<f64>>,
+    /// Delay of b0 in samples
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub nk: usize,
+    /// Operator parameters: K_e=.09,T_L=.4,omega_nm=11.25,zeta_nm=.35,tau_e=.28 (K_e_dot may stand for T_L)
+    #[arg(long, value_name = "LIST", value_parser = parse_numbers, allow_hyphen_values = true)]
+    pub operator: Option<std::vec::Vec<(String, f64)>>,
+    /// Transfer function NUM/DEN to discretise, by descending powers of s, as 1,2/1,3,4
+    #[arg(long, value_name = "NUM/DEN", value_parser = parse_transfer_function, allow_hyphen_values = true)]
+    pub transfer_function: Option<ContinuousTransferFunction>,
+    /// Discretisation of the transfer function
+    #[arg(long, value_name = "NAME", default_value = "zoh")]
+    pub method: MethodName,
+    /// Prewarp frequency in rad/s, for --method prewarped
+    #[arg(long, value_name = "RAD/S", required_if_eq("method", "prewarped"))]
+    pub prewarp: Option<f64>,
+    /// Sample time Ts in s
+    #[arg(long, value_name = "S", default_value_t = 0.01)]
+    pub sample_time: f64,
+    /// Print one JSON object instead of text
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+pub struct MarginsArgs {
+    #[command(flatten)]
+    pub base: ScenarioChoice,
+    /// Which state of a scenario that changes
+    #[arg(long, value_name = "WHICH", default_value = "initial")]
+    pub state: StateName,
+    /// Noise levels P_n for the remnant gains
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [0.01, 0.1, 0.2, 0.3])]
+    pub noise_levels: Vec<f64>,
+    /// What the noise level is a share of: var(u_n)/var(u) or var(n)/var(u)
+    #[arg(long, value_name = "WHICH", default_value = "response")]
+    pub noise_definition: NoiseDefinitionName,
+    /// Print one JSON object instead of tables
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A name on the command line for each value of a type of the library.
+macro_rules! names {
+    ($name:ident for $target:ty { $($variant:ident = $value:expr),+ $(,)? }) => {
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+        pub enum $name { $($variant),+ }
+        impl From<$name> for $target {
+            fn from(name: $name) -> Self {
+                match name { $($name::$variant => $value),+ }
+            }
+        }
+    };
+}
+
+names!(StructureName for Structure { Arx = Structure::Arx, Bj = Structure::BoxJenkins });
+names!(CriterionName for Criterion { Loss = Criterion::Loss, Aic = Criterion::Aic, Bic = Criterion::Bic });
+names!(InitialStateName for InitialState {
+    Auto = InitialState::Estimate,
+    Zero = InitialState::Zero,
+    Estimate = InitialState::Estimate,
+});
+names!(DetrendName for Detrend { None = Detrend::None, Mean = Detrend::Mean, Linear = Detrend::Linear });
+names!(NoiseDefinitionName for NoiseDefinition {
+    Response = NoiseDefinition::Response,
+    Remnant = NoiseDefinition::Remnant,
+});
+names!(RealisationName for Realisation { Input = Realisation::Input, Output = Realisation::Output });
+names!(RemnantDiscretisationName for RemnantDiscretisation {
+    Zoh = RemnantDiscretisation::ZeroOrderHold,
+    BackwardEuler = RemnantDiscretisation::BackwardEuler,
+});
+
+/// A discretisation; prewarping needs its frequency besides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MethodName {
+    Zoh,
+    Foh,
+    Tustin,
+    Prewarped,
+    ForwardEuler,
+    BackwardEuler,
+    Matched,
+}
+
+impl MethodName {
+    /// The method of the library.
+    pub fn method(self, prewarp_rad_s: Option<f64>) -> discretise::Method {
+        match self {
+            Self::Zoh => discretise::Method::ZeroOrderHold,
+            Self::Foh => discretise::Method::FirstOrderHold,
+            Self::Tustin => discretise::Method::Tustin,
+            Self::Prewarped => discretise::Method::TustinPrewarped {
+                omega_rad_s: prewarp_rad_s.unwrap_or(f64::NAN),
+            },
+            Self::ForwardEuler => discretise::Method::ForwardEuler,
+            Self::BackwardEuler => discretise::Method::BackwardEuler,
+            Self::Matched => discretise::Method::Matched,
+        }
+    }
+}
+
+/// Which state of a scenario.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum StateName {
+    Initial,
+    Last,
+}
+
+/// `NUM/DEN`, coefficients by descending powers of s, separated by commas.
+pub fn parse_transfer_function(text: &str) -> Result<ContinuousTransferFunction, String> {
+    let usage = "write NUM/DEN by descending powers of s, as 90/1,6,0";
+    let (num, den) = text
+        .split_once('/')
+        .ok_or_else(|| format!("{text:?} has no '/'; {usage}"))?;
+    let coefficients = |part: &str| {
+        part.split(',')
+            .map(|c| {
+                c.trim()
+                    .parse::<f64>()
+                    .map_err(|_| format!("{c:?} is no number; {usage}"))
+            })
+            .collect::<Result<Vec<f64>, String>>()
+    };
+    ContinuousTransferFunction::new(&coefficients(num)?, &coefficients(den)?).map_err(|e| e.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_definitions_do_not_contradict_each_other() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn transfer_functions_as_typed() {
+        let h = parse_transfer_function("90/1,6,0").unwrap();
+        assert_eq!((h.num(), h.den()), (&[90.0][..], &[1.0, 6.0, 0.0][..]));
+        for bad in ["90", "a/1", "1,0,0/1", "1/0", ""] {
+            assert!(parse_transfer_function(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! `hoid convert`: discrete coefficients to operator parameters, back, and any transfer function to discrete time.
+
+use hoid_model::{
+    ContinuousTransferFunction, DiscreteOperator, OperatorParameters, SampleTime, discretise::discretise,
+    second_order::HeldSecondOrder,
+};
+use hoid_report::numbers;
+use serde_json::json;
+
+use crate::{args::ConvertArgs, error::CliError, json, output, text};
+
+pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
+    let sample_time = SampleTime::new(args.sample_time)?;
+    if let Some(h) = &args.transfer_function {
+        return discretised(args, h, sample_time);
+    }
+    let (discrete, operator) = match (&args.f, &args.b, &args.operator) {
+        (Some(f), Some(b), _) => {
+            let discrete = DiscreteOperator {
+                held: held(f, b)?,
+                nk: args.nk,
+                sample_time,
+            };
+            (discrete, discrete.parameters())
+        }
+        (_, _, Some(pairs)) => {
+            let operator = operator_from(pairs)?;
+            (operator.discretise(sample_time)?, Ok(operator))
+        }
+        _ => {
+            return Err(CliError::Usage(
+                "give --f and --b, --operator, or --transfer-function".to_owned(),
+            ));
+        }
+    };
+    let held = discrete.held;
+    if args.json {
+        let operator = match &operator {
+            Ok(o) => json!({
+                "convertible": true,
+                "stable": o.is_stable(),
+                "K_e": {"value": json::number(o.k_e)},
+                "T_L": {"value": json::number(o.t_l_s)},
+                "K_e_dot": {"value": json::number(o.k_e_dot())},
+                "omega_nm": {"value": json::number(o.omega_nm_rad_s)},
+                "zeta_nm": {"value": json::number(o.zeta_nm)},
+                "tau_e": {"value": json::number(o.tau_e_s)},
+            }),
+            Err(reason) => json!({"convertible": false, "reason": reason.to_string()}),
+        };
+        json::print(&json!({
+            "sample_time": json::number(sample_time.s()),
+            "discrete": {"f": [held.f1, held.f2], "b": [held.b0, held.b1], "nk": discrete.nk},
+            "operator": operator,
+        }));
+        return Ok(());
+    }
+    let mut text = format!(
+        "Discrete, Ts = {} s: ({:.10} {:+.10} q^-1) q^-{} / (1 {:+.10} q^-1 {:+.10} q^-2)\n",
+        sample_time.s(),
+        held.b0,
+        held.b1,
+        discrete.nk,
+        held.f1,
+        held.f2
+    );
+    match operator {
+        Ok(o) => {
+            let mut table = text::table(&["operator", "value", "unit"]);
+            for (name, value, unit) in [
+                ("K_e", o.k_e, ""),
+                ("T_L", o.t_l_s, "s"),
+                ("K_e_dot", o.k_e_dot(), "s"),
+                ("omega_nm", o.omega_nm_rad_s, "rad/s"),
+                ("zeta_nm", o.zeta_nm, ""),
+                ("tau_e", o.tau_e_s, "s"),
+            ] {
+                table.add_row([name, &numbers::plain(value), unit]);
+            }
+            text.push_str(&format!("{table}\n"));
+            if !o.is_stable() {
+                text.push_str("zeta_nm is not positive: this operator is not stable.\n");
+            }
+        }
+        Err(reason) => text.push_str(&format!("Operator parameters: not convertible: {reason}.\n")),
+    }
+    output::print(&text);
+    Ok(())
+}
+
+fn held(f: &[f64], b: &[f64]) -> Result<HeldSecondOrder, CliError> {
+    match (f, b) {
+        (&[f1, f2], &[b0, b1]) => Ok(HeldSecondOrder { b0, b1, f1, f2 }),
+        _ => Err(CliError::Usage(format!(
+            "the operator model has two coefficients in F and in B, found {} and {}; write --f F1,F2 --b B0,B1",
+            f.len(),
+            b.len()
+        ))),
+    }
+}
+
+fn operator_from(pairs: &[(String, f64)]) -> Result<OperatorParameters, CliError> {
+    const NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
+    if let Some((name, _)) = pairs.iter().find(|(name, _)| !NAMES.contains(&name.as_str())) {
+        return Err(CliError::Usage(format!(
+            "--operator: there is no parameter {name}; expected {}",
+            NAMES.join(", ")
+        )));
+    }
+    let find = |name: &str| pairs.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
+    let need = |name: &str| find(name).ok_or_else(|| CliError::Usage(format!("--operator lacks {name}")));
+    let k_e = need("K_e")?;
+    let t_l_s = match (find("T_L"), find("K_e_dot")) {
+        (Some(t_l), None) => t_l,
+        (None, Some(k_e_dot)) if k_e != 0.0 => k_e_dot / k_e,
+        (None, Some(_)) => {
+            return Err(CliError::Usage(
+                "--operator: K_e = 0 has no T_L = K_e_dot/K_e".to_owned(),
+            ));
+        }
+        (Some(_), Some(_)) => return Err(CliError::Usage("--operator: give T_L or K_e_dot, not both".to_owned())),
+        (None, None) => return Err(CliError::Usage("--operator lacks T_L (or K_e_dot)".to_owned())),
+    };
+    Ok(OperatorParameters {
+        k_e,
+        t_l_s,
+        omega_nm_rad_s: need("omega_nm")?,
+        zeta_nm: need("zeta_nm")?,
+        tau_e_s: find("tau_e").unwrap_or(0.0),
+    })
+}
+
+fn discretised(args: &ConvertArgs, h: &ContinuousTransferFunction, sample_time: SampleTime) -> Result<(), CliError> {
+    let discrete = discretise(h, sample_time, args.method.method(args.prewarp))?;
+    if args.json {
+        json::print(&json!({
+            "sample_time": json::number(sample_time.s()),
+            "transfer_function": {"num": discrete.num(), "den": discrete.den()},
+        }));
+        return Ok(());
+    }
+    let row = |c: &[f64]| c.iter().map(|v| format!("{v:.10}")).collect::<Vec<_>>().join(", ");
+    output::print(&format!(
+        "By ascending powers of q^-1, Ts = {} s:\nnumerator    {}\ndenominator  {}\n",
+        sample_time.s(),
+        row(discrete.num()),
+        row(discrete.den())
+    ));
+    Ok(())
+}

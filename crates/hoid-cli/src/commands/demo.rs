@@ -1,0 +1,143 @@
+//! `hoid demo`: the whole path on a simulated run of condition C4, in which the controlled element changes at 40.96 s and the
+//! operator with it.
+
+use std::path::PathBuf;
+
+use hoid_ident::{Choice, Estimator, Fit, choose_orders, order_search};
+use hoid_io::{make_directory, write_record};
+use hoid_model::{
+    Record, Structure,
+    scenario::{Condition, Scenario},
+};
+use hoid_report::{ModelSection, Report, numbers};
+use hoid_sim::{Simulator, Stream};
+
+use crate::{args::DemoArgs, commands::identify::write_report, error::CliError, output, text};
+
+/// The spans of the reference text (V.B) that lie wholly before and wholly after the change, s.
+const SPANS: [(&str, f64, f64); 2] = [("before", 0.0, 30.72), ("after", 51.2, 81.92)];
+
+struct Stage {
+    name: &'static str,
+    record: Record,
+    arx: Fit,
+    choice: Choice,
+}
+
+pub fn run(args: &DemoArgs) -> Result<(), CliError> {
+    let scenario = Scenario::condition(Condition::C4);
+    let stream = Stream {
+        seed: args.seed,
+        ..Stream::default()
+    };
+    let record = Simulator::new(&scenario)?.run(stream, false)?;
+    make_directory(&args.out)?;
+    let path = args.out.join("c4.csv");
+    write_record(&path, &record)?;
+    output::print(&format!(
+        "Simulated {}: {} samples of {} s; the controlled element changes at 40.96 s and the operator with it.\n\
+         Record: {}\n\n",
+        scenario.name,
+        record.len(),
+        record.sample_time().s(),
+        path.display()
+    ));
+    let stages = SPANS
+        .into_iter()
+        .map(|(name, from, to)| identify(name, record.span(from, to)?))
+        .collect::<Result<Vec<Stage>, CliError>>()?;
+    output::print(&table(&stages));
+    let page = report(args, &stages)?;
+    output::print(&format!("Report: {}\n", page.display()));
+    Ok(())
+}
+
+/// Box-Jenkins with nk and nd searched as `hoid identify` does by default, and ARX with the same delay.
+fn identify(name: &'static str, record: Record) -> Result<Stage, CliError> {
+    let structure = Structure::BoxJenkins;
+    let ranges = order_search::default_operator_ranges(structure, record.sample_time());
+    let records = [record];
+    let template = Estimator::new(structure, structure.operator_orders(1));
+    let choice = choose_orders(&template, &ranges, order_search::Criterion::Bic, &records)?;
+    let nk = choice.fit.orders().nk;
+    let arx = Estimator::new(Structure::Arx, Structure::Arx.operator_orders(nk)).fit(&records)?;
+    let [record] = records;
+    Ok(Stage {
+        name,
+        record,
+        arx,
+        choice,
+    })
+}
+
+fn table(stages: &[Stage]) -> String {
+    let mut text = String::new();
+    for stage in stages {
+        let bj = &stage.choice.fit;
+        text.push_str(&format!(
+            "{} the change, {:.2} to {:.2} s: BJ({}) chosen from {} candidates by BIC\n",
+            stage.name,
+            stage.record.time_s(0),
+            stage.record.time_s(stage.record.len()),
+            bj.orders(),
+            stage.choice.candidates.len(),
+        ));
+        let mut rows = text::table(&["operator", "true", "ARX", "Box-Jenkins", "standard error", "unit"]);
+        let truth = super::known_operator(std::slice::from_ref(&stage.record));
+        let (arx, bj) = (stage.arx.operator(), bj.operator());
+        match (&bj, truth) {
+            (Ok(bj), Some(t)) => {
+                let truth = [t.k_e, t.t_l_s, t.k_e_dot(), t.omega_nm_rad_s, t.zeta_nm, t.tau_e_s];
+                for (i, (name, unit, e)) in bj.rows().into_iter().enumerate() {
+                    let (value, error) = text::with_uncertainty(&e);
+                    let by_arx = match &arx {
+                        Ok(o) => numbers::plain(o.rows()[i].2.value),
+                        Err(_) => "not convertible".to_owned(),
+                    };
+                    rows.add_row([name, &numbers::plain(truth[i]), &by_arx, &value, &error, unit]);
+                }
+                text.push_str(&format!("{rows}\n\n"));
+            }
+            _ => text.push_str(&text::operator(&bj)),
+        }
+    }
+    text
+}
+
+fn report(args: &DemoArgs, stages: &[Stage]) -> Result<PathBuf, CliError> {
+    let mut models = Vec::new();
+    for stage in stages {
+        let records = std::slice::from_ref(&stage.record);
+        let truth = super::known_operator(records);
+        for (name, fit, candidates) in [
+            ("ARX", &stage.arx, None),
+            ("BJ", &stage.choice.fit, Some(&stage.choice)),
+        ] {
+            models.push(ModelSection {
+                name: format!("{name} {}", stage.name),
+                fit,
+                records,
+                candidates,
+                truth,
+                margins: None,
+            });
+        }
+    }
+    let setting = |name: &str, value: String| (name.to_owned(), value);
+    let report = Report {
+        title: "A person who adapts: condition C4, simulated".to_owned(),
+        settings: vec![
+            setting("condition", "C4: s1 to s2 at 40.96 s, G = 100 1/s".to_owned()),
+            setting("remnant", "order 1, T_n = 0.06 s, P_n = 0.1".to_owned()),
+            setting("seed", args.seed.to_string()),
+            setting("hoid", env!("CARGO_PKG_VERSION").to_owned()),
+        ],
+        models,
+        notes: vec![
+            "Before: 0 to 30.72 s. After: 51.20 to 81.92 s. Delay and order of the noise model are searched for Box-Jenkins; \
+             ARX takes the same delay."
+                .to_owned(),
+        ],
+    };
+    write_report(&args.out, &report)
+}

@@ -1,0 +1,239 @@
+//! `hoid identify`: records to a model and the operator's parameters.
+
+use std::path::{Path, PathBuf};
+
+use hoid_ident::{
+    Choice, Estimator, Fit, SearchOptions, choose_orders,
+    order_search::{Criterion, OrderRanges},
+};
+use hoid_io::{ReadOptions, Repair, make_directory, read_record, write_atomically};
+use hoid_model::{
+    ContinuousTransferFunction, Detrend, Record, Structure,
+    margins::{MANUAL_CONTROL_RANGE_RAD_S, Margins, margins},
+};
+use hoid_report::{ModelSection, Report, numbers};
+
+use crate::{
+    args::{IdentifyArgs, ReadArgs},
+    error::CliError,
+    json::{self, Identified},
+    orders, output, text,
+};
+
+pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
+    let records = args
+        .records
+        .iter()
+        .map(|path| read(path, &args.read))
+        .collect::<Result<Vec<_>, _>>()?;
+    let structure = Structure::from(args.structure);
+    let ranges = orders::ranges(
+        structure,
+        args.orders.as_deref(),
+        args.nk.as_ref(),
+        records[0].sample_time(),
+    )?;
+    let (fit, choice) = fit(args, structure, &ranges, &records)?;
+    // Read before anything is written: a bad validation file leaves nothing behind.
+    let validation = match &args.validate {
+        Some(path) => Some((path.display().to_string(), fit.quality(&[read(path, &args.read)?])?)),
+        None => None,
+    };
+    let files: Vec<String> = args.records.iter().map(|p| p.display().to_string()).collect();
+    let settings = settings(args, structure, &ranges);
+    let operator = fit.operator();
+    let remnant = (fit.orders().nd > 0).then(|| fit.remnant(args.remnant_discretisation.into()));
+    let margins = args
+        .controlled_element
+        .as_ref()
+        .map(|element| loop_margins(&fit, element));
+    let identified = Identified {
+        files: &files,
+        records: &records,
+        quality: fit.quality(&records)?,
+        fit: &fit,
+        choice: choice.as_ref(),
+        operator: &operator,
+        remnant: remnant.as_ref(),
+        margins: margins.as_ref(),
+        validation: validation.as_ref().map(|(file, q)| (file.as_str(), *q)),
+        settings: &settings,
+    };
+    if let Some(directory) = &args.report {
+        let report = Report {
+            title: format!("Identification of {}", files.join(", ")),
+            settings: settings.clone(),
+            models: vec![ModelSection {
+                name: format!("{}({})", fit.model().structure(), fit.orders()),
+                fit: &fit,
+                records: &records,
+                candidates: choice.as_ref(),
+                truth: super::known_operator(&records),
+                margins,
+            }],
+            notes: Vec::new(),
+        };
+        let page = write_report(directory, &report)?;
+        output::complain(&format!("report: {}", page.display()));
+    }
+    if args.json {
+        json::print(&identified.to_json());
+    } else {
+        output::print(&page(&identified));
+    }
+    Ok(())
+}
+
+/// Reads a record as the options say; what was repaired or left out goes to standard error.
+fn read(path: &Path, args: &ReadArgs) -> Result<Record, CliError> {
+    let column = |text: &str| text.parse().map_err(CliError::from);
+    let options = ReadOptions {
+        input: column(&args.input)?,
+        output: column(&args.output)?,
+        sampling_hz: args.fs,
+        span_s: (args.from, args.to),
+        repair: Repair {
+            resample: args.resample,
+            fill: args.fill,
+        },
+    };
+    let read = read_record(path, &options)?;
+    for note in &read.notes {
+        output::complain(&format!("{}: {note}", path.display()));
+    }
+    Ok(read.record.detrended(Detrend::from(args.detrend)))
+}
+
+fn fit(
+    args: &IdentifyArgs,
+    structure: Structure,
+    ranges: &OrderRanges,
+    records: &[Record],
+) -> Result<(Fit, Option<Choice>), CliError> {
+    let combinations = ranges.combinations()?;
+    let mut estimator = Estimator {
+        initial_state: args.initial_state.into(),
+        search: SearchOptions {
+            max_iterations: args.max_iterations,
+            ..SearchOptions::default()
+        },
+        ..Estimator::new(structure, combinations[0])
+    };
+    if let [orders] = combinations.as_slice() {
+        estimator.start = args
+            .start
+            .as_deref()
+            .map(|text| orders::theta(orders, text))
+            .transpose()?;
+        return Ok((estimator.fit(records)?, None));
+    }
+    if args.start.is_some() {
+        return Err(CliError::Usage(
+            "--start belongs to one model, but a range of orders or delays is searched; give --nk and --orders as single \
+             numbers"
+                .to_owned(),
+        ));
+    }
+    let choice = choose_orders(&estimator, ranges, Criterion::from(args.criterion), records)?;
+    Ok((choice.fit.clone(), Some(choice)))
+}
+
+fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> Margins {
+    let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
+    // The sampled model says nothing above half the sampling frequency.
+    let high = high.min(fit.model().sample_time().nyquist_rad_s());
+    margins(
+        |omega| fit.model().response(omega) * element.response(omega),
+        (low, high),
+    )
+}
+
+/// Every option that shaped the result, defaults included.
+fn settings(args: &IdentifyArgs, structure: Structure, ranges: &OrderRanges) -> Vec<(String, String)> {
+    let read = &args.read;
+    let or_all = |bound: Option<f64>, all: &str| bound.map_or(all.to_owned(), |v| v.to_string());
+    let mut list = vec![
+        ("structure".to_owned(), structure.name().to_owned()),
+        ("orders".to_owned(), ranges.to_string()),
+        ("criterion".to_owned(), format!("{:?}", args.criterion).to_lowercase()),
+        (
+            "initial state".to_owned(),
+            format!("{:?}", args.initial_state).to_lowercase(),
+        ),
+        ("input".to_owned(), read.input.clone()),
+        ("output".to_owned(), read.output.clone()),
+        (
+            "sampling".to_owned(),
+            read.fs.map_or("column t".to_owned(), |fs| format!("{fs} Hz")),
+        ),
+        (
+            "span in s".to_owned(),
+            format!("{} to {}", or_all(read.from, "start"), or_all(read.to, "end")),
+        ),
+        ("detrend".to_owned(), format!("{:?}", read.detrend).to_lowercase()),
+        ("start".to_owned(), args.start.clone().unwrap_or("own".to_owned())),
+        ("largest number of steps".to_owned(), args.max_iterations.to_string()),
+    ];
+    if read.resample || read.fill {
+        list.push((
+            "repair".to_owned(),
+            format!("resample {}, fill {}", read.resample, read.fill),
+        ));
+    }
+    if let Some(h) = &args.controlled_element {
+        list.push((
+            "controlled element".to_owned(),
+            format!("{:?} / {:?}", h.num(), h.den()),
+        ));
+    }
+    list
+}
+
+fn page(found: &Identified<'_>) -> String {
+    let fit = found.fit;
+    let mut page = String::new();
+    for (file, record) in found.files.iter().zip(found.records) {
+        page.push_str(&format!(
+            "{file}: {} samples of {} s from t = {:.4} s\n",
+            record.len(),
+            numbers::plain(record.sample_time().s()),
+            record.time_s(0)
+        ));
+    }
+    page.push('\n');
+    if let Some(choice) = found.choice {
+        page.push_str(&text::candidates(choice));
+        page.push('\n');
+    }
+    page.push_str(&text::model(fit));
+    page.push_str(&text::quality(fit, &found.quality));
+    page.push('\n');
+    page.push_str(&text::operator(found.operator));
+    if let Some(remnant) = found.remnant {
+        page.push_str(&text::remnant(remnant));
+    }
+    if let Some(m) = found.margins {
+        page.push_str(&format!(
+            "Open loop with the given controlled element: {}",
+            text::margins(m)
+        ));
+    }
+    if let Some((file, q)) = &found.validation {
+        page.push_str(&format!(
+            "On {file}: VAF simulation {:.2} %, prediction {:.2} %; NRMSE fit simulation {:.2} %, prediction {:.2} %.\n",
+            q.vaf_simulation, q.vaf_prediction, q.nrmse_simulation, q.nrmse_prediction
+        ));
+    }
+    let defaults: Vec<String> = found.settings.iter().map(|(k, v)| format!("{k}: {v}")).collect();
+    page.push_str(&format!("\nSettings: {}.\n", defaults.join("; ")));
+    page
+}
+
+/// Writes `report.html` into a directory, which is made if it is not there.
+pub fn write_report(directory: &Path, report: &Report<'_>) -> Result<PathBuf, CliError> {
+    let html = report.to_html()?;
+    make_directory(directory)?;
+    let path = directory.join("report.html");
+    write_atomically(&path, |out| out.write_all(html.as_bytes()))?;
+    Ok(path)
+}

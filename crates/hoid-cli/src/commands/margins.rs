@@ -1,0 +1,112 @@
+//! `hoid margins`: crossover, margins and remnant gains of a scenario.
+
+use hoid_model::{
+    ModelError,
+    margins::{MANUAL_CONTROL_RANGE_RAD_S, margins},
+    remnant::HIGHEST_ORDER,
+    remnant_gain::NoiseDefinition,
+    scenario::{RemnantStrength, Scenario},
+};
+use serde_json::{Value, json};
+
+use crate::{
+    args::{MarginsArgs, NoiseDefinitionName, StateName},
+    error::CliError,
+    json, output, text,
+};
+
+/// K_n for one order and level, or why there is none.
+struct Gain {
+    order: usize,
+    level: f64,
+    k_n: Result<f64, ModelError>,
+}
+
+pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
+    let scenario = super::scenario(&args.base)?;
+    let state = match args.state {
+        StateName::Initial => scenario.initial,
+        StateName::Last => scenario.last,
+    };
+    let open_loop = state
+        .operator
+        .transfer_function()?
+        .series(&state.controlled_element.transfer_function()?);
+    let found = margins(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S);
+    let definition = NoiseDefinition::from(args.noise_definition);
+    let gains: Vec<Gain> = (1..=HIGHEST_ORDER)
+        .flat_map(|order| args.noise_levels.iter().map(move |&level| (order, level)))
+        .map(|(order, level)| Gain {
+            order,
+            level,
+            k_n: gain(&scenario, &state, order, level, definition),
+        })
+        .collect();
+    // A level that cannot be reached is a row of the table; anything else is wrong for all of them.
+    for g in &gains {
+        if let Err(error) = &g.k_n
+            && !matches!(error, ModelError::UnreachableNoiseLevel { .. })
+        {
+            return Err(error.clone().into());
+        }
+    }
+    let name = match args.noise_definition {
+        NoiseDefinitionName::Response => "response",
+        NoiseDefinitionName::Remnant => "remnant",
+    };
+    if args.json {
+        let mut object = json::margins(&found);
+        let rows = gains
+            .iter()
+            .map(|g| match &g.k_n {
+                Ok(k_n) => json!({"remnant_order": g.order, "noise_level": g.level, "definition": name, "K_n": json::number(*k_n)}),
+                Err(reason) => json!({
+                    "remnant_order": g.order, "noise_level": g.level, "definition": name, "K_n": null, "reason": reason.to_string(),
+                }),
+            })
+            .collect();
+        object.insert("remnant_gain".to_owned(), Value::Array(rows));
+        json::print(&Value::Object(object));
+        return Ok(());
+    }
+    let mut header = vec!["K_n of order".to_owned()];
+    header.extend(args.noise_levels.iter().map(|l| format!("P_n = {l}")));
+    let mut table = text::table(&header.iter().map(String::as_str).collect::<Vec<_>>());
+    for rows in gains.chunks(args.noise_levels.len().max(1)) {
+        let mut cells = vec![format!("m = {}", rows[0].order)];
+        cells.extend(rows.iter().map(|g| match &g.k_n {
+            Ok(k_n) => format!("{k_n:.5}"),
+            Err(_) => "unreachable".to_owned(),
+        }));
+        table.add_row(cells);
+    }
+    let share = match definition {
+        NoiseDefinition::Response => "var(u_n)/var(u)",
+        NoiseDefinition::Remnant => "var(n)/var(u)",
+    };
+    let state_name = match args.state {
+        StateName::Initial => "initial",
+        StateName::Last => "last",
+    };
+    output::print(&format!(
+        "{}, {state_name} state.\n{}\nRemnant gain K_n for P_n = {share}, T_n = {} s, Ts = {} s:\n{table}\n",
+        scenario.name,
+        text::margins(&found),
+        scenario.remnant.time_constant_s,
+        scenario.sample_time.s(),
+    ));
+    Ok(())
+}
+
+fn gain(
+    scenario: &Scenario,
+    state: &hoid_model::scenario::OperatingState,
+    order: usize,
+    level: f64,
+    definition: NoiseDefinition,
+) -> Result<f64, ModelError> {
+    let mut scenario = scenario.clone();
+    scenario.remnant.order = order;
+    scenario.remnant.strength = RemnantStrength::Level { level, definition };
+    scenario.remnant_gain_of(state, 0.0)
+}

@@ -1,0 +1,70 @@
+//! `hoid simulate`: one closed-loop run into a file.
+
+use hoid_io::write_record;
+use hoid_model::{
+    SampleTime,
+    scenario::{RemnantStrength, Scenario},
+};
+use hoid_report::numbers;
+use hoid_sim::{Simulator, Stream};
+
+use crate::{args::SimulateArgs, error::CliError, output};
+
+pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
+    let scenario = with_changes(super::scenario(&args.base)?, args)?;
+    let simulator = Simulator::new(&scenario)?;
+    let stream = Stream {
+        seed: args.seed,
+        cell: 0,
+        replication: args.replication,
+    };
+    let record = simulator.run(stream, args.keep_run_in)?;
+    write_record(&args.out, &record)?;
+    let rms = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
+    output::print(&format!(
+        "{}: {} samples of {} s, seed {}, replication {}; rms e {} deg, rms u {} deg.\nWritten to {}.\n",
+        scenario.name,
+        record.len(),
+        record.sample_time().s(),
+        args.seed,
+        args.replication,
+        numbers::plain(rms(record.input())),
+        numbers::plain(rms(record.output())),
+        args.out.display(),
+    ));
+    Ok(())
+}
+
+fn with_changes(mut scenario: Scenario, args: &SimulateArgs) -> Result<Scenario, CliError> {
+    if let Some(order) = args.remnant_order {
+        scenario.remnant.order = order;
+    }
+    if let Some(time_constant) = args.remnant_time_constant {
+        scenario.remnant.time_constant_s = time_constant;
+    }
+    if let Some(ts) = args.sample_time {
+        scenario.sample_time = SampleTime::new(ts)?;
+    }
+    if let Some(realisation) = args.realisation {
+        scenario.realisation = realisation.into();
+    }
+    match (&mut scenario.remnant.strength, args.noise_level, args.noise_definition) {
+        (_, None, None) => {}
+        (RemnantStrength::Level { level, definition }, new_level, new_definition) => {
+            *level = new_level.unwrap_or(*level);
+            *definition = new_definition.map_or(*definition, Into::into);
+        }
+        (strength @ RemnantStrength::Gain { .. }, Some(level), definition) => {
+            *strength = RemnantStrength::Level {
+                level,
+                definition: definition.map(Into::into).unwrap_or_default(),
+            };
+        }
+        (RemnantStrength::Gain { .. }, None, Some(_)) => {
+            return Err(CliError::Usage(
+                "--noise-definition needs --noise-level: the scenario gives the gain K_n itself".to_owned(),
+            ));
+        }
+    }
+    Ok(scenario)
+}

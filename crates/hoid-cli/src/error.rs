@@ -1,0 +1,38 @@
+//! What ends a command early, and with which exit code.
+
+use hoid_ident::IdentError;
+use hoid_io::{IoError, ScenarioFileError};
+use hoid_model::ModelError;
+use hoid_report::ReportError;
+use hoid_sim::SimError;
+use thiserror::Error;
+
+/// Everything that a command can run into.
+#[derive(Debug, Error)]
+pub enum CliError {
+    /// What was typed contradicts itself or cannot be read.
+    #[error("{0}")]
+    Usage(String),
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error(transparent)]
+    Ident(#[from] IdentError),
+    #[error(transparent)]
+    Io(#[from] IoError),
+    #[error(transparent)]
+    Scenario(#[from] ScenarioFileError),
+    #[error(transparent)]
+    Sim(#[from] SimError),
+    #[error(transparent)]
+    Report(#[from] ReportError),
+}
+
+impl CliError {
+    /// 2 for wrong usage, 1 for data and tasks that give no result.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Usage(_) => 2,
+            _ => 1,
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! Results as JSON objects, the contract with other programs.
+
+use hoid_ident::{Choice, Fit, IdentError, validation::Quality};
+use hoid_model::{
+    NotConvertible, Orders, Record,
+    margins::Margins,
+    uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
+};
+use serde_json::{Map, Value, json};
+
+use crate::output;
+
+/// A number, or null where there is none: JSON has no NaN.
+pub fn number(value: f64) -> Value {
+    serde_json::Number::from_f64(value).map_or(Value::Null, Value::Number)
+}
+
+fn optional(value: Option<f64>) -> Value {
+    value.map_or(Value::Null, number)
+}
+
+fn estimate(e: &Estimate) -> Value {
+    json!({"value": number(e.value), "standard_error": optional(e.standard_error)})
+}
+
+pub fn orders(o: &Orders) -> Value {
+    json!({"na": o.na, "nb": o.nb, "nc": o.nc, "nd": o.nd, "nf": o.nf, "nk": o.nk})
+}
+
+/// The operator, or why there is none.
+pub fn operator(found: &Result<OperatorEstimate, NotConvertible>) -> Value {
+    match found {
+        Ok(o) => {
+            let mut map = Map::new();
+            map.insert("convertible".to_owned(), json!(true));
+            map.insert("stable".to_owned(), json!(o.parameters().is_stable()));
+            for (name, _, e) in o.rows() {
+                map.insert(name.to_owned(), estimate(&e));
+            }
+            Value::Object(map)
+        }
+        // Another order has no meaning as an operator at all.
+        Err(NotConvertible::OtherOrders { .. }) => Value::Null,
+        Err(reason) => json!({"convertible": false, "reason": reason.to_string()}),
+    }
+}
+
+fn remnant(found: &Result<RemnantEstimate, NotConvertible>) -> Value {
+    match found {
+        Ok(r) => json!({
+            "convertible": true,
+            "order": r.order,
+            "discretisation": crate::text::remnant_discretisation(r.discretisation),
+            "T_n": estimate(&r.t_n_s),
+            "K_n": estimate(&r.k_n),
+        }),
+        Err(reason) => json!({"convertible": false, "reason": reason.to_string()}),
+    }
+}
+
+pub fn margins(m: &Margins) -> Map<String, Value> {
+    let mut map = Map::new();
+    map.insert("crossover_rad_s".to_owned(), optional(m.crossover_rad_s));
+    map.insert("phase_margin_deg".to_owned(), optional(m.phase_margin_deg));
+    map.insert("gain_margin_db".to_owned(), optional(m.gain_margin_db));
+    map.insert("phase_crossover_rad_s".to_owned(), optional(m.phase_crossover_rad_s));
+    map
+}
+
+fn quality(q: &Quality, fit: &Fit) -> Value {
+    json!({
+        "vaf_simulation": number(q.vaf_simulation),
+        "vaf_prediction": number(q.vaf_prediction),
+        "nrmse_simulation": number(q.nrmse_simulation),
+        "nrmse_prediction": number(q.nrmse_prediction),
+        "aic": number(fit.aic()),
+        "bic": number(fit.bic()),
+        "fpe": number(fit.fpe()),
+    })
+}
+
+/// Everything that `identify` found.
+pub struct Identified<'a> {
+    pub files: &'a [String],
+    pub records: &'a [Record],
+    pub fit: &'a Fit,
+    pub choice: Option<&'a Choice>,
+    pub quality: Quality,
+    pub operator: &'a Result<OperatorEstimate, NotConvertible>,
+    pub remnant: Option<&'a Result<RemnantEstimate, NotConvertible>>,
+    pub margins: Option<&'a Margins>,
+    pub validation: Option<(&'a str, Quality)>,
+    pub settings: &'a [(String, String)],
+}
+
+impl Identified<'_> {
+    pub fn to_json(&self) -> Value {
+        let fit = self.fit;
+        let records: Vec<Value> = self
+            .files
+            .iter()
+            .zip(self.records)
+            .map(|(file, r)| json!({"file": file, "samples": r.len(), "sample_time": number(r.sample_time().s())}))
+            .collect();
+        let parameters: Vec<Value> = fit
+            .parameters()
+            .iter()
+            .map(|(name, e)| {
+                json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)})
+            })
+            .collect();
+        let termination = fit.termination();
+        let mut map = Map::new();
+        let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
+        set("hoid", json!(env!("CARGO_PKG_VERSION")));
+        set("records", Value::Array(records));
+        set("structure", json!(fit.model().structure().name()));
+        set("orders", orders(&fit.orders()));
+        set("parameters", Value::Array(parameters));
+        set("loss", number(fit.loss()));
+        set("innovation_variance", number(fit.innovation_variance()));
+        set(
+            "termination",
+            json!({
+                "reason": termination.reason.to_string(),
+                "converged": termination.converged(),
+                "iterations": termination.iterations,
+            }),
+        );
+        set("start", json!(fit.start()));
+        set("residuals", json!(fit.residual_count()));
+        set("initial_states", json!(fit.state_count()));
+        set("stable", json!(fit.model().is_stable()));
+        set("fit", quality(&self.quality, fit));
+        set("operator", operator(self.operator));
+        set("remnant", self.remnant.map_or(Value::Null, remnant));
+        if let Some(m) = self.margins {
+            set("open_loop", Value::Object(margins(m)));
+        }
+        if let Some((file, q)) = &self.validation {
+            set(
+                "validation",
+                json!({
+                    "file": file,
+                    "vaf_simulation": number(q.vaf_simulation),
+                    "vaf_prediction": number(q.vaf_prediction),
+                    "nrmse_simulation": number(q.nrmse_simulation),
+                    "nrmse_prediction": number(q.nrmse_prediction),
+                }),
+            );
+        }
+        set("candidates", self.choice.map_or(json!([]), candidates));
+        let settings: Map<String, Value> = self.settings.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
+        set("settings", Value::Object(settings));
+        Value::Object(map)
+    }
+}
+
+fn candidates(choice: &Choice) -> Value {
+    let row = |c: &hoid_ident::Candidate| match &c.outcome {
+        Ok(f) => json!({
+            "orders": orders(&c.orders),
+            "loss": number(f.loss),
+            "aic": number(f.aic),
+            "bic": number(f.bic),
+            "converged": f.converged,
+        }),
+        Err(reason) => json!({"orders": orders(&c.orders), "error": IdentError::to_string(reason)}),
+    };
+    Value::Array(choice.candidates.iter().map(row).collect())
+}
+
+/// Prints one object, indented, and nothing else.
+pub fn print(value: &Value) {
+    output::print(&format!("{value:#}\n"));
+}

@@ -1,0 +1,156 @@
+//! Orders, ranges and named numbers as they are typed.
+
+use std::ops::RangeInclusive;
+
+use hoid_ident::OrderRanges;
+use hoid_model::{Orders, SampleTime, Structure};
+
+use crate::error::CliError;
+
+/// `N` or `LO..HI` (both ends included).
+pub fn parse_range(text: &str) -> Result<RangeInclusive<usize>, String> {
+    let number = |part: &str| {
+        part.trim()
+            .parse::<usize>()
+            .map_err(|_| format!("{part:?} is no whole number of zero or more; write N or LO..HI"))
+    };
+    match text.split_once("..") {
+        None => number(text).map(|n| n..=n),
+        Some((low, high)) => {
+            let (low, high) = (number(low)?, number(high.trim_start_matches('='))?);
+            if low > high {
+                return Err(format!(
+                    "the range {low}..{high} is empty; write the smaller number first"
+                ));
+            }
+            Ok(low..=high)
+        }
+    }
+}
+
+/// `name=value,name=value`.
+pub fn parse_pairs(text: &str) -> Result<Vec<(String, String)>, String> {
+    text.split(',')
+        .map(str::trim)
+        .filter(|part| !part.is_empty())
+        .map(|part| {
+            let (name, value) = part
+                .split_once('=')
+                .ok_or_else(|| format!("{part:?} has no '='; write name=value,name=value"))?;
+            Ok((name.trim().to_owned(), value.trim().to_owned()))
+        })
+        .collect()
+}
+
+/// `name=number,name=number`.
+pub fn parse_numbers(text: &str) -> Result<Vec<(String, f64)>, String> {
+    parse_pairs(text)?
+        .into_iter()
+        .map(|(name, value)| match value.parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok((name, number)),
+            _ => Err(format!("{name}={value}: expected a finite number")),
+        })
+        .collect()
+}
+
+/// What is to be searched: the defaults of the structure, changed by what was typed.
+pub fn ranges(
+    structure: Structure,
+    orders: Option<&str>,
+    nk: Option<&RangeInclusive<usize>>,
+    sample_time: SampleTime,
+) -> Result<OrderRanges, CliError> {
+    let mut ranges = hoid_ident::order_search::default_operator_ranges(structure, sample_time);
+    for (name, value) in parse_pairs(orders.unwrap_or_default()).map_err(CliError::Usage)? {
+        let range = parse_range(&value).map_err(|e| CliError::Usage(format!("--orders {name}: {e}")))?;
+        let place = match name.as_str() {
+            "na" => &mut ranges.na,
+            "nb" => &mut ranges.nb,
+            "nc" => &mut ranges.nc,
+            "nd" => &mut ranges.nd,
+            "nf" => &mut ranges.nf,
+            "nk" if nk.is_some() => {
+                return Err(CliError::Usage(
+                    "nk is given twice, by --orders and by --nk; drop one".to_owned(),
+                ));
+            }
+            "nk" => &mut ranges.nk,
+            _ => {
+                return Err(CliError::Usage(format!(
+                    "--orders: there is no order {name}; expected na, nb, nc, nd, nf or nk"
+                )));
+            }
+        };
+        *place = range;
+    }
+    if let Some(nk) = nk {
+        ranges.nk = nk.clone();
+    }
+    Ok(ranges)
+}
+
+/// Theta from `f1=..,b0=..`: every coefficient of the orders, each once.
+pub fn theta(orders: &Orders, text: &str) -> Result<Vec<f64>, CliError> {
+    let names = orders.parameter_names();
+    let mut theta = vec![None; names.len()];
+    for (name, value) in parse_numbers(text).map_err(|e| CliError::Usage(format!("--start: {e}")))? {
+        let Some(i) = names.iter().position(|n| *n == name) else {
+            return Err(CliError::Usage(format!(
+                "--start: the model has no coefficient {name}; it has {}",
+                names.join(", ")
+            )));
+        };
+        if theta[i].replace(value).is_some() {
+            return Err(CliError::Usage(format!("--start: {name} is given twice")));
+        }
+    }
+    let missing: Vec<&str> = names
+        .iter()
+        .zip(&theta)
+        .filter(|(_, v)| v.is_none())
+        .map(|(n, _)| n.as_str())
+        .collect();
+    if !missing.is_empty() {
+        return Err(CliError::Usage(format!(
+            "--start lacks {}; give all coefficients, or none for the program's own starts",
+            missing.join(", ")
+        )));
+    }
+    Ok(theta.into_iter().flatten().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_as_typed() {
+        assert_eq!(parse_range("29").unwrap(), 29..=29);
+        assert_eq!(parse_range("20..40").unwrap(), 20..=40);
+        assert_eq!(parse_range("20..=40").unwrap(), 20..=40);
+        for bad in ["", "x", "-1", "5..4", "1..", "1.5"] {
+            assert!(parse_range(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn defaults_stay_where_nothing_is_typed() {
+        let ts = SampleTime::HUNDREDTH;
+        let all = ranges(Structure::BoxJenkins, None, None, ts).unwrap();
+        assert_eq!((all.nk.clone(), all.nd.clone(), all.nb.clone()), (6..=61, 1..=4, 2..=2));
+        let some = ranges(Structure::BoxJenkins, Some("nd=2, nc=1"), Some(&(29..=29)), ts).unwrap();
+        assert_eq!((some.nk, some.nd, some.nc, some.nf), (29..=29, 2..=2, 1..=1, 2..=2));
+        assert!(ranges(Structure::Arx, Some("nx=2"), None, ts).is_err());
+        assert!(ranges(Structure::Arx, Some("nk=2"), Some(&(3..=3)), ts).is_err());
+    }
+
+    #[test]
+    fn a_start_is_complete_or_refused() {
+        let orders = Structure::BoxJenkins.operator_orders(29);
+        let good = theta(&orders, "f1=-1.9,f2=.92,b0=.04,b1=-.04,d1=-.8").unwrap();
+        assert_eq!(good, [0.04, -0.04, -0.8, -1.9, 0.92]);
+        for bad in ["f1=-1.9", "a1=3", "f1=1,f1=2", "f1=abc"] {
+            assert!(theta(&orders, bad).is_err(), "{bad}");
+        }
+    }
+}

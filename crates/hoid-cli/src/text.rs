@@ -1,0 +1,179 @@
+//! Results as tables for people.
+
+use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
+use hoid_ident::{Choice, Fit, order_search::Criterion, validation::Quality};
+use hoid_model::{
+    NotConvertible,
+    margins::Margins,
+    remnant::RemnantDiscretisation,
+    uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
+};
+use hoid_report::numbers;
+
+/// Rows of a search that are printed; all of them are in the JSON.
+const CANDIDATES_SHOWN: usize = 8;
+
+/// Three rules, as in print.
+const STYLE: TableStyle = {
+    let rule = LineStyle::none().fill('─').junction('─');
+    TableStyle::new()
+        .top_border(rule)
+        .header_separator(rule)
+        .bottom_border(rule)
+};
+
+/// A table in the plain style of all output: first column to the left, the others to the right.
+pub fn table(header: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_style(STYLE);
+    table.set_header(header.to_vec());
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+/// Value and standard error as two texts with the digits that the error allows.
+pub fn with_uncertainty(e: &Estimate) -> (String, String) {
+    numbers::with_uncertainty(e.value, e.standard_error)
+}
+
+/// Name of a discretisation as on the command line.
+pub fn remnant_discretisation(how: RemnantDiscretisation) -> &'static str {
+    match how {
+        RemnantDiscretisation::ZeroOrderHold => "zoh",
+        RemnantDiscretisation::BackwardEuler => "backward-euler",
+    }
+}
+
+/// The model in a line, and its coefficients.
+pub fn model(fit: &Fit) -> String {
+    let mut coefficients = table(&["coefficient", "value", "standard error"]);
+    for (name, e) in fit.parameters() {
+        let (value, error) = with_uncertainty(&e);
+        coefficients.add_row([name, value, error]);
+    }
+    let t = fit.termination();
+    let mut text = format!(
+        "{}({})\n{coefficients}\nSearch: {}, {} steps, start: {}.\n",
+        fit.model().structure(),
+        fit.orders(),
+        t.reason,
+        t.iterations,
+        fit.start(),
+    );
+    if !fit.model().is_stable() {
+        text.push_str("The model from e to u is not stable (a pole outside the unit circle).\n");
+    }
+    text
+}
+
+/// Loss and fit percentages.
+pub fn quality(fit: &Fit, q: &Quality) -> String {
+    format!(
+        "Loss {} over {} residuals; innovation variance {} (divisor: residuals - parameters - {} initial states).\n\
+         VAF (no mean removed): simulation {:.2} %, prediction {:.2} %.  NRMSE fit (mean removed): simulation {:.2} %, \
+         prediction {:.2} %.\n",
+        numbers::plain(fit.loss()),
+        fit.residual_count(),
+        numbers::plain(fit.innovation_variance()),
+        fit.state_count(),
+        q.vaf_simulation,
+        q.vaf_prediction,
+        q.nrmse_simulation,
+        q.nrmse_prediction,
+    )
+}
+
+/// The operator's parameters, or why there are none.
+pub fn operator(found: &Result<OperatorEstimate, NotConvertible>) -> String {
+    match found {
+        Ok(o) => {
+            let mut rows = table(&["operator", "value", "standard error", "unit"]);
+            for (name, unit, e) in o.rows() {
+                let (value, error) = with_uncertainty(&e);
+                rows.add_row([name.to_owned(), value, error, unit.to_owned()]);
+            }
+            let warning = if o.parameters().is_stable() {
+                ""
+            } else {
+                "zeta_nm is not positive: not stable.\n"
+            };
+            format!("{rows}\n{warning}")
+        }
+        Err(reason) => format!("Operator parameters: {}.\n", not_convertible(reason)),
+    }
+}
+
+/// T_n and K_n, or why there are none.
+pub fn remnant(found: &Result<RemnantEstimate, NotConvertible>) -> String {
+    match found {
+        Ok(r) => {
+            let ((t_n, t_n_error), (k_n, k_n_error)) = (with_uncertainty(&r.t_n_s), with_uncertainty(&r.k_n));
+            format!(
+                "Remnant of order {} ({}): T_n = {t_n} s (standard error {t_n_error}), K_n = {k_n} ({k_n_error}).\n",
+                r.order,
+                remnant_discretisation(r.discretisation)
+            )
+        }
+        Err(reason) => format!("Remnant filter: {}.\n", not_convertible(reason)),
+    }
+}
+
+fn not_convertible(reason: &NotConvertible) -> String {
+    format!("not convertible: {reason}")
+}
+
+/// Crossover and margins in a line.
+pub fn margins(m: &Margins) -> String {
+    let or_none = |value: Option<f64>, unit: &str| match value {
+        Some(v) => format!("{v:.4} {unit}"),
+        None => "none".to_owned(),
+    };
+    format!(
+        "Crossover frequency {}, phase margin {}; gain margin {} at {}.\n",
+        or_none(m.crossover_rad_s, "rad/s"),
+        or_none(m.phase_margin_deg, "deg"),
+        or_none(m.gain_margin_db, "dB"),
+        or_none(m.phase_crossover_rad_s, "rad/s"),
+    )
+}
+
+/// The best candidates of a search.
+pub fn candidates(choice: &Choice) -> String {
+    let mut good: Vec<_> = choice
+        .candidates
+        .iter()
+        .filter_map(|c| c.outcome.as_ref().ok().map(|f| (c.orders, f)))
+        .collect();
+    let key = match choice.criterion {
+        Criterion::Loss => "loss",
+        Criterion::Aic => "AIC",
+        Criterion::Bic => "BIC",
+    };
+    good.sort_by(|a, b| {
+        let value = |f: &hoid_ident::order_search::CandidateFigures| f.value(choice.criterion);
+        value(a.1).total_cmp(&value(b.1))
+    });
+    let mut rows = table(&["candidate", "loss", "AIC", "BIC", ""]);
+    for (orders, f) in good.iter().take(CANDIDATES_SHOWN) {
+        rows.add_row([
+            orders.to_string(),
+            numbers::plain(f.loss),
+            format!("{:.1}", f.aic),
+            format!("{:.1}", f.bic),
+            if f.converged { "" } else { "not converged" }.to_owned(),
+        ]);
+    }
+    let failed = choice.candidates.len() - good.len();
+    let mut text = format!(
+        "Searched {} candidates, smallest {key} first; all on the same samples.\n{rows}\n",
+        choice.candidates.len()
+    );
+    if failed > 0 {
+        text.push_str(&format!(
+            "{failed} candidates could not be fitted; --json lists the reasons.\n"
+        ));
+    }
+    text
+}

@@ -1,0 +1,463 @@
+//! The commands as a user runs them.
+#![allow(clippy::unwrap_used)]
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output},
+};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn hoid(directory: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hoid"))
+        .args(arguments)
+        .current_dir(directory)
+        .output()
+        .unwrap()
+}
+
+fn good(directory: &Path, arguments: &[&str]) -> String {
+    let output = hoid(directory, arguments);
+    assert!(
+        output.status.success(),
+        "{arguments:?}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn json(directory: &Path, arguments: &[&str]) -> Value {
+    serde_json::from_str(&good(directory, arguments)).unwrap()
+}
+
+/// Exit code and message of a command that fails, which must print nothing on standard output and leave no file behind.
+fn bad(directory: &Path, arguments: &[&str]) -> (i32, String) {
+    let files = |d: &Path| fs::read_dir(d).unwrap().count();
+    let before = files(directory);
+    let output = hoid(directory, arguments);
+    assert!(
+        output.stdout.is_empty(),
+        "{arguments:?}: {}",
+        String::from_utf8_lossy(&output.stdout)
+    );
+    assert_eq!(files(directory), before, "{arguments:?} left a file behind");
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(!message.contains("panicked"), "{message}");
+    (output.status.code().unwrap(), message)
+}
+
+fn simulated() -> TempDir {
+    let directory = TempDir::new().unwrap();
+    good(
+        directory.path(),
+        &["simulate", "--condition", "C1", "--seed", "1", "--out", "c1.csv"],
+    );
+    directory
+}
+
+/// A file of `rows` samples at 100 Hz, each line made by `row` from its number.
+fn write(directory: &Path, name: &str, header: &str, rows: usize, row: impl Fn(usize) -> String) {
+    let lines: Vec<String> = std::iter::once(header.to_owned()).chain((0..rows).map(row)).collect();
+    fs::write(directory.join(name), lines.join("\n") + "\n").unwrap();
+}
+
+fn wave(k: usize) -> (f64, f64, f64) {
+    let t = k as f64 / 100.0;
+    (
+        t,
+        (1.7 * t).sin() + 0.5 * (9.1 * t).sin(),
+        (1.7 * t - 0.8).sin() + 0.3 * (23.0 * t).cos(),
+    )
+}
+
+fn row(k: usize) -> String {
+    let (t, e, u) = wave(k);
+    format!("{t},{e},{u}")
+}
+
+#[test]
+fn identify_prints_the_json_of_the_contract() {
+    let directory = simulated();
+    let found = json(
+        directory.path(),
+        &["identify", "c1.csv", "--nk", "29", "--orders", "nd=1", "--json"],
+    );
+    assert_eq!(found["structure"], "bj");
+    assert_eq!(
+        found["orders"],
+        serde_json::json!({"na": 0, "nb": 2, "nc": 0, "nd": 1, "nf": 2, "nk": 29})
+    );
+    assert_eq!(found["records"][0]["samples"], 8192);
+    let names: Vec<&str> = found["parameters"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| p["name"].as_str().unwrap())
+        .collect();
+    assert_eq!(names, ["b0", "b1", "d1", "f1", "f2"]);
+    assert_eq!(found["termination"]["converged"], true);
+    assert_eq!(found["operator"]["convertible"], true);
+    for (name, truth) in [
+        ("K_e", 0.09),
+        ("T_L", 0.4),
+        ("K_e_dot", 0.036),
+        ("omega_nm", 11.25),
+        ("zeta_nm", 0.35),
+    ] {
+        let (value, error) = (
+            &found["operator"][name]["value"],
+            &found["operator"][name]["standard_error"],
+        );
+        let distance = (value.as_f64().unwrap() - truth) / error.as_f64().unwrap();
+        assert!(distance.abs() < 4.0, "{name} lies {distance} standard errors off");
+    }
+    let close = |value: &Value, truth: f64| {
+        (value["value"].as_f64().unwrap() - truth).abs() < 4.0 * value["standard_error"].as_f64().unwrap()
+    };
+    assert!((found["operator"]["tau_e"]["value"].as_f64().unwrap() - 0.28).abs() < 1e-12);
+    assert!(close(&found["remnant"]["T_n"], 0.06));
+    assert!(close(&found["remnant"]["K_n"], 0.076_36));
+    for key in [
+        "vaf_simulation",
+        "vaf_prediction",
+        "nrmse_simulation",
+        "nrmse_prediction",
+        "aic",
+        "bic",
+        "fpe",
+    ] {
+        assert!(found["fit"][key].is_number(), "{key}");
+    }
+    assert_eq!(found["candidates"], serde_json::json!([]));
+}
+
+#[test]
+fn a_range_is_searched_and_its_table_is_part_of_the_result() {
+    let directory = simulated();
+    let found = json(
+        directory.path(),
+        &["identify", "c1.csv", "--nk", "27..31", "--orders", "nd=1..2", "--json"],
+    );
+    assert_eq!(found["candidates"].as_array().unwrap().len(), 10);
+    assert_eq!(found["orders"]["nk"], 29);
+    assert_eq!(found["orders"]["nd"], 1);
+    let text = good(
+        directory.path(),
+        &["identify", "c1.csv", "--structure", "arx", "--nk", "27..31"],
+    );
+    assert!(text.contains("Searched 5 candidates"), "{text}");
+}
+
+#[test]
+fn several_records_start_validation_report_and_margins() {
+    let directory = simulated();
+    let d = directory.path();
+    good(
+        d,
+        &["simulate", "--condition", "C1", "--seed", "2", "--out", "again.csv"],
+    );
+    let arguments = [
+        "identify",
+        "c1.csv",
+        "again.csv",
+        "--nk",
+        "29",
+        "--orders",
+        "nd=1",
+        "--validate",
+        "again.csv",
+        "--report",
+        "out",
+        "--controlled-element",
+        "90/1,6,0",
+        "--start",
+        "b0=.04,b1=-.04,d1=-.5,f1=-1.8,f2=.85",
+        "--json",
+    ];
+    let found = json(d, &arguments);
+    assert_eq!(found["records"].as_array().unwrap().len(), 2);
+    assert_eq!(found["start"], "given");
+    let crossover = found["open_loop"]["crossover_rad_s"].as_f64().unwrap();
+    assert!((crossover - 1.5635).abs() < 0.1, "{crossover}");
+    assert!(found["validation"]["vaf_simulation"].as_f64().unwrap() > 85.0);
+    let page = fs::read_to_string(d.join("out/report.html")).unwrap();
+    assert!(page.contains("<svg") && page.contains("again.csv"), "{}", page.len());
+}
+
+#[test]
+fn simulate_is_repeatable_and_takes_its_options() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    let file = |name: &str, more: &[&str]| {
+        let mut arguments = vec!["simulate", "--condition", "C4", "--out", name];
+        arguments.extend(more);
+        good(d, &arguments);
+        fs::read_to_string(d.join(name)).unwrap()
+    };
+    let base = file("a.csv", &["--seed", "5"]);
+    assert_eq!(base, file("b.csv", &["--seed", "5"]));
+    assert_ne!(base, file("c.csv", &["--seed", "5", "--replication", "1"]));
+    assert_ne!(base, file("d.csv", &["--seed", "5", "--realisation", "output"]));
+    assert_ne!(
+        base,
+        file(
+            "e.csv",
+            &["--seed", "5", "--remnant-order", "3", "--noise-definition", "remnant"]
+        )
+    );
+    let header = base.lines().find(|l| !l.starts_with('#')).unwrap();
+    assert_eq!(
+        header,
+        "t,f_t,e,u,x,n,K_e,T_L,K_e_dot,omega_nm,zeta_nm,tau_e,T_n,K_n,K_c,omega_b"
+    );
+    let rows = |text: &str| text.lines().filter(|l| !l.starts_with('#')).count() - 1;
+    assert_eq!(rows(&base), 8192);
+    assert_eq!(rows(&file("f.csv", &["--keep-run-in"])), 9192);
+    assert_eq!(rows(&file("g.csv", &["--sample-time", "0.02"])), 4096);
+    fs::write(d.join("s.toml"), "condition = \"C2\"\n[remnant]\nnoise_level = 0.2\n").unwrap();
+    good(d, &["simulate", "--scenario", "s.toml", "--out", "h.csv"]);
+}
+
+#[test]
+fn convert_goes_both_ways_and_says_what_does_not_convert() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    let operator = "K_e=.09,T_L=.4,omega_nm=11.25,zeta_nm=.35,tau_e=.28";
+    let there = json(d, &["convert", "--operator", operator, "--json"]);
+    assert!((there["discrete"]["f"][0].as_f64().unwrap() + 1.912_113_054_8).abs() < 5e-11);
+    assert!((there["discrete"]["b"][1].as_f64().unwrap() + 0.043_182_380_6).abs() < 5e-11);
+    assert_eq!(there["discrete"]["nk"], 29);
+    let number = |v: &Value| v.as_f64().unwrap().to_string();
+    let (f, b) = (&there["discrete"]["f"], &there["discrete"]["b"]);
+    let f = format!("{},{}", number(&f[0]), number(&f[1]));
+    let b = format!("{},{}", number(&b[0]), number(&b[1]));
+    let back = json(
+        d,
+        &[
+            "convert",
+            "--f",
+            &f,
+            "--b",
+            &b,
+            "--nk",
+            "29",
+            "--sample-time",
+            "0.01",
+            "--json",
+        ],
+    );
+    assert!((back["operator"]["T_L"]["value"].as_f64().unwrap() - 0.4).abs() < 1e-9);
+    let none = json(d, &["convert", "--f", "-0.9,-0.05", "--b", "1,0", "--json"]);
+    assert_eq!(none["operator"]["convertible"], false);
+    assert!(
+        none["operator"]["reason"]
+            .as_str()
+            .unwrap()
+            .contains("negative real axis")
+    );
+    let held = json(
+        d,
+        &[
+            "convert",
+            "--transfer-function",
+            "1/1,0",
+            "--method",
+            "tustin",
+            "--sample-time",
+            "0.2",
+            "--json",
+        ],
+    );
+    assert_eq!(held["transfer_function"]["num"], serde_json::json!([0.1, 0.1]));
+}
+
+#[test]
+fn margins_of_both_states() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    let s1 = json(d, &["margins", "--condition", "C1", "--json"]);
+    assert!((s1["crossover_rad_s"].as_f64().unwrap() - 1.5635).abs() < 5e-5);
+    assert!((s1["phase_margin_deg"].as_f64().unwrap() - 76.67).abs() < 5e-3);
+    assert_eq!(s1["remnant_gain"].as_array().unwrap().len(), 16);
+    let s2 = json(
+        d,
+        &[
+            "margins",
+            "--condition",
+            "C4",
+            "--state",
+            "last",
+            "--noise-levels",
+            "0.1",
+            "--json",
+        ],
+    );
+    assert!((s2["crossover_rad_s"].as_f64().unwrap() - 2.748).abs() < 5e-5);
+    assert!((s2["remnant_gain"][1]["K_n"].as_f64().unwrap() - 0.165).abs() < 5e-6);
+    let unreachable = json(
+        d,
+        &[
+            "margins",
+            "--condition",
+            "C1",
+            "--noise-definition",
+            "remnant",
+            "--noise-levels",
+            "5",
+            "--json",
+        ],
+    );
+    assert!(unreachable["remnant_gain"][0]["K_n"].is_null());
+    assert!(
+        unreachable["remnant_gain"][0]["reason"]
+            .as_str()
+            .unwrap()
+            .contains("largest reachable")
+    );
+}
+
+#[test]
+fn demo_writes_its_record_and_report() {
+    let directory = TempDir::new().unwrap();
+    let text = good(directory.path(), &["demo", "--out", "here"]);
+    assert!(
+        text.contains("before the change") && text.contains("after the change"),
+        "{text}"
+    );
+    for file in ["here/c4.csv", "here/report.html"] {
+        assert!(directory.path().join(file).is_file(), "{file}");
+    }
+}
+
+#[test]
+fn bad_input_is_told_in_the_users_words() {
+    let directory = simulated();
+    let d = directory.path();
+    let n = 400;
+    fs::write(d.join("empty.csv"), "").unwrap();
+    write(d, "nocolumn.csv", "t,e,y", n, row);
+    write(d, "text.csv", "t,e,u", n, |k| {
+        if k == 7 { "0.07,abc,1".to_owned() } else { row(k) }
+    });
+    write(d, "nan.csv", "t,e,u", n, |k| {
+        if k == 8 { "0.08,NaN,1".to_owned() } else { row(k) }
+    });
+    write(d, "inf.csv", "t,e,u", n, |k| {
+        if k == 9 { "0.09,1,inf".to_owned() } else { row(k) }
+    });
+    write(d, "gap.csv", "t,e,u", n, |k| row(if k > 50 { k + 20 } else { k }));
+    write(d, "jitter.csv", "t,e,u", n, |k| {
+        let (t, e, u) = wave(k);
+        format!("{},{e},{u}", t + 0.003 * (k as f64 * 2.3).sin())
+    });
+    write(d, "short.csv", "t,e,u", 33, row);
+    write(d, "zero.csv", "t,e,u", n, |k| format!("{},{},0", wave(k).0, wave(k).1));
+    write(d, "constant.csv", "t,e,u", n, |k| {
+        format!("{},2.5,{}", wave(k).0, wave(k).2)
+    });
+    write(d, "slow.csv", "t,e,u", n, |k| {
+        format!("{},{},{}", 2.0 * wave(k).0, wave(k).1, wave(k).2)
+    });
+    write(d, "one.csv", "t,e,u", n, row);
+    let cases: [(&[&str], &[&str]); 17] = [
+        (&["empty.csv"], &["empty.csv", "empty"]),
+        (&["absent.csv"], &["absent.csv", "cannot be read"]),
+        (&["nocolumn.csv"], &["u", "t, e, y"]),
+        (&["text.csv"], &["line 9", "abc"]),
+        (&["nan.csv"], &["line 10", "--fill"]),
+        (&["inf.csv"], &["line 11", "inf"]),
+        (&["gap.csv"], &["line 52", "--resample"]),
+        (&["jitter.csv"], &["--resample"]),
+        (&["short.csv"], &["33 samples"]),
+        (&["one.csv", "--nk", "500"], &["nk = 500", "400 samples"]),
+        (&["zero.csv"], &["u", "0 in every sample"]),
+        (&["constant.csv"], &["e", "2.5 in every sample"]),
+        (&["one.csv", "slow.csv"], &["0.02", "0.01", "resample"]),
+        (&["one.csv", "--from", "90", "--to", "95"], &["90", "95"]),
+        (&["one.csv", "--input", "q"], &["q", "t, e, u"]),
+        (
+            &["one.csv", "--start", "f1=2", "--nk", "5", "--orders", "nd=1"],
+            &["--start lacks b0"],
+        ),
+        (
+            &[
+                "one.csv",
+                "--start",
+                "b0=1,b1=1,d1=0,f1=-2.1,f2=1.2",
+                "--nk",
+                "5",
+                "--orders",
+                "nd=1",
+            ],
+            &["unit circle"],
+        ),
+    ];
+    for (arguments, expected) in cases {
+        let mut all = vec!["identify", "--nk", "29", "--orders", "nd=1"];
+        if arguments.contains(&"--nk") {
+            all.truncate(1);
+        }
+        if arguments.contains(&"--orders") {
+            all.truncate(1);
+        }
+        all.extend(arguments);
+        let (code, message) = bad(d, &all);
+        let usage = message.contains("--start lacks");
+        assert_eq!(code, if usage { 2 } else { 1 }, "{arguments:?}: {message}");
+        for part in expected {
+            assert!(message.contains(part), "{arguments:?}: {part:?} is not in: {message}");
+        }
+    }
+}
+
+#[test]
+fn wrong_usage_ends_with_two() {
+    let directory = simulated();
+    let d = directory.path();
+    for arguments in [
+        &["identify"][..],
+        &["identify", "c1.csv", "--nk", "5..2"],
+        &["identify", "c1.csv", "--orders", "nx=2"],
+        &["identify", "c1.csv", "--orders", "nk=3", "--nk", "4"],
+        &["identify", "c1.csv", "--structure", "armax"],
+        &["identify", "c1.csv", "--start", "b0=1"],
+        &["simulate", "--out", "x.csv"],
+        &["simulate", "--condition", "C9", "--out", "x.csv"],
+        &["convert", "--f", "1,2"],
+        &["convert", "--operator", "K_e=1"],
+        &["convert", "--operator", "K_e=x"],
+        &["convert", "--transfer-function", "1/1,2", "--method", "prewarped"],
+        &["margins"],
+        &["nonsense"],
+    ] {
+        let (code, message) = bad(d, arguments);
+        assert_eq!(code, 2, "{arguments:?}: {message}");
+    }
+}
+
+#[test]
+fn what_cannot_be_simulated_ends_with_one_and_writes_nothing() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    for (arguments, expected) in [
+        (&["--noise-level", "1.5"][..], "P_n"),
+        (&["--remnant-order", "7"], "order"),
+        (
+            &["--noise-level", "5", "--noise-definition", "remnant"],
+            "largest reachable",
+        ),
+        (&["--sample-time", "0.013"], "whole number of samples"),
+        (&["--sample-time", "-1"], "Ts"),
+        (&["--remnant-time-constant", "0"], "T_n"),
+    ] {
+        let mut all = vec!["simulate", "--condition", "C1", "--out", "x.csv"];
+        all.extend(arguments);
+        let (code, message) = bad(d, &all);
+        assert_eq!(code, 1, "{arguments:?}: {message}");
+        assert!(message.contains(expected), "{arguments:?}: {message}");
+    }
+    let (code, _) = bad(d, &["simulate", "--condition", "C1", "--out", "no/such/place.csv"]);
+    assert_eq!(code, 1);
+}

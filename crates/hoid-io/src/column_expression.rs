@@ -1,0 +1,188 @@
+//! Which columns are the input and the output: `NAME`, `-NAME` or `NAME-NAME`.
+//!
+//! Laboratories often record the target r and the output y of the controlled element and leave the tracking error
+//! `e = r - y` to the reader, or count the control with the other sign. A column whose name is the whole text wins, so that a
+//! name may hold a hyphen.
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::IoError;
+
+/// A column, its negative, or the difference of two columns. It is text until the columns of a file are known.
+///
+/// ```
+/// let error: hoid_io::ColumnExpression = "r-y".parse()?;
+/// assert_eq!(error.to_string(), "r-y");
+/// # Ok::<(), hoid_io::IoError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ColumnExpression {
+    text: String,
+}
+
+/// An expression in terms of the columns of one file, counted from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Signal {
+    Column(usize),
+    Negative(usize),
+    Difference(usize, usize),
+}
+
+impl ColumnExpression {
+    /// The column of this name.
+    pub fn column(name: impl Into<String>) -> Self {
+        Self { text: name.into() }
+    }
+
+    /// The columns that are meant, among `names`.
+    pub(crate) fn resolve(&self, names: &[&str], file: &str) -> Result<Signal, IoError> {
+        let find = |name: &str| {
+            let name = name.trim();
+            names.iter().position(|known| !known.is_empty() && *known == name)
+        };
+        if let Some(column) = find(&self.text) {
+            return Ok(Signal::Column(column));
+        }
+        let mut meanings = Vec::new();
+        if let Some(name) = self.text.strip_prefix('-') {
+            meanings.extend(find(name).map(Signal::Negative));
+        }
+        let splits: Vec<(&str, &str)> = self
+            .text
+            .match_indices('-')
+            .map(|(at, _)| (&self.text[..at], &self.text[at + 1..]))
+            .filter(|(left, right)| !left.trim().is_empty() && !right.trim().is_empty())
+            .collect();
+        for (left, right) in &splits {
+            if let (Some(left), Some(right)) = (find(left), find(right)) {
+                meanings.push(Signal::Difference(left, right));
+            }
+        }
+        match (meanings.as_slice(), splits.as_slice()) {
+            ([one], _) => Ok(*one),
+            ([], splits) => {
+                // With one hyphen it is clear which of the two names is wrong; otherwise the text is named as it stands.
+                let parts = match splits {
+                    [(left, right)] => vec![*left, *right],
+                    _ => vec![self.text.strip_prefix('-').unwrap_or(&self.text)],
+                };
+                let missing: Vec<String> = parts
+                    .into_iter()
+                    .filter(|part| find(part).is_none())
+                    .map(|part| format!("\"{}\"", part.trim()))
+                    .collect();
+                Err(IoError::NoSuchColumn {
+                    file: file.to_owned(),
+                    missing: missing.join(" and no "),
+                    asked: self.text.clone(),
+                    available: list(names),
+                })
+            }
+            _ => Err(IoError::Expression {
+                found: self.text.clone(),
+                expected: format!(
+                    "it can be read as more than one difference of the columns of {file}; rename a column so that no name holds a hyphen"
+                ),
+            }),
+        }
+    }
+}
+
+impl FromStr for ColumnExpression {
+    type Err = IoError;
+
+    /// # Errors
+    /// [`IoError::Expression`] when the text holds no name.
+    fn from_str(text: &str) -> Result<Self, IoError> {
+        let trimmed = text.trim();
+        if trimmed.trim_matches(|c: char| c == '-' || c.is_whitespace()).is_empty() {
+            return Err(IoError::Expression {
+                found: text.to_owned(),
+                expected: String::from("expected a column name, -NAME, or a difference NAME-NAME such as r-y"),
+            });
+        }
+        Ok(Self {
+            text: trimmed.to_owned(),
+        })
+    }
+}
+
+impl fmt::Display for ColumnExpression {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+/// Names for a message: all of them, unless there are very many.
+pub(crate) fn list(names: &[&str]) -> String {
+    const SHOWN: usize = 40;
+    let named: Vec<&str> = names.iter().copied().filter(|name| !name.is_empty()).collect();
+    let mut text = named[..named.len().min(SHOWN)].join(", ");
+    match named.len() {
+        0 => text.push_str("no named columns"),
+        n if n > SHOWN => text.push_str(&format!(" and {} more", n - SHOWN)),
+        _ => {}
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NAMES: [&str; 6] = ["t", "r", "y", "stick-x", "", "r-d"];
+
+    fn resolve(text: &str) -> Result<Signal, IoError> {
+        text.parse::<ColumnExpression>()?.resolve(&NAMES, "run.csv")
+    }
+
+    #[test]
+    fn name_negative_and_difference() {
+        assert_eq!(resolve("y").unwrap(), Signal::Column(2));
+        assert_eq!(resolve(" -y ").unwrap(), Signal::Negative(2));
+        assert_eq!(resolve("- y").unwrap(), Signal::Negative(2));
+        assert_eq!(resolve("r-y").unwrap(), Signal::Difference(1, 2));
+        assert_eq!(resolve("r - y").unwrap(), Signal::Difference(1, 2));
+    }
+
+    #[test]
+    fn hyphens_in_names() {
+        assert_eq!(resolve("stick-x").unwrap(), Signal::Column(3));
+        assert_eq!(resolve("-stick-x").unwrap(), Signal::Negative(3));
+        assert_eq!(resolve("stick-x-y").unwrap(), Signal::Difference(3, 2));
+        assert_eq!(resolve("y - stick-x").unwrap(), Signal::Difference(2, 3));
+        // There is no column d, but r-d is one: the exact name wins.
+        assert_eq!(resolve("r-d").unwrap(), Signal::Column(5));
+    }
+
+    #[test]
+    fn what_is_missing_is_named() {
+        let message = |text| resolve(text).unwrap_err().to_string();
+        assert!(message("q").contains("no column \"q\" (asked for: q); it has t, r, y, stick-x, r-d"));
+        assert!(message("r-q").contains("no column \"q\" (asked for: r-q)"));
+        assert!(message("p-q").contains("no column \"p\" and no \"q\""));
+        assert!(message("-q").contains("no column \"q\" (asked for: -q)"));
+        for empty in ["", "  ", "-", " - - "] {
+            assert!(matches!(resolve(empty), Err(IoError::Expression { .. })), "{empty:?}");
+        }
+    }
+
+    #[test]
+    fn two_readings_are_refused() {
+        let names = ["a", "a-b", "c", "b-c"];
+        let expression = ColumnExpression::column("a-b-c");
+        assert!(matches!(
+            expression.resolve(&names, "run.csv"),
+            Err(IoError::Expression { .. })
+        ));
+    }
+
+    #[test]
+    fn long_lists_are_cut() {
+        let names: Vec<String> = (0..45).map(|k| format!("x{k}")).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        assert!(list(&names).ends_with("x39 and 5 more"));
+        assert_eq!(list(&["", ""]), "no named columns");
+    }
+}

@@ -1,0 +1,319 @@
+//! Everything that can be wrong with a file, in the words of the person who has to mend it.
+
+use hoid_model::ModelError;
+use thiserror::Error;
+
+/// Why a file could not be read or written. Each message names the file, the place in it, what was found, what was expected
+/// and the remedy. A `place` is "line 12" where the format has lines, else "row 12".
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum IoError {
+    /// A file that the system does not give.
+    #[error("{file} cannot be read: {source}; check the name and the permissions")]
+    Unreadable {
+        /// The file.
+        file: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// A file that the system does not take.
+    #[error("{file} cannot be written: {source}; check that the directory exists and that you may write there")]
+    Unwritable {
+        /// The file.
+        file: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// A directory in the place of a file.
+    #[error("{file} is a directory, expected a file; name the file in it")]
+    Directory {
+        /// The directory.
+        file: String,
+    },
+    /// An extension that stands for no format.
+    #[error("{file}: {found}, which names no format of a record; expected {expected}")]
+    UnknownFormat {
+        /// The file.
+        file: String,
+        /// The extension, or that there is none.
+        found: String,
+        /// The extensions that are known.
+        expected: &'static str,
+    },
+    /// Bytes that are no text.
+    #[error("{file}, {place}: {found}, expected text in UTF-8; save the table as CSV in UTF-8")]
+    NotText {
+        /// The file.
+        file: String,
+        /// Where.
+        place: String,
+        /// The first bad byte.
+        found: String,
+    },
+    /// A file with nothing in it but blank lines and comments.
+    #[error("{file} is empty, expected a header with the names of the columns and one line a sample")]
+    Empty {
+        /// The file.
+        file: String,
+    },
+    /// A header and nothing below it.
+    #[error("{file} holds a header and no samples; check that the recording was saved to its end")]
+    NoRows {
+        /// The file.
+        file: String,
+    },
+    /// Numbers where the names should be.
+    #[error(
+        "{file}, {place}: the first line holds numbers ({found}), expected the names of the columns; put a header such as t,e,u above it, without # in front"
+    )]
+    NoHeader {
+        /// The file.
+        file: String,
+        /// Where.
+        place: String,
+        /// The first cells.
+        found: String,
+    },
+    /// One name for two columns.
+    #[error("{file}: columns {first} and {second} are both named \"{name}\"; give each column a name of its own")]
+    DuplicateColumn {
+        /// The file.
+        file: String,
+        /// The name.
+        name: String,
+        /// Number of the one column, from 1.
+        first: usize,
+        /// Number of the other column, from 1.
+        second: usize,
+    },
+    /// A row that is shorter or longer than the header.
+    #[error(
+        "{file}, {place}: {found} values, expected {expected} as in the header; look for a cut line, a stray separator or an open quotation mark"
+    )]
+    RowLength {
+        /// The file.
+        file: String,
+        /// Where.
+        place: String,
+        /// Values in the row.
+        found: usize,
+        /// Names in the header.
+        expected: usize,
+    },
+    /// A column that the file does not have.
+    #[error(
+        "{file} has no column {missing} (asked for: {asked}); it has {available}; choose by --input and --output with NAME, -NAME or NAME-NAME"
+    )]
+    NoSuchColumn {
+        /// The file.
+        file: String,
+        /// The names that were not found.
+        missing: String,
+        /// The whole expression.
+        asked: String,
+        /// The names that exist.
+        available: String,
+    },
+    /// Text that is no choice of a column.
+    #[error("the column \"{found}\": {expected}")]
+    Expression {
+        /// The text as given.
+        found: String,
+        /// What is wrong, and the remedy.
+        expected: String,
+    },
+    /// One column as input and as output.
+    #[error("{file}: input and output are both {asked}; choose two columns with --input and --output")]
+    SameColumn {
+        /// The file.
+        file: String,
+        /// The expression.
+        asked: String,
+    },
+    /// Text in the place of a number.
+    #[error("{file}, {place}, column {column}: found \"{found}\", expected a number; {remedy}")]
+    NotANumber {
+        /// The file.
+        file: String,
+        /// Where.
+        place: String,
+        /// The column.
+        column: String,
+        /// The text found, cut to a readable length.
+        found: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// An infinite value.
+    #[error(
+        "{file}, {place}, column {column}: found {found}, expected a finite number; correct the value, or empty the cell and bridge it with --fill"
+    )]
+    Infinite {
+        /// The file.
+        file: String,
+        /// Where.
+        place: String,
+        /// The column.
+        column: String,
+        /// The cell.
+        found: String,
+    },
+    /// Missing values.
+    #[error(
+        "{file}, {place}, column {column}: the value is missing ({found}), as are {count} of {rows} in this column; bridge them linearly with --fill, or leave them out with --from and --to"
+    )]
+    Missing {
+        /// The file.
+        file: String,
+        /// The first.
+        place: String,
+        /// The column.
+        column: String,
+        /// The cell.
+        found: String,
+        /// How many values are missing.
+        count: usize,
+        /// How many rows were looked at.
+        rows: usize,
+    },
+    /// Missing values with nothing on one side of them.
+    #[error(
+        "{file}, {place}, column {column}: the values are missing up to the {end} of the record, so that --fill has nothing to bridge to; leave them out with --from and --to"
+    )]
+    NothingToBridgeTo {
+        /// The file.
+        file: String,
+        /// The first or last of them.
+        place: String,
+        /// The column.
+        column: String,
+        /// "start" or "end".
+        end: &'static str,
+    },
+    /// Neither a time column nor a sampling frequency.
+    #[error(
+        "{file} has no column t (time in s), and no sampling frequency was given; name the time column t, or give --fs HZ; it has {available}"
+    )]
+    NoSampling {
+        /// The file.
+        file: String,
+        /// The names that exist.
+        available: String,
+    },
+    /// A sampling frequency without meaning.
+    #[error("the sampling frequency is {found} Hz, expected a positive finite number of samples in a second")]
+    SamplingFrequency {
+        /// The value given.
+        found: f64,
+    },
+    /// Too few samples to see the sampling.
+    #[error(
+        "{file}: {found} sample, expected at least 2 to find the sampling from t; check the file and the span, or give --fs HZ"
+    )]
+    TooFewSamples {
+        /// The file.
+        file: String,
+        /// How many there are.
+        found: usize,
+    },
+    /// Time that stands still or runs back.
+    #[error(
+        "{file}, {place}: t = {found} s after {previous} s, expected increasing time; remove the rows that were written twice, write t with more decimals, or give --fs HZ to count samples instead"
+    )]
+    NotIncreasing {
+        /// The file.
+        file: String,
+        /// The later row.
+        place: String,
+        /// Its time, s.
+        found: f64,
+        /// The time before, s.
+        previous: f64,
+    },
+    /// Samples that are not there.
+    #[error(
+        "{file}: samples missing after {place}, t = {after_s} s: {missing} (the next is at {next_s} s, the sample time is {sample_time_s:.6} s; gaps in all: {gaps}); interpolate over them with --resample, or use the part before or behind with --from and --to"
+    )]
+    Gap {
+        /// The file.
+        file: String,
+        /// The row before the first gap.
+        place: String,
+        /// Its time, s.
+        after_s: f64,
+        /// The time of the row behind the gap, s.
+        next_s: f64,
+        /// Samples missing in the first gap.
+        missing: u64,
+        /// Number of gaps.
+        gaps: usize,
+        /// Sample time, s.
+        sample_time_s: f64,
+    },
+    /// Samples off the even grid.
+    #[error(
+        "{file}: t is uneven: at {place}, t = {found} s, it is {deviation_s:.3e} s off the even grid with sample time {sample_time_s:.6} s, more than the allowed {tolerance_s:.3e} s; interpolate onto the grid with --resample, or give --fs HZ if the samples were taken evenly and only t is wrong"
+    )]
+    Jitter {
+        /// The file.
+        file: String,
+        /// The row farthest from the grid.
+        place: String,
+        /// Its time, s.
+        found: f64,
+        /// How far it is, s.
+        deviation_s: f64,
+        /// How far it may be, s.
+        tolerance_s: f64,
+        /// Sample time, s.
+        sample_time_s: f64,
+    },
+    /// A resampled record that would be mostly invented.
+    #[error(
+        "{file}: resampling from t = {start_s} s to {end_s} s would make {samples:.0} samples out of {rows}, expected at most {factor} times as many; look for a wrong time in t, or use a part with --from and --to"
+    )]
+    ResampledTooLong {
+        /// The file.
+        file: String,
+        /// First time, s.
+        start_s: f64,
+        /// Last time, s.
+        end_s: f64,
+        /// Samples that would be made.
+        samples: f64,
+        /// Samples that there are.
+        rows: usize,
+        /// The largest ratio allowed.
+        factor: usize,
+    },
+    /// A time span without samples.
+    #[error("{file}: the span {span} holds no samples; the record covers {start_s} to {end_s} s")]
+    EmptySpan {
+        /// The file.
+        file: String,
+        /// The span as asked for.
+        span: String,
+        /// First time of the record, s.
+        start_s: f64,
+        /// Last time of the record, s.
+        end_s: f64,
+    },
+    /// A channel that cannot be the column of a file.
+    #[error("{file}: the channel \"{name}\" cannot be written: {reason}; rename it")]
+    ChannelName {
+        /// The file.
+        file: String,
+        /// Name of the channel.
+        name: String,
+        /// Why.
+        reason: &'static str,
+    },
+    /// What was read does not make a record.
+    #[error("{file}: {source}")]
+    Model {
+        /// The file.
+        file: String,
+        /// Why.
+        source: ModelError,
+    },
+}

@@ -1,0 +1,135 @@
+//! Records from files and into files.
+//!
+//! Reading takes the columns that are asked for, finds the sampling, checks every value in use and gives a [`Record`], or the
+//! error that names the place. Nothing is repaired unless [`Repair`] asks for it, and what was repaired is said in the notes.
+//! The format follows from the extension, here and nowhere else; a new format is a function from bytes to a table, one that
+//! writes, and a line in [`Format`].
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+
+use hoid_model::Record;
+
+use crate::{ColumnExpression, IoError, assemble, csv_record, csv_table, write_atomically};
+
+/// The formats of a record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Csv,
+}
+
+impl Format {
+    const EXPECTED: &'static str = ".csv (also as .tsv or .txt)";
+
+    fn of(path: &Path) -> Result<Self, IoError> {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        match extension.as_deref() {
+            Some("csv" | "tsv" | "txt") => Ok(Self::Csv),
+            other => Err(IoError::UnknownFormat {
+                file: path.display().to_string(),
+                found: other.map_or(String::from("there is no extension"), |e| {
+                    format!("the extension is .{e}")
+                }),
+                expected: Self::EXPECTED,
+            }),
+        }
+    }
+}
+
+/// What may be mended in a damaged record. By default nothing is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Repair {
+    /// Interpolate linearly from an uneven t, also over gaps, to an even grid. The grid starts at the first t; its sample time
+    /// is that of the typical step, or of [`ReadOptions::sampling_hz`].
+    pub resample: bool,
+    /// Bridge missing values (empty, NaN, NA) linearly between the values before and behind.
+    pub fill: bool,
+}
+
+/// How to read a record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadOptions {
+    /// Input of the person; `e` by default.
+    pub input: ColumnExpression,
+    /// Output of the person; `u` by default.
+    pub output: ColumnExpression,
+    /// Sampling frequency in Hz. It wins over the column t, which then gives only the time of the first sample (0 when there
+    /// is none); with [`Repair::resample`] it is the frequency of the new grid. By default the sampling is that of t.
+    pub sampling_hz: Option<f64>,
+    /// The samples with `from <= t < to`, s; what lies outside is not looked at. By default all.
+    pub span_s: (Option<f64>, Option<f64>),
+    /// What may be mended.
+    pub repair: Repair,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self {
+            input: ColumnExpression::column("e"),
+            output: ColumnExpression::column("u"),
+            sampling_hz: None,
+            span_s: (None, None),
+            repair: Repair::default(),
+        }
+    }
+}
+
+/// A record, and what a person should know about how it was read: columns left out, values repaired.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadRecord {
+    /// The record, labelled with the name of the file without extension.
+    pub record: Record,
+    /// One sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Reads a record from a file: input, output, and each other column of numbers as a channel of its own.
+///
+/// # Errors
+/// [`IoError`], naming the place in the file.
+pub fn read_record(path: &Path, options: &ReadOptions) -> Result<ReadRecord, IoError> {
+    let file = path.display().to_string();
+    if path.is_dir() {
+        return Err(IoError::Directory { file });
+    }
+    let format = Format::of(path)?;
+    let bytes = fs::read(path).map_err(|source| IoError::Unreadable {
+        file: file.clone(),
+        source,
+    })?;
+    let table = match format {
+        Format::Csv => csv_table::parse(&bytes, &file)?,
+    };
+    let label = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    assemble::record_of(table, options).map(|read| ReadRecord {
+        record: read.record.labelled(label.unwrap_or_default()),
+        ..read
+    })
+}
+
+/// Writes a record: t, then `f_t` where there is one, input, output, and the other channels in their order, all with the digits
+/// that give the same numbers back. Units and sample time stand above as comments; the label is not written.
+///
+/// # Errors
+/// [`IoError::UnknownFormat`], [`IoError::ChannelName`] for a channel that could not be read back, and those of
+/// [`write_atomically`].
+pub fn write_record(path: &Path, record: &Record) -> Result<(), IoError> {
+    let format = Format::of(path)?;
+    for name in record.channels().map(|c| c.name.as_str()) {
+        let reason = match name {
+            "t" => "t is the time of the samples",
+            "" => "it has no name",
+            padded if padded != padded.trim() => "there are blanks around the name",
+            _ => continue,
+        };
+        return Err(IoError::ChannelName {
+            file: path.display().to_string(),
+            name: name.to_owned(),
+            reason,
+        });
+    }
+    match format {
+        Format::Csv => write_atomically(path, |file: &mut dyn Write| csv_record::write(file, record)),
+    }
+}

@@ -1,0 +1,320 @@
+//! The sampling that a column t states, and whether it is even.
+//!
+//! `Ts = (t_last - t_first) / (N - 1)`, and each t must lie on the grid `t_first + k Ts` within the larger of `1e-3 Ts` and one
+//! unit of the last printed decimal of t: files print t rounded (0.0167 at 60 Hz), and a rounded t is no uneven one. When
+//! `1 / Ts` is a whole number of Hz within `1e-4`, or within the rounding of t, it is taken as that number, so that runs of
+//! one laboratory have one sample time.
+
+use crate::table::Precision;
+
+/// Largest deviation from the even grid, in sample times.
+const JITTER: f64 = 1e-3;
+/// Largest relative distance from a whole number of Hz that is taken as that number.
+const WHOLE_HZ: f64 = 1e-4;
+
+/// Why the sampling is not even. Rows count from the first in use.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Uneven {
+    TooFew,
+    NotIncreasing {
+        row: usize,
+    },
+    Gap {
+        row: usize,
+        missing: u64,
+        gaps: usize,
+        sample_time_s: f64,
+    },
+    Jitter {
+        row: usize,
+        deviation_s: f64,
+        tolerance_s: f64,
+        sample_time_s: f64,
+    },
+}
+
+/// A sample time, and the words about it when it was not simply read.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Sampling {
+    pub(crate) sample_time_s: f64,
+    pub(crate) note: Option<String>,
+}
+
+/// The sample time of an even t. A sample time that the file states beside its columns counts when t agrees with it.
+pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Result<Sampling, Uneven> {
+    let (&[first, .., last], steps) = (t, t.len().saturating_sub(1) as f64) else {
+        return match stated_s {
+            Some(sample_time_s) if t.len() == 1 => Ok(Sampling {
+                sample_time_s,
+                note: None,
+            }),
+            _ => Err(Uneven::TooFew),
+        };
+    };
+    increasing(t)?;
+    let rounding = Rounding::of(t, precision);
+    let typical_s = typical_step(t, rounding);
+    gap(t, rounding, typical_s)?;
+    let mean_s = (last - first) / steps;
+    let tolerance = |k: usize| (JITTER * mean_s).max(rounding.unit(t[k]).max(rounding.unit(first)) * (1.0 + 1e-6));
+    // The excess over the tolerance decides; NaN, from times that overflow, is excess as well.
+    let deviation = |k: usize| (t[k] - (first + k as f64 * mean_s)).abs();
+    let excess = |k: &usize| deviation(*k) - tolerance(*k);
+    let worst = (0..t.len()).max_by(|a, b| excess(a).total_cmp(&excess(b))).unwrap_or(0);
+    if !(excess(&worst) <= 0.0 && mean_s.is_finite() && mean_s > 0.0) {
+        return Err(Uneven::Jitter {
+            row: worst,
+            deviation_s: deviation(worst),
+            tolerance_s: tolerance(worst),
+            sample_time_s: mean_s,
+        });
+    }
+    let end_tolerance = tolerance(t.len() - 1);
+    let moves_end = |ts: f64| steps * (ts - mean_s).abs() > end_tolerance;
+    if let Some(stated) = stated_s {
+        if !moves_end(stated) {
+            return Ok(Sampling {
+                sample_time_s: stated,
+                note: None,
+            });
+        }
+        let note = format!("the stated sample time {stated} s contradicts t, which gives {mean_s} s; t counts");
+        return Ok(Sampling {
+            sample_time_s: mean_s,
+            note: Some(note),
+        });
+    }
+    let sample_time_s = whole_hz(mean_s, rounding.unit(first.abs().max(last.abs())) / steps);
+    let note = moves_end(sample_time_s).then(|| {
+        format!(
+            "t gives a sampling frequency of {:.6} Hz, taken as {:.0} Hz",
+            1.0 / mean_s,
+            1.0 / sample_time_s
+        )
+    });
+    Ok(Sampling { sample_time_s, note })
+}
+
+/// The sample time to resample an uneven t to: that of its typical step.
+pub(crate) fn typical(t: &[f64], precision: Precision) -> Result<f64, Uneven> {
+    let &[first, .., last] = t else {
+        return Err(Uneven::TooFew);
+    };
+    increasing(t)?;
+    let rounding = Rounding::of(t, precision);
+    let slack_s = rounding.unit(first.abs().max(last.abs())) / (t.len() - 1) as f64;
+    Ok(whole_hz(typical_step(t, rounding), slack_s))
+}
+
+fn increasing(t: &[f64]) -> Result<(), Uneven> {
+    // Written so that NaN fails as well.
+    let standing = |pair: &[f64]| pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Greater);
+    match t.windows(2).position(standing) {
+        None => Ok(()),
+        Some(at) => Err(Uneven::NotIncreasing { row: at + 1 }),
+    }
+}
+
+/// How far rounding may move a printed t.
+#[derive(Clone, Copy)]
+struct Rounding {
+    precision: Precision,
+    median_step_s: f64,
+}
+
+impl Rounding {
+    fn of(t: &[f64], precision: Precision) -> Self {
+        let mut steps: Vec<f64> = t.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let middle = steps.len() / 2;
+        Self {
+            precision,
+            median_step_s: *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
+        }
+    }
+
+    /// One unit of the last digit of t, but no more than the median step: a t coarser than that would have stood still.
+    fn unit(self, t: f64) -> f64 {
+        self.precision.unit(t).min(self.median_step_s)
+    }
+}
+
+/// The mean of the steps that are no gaps: of those below 1.5 times the median step, plus one unit for the rounding of t.
+fn typical_step(t: &[f64], rounding: Rounding) -> f64 {
+    let median = rounding.median_step_s;
+    let (sum, count) = t
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0], rounding.unit(pair[1])))
+        .filter(|(step, unit)| *step < 1.5 * median + unit)
+        .fold((0.0, 0_usize), |(sum, count), (step, _)| (sum + step, count + 1));
+    if count == 0 { median } else { sum / count as f64 }
+}
+
+/// Where samples are missing. Rounding makes steps of one unit more than the sample time, as in 0.00, 0.02, 0.03 at 60 Hz, but
+/// not of a whole unit more where the sample time is itself a multiple of the unit.
+fn gap(t: &[f64], rounding: Rounding, typical_s: f64) -> Result<(), Uneven> {
+    let is_gap = |k: &usize| {
+        let step = t[k + 1] - t[*k];
+        step >= 1.5 * typical_s && step - typical_s > 0.95 * rounding.unit(t[k + 1])
+    };
+    let mut gaps = (0..t.len() - 1).filter(is_gap);
+    let Some(row) = gaps.next() else { return Ok(()) };
+    Err(Uneven::Gap {
+        row,
+        missing: (((t[row + 1] - t[row]) / typical_s).round() - 1.0).max(1.0) as u64,
+        gaps: 1 + gaps.count(),
+        sample_time_s: typical_s,
+    })
+}
+
+/// `ts`, or the sample time of the whole number of Hz near it; `slack_s` is the uncertainty of `ts` from the rounding of t.
+fn whole_hz(ts: f64, slack_s: f64) -> f64 {
+    let frequency = (1.0 / ts).round();
+    let near = (1.0 / ts - frequency).abs() <= WHOLE_HZ * frequency || (1.0 / frequency - ts).abs() <= slack_s;
+    if frequency >= 1.0 && frequency.is_finite() && near {
+        1.0 / frequency
+    } else {
+        ts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Times as a file with so many decimals prints them.
+    fn printed(times: impl Iterator<Item = f64>, decimals: usize) -> (Vec<f64>, Precision) {
+        let mut precision = Precision::default();
+        let t = times
+            .map(|t| {
+                let text = format!("{t:.decimals$}");
+                precision.add(&text);
+                text.parse().unwrap()
+            })
+            .collect();
+        (t, precision)
+    }
+
+    fn grid(n: usize, start: f64, ts: f64) -> impl Iterator<Item = f64> {
+        (0..n).map(move |k| start + k as f64 * ts)
+    }
+
+    #[test]
+    fn rounded_times_are_even_and_give_whole_hz() {
+        for hz in [30.0, 50.0, 60.0, 75.0, 100.0, 128.0, 1000.0] {
+            for decimals in [3, 4, 6, 17] {
+                for (n, start) in [(12, 0.0), (2702, 0.0), (9000, -10.24)] {
+                    let (t, precision) = printed(grid(n, start, 1.0 / hz), decimals);
+                    let sampling = even(&t, precision, None).unwrap();
+                    assert_eq!(
+                        sampling.sample_time_s,
+                        1.0 / hz,
+                        "{hz} Hz, {decimals} decimals, {n} samples"
+                    );
+                    assert_eq!(sampling.note, None);
+                }
+            }
+        }
+        // Steps of 0.01 and 0.02 by turns.
+        let (t, precision) = printed(grid(2000, 0.0, 1.0 / 60.0), 2);
+        assert_eq!(even(&t, precision, None).unwrap().sample_time_s, 1.0 / 60.0);
+    }
+
+    #[test]
+    fn other_rates_stay_what_they_are() {
+        let (t, precision) = printed(grid(5000, 0.0, 0.0125 / 0.79), 12);
+        let ts = even(&t, precision, None).unwrap().sample_time_s;
+        assert!((ts - 0.0125 / 0.79).abs() < 1e-12);
+        let (t, precision) = printed(grid(100, 0.0, 2.0), 0);
+        assert_eq!(even(&t, precision, None).unwrap().sample_time_s, 2.0);
+        // 99.995 Hz is taken as 100 Hz, but not in silence.
+        let (t, precision) = printed(grid(8000, 0.0, 1.0 / 99.995), 9);
+        let sampling = even(&t, precision, None).unwrap();
+        assert_eq!(sampling.sample_time_s, 0.01);
+        assert!(sampling.note.unwrap().contains("99.995000 Hz, taken as 100 Hz"));
+    }
+
+    #[test]
+    fn a_stated_sample_time_counts_where_t_agrees() {
+        let (t, precision) = printed(grid(500, 0.0, 0.015), 17);
+        let stated = f64::from_bits(0.015_f64.to_bits() + 1);
+        assert_eq!(even(&t, precision, Some(stated)).unwrap().sample_time_s, stated);
+        let other = even(&t, precision, Some(0.016)).unwrap();
+        assert!((other.sample_time_s - 0.015).abs() < 1e-12);
+        assert!(other.note.unwrap().contains("contradicts t"));
+        assert_eq!(even(&[3.0], precision, Some(0.015)).unwrap().sample_time_s, 0.015);
+        assert_eq!(even(&[3.0], precision, None), Err(Uneven::TooFew));
+        assert_eq!(even(&[], precision, Some(0.015)), Err(Uneven::TooFew));
+    }
+
+    #[test]
+    fn gaps_are_counted() {
+        for decimals in [2, 3, 6] {
+            let (mut t, precision) = printed(grid(1000, 0.0, 0.01), decimals);
+            t.drain(900..903);
+            t.remove(400);
+            let found = even(&t, precision, None);
+            let Err(Uneven::Gap {
+                row,
+                missing,
+                gaps,
+                sample_time_s,
+            }) = found
+            else {
+                panic!("{decimals} decimals: {found:?}");
+            };
+            assert_eq!((row, missing, gaps), (399, 1, 2), "{decimals} decimals");
+            assert!((sample_time_s - 0.01).abs() < 1e-4);
+        }
+        // Counts in place of s.
+        let (mut t, precision) = printed(grid(50, 0.0, 1.0), 0);
+        t.remove(20);
+        assert!(matches!(
+            even(&t, precision, None),
+            Err(Uneven::Gap {
+                row: 19,
+                missing: 1,
+                ..
+            })
+        ));
+    }
+
+    #[test]
+    fn jitter_is_measured() {
+        let (mut t, precision) = printed(grid(1000, 0.0, 0.01), 6);
+        t[321] += 0.002;
+        let Err(Uneven::Jitter {
+            row,
+            deviation_s,
+            tolerance_s,
+            ..
+        }) = even(&t, precision, None)
+        else {
+            panic!("not found");
+        };
+        assert_eq!(row, 321);
+        // One sample of 1000 moves neither end of the grid.
+        assert!((deviation_s - 0.002).abs() < 1e-9 && (tolerance_s - 1e-5).abs() < 1e-9);
+        t[321] -= 0.001_995;
+        assert!(even(&t, precision, None).is_ok());
+    }
+
+    #[test]
+    fn time_that_stands_or_runs_back_or_overflows() {
+        let p = Precision::default();
+        assert_eq!(
+            even(&[0.0, 0.1, 0.1, 0.2], p, None),
+            Err(Uneven::NotIncreasing { row: 2 })
+        );
+        assert_eq!(even(&[0.0, 0.1, 0.05], p, None), Err(Uneven::NotIncreasing { row: 2 }));
+        assert_eq!(typical(&[0.0, f64::NAN], p), Err(Uneven::NotIncreasing { row: 1 }));
+        assert!(even(&[-1e308, 0.0, 1e308], p, None).is_err());
+        assert!(even(&[0.0, 5e-324], p, None).is_ok_and(|s| s.sample_time_s > 0.0));
+    }
+
+    #[test]
+    fn the_typical_step_ignores_gaps_and_sees_through_jitter() {
+        let (mut t, precision) = printed(grid(1000, 5.0, 1.0 / 60.0), 4);
+        t.iter_mut().skip(300).for_each(|t| *t += 7.0);
+        assert_eq!(typical(&t, precision).unwrap(), 1.0 / 60.0);
+    }
+}

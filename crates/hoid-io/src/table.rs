@@ -1,0 +1,208 @@
+//! Columns of numbers as they stand in a file, before anything is chosen, checked or repaired.
+//!
+//! Each format fills a [`Table`]; everything behind it (choice of columns, sampling, repair) is the same for all formats. A
+//! value that is missing or no number is NaN here; the file is asked again what stood there only when an error has to say
+//! so, which keeps a million rows cheap.
+
+use std::ops::Range;
+
+use crate::IoError;
+
+/// What stands in a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Cell {
+    /// A number, finite or infinite.
+    Number(f64),
+    /// Nothing, or a word for nothing.
+    Missing,
+    /// Something else.
+    Text,
+}
+
+impl Cell {
+    /// What the text of a cell means: empty, NaN, NA, N/A and null are missing values.
+    pub(crate) fn parse(text: &str) -> Self {
+        let text = text.trim();
+        match text.parse::<f64>() {
+            Ok(value) if value.is_nan() => Self::Missing,
+            Ok(value) => Self::Number(value),
+            Err(_)
+                if ["", "na", "n/a", "null"]
+                    .iter()
+                    .any(|word| text.eq_ignore_ascii_case(word)) =>
+            {
+                Self::Missing
+            }
+            Err(_) => Self::Text,
+        }
+    }
+}
+
+/// How exactly a column of decimal numbers is printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Precision {
+    /// Most decimals of any value; `None` when the values were not printed.
+    decimals: Option<i32>,
+    /// Most significant digits of any value.
+    significant: i32,
+}
+
+impl Precision {
+    /// Takes one more printed number into account.
+    pub(crate) fn add(&mut self, text: &str) {
+        let (mantissa, exponent) = match text.trim().split_once(['e', 'E']) {
+            Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().unwrap_or(0).clamp(-400, 400)),
+            None => (text.trim(), 0),
+        };
+        let digits = |part: &str| part.bytes().filter(u8::is_ascii_digit).count() as i32;
+        let behind = mantissa.split_once('.').map_or(0, |(_, behind)| digits(behind));
+        let leading_zeros = mantissa
+            .bytes()
+            .take_while(|b| !(b'1'..=b'9').contains(b))
+            .filter(u8::is_ascii_digit)
+            .count() as i32;
+        self.decimals = Some(self.decimals.unwrap_or(i32::MIN).max(behind - exponent));
+        self.significant = self.significant.max(digits(mantissa) - leading_zeros);
+    }
+
+    /// One unit of the last printed digit of a value of this size. Fixed decimals give the same unit everywhere; with a fixed
+    /// number of significant digits the unit grows with the value.
+    pub(crate) fn unit(self, value: f64) -> f64 {
+        let Some(decimals) = self.decimals else { return 0.0 };
+        let fixed = 10_f64.powi(-decimals);
+        let magnitude = value.abs().log10().floor();
+        if self.significant == 0 || !magnitude.is_finite() {
+            return fixed;
+        }
+        fixed.max(10_f64.powi(magnitude as i32 + 1 - self.significant))
+    }
+}
+
+/// One column.
+#[derive(Debug, Default)]
+pub(crate) struct Column {
+    /// Name; empty when the header has none.
+    pub(crate) name: String,
+    /// Unit; empty when unknown.
+    pub(crate) unit: String,
+    /// One value a row, NaN where there is no number.
+    pub(crate) values: Vec<f64>,
+    /// Rows that hold text, in increasing order.
+    pub(crate) texts: Vec<usize>,
+    /// How exactly the values are printed; only kept for the time.
+    pub(crate) precision: Precision,
+}
+
+/// Where the rows came from, for messages.
+pub(crate) trait Source {
+    /// Name of the file.
+    fn file(&self) -> &str;
+    /// "line 12" or "row 12".
+    fn place(&self, row: usize) -> String;
+    /// What stands in a cell, cut to a readable length.
+    fn cell(&self, row: usize, column: usize) -> String;
+}
+
+/// The columns of a file.
+pub(crate) struct Table<'a> {
+    pub(crate) columns: Vec<Column>,
+    pub(crate) rows: usize,
+    /// Sample time that the file states beside its columns, s.
+    pub(crate) sample_time_s: Option<f64>,
+    pub(crate) source: Box<dyn Source + 'a>,
+    pub(crate) notes: Vec<String>,
+}
+
+impl Table<'_> {
+    /// Names of all columns in order.
+    pub(crate) fn names(&self) -> Vec<&str> {
+        self.columns.iter().map(|c| c.name.as_str()).collect()
+    }
+
+    /// Why the value at `row` of a column, which is not finite, cannot be used. `rows` are the rows in use.
+    pub(crate) fn bad_value(&self, column: usize, row: usize, rows: Range<usize>) -> IoError {
+        let Column {
+            name, values, texts, ..
+        } = &self.columns[column];
+        let file = self.source.file().to_owned();
+        let place = self.source.place(row);
+        let found = self.source.cell(row, column);
+        let column = name.clone();
+        if texts.binary_search(&row).is_ok() {
+            let remedy = if matches!(Cell::parse(&found.replacen(',', ".", 1)), Cell::Number(_)) {
+                "write the numbers with a decimal point instead of a comma"
+            } else {
+                "correct the cell, empty it and bridge it with --fill, or choose another column"
+            };
+            return IoError::NotANumber {
+                file,
+                place,
+                column,
+                found,
+                remedy,
+            };
+        }
+        if values[row].is_infinite() {
+            return IoError::Infinite {
+                file,
+                place,
+                column,
+                found,
+            };
+        }
+        let count = rows
+            .clone()
+            .filter(|row| values[*row].is_nan() && texts.binary_search(row).is_err())
+            .count();
+        IoError::Missing {
+            file,
+            place,
+            column,
+            found: if found.is_empty() { String::from("empty") } else { found },
+            count,
+            rows: rows.len(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells() {
+        for missing in ["", "  ", "NaN", "nan", "NA", "n/a", "NULL", "-NaN"] {
+            assert_eq!(Cell::parse(missing), Cell::Missing, "{missing:?}");
+        }
+        for text in ["1,5", "abc", "1 2", "--1", "0x10", "1_000"] {
+            assert_eq!(Cell::parse(text), Cell::Text, "{text:?}");
+        }
+        assert_eq!(Cell::parse(" -1.5e-3 "), Cell::Number(-1.5e-3));
+        assert_eq!(Cell::parse("+.5"), Cell::Number(0.5));
+        assert_eq!(Cell::parse("1e999"), Cell::Number(f64::INFINITY));
+    }
+
+    fn precision(texts: &[&str]) -> Precision {
+        let mut precision = Precision::default();
+        texts.iter().for_each(|text| precision.add(text));
+        precision
+    }
+
+    #[test]
+    fn unit_of_the_last_digit() {
+        let fixed = precision(&["0.0000", "0.0167", "45.0167"]);
+        for t in [0.0, 0.0167, 45.0] {
+            assert!((fixed.unit(t) - 1e-4).abs() < 1e-18, "{t}");
+        }
+        // Five significant digits, as some programs print: at 100 s the last digit is 0.01.
+        let significant = precision(&["0", "0.016667", "1.0167", "100.02"]);
+        assert!((significant.unit(100.02) - 1e-2).abs() < 1e-15);
+        assert!((significant.unit(0.016667) - 1e-6).abs() < 1e-18);
+        assert!((precision(&["1.67e-02", "1.00e-01"]).unit(0.0167) - 1e-4).abs() < 1e-18);
+        assert_eq!(precision(&["0", "1", "120"]).unit(3.0), 1.0);
+        assert!(precision(&["0.30000000000000004"]).unit(0.3) < 1e-15);
+        assert_eq!(Precision::default().unit(3.0), 0.0);
+        // Nothing that can stand in a file gives anything but a number of s.
+        assert!(precision(&["1e-99999999999", ".", "-", "e"]).unit(1e300) >= 0.0);
+    }
+}

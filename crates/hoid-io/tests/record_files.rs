@@ -1,0 +1,552 @@
+//! Whole files in and out: what comes back is what went in, and what is damaged is said.
+
+#![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use hoid_io::{IoError, ReadOptions, ReadRecord, Repair, read_record, write_record};
+use hoid_model::{Channel, Record, SampleTime};
+
+const FILL: Repair = Repair {
+    resample: false,
+    fill: true,
+};
+const RESAMPLE: Repair = Repair {
+    resample: true,
+    fill: false,
+};
+
+struct Desk {
+    dir: tempfile::TempDir,
+}
+
+impl Desk {
+    fn new() -> Self {
+        Self {
+            dir: tempfile::tempdir().unwrap(),
+        }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+
+    fn read(&self, text: impl AsRef<[u8]>, options: &ReadOptions) -> Result<ReadRecord, IoError> {
+        let path = self.path("run.csv");
+        fs::write(&path, text).unwrap();
+        read_record(&path, options)
+    }
+
+    fn error(&self, text: impl AsRef<[u8]>, options: &ReadOptions) -> String {
+        let message = self.read(text, options).unwrap_err().to_string();
+        assert!(message.contains("run.csv"), "{message}");
+        message
+    }
+}
+
+fn options(input: &str, output: &str) -> ReadOptions {
+    ReadOptions {
+        input: input.parse().unwrap(),
+        output: output.parse().unwrap(),
+        ..ReadOptions::default()
+    }
+}
+
+fn defaults() -> ReadOptions {
+    ReadOptions::default()
+}
+
+/// Numbers in [-1, 1) from a linear congruence (Knuth's MMIX constants): the same on every machine.
+struct Draw(u64);
+
+impl Draw {
+    fn bits(&mut self) -> u64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 >> 33
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        (self.bits() % n.max(1) as u64) as usize
+    }
+
+    fn value(&mut self) -> f64 {
+        self.bits() as f64 / f64::from(1_u32 << 30) - 1.0
+    }
+}
+
+fn record(n: usize, ts: f64, start: f64) -> Record {
+    let mut draw = Draw(7);
+    let mut channel = |name: &str, unit: &str| Channel::new(name, unit, (0..n).map(|_| draw.value().powi(5)).collect());
+    let (e, u) = (channel("e", "deg"), channel("u", "deg"));
+    Record::new(SampleTime::new(ts).unwrap(), e, u)
+        .unwrap()
+        .starting_at(start)
+        .labelled("run")
+        .with_channel(channel("x", ""))
+        .unwrap()
+        .with_channel(channel("f_t", "deg"))
+        .unwrap()
+        .with_channel(channel("stick, \"raw\"", ""))
+        .unwrap()
+        .with_channel(channel("K e", "deg per deg"))
+        .unwrap()
+}
+
+#[test]
+fn what_is_written_is_read_bit_for_bit() {
+    let desk = Desk::new();
+    let path = desk.path("run.csv");
+    for (n, ts, start) in [
+        (5000, 0.01, 0.0),
+        (9000, 0.01, -8.0),
+        (333, 1.0 / 60.0, 0.1),
+        (400, 0.007_3, -1.0 / 3.0),
+        // Two grids that look like a whole number of Hz and are not.
+        (700, 0.010_000_03, 12.5),
+        (4001, 1.0 / 99.995, 0.0),
+        (2, 0.3, 0.0),
+        (1, 0.3, 5.0),
+    ] {
+        let record = record(n, ts, start);
+        write_record(&path, &record).unwrap();
+        let back = read_record(&path, &defaults()).unwrap();
+        assert!(back.notes.is_empty(), "{:?}", back.notes);
+        let back = back.record;
+        assert_eq!(back.sample_time().s().to_bits(), ts.to_bits(), "{n} samples of {ts} s");
+        assert_eq!(back.time_s(0).to_bits(), record.time_s(0).to_bits());
+        assert_eq!(back.label(), "run");
+        assert_eq!(back.len(), n);
+        assert_eq!(back.channels().count(), record.channels().count());
+        for channel in record.channels() {
+            let other = back.channels().find(|c| c.name == channel.name).unwrap();
+            assert_eq!(other.unit, channel.unit);
+            assert!(
+                other
+                    .values
+                    .iter()
+                    .zip(&channel.values)
+                    .all(|(a, b)| a.to_bits() == b.to_bits())
+            );
+        }
+    }
+}
+
+#[test]
+fn columns_are_written_in_the_order_of_the_task() {
+    let desk = Desk::new();
+    let path = desk.path("run.csv");
+    write_record(&path, &record(3, 0.01, 0.0)).unwrap();
+    let text = fs::read_to_string(&path).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines[0], "# units: t s, f_t deg, e deg, u deg, K e deg per deg");
+    assert_eq!(lines[1], "# sample_time: 0.01 s");
+    assert_eq!(lines[2], "t,f_t,e,u,x,\"stick, \"\"raw\"\"\",K e");
+    assert_eq!(lines.len(), 6);
+    assert_eq!(fs::read_dir(desk.dir.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn channels_that_could_not_be_read_back_are_not_written() {
+    let desk = Desk::new();
+    for name in ["t", "", " x"] {
+        let record = record(3, 0.01, 0.0)
+            .with_channel(Channel::new(name, "", vec![0.0; 3]))
+            .unwrap();
+        let written = write_record(&desk.path("run.csv"), &record);
+        assert!(matches!(written, Err(IoError::ChannelName { .. })), "{name:?}");
+    }
+    assert!(!desk.path("run.csv").exists());
+}
+
+#[test]
+fn other_extensions_and_places() {
+    let desk = Desk::new();
+    for name in ["run.parquet", "run", "run.csv.gz"] {
+        fs::write(desk.path(name), "t,e,u\n0,1,2\n").unwrap();
+        let message = read_record(&desk.path(name), &defaults()).unwrap_err().to_string();
+        assert!(
+            message.contains("names no format of a record; expected .csv"),
+            "{message}"
+        );
+        assert!(write_record(&desk.path(name), &record(3, 0.01, 0.0)).is_err());
+    }
+    fs::write(desk.path("run.TSV"), "t\te\tu\n0\t1\t2\n1\t1\t2\n").unwrap();
+    assert_eq!(read_record(&desk.path("run.TSV"), &defaults()).unwrap().record.len(), 2);
+    assert!(matches!(
+        read_record(desk.dir.path(), &defaults()),
+        Err(IoError::Directory { .. })
+    ));
+    assert!(matches!(
+        read_record(&desk.path("no.csv"), &defaults()),
+        Err(IoError::Unreadable { .. })
+    ));
+}
+
+#[test]
+fn expressions_choose_and_combine() {
+    let desk = Desk::new();
+    let text = "# units: t s, r deg, y deg, stick mV\nt,r,y,stick\n0,1,0.25,3\n0.5,2,0.5,4\n";
+    let ReadRecord { record, notes } = desk.read(text, &options("r-y", "-stick")).unwrap();
+    assert!(notes.is_empty());
+    assert_eq!((record.input(), record.output()), (&[0.75, 1.5][..], &[-3.0, -4.0][..]));
+    assert_eq!(
+        (
+            record.input_channel().name.as_str(),
+            record.input_channel().unit.as_str()
+        ),
+        ("r-y", "deg")
+    );
+    assert_eq!(record.output_channel().unit, "mV");
+    let names: Vec<&str> = record.channels().map(|c| c.name.as_str()).collect();
+    assert_eq!(names, ["r-y", "-stick", "r", "y", "stick"]);
+    // Written and read again, the columns r-y and -stick are found by their names.
+    let path = desk.path("again.csv");
+    write_record(&path, &record).unwrap();
+    let again = read_record(&path, &options("r-y", "-stick"))
+        .unwrap()
+        .record
+        .labelled("run");
+    assert_eq!(again, record);
+
+    assert!(
+        desk.error(text, &defaults())
+            .contains("has no column \"e\" (asked for: e); it has t, r, y, stick")
+    );
+    assert!(
+        desk.error(text, &options("r-y", "r-y"))
+            .contains("input and output are both r-y")
+    );
+}
+
+#[test]
+fn a_given_frequency_wins_over_t() {
+    let desk = Desk::new();
+    let with = |hz| ReadOptions {
+        sampling_hz: Some(hz),
+        ..defaults()
+    };
+    let text = "t,e,u\n5,1,0\n5.1,2,0\n9,3,0\n";
+    let read = desk.read(text, &with(50.0)).unwrap();
+    assert_eq!(read.record.times_s(), [5.0, 5.02, 5.04]);
+    assert!(
+        read.notes[0].contains("the given sampling frequency of 50 Hz counts"),
+        "{:?}",
+        read.notes
+    );
+    let clock = desk.read("t,e,u\n12:00:01,1,0\n12:00:02,2,0\n", &with(2.0)).unwrap();
+    assert_eq!(clock.record.time_s(1), 0.5);
+    assert!(clock.notes[0].contains("t is no number on line 2"), "{:?}", clock.notes);
+    assert_eq!(desk.read("e,u\n1,2\n", &with(2.0)).unwrap().record.len(), 1);
+    assert!(
+        desk.error("e,u\n1,2\n", &defaults())
+            .contains("has no column t (time in s)")
+    );
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-320] {
+        assert!(
+            matches!(desk.read(text, &with(bad)), Err(IoError::SamplingFrequency { .. })),
+            "{bad}"
+        );
+    }
+    // A span of counted samples.
+    let span = ReadOptions {
+        span_s: (Some(5.02), None),
+        ..with(50.0)
+    };
+    let part = desk.read(text, &span).unwrap().record;
+    assert_eq!((part.time_s(0), part.input()), (5.02, &[2.0, 3.0][..]));
+}
+
+#[test]
+fn errors_name_line_column_and_remedy() {
+    let desk = Desk::new();
+    let message = |text: &str| desk.error(text, &defaults());
+    let says = |text: &str, parts: &[&str]| {
+        let message = message(text);
+        for part in parts {
+            assert!(message.contains(part), "\"{part}\" is not in: {message}");
+        }
+    };
+    says(
+        "t,e,u\n0,1,2\n1,abc,2\n",
+        &["line 3, column e: found \"abc\", expected a number", "--fill"],
+    );
+    says(
+        "t;e;u\n0;1,5;2\n1;1,6;2\n",
+        &["line 2, column e", "decimal point instead of a comma"],
+    );
+    says(
+        "t,e,u\n0,1,2\n#\n1,NaN,2\n2,,2\n",
+        &["line 4, column e: the value is missing (NaN), as are 2 of 3", "--fill"],
+    );
+    says(
+        "t,e,u\n0,1,2\n1,2,\n",
+        &["line 3, column u: the value is missing (empty)"],
+    );
+    says(
+        "t,e,u\n0,1,2\n1,2,-inf\n",
+        &["line 3, column u: found -inf, expected a finite number"],
+    );
+    says("t,e,u\n0,1,2\nx,2,3\n", &["line 3, column t: found \"x\""]);
+    says("t,e,u\n0,1,2\n,2,3\n", &["line 3, column t: the value is missing"]);
+    says("t,e,u\n0,1,2\n", &["1 sample, expected at least 2", "--fs HZ"]);
+    says(
+        "t,e,u\n0,1,2\n1,1,2\n1,1,2\n2,1,2\n",
+        &["line 4: t = 1 s after 1 s, expected increasing time"],
+    );
+    says("t,e,u\n0,1,2\n2,1,2\n1,1,2\n", &["line 4: t = 1 s after 2 s"]);
+    says(
+        "t,e,u\n0.0,1,2\n0.1,1,2\n0.2,1,2\n0.6,1,2\n0.7,1,2\n0.8,1,2\n0.9,1,2\n",
+        &[
+            "samples missing after line 4, t = 0.2 s: 3 (the next is at 0.6 s",
+            "gaps in all: 1",
+            "--resample",
+        ],
+    );
+    says(
+        "t,e,u\n0.000,1,2\n0.100,1,2\n0.230,1,2\n0.300,1,2\n",
+        &[
+            "at line 4, t = 0.23 s, it is 3.000e-2 s off",
+            "more than the allowed 1.000e-3 s",
+            "--resample",
+        ],
+    );
+    says("t,e,u\n0,1,2\n1,1\n", &["line 3: 2 values, expected 3"]);
+    says(
+        "t,e,u\n0,1,2\n1,\"1,2\n2,1,2\n",
+        &["line 3: 2 values, expected 3", "quotation mark"],
+    );
+}
+
+#[test]
+fn other_columns_that_are_no_numbers_are_left_out_with_a_note() {
+    let desk = Desk::new();
+    let text = "t,e,u,who,d,\n0,1,2,P1,,\n1,1,2,P1,3,\n2,1,2,P1,4,\n";
+    let read = desk.read(text, &defaults()).unwrap();
+    let names: Vec<&str> = read.record.channels().map(|c| c.name.as_str()).collect();
+    assert_eq!(names, ["e", "u"]);
+    assert_eq!(read.notes.len(), 3, "{:?}", read.notes);
+    assert!(read.notes[0].contains("column 6 has no name"));
+    assert!(read.notes[1].contains("column who is left out") && read.notes[1].contains("found \"P1\""));
+    assert!(read.notes[2].contains("column d is left out") && read.notes[2].contains("missing (empty)"));
+}
+
+#[test]
+fn fill_bridges_and_says_so() {
+    let desk = Desk::new();
+    let fill = |repair| ReadOptions { repair, ..defaults() };
+    let text = "t,e,u,d\n0,1,2,1\n,NaN,2,NA\n2,,2,\n3,4,2,4\n";
+    let read = desk.read(text, &fill(FILL)).unwrap();
+    assert_eq!(read.record.input(), [1.0, 2.0, 3.0, 4.0]);
+    assert_eq!(read.record.channel("d").unwrap(), [1.0, 2.0, 3.0, 4.0]);
+    assert_eq!(read.record.times_s(), [0.0, 1.0, 2.0, 3.0]);
+    assert!(
+        read.notes
+            .iter()
+            .any(|n| n == "column e: 2 missing values bridged linearly, at most 2 in a row")
+    );
+    let open = desk.error("t,e,u\n0,1,2\n1,,2\n", &fill(FILL));
+    assert!(
+        open.contains("line 3, column e: the values are missing up to the end"),
+        "{open}"
+    );
+    let open = desk.error("t,e,u\n0,,2\n1,1,2\n", &fill(FILL));
+    assert!(
+        open.contains("line 2, column e: the values are missing up to the start"),
+        "{open}"
+    );
+    // Text and infinite values are mistakes and not gaps.
+    assert!(
+        desk.error("t,e,u\n0,1,2\n1,x,2\n2,1,2\n", &fill(FILL))
+            .contains("found \"x\"")
+    );
+    assert!(
+        desk.error("t,e,u\n0,1,2\n1,inf,2\n2,1,2\n", &fill(FILL))
+            .contains("found inf")
+    );
+}
+
+#[test]
+fn resample_goes_over_gaps_and_jitter() {
+    let desk = Desk::new();
+    let ask = |repair, sampling_hz| ReadOptions {
+        repair,
+        sampling_hz,
+        ..defaults()
+    };
+    // e = 10 t and u = 1 - t on an uneven t with two samples missing: straight lines come back exactly up to rounding.
+    let times = [0.0, 0.101, 0.199, 0.3, 0.6, 0.7, 0.803, 0.9, 1.0];
+    let mut text = String::from("t,e,u\n");
+    times
+        .iter()
+        .for_each(|t| text.push_str(&format!("{t:.3},{},{}\n", 10.0 * t, 1.0 - t)));
+    assert!(matches!(
+        desk.read(&text, &defaults()),
+        Err(IoError::Gap { missing: 2, .. })
+    ));
+    let read = desk.read(&text, &ask(RESAMPLE, None)).unwrap();
+    assert_eq!(read.record.sample_time().s(), 0.1);
+    assert_eq!(read.record.len(), 11);
+    for k in 0..11 {
+        let t = 0.1 * k as f64;
+        assert!((read.record.input()[k] - 10.0 * t).abs() < 1e-13, "{k}");
+        assert!((read.record.output()[k] - (1.0 - t)).abs() < 1e-14, "{k}");
+    }
+    assert!(
+        read.notes[0].contains("from 9 samples to 11 at 10 Hz; the longest step"),
+        "{:?}",
+        read.notes
+    );
+    let twenty = desk.read(&text, &ask(RESAMPLE, Some(20.0))).unwrap().record;
+    assert_eq!((twenty.len(), twenty.sample_time().s()), (21, 0.05));
+    let coarse = desk.read(&text, &ask(RESAMPLE, Some(4.0))).unwrap();
+    assert_eq!(coarse.record.times_s(), [0.0, 0.25, 0.5, 0.75, 1.0]);
+    assert!((coarse.record.input()[1] - 2.5).abs() < 1e-14);
+    let slow = desk.read(&text, &ask(RESAMPLE, Some(2.0))).unwrap();
+    assert!(slow.notes[1].contains("no low-pass filter"), "{:?}", slow.notes);
+    // An even record is left alone, and one with a time that jumps away is no record.
+    let even = "t,e,u\n0.0,1,2\n0.1,2,3\n0.2,4,5\n";
+    assert_eq!(
+        desk.read(even, &ask(RESAMPLE, None)).unwrap(),
+        desk.read(even, &defaults()).unwrap()
+    );
+    let away = desk.error("t,e,u\n0,1,2\n1,1,2\n2,1,2\n1e9,1,2\n", &ask(RESAMPLE, None));
+    assert!(away.contains("would make 1000000001 samples out of 4"), "{away}");
+    let back = desk.error("t,e,u\n0,1,2\n1,1,2\n0.5,1,2\n", &ask(RESAMPLE, None));
+    assert!(back.contains("expected increasing time"), "{back}");
+}
+
+#[test]
+fn what_lies_outside_the_span_is_not_looked_at() {
+    let desk = Desk::new();
+    let span = |from, to| ReadOptions {
+        span_s: (from, to),
+        ..defaults()
+    };
+    let text = "t,e,u\n0,x,2\n1,1,2\n2,2,2\n3,3,2\n7,,2\n";
+    let read = desk.read(text, &span(Some(1.0), Some(7.0))).unwrap().record;
+    assert_eq!(
+        (read.times_s(), read.input()),
+        (vec![1.0, 2.0, 3.0], &[1.0, 2.0, 3.0][..])
+    );
+    assert!(desk.error(text, &span(Some(3.0), None)).contains("column e"));
+    // 0.3 falls on the sample that floating point puts at 0.30000000000000004.
+    let sums = "t,e,u\n0.1,1,2\n0.2,2,2\n0.30000000000000004,3,2\n0.4,4,2\n";
+    assert_eq!(desk.read(sums, &span(None, Some(0.3))).unwrap().record.len(), 2);
+    assert_eq!(desk.read(sums, &span(Some(0.3), None)).unwrap().record.len(), 2);
+    for (from, to) in [
+        (Some(9.0), None),
+        (None, Some(0.0)),
+        (Some(2.0), Some(2.0)),
+        (Some(f64::NAN), None),
+    ] {
+        let message = desk.error(text, &span(from, to));
+        assert!(
+            message.contains("holds no samples; the record covers 0 to 7 s"),
+            "{message}"
+        );
+    }
+}
+
+/// Whatever stands in a file, the answer is a record of finite numbers or an error that names the file.
+#[test]
+fn damaged_files_never_panic() {
+    let desk = Desk::new();
+    let path = desk.path("run.csv");
+    write_record(&path, &record(12, 0.01, -0.05)).unwrap();
+    let seeds = [
+        fs::read(&path).unwrap(),
+        b"\xef\xbb\xbft;e;u;d\r\n0,00;1;2;a\r\n0.01;1e3;-2;\r\n0.02;NaN;3;4\r\n0.03;1;2;3\r\n".to_vec(),
+        b"t\te\tu\n-1\t1\t2\n0\t3\t4\n1\t5\t6\n2\t5\t6\n".to_vec(),
+    ];
+    let pieces: [&[u8]; 14] = [
+        b"\"",
+        b"\n",
+        b"\r",
+        b"#",
+        b",",
+        b"NaN",
+        b"-inf",
+        b"1e308",
+        b"-1e308",
+        b"5e-324",
+        b"\xff",
+        b"\0",
+        b"t",
+        b"e-999999999999",
+    ];
+    let mut draw = Draw(1);
+    let (mut read, mut refused) = (0, 0);
+    for round in 0..3000 {
+        let mut bytes = seeds[round % seeds.len()].clone();
+        for _ in 0..=draw.below(4) {
+            let at = draw.below(bytes.len());
+            match draw.below(6) {
+                0 if !bytes.is_empty() => bytes[at] = draw.below(256) as u8,
+                1 => bytes.truncate(at),
+                2 => {
+                    let end = (at + draw.below(20)).min(bytes.len());
+                    bytes.drain(at..end);
+                }
+                3 => {
+                    let end = (at + draw.below(40)).min(bytes.len());
+                    let copy = bytes[at..end].to_vec();
+                    bytes.splice(at..at, copy);
+                }
+                4 if !bytes.is_empty() => bytes[at] = b"0123456789.-e,;"[draw.below(15)],
+                _ => {
+                    let piece = pieces[draw.below(pieces.len())];
+                    bytes.splice(at..at, piece.iter().copied());
+                }
+            }
+        }
+        let options = ReadOptions {
+            input: ["e", "u-e", "-e"][draw.below(3)].parse().unwrap(),
+            sampling_hz: [None, None, Some(100.0)][draw.below(3)],
+            span_s: [(None, None), (Some(0.0), None), (Some(-1.0), Some(1.5))][draw.below(3)],
+            repair: Repair {
+                resample: draw.below(2) == 0,
+                fill: draw.below(2) == 0,
+            },
+            ..defaults()
+        };
+        match desk.read(&bytes, &options) {
+            Ok(good) => {
+                read += 1;
+                assert!(good.record.channels().flat_map(|c| &c.values).all(|v| v.is_finite()));
+                assert!(good.record.times_s().iter().all(|t| t.is_finite()));
+            }
+            Err(error) => {
+                refused += 1;
+                assert!(error.to_string().contains("run.csv"), "{error}");
+            }
+        }
+    }
+    // Both ways are walked often.
+    assert!(read > 250 && refused > 250, "{read} read, {refused} refused");
+}
+
+/// Recordings of people at work, which are not part of the project: skipped where they are absent.
+#[test]
+fn recordings_of_people_are_read() {
+    let Some(dir) = std::env::var_os("HOID_HUMAN_DATA") else {
+        eprintln!("skipped: HOID_HUMAN_DATA names no directory of recordings with columns t, r, y, u");
+        return;
+    };
+    let mut read = 0;
+    for entry in fs::read_dir(Path::new(&dir)).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|e| e != "csv") || path.file_stem().is_some_and(|stem| stem == "index") {
+            continue;
+        }
+        let found = read_record(&path, &options("r-y", "u")).unwrap();
+        assert!(found.notes.is_empty(), "{:?}", found.notes);
+        assert_eq!(found.record.sample_time().s(), 1.0 / 60.0);
+        read += 1;
+    }
+    assert!(read > 0);
+    eprintln!("{read} recordings read");
+}

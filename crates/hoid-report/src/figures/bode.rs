@@ -1,0 +1,283 @@
+//! Bode pair: magnitude and phase of models with their 95 % bands, and of the true operator where it is known.
+//!
+//! The estimators see the operator behind the zero-order hold of their sampling, `B q^-nk/(A F)`; the truth is drawn behind the
+//! same hold, so that both curves lie on each other when the parameters agree. The phase is unwrapped with the delay
+//! `nk Ts omega` taken out, which turns fastest, and put back.
+
+use std::f64::consts::{PI, TAU};
+
+use hoid_ident::{Fit, ResponsePoint};
+use hoid_model::{Complex64, OperatorParameters, PolynomialModel, Record, SampleTime, Structure};
+use kuva::prelude::{BandPlot, Plot};
+
+use super::style::{self, BLACK, MODEL_COLOURS};
+
+const UPPER: f64 = 175.0;
+const LOWER: f64 = 205.0;
+
+const MAGNITUDE_STEPS: [f64; 5] = [1.0, 2.0, 5.0, 10.0, 20.0];
+const MOST_STEPS: f64 = 6.5;
+const PHASE_STEPS: [f64; 6] = [15.0, 30.0, 45.0, 90.0, 180.0, 360.0];
+
+/// Frequencies of a curve.
+const POINTS: usize = 240;
+/// Range in which a person controls, rad/s; from a tenth to fifty the axis has ticks at 1, 2 and 5 of each decade.
+const LOWEST_RAD_S: f64 = 0.1;
+const HIGHEST_RAD_S: f64 = 50.0;
+/// Two-sided 95 % point of the normal distribution.
+const Z_95: f64 = 1.959_963_984_540_054;
+
+/// A model in the figure.
+#[derive(Debug, Clone, Copy)]
+pub struct BodeModel<'a> {
+    /// Its name in the legend.
+    pub name: &'a str,
+    /// The model.
+    pub fit: &'a Fit,
+    /// The records it was fitted on; the longest decides the lowest frequency.
+    pub records: &'a [Record],
+}
+
+/// The true operator in the figure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrueResponse {
+    /// Its parameters.
+    pub operator: OperatorParameters,
+    /// Sample time of the hold it is seen through.
+    pub sample_time: SampleTime,
+}
+
+/// Magnitude in dB and phase in deg over frequency in rad/s, from 0.1 rad/s, or the lowest frequency that the longest
+/// record resolves, to 50 rad/s or half the sampling frequency.
+///
+/// Bands are 1.96 standard errors to either side; a model without standard errors has none. A truth that no discrete model
+/// stands for (a delay of no whole number of samples) is drawn without the hold.
+pub fn bode(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse]) -> String {
+    let omega = frequencies(models);
+    let mut curves: Vec<(Curve, &str)> = Vec::new();
+    for (i, model) in models.iter().enumerate() {
+        let delay_s = model.fit.orders().nk as f64 * model.fit.model().sample_time().s();
+        let curve = Curve::of_model(&model.fit.frequency_response(&omega), delay_s);
+        curves.push((curve, MODEL_COLOURS[i % MODEL_COLOURS.len()]));
+    }
+    let truths: Vec<Curve> = truths.iter().map(|t| Curve::of_truth(t, &omega)).collect();
+
+    let limits = (omega[0], omega[omega.len() - 1]);
+    let mut panels = Vec::new();
+    for is_phase in [false, true] {
+        let series = |c: &Curve| {
+            if is_phase {
+                c.phase_deg.clone()
+            } else {
+                c.magnitude_db.clone()
+            }
+        };
+        let all = curves.iter().map(|(c, _)| c).chain(&truths);
+        let (low, high) = style::padded_range(all.flat_map(|c| series(c).into_iter().map(|p| p.0)));
+        let room = 0.05 * (high - low);
+        let step = tick_step(
+            high - low + 2.0 * room,
+            if is_phase { &PHASE_STEPS } else { &MAGNITUDE_STEPS },
+        );
+        let range = (
+            ((low - room) / step).floor() * step,
+            ((high + room) / step).ceil() * step,
+        );
+        let mut plots: Vec<Plot> = Vec::new();
+        for (curve, colour) in &curves {
+            plots.extend(band(&omega, &series(curve), range, colour));
+        }
+        for (curve, colour) in &curves {
+            let points = omega.iter().copied().zip(series(curve).into_iter().map(|p| p.0));
+            plots.push(style::line(points, colour, 1.6).into());
+        }
+        for truth in &truths {
+            let points = omega.iter().copied().zip(series(truth).into_iter().map(|p| p.0));
+            plots.push(style::line(points, BLACK, 1.4).with_dashed().into());
+        }
+        let height = if is_phase { LOWER } else { UPPER };
+        let layout = style::layout(limits, range, height).with_log_x().with_y_tick_step(step);
+        let layout = if is_phase {
+            layout
+                .with_y_label("phase (deg)")
+                .with_x_label("frequency \u{3c9} (rad/s)")
+        } else {
+            layout
+                .with_y_label("magnitude (dB)")
+                .with_force_margins_y(style::TOP, style::BOTTOM_WITHOUT_LABEL)
+        };
+        panels.push((plots, layout, height));
+    }
+    let mut entries: Vec<_> = models
+        .iter()
+        .zip(&curves)
+        .map(|(m, (_, colour))| (m.name, *colour, false))
+        .collect();
+    if !truths.is_empty() {
+        entries.push(("true operator", BLACK, true));
+    }
+    let mut scene = style::stacked(panels);
+    style::add_legend(&mut scene, &entries);
+    style::finish(id, "Frequency response with 95 % bands", &scene)
+}
+
+fn frequencies(models: &[BodeModel<'_>]) -> Vec<f64> {
+    let nyquist = models
+        .iter()
+        .map(|m| m.fit.model().sample_time().nyquist_rad_s())
+        .fold(f64::INFINITY, f64::min);
+    let high = nyquist.min(HIGHEST_RAD_S);
+    let longest_s = models
+        .iter()
+        .flat_map(|m| m.records)
+        .map(|r| r.len() as f64 * r.sample_time().s())
+        .fold(0.0, f64::max);
+    let low = (TAU / longest_s).max(LOWEST_RAD_S).min(high / 10.0);
+    let ratio = (high / low).ln() / (POINTS - 1) as f64;
+    (0..POINTS).map(|i| low * (ratio * i as f64).exp()).collect()
+}
+
+/// Value and standard error over frequency.
+struct Curve {
+    magnitude_db: Vec<(f64, Option<f64>)>,
+    phase_deg: Vec<(f64, Option<f64>)>,
+}
+
+impl Curve {
+    fn of_model(response: &[ResponsePoint], delay_s: f64) -> Self {
+        let phases: Vec<(f64, f64)> = response.iter().map(|p| (p.omega_rad_s, p.phase_deg.value)).collect();
+        let unwrapped = unwrap(&phases, delay_s);
+        Self {
+            magnitude_db: response
+                .iter()
+                .map(|p| (p.magnitude_db.value, p.magnitude_db.standard_error))
+                .collect(),
+            phase_deg: unwrapped
+                .into_iter()
+                .zip(response)
+                .map(|(phase, p)| (phase, p.phase_deg.standard_error))
+                .collect(),
+        }
+    }
+
+    fn of_truth(truth: &TrueResponse, omega: &[f64]) -> Self {
+        let discrete = truth.operator.discretise(truth.sample_time).ok().and_then(|d| {
+            let orders = Structure::BoxJenkins.operator_orders(d.nk);
+            let theta = [d.held.b0, d.held.b1, 0.0, d.held.f1, d.held.f2];
+            PolynomialModel::new(Structure::BoxJenkins, orders, truth.sample_time, theta.to_vec()).ok()
+        });
+        let continuous = truth.operator.transfer_function().ok();
+        let (delay_s, response): (f64, Vec<Complex64>) = match (&discrete, &continuous) {
+            (Some(model), _) => (
+                model.orders().nk as f64 * truth.sample_time.s(),
+                omega.iter().map(|&w| model.response(w)).collect(),
+            ),
+            (None, Some(h)) => (h.delay_s(), omega.iter().map(|&w| h.response(w)).collect()),
+            (None, None) => (0.0, Vec::new()),
+        };
+        let phases: Vec<(f64, f64)> = omega
+            .iter()
+            .zip(&response)
+            .map(|(&w, h)| (w, h.arg().to_degrees()))
+            .collect();
+        Self {
+            magnitude_db: response.iter().map(|h| (20.0 * h.norm().log10(), None)).collect(),
+            phase_deg: unwrap(&phases, delay_s).into_iter().map(|p| (p, None)).collect(),
+        }
+    }
+}
+
+/// Phase without jumps, in deg. The first value is the principal one with the delay taken out.
+fn unwrap(phases: &[(f64, f64)], delay_s: f64) -> Vec<f64> {
+    let mut before: Option<f64> = None;
+    phases
+        .iter()
+        .map(|&(omega, phase)| {
+            let by_delay = omega * delay_s * 180.0 / PI;
+            let rest = phase + by_delay;
+            let turns = match before {
+                None => (rest / 360.0).round(),
+                Some(last) => ((rest - last) / 360.0).round(),
+            };
+            let rest = rest - 360.0 * turns;
+            if rest.is_finite() {
+                before = Some(rest);
+            }
+            rest - by_delay
+        })
+        .collect()
+}
+
+/// The first step that gives eight ticks or fewer, or a multiple of the last one.
+fn tick_step(span: f64, steps: &[f64]) -> f64 {
+    let largest = steps.last().copied().unwrap_or(1.0);
+    let enough = |step: &&f64| span / **step <= MOST_STEPS;
+    steps
+        .iter()
+        .find(enough)
+        .copied()
+        .unwrap_or_else(|| largest * (span / (MOST_STEPS * largest)).ceil())
+}
+
+/// The 95 % band, cut at the range of the figure; `None` without standard errors.
+fn band(omega: &[f64], curve: &[(f64, Option<f64>)], (low, high): (f64, f64), colour: &str) -> Option<Plot> {
+    let known: Vec<(f64, f64, f64)> = omega
+        .iter()
+        .zip(curve)
+        .filter_map(|(&w, &(value, error))| {
+            let reach = Z_95 * error?;
+            let cut = |v: f64| v.clamp(low, high);
+            (value.is_finite() && reach.is_finite()).then(|| (w, cut(value - reach), cut(value + reach)))
+        })
+        .collect();
+    (known.len() > 1).then(|| {
+        BandPlot::new(
+            known.iter().map(|k| k.0),
+            known.iter().map(|k| k.1),
+            known.iter().map(|k| k.2),
+        )
+        .with_color(colour)
+        .with_opacity(0.22)
+        .into()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unwrapped_phase_of_a_delay_is_a_line() {
+        // 0.9 s of delay and 1 rad/s steps: 52 deg a step, far beyond one round.
+        let phases: Vec<(f64, f64)> = (1..200)
+            .map(|k| {
+                let omega = f64::from(k);
+                (omega, Complex64::from_polar(1.0, -0.9 * omega).arg().to_degrees())
+            })
+            .collect();
+        for (phase, (omega, _)) in unwrap(&phases, 0.9).iter().zip(&phases) {
+            assert!((phase + (0.9 * omega).to_degrees()).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_truth_behind_its_hold_is_the_continuous_operator_at_low_frequency() {
+        let truth = TrueResponse {
+            operator: OperatorParameters {
+                k_e: 0.09,
+                t_l_s: 0.4,
+                omega_nm_rad_s: 11.25,
+                zeta_nm: 0.35,
+                tau_e_s: 0.28,
+            },
+            sample_time: SampleTime::HUNDREDTH,
+        };
+        let curve = Curve::of_truth(&truth, &[0.01, 5.0]);
+        // K_e in dB; at 5 rad/s the hold and its half sample of delay add 1.4 deg.
+        assert!((curve.magnitude_db[0].0 - 20.0 * 0.09_f64.log10()).abs() < 1e-3);
+        let h = truth.operator.transfer_function().unwrap().response(5.0);
+        let half_sample_deg = (5.0_f64 * 0.005).to_degrees();
+        assert!((curve.phase_deg[1].0 - (h.arg().to_degrees() - half_sample_deg)).abs() < 0.05);
+        assert!((curve.magnitude_db[1].0 - 20.0 * h.norm().log10()).abs() < 0.01);
+    }
+}

@@ -1,0 +1,15 @@
+//! The figures of the report, each as one SVG text.
+//!
+//! All are drawn 420 units wide with 13-unit text: 7.5 pt in a column of 85 mm. Colours are those of Okabe and Ito
+//! (*Color Universal Design*, 2008), on white. The same data give the same bytes. `id` must be different for figures that stand
+//! on one page: it is the prefix of all ids inside the SVG.
+
+mod bode;
+mod correlation;
+mod style;
+mod time_response;
+
+pub use bode::{BodeModel, TrueResponse, bode};
+pub use correlation::{autocorrelation, cross_correlation};
+pub(crate) use time_response::has_close_up;
+pub use time_response::time_response;

@@ -1,0 +1,257 @@
+//! What all figures share: size, colours, fonts, and the last touches to the SVG text.
+
+use std::sync::Arc;
+
+use kuva::prelude::{Figure, Layout, LinePlot, Plot, SvgBackend, Theme, TickFormat};
+use kuva::render::{
+    color::Color,
+    render::{Primitive, Scene, TextAnchor},
+};
+
+/// Width of every figure in units of the SVG.
+pub const WIDTH: f64 = 420.0;
+/// Space for tick labels and the label of the ordinate, the same in all figures so that panels align.
+const LEFT: f64 = 68.0;
+const RIGHT: f64 = 14.0;
+/// Space above the axes.
+pub const TOP: f64 = 10.0;
+/// Space below the axes for ticks and the label of the abscissa.
+pub const BOTTOM: f64 = 48.0;
+/// Space below the axes for ticks alone.
+pub const BOTTOM_WITHOUT_LABEL: f64 = 26.0;
+const TEXT: u32 = 13;
+
+pub const BLACK: &str = "#000000";
+pub const GREY: &str = "#999999";
+pub const BLUE: &str = "#0072B2";
+pub const VERMILLION: &str = "#D55E00";
+
+/// Colours of models in the order of the report: blue, vermillion, green, purple, orange, sky blue.
+pub const MODEL_COLOURS: [&str; 6] = [BLUE, VERMILLION, "#009E73", "#CC79A7", "#E69F00", "#56B4E9"];
+
+/// Layout over a fixed range of both axes.
+pub fn layout((x_low, x_high): (f64, f64), (y_low, y_high): (f64, f64), height: f64) -> Layout {
+    Layout::new((x_low, x_high), (y_low, y_high))
+        .with_x_axis_min(x_low)
+        .with_x_axis_max(x_high)
+        .with_y_axis_min(y_low)
+        .with_y_axis_max(y_high)
+        .with_width(WIDTH)
+        .with_height(height)
+        .with_force_margins(LEFT, RIGHT)
+        .with_force_margins_y(TOP, BOTTOM)
+        .with_theme(Theme {
+            grid_color: "#e4e4e4".to_owned(),
+            ..Theme::light()
+        })
+        .with_font_family("Helvetica, Arial, 'Liberation Sans', sans-serif")
+        .with_label_size(TEXT)
+        .with_tick_size(TEXT)
+        .with_body_size(TEXT)
+        .with_axis_line_width(1.0)
+        .with_tick_format(TickFormat::Custom(Arc::new(tick)))
+}
+
+/// A tick as the shortest decimal that tells it: rounding noise of `0.1 + 0.2` is not shown.
+fn tick(value: f64) -> String {
+    let text = format!("{value:.6}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    match text {
+        "-0" | "" => "0".to_owned(),
+        _ => text.to_owned(),
+    }
+}
+
+/// Line through points; those that are not finite are left out.
+pub fn line(points: impl IntoIterator<Item = (f64, f64)>, colour: &str, width: f64) -> LinePlot {
+    let finite = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
+    LinePlot::new()
+        .with_data(points.into_iter().filter(finite))
+        .with_color(colour)
+        .with_stroke_width(width)
+}
+
+/// Adds the legend below the figure, which grows by it: name, colour and whether the line is dashed. Entries share a row as
+/// long as they fit.
+pub fn add_legend(scene: &mut Scene, entries: &[(&str, &str, bool)]) {
+    const ROW: f64 = 18.0;
+    const SAMPLE: f64 = 22.0;
+    const GAP: f64 = 6.0;
+    const LONGEST: usize = 48;
+    let (mut x, mut y) = (LEFT, scene.height + 15.0);
+    for (name, colour, dashed) in entries {
+        // Sans-serif text is a little narrower than this on average; a long name gets a row of its own, and no more.
+        let name = shortened(name, LONGEST);
+        let width = SAMPLE + GAP + 0.58 * f64::from(TEXT) * name.chars().count() as f64 + 14.0;
+        if x > LEFT && x + width > WIDTH {
+            (x, y) = (LEFT, y + ROW);
+        }
+        let start = if x + width > WIDTH { (WIDTH - width).max(4.0) } else { x };
+        scene.add(Primitive::Line {
+            x1: start,
+            y1: y - 4.5,
+            x2: start + SAMPLE,
+            y2: y - 4.5,
+            stroke: Color::from(*colour),
+            stroke_width: 2.0,
+            stroke_dasharray: dashed.then(|| "6 3".to_owned()),
+        });
+        scene.add(Primitive::Text {
+            x: start + SAMPLE + GAP,
+            y,
+            content: label(&name),
+            anchor: TextAnchor::Start,
+            size: TEXT,
+            rotate: None,
+            bold: false,
+            color: None,
+        });
+        x = start + width;
+    }
+    scene.height = y + 7.0;
+}
+
+fn shortened(text: &str, longest: usize) -> String {
+    if text.chars().count() <= longest {
+        return text.to_owned();
+    }
+    let mut short: String = text.chars().take(longest - 1).collect();
+    short.push('\u{2026}');
+    short
+}
+
+/// Text of the user: a dollar sign would open a formula.
+pub fn label(text: &str) -> String {
+    text.replace('$', "\\$")
+}
+
+/// Name and unit of an axis.
+pub fn axis_label(name: &str, unit: &str) -> String {
+    let unit = if unit.is_empty() { "-" } else { unit };
+    label(&format!("{name} ({unit})"))
+}
+
+/// Range of values with 5 % of room on both sides; a range of zero width becomes one around it.
+pub fn padded_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for value in values.into_iter().filter(|v| v.is_finite()) {
+        low = low.min(value);
+        high = high.max(value);
+    }
+    if low > high {
+        return (-1.0, 1.0);
+    }
+    let room = match high - low {
+        0.0 if high == 0.0 => 1.0,
+        0.0 => 0.1 * high.abs(),
+        span => 0.05 * span,
+    };
+    (low - room, high + room)
+}
+
+/// Panels one above the other, each with its height.
+pub fn stacked(panels: Vec<(Vec<Plot>, Layout, f64)>) -> Scene {
+    let mut figure = Figure::new(panels.len(), 1)
+        .with_cell_size(WIDTH, WIDTH)
+        .with_spacing(0.0)
+        .with_padding(0.0);
+    let (mut plots, mut layouts) = (Vec::new(), Vec::new());
+    for (row, (plot, layout, height)) in panels.into_iter().enumerate() {
+        figure = figure.with_row_height(row, height);
+        plots.push(plot);
+        layouts.push(layout);
+    }
+    figure.with_plots(plots).with_layouts(layouts).render()
+}
+
+/// SVG text with a view box (it scales with the page), a title for screen readers, and ids that begin with that of the figure.
+pub fn finish(id: &str, title: &str, scene: &Scene) -> String {
+    let raw = SvgBackend::new().render_scene(scene);
+    let Some((_, body)) = raw.split_once('>') else {
+        return raw;
+    };
+    let font = scene.font_family.as_deref().map(escaped).unwrap_or_default();
+    let (width, height) = (scene.width, scene.height);
+    let (id, title) = (escaped(id), escaped(title));
+    // The generator's stamp would change the bytes with its version.
+    let body = match body.split_once("-->") {
+        Some((stamp, rest)) if stamp.trim_start().starts_with("<!--") => rest,
+        _ => body,
+    };
+    let body = renumbered(body, "kuva-clip-", &format!("{id}-clip-"));
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
+         font-family=\"{font}\" fill=\"black\" role=\"img\" aria-labelledby=\"{id}-title\"><title id=\"{id}-title\">{title}</title>{body}"
+    )
+}
+
+/// Ids `from` + number as `to` + number, counted from 1 in the order in which they come. The library counts them over the whole
+/// life of the process: the same figure drawn twice would differ.
+fn renumbered(text: &str, from: &str, to: &str) -> String {
+    let mut known: Vec<&str> = Vec::new();
+    let mut parts = text.split(from);
+    let mut result = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let digits = part.len() - part.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+        let (number, rest) = part.split_at(digits);
+        let position = known.iter().position(|k| *k == number).unwrap_or_else(|| {
+            known.push(number);
+            known.len() - 1
+        });
+        result.push_str(&format!("{to}{}{rest}", position + 1));
+    }
+    result
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_short() {
+        assert_eq!(tick(0.1 + 0.2), "0.3");
+        assert_eq!(tick(-0.0), "0");
+        assert_eq!(tick(-1e-12), "0");
+        assert_eq!(tick(20.0), "20");
+    }
+
+    #[test]
+    fn ranges_always_have_a_width() {
+        assert_eq!(padded_range([]), (-1.0, 1.0));
+        assert_eq!(padded_range([0.0, f64::NAN]), (-1.0, 1.0));
+        assert_eq!(padded_range([2.0]), (1.8, 2.2));
+        assert_eq!(padded_range([0.0, 1.0]), (-0.05, 1.05));
+    }
+
+    #[test]
+    fn long_names_are_cut() {
+        assert_eq!(shortened("abc", 3), "abc");
+        assert_eq!(shortened("\u{3c9}\u{3c9}\u{3c9}\u{3c9}", 3), "\u{3c9}\u{3c9}\u{2026}");
+    }
+
+    #[test]
+    fn ids_count_from_one() {
+        let text = "<a id=\"k-12\"/><b id=\"k-7\"/> url(#k-7) url(#k-12)";
+        assert_eq!(
+            renumbered(text, "k-", "f-"),
+            "<a id=\"f-1\"/><b id=\"f-2\"/> url(#f-2) url(#f-1)"
+        );
+    }
+
+    #[test]
+    fn text_of_the_user_stays_text() {
+        let plots = vec![line([(0.0, 0.0), (1.0, 1.0)], BLUE, 1.0).into()];
+        let layout = layout((0.0, 1.0), (0.0, 1.0), 200.0).with_x_label(axis_label("a<b> & $x^2$", "\"s\""));
+        let svg = finish("f<1", "t & t", &stacked(vec![(plots, layout, 200.0)]));
+        assert!(svg.contains("a&lt;b&gt; &amp; $x^2$"), "{svg}");
+        assert!(svg.contains("f&lt;1-title") && svg.contains("t &amp; t"));
+        assert!(!svg.contains("kuva"));
+    }
+}

@@ -1,0 +1,118 @@
+//! Measured output with the simulated and the one-step-ahead predicted output of a model.
+
+use hoid_ident::validation::Validation;
+use hoid_model::Record;
+use kuva::prelude::Plot;
+
+use super::style::{self, BLUE, GREY, VERMILLION};
+
+/// Columns of the figure that a line is reduced to: one for each unit between its axes.
+const COLUMNS: usize = 340;
+
+/// The close-up shows this part of a record, when that has samples enough to be worth it.
+const CLOSE_UP: usize = 8;
+const SMALLEST_CLOSE_UP: usize = 50;
+
+const UPPER: f64 = 150.0;
+const LOWER: f64 = 190.0;
+
+/// Measured (grey), predicted (vermillion) and simulated (blue) output over time: the whole record above, its middle eighth
+/// below, where the prediction can be told from the measurement.
+///
+/// The ordinate covers the measured output with half its range to either side; what leaves that (an unstable model) is cut off.
+/// Long records are drawn by the smallest and largest sample of each column, so that no peak is lost.
+pub fn time_response(id: &str, record: &Record, validation: &Validation) -> String {
+    let measured = record.output();
+    let (low, high) = style::padded_range(measured.iter().copied());
+    let half = 0.5 * (high - low);
+    let models = validation.simulated.iter().chain(&validation.predicted);
+    let (wanted_low, wanted_high) = style::padded_range(measured.iter().chain(models).copied());
+    let range = (wanted_low.max(low - half), wanted_high.min(high + half));
+    // Beyond the axes the path is clipped; without bound, numbers of 1e300 would stand in the file.
+    let bounded = |v: f64| v.clamp(range.0 - half, range.1 + half);
+
+    let panel = |from: usize, to: usize| -> (Vec<Plot>, (f64, f64)) {
+        let trace = |first: usize, values: &[f64], colour: &str, width: f64| -> Plot {
+            let part =
+                &values[from.saturating_sub(first).min(values.len())..to.saturating_sub(first).min(values.len())];
+            let start = from.max(first);
+            let points = thinned(part)
+                .into_iter()
+                .map(|k| (record.time_s(start + k), bounded(part[k])));
+            style::line(points, colour, width).into()
+        };
+        let plots = vec![
+            trace(0, measured, GREY, 2.6),
+            trace(validation.first, &validation.predicted, VERMILLION, 0.9),
+            trace(validation.first, &validation.simulated, BLUE, 1.2),
+        ];
+        // One sample alone still needs an axis.
+        (plots, (record.time_s(from), record.time_s((to - 1).max(from + 1))))
+    };
+    let channel = record.output_channel();
+    let ordinate = style::axis_label(&channel.name, &channel.unit);
+    let layout = |span, height| style::layout(span, range, height).with_y_label(ordinate.clone());
+
+    let n = record.len();
+    let mut panels = Vec::new();
+    let (from, to) = if has_close_up(record) {
+        let (plots, span) = panel(0, n);
+        let upper = layout(span, UPPER).with_force_margins_y(style::TOP, style::BOTTOM_WITHOUT_LABEL);
+        panels.push((plots, upper, UPPER));
+        let part = n / CLOSE_UP;
+        ((n - part) / 2, (n + part) / 2)
+    } else {
+        (0, n)
+    };
+    let (plots, span) = panel(from, to);
+    panels.push((plots, layout(span, LOWER).with_x_label("time (s)"), LOWER));
+    let mut scene = style::stacked(panels);
+    let entries = [
+        ("measured", GREY, false),
+        ("predicted", VERMILLION, false),
+        ("simulated", BLUE, false),
+    ];
+    style::add_legend(&mut scene, &entries);
+    style::finish(id, "Measured, simulated and predicted output over time", &scene)
+}
+
+/// True when the record is long enough for a close-up of its middle.
+pub fn has_close_up(record: &Record) -> bool {
+    record.len() / CLOSE_UP >= SMALLEST_CLOSE_UP
+}
+
+/// Indices of the smallest and the largest value of each column, in order; all indices of a short series.
+fn thinned(values: &[f64]) -> Vec<usize> {
+    if values.len() <= 2 * COLUMNS {
+        return (0..values.len()).collect();
+    }
+    let mut kept = Vec::with_capacity(2 * COLUMNS + 2);
+    kept.push(0);
+    for column in 0..COLUMNS {
+        let (from, to) = (column * values.len() / COLUMNS, (column + 1) * values.len() / COLUMNS);
+        let by_value = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
+        let lowest = (from..to).min_by(by_value).unwrap_or(from);
+        let highest = (from..to).max_by(by_value).unwrap_or(from);
+        kept.extend([lowest.min(highest), lowest.max(highest)]);
+    }
+    kept.push(values.len() - 1);
+    kept.dedup();
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinning_keeps_order_ends_and_peaks() {
+        let mut values: Vec<f64> = (0..50_000).map(|k| (k as f64 * 0.01).sin()).collect();
+        values[12_345] = 9.0;
+        let kept = thinned(&values);
+        assert!(kept.len() <= 2 * COLUMNS + 2);
+        assert!(kept.windows(2).all(|w| w[0] < w[1]));
+        assert_eq!((kept[0], kept[kept.len() - 1]), (0, 49_999));
+        assert!(kept.contains(&12_345));
+        assert_eq!(thinned(&[1.0, 2.0]), [0, 1]);
+    }
+}

@@ -1,0 +1,169 @@
+//! Numbers with as many digits as their standard error allows.
+//!
+//! A standard error is itself known to a few per cent at best, so that it is given with two significant digits and the value
+//! with the same decimals (ISO/IEC Guide 98-3, 7.2.6). Numbers without a standard error get five significant digits.
+
+/// Stands where there is no number.
+pub const DASH: &str = "\u{2013}";
+
+const DIGITS_OF_ERROR: i32 = 2;
+const DIGITS_ALONE: i32 = 5;
+
+/// Value and standard error as text, both with the decimals that two significant digits of the error need. A dash for what is
+/// not finite.
+pub fn with_uncertainty(value: f64, standard_error: Option<f64>) -> (String, String) {
+    if !value.is_finite() {
+        return (DASH.to_owned(), DASH.to_owned());
+    }
+    match standard_error.filter(|s| s.is_finite() && *s > 0.0) {
+        None => (plain(value), DASH.to_owned()),
+        Some(error) => {
+            let last = last_digit(error, DIGITS_OF_ERROR);
+            let exponent = exponent_for(value.abs().max(error));
+            (written(value, last, exponent), written(error, last, exponent))
+        }
+    }
+}
+
+/// The interval `value +- factor * standard_error` with the same decimals; a dash without a standard error.
+pub fn interval(value: f64, standard_error: Option<f64>, factor: f64) -> String {
+    match standard_error.filter(|s| s.is_finite() && *s > 0.0 && value.is_finite()) {
+        None => DASH.to_owned(),
+        Some(error) => {
+            let last = last_digit(error, DIGITS_OF_ERROR);
+            let (low, high) = (value - factor * error, value + factor * error);
+            let exponent = exponent_for(value.abs().max(error));
+            format!("{} to {}", written(low, last, exponent), written(high, last, exponent))
+        }
+    }
+}
+
+/// A number without standard error: five significant digits. A dash for what is not finite.
+pub fn plain(value: f64) -> String {
+    if !value.is_finite() {
+        return DASH.to_owned();
+    }
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let exponent = exponent_for(value.abs());
+    let text = written(value, last_digit(value, DIGITS_ALONE), exponent);
+    match exponent {
+        0 => without_trailing_zeros(&text).to_owned(),
+        _ => text,
+    }
+}
+
+/// A number with a fixed number of decimals; a dash for what is not finite.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        return DASH.to_owned();
+    }
+    without_negative_zero(format!("{value:.decimals$}"))
+}
+
+/// Power of ten of the last significant digit.
+fn last_digit(value: f64, digits: i32) -> i32 {
+    // Rounding first: 0.0996 with two digits is 0.10, not 0.100.
+    let text = format!("{:.*e}", (digits - 1) as usize, value.abs());
+    let exponent: i32 = text.split_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0);
+    exponent - (digits - 1)
+}
+
+/// Zero where the number is readable with plain decimals, else its power of ten.
+fn exponent_for(size: f64) -> i32 {
+    let exponent = size.log10().floor();
+    if (-3.0..6.0).contains(&exponent) {
+        0
+    } else {
+        exponent as i32
+    }
+}
+
+fn written(value: f64, last: i32, exponent: i32) -> String {
+    let decimals = (exponent - last).clamp(0, 17) as usize;
+    if exponent == 0 {
+        return without_negative_zero(format!("{value:.decimals$}"));
+    }
+    // Through the decimal text of the scaled number: powi overflows for the smallest exponents.
+    let scaled = value / 10f64.powi(exponent / 2) / 10f64.powi(exponent - exponent / 2);
+    without_negative_zero(format!("{scaled:.decimals$}e{exponent}"))
+}
+
+fn without_negative_zero(text: String) -> String {
+    match text.strip_prefix('-') {
+        Some(rest)
+            if !rest
+                .split('e')
+                .next()
+                .unwrap_or("")
+                .contains(|c: char| c.is_ascii_digit() && c != '0') =>
+        {
+            rest.to_owned()
+        }
+        _ => text,
+    }
+}
+
+fn without_trailing_zeros(text: &str) -> &str {
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn both(value: f64, error: f64) -> (String, String) {
+        with_uncertainty(value, Some(error))
+    }
+
+    fn pair(a: &str, b: &str) -> (String, String) {
+        (a.to_owned(), b.to_owned())
+    }
+
+    #[test]
+    fn the_error_decides_the_digits() {
+        assert_eq!(both(0.090_123_4, 0.001_234), pair("0.0901", "0.0012"));
+        assert_eq!(both(11.2499, 0.0996), pair("11.25", "0.10"));
+        assert_eq!(both(-1.912_113_05, 0.000_52), pair("-1.91211", "0.00052"));
+        assert_eq!(both(1234.5, 120.0), pair("1234", "120"));
+        assert_eq!(both(1.234_56e-7, 2.3e-9), pair("1.235e-7", "0.023e-7"));
+        assert_eq!(both(0.3, 12.3), pair("0", "12"));
+        assert_eq!(both(-0.001, 0.52), pair("0.00", "0.52"));
+        assert_eq!(both(5.0e9, 1.0e8), pair("5.00e9", "0.10e9"));
+    }
+
+    #[test]
+    fn what_is_no_number_is_a_dash() {
+        assert_eq!(both(f64::NAN, 1.0), pair(DASH, DASH));
+        assert_eq!(with_uncertainty(f64::INFINITY, None), pair(DASH, DASH));
+        assert_eq!(both(0.25, f64::NAN), pair("0.25", DASH));
+        assert_eq!(both(0.25, 0.0), pair("0.25", DASH));
+        assert_eq!(plain(f64::NAN), DASH);
+        assert_eq!(fixed(f64::NEG_INFINITY, 1), DASH);
+        assert_eq!(interval(1.0, None, 1.96), DASH);
+    }
+
+    #[test]
+    fn numbers_alone_have_five_digits() {
+        assert_eq!(plain(0.28), "0.28");
+        assert_eq!(plain(0.0), "0");
+        assert_eq!(plain(13.714_285), "13.714");
+        assert_eq!(plain(1.373_21e-3), "0.0013732");
+        assert_eq!(plain(1.373_21e-4), "1.3732e-4");
+        assert_eq!(plain(1.373_21e-5), "1.3732e-5");
+        assert_eq!(plain(123_456.0), "123456");
+        assert_eq!(plain(-8192.0), "-8192");
+        assert_eq!(plain(f64::MIN_POSITIVE), "2.2251e-308");
+        assert_eq!(fixed(-0.04, 1), "0.0");
+    }
+
+    #[test]
+    fn intervals_keep_the_decimals() {
+        assert_eq!(interval(0.0901, Some(0.0012), 1.96), "0.0877 to 0.0925");
+    }
+}

@@ -1,0 +1,203 @@
+//! One self-contained HTML page about the models fitted to a record or to several.
+
+use hoid_ident::{
+    Choice, Fit,
+    validation::{Correlation, Quality, Validation},
+};
+use hoid_model::{OperatorParameters, Record, margins::Margins};
+use minijinja::{Environment, UndefinedBehavior, Value, context};
+
+use crate::{
+    ReportError,
+    figures::{self, BodeModel, TrueResponse},
+    tables,
+};
+
+/// Records of a model whose time response is drawn.
+const MOST_TIME_RESPONSES: usize = 4;
+
+const TEMPLATE: &str = include_str!("../templates/report.html");
+
+/// What the page is about.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report<'a> {
+    /// Heading of the page.
+    pub title: String,
+    /// What was done and with what, as name and value: command, versions, records, span, seed.
+    pub settings: Vec<(String, String)>,
+    /// The models, one section each.
+    pub models: Vec<ModelSection<'a>>,
+    /// Remarks for the reader, such as warnings of the command.
+    pub notes: Vec<String>,
+}
+
+/// One model of the page.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelSection<'a> {
+    /// Heading and legend text, such as `BJ(nb=2, nd=1, nf=2, nk=29)`.
+    pub name: String,
+    /// The model.
+    pub fit: &'a Fit,
+    /// The records that it was fitted on.
+    pub records: &'a [Record],
+    /// The search that chose its orders, if there was one.
+    pub candidates: Option<&'a Choice>,
+    /// The operator behind the records, where it is known (simulation).
+    pub truth: Option<OperatorParameters>,
+    /// Margins of the loop of this model and the controlled element, where that is known.
+    pub margins: Option<Margins>,
+}
+
+impl Report<'_> {
+    /// The page as HTML text, with all styles and figures inside it. The same data give the same bytes.
+    ///
+    /// # Errors
+    /// [`ReportError::NoModels`]; [`ReportError::Template`] for a defect of this crate.
+    pub fn to_html(&self) -> Result<String, ReportError> {
+        if self.models.is_empty() {
+            return Err(ReportError::NoModels);
+        }
+        let validations: Vec<Vec<Result<Validation, String>>> = self.models.iter().map(validate).collect();
+        let qualities: Vec<Result<Quality, String>> = self.models.iter().map(quality_of).collect();
+        let sections: Vec<Value> = self
+            .models
+            .iter()
+            .zip(&validations)
+            .enumerate()
+            .map(|(i, (model, validations))| section(i, model, validations))
+            .collect();
+        let settings: Vec<Value> = self
+            .settings
+            .iter()
+            .map(|(label, text)| context! { label, text })
+            .collect();
+        let values = context! {
+            title => self.title.clone(),
+            settings,
+            notes => self.notes.clone(),
+            comparison => tables::comparison(&self.models, &qualities),
+            bode => Value::from_safe_string(self.bode()),
+            models => sections,
+        };
+        let defect = |e: minijinja::Error| ReportError::Template { reason: e.to_string() };
+        let mut environment = Environment::new();
+        environment.set_undefined_behavior(UndefinedBehavior::SemiStrict);
+        environment.add_template("report.html", TEMPLATE).map_err(defect)?;
+        let page = environment.get_template("report.html").map_err(defect)?;
+        page.render(values).map_err(defect)
+    }
+
+    fn bode(&self) -> String {
+        let models: Vec<BodeModel<'_>> = self
+            .models
+            .iter()
+            .map(|m| BodeModel {
+                name: &m.name,
+                fit: m.fit,
+                records: m.records,
+            })
+            .collect();
+        let mut truths: Vec<TrueResponse> = Vec::new();
+        for model in &self.models {
+            if let Some(operator) = model.truth {
+                let truth = TrueResponse {
+                    operator,
+                    sample_time: model.fit.model().sample_time(),
+                };
+                if !truths.contains(&truth) {
+                    truths.push(truth);
+                }
+            }
+        }
+        figures::bode("bode", &models, &truths)
+    }
+}
+
+fn validate(model: &ModelSection<'_>) -> Vec<Result<Validation, String>> {
+    let validation = |record| model.fit.validate(record).map_err(|e| e.to_string());
+    model.records.iter().map(validation).collect()
+}
+
+/// VAF and NRMSE over all records together, or the reason why there are none.
+fn quality_of(model: &ModelSection<'_>) -> Result<Quality, String> {
+    if model.records.is_empty() {
+        return Err("no record was given".to_owned());
+    }
+    model.fit.quality(model.records).map_err(|e| e.to_string())
+}
+
+fn section(index: usize, model: &ModelSection<'_>, validations: &[Result<Validation, String>]) -> Value {
+    let fit = model.fit;
+    let drawn: Vec<Value> = model
+        .records
+        .iter()
+        .zip(validations)
+        .enumerate()
+        .filter_map(|(k, (record, validation))| Some((k, record, validation.as_ref().ok()?)))
+        .take(MOST_TIME_RESPONSES)
+        .map(|(k, record, validation)| {
+            let svg = figures::time_response(&format!("m{index}-time{k}"), record, validation);
+            context! { svg => Value::from_safe_string(svg), record => tables::record_name(record, k), close_up => figures::has_close_up(record) }
+        })
+        .collect();
+    let tested = model
+        .records
+        .iter()
+        .zip(validations)
+        .enumerate()
+        .find_map(|(k, (r, v))| v.as_ref().ok().map(|v| (k, r, v)));
+    let tests = match tested {
+        Some((k, record, validation)) => residual_tests(index, &tables::record_name(record, k), record, validation),
+        None => {
+            let reason = quality_of(model).err().unwrap_or_default();
+            context! { reason }
+        }
+    };
+    context! {
+        name => model.name.clone(),
+        anchor => format!("model-{index}"),
+        converged => fit.termination().converged(),
+        stable => fit.model().is_stable(),
+        exact => fit.covariance().is_none(),
+        coefficients => tables::coefficients(fit),
+        operator => tables::operator(fit, model.truth.as_ref()),
+        remnant => tables::remnant(fit),
+        no_remnant => tables::no_remnant(fit),
+        course => tables::course(fit, model.records),
+        margins => model.margins.as_ref().map(tables::margins),
+        several => model.records.len() > 1,
+        qualities => tables::qualities(model.records, validations),
+        not_drawn => validations.iter().filter(|v| v.is_ok()).count() - drawn.len(),
+        responses => drawn,
+        tests,
+        candidates => model.candidates.map(tables::candidates),
+    }
+}
+
+fn residual_tests(index: usize, name: &str, record: &Record, validation: &Validation) -> Value {
+    let sample_time = record.sample_time();
+    let (own, cross) = (&validation.autocorrelation, &validation.cross_correlation);
+    let own_svg = (!own.lags.is_empty())
+        .then(|| figures::autocorrelation(&format!("m{index}-auto"), own, sample_time))
+        .map(Value::from_safe_string);
+    let cross_svg = (cross.lags.len() > 1)
+        .then(|| figures::cross_correlation(&format!("m{index}-cross"), cross, sample_time))
+        .map(Value::from_safe_string);
+    context! {
+        record => name,
+        autocorrelation => own_svg,
+        outside_auto => outside(own, |_| true),
+        lags_auto => own.lags.len(),
+        cross_correlation => cross_svg,
+        outside_positive => outside(cross, |k| k >= 0),
+        lags_positive => cross.lags.iter().filter(|k| **k >= 0).count(),
+        outside_negative => outside(cross, |k| k < 0),
+        lags_negative => cross.lags.iter().filter(|k| **k < 0).count(),
+    }
+}
+
+/// Number of values outside the bounds among the lags asked for.
+fn outside(correlation: &Correlation, of: impl Fn(i64) -> bool) -> usize {
+    let pairs = correlation.lags.iter().zip(&correlation.values);
+    pairs.filter(|(k, v)| of(**k) && v.abs() > correlation.bound_99).count()
+}

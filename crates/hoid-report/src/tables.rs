@@ -1,0 +1,379 @@
+//! The tables of the page as values for the template. Where a number does not exist there is a dash and, beside it, the reason.
+
+use hoid_ident::{
+    Choice, Fit, InitialState,
+    order_search::Criterion,
+    validation::{Quality, Validation},
+};
+use hoid_model::{OperatorParameters, Record, margins::Margins, remnant::RemnantDiscretisation, uncertainty::Estimate};
+use minijinja::{Value, context};
+
+use crate::{
+    ModelSection,
+    numbers::{DASH, fixed, interval, plain, with_uncertainty},
+};
+
+/// Two-sided 95 % point of the normal distribution.
+const Z_95: f64 = 1.959_963_984_540_054;
+
+/// Longest table of candidates.
+const MOST_CANDIDATES: usize = 30;
+
+fn html(text: impl Into<String>) -> Value {
+    Value::from_safe_string(text.into())
+}
+
+/// Name and unit of an operator parameter for the page.
+fn symbol(name: &str) -> (Value, &'static str) {
+    let (symbol, unit) = match name {
+        "K_e" => ("<i>K</i><sub>e</sub>", "deg/deg"),
+        "T_L" => ("<i>T</i><sub>L</sub>", "s"),
+        "K_e_dot" => ("<i>K</i><sub>\u{117}</sub>", "s deg/deg"),
+        "omega_nm" => ("<i>\u{3c9}</i><sub>nm</sub>", "rad/s"),
+        "zeta_nm" => ("<i>\u{3b6}</i><sub>nm</sub>", "-"),
+        "tau_e" => ("<i>\u{3c4}</i><sub>e</sub>", "s"),
+        other => return (Value::from(other), ""),
+    };
+    (html(symbol), unit)
+}
+
+fn true_value(name: &str, truth: &OperatorParameters) -> Option<f64> {
+    Some(match name {
+        "K_e" => truth.k_e,
+        "T_L" => truth.t_l_s,
+        "K_e_dot" => truth.k_e_dot(),
+        "omega_nm" => truth.omega_nm_rad_s,
+        "zeta_nm" => truth.zeta_nm,
+        "tau_e" => truth.tau_e_s,
+        _ => return None,
+    })
+}
+
+const OPERATOR_NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
+
+fn cell(estimate: Estimate) -> Value {
+    let (value, error) = with_uncertainty(estimate.value, estimate.standard_error);
+    Value::from(if error == DASH {
+        value
+    } else {
+        format!("{value} \u{b1} {error}")
+    })
+}
+
+/// One column a model, one row a quantity.
+pub fn comparison(models: &[ModelSection<'_>], qualities: &[Result<Quality, String>]) -> Value {
+    let row = |label: Value, unit: &str, cells: Vec<Value>, truth: Option<String>| {
+        context! { label, unit, cells, truth => truth.unwrap_or_default() }
+    };
+    let unit = common_output_unit(models);
+    let each =
+        |f: &dyn Fn(&Fit) -> f64| -> Vec<Value> { models.iter().map(|m| Value::from(plain(f(m.fit)))).collect() };
+    let criterion =
+        |f: &dyn Fn(&Fit) -> f64| -> Vec<Value> { models.iter().map(|m| Value::from(fixed(f(m.fit), 1))).collect() };
+    let mut rows = vec![row(html("loss <i>V</i>"), &squared(&unit), each(&Fit::loss), None)];
+    type Part = fn(&Quality) -> f64;
+    let percentages: [(&str, Part); 4] = [
+        ("VAF, simulation<sup>1</sup>", |q| q.vaf_simulation),
+        ("VAF, prediction<sup>1</sup>", |q| q.vaf_prediction),
+        ("NRMSE fit, simulation<sup>2</sup>", |q| q.nrmse_simulation),
+        ("NRMSE fit, prediction<sup>2</sup>", |q| q.nrmse_prediction),
+    ];
+    for (label, of) in percentages {
+        let cells = qualities
+            .iter()
+            .map(|q| match q {
+                Ok(q) => Value::from(fixed(of(q), 2)),
+                Err(_) => Value::from(DASH),
+            })
+            .collect();
+        rows.push(row(html(label), "%", cells, None));
+    }
+    rows.push(row(Value::from("AIC"), "-", criterion(&Fit::aic), None));
+    rows.push(row(Value::from("BIC"), "-", criterion(&Fit::bic), None));
+    let operators: Vec<_> = models.iter().map(|m| m.fit.operator()).collect();
+    let truth = common_truth(models);
+    for (i, name) in OPERATOR_NAMES.into_iter().enumerate() {
+        let cells = operators
+            .iter()
+            .map(|o| match o {
+                Ok(o) => cell(o.rows()[i].2),
+                Err(_) => Value::from(DASH),
+            })
+            .collect();
+        let (label, unit) = symbol(name);
+        let truth = truth.and_then(|t| true_value(name, &t)).map(plain);
+        rows.push(row(label, unit, cells, truth));
+    }
+    let mut remarks: Vec<String> = Vec::new();
+    for ((model, operator), quality) in models.iter().zip(&operators).zip(qualities) {
+        if let Err(reason) = operator {
+            remarks.push(format!("{}: not convertible: {reason}", model.name));
+        }
+        if let Err(reason) = quality {
+            remarks.push(format!("{}: no VAF and NRMSE: {reason}", model.name));
+        }
+        if model.fit.loss() == 0.0 {
+            remarks.push(format!("{}: no AIC and BIC: the loss is zero", model.name));
+        }
+    }
+    let several = models.iter().any(|m| m.records.len() > 1);
+    context! {
+        names => models.iter().map(|m| m.name.clone()).collect::<Vec<_>>(),
+        has_truth => truth.is_some(),
+        rows, remarks, several,
+    }
+}
+
+/// The truth, when all models that have one have the same.
+fn common_truth(models: &[ModelSection<'_>]) -> Option<OperatorParameters> {
+    let mut known = models.iter().filter_map(|m| m.truth);
+    let first = known.next()?;
+    known.all(|t| t == first).then_some(first)
+}
+
+fn output_unit(records: &[Record]) -> String {
+    records
+        .first()
+        .map(|r| r.output_channel().unit.clone())
+        .unwrap_or_default()
+}
+
+/// The unit of the outputs, when all models have the same.
+fn common_output_unit(models: &[ModelSection<'_>]) -> String {
+    let first = models.first().map(|m| output_unit(m.records)).unwrap_or_default();
+    if models.iter().all(|m| output_unit(m.records) == first) {
+        first
+    } else {
+        String::new()
+    }
+}
+
+fn squared(unit: &str) -> String {
+    match unit {
+        "" => "-".to_owned(),
+        u if u.chars().all(char::is_alphanumeric) => format!("{u}\u{b2}"),
+        u => format!("({u})\u{b2}"),
+    }
+}
+
+/// Coefficient, value, standard error, 95 % interval.
+pub fn coefficients(fit: &Fit) -> Vec<Value> {
+    let rows = fit.parameters().into_iter().map(|(name, estimate)| {
+        let (letter, index) = name.split_at(1);
+        let (value, error) = with_uncertainty(estimate.value, estimate.standard_error);
+        let name = html(format!("<i>{letter}</i><sub>{index}</sub>"));
+        context! { name, value, error, interval => interval(estimate.value, estimate.standard_error, Z_95) }
+    });
+    rows.collect()
+}
+
+/// The operator's parameters, or why there are none.
+pub fn operator(fit: &Fit, truth: Option<&OperatorParameters>) -> Value {
+    let estimate = match fit.operator() {
+        Ok(estimate) => estimate,
+        Err(reason) => return context! { reason => reason.to_string() },
+    };
+    let rows: Vec<Value> = estimate
+        .rows()
+        .into_iter()
+        .map(|(name, _, e)| {
+            let (label, unit) = symbol(name);
+            let (value, error) = with_uncertainty(e.value, e.standard_error);
+            let truth = truth.and_then(|t| true_value(name, t));
+            let relative = truth.map(|t| 100.0 * (e.value / t - 1.0));
+            context! {
+                label, unit, value, error,
+                interval => interval(e.value, e.standard_error, Z_95),
+                truth => truth.map(plain),
+                relative => relative.map(|r| if r.is_finite() { format!("{r:+.1}") } else { DASH.to_owned() }),
+            }
+        })
+        .collect();
+    context! { rows, has_truth => truth.is_some() }
+}
+
+/// T_n and K_n by each discretisation, or why not.
+pub fn remnant(fit: &Fit) -> Vec<Value> {
+    let ways = [
+        (
+            RemnantDiscretisation::ZeroOrderHold,
+            "zero-order hold (exact for noise held over each sample)",
+        ),
+        (RemnantDiscretisation::BackwardEuler, "backward Euler"),
+    ];
+    let rows = ways.into_iter().map(|(how, name)| match fit.remnant(how) {
+        Ok(r) => context! { how => name, order => r.order, t_n => cell(r.t_n_s), k_n => cell(r.k_n) },
+        Err(reason) => context! { how => name, reason => reason.to_string() },
+    });
+    rows.collect()
+}
+
+/// The reason why no discretisation gives T_n and K_n, when it is the same for all.
+pub fn no_remnant(fit: &Fit) -> Option<String> {
+    if fit.orders().nd == 0 {
+        return Some("the model has no polynomial D".to_owned());
+    }
+    let reason = |how| fit.remnant(how).err().map(|e| e.to_string());
+    let first = reason(RemnantDiscretisation::ZeroOrderHold)?;
+    (reason(RemnantDiscretisation::BackwardEuler)? == first).then_some(first)
+}
+
+/// How the fit came about: label and text.
+pub fn course(fit: &Fit, records: &[Record]) -> Vec<Value> {
+    let end = fit.termination();
+    let (n, p, s) = (fit.residual_count(), fit.parameters().len(), fit.state_count());
+    let unit = output_unit(records);
+    let divisor = n.saturating_sub(p + s);
+    let initial = match fit.initial_state() {
+        InitialState::Zero => "input, output and innovations are zero before each record".to_owned(),
+        InitialState::Estimate if s == 0 => {
+            "conditional on the first samples of each record; no initial states are needed".to_owned()
+        }
+        InitialState::Estimate => format!("estimated with the parameters, {s} in all"),
+    };
+    let steps = match end.iterations {
+        1 => "1 step".to_owned(),
+        n => format!("{n} steps"),
+    };
+    let rows = [
+        ("model", format!("{}({})", fit.model().structure(), fit.orders())),
+        ("end of the search", format!("{}; {steps}", end.reason)),
+        ("start that won", fit.start().to_owned()),
+        ("initial states", initial),
+        (
+            "innovation variance",
+            format!(
+                "\u{3c3}\u{b2} = {} {}, the sum of squared residuals over n - p - s = {n} - {p} - {s} = {divisor} \
+                 (residuals, parameters, initial states)",
+                plain(fit.innovation_variance()),
+                squared(&unit)
+            ),
+        ),
+        (
+            "loss",
+            format!(
+                "V = {} {}, the same sum over n = {n}",
+                plain(fit.loss()),
+                squared(&unit)
+            ),
+        ),
+    ];
+    rows.into_iter().map(|(label, text)| context! { label, text }).collect()
+}
+
+/// VAF and NRMSE of each record.
+pub fn qualities(records: &[Record], validations: &[Result<Validation, String>]) -> Vec<Value> {
+    let rows = records
+        .iter()
+        .zip(validations)
+        .enumerate()
+        .map(|(i, (record, validation))| {
+            let label = record_name(record, i);
+            match validation {
+                Ok(v) => context! {
+                    label, samples => record.len(),
+                    vaf_simulation => fixed(v.quality.vaf_simulation, 2),
+                    vaf_prediction => fixed(v.quality.vaf_prediction, 2),
+                    nrmse_simulation => fixed(v.quality.nrmse_simulation, 2),
+                    nrmse_prediction => fixed(v.quality.nrmse_prediction, 2),
+                },
+                Err(reason) => context! { label, samples => record.len(), reason },
+            }
+        });
+    rows.collect()
+}
+
+/// Label of a record, or its number.
+pub fn record_name(record: &Record, index: usize) -> String {
+    match record.label() {
+        "" => format!("record {}", index + 1),
+        label => label.to_owned(),
+    }
+}
+
+/// Margins of the loop with the controlled element.
+pub fn margins(margins: &Margins) -> Vec<Value> {
+    let rows = [
+        (
+            "gain crossover",
+            "rad/s",
+            margins.crossover_rad_s,
+            "the magnitude does not cross 1",
+        ),
+        (
+            "phase margin",
+            "deg",
+            margins.phase_margin_deg,
+            "there is no gain crossover",
+        ),
+        (
+            "phase crossover",
+            "rad/s",
+            margins.phase_crossover_rad_s,
+            "the phase does not cross -180 deg",
+        ),
+        (
+            "gain margin",
+            "dB",
+            margins.gain_margin_db,
+            "there is no phase crossover",
+        ),
+    ];
+    let rows = rows.into_iter().map(|(label, unit, value, without)| match value {
+        Some(v) if v.is_finite() => context! { label, unit, value => plain(v) },
+        _ => context! { label, unit, value => DASH, reason => format!("{without} in the range scanned") },
+    });
+    rows.collect()
+}
+
+/// Candidates of an order search, best first.
+pub fn candidates(choice: &Choice) -> Value {
+    let name = match choice.criterion {
+        Criterion::Loss => "loss",
+        Criterion::Aic => "AIC",
+        Criterion::Bic => "BIC",
+    };
+    let mut fitted = Vec::new();
+    let mut failed = Vec::new();
+    for candidate in &choice.candidates {
+        match &candidate.outcome {
+            Ok(f) => {
+                let value = match choice.criterion {
+                    Criterion::Loss => f.loss,
+                    Criterion::Aic => f.aic,
+                    Criterion::Bic => f.bic,
+                };
+                fitted.push((value, candidate.orders, *f));
+            }
+            Err(reason) => failed.push((candidate.orders, reason.to_string())),
+        }
+    }
+    // Stable: equals stay in the order of the search.
+    fitted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let best = fitted.first().map_or(0.0, |f| f.0);
+    let all = fitted.len() + failed.len();
+    let decimals = |value: f64| match choice.criterion {
+        Criterion::Loss => plain(value),
+        _ => fixed(value, 1),
+    };
+    let rows: Vec<Value> = fitted
+        .iter()
+        .map(|(value, orders, f)| {
+            context! {
+                orders => orders.to_string(), parameters => orders.parameters(),
+                loss => plain(f.loss), aic => fixed(f.aic, 1), bic => fixed(f.bic, 1),
+                above => decimals(value - best),
+                remark => if f.converged { "" } else { "search did not converge" },
+            }
+        })
+        .chain(failed.iter().map(|(orders, reason)| {
+            context! {
+                orders => orders.to_string(), parameters => orders.parameters(),
+                loss => DASH, aic => DASH, bic => DASH, above => DASH, remark => reason,
+            }
+        }))
+        .take(MOST_CANDIDATES)
+        .collect();
+    let more = all - rows.len();
+    context! { criterion => name, rows, more, all }
+}

@@ -1,0 +1,356 @@
+//! The page as a whole, from simulated runs.
+#![allow(clippy::unwrap_used)]
+
+use hoid_ident::{Choice, Estimator, Fit, OrderRanges, choose_orders, order_search::Criterion};
+use hoid_model::{
+    Channel, OperatorParameters, Orders, Record, SampleTime, Structure,
+    margins::Margins,
+    remnant::RemnantDiscretisation,
+    scenario::{Condition, Scenario},
+};
+use hoid_report::{ModelSection, Report, ReportError, figures};
+use hoid_sim::{Simulator, Stream};
+
+fn runs(n: u64) -> Vec<Record> {
+    let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+    let run = |replication| {
+        let stream = Stream {
+            seed: 5,
+            replication,
+            ..Stream::default()
+        };
+        simulator
+            .run(stream, false)
+            .unwrap()
+            .labelled(format!("run {replication}"))
+    };
+    (0..n).map(run).collect()
+}
+
+fn fitted(structure: Structure, records: &[Record]) -> Fit {
+    Estimator::new(structure, structure.operator_orders(29))
+        .fit(records)
+        .unwrap()
+}
+
+fn truth() -> OperatorParameters {
+    Scenario::condition(Condition::C1).initial.operator
+}
+
+fn section<'a>(name: &str, fit: &'a Fit, records: &'a [Record]) -> ModelSection<'a> {
+    ModelSection {
+        name: name.to_owned(),
+        fit,
+        records,
+        candidates: None,
+        truth: None,
+        margins: None,
+    }
+}
+
+fn page<'a>(models: Vec<ModelSection<'a>>) -> String {
+    let report = Report {
+        title: "Title".to_owned(),
+        settings: vec![("seed".to_owned(), "5".to_owned())],
+        models,
+        notes: Vec::new(),
+    };
+    report.to_html().unwrap()
+}
+
+/// The text behind the first `<h2 id=...>` with this name, up to the next section.
+fn section_of<'a>(html: &'a str, name: &str) -> &'a str {
+    let start = html.find(&format!("\">{name}</h2>")).unwrap();
+    let end = html[start..].find("</section>").unwrap();
+    &html[start..start + end]
+}
+
+/// What every page must keep: nothing from outside, no NaN, no two equal ids, references that exist.
+fn check_page(html: &str) {
+    let without_namespace = html.replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
+    for outside in ["http", "src=", "<link", "<script", "@import", "url(\"", "//cdn"] {
+        assert!(!without_namespace.contains(outside), "{outside}");
+    }
+    for bad in ["NaN", "nan,", ">inf", ">-inf", "undefined", "none</td>"] {
+        assert!(!html.contains(bad), "{bad} in the page");
+    }
+    let mut ids: Vec<&str> = html
+        .split(" id=\"")
+        .skip(1)
+        .filter_map(|s| s.split('"').next())
+        .collect();
+    let count = ids.len();
+    for reference in html.split("url(#").skip(1).filter_map(|s| s.split(')').next()) {
+        assert!(ids.contains(&reference), "{reference} does not exist");
+    }
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), count, "two equal ids");
+}
+
+#[test]
+fn two_models_with_truth_show_all_that_is_asked_for() {
+    let records = runs(1);
+    let (arx, bj) = (
+        fitted(Structure::Arx, &records),
+        fitted(Structure::BoxJenkins, &records),
+    );
+    let mut models = vec![section("ARX", &arx, &records), section("BJ", &bj, &records)];
+    for model in &mut models {
+        model.truth = Some(truth());
+    }
+    let html = page(models);
+    check_page(&html);
+    // Two time responses, two tests each, one Bode pair.
+    assert_eq!(html.matches("<svg ").count(), 7);
+    let reason = arx.operator().unwrap_err().to_string();
+    assert!(html.contains(&format!("ARX: not convertible: {reason}")));
+    assert!(section_of(&html, "ARX").contains(&format!("not convertible: {reason}")));
+
+    let bj_text = section_of(&html, "BJ");
+    let estimate = bj.operator().unwrap();
+    for (_, _, e) in estimate.rows() {
+        let (value, error) = hoid_report::numbers::with_uncertainty(e.value, e.standard_error);
+        assert!(bj_text.contains(&format!("<td class=\"n\">{value}</td><td class=\"n\">{error}</td>")));
+    }
+    for (name, e) in bj.parameters() {
+        let (value, _) = hoid_report::numbers::with_uncertainty(e.value, e.standard_error);
+        let symbol = format!("<i>{}</i><sub>{}</sub>", &name[..1], &name[1..]);
+        assert!(
+            bj_text.contains(&format!("<th>{symbol}</th><td class=\"n\">{value}</td>")),
+            "{name}"
+        );
+    }
+    let t_n = bj.remnant(RemnantDiscretisation::ZeroOrderHold).unwrap().t_n_s;
+    let (value, error) = hoid_report::numbers::with_uncertainty(t_n.value, t_n.standard_error);
+    assert!(bj_text.contains(&format!("{value} \u{b1} {error}")));
+    for text in [bj.termination().reason.to_string(), bj.start().replace('/', "&#x2f;")] {
+        assert!(bj_text.contains(&text), "{text}");
+    }
+    let divisor = bj.residual_count() - 5 - bj.state_count();
+    assert!(bj_text.contains(&format!(" = {divisor} (residuals, parameters, initial states)")));
+    assert!(html.contains("<td class=\"n\">11.25</td>"), "the true omega_nm");
+    assert!(html.contains("no mean is removed") && html.contains("the mean is removed"));
+}
+
+#[test]
+fn the_same_data_give_the_same_bytes() {
+    let records = runs(1);
+    let fit = fitted(Structure::BoxJenkins, &records);
+    let make = || page(vec![section("BJ", &fit, &records)]);
+    assert!(make() == make());
+}
+
+#[test]
+fn text_of_the_user_is_escaped() {
+    let hostile = "a<script>alert(1)</script> & \"b\" $x^2$";
+    let records: Vec<Record> = runs(2).into_iter().map(|r| r.labelled(hostile)).collect();
+    let ts = SampleTime::HUNDREDTH;
+    let renamed = Record::new(
+        ts,
+        Channel::new("e<0>", "<deg>", records[0].input().to_vec()),
+        Channel::new("u&$v$", "<b>", records[0].output().to_vec()),
+    )
+    .unwrap()
+    .labelled(hostile);
+    let records = [renamed, records[1].clone()];
+    let fit = fitted(Structure::BoxJenkins, &records);
+    let report = Report {
+        title: hostile.to_owned(),
+        settings: vec![(hostile.to_owned(), hostile.to_owned())],
+        models: vec![section(hostile, &fit, &records)],
+        notes: vec![hostile.to_owned()],
+    };
+    let html = report.to_html().unwrap();
+    check_page(&html);
+    assert!(!html.contains("<b>") && !html.contains("<deg>"));
+    // Title twice, setting, note, heading, column, legend, record table and captions.
+    assert!(html.matches("a&lt;script&gt;alert(1)&lt;").count() >= 10);
+    assert!(html.contains("$x^2$") && html.contains("u&amp;$v$ (&lt;b&gt;)"));
+}
+
+#[test]
+fn several_records_are_listed_and_at_most_four_drawn() {
+    let records = runs(6);
+    let fit = fitted(Structure::BoxJenkins, &records);
+    let html = page(vec![section("BJ", &fit, &records)]);
+    check_page(&html);
+    for k in 0..6 {
+        assert!(html.contains(&format!("<th>run {k}</th><td class=\"n\">8192</td>")));
+    }
+    assert!(html.contains("2 more records are not drawn"));
+    assert!(html.contains("all records of a model together"));
+    // Four time responses, two tests, one Bode pair.
+    assert_eq!(html.matches("<svg ").count(), 7);
+    let together = fit.quality(&records).unwrap().vaf_simulation;
+    assert!(html.contains(&format!("<td class=\"n\">{together:.2}</td>")));
+}
+
+#[test]
+fn a_series_shorter_than_the_lags_has_its_figures() {
+    let long = runs(1).remove(0);
+    let cut = |n: usize| {
+        let part = |v: &[f64]| v[..n].to_vec();
+        Record::new(
+            long.sample_time(),
+            Channel::new("e", "deg", part(long.input())),
+            Channel::new("u", "deg", part(long.output())),
+        )
+        .unwrap()
+    };
+    let orders = Orders {
+        na: 1,
+        nb: 1,
+        nk: 1,
+        ..Orders::default()
+    };
+    let records = [cut(12)];
+    let fit = Estimator::new(Structure::Arx, orders).fit(&records).unwrap();
+    let lags = fit.validate(&records[0]).unwrap().autocorrelation.lags.len();
+    assert!(lags < 15);
+    let html = page(vec![section("ARX", &fit, &records)]);
+    check_page(&html);
+    assert!(html.contains(&format!(" of {lags} lags outside")));
+
+    // A record that the model cannot be compared with gives the reason, one without a name its number.
+    let other = [cut(12), cut(1)];
+    let html = page(vec![section("ARX", &fit, &other)]);
+    check_page(&html);
+    let reason = fit.validate(&other[1]).unwrap_err().to_string();
+    assert!(html.contains(&reason), "{reason}");
+    assert!(html.contains("<th>record 2</th>"));
+    let html = page(vec![section("ARX", &fit, &other[1..])]);
+    check_page(&html);
+    assert!(html.contains("no figures: "));
+    let html = page(vec![section("ARX", &fit, &[])]);
+    check_page(&html);
+    assert!(html.contains("no record was given"));
+}
+
+#[test]
+fn an_exact_fit_says_why_it_has_no_standard_errors() {
+    let e: Vec<f64> = (0..300)
+        .map(|k| (0.7 * f64::from(k)).sin() + (0.31 * f64::from(k * k)).cos())
+        .collect();
+    let mut u = vec![0.0; 300];
+    for t in 2..300 {
+        u[t] = 0.5 * u[t - 1] + 0.3 * e[t - 1] + 0.1 * e[t - 2];
+    }
+    let record = Record::new(
+        SampleTime::HUNDREDTH,
+        Channel::new("e", "", e),
+        Channel::new("u", "", u),
+    )
+    .unwrap();
+    let orders = Orders {
+        nb: 2,
+        nf: 1,
+        nd: 0,
+        nk: 1,
+        ..Orders::default()
+    };
+    let records = [record];
+    let fit = Estimator::new(Structure::BoxJenkins, orders).fit(&records).unwrap();
+    assert!(fit.covariance().is_none());
+    let html = page(vec![section("exact", &fit, &records)]);
+    check_page(&html);
+    assert!(html.contains("residuals are zero up to rounding and say nothing about the noise"));
+}
+
+#[test]
+fn candidates_are_sorted_and_cut() {
+    let records = runs(1);
+    let bj = Structure::BoxJenkins;
+    let mut ranges = OrderRanges::from(bj.operator_orders(29));
+    ranges.nk = 12..=44;
+    let template = Estimator::new(bj, bj.operator_orders(29));
+    let choice: Choice = choose_orders(&template, &ranges, Criterion::Bic, &records).unwrap();
+    let mut model = section("BJ", &choice.fit, &records);
+    model.candidates = Some(&choice);
+    model.margins = Some(Margins {
+        crossover_rad_s: Some(1.5635),
+        phase_margin_deg: Some(76.67),
+        phase_crossover_rad_s: None,
+        gain_margin_db: None,
+    });
+    let html = page(vec![model]);
+    check_page(&html);
+    let table = &html[html.find("Candidates</h3>").unwrap()..];
+    assert_eq!(table.matches("<tr><th>nb=2").count(), 30);
+    assert!(table.contains("33 candidates") && table.contains("3 more candidates are not shown"));
+    let first = &table[table.find("<tr><th>nb=2").unwrap()..];
+    assert!(first.starts_with(&format!("<tr><th>{}</th>", choice.fit.orders())));
+    assert!(html.contains("<td class=\"n\">1.5635</td>"));
+    assert!(html.contains("the phase does not cross -180 deg in the range scanned"));
+}
+
+#[test]
+fn a_report_without_models_is_an_error() {
+    let report = Report {
+        title: String::new(),
+        settings: Vec::new(),
+        models: Vec::new(),
+        notes: Vec::new(),
+    };
+    assert_eq!(report.to_html(), Err(ReportError::NoModels));
+}
+
+#[test]
+fn figures_are_the_same_twice_and_bounded_for_unstable_models() {
+    let records = runs(1);
+    let fit = fitted(Structure::BoxJenkins, &records);
+    let mut validation = fit.validate(&records[0]).unwrap();
+    let stable = figures::time_response("a", &records[0], &validation);
+    assert!(stable == figures::time_response("a", &records[0], &validation));
+    assert!(stable.contains("u (deg)") && stable.contains("time (s)"));
+    // Peaks are kept and yet the figure is small: 3 lines of at most 682 points, twice.
+    assert!(stable.len() < 90_000, "{}", stable.len());
+    for (k, v) in validation.simulated.iter_mut().enumerate() {
+        *v = 1.2_f64.powi(k as i32);
+    }
+    let unstable = figures::time_response("a", &records[0], &validation);
+    let largest = unstable
+        .split(|c: char| !(c.is_ascii_digit() || c == '.'))
+        .filter_map(|n| n.parse::<f64>().ok())
+        .fold(0.0, f64::max);
+    // 999999 is a colour.
+    assert!(largest < 1e6 && !unstable.contains("inf"), "{largest}");
+}
+
+#[test]
+fn bode_has_a_band_for_each_model_with_errors_and_the_dashed_truth() {
+    let records = runs(1);
+    let (arx, bj) = (
+        fitted(Structure::Arx, &records),
+        fitted(Structure::BoxJenkins, &records),
+    );
+    let model = |name, fit| figures::BodeModel {
+        name,
+        fit,
+        records: &records,
+    };
+    let truth = figures::TrueResponse {
+        operator: truth(),
+        sample_time: SampleTime::HUNDREDTH,
+    };
+    let svg = figures::bode("b", &[model("first", &arx), model("second", &bj)], &[truth]);
+    // Two panels with one band a model.
+    assert_eq!(svg.matches("fill-opacity=\"0.22\"").count(), 4, "bands");
+    assert_eq!(
+        svg.matches("stroke-dasharray").count(),
+        3,
+        "two curves and one legend entry"
+    );
+    for text in [
+        ">first<",
+        ">second<",
+        ">true operator<",
+        "magnitude (dB)",
+        "phase (deg)",
+        "(rad/s)",
+    ] {
+        assert!(svg.contains(text), "{text}");
+    }
+    let without = figures::bode("b", &[model("first", &arx)], &[]);
+    assert!(!without.contains("stroke-dasharray") && !without.contains("true operator"));
+}

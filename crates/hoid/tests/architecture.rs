@@ -1,0 +1,73 @@
+//! Keeps the directions between the crates as ARCHITECTURE.md draws them.
+#![allow(clippy::unwrap_used)]
+
+use std::{collections::BTreeMap, process::Command};
+
+use serde_json::Value;
+
+/// What each crate may depend on within the workspace.
+const ALLOWED: [(&str, &[&str]); 9] = [
+    ("hoid-core", &[]),
+    ("hoid-model", &["hoid-core"]),
+    ("hoid-ident", &["hoid-core", "hoid-model"]),
+    ("hoid-sim", &["hoid-core", "hoid-model"]),
+    ("hoid-io", &["hoid-model"]),
+    ("hoid-report", &["hoid-model", "hoid-ident"]),
+    (
+        "hoid",
+        &[
+            "hoid-core",
+            "hoid-model",
+            "hoid-ident",
+            "hoid-sim",
+            "hoid-io",
+            "hoid-report",
+        ],
+    ),
+    (
+        "hoid-cli",
+        &["hoid-model", "hoid-ident", "hoid-sim", "hoid-io", "hoid-report"],
+    ),
+    ("xtask", &[]),
+];
+
+fn packages() -> Vec<Value> {
+    let output = Command::new(env!("CARGO"))
+        .args(["metadata", "--format-version", "1", "--no-deps", "--offline"])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let metadata: Value = serde_json::from_slice(&output.stdout).unwrap();
+    metadata["packages"].as_array().unwrap().clone()
+}
+
+#[test]
+fn crates_depend_only_downwards() {
+    let allowed: BTreeMap<&str, &[&str]> = ALLOWED.into_iter().collect();
+    let packages = packages();
+    assert_eq!(
+        packages.len(),
+        ALLOWED.len(),
+        "a new crate needs a line here and in ARCHITECTURE.md"
+    );
+    for package in &packages {
+        let name = package["name"].as_str().unwrap();
+        let may = allowed
+            .get(name)
+            .unwrap_or_else(|| panic!("{name} needs a line here and in ARCHITECTURE.md"));
+        for dependency in package["dependencies"].as_array().unwrap() {
+            let to = dependency["name"].as_str().unwrap();
+            // Tests may look at the whole.
+            let for_tests = dependency["kind"] == "dev";
+            if to.starts_with("hoid") && !for_tests {
+                assert!(may.contains(&to), "{name} must not depend on {to}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_kernel_depends_on_nothing() {
+    let core = packages().into_iter().find(|p| p["name"] == "hoid-core").unwrap();
+    assert_eq!(core["dependencies"].as_array().unwrap().len(), 0);
+}
