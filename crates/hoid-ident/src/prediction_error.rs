@@ -210,13 +210,14 @@ impl Criterion<'_> {
         let n = data.u.len();
         let o = &self.orders;
         let pad = o.na.max(o.nb).max(o.nc).max(o.nd).max(o.nf);
-        ws.reset(pad, n);
+        ws.make_room(pad, n);
         let regressed = self.first_regressed();
         let start = match self.initial {
             InitialState::Zero => 0,
             InitialState::Estimate => self.first,
         };
 
+        ws.w.fill(0.0);
         for (j, &bj) in parts.b.iter().enumerate() {
             let lag = o.nk + j;
             let from = regressed.max(lag);
@@ -226,8 +227,13 @@ impl Criterion<'_> {
         }
         divide_in_place(parts.f, &mut ws.w[pad + regressed..]);
 
-        for t in regressed..n {
-            ws.v[pad + t] = data.u[t] - ws.w[pad + t];
+        ws.v[..pad + regressed].fill(0.0);
+        for ((v, w), u) in ws.v[pad + regressed..]
+            .iter_mut()
+            .zip(&ws.w[pad + regressed..])
+            .zip(&data.u[regressed..])
+        {
+            *v = u - w;
         }
         for (i, &ai) in parts.a.iter().enumerate() {
             let from = regressed.max(i + 1);
@@ -255,6 +261,7 @@ impl Criterion<'_> {
         self.filter_input(&parts, data, ws);
         let [xa, _, xc, xd, xf] = &mut ws.filtered;
         if o.na > 0 {
+            ws.scratch[..pad].fill(0.0);
             ws.scratch[pad..].copy_from_slice(data.u);
             whiten(parts.c, parts.d, &ws.scratch, xa, pad);
         }
@@ -276,7 +283,11 @@ impl Criterion<'_> {
     /// `(D/(C F)) e(t-nk)`.
     fn filter_input(&self, parts: &Parts<'_>, data: Data<'_>, ws: &mut Workspace) {
         let (nk, pad, n) = (self.orders.nk, ws.pad, data.u.len());
-        if self.orders.nb == 0 || nk >= n {
+        if self.orders.nb == 0 {
+            return;
+        }
+        if nk >= n {
+            ws.filtered[Block::B as usize].fill(0.0);
             return;
         }
         ws.scratch[..pad + nk].fill(0.0);
@@ -362,13 +373,13 @@ impl Block {
 }
 
 impl Workspace {
-    fn reset(&mut self, pad: usize, n: usize) {
+    /// Makes room for a record; every pass writes all of a signal before it reads it, zeros in front included.
+    fn make_room(&mut self, pad: usize, n: usize) {
         self.pad = pad;
         for signal in [&mut self.w, &mut self.v, &mut self.eps, &mut self.scratch]
             .into_iter()
             .chain(&mut self.filtered)
         {
-            signal.clear();
             signal.resize(pad + n, 0.0);
         }
     }
@@ -487,29 +498,47 @@ fn shifted(response: &[f64], delay: usize, lead: usize, rows: usize) -> Vec<f64>
 
 /// Impulse response of `1/D`, until it has died away (1e-20 of its largest value) or `longest` is reached.
 fn impulse_response(d: &[f64], longest: usize) -> Vec<f64> {
-    let mut h: Vec<f64> = Vec::with_capacity(longest.min(4096));
-    let mut largest = 0.0_f64;
-    let mut quiet = 0;
-    for t in 0..longest {
-        let mut y = f64::from(u8::from(t == 0));
-        for (i, di) in d.iter().enumerate().take(t) {
-            y -= di * h[t - 1 - i];
+    const BLOCK: usize = 128;
+    let order = d.len();
+    let mut h = vec![0.0; order];
+    h.reserve(longest.min(4096));
+    let mut largest = 1.0_f64;
+    while h.len() < order + longest {
+        let from = h.len();
+        let to = (from + BLOCK).min(order + longest);
+        match *d {
+            [d1, d2] => {
+                let (mut y1, mut y2) = (h[from - 1], h[from - 2]);
+                for t in from..to {
+                    let y = (f64::from(u8::from(t == order)) - d2 * y2) - d1 * y1;
+                    (y2, y1) = (y1, y);
+                    h.push(y);
+                }
+            }
+            _ => {
+                for t in from..to {
+                    let past: f64 = d.iter().enumerate().map(|(i, di)| di * h[t - 1 - i]).sum();
+                    h.push(f64::from(u8::from(t == order)) - past);
+                }
+            }
         }
-        h.push(y);
-        largest = largest.max(y.abs());
-        quiet = if y.abs() < 1e-20 * largest { quiet + 1 } else { 0 };
-        if quiet > d.len() {
+        let size = h[from..].iter().fold(0.0_f64, |m, y| m.max(y.abs()));
+        largest = largest.max(size);
+        if size < 1e-20 * largest {
             break;
         }
     }
+    h.drain(..order);
     h
 }
 
-/// `y = (D/C) x` from index `from` on, zero state of 1/C, x as it is before.
+/// `y = (D/C) x` from index `from` on, zero before: zero state of 1/C, x as it is before.
 fn whiten(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
     if from >= x.len() {
+        y.fill(0.0);
         return;
     }
+    y[..from].fill(0.0);
     y[from..].copy_from_slice(&x[from..]);
     for (i, &di) in d.iter().enumerate() {
         let lag = i + 1;
