@@ -2,13 +2,15 @@
 
 use hoid_model::{
     NotConvertible, Orders, PolynomialModel, Record,
+    polynomial::product,
+    polynomial_model::monic,
     remnant::RemnantDiscretisation,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate, operator_estimate, remnant_estimate, variance_along},
 };
 
 use crate::{
     IdentError, InitialState, Termination,
-    prediction_error::{Criterion, Data, first_residual, output_error_form},
+    prediction_error::{Criterion, Data, first_residual},
 };
 
 /// A fitted model.
@@ -256,4 +258,19 @@ fn output_less(record: &Record, errors: Series) -> Series {
         first: errors.first,
         values: output.iter().zip(&errors.values).map(|(u, e)| u - e).collect(),
     }
+}
+
+/// Orders and theta of the output-error model `u = B/(A F) q^-nk e + eps` with the same system: its residual is the
+/// simulation error of the model.
+fn output_error_form(model: &PolynomialModel) -> (Orders, Vec<f64>) {
+    let orders = model.orders();
+    let den = product(&monic(model.a()), &monic(model.f()));
+    let theta = model.b().iter().chain(&den[1..]).copied().collect();
+    let form = Orders {
+        nb: orders.nb,
+        nf: orders.na + orders.nf,
+        nk: orders.nk,
+        ..Orders::default()
+    };
+    (form, theta)
 }

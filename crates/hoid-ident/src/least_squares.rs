@@ -194,6 +194,13 @@ pub(crate) fn solve_symmetric(gram: &[f64], rhs: &[f64]) -> Option<Vec<f64>> {
     Some(y.iter().zip(&scale).map(|(v, s)| v / s).collect())
 }
 
+/// `y += k x`.
+pub(crate) fn add_scaled(y: &mut [f64], k: f64, x: &[f64]) {
+    for (yi, xi) in y.iter_mut().zip(x) {
+        *yi += k * xi;
+    }
+}
+
 /// Sum of products, in eight fixed partial sums: fast, and the same bits on every machine.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];

@@ -3,7 +3,8 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`Estimator`] | structure, orders and options; `fit` |
-//! | `prediction_error` | the criterion of the general model, gradients, elimination of initial states |
+//! | `prediction_error` | the criterion of the general model and its gradients |
+//! | `initial_states` | what a record does not say about its past, eliminated exactly |
 //! | `search` | damped Gauss-Newton |
 //! | `starts` | where the search begins when nobody says |
 //! | `arx`, `least_squares` | linear regression by QR with column pivoting |
@@ -15,6 +16,7 @@ mod arx;
 mod error;
 mod estimator;
 mod fit;
+mod initial_states;
 mod least_squares;
 pub mod order_search;
 mod prediction_error;

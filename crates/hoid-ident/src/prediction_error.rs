@@ -26,9 +26,12 @@
 //! span of Q: shifting stays exact.
 
 use hoid_core::{filter::divide_in_place, stability::roots_inside};
-use hoid_model::{Orders, PolynomialModel};
+use hoid_model::Orders;
 
-use crate::least_squares::{dot, solve_symmetric};
+use crate::{
+    initial_states::FreeResponses,
+    least_squares::{add_scaled, dot, solve_symmetric},
+};
 
 /// What is assumed about the time before a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -102,20 +105,6 @@ impl<'t> Parts<'t> {
         let (d, f) = rest.split_at(orders.nd);
         Self { a, b, c, d, f }
     }
-}
-
-/// Orthonormal basis of the responses to the initial states of a record, and the way back to the states.
-#[derive(Debug, Default)]
-struct FreeResponses {
-    /// Basis vectors from the first residual on; what follows their end is zero.
-    q: Vec<Vec<f64>>,
-    /// `G[:, kept[k]] = sum over l <= k of Q_l r[k][l]`.
-    r: Vec<Vec<f64>>,
-    kept: Vec<usize>,
-    /// Impulse response of 1/F.
-    h: Vec<f64>,
-    /// Number of states of 1/F; those of 1/C come after them.
-    nf: usize,
 }
 
 impl Criterion<'_> {
@@ -246,8 +235,12 @@ impl Criterion<'_> {
         match self.initial {
             InitialState::Zero => FreeResponses::default(),
             InitialState::Estimate => {
-                let free = FreeResponses::of(&parts, o.nd, n - self.first);
-                free.eliminate(ws, pad, regressed, self.first);
+                let free = FreeResponses::of(parts.c, parts.d, parts.f, n - self.first);
+                free.eliminate(
+                    &mut ws.w[pad + regressed..],
+                    &mut ws.v[pad + regressed..],
+                    &mut ws.eps[pad + self.first..],
+                );
                 free
             }
         }
@@ -330,7 +323,7 @@ impl Criterion<'_> {
         // Components of each column in the space of the initial states.
         let inside: Vec<Vec<f64>> = columns
             .iter()
-            .map(|(column, sign)| free.q.iter().map(|q| sign * dot(q, &column[..q.len()])).collect())
+            .map(|(column, sign)| free.basis().iter().map(|q| sign * dot(q, &column[..q.len()])).collect())
             .collect();
         for i in 0..p {
             let (column, sign) = columns[i];
@@ -385,153 +378,6 @@ impl Workspace {
     }
 }
 
-impl FreeResponses {
-    /// Responses of the residuals, from the first one on, to the nf initial values of w and the nc of eps.
-    ///
-    /// Any free response of 1/F is a combination of its impulse response `h` started at the first nf samples (that basis stays
-    /// independent even where f_nf = 0).
-    fn of(parts: &Parts<'_>, nd: usize, rows: usize) -> Self {
-        let mut columns: Vec<Vec<f64>> = Vec::new();
-        let mut h = Vec::new();
-        if !parts.f.is_empty() {
-            h = impulse_response(parts.f, rows + nd);
-            let mut s = vec![0.0; (h.len() + nd).min(rows + nd)];
-            for (t, st) in s.iter_mut().enumerate() {
-                *st = h.get(t).copied().unwrap_or(0.0);
-                for (i, di) in parts.d.iter().enumerate().take(t) {
-                    *st += di * h.get(t - 1 - i).copied().unwrap_or(0.0);
-                }
-            }
-            if !parts.c.is_empty() {
-                s.resize(rows + nd, 0.0);
-                divide_in_place(parts.c, &mut s);
-            }
-            // w grows with a state, the residual falls with w.
-            s.iter_mut().for_each(|v| *v = -*v);
-            for i in 0..parts.f.len() {
-                // The state enters i samples after w starts, nd samples before the first residual.
-                columns.push(shifted(&s, i, nd, rows));
-            }
-        }
-        if !parts.c.is_empty() {
-            let k = impulse_response(parts.c, rows);
-            for j in 0..parts.c.len() {
-                columns.push(shifted(&k, j, 0, rows));
-            }
-        }
-        let mut free = Self {
-            h,
-            nf: parts.f.len(),
-            ..Self::default()
-        };
-        for (index, column) in columns.into_iter().enumerate() {
-            free.orthonormalise(index, column);
-        }
-        free
-    }
-
-    /// Modified Gram-Schmidt, twice for orthogonality to rounding; a column without a part of its own is dropped.
-    fn orthonormalise(&mut self, index: usize, mut column: Vec<f64>) {
-        let size = dot(&column, &column).sqrt();
-        let mut r = vec![0.0; self.q.len()];
-        for _ in 0..2 {
-            for (q, rk) in self.q.iter().zip(&mut r) {
-                let common = q.len().min(column.len());
-                let component = dot(&q[..common], &column[..common]);
-                *rk += component;
-                if column.len() < q.len() {
-                    column.resize(q.len(), 0.0);
-                }
-                add_scaled(&mut column[..q.len()], -component, q);
-            }
-        }
-        let rest = dot(&column, &column).sqrt();
-        if rest.is_nan() || rest <= 1e-10 * size {
-            return;
-        }
-        column.iter_mut().for_each(|v| *v /= rest);
-        r.push(rest);
-        self.q.push(column);
-        self.r.push(r);
-        self.kept.push(index);
-    }
-
-    /// Takes the best initial states into w, v and eps.
-    fn eliminate(&self, ws: &mut Workspace, pad: usize, regressed: usize, first: usize) {
-        let components: Vec<f64> = self
-            .q
-            .iter()
-            .map(|q| dot(q, &ws.eps[pad + first..pad + first + q.len()]))
-            .collect();
-        for (q, &component) in self.q.iter().zip(&components) {
-            add_scaled(&mut ws.eps[pad + first..pad + first + q.len()], -component, q);
-        }
-        // R x = -Q' eps by back substitution.
-        let mut states: Vec<f64> = components.iter().map(|c| -c).collect();
-        for k in (0..states.len()).rev() {
-            states[k] /= self.r[k][k];
-            for l in 0..k {
-                states[l] -= self.r[k][l] * states[k];
-            }
-        }
-        // States of C do not act on w.
-        for (&index, &x) in self.kept.iter().zip(&states).filter(|(index, _)| **index < self.nf) {
-            let from = pad + regressed + index;
-            if from >= ws.w.len() {
-                continue;
-            }
-            let end = (from + self.h.len()).min(ws.w.len());
-            add_scaled(&mut ws.w[from..end], x, &self.h[..end - from]);
-            add_scaled(&mut ws.v[from..end], -x, &self.h[..end - from]);
-        }
-    }
-}
-
-/// `response(t + lead - delay)` for t = 0 .. rows, cut where the response has ended.
-fn shifted(response: &[f64], delay: usize, lead: usize, rows: usize) -> Vec<f64> {
-    let mut column = vec![0.0; delay.saturating_sub(lead).min(rows)];
-    let from = lead.saturating_sub(delay).min(response.len());
-    column.extend_from_slice(&response[from..]);
-    column.truncate(rows);
-    column
-}
-
-/// Impulse response of `1/D`, until it has died away (1e-20 of its largest value) or `longest` is reached.
-fn impulse_response(d: &[f64], longest: usize) -> Vec<f64> {
-    const BLOCK: usize = 128;
-    let order = d.len();
-    let mut h = vec![0.0; order];
-    h.reserve(longest.min(4096));
-    let mut largest = 1.0_f64;
-    while h.len() < order + longest {
-        let from = h.len();
-        let to = (from + BLOCK).min(order + longest);
-        match *d {
-            [d1, d2] => {
-                let (mut y1, mut y2) = (h[from - 1], h[from - 2]);
-                for t in from..to {
-                    let y = (f64::from(u8::from(t == order)) - d2 * y2) - d1 * y1;
-                    (y2, y1) = (y1, y);
-                    h.push(y);
-                }
-            }
-            _ => {
-                for t in from..to {
-                    let past: f64 = d.iter().enumerate().map(|(i, di)| di * h[t - 1 - i]).sum();
-                    h.push(f64::from(u8::from(t == order)) - past);
-                }
-            }
-        }
-        let size = h[from..].iter().fold(0.0_f64, |m, y| m.max(y.abs()));
-        largest = largest.max(size);
-        if size < 1e-20 * largest {
-            break;
-        }
-    }
-    h.drain(..order);
-    h
-}
-
 /// `y = (D/C) x` from index `from` on, zero before: zero state of 1/C, x as it is before.
 fn whiten(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
     if from >= x.len() {
@@ -548,29 +394,6 @@ fn whiten(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
         }
     }
     divide_in_place(c, &mut y[from..]);
-}
-
-/// `y += k x`.
-fn add_scaled(y: &mut [f64], k: f64, x: &[f64]) {
-    for (yi, xi) in y.iter_mut().zip(x) {
-        *yi += k * xi;
-    }
-}
-
-/// Orders and theta of the output-error model `u = B/(A F) q^-nk e + eps` with the same system: its residual is the
-/// simulation error of the model.
-pub(crate) fn output_error_form(model: &PolynomialModel) -> (Orders, Vec<f64>) {
-    use hoid_model::{polynomial::product, polynomial_model::monic};
-    let orders = model.orders();
-    let den = product(&monic(model.a()), &monic(model.f()));
-    let theta = model.b().iter().chain(&den[1..]).copied().collect();
-    let form = Orders {
-        nb: orders.nb,
-        nf: orders.na + orders.nf,
-        nk: orders.nk,
-        ..Orders::default()
-    };
-    (form, theta)
 }
 
 #[cfg(test)]
@@ -728,9 +551,9 @@ mod tests {
             let c = criterion(orders, vec![Data { e: &e, u: &u }], InitialState::Estimate);
             let eps = c.residuals_of(&theta, c.data[0]);
             let parts = Parts::split(&orders, &theta);
-            let free = FreeResponses::of(&parts, orders.nd, eps.len());
-            assert_eq!(free.q.len(), orders.nf + orders.nc, "{orders}");
-            for q in &free.q {
+            let free = FreeResponses::of(parts.c, parts.d, parts.f, eps.len());
+            assert_eq!(free.basis().len(), orders.nf + orders.nc, "{orders}");
+            for q in free.basis() {
                 assert!(dot(q, &eps[..q.len()]).abs() < 1e-12);
             }
         }

@@ -343,6 +343,10 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
+    use crate::{
+        discretise::{Method, discretise},
+        transfer_function::ContinuousTransferFunction,
+    };
 
     fn ts() -> SampleTime {
         SampleTime::new(0.01).unwrap()
@@ -437,6 +441,22 @@ mod tests {
             ] {
                 let scale = 1.0 + b.abs() + if name.starts_with('a') { case.a1.abs() } else { 0.0 };
                 assert!((a - b).abs() < 2e-8 * scale, "{name} of {case:?}: {a} and {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn agrees_with_the_general_hold() {
+        for case in cases() {
+            let general = ContinuousTransferFunction::new(&[case.b0, case.b1], &[1.0, case.a1, case.a2]).unwrap();
+            let general = discretise(&general, ts(), Method::ZeroOrderHold).unwrap();
+            let exact = case.hold(ts()).unwrap();
+            let size = exact.b0.abs() + exact.b1.abs();
+            for (a, b) in [(exact.b0, general.num()[1]), (exact.b1, general.num()[2])] {
+                assert!((a - b).abs() < 1e-12 * size, "{case:?}: {a} and {b}");
+            }
+            for (a, b) in [(exact.f1, general.den()[1]), (exact.f2, general.den()[2])] {
+                assert!((a - b).abs() < 1e-13 * (1.0 + b.abs()), "{case:?}: {a} and {b}");
             }
         }
     }

@@ -1,0 +1,171 @@
+//! Initial states of a record, eliminated exactly.
+//!
+//! What a record does not say about its own past enters the residuals linearly: the nf past values of w through the free
+//! responses of `1/F` (as `-(D/C) h`, h the impulse response of `1/F`), the nc past innovations through those of `1/C`. With G the
+//! matrix of these responses and `G = Q R`, the states of least squares are `x = -R^-1 Q' eps_0` and the residuals
+//! `eps = (I - Q Q') eps_0`. The responses die away, so that Q is short beside the record.
+//! Source: G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432.
+
+use hoid_core::filter::divide_in_place;
+
+use crate::least_squares::{add_scaled, dot};
+
+/// Orthonormal basis of the responses to the initial states of a record, and the way back to the states.
+#[derive(Debug, Default)]
+pub(crate) struct FreeResponses {
+    /// Basis vectors from the first residual on; what follows their end is zero.
+    q: Vec<Vec<f64>>,
+    /// `G[:, kept[k]] = sum over l <= k of Q_l r[k][l]`.
+    r: Vec<Vec<f64>>,
+    kept: Vec<usize>,
+    /// Impulse response of 1/F.
+    h: Vec<f64>,
+    /// Number of states of 1/F; those of 1/C come after them.
+    nf: usize,
+}
+
+impl FreeResponses {
+    /// Responses of the residuals, from the first one on, to the nf initial values of w and the nc of eps.
+    ///
+    /// Any free response of 1/F is a combination of its impulse response `h` started at the first nf samples (that basis stays
+    /// independent even where f_nf = 0).
+    pub fn of(c: &[f64], d: &[f64], f: &[f64], rows: usize) -> Self {
+        let nd = d.len();
+        let mut columns: Vec<Vec<f64>> = Vec::new();
+        let mut h = Vec::new();
+        if !f.is_empty() {
+            h = impulse_response(f, rows + nd);
+            let mut s = vec![0.0; (h.len() + nd).min(rows + nd)];
+            for (t, st) in s.iter_mut().enumerate() {
+                *st = h.get(t).copied().unwrap_or(0.0);
+                for (i, di) in d.iter().enumerate().take(t) {
+                    *st += di * h.get(t - 1 - i).copied().unwrap_or(0.0);
+                }
+            }
+            if !c.is_empty() {
+                s.resize(rows + nd, 0.0);
+                divide_in_place(c, &mut s);
+            }
+            // w grows with a state, the residual falls with w.
+            s.iter_mut().for_each(|v| *v = -*v);
+            for i in 0..f.len() {
+                // The state enters i samples after w starts, nd samples before the first residual.
+                columns.push(shifted(&s, i, nd, rows));
+            }
+        }
+        if !c.is_empty() {
+            let k = impulse_response(c, rows);
+            for j in 0..c.len() {
+                columns.push(shifted(&k, j, 0, rows));
+            }
+        }
+        let mut free = Self {
+            h,
+            nf: f.len(),
+            ..Self::default()
+        };
+        for (index, column) in columns.into_iter().enumerate() {
+            free.orthonormalise(index, column);
+        }
+        free
+    }
+
+    /// Modified Gram-Schmidt, twice for orthogonality to rounding; a column without a part of its own is dropped.
+    fn orthonormalise(&mut self, index: usize, mut column: Vec<f64>) {
+        let size = dot(&column, &column).sqrt();
+        let mut r = vec![0.0; self.q.len()];
+        for _ in 0..2 {
+            for (q, rk) in self.q.iter().zip(&mut r) {
+                let common = q.len().min(column.len());
+                let component = dot(&q[..common], &column[..common]);
+                *rk += component;
+                if column.len() < q.len() {
+                    column.resize(q.len(), 0.0);
+                }
+                add_scaled(&mut column[..q.len()], -component, q);
+            }
+        }
+        let rest = dot(&column, &column).sqrt();
+        if rest.is_nan() || rest <= 1e-10 * size {
+            return;
+        }
+        column.iter_mut().for_each(|v| *v /= rest);
+        r.push(rest);
+        self.q.push(column);
+        self.r.push(r);
+        self.kept.push(index);
+    }
+
+    /// Takes the best initial states into the signals: w and v from the first regressed sample on, eps from the first residual.
+    pub fn eliminate(&self, w: &mut [f64], v: &mut [f64], eps: &mut [f64]) {
+        let components: Vec<f64> = self.q.iter().map(|q| dot(q, &eps[..q.len()])).collect();
+        for (q, &component) in self.q.iter().zip(&components) {
+            add_scaled(&mut eps[..q.len()], -component, q);
+        }
+        // R x = -Q' eps by back substitution.
+        let mut states: Vec<f64> = components.iter().map(|c| -c).collect();
+        for k in (0..states.len()).rev() {
+            states[k] /= self.r[k][k];
+            for l in 0..k {
+                states[l] -= self.r[k][l] * states[k];
+            }
+        }
+        // States of C do not act on w.
+        for (&index, &x) in self.kept.iter().zip(&states).filter(|(index, _)| **index < self.nf) {
+            if index < w.len() {
+                add_scaled(&mut w[index..], x, &self.h);
+                add_scaled(&mut v[index..], -x, &self.h);
+            }
+        }
+    }
+
+    /// The orthonormal basis; a vector starts at the first residual, and what follows its end is zero.
+    pub fn basis(&self) -> &[Vec<f64>] {
+        &self.q
+    }
+}
+
+/// `response(t + lead - delay)` for t = 0 .. rows, cut where the response has ended.
+fn shifted(response: &[f64], delay: usize, lead: usize, rows: usize) -> Vec<f64> {
+    let mut column = vec![0.0; delay.saturating_sub(lead).min(rows)];
+    let from = lead.saturating_sub(delay).min(response.len());
+    column.extend_from_slice(&response[from..]);
+    column.truncate(rows);
+    column
+}
+
+/// Impulse response of `1/D`, until it has died away (1e-20 of its largest value) or `longest` is reached.
+fn impulse_response(d: &[f64], longest: usize) -> Vec<f64> {
+    const BLOCK: usize = 128;
+    let order = d.len();
+    let mut h = vec![0.0; order];
+    h.reserve(longest.min(4096));
+    let mut largest = 1.0_f64;
+    while h.len() < order + longest {
+        let from = h.len();
+        let to = (from + BLOCK).min(order + longest);
+        match *d {
+            [d1, d2] => {
+                let (mut y1, mut y2) = (h[from - 1], h[from - 2]);
+                for t in from..to {
+                    let y = (f64::from(u8::from(t == order)) - d2 * y2) - d1 * y1;
+                    (y2, y1) = (y1, y);
+                    h.push(y);
+                }
+            }
+            _ => {
+                for t in from..to {
+                    let past: f64 = d.iter().enumerate().map(|(i, di)| di * h[t - 1 - i]).sum();
+                    h.push(f64::from(u8::from(t == order)) - past);
+                }
+            }
+        }
+        let size = h[from..].iter().fold(0.0_f64, |m, y| m.max(y.abs()));
+        largest = largest.max(size);
+        if size < 1e-20 * largest {
+            break;
+        }
+    }
+    h.drain(..order);
+    h
+}
