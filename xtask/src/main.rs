@@ -11,7 +11,8 @@
 
 use std::{
     env,
-    process::{Command, ExitCode},
+    io::{BufRead, BufReader},
+    process::{Command, ExitCode, Stdio},
 };
 
 const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | check | book";
@@ -33,11 +34,59 @@ fn main() -> ExitCode {
     }
 }
 
-/// Passes further arguments on to `cargo test`.
+/// Runs all tests, passing further arguments on to `cargo test`, and closes with their number over all crates.
 fn test(arguments: &[String]) -> Result<(), String> {
-    let mut all = vec!["test", "--workspace", "--no-fail-fast"];
-    all.extend(arguments.iter().map(String::as_str));
-    cargo(&all, &[])
+    let mut command = cargo_command();
+    command.args(["test", "--workspace", "--no-fail-fast"]).args(arguments);
+    let shown = format!("{command:?}");
+    let cannot_run = |error: std::io::Error| format!("cannot run {shown}: {error}");
+    let mut child = command.stdout(Stdio::piped()).spawn().map_err(cannot_run)?;
+    let mut total = Counts::default();
+    if let Some(output) = child.stdout.take() {
+        for line in BufReader::new(output).lines() {
+            let line = line.map_err(cannot_run)?;
+            println!("{line}");
+            total.add(&line);
+        }
+    }
+    let status = child.wait().map_err(cannot_run)?;
+    println!(
+        "\n{} passed, {} failed, {} skipped",
+        total.passed, total.failed, total.ignored
+    );
+    if status.success() {
+        Ok(())
+    } else {
+        Err(format!("failed ({status}): {shown}"))
+    }
+}
+
+#[derive(Debug, Default, PartialEq)]
+struct Counts {
+    passed: usize,
+    failed: usize,
+    ignored: usize,
+}
+
+impl Counts {
+    /// Adds a line such as `test result: ok. 7 passed; 0 failed; 0 ignored; ...`; other lines count nothing.
+    fn add(&mut self, line: &str) {
+        let Some(numbers) = line.strip_prefix("test result: ") else {
+            return;
+        };
+        for part in numbers.split([';', '.']) {
+            let mut words = part.split_whitespace();
+            let (Some(Ok(n)), Some(what)) = (words.next().map(str::parse::<usize>), words.next()) else {
+                continue;
+            };
+            match what {
+                "passed" => self.passed += n,
+                "failed" => self.failed += n,
+                "ignored" => self.ignored += n,
+                _ => {}
+            }
+        }
+    }
 }
 
 fn check() -> Result<(), String> {
@@ -53,8 +102,11 @@ fn book() -> Result<(), String> {
 }
 
 fn cargo(arguments: &[&str], environment: &[(&str, &str)]) -> Result<(), String> {
-    let program = env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
-    run(Command::new(program).args(arguments).envs(environment.iter().copied()))
+    run(cargo_command().args(arguments).envs(environment.iter().copied()))
+}
+
+fn cargo_command() -> Command {
+    Command::new(env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned()))
 }
 
 fn run(command: &mut Command) -> Result<(), String> {
@@ -63,5 +115,30 @@ fn run(command: &mut Command) -> Result<(), String> {
         Ok(status) if status.success() => Ok(()),
         Ok(status) => Err(format!("failed ({status}): {shown}")),
         Err(error) => Err(format!("cannot run {shown}: {error}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_add_up_over_crates() {
+        let mut counts = Counts::default();
+        for line in [
+            "running 3 tests",
+            "test result: ok. 7 passed; 0 failed; 1 ignored; 0 measured; 2 filtered out; finished in 0.00s",
+            "test result: FAILED. 5 passed; 2 failed; 0 ignored; 0 measured; 0 filtered out; finished in 1.00s",
+        ] {
+            counts.add(line);
+        }
+        assert_eq!(
+            counts,
+            Counts {
+                passed: 12,
+                failed: 2,
+                ignored: 1
+            }
+        );
     }
 }
