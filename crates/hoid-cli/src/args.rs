@@ -334,6 +334,37 @@ mod tests {
         Cli::command().debug_assert();
     }
 
+    /// The help pages as a page of the book.
+    fn reference_page() -> String {
+        let mut page = "# Command line\n\nThe help pages of the program, word for word.\n".to_owned();
+        let mut cli = Cli::command().term_width(110);
+        cli.build();
+        for command in cli.get_subcommands_mut().filter(|c| c.get_name() != "help") {
+            let help = command.render_long_help().to_string();
+            let trimmed: Vec<&str> = help.lines().map(str::trim_end).collect();
+            page.push_str(&format!(
+                "\n## hoid {}\n\n```text\n{}\n```\n",
+                command.get_name(),
+                trimmed.join("\n").trim_end()
+            ));
+        }
+        page
+    }
+
+    #[test]
+    fn the_book_has_the_help_pages() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/reference/command-line.md");
+        let page = reference_page();
+        if std::env::var_os("HOID_UPDATE_DOCS").is_some() {
+            std::fs::write(path, &page).unwrap();
+        }
+        let book = std::fs::read_to_string(path).unwrap();
+        assert_eq!(
+            book, page,
+            "run HOID_UPDATE_DOCS=1 cargo test -p hoid-cli to renew the page"
+        );
+    }
+
     #[test]
     fn transfer_functions_as_typed() {
         let h = parse_transfer_function("90/1,6,0").unwrap();

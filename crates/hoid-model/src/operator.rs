@@ -46,6 +46,9 @@ pub struct DiscreteOperator {
     pub sample_time: SampleTime,
 }
 
+/// Size of `1 + f1 + f2` below which a pole counts as lying at the origin of s: four digits above rounding.
+const AT_ORIGIN: f64 = 1e-12;
+
 /// Names of the physical parameters in the order of rows and columns of every Jacobian here.
 pub const PHYSICAL_NAMES: [&str; 4] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm"];
 
@@ -130,7 +133,9 @@ impl DiscreteOperator {
             return Err(NotConvertible::NoDelay);
         }
         let c = self.held.unhold(self.sample_time)?;
-        if c.a2 <= 0.0 {
+        // K_e and omega_nm hang on 1 + f1 + f2, a difference of numbers of size 1: below this nothing of it is left.
+        let at_one = (1.0 + self.held.f1 + self.held.f2).abs();
+        if c.a2 <= 0.0 || at_one < AT_ORIGIN {
             return Err(NotConvertible::NoNaturalFrequency { a1: c.a1, a2: c.a2 });
         }
         let omega = c.a2.sqrt();
