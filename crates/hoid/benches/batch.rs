@@ -1,0 +1,35 @@
+//! Time of one simulated run and of one batch fit: condition C1, 8192 samples, nk = 29.
+//!
+//! `cargo bench -p hoid`. Machines are shared and noisy: compare ratios within one run only.
+#![allow(missing_docs, clippy::unwrap_used)]
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use hoid::prelude::*;
+
+fn batch(c: &mut Criterion) {
+    let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+    let changing = Simulator::new(&Scenario::condition(Condition::C3)).unwrap();
+    let stream = Stream::default();
+    let noise = stream.white_noise(simulator.samples());
+    let record = [simulator.run(stream, false).unwrap()];
+    let estimator = |structure: Structure| Estimator::new(structure, structure.operator_orders(29));
+    let (arx, bj) = (estimator(Structure::Arx), estimator(Structure::BoxJenkins));
+
+    c.bench_function("noise of a run", |b| b.iter(|| stream.white_noise(simulator.samples())));
+    c.bench_function("loop, C1, noise given", |b| {
+        b.iter(|| simulator.signals(&noise).unwrap())
+    });
+    c.bench_function("loop, C3, noise given", |b| {
+        b.iter(|| changing.signals(&noise).unwrap())
+    });
+    c.bench_function("run with all channels, C1", |b| {
+        b.iter(|| simulator.run(stream, false).unwrap())
+    });
+    c.bench_function("ARX fit", |b| b.iter(|| arx.fit(&record).unwrap()));
+    c.bench_function("BJ fit, own start, initial states, covariance", |b| {
+        b.iter(|| bj.fit(&record).unwrap())
+    });
+}
+
+criterion_group!(benches, batch);
+criterion_main!(benches);
