@@ -60,9 +60,18 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         settings: &settings,
     };
     if let Some(directory) = &args.report {
+        let title = match records.as_slice() {
+            [only] => format!("Identification of {}", only.label()),
+            all => format!("Identification of {} records", all.len()),
+        };
+        let mut facts = vec![
+            ("hoid".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+            ("records".to_owned(), files.join(", ")),
+        ];
+        facts.extend(settings.iter().cloned());
         let report = Report {
-            title: format!("Identification of {}", files.join(", ")),
-            settings: settings.clone(),
+            title,
+            settings: facts,
             models: vec![ModelSection {
                 name: format!("{}({})", fit.model().structure(), fit.orders()),
                 fit: &fit,
