@@ -53,7 +53,7 @@ const AT_ORIGIN: f64 = 1e-12;
 pub const PHYSICAL_NAMES: [&str; 4] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm"];
 
 impl OperatorParameters {
-    /// Error-rate gain `K_e_dot = K_e T_L`, s deg/deg.
+    /// Error-rate gain `K_e_dot = K_e T_L`, s.
     pub fn k_e_dot(&self) -> f64 {
         self.k_e * self.t_l_s
     }

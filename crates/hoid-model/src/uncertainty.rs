@@ -45,7 +45,7 @@ pub struct OperatorEstimate {
     pub k_e: Estimate,
     /// Lead time constant T_L, s.
     pub t_l_s: Estimate,
-    /// Error-rate gain K_e_dot, s deg/deg.
+    /// Error-rate gain K_e_dot, s.
     pub k_e_dot: Estimate,
     /// Neuromuscular frequency omega_nm, rad/s.
     pub omega_nm_rad_s: Estimate,
@@ -53,6 +53,20 @@ pub struct OperatorEstimate {
     pub zeta_nm: Estimate,
     /// Delay tau_e = (nk - 1) Ts, s: a whole number of samples that was given or searched, without a standard error.
     pub tau_e_s: Estimate,
+}
+
+impl From<OperatorParameters> for OperatorEstimate {
+    /// Parameters that are given and not estimated: no standard errors.
+    fn from(o: OperatorParameters) -> Self {
+        Self {
+            k_e: Estimate::fixed(o.k_e),
+            t_l_s: Estimate::fixed(o.t_l_s),
+            k_e_dot: Estimate::fixed(o.k_e_dot()),
+            omega_nm_rad_s: Estimate::fixed(o.omega_nm_rad_s),
+            zeta_nm: Estimate::fixed(o.zeta_nm),
+            tau_e_s: Estimate::fixed(o.tau_e_s),
+        }
+    }
 }
 
 impl OperatorEstimate {
@@ -70,7 +84,7 @@ impl OperatorEstimate {
     /// Name, unit and estimate of each parameter, in the order of the tables.
     pub fn rows(&self) -> [(&'static str, &'static str, Estimate); 6] {
         [
-            ("K_e", "", self.k_e),
+            ("K_e", "deg/deg", self.k_e),
             ("T_L", "s", self.t_l_s),
             ("K_e_dot", "s", self.k_e_dot),
             ("omega_nm", "rad/s", self.omega_nm_rad_s),

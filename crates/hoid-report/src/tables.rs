@@ -28,7 +28,7 @@ fn symbol(name: &str) -> (Value, &'static str) {
     let (symbol, unit) = match name {
         "K_e" => ("<i>K</i><sub>e</sub>", "deg/deg"),
         "T_L" => ("<i>T</i><sub>L</sub>", "s"),
-        "K_e_dot" => ("<i>K</i><sub>\u{117}</sub>", "s deg/deg"),
+        "K_e_dot" => ("<i>K</i><sub>\u{117}</sub>", "s"),
         "omega_nm" => ("<i>\u{3c9}</i><sub>nm</sub>", "rad/s"),
         "zeta_nm" => ("<i>\u{3b6}</i><sub>nm</sub>", "-"),
         "tau_e" => ("<i>\u{3c4}</i><sub>e</sub>", "s"),

@@ -2,10 +2,10 @@
 
 use hoid_model::{
     ContinuousTransferFunction, DiscreteOperator, OperatorParameters, SampleTime, discretise::discretise,
-    second_order::HeldSecondOrder,
+    second_order::HeldSecondOrder, uncertainty::OperatorEstimate,
 };
 use hoid_report::numbers;
-use serde_json::json;
+use serde_json::{Map, Value, json};
 
 use crate::{args::ConvertArgs, error::CliError, json, output, text};
 
@@ -35,17 +35,16 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
     };
     let held = discrete.held;
     if args.json {
-        let operator = match &operator {
-            Ok(o) => json!({
-                "convertible": true,
-                "stable": o.is_stable(),
-                "K_e": {"value": json::number(o.k_e)},
-                "T_L": {"value": json::number(o.t_l_s)},
-                "K_e_dot": {"value": json::number(o.k_e_dot())},
-                "omega_nm": {"value": json::number(o.omega_nm_rad_s)},
-                "zeta_nm": {"value": json::number(o.zeta_nm)},
-                "tau_e": {"value": json::number(o.tau_e_s)},
-            }),
+        let operator = match operator {
+            Ok(o) => {
+                let mut map = Map::new();
+                map.insert("convertible".to_owned(), json!(true));
+                map.insert("stable".to_owned(), json!(o.is_stable()));
+                for (name, _, e) in OperatorEstimate::from(o).rows() {
+                    map.insert(name.to_owned(), json!({"value": json::number(e.value)}));
+                }
+                Value::Object(map)
+            }
             Err(reason) => json!({"convertible": false, "reason": reason.to_string()}),
         };
         json::print(&json!({
@@ -67,15 +66,8 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
     match operator {
         Ok(o) => {
             let mut table = text::table(&["operator", "value", "unit"]);
-            for (name, value, unit) in [
-                ("K_e", o.k_e, ""),
-                ("T_L", o.t_l_s, "s"),
-                ("K_e_dot", o.k_e_dot(), "s"),
-                ("omega_nm", o.omega_nm_rad_s, "rad/s"),
-                ("zeta_nm", o.zeta_nm, ""),
-                ("tau_e", o.tau_e_s, "s"),
-            ] {
-                table.add_row([name, &numbers::plain(value), unit]);
+            for (name, unit, e) in OperatorEstimate::from(o).rows() {
+                table.add_row([name, &numbers::plain(e.value), unit]);
             }
             text.push_str(&format!("{table}\n"));
             if !o.is_stable() {

@@ -8,6 +8,7 @@ use hoid_io::{make_directory, write_record};
 use hoid_model::{
     Record, Structure,
     scenario::{Condition, Scenario},
+    uncertainty::OperatorEstimate,
 };
 use hoid_report::{ModelSection, Report, numbers};
 use hoid_sim::{Simulator, Stream};
@@ -87,14 +88,14 @@ fn table(stages: &[Stage]) -> String {
         let (arx, bj) = (stage.arx.operator(), bj.operator());
         match (&bj, truth) {
             (Ok(bj), Some(t)) => {
-                let truth = [t.k_e, t.t_l_s, t.k_e_dot(), t.omega_nm_rad_s, t.zeta_nm, t.tau_e_s];
+                let truth = OperatorEstimate::from(t).rows();
                 for (i, (name, unit, e)) in bj.rows().into_iter().enumerate() {
                     let (value, error) = text::with_uncertainty(&e);
                     let by_arx = match &arx {
                         Ok(o) => numbers::plain(o.rows()[i].2.value),
                         Err(_) => "not convertible".to_owned(),
                     };
-                    rows.add_row([name, &numbers::plain(truth[i]), &by_arx, &value, &error, unit]);
+                    rows.add_row([name, &numbers::plain(truth[i].2.value), &by_arx, &value, &error, unit]);
                 }
                 text.push_str(&format!("{rows}\n\n"));
             }
