@@ -134,13 +134,11 @@ impl Estimator {
         };
         let mut best: Option<(String, Minimum)> = None;
         for (label, theta) in candidates {
-            let Some(minimum) = minimise(criterion, theta, &self.search, &mut workspace) else {
+            let known = best.as_ref().map(|(_, b): &(String, Minimum)| b.at.sum_of_squares);
+            let Some(minimum) = minimise(criterion, theta, &self.search, known, &mut workspace) else {
                 continue;
             };
-            let better = best
-                .as_ref()
-                .is_none_or(|(_, b)| minimum.at.sum_of_squares < b.at.sum_of_squares);
-            if better {
+            if known.is_none_or(|known| minimum.at.sum_of_squares < known) {
                 best = Some((label, minimum));
             }
         }

@@ -10,7 +10,7 @@ use hoid_model::{
 
 use crate::{
     IdentError, InitialState, Termination,
-    prediction_error::{Criterion, Data, first_residual},
+    prediction_error::{Criterion, Data, Workspace, first_residual},
 };
 
 /// A fitted model.
@@ -222,7 +222,7 @@ impl Fit {
         };
         Ok(Series {
             first,
-            values: criterion.residuals_of(theta, data),
+            values: criterion.residuals_of(theta, data, &mut Workspace::default()),
         })
     }
 

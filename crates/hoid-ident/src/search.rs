@@ -85,11 +85,13 @@ pub(crate) struct Minimum {
     pub termination: Termination,
 }
 
-/// Searches from `theta`. `None` when the start is unstable or its loss is not finite.
+/// Searches from `theta`. `None` when the start is unstable or its loss is not finite, or when the search comes close to
+/// `rival`, the sum of squares of a minimum that is known already, and promises to end no lower.
 pub(crate) fn minimise(
     criterion: &Criterion<'_>,
     mut theta: Vec<f64>,
     options: &SearchOptions,
+    rival: Option<f64>,
     workspace: &mut Workspace,
 ) -> Option<Minimum> {
     if !criterion.is_feasible(&theta) {
@@ -107,7 +109,14 @@ pub(crate) fn minimise(
         if at.sum_of_squares <= 1e-26 * power {
             break Reason::ExactFit;
         }
-        if let Some((step, promised)) = damped_step(&at, 0.0)
+        let undamped = damped_step(&at, 0.0);
+        if let (Some(rival), Some((_, promised))) = (rival, &undamped) {
+            let close = at.sum_of_squares < rival * (1.0 + 1e-3);
+            if close && at.sum_of_squares - promised > rival * (1.0 - 1e-7) {
+                return None;
+            }
+        }
+        if let Some((step, promised)) = undamped
             && promised <= options.tolerance * at.sum_of_squares
         {
             let last: Vec<f64> = theta.iter().zip(&step).map(|(t, s)| t + s).collect();
@@ -130,10 +139,11 @@ pub(crate) fn minimise(
             if let Some((step, promised)) = damped_step(&at, mu) {
                 let trial: Vec<f64> = theta.iter().zip(&step).map(|(t, s)| t + s).collect();
                 if criterion.is_feasible(&trial) {
-                    let value = criterion.sum_of_squares(&trial, workspace);
-                    let ratio = (at.sum_of_squares - value) / promised;
-                    if value.is_finite() && value < at.sum_of_squares {
-                        break Some((trial, ratio));
+                    // Most trials are accepted: derivatives at once cost less than a second pass.
+                    let there = criterion.linearise(&trial, workspace);
+                    if there.sum_of_squares.is_finite() && there.sum_of_squares < at.sum_of_squares {
+                        let ratio = (at.sum_of_squares - there.sum_of_squares) / promised;
+                        break Some((trial, there, ratio));
                     }
                 }
             }
@@ -142,9 +152,8 @@ pub(crate) fn minimise(
         };
         match accepted {
             None => break Reason::NoDescent,
-            Some((trial, ratio)) => {
-                theta = trial;
-                at = criterion.linearise(&theta, workspace);
+            Some((trial, there, ratio)) => {
+                (theta, at) = (trial, there);
                 mu *= (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(1.0 / 3.0, 2.0);
                 mu = mu.max(1e-12);
                 growth = 2.0;
@@ -219,6 +228,7 @@ mod tests {
             &criterion,
             start.to_vec(),
             &SearchOptions::default(),
+            None,
             &mut Workspace::default(),
         )
     }
@@ -265,6 +275,7 @@ mod tests {
             &criterion,
             vec![0.1, 0.1, 0.0, -1.0, 0.3],
             &limited,
+            None,
             &mut Workspace::default(),
         )
         .unwrap();

@@ -7,7 +7,7 @@
 //!    alone.
 //! 2. `steiglitz-mcbride`: ARX again on input and output filtered by 1/F of the step before, a few times (K. Steiglitz and
 //!    L. E. McBride, *IEEE Trans. Automatic Control* 10 (1965) 461-464).
-//! 3. `pole grid`: for two poles and more, neuromuscular frequencies from 3 to 24 rad/s with damping 0.15 to 1, as people
+//! 3. `pole grid`: for two poles and more, neuromuscular frequencies from 3 to 24 rad/s with damping 0.25 and 0.7, as people
 //!    have them, through the exact zero-order hold.
 //!
 //! The proposals are ranked by their loss with the initial states eliminated; the search runs from the best of them, and the
@@ -32,7 +32,7 @@ pub(crate) struct Start {
 /// Neuromuscular frequencies of the pole grid, rad/s.
 const GRID_OMEGA: [f64; 4] = [3.0, 6.0, 12.0, 24.0];
 /// Damping ratios of the pole grid.
-const GRID_ZETA: [f64; 3] = [0.15, 0.4, 1.0];
+const GRID_ZETA: [f64; 2] = [0.25, 0.7];
 /// Further poles of the grid for nf > 2: fast ones, which matter least.
 const EXTRA_POLE: f64 = 0.3;
 
@@ -175,7 +175,7 @@ fn complete(criterion: &Criterion<'_>, f: &[f64], workspace: &mut Workspace) -> 
         let left: Vec<Vec<f64>> = output_error
             .data
             .iter()
-            .map(|data| output_error.residuals_of(&theta, *data))
+            .map(|data| output_error.residuals_of(&theta, *data, workspace))
             .collect();
         noise_model(&left, o.nc, o.nd)
     };
