@@ -116,6 +116,9 @@ fn arx_poles(criterion: &Criterion<'_>, data: &[Data<'_>]) -> Option<Vec<f64>> {
         ..Orders::default()
     };
     let first = criterion.first.max(first_residual(&orders, InitialState::Estimate));
+    if data.iter().any(|d| d.u.len() <= first) {
+        return None;
+    }
     let fitted = arx::regress(&orders, data, first).ok()?;
     reflected_inside(&fitted.theta[..orders.na])
 }

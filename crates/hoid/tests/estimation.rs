@@ -230,6 +230,50 @@ fn one_sample_too_few_is_told() {
 }
 
 #[test]
+fn no_length_and_no_order_makes_it_panic() {
+    let whole = runs(Condition::C1, 1).remove(0);
+    let mut fitted = 0;
+    for samples in [1, 2, 3, 5, 8, 13, 30, 31, 32, 33, 40, 60, 120] {
+        let record = [whole.span(0.0, 0.01 * f64::from(samples)).unwrap()];
+        for structure in [Structure::Arx, Structure::BoxJenkins] {
+            for initial_state in [InitialState::Zero, InitialState::Estimate] {
+                for nk in [0, 1, 28, 29, 31, 45, 1000] {
+                    for (nc, nd, nf) in [(0, 1, 2), (2, 3, 2), (1, 0, 1), (0, 0, 0), (0, 6, 5)] {
+                        let bj = structure == Structure::BoxJenkins;
+                        let orders = if bj {
+                            Orders {
+                                na: 0,
+                                nb: 2,
+                                nc,
+                                nd,
+                                nf,
+                                nk,
+                            }
+                        } else {
+                            Orders {
+                                na: nf,
+                                nb: 1 + nd,
+                                nk,
+                                ..Orders::default()
+                            }
+                        };
+                        let estimator = Estimator {
+                            initial_state,
+                            ..Estimator::new(structure, orders)
+                        };
+                        if let Ok(fit) = estimator.fit(&record) {
+                            assert!(fit.loss().is_finite() && fit.model().theta().iter().all(|t| t.is_finite()));
+                            fitted += 1;
+                        }
+                    }
+                }
+            }
+        }
+    }
+    assert!(fitted > 100, "{fitted}");
+}
+
+#[test]
 fn a_search_that_is_cut_off_says_so() {
     let record = runs(Condition::C1, 1);
     let mut cut = bj();
