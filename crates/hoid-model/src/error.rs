@@ -134,7 +134,7 @@ pub enum NotConvertible {
     },
     /// `omega_nm^2` would not be positive.
     #[error(
-        "the continuous denominator s^2 + {a1:.4} s + {a2:.4} has no positive omega_nm^2: the poles are real and lie on both sides of (or at) the origin of s"
+        "the continuous denominator s^2 + {a1:.4} s + {a2:.3e} has no positive omega_nm^2: the poles are real and lie on both sides of (or at) the origin of s"
     )]
     NoNaturalFrequency {
         /// Coefficient of s.
