@@ -311,7 +311,7 @@ impl<'a> Characteristic<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{DiscreteTransferFunction, OperatorParameters, SampleTime};
+    use crate::{DiscreteTransferFunction, SampleTime, scenario::OperatingState};
 
     fn tf(num: &[f64], den: &[f64]) -> ContinuousTransferFunction {
         ContinuousTransferFunction::new(num, den).unwrap()
@@ -325,26 +325,17 @@ mod tests {
         h.series(&tf(&[gain], &[1.0]))
     }
 
-    fn state(k_e: f64, t_l_s: f64, k_c: f64, omega_b: f64) -> ContinuousTransferFunction {
-        let operator = OperatorParameters {
-            k_e,
-            t_l_s,
-            omega_nm_rad_s: 11.25,
-            zeta_nm: 0.35,
-            tau_e_s: 0.28,
-        };
-        operator
-            .transfer_function()
-            .unwrap()
-            .series(&tf(&[k_c], &[1.0, omega_b, 0.0]))
+    fn open_loop(state: OperatingState) -> ContinuousTransferFunction {
+        let element = state.controlled_element.transfer_function().unwrap();
+        state.operator.transfer_function().unwrap().series(&element)
     }
 
     fn s1() -> ContinuousTransferFunction {
-        state(0.09, 0.4, 90.0, 6.0)
+        open_loop(OperatingState::s1())
     }
 
     fn s2() -> ContinuousTransferFunction {
-        state(0.07, 1.2, 30.0, 0.2)
+        open_loop(OperatingState::s2())
     }
 
     fn continuous(h: &ContinuousTransferFunction) -> Margins {

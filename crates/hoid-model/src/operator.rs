@@ -239,27 +239,18 @@ fn scaled_hyperbolics(h: f64, x: f64) -> (f64, f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenario::OperatingState;
 
     fn ts() -> SampleTime {
         SampleTime::new(0.01).unwrap()
     }
 
     fn s1() -> OperatorParameters {
-        OperatorParameters {
-            k_e: 0.09,
-            t_l_s: 0.4,
-            omega_nm_rad_s: 11.25,
-            zeta_nm: 0.35,
-            tau_e_s: 0.28,
-        }
+        OperatingState::s1().operator
     }
 
     fn s2() -> OperatorParameters {
-        OperatorParameters {
-            k_e: 0.07,
-            t_l_s: 1.2,
-            ..s1()
-        }
+        OperatingState::s2().operator
     }
 
     fn others() -> Vec<OperatorParameters> {

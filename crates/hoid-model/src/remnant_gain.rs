@@ -289,7 +289,7 @@ fn integrate(f: impl Fn(f64) -> f64, band: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::OperatorParameters;
+    use crate::{forcing::ForcingFunction, scenario::OperatingState};
 
     fn ts() -> SampleTime {
         SampleTime::new(0.01).unwrap()
@@ -297,32 +297,18 @@ mod tests {
 
     /// Table 1: amplitudes in deg, frequencies as multiples of 2 pi / 81.92 s.
     fn forcing() -> Vec<Line> {
-        let amplitudes = [1.186, 1.121, 0.991, 0.756, 0.447, 0.245, 0.123, 0.061, 0.036, 0.025];
-        let multiples = [3.0, 5.0, 8.0, 13.0, 22.0, 34.0, 53.0, 86.0, 139.0, 229.0];
-        let line = |(amplitude, n)| Line {
-            amplitude,
-            omega_rad_s: n * std::f64::consts::TAU / 81.92,
-        };
-        amplitudes.into_iter().zip(multiples).map(line).collect()
+        ForcingFunction::reference().lines()
     }
 
     fn tf(num: &[f64], den: &[f64]) -> ContinuousTransferFunction {
         ContinuousTransferFunction::new(num, den).unwrap()
     }
 
-    fn state(k_e: f64, t_l_s: f64, k_c: f64, omega_b: f64) -> (ContinuousTransferFunction, ContinuousTransferFunction) {
-        let operator = OperatorParameters {
-            k_e,
-            t_l_s,
-            omega_nm_rad_s: 11.25,
-            zeta_nm: 0.35,
-            tau_e_s: 0.28,
-        };
-        (operator.transfer_function().unwrap(), tf(&[k_c], &[1.0, omega_b, 0.0]))
-    }
-
     fn states() -> [(ContinuousTransferFunction, ContinuousTransferFunction); 2] {
-        [state(0.09, 0.4, 90.0, 6.0), state(0.07, 1.2, 30.0, 0.2)]
+        [OperatingState::s1(), OperatingState::s2()].map(|state| {
+            let element = state.controlled_element.transfer_function();
+            (state.operator.transfer_function().unwrap(), element.unwrap())
+        })
     }
 
     fn gain(level: f64, definition: NoiseDefinition, order: usize, state: usize) -> Result<f64, ModelError> {
@@ -413,7 +399,7 @@ mod tests {
     #[test]
     fn without_feedback_both_definitions_follow_from_variances() {
         // No controlled element: u = H_HO f_t + n, so that var(u_n) = var(n) and both definitions are one.
-        let (operator, _) = state(0.09, 0.4, 90.0, 6.0);
+        let [(operator, _), _] = states();
         let none = tf(&[0.0], &[1.0, 1.0]);
         let line = [Line {
             amplitude: 2.0,
@@ -431,7 +417,7 @@ mod tests {
     fn sharp_peaks_are_integrated() {
         // Just below the gain that makes the loop unstable the integrand has a peak of relative width 1e-6: V_u is its
         // residue, which grows as the inverse of the distance.
-        let (operator, element) = state(0.09, 0.4, 90.0, 6.0);
+        let [(operator, element), _] = states();
         let margin = crate::margins::margins(|w| operator.series(&element).response(w), (0.1, 100.0));
         let limit = 10f64.powf(margin.gain_margin_db.unwrap() / 20.0);
         let at = |distance: f64| {
@@ -455,7 +441,7 @@ mod tests {
 
     #[test]
     fn what_has_no_gain_is_refused() {
-        let (operator, element) = state(0.09, 0.4, 90.0, 6.0);
+        let [(operator, element), _] = states();
         let call = |level, definition, order, time, lines: &[Line]| {
             remnant_gain(level, definition, order, time, &operator, &element, lines, ts())
         };

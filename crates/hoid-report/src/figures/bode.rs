@@ -244,6 +244,8 @@ fn band(omega: &[f64], curve: &[(f64, Option<f64>)], (low, high): (f64, f64), co
 
 #[cfg(test)]
 mod tests {
+    use hoid_model::scenario::OperatingState;
+
     use super::*;
 
     #[test]
@@ -263,13 +265,7 @@ mod tests {
     #[test]
     fn the_truth_behind_its_hold_is_the_continuous_operator_at_low_frequency() {
         let truth = TrueResponse {
-            operator: OperatorParameters {
-                k_e: 0.09,
-                t_l_s: 0.4,
-                omega_nm_rad_s: 11.25,
-                zeta_nm: 0.35,
-                tau_e_s: 0.28,
-            },
+            operator: OperatingState::s1().operator,
             sample_time: SampleTime::HUNDREDTH,
         };
         let curve = Curve::of_truth(&truth, &[0.01, 5.0]);
