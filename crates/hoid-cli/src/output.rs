@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 
+use indicatif::{ProgressBar, ProgressStyle};
+
 /// Writes a result to standard output.
 pub fn print(text: &str) {
     let mut out = io::stdout().lock();
@@ -16,4 +18,14 @@ pub fn print(text: &str) {
 pub fn complain(text: &str) {
     // When even standard error is closed there is no one to tell.
     let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
+/// A progress bar on standard error with rate and time left; invisible where standard error is no terminal.
+pub fn progress(total: usize) -> ProgressBar {
+    let bar = ProgressBar::new(total as u64);
+    // The template is a constant; should it be wrong, the plain bar does as well.
+    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} candidates, {per_sec}, {eta} left") {
+        bar.set_style(style);
+    }
+    bar
 }

@@ -168,6 +168,20 @@ pub fn choose_orders(
     criterion: Criterion,
     records: &[Record],
 ) -> Result<Choice, IdentError> {
+    choose_orders_with(template, ranges, criterion, records, &|| {})
+}
+
+/// As [`choose_orders`], calling `each` after every candidate, from any thread, so that a long search can show how far it is.
+///
+/// # Errors
+/// As [`choose_orders`].
+pub fn choose_orders_with(
+    template: &Estimator,
+    ranges: &OrderRanges,
+    criterion: Criterion,
+    records: &[Record],
+    each: &(dyn Fn() + Sync),
+) -> Result<Choice, IdentError> {
     let combinations = ranges.combinations()?;
     for orders in &combinations {
         orders.check(template.structure)?;
@@ -189,17 +203,21 @@ pub fn choose_orders(
     // Collected by index: the table does not depend on the number of threads.
     let candidates: Vec<Candidate> = combinations
         .into_par_iter()
-        .map(|orders| Candidate {
-            orders,
-            outcome: quick
-                .with_orders(orders)
-                .fit_from(records, first)
-                .map(|fit| CandidateFigures {
-                    loss: fit.loss(),
-                    aic: fit.aic(),
-                    bic: fit.bic(),
-                    converged: fit.termination().converged(),
-                }),
+        .map(|orders| {
+            let candidate = Candidate {
+                orders,
+                outcome: quick
+                    .with_orders(orders)
+                    .fit_from(records, first)
+                    .map(|fit| CandidateFigures {
+                        loss: fit.loss(),
+                        aic: fit.aic(),
+                        bic: fit.bic(),
+                        converged: fit.termination().converged(),
+                    }),
+            };
+            each();
+            candidate
         })
         .collect();
     let best = candidates

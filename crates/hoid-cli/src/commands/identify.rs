@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use hoid_ident::{
-    Choice, Estimator, Fit, SearchOptions, choose_orders,
-    order_search::{Criterion, OrderRanges},
+    Choice, Estimator, Fit, SearchOptions,
+    order_search::{Criterion, OrderRanges, choose_orders_with},
 };
 use hoid_io::{ReadOptions, Repair, make_directory, read_record, write_atomically};
 use hoid_model::{
@@ -143,7 +143,12 @@ fn fit(
                 .to_owned(),
         ));
     }
-    let choice = choose_orders(&estimator, ranges, Criterion::from(args.criterion), records)?;
+    let bar = output::progress(combinations.len());
+    let choice = choose_orders_with(&estimator, ranges, Criterion::from(args.criterion), records, &|| {
+        bar.inc(1)
+    });
+    bar.finish_and_clear();
+    let choice = choice?;
     Ok((choice.fit.clone(), Some(choice)))
 }
 
