@@ -13,6 +13,16 @@ pub enum IdentError {
     /// No record at all.
     #[error("no record was given; a fit needs at least one")]
     NoRecords,
+    /// A structure with an input, and a record without one.
+    #[error(
+        "{structure} describes how an output follows an input, but record {label} has no input; give one, or take ar, ma or arma"
+    )]
+    NoInput {
+        /// The structure.
+        structure: String,
+        /// The record.
+        label: String,
+    },
     /// Records that were sampled differently cannot share a discrete model.
     #[error(
         "record {label} has the sample time {found} s, the first record {expected} s; resample one of them, or fit them separately"

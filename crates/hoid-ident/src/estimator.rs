@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 use crate::{
     Fit, IdentError, InitialState, Reason, SearchOptions, Termination, arx,
     prediction_error::{Criterion, Data, Workspace, first_residual},
-    search::{Minimum, minimise},
+    search::{Minimum, Objective, minimise},
     starts,
 };
 
@@ -56,9 +56,10 @@ impl Estimator {
     /// The rule for initial states that this structure follows: the regression of ARX is conditional on the first samples
     /// (eq. 5.33) under either rule, it needs no states.
     pub(crate) fn initial_state_in_use(&self) -> InitialState {
-        match self.structure {
-            Structure::Arx => InitialState::Estimate,
-            _ => self.initial_state,
+        if self.structure.is_linear() {
+            InitialState::Estimate
+        } else {
+            self.initial_state
         }
     }
 
@@ -96,9 +97,10 @@ impl Estimator {
             first,
         };
         self.check_degrees_of_freedom(&criterion, records)?;
-        match self.structure {
-            Structure::Arx => self.fit_linear(&criterion, sample_time),
-            _ => self.fit_iteratively(&criterion, sample_time),
+        if self.structure.is_linear() {
+            self.fit_linear(&criterion, sample_time)
+        } else {
+            self.fit_iteratively(&criterion, sample_time)
         }
     }
 
@@ -188,7 +190,14 @@ impl Estimator {
 
     fn check_record(&self, record: &Record, first: usize) -> Result<(), IdentError> {
         let label = || record.label().to_owned();
-        for channel in [record.input_channel(), record.output_channel()] {
+        if self.structure.has_input() && record.input_channel().is_none() {
+            return Err(IdentError::NoInput {
+                structure: self.structure.to_string(),
+                label: label(),
+            });
+        }
+        let input = record.input_channel().filter(|_| self.structure.has_input());
+        for channel in input.into_iter().chain([record.output_channel()]) {
             let value = channel.values[0];
             if channel.values.iter().all(|v| *v == value) {
                 return Err(IdentError::NoExcitation {

@@ -182,11 +182,18 @@ impl Fit {
     }
 
     /// Simulated output: the response of `B/(A F)` to the input alone, without noise model. Where the fit estimated initial
-    /// states, those of the simulation are estimated too (least squares of the simulation error).
+    /// states, those of the simulation are estimated too (least squares of the simulation error). A model without an input
+    /// has nothing to simulate: zero.
     ///
     /// # Errors
     /// As [`Fit::residuals`].
     pub fn simulate(&self, record: &Record) -> Result<Series, IdentError> {
+        if !self.model.structure().has_input() {
+            return Ok(Series {
+                first: 0,
+                values: vec![0.0; record.len()],
+            });
+        }
         let (orders, theta) = output_error_form(&self.model);
         Ok(output_less(record, self.errors_of(orders, &theta, record)?))
     }

@@ -31,6 +31,7 @@ use hoid_model::Orders;
 use crate::{
     initial_states::FreeResponses,
     least_squares::{add_scaled, dot, solve_symmetric},
+    search::Objective,
 };
 
 /// What is assumed about the time before a record.
@@ -121,12 +122,6 @@ impl Criterion<'_> {
         }
     }
 
-    /// True when the predictor is stable: roots of C and F inside the unit circle.
-    pub fn is_feasible(&self, theta: &[f64]) -> bool {
-        let parts = Parts::split(&self.orders, theta);
-        theta.iter().all(|v| v.is_finite()) && roots_inside(parts.f, 1.0) && roots_inside(parts.c, 1.0)
-    }
-
     /// Sum of squared residuals, without derivatives.
     #[cfg(test)]
     pub fn sum_of_squares(&self, theta: &[f64], workspace: &mut Workspace) -> f64 {
@@ -140,44 +135,29 @@ impl Criterion<'_> {
             .sum()
     }
 
-    /// Sum of squares with its derivatives.
-    pub fn linearise(&self, theta: &[f64], workspace: &mut Workspace) -> Linearisation {
-        let p = theta.len();
-        let mut total = Linearisation {
-            sum_of_squares: 0.0,
-            descent: vec![0.0; p],
-            gram: vec![0.0; p * p],
-        };
-        for data in &self.data {
-            let free = self.residual_pass(theta, *data, workspace);
-            self.gradient_pass(theta, *data, workspace);
-            let columns = self.columns(data.u.len(), workspace, &Block::ALL);
-            self.accumulate(&free, &columns, data.u.len(), workspace, &mut total);
-        }
-        total
-    }
-
-    /// B of least squares for the other coefficients of theta, in one step because the residual is affine in B, and the sum of
-    /// squares there. `None` when the regressors are singular or the loss is not finite.
-    pub fn best_gains(&self, theta: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, f64)> {
-        let (at, nb) = (self.orders.na, self.orders.nb);
+    /// A and B of least squares for the other coefficients of theta, in one step because the residual is affine in them, and
+    /// the sum of squares there. `None` when the regressors are singular or the loss is not finite.
+    pub fn best_linear_part(&self, theta: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, f64)> {
+        let linear = self.orders.na + self.orders.nb;
         let mut theta = theta.to_vec();
-        theta[at..at + nb].fill(0.0);
+        theta[..linear].fill(0.0);
         let mut total = Linearisation {
             sum_of_squares: 0.0,
-            descent: vec![0.0; nb],
-            gram: vec![0.0; nb * nb],
+            descent: vec![0.0; linear],
+            gram: vec![0.0; linear * linear],
         };
         for data in &self.data {
             let free = self.residual_pass(&theta, *data, workspace);
-            self.filter_input(&Parts::split(&self.orders, &theta), *data, workspace);
-            let columns = self.columns(data.u.len(), workspace, &[Block::B]);
+            let parts = Parts::split(&self.orders, &theta);
+            self.filter_output(&parts, *data, workspace);
+            self.filter_input(&parts, *data, workspace);
+            let columns = self.columns(data.u.len(), workspace, &[Block::A, Block::B]);
             self.accumulate(&free, &columns, data.u.len(), workspace, &mut total);
         }
-        let b = solve_symmetric(&total.gram, &total.descent)?;
-        let gained = dot(&b, &total.descent);
+        let best = solve_symmetric(&total.gram, &total.descent)?;
+        let gained = dot(&best, &total.descent);
         let value = total.sum_of_squares - gained;
-        value.is_finite().then_some((b, value))
+        value.is_finite().then_some((best, value))
     }
 
     /// Residuals of one record, from [`Criterion::first`] on.
@@ -251,13 +231,9 @@ impl Criterion<'_> {
         let parts = Parts::split(&self.orders, theta);
         let (o, pad) = (&self.orders, ws.pad);
         let regressed = self.first_regressed();
+        self.filter_output(&parts, data, ws);
         self.filter_input(&parts, data, ws);
-        let [xa, _, xc, xd, xf] = &mut ws.filtered;
-        if o.na > 0 {
-            ws.scratch[..pad].fill(0.0);
-            ws.scratch[pad..].copy_from_slice(data.u);
-            whiten(parts.c, parts.d, &ws.scratch, xa, pad);
-        }
+        let [_, _, xc, xd, xf] = &mut ws.filtered;
         if o.nc > 0 {
             xc.copy_from_slice(&ws.eps);
             divide_in_place(parts.c, &mut xc[pad..]);
@@ -271,6 +247,17 @@ impl Criterion<'_> {
             divide_in_place(parts.f, &mut ws.scratch[pad + regressed..]);
             whiten(parts.c, parts.d, &ws.scratch, xf, pad + regressed);
         }
+    }
+
+    /// `(D/C) u`.
+    fn filter_output(&self, parts: &Parts<'_>, data: Data<'_>, ws: &mut Workspace) {
+        if self.orders.na == 0 {
+            return;
+        }
+        let pad = ws.pad;
+        ws.scratch[..pad].fill(0.0);
+        ws.scratch[pad..].copy_from_slice(data.u);
+        whiten(parts.c, parts.d, &ws.scratch, &mut ws.filtered[Block::A as usize], pad);
     }
 
     /// `(D/(C F)) e(t-nk)`.
@@ -337,6 +324,34 @@ impl Criterion<'_> {
                 }
             }
         }
+    }
+}
+
+impl Objective for Criterion<'_> {
+    /// Roots of C and F inside the unit circle.
+    fn is_feasible(&self, theta: &[f64]) -> bool {
+        let parts = Parts::split(&self.orders, theta);
+        theta.iter().all(|v| v.is_finite()) && roots_inside(parts.f, 1.0) && roots_inside(parts.c, 1.0)
+    }
+
+    fn linearise(&self, theta: &[f64], workspace: &mut Workspace) -> Linearisation {
+        let p = theta.len();
+        let mut total = Linearisation {
+            sum_of_squares: 0.0,
+            descent: vec![0.0; p],
+            gram: vec![0.0; p * p],
+        };
+        for data in &self.data {
+            let free = self.residual_pass(theta, *data, workspace);
+            self.gradient_pass(theta, *data, workspace);
+            let columns = self.columns(data.u.len(), workspace, &Block::ALL);
+            self.accumulate(&free, &columns, data.u.len(), workspace, &mut total);
+        }
+        total
+    }
+
+    fn output_power(&self) -> f64 {
+        self.data.iter().map(|d| dot(d.u, d.u)).sum()
     }
 }
 

@@ -12,8 +12,22 @@ use std::fmt;
 
 use crate::{
     least_squares::{dot, solve_symmetric},
-    prediction_error::{Criterion, Linearisation, Workspace},
+    prediction_error::{Linearisation, Workspace},
 };
+
+/// A sum of squares over theta with its derivatives: what the search needs to know of a model.
+pub(crate) trait Objective {
+    /// True where the predictor exists: finite theta, stable polynomials.
+    fn is_feasible(&self, theta: &[f64]) -> bool;
+    /// Sum of squares, `psi' eps` and `psi' psi` at a feasible theta.
+    fn linearise(&self, theta: &[f64], workspace: &mut Workspace) -> Linearisation;
+    /// Sum of squares of the output, against which residuals count as zero.
+    fn output_power(&self) -> f64;
+    /// Lower and upper bound of each parameter; equal bounds fix it. By default there are none.
+    fn limits(&self) -> Option<&[(f64, f64)]> {
+        None
+    }
+}
 
 /// Limits of the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,7 +102,7 @@ pub(crate) struct Minimum {
 /// Searches from `theta`. `None` when the start is unstable or its loss is not finite, or when the search comes close to
 /// `rival`, the sum of squares of a minimum that is known already, and promises to end no lower.
 pub(crate) fn minimise(
-    criterion: &Criterion<'_>,
+    criterion: &impl Objective,
     mut theta: Vec<f64>,
     options: &SearchOptions,
     rival: Option<f64>,
@@ -97,7 +111,7 @@ pub(crate) fn minimise(
     if !criterion.is_feasible(&theta) {
         return None;
     }
-    let power: f64 = criterion.data.iter().flat_map(|d| d.u).map(|u| u * u).sum();
+    let power = criterion.output_power();
     let mut at = criterion.linearise(&theta, workspace);
     let (mut mu, mut growth) = (1e-3, 2.0);
     let mut iterations = 0;
@@ -187,7 +201,7 @@ mod tests {
     use hoid_model::Orders;
 
     use super::*;
-    use crate::prediction_error::{Data, InitialState, first_residual};
+    use crate::prediction_error::{Criterion, Data, InitialState, first_residual};
 
     fn signals(n: usize, noise: f64) -> (Vec<f64>, Vec<f64>) {
         let mut state = 99_u64;

@@ -20,6 +20,7 @@ use crate::{
     arx,
     least_squares::{dot, solve_symmetric},
     prediction_error::{Criterion, Data, InitialState, Workspace, first_residual},
+    search::Objective,
 };
 
 /// A start of the search, with its name.
@@ -55,7 +56,7 @@ pub(crate) fn propose(criterion: &Criterion<'_>, sample_time: SampleTime, worksp
         .filter_map(|(label, f)| {
             let mut theta = reference.clone();
             theta[o.parameters() - o.nf..].copy_from_slice(&f);
-            let (_, value) = criterion.best_gains(&theta, workspace)?;
+            let (_, value) = criterion.best_linear_part(&theta, workspace)?;
             Some((label, f, value))
         })
         .collect();
@@ -160,35 +161,60 @@ fn reflected_inside(coefficients: &[f64]) -> Option<Vec<f64>> {
     roots_inside(&inside, 1.0).then_some(inside)
 }
 
-/// Theta and sum of squares for a given F: B by least squares, the noise model by autoregression of what is left, and B once
-/// more with that noise model.
+/// Theta and sum of squares for a given F: A and B by least squares, the noise model by autoregression of what is left, and A
+/// and B once more with that noise model. With A in the model that is repeated: A and the noise model depend on each other
+/// (generalised least squares; D. W. Clarke, *IFAC Symposium on Identification*, Prague 1967).
 fn complete(criterion: &Criterion<'_>, f: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, f64)> {
     let o = criterion.orders;
-    let output_error = Criterion {
+    if o.nb == 0 {
+        return time_series(criterion, workspace);
+    }
+    let linear = o.na + o.nb;
+    let white = Criterion {
         orders: Orders { nc: 0, nd: 0, ..o },
         ..criterion.clone()
     };
-    let mut theta = vec![0.0; o.nb];
-    theta.extend_from_slice(f);
-    let (b, _) = output_error.best_gains(&theta, workspace)?;
-    theta[..o.nb].copy_from_slice(&b);
-    let (c, d) = if o.nc + o.nd == 0 {
-        (Vec::new(), Vec::new())
-    } else {
-        let left: Vec<Vec<f64>> = output_error
+    let mut start = vec![0.0; linear];
+    start.extend_from_slice(f);
+    let (mut best, mut value) = white.best_linear_part(&start, workspace)?;
+    if o.nc + o.nd == 0 {
+        best.extend_from_slice(f);
+        return Some((best, value));
+    }
+    let mut theta = Vec::new();
+    let rounds = if o.na == 0 { 1 } else { 4 };
+    for _ in 0..rounds {
+        start[..linear].copy_from_slice(&best);
+        let left: Vec<Vec<f64>> = white
             .data
             .iter()
-            .map(|data| output_error.residuals_of(&theta, *data, workspace))
+            .map(|data| white.residuals_of(&start, *data, workspace))
             .collect();
-        noise_model(&left, o.nc, o.nd)
-    };
-    let mut theta = b;
-    theta.extend(c);
-    theta.extend(d);
-    theta.extend_from_slice(f);
-    let (b, value) = criterion.best_gains(&theta, workspace)?;
-    theta[..o.nb].copy_from_slice(&b);
+        let (c, d) = noise_model(&left, o.nc, o.nd);
+        theta.clone_from(&best);
+        theta.extend(c);
+        theta.extend(d);
+        theta.extend_from_slice(f);
+        (best, value) = criterion.best_linear_part(&theta, workspace)?;
+        theta[..linear].copy_from_slice(&best);
+    }
     Some((theta, value))
+}
+
+/// Start of a model of the output alone, `u = C/(A D) eps`, by Hannan and Rissanen: A takes the autoregression where it is
+/// there, D starts at one.
+fn time_series(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Option<(Vec<f64>, f64)> {
+    let o = criterion.orders;
+    let outputs: Vec<Vec<f64>> = criterion.data.iter().map(|d| d.u.to_vec()).collect();
+    let (c, mut a) = noise_model(&outputs, o.nc, o.na);
+    if o.na > 0 {
+        a = reflected_inside(&a)?;
+    }
+    let mut theta = a;
+    theta.extend(c);
+    theta.resize(o.parameters(), 0.0);
+    let value = criterion.linearise(&theta, workspace).sum_of_squares;
+    value.is_finite().then_some((theta, value))
 }
 
 /// C and D of `v = (C/D) eps` by Hannan and Rissanen (*Biometrika* 69 (1982) 81-94): with nc = 0 one autoregression, else a long

@@ -55,7 +55,7 @@ pub struct Validation {
     pub quality: Quality,
     /// Residual autocorrelation, lags 1 to [`LARGEST_LAG`].
     pub autocorrelation: Correlation,
-    /// Cross-correlation of residuals and input, lags from minus to plus [`LARGEST_LAG`].
+    /// Cross-correlation of residuals and input, lags from minus to plus [`LARGEST_LAG`]; no lags without an input.
     pub cross_correlation: Correlation,
 }
 
@@ -70,7 +70,6 @@ impl Fit {
         let simulated = simulated.values[first - simulated.first..].to_vec();
         let predicted = predicted.values[first - predicted.first..].to_vec();
         let output = &record.output()[first..];
-        let input = &record.input()[first..];
         let residuals: Vec<f64> = output.iter().zip(&predicted).map(|(u, p)| u - p).collect();
         Ok(Validation {
             quality: Quality {
@@ -80,7 +79,14 @@ impl Fit {
                 nrmse_prediction: nrmse_fit(output, &predicted),
             },
             autocorrelation: autocorrelation(&residuals, LARGEST_LAG),
-            cross_correlation: cross_correlation(&residuals, input, LARGEST_LAG),
+            cross_correlation: match record.input().get(first..) {
+                Some(input) => cross_correlation(&residuals, input, LARGEST_LAG),
+                None => Correlation {
+                    lags: Vec::new(),
+                    values: Vec::new(),
+                    bound_99: 0.0,
+                },
+            },
             first,
             simulated,
             predicted,

@@ -195,8 +195,8 @@ fn expressions_choose_and_combine() {
     assert_eq!((record.input(), record.output()), (&[0.75, 1.5][..], &[-3.0, -4.0][..]));
     assert_eq!(
         (
-            record.input_channel().name.as_str(),
-            record.input_channel().unit.as_str()
+            record.input_channel().unwrap().name.as_str(),
+            record.input_channel().unwrap().unit.as_str()
         ),
         ("r-y", "deg")
     );

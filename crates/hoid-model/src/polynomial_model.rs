@@ -177,9 +177,14 @@ impl PolynomialModel {
         }
     }
 
-    /// The polynomial that holds the operator's poles: A of an ARX model, F of a Box-Jenkins model.
+    /// The polynomial that holds the operator's poles: A where there is no F (ARX and its kin), else F. Empty when the poles
+    /// are spread over both.
     fn operator_poles(&self) -> &[f64] {
-        if self.orders.nf == 0 { self.a() } else { self.f() }
+        match (self.orders.na, self.orders.nf) {
+            (_, 0) => self.a(),
+            (0, _) => self.f(),
+            _ => &[],
+        }
     }
 
     /// Positions of `[b0, b1, f1, f2]` (or a1, a2) in theta, for models that [`PolynomialModel::discrete_operator`] takes.

@@ -46,7 +46,7 @@ pub struct Record {
     label: String,
     sample_time: SampleTime,
     start_s: f64,
-    input: Channel,
+    input: Option<Channel>,
     output: Channel,
     others: Vec<Channel>,
 }
@@ -55,24 +55,38 @@ impl Record {
     /// A record of the input (tracking error) and the output (control), both with one value a sample.
     ///
     /// # Errors
-    /// [`ModelError::EmptyRecord`], [`ModelError::LengthMismatch`], [`ModelError::NotFinite`].
+    /// [`ModelError::EmptyRecord`], [`ModelError::LengthMismatch`], [`ModelError::NotFinite`],
+    /// [`ModelError::DuplicateChannel`].
     pub fn new(sample_time: SampleTime, input: Channel, output: Channel) -> Result<Self, ModelError> {
-        if input.values.is_empty() {
+        // The input gives the length that the output is held to.
+        let record = Self::of_output(sample_time, input)?;
+        record.check(&output)?;
+        Ok(Self {
+            input: Some(record.output),
+            output,
+            ..record
+        })
+    }
+
+    /// A record of an output alone, for the structures that have no input (AR, MA, ARMA).
+    ///
+    /// # Errors
+    /// [`ModelError::EmptyRecord`], [`ModelError::NotFinite`].
+    pub fn of_output(sample_time: SampleTime, output: Channel) -> Result<Self, ModelError> {
+        if output.values.is_empty() {
             return Err(ModelError::EmptyRecord {
                 label: String::from("(unnamed)"),
             });
         }
-        check_finite(&input)?;
-        let record = Self {
+        check_finite(&output)?;
+        Ok(Self {
             label: String::new(),
             sample_time,
             start_s: 0.0,
-            input,
-            output: Channel::new("", "", Vec::new()),
+            input: None,
+            output,
             others: Vec::new(),
-        };
-        record.check(&output)?;
-        Ok(Self { output, ..record })
+        })
     }
 
     /// The same record with a name for messages and reports.
@@ -108,7 +122,7 @@ impl Record {
                 channel: channel.name.clone(),
                 found: channel.values.len(),
                 expected: self.len(),
-                reference: self.input.name.clone(),
+                reference: self.input.as_ref().unwrap_or(&self.output).name.clone(),
             });
         }
         check_finite(channel)
@@ -126,12 +140,12 @@ impl Record {
 
     /// Number of samples.
     pub fn len(&self) -> usize {
-        self.input.values.len()
+        self.output.values.len()
     }
 
     /// Never true: a record without samples cannot be made.
     pub fn is_empty(&self) -> bool {
-        self.input.values.is_empty()
+        self.output.values.is_empty()
     }
 
     /// Time of sample `k` in s.
@@ -145,9 +159,9 @@ impl Record {
         (0..self.len()).map(|k| self.time_s(k)).collect()
     }
 
-    /// Input e, one value a sample.
+    /// Input e, one value a sample; empty for a record of an output alone.
     pub fn input(&self) -> &[f64] {
-        &self.input.values
+        self.input.as_ref().map_or(&[], |c| &c.values)
     }
 
     /// Output u, one value a sample.
@@ -155,9 +169,9 @@ impl Record {
         &self.output.values
     }
 
-    /// The input with its name and unit.
-    pub fn input_channel(&self) -> &Channel {
-        &self.input
+    /// The input with its name and unit; `None` for a record of an output alone.
+    pub fn input_channel(&self) -> Option<&Channel> {
+        self.input.as_ref()
     }
 
     /// The output with its name and unit.
@@ -167,7 +181,7 @@ impl Record {
 
     /// All channels: input, output, then the others in the order in which they were added.
     pub fn channels(&self) -> impl Iterator<Item = &Channel> {
-        [&self.input, &self.output].into_iter().chain(&self.others)
+        self.input.iter().chain([&self.output]).chain(&self.others)
     }
 
     /// The values of a channel by its name.
@@ -197,7 +211,7 @@ impl Record {
             label: self.label.clone(),
             sample_time: self.sample_time,
             start_s: self.time_s(first),
-            input: cut(&self.input),
+            input: self.input.as_ref().map(cut),
             output: cut(&self.output),
             others: self.others.iter().map(cut).collect(),
         })
@@ -205,7 +219,7 @@ impl Record {
 
     /// The same record with the mean or the line taken out of input and output; other channels stay as they are.
     pub fn detrended(mut self, how: Detrend) -> Self {
-        for channel in [&mut self.input, &mut self.output] {
+        for channel in self.input.iter_mut().chain([&mut self.output]) {
             take_out(how, &mut channel.values);
         }
         self
@@ -274,6 +288,18 @@ mod tests {
             Err(ModelError::DuplicateChannel { .. })
         ));
         assert!(good.with_channel(channel("x", &[0.0, f64::INFINITY])).is_err());
+    }
+
+    #[test]
+    fn an_output_alone_is_a_record_too() {
+        let ts = SampleTime::new(0.01).unwrap();
+        let alone = Record::of_output(ts, channel("u", &[1.0, 2.0, 3.0])).unwrap();
+        assert!(alone.input().is_empty() && alone.input_channel().is_none());
+        assert_eq!((alone.len(), alone.channels().count()), (3, 1));
+        let part = alone.clone().detrended(Detrend::Mean).span(0.01, 1.0).unwrap();
+        assert_eq!(part.output(), [0.0, 1.0]);
+        assert!(alone.with_channel(channel("x", &[1.0])).is_err());
+        assert!(Record::of_output(ts, channel("u", &[])).is_err());
     }
 
     #[test]

@@ -10,26 +10,80 @@ use hoid_core::stability::MAX_ORDER;
 
 use crate::ModelError;
 
-/// Which polynomials a model has.
+/// Which polynomials a model has (Table 5.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Structure {
+    /// `u = B q^-nk e + eps`: finite impulse response.
+    Fir,
+    /// `A u = eps`: autoregression of the output alone.
+    Ar,
+    /// `u = C eps`: moving average of the output alone.
+    Ma,
     /// `A u = B q^-nk e + eps`.
     Arx,
+    /// `A u = C eps`: the output alone.
+    Arma,
+    /// `A u = B q^-nk e + C eps`.
+    Armax,
+    /// `A u = B q^-nk e + (1/D) eps`.
+    Ararx,
+    /// `A u = B q^-nk e + (C/D) eps`.
+    Ararmax,
+    /// `u = (B/F) q^-nk e + eps`.
+    OutputError,
     /// `u = (B/F) q^-nk e + (C/D) eps`.
     BoxJenkins,
+    /// `A u = (B/F) q^-nk e + (C/D) eps`: all polynomials.
+    General,
 }
 
 impl Structure {
+    /// All structures, in the order of Table 5.1 and the general form behind them.
+    pub const ALL: [Self; 11] = [
+        Self::Fir,
+        Self::Ar,
+        Self::Ma,
+        Self::Arx,
+        Self::Arma,
+        Self::Armax,
+        Self::Ararx,
+        Self::Ararmax,
+        Self::OutputError,
+        Self::BoxJenkins,
+        Self::General,
+    ];
+
     /// The polynomials of the structure, in the order of theta.
     pub fn polynomials(self) -> &'static str {
         match self {
+            Self::Fir => "b",
+            Self::Ar => "a",
+            Self::Ma => "c",
             Self::Arx => "ab",
+            Self::Arma => "ac",
+            Self::Armax => "abc",
+            Self::Ararx => "abd",
+            Self::Ararmax => "abcd",
+            Self::OutputError => "bf",
             Self::BoxJenkins => "bcdf",
+            Self::General => "abcdf",
         }
     }
 
-    /// The structure of the human operator with n poles at its end: `ARX(na=2, nb=2)` or `BJ(nb=2, nc=0, nd=1, nf=2)`.
+    /// True when the structure describes how the output follows an input; AR, MA and ARMA describe the output alone.
+    pub fn has_input(self) -> bool {
+        self.polynomials().contains('b')
+    }
+
+    /// True when the residual is linear in theta, so that least squares gives the fit in one step: FIR, AR, ARX.
+    pub fn is_linear(self) -> bool {
+        matches!(self, Self::Fir | Self::Ar | Self::Arx)
+    }
+
+    /// The orders with which the structure comes nearest to the human operator (two poles, b0 and b1) with a remnant of
+    /// first order: `ARX(na=2, nb=2)`, `BJ(nb=2, nc=0, nd=1, nf=2)`. A structure without poles or input takes orders that
+    /// are usual for it.
     pub fn operator_orders(self, nk: usize) -> Orders {
         let base = Orders {
             nb: 2,
@@ -37,26 +91,59 @@ impl Structure {
             ..Orders::default()
         };
         match self {
+            // One time constant of the neuromuscular system at 100 Hz.
+            Self::Fir => Orders { nb: 20, ..base },
+            Self::Ar => Orders {
+                na: 2,
+                ..Orders::default()
+            },
+            Self::Ma => Orders {
+                nc: 2,
+                ..Orders::default()
+            },
+            Self::Arma => Orders {
+                na: 2,
+                nc: 1,
+                ..Orders::default()
+            },
             Self::Arx => Orders { na: 2, ..base },
-            Self::BoxJenkins => Orders { nd: 1, nf: 2, ..base },
+            Self::Armax => Orders { na: 2, nc: 1, ..base },
+            Self::Ararx => Orders { na: 2, nd: 1, ..base },
+            Self::Ararmax => Orders {
+                na: 2,
+                nc: 1,
+                nd: 1,
+                ..base
+            },
+            Self::OutputError => Orders { nf: 2, ..base },
+            Self::BoxJenkins | Self::General => Orders { nd: 1, nf: 2, ..base },
         }
     }
 
     /// Short name as on the command line.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Fir => "fir",
+            Self::Ar => "ar",
+            Self::Ma => "ma",
             Self::Arx => "arx",
+            Self::Arma => "arma",
+            Self::Armax => "armax",
+            Self::Ararx => "ararx",
+            Self::Ararmax => "ararmax",
+            Self::OutputError => "oe",
             Self::BoxJenkins => "bj",
+            Self::General => "general",
         }
     }
 }
 
 impl fmt::Display for Structure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Arx => "ARX",
-            Self::BoxJenkins => "BJ",
-        })
+        match self {
+            Self::General => f.write_str("general"),
+            other => f.write_str(&other.name().to_uppercase()),
+        }
     }
 }
 
@@ -128,10 +215,23 @@ impl Orders {
                 return refuse(format!("n{letter} must not exceed {MAX_ORDER}"));
             }
         }
-        if self.nb == 0 {
+        if structure.has_input() && self.nb == 0 {
             return refuse(
-                "B needs at least one coefficient (nb counts b0 ... b_{nb-1}); set nb = 1 or more".to_owned(),
+                "B needs at least one coefficient (nb counts b0 ... b_{nb-1}); set nb = 1 or more, or take ar, ma or arma, \
+                 which describe the output alone"
+                    .to_owned(),
             );
+        }
+        if !structure.has_input() && self.nk > 0 {
+            return refuse(format!(
+                "the structure {structure} has no input, so that a delay means nothing; set nk = 0"
+            ));
+        }
+        if self.parameters() == 0 {
+            return refuse(format!(
+                "the structure {structure} needs at least one coefficient in {}",
+                structure.polynomials()
+            ));
         }
         Ok(())
     }
