@@ -29,4 +29,4 @@ pub use estimator::Estimator;
 pub use fit::{Fit, ResponsePoint, Series};
 pub use order_search::{Candidate, Choice, OrderRanges, choose_orders};
 pub use prediction_error::InitialState;
-pub use search::{Reason, SearchOptions, Termination};
+pub use search::{Reason, SearchMethod, SearchOptions, Termination};

@@ -196,6 +196,7 @@ pub fn choose_orders_with(
         search: SearchOptions {
             tolerance: template.search.tolerance.max(1e-8),
             max_iterations: template.search.max_iterations.min(50),
+            ..template.search
         },
         starts: 1,
         ..template.clone()

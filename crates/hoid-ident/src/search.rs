@@ -1,12 +1,23 @@
-//! Minimisation of the prediction-error criterion by a damped Gauss-Newton search.
+//! Minimisation of a sum of squares over theta.
 //!
-//! Levenberg-Marquardt with Marquardt's scaling: the step solves `(H + mu diag H) delta = psi' eps` with the Gauss-Newton
-//! matrix `H = psi' psi`; mu follows the ratio of gained to promised decrease (H. B. Nielsen, *Damping parameter in
-//! Marquardt's method*, IMM-REP-1999-05, DTU). A step that makes C or F unstable counts as one that does not lower the loss.
+//! With `g = psi' eps` and the Gauss-Newton matrix `H = psi' psi` at theta, the methods differ in their step:
 //!
-//! The search has converged when the undamped Gauss-Newton step promises less than `tolerance` of relative decrease of the
-//! loss: `g' H^-1 g <= tolerance V`. In units of standard errors the distance left is about `sqrt(tolerance N)`, 1e-4 for the
-//! default and 8192 samples; that last step is still taken.
+//! | method | step |
+//! |---|---|
+//! | Levenberg-Marquardt | `(H + mu diag H)^-1 g`, mu by the ratio of gained to promised decrease (H. B. Nielsen, *Damping parameter in Marquardt's method*, IMM-REP-1999-05, DTU) |
+//! | Gauss-Newton | `H^-1 g`, halved until the loss falls |
+//! | steepest descent | `alpha (diag H)^-1 g`, alpha best for the quadratic model, halved until the loss falls |
+//! | automatic | Levenberg-Marquardt; where it finds no lower loss although the gradient is not zero, a run of steepest descent and Levenberg-Marquardt once more |
+//!
+//! A step that makes the predictor unstable counts as one that does not lower the loss.
+//!
+//! **Limits.** A parameter with equal bounds is fixed. Else a step is cut where it meets a bound, and a parameter that rests at
+//! a bound while the loss falls outwards takes no part in it (an active set; J. Nocedal and S. J. Wright, *Numerical
+//! Optimization*, 2006, section 16.5).
+//!
+//! The search has converged when the undamped Gauss-Newton step of the free parameters promises less than `tolerance` of
+//! relative decrease of the loss: `g' H^-1 g <= tolerance V`. In units of standard errors the distance left is about
+//! `sqrt(tolerance N)`, 1e-4 for the default and 8192 samples; that last step is still taken.
 
 use std::fmt;
 
@@ -29,10 +40,26 @@ pub(crate) trait Objective {
     }
 }
 
-/// Limits of the search.
+/// How a step is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SearchMethod {
+    /// Levenberg-Marquardt, helped by steepest descent where it cannot go on.
+    #[default]
+    Automatic,
+    /// Gauss-Newton with halved steps.
+    GaussNewton,
+    /// Levenberg-Marquardt.
+    LevenbergMarquardt,
+    /// Steepest descent, scaled by the diagonal of the Gauss-Newton matrix.
+    SteepestDescent,
+}
+
+/// Method and limits of the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchOptions {
-    /// Largest number of Gauss-Newton steps from each start. Default 100.
+    /// How a step is made. Default automatic.
+    pub method: SearchMethod,
+    /// Largest number of steps from each start. Default 100.
     pub max_iterations: usize,
     /// Relative decrease of the loss below which the search has converged. Default 1e-12.
     pub tolerance: f64,
@@ -41,6 +68,7 @@ pub struct SearchOptions {
 impl Default for SearchOptions {
     fn default() -> Self {
         Self {
+            method: SearchMethod::Automatic,
             max_iterations: 100,
             tolerance: 1e-12,
         }
@@ -102,98 +130,265 @@ pub(crate) struct Minimum {
 /// Searches from `theta`. `None` when the start is unstable or its loss is not finite, or when the search comes close to
 /// `rival`, the sum of squares of a minimum that is known already, and promises to end no lower.
 pub(crate) fn minimise(
-    criterion: &impl Objective,
+    objective: &impl Objective,
     mut theta: Vec<f64>,
     options: &SearchOptions,
     rival: Option<f64>,
     workspace: &mut Workspace,
 ) -> Option<Minimum> {
-    if !criterion.is_feasible(&theta) {
+    if let Some(limits) = objective.limits() {
+        for (t, (low, high)) in theta.iter_mut().zip(limits) {
+            *t = t.max(*low).min(*high);
+        }
+    }
+    if !objective.is_feasible(&theta) {
         return None;
     }
-    let power = criterion.output_power();
-    let mut at = criterion.linearise(&theta, workspace);
-    let (mut mu, mut growth) = (1e-3, 2.0);
-    let mut iterations = 0;
-    let reason = loop {
-        if !at.sum_of_squares.is_finite() {
-            return None;
-        }
-        // Rounding leaves residuals of about 1e-15 of the output.
-        if at.sum_of_squares <= 1e-26 * power {
-            break Reason::ExactFit;
-        }
-        let undamped = damped_step(&at, 0.0);
-        if let (Some(rival), Some((_, promised))) = (rival, &undamped) {
-            let close = at.sum_of_squares < rival * (1.0 + 1e-3);
-            if close && at.sum_of_squares - promised > rival * (1.0 - 1e-7) {
-                return None;
-            }
-        }
-        if let Some((step, promised)) = undamped
-            && promised <= options.tolerance * at.sum_of_squares
-        {
-            let last: Vec<f64> = theta.iter().zip(&step).map(|(t, s)| t + s).collect();
-            if criterion.is_feasible(&last) {
-                let there = criterion.linearise(&last, workspace);
-                if there.sum_of_squares <= at.sum_of_squares * (1.0 + 1e-14) {
-                    (theta, at) = (last, there);
-                }
-            }
-            break Reason::SmallDecrease;
-        }
-        if iterations >= options.max_iterations {
-            break Reason::IterationLimit;
-        }
-        iterations += 1;
-        let accepted = loop {
-            if mu > 1e16 {
-                break None;
-            }
-            if let Some((step, promised)) = damped_step(&at, mu) {
-                let trial: Vec<f64> = theta.iter().zip(&step).map(|(t, s)| t + s).collect();
-                if criterion.is_feasible(&trial) {
-                    // Most trials are accepted: derivatives at once cost less than a second pass.
-                    let there = criterion.linearise(&trial, workspace);
-                    if there.sum_of_squares.is_finite() && there.sum_of_squares < at.sum_of_squares {
-                        let ratio = (at.sum_of_squares - there.sum_of_squares) / promised;
-                        break Some((trial, there, ratio));
-                    }
-                }
-            }
-            mu *= growth;
-            growth *= 2.0;
-        };
-        match accepted {
-            None => break Reason::NoDescent,
-            Some((trial, there, ratio)) => {
-                (theta, at) = (trial, there);
-                mu *= (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(1.0 / 3.0, 2.0);
-                mu = mu.max(1e-12);
-                growth = 2.0;
-            }
-        }
-    };
-    Some(Minimum {
+    let at = objective.linearise(&theta, workspace);
+    let mut search = Search {
+        objective,
+        workspace,
+        options,
+        rival,
         theta,
         at,
-        termination: Termination { reason, iterations },
+        iterations: 0,
+    };
+    let reason = match options.method {
+        SearchMethod::Automatic => {
+            let mut reason = search.descend(SearchMethod::LevenbergMarquardt, options.max_iterations)?;
+            if reason == Reason::NoDescent {
+                let before = search.at.sum_of_squares;
+                let help = (search.iterations + STEEPEST_HELP).min(options.max_iterations);
+                search.descend(SearchMethod::SteepestDescent, help)?;
+                if search.at.sum_of_squares < before * (1.0 - options.tolerance) {
+                    reason = search.descend(SearchMethod::LevenbergMarquardt, options.max_iterations)?;
+                }
+            }
+            reason
+        }
+        method => search.descend(method, options.max_iterations)?,
+    };
+    Some(Minimum {
+        theta: search.theta,
+        at: search.at,
+        termination: Termination {
+            reason,
+            iterations: search.iterations,
+        },
     })
 }
 
-/// `(H + mu diag H)^-1 g` and the decrease of the sum of squares that the quadratic model promises for it. `None` when the
-/// matrix is not positive definite.
-fn damped_step(at: &Linearisation, mu: f64) -> Option<(Vec<f64>, f64)> {
-    let p = at.descent.len();
-    let mut damped = at.gram.clone();
-    for i in 0..p {
-        damped[i * p + i] *= 1.0 + mu;
+/// Steps of steepest descent that help a search that cannot go on.
+const STEEPEST_HELP: usize = 10;
+
+struct Search<'s, O> {
+    objective: &'s O,
+    workspace: &'s mut Workspace,
+    options: &'s SearchOptions,
+    rival: Option<f64>,
+    theta: Vec<f64>,
+    at: Linearisation,
+    iterations: usize,
+}
+
+impl<O: Objective> Search<'_, O> {
+    /// Steps of one method until it ends. `None` when the loss is not finite or the rival will not be beaten.
+    fn descend(&mut self, method: SearchMethod, max_iterations: usize) -> Option<Reason> {
+        let power = self.objective.output_power();
+        let (mut mu, mut growth) = (1e-3, 2.0);
+        loop {
+            if !self.at.sum_of_squares.is_finite() {
+                return None;
+            }
+            // Rounding leaves residuals of about 1e-15 of the output.
+            if self.at.sum_of_squares <= 1e-26 * power {
+                return Some(Reason::ExactFit);
+            }
+            let undamped = self.damped_step(0.0);
+            if let (Some(rival), Some(step)) = (self.rival, &undamped) {
+                let close = self.at.sum_of_squares < rival * (1.0 + 1e-3);
+                if close && self.at.sum_of_squares - step.promised > rival * (1.0 - 1e-7) {
+                    return None;
+                }
+            }
+            if let Some(step) = &undamped
+                && step.promised <= self.options.tolerance * self.at.sum_of_squares
+            {
+                if let Some((last, there)) = self.try_step(&step.delta, 1.0)
+                    && there.sum_of_squares <= self.at.sum_of_squares * (1.0 + 1e-14)
+                {
+                    (self.theta, self.at) = (last, there);
+                }
+                return Some(Reason::SmallDecrease);
+            }
+            if self.iterations >= max_iterations {
+                return Some(Reason::IterationLimit);
+            }
+            self.iterations += 1;
+            let accepted = match method {
+                SearchMethod::Automatic | SearchMethod::LevenbergMarquardt => {
+                    self.levenberg_marquardt(&mut mu, &mut growth)
+                }
+                SearchMethod::GaussNewton => undamped.and_then(|step| self.halve(&step.delta)),
+                SearchMethod::SteepestDescent => self.scaled_gradient().and_then(|delta| self.halve(&delta)),
+            };
+            match accepted {
+                None => return Some(Reason::NoDescent),
+                Some((theta, at)) => (self.theta, self.at) = (theta, at),
+            }
+        }
     }
-    let step = solve_symmetric(&damped, &at.descent)?;
-    // V(theta + step) ~ V - 2 g' step + step' H step.
-    let curvature: f64 = (0..p).map(|i| step[i] * dot(&at.gram[i * p..(i + 1) * p], &step)).sum();
-    let promised = 2.0 * dot(&at.descent, &step) - curvature;
-    (promised >= 0.0 && step.iter().all(|s| s.is_finite())).then_some((step, promised))
+
+    fn levenberg_marquardt(&mut self, mu: &mut f64, growth: &mut f64) -> Option<(Vec<f64>, Linearisation)> {
+        while *mu <= 1e16 {
+            if let Some(step) = self.damped_step(*mu)
+                // Most trials are accepted: derivatives at once cost less than a second pass.
+                && let Some((theta, there)) = self.try_step(&step.delta, 1.0)
+                && there.sum_of_squares < self.at.sum_of_squares
+            {
+                let ratio = (self.at.sum_of_squares - there.sum_of_squares) / step.promised;
+                *mu = (*mu * (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(1.0 / 3.0, 2.0)).max(1e-12);
+                *growth = 2.0;
+                return Some((theta, there));
+            }
+            *mu *= *growth;
+            *growth *= 2.0;
+        }
+        None
+    }
+
+    /// The step, halved until the loss falls.
+    fn halve(&mut self, delta: &[f64]) -> Option<(Vec<f64>, Linearisation)> {
+        let mut factor = 1.0;
+        while factor > 1e-12 {
+            if let Some((theta, there)) = self.try_step(delta, factor)
+                && there.sum_of_squares < self.at.sum_of_squares
+            {
+                return Some((theta, there));
+            }
+            factor *= 0.5;
+        }
+        None
+    }
+
+    /// Theta behind a step and the loss there; `None` where there is none.
+    fn try_step(&mut self, delta: &[f64], factor: f64) -> Option<(Vec<f64>, Linearisation)> {
+        let mut trial: Vec<f64> = self.theta.iter().zip(delta).map(|(t, s)| t + factor * s).collect();
+        if let Some(limits) = self.objective.limits() {
+            // Against rounding: a step that was cut at a bound ends on it.
+            for (t, (low, high)) in trial.iter_mut().zip(limits) {
+                *t = t.max(*low).min(*high);
+            }
+        }
+        if !self.objective.is_feasible(&trial) {
+            return None;
+        }
+        let there = self.objective.linearise(&trial, self.workspace);
+        there.sum_of_squares.is_finite().then_some((trial, there))
+    }
+
+    /// `(H + mu diag H)^-1 g` of the free parameters, cut where it meets a bound, and the decrease of the sum of squares that
+    /// the quadratic model promises for it. `None` when the matrix is not positive definite.
+    fn damped_step(&self, mu: f64) -> Option<Step> {
+        let p = self.theta.len();
+        let mut free = self.free();
+        loop {
+            let mut delta = vec![0.0; p];
+            if !free.is_empty() {
+                let gram = |i: usize, j: usize| self.at.gram[i * p + j] * if i == j { 1.0 + mu } else { 1.0 };
+                let damped: Vec<f64> = free
+                    .iter()
+                    .flat_map(|&i| free.iter().map(move |&j| gram(i, j)))
+                    .collect();
+                let descent: Vec<f64> = free.iter().map(|&i| self.at.descent[i]).collect();
+                for (&i, value) in free.iter().zip(solve_symmetric(&damped, &descent)?) {
+                    delta[i] = value;
+                }
+            }
+            if let Some(limits) = self.objective.limits() {
+                let leaves = |i: usize| {
+                    let ((low, high), t, d) = (limits[i], self.theta[i], delta[i]);
+                    (t <= low && d < 0.0) || (t >= high && d > 0.0)
+                };
+                let before = free.len();
+                free.retain(|&i| !leaves(i));
+                if free.len() < before {
+                    continue;
+                }
+                let room = cut(&self.theta, &delta, limits);
+                delta.iter_mut().for_each(|d| *d *= room);
+            }
+            return self.promise(delta);
+        }
+    }
+
+    /// `alpha (diag H)^-1 g` with the alpha that is best for the quadratic model.
+    fn scaled_gradient(&self) -> Option<Vec<f64>> {
+        let p = self.theta.len();
+        let mut delta = vec![0.0; p];
+        for i in self.free() {
+            let curvature = self.at.gram[i * p + i];
+            if curvature > 0.0 {
+                delta[i] = self.at.descent[i] / curvature;
+            }
+        }
+        let mut alpha = dot(&self.at.descent, &delta) / self.curvature(&delta);
+        if !(alpha.is_finite() && alpha > 0.0) {
+            return None;
+        }
+        delta.iter_mut().for_each(|d| *d *= alpha);
+        if let Some(limits) = self.objective.limits() {
+            alpha = cut(&self.theta, &delta, limits);
+            delta.iter_mut().for_each(|d| *d *= alpha);
+        }
+        Some(delta)
+    }
+
+    /// `V(theta + step) ~ V - 2 g' step + step' H step`.
+    fn promise(&self, delta: Vec<f64>) -> Option<Step> {
+        let promised = 2.0 * dot(&self.at.descent, &delta) - self.curvature(&delta);
+        (promised >= 0.0 && delta.iter().all(|s| s.is_finite())).then_some(Step { delta, promised })
+    }
+
+    fn curvature(&self, delta: &[f64]) -> f64 {
+        let p = delta.len();
+        (0..p)
+            .map(|i| delta[i] * dot(&self.at.gram[i * p..(i + 1) * p], delta))
+            .sum()
+    }
+
+    fn free(&self) -> Vec<usize> {
+        free_parameters(self.objective, &self.theta, &self.at.descent)
+    }
+}
+
+/// Parameters that may move: neither fixed nor at a bound beyond which the loss falls.
+pub(crate) fn free_parameters(objective: &impl Objective, theta: &[f64], descent: &[f64]) -> Vec<usize> {
+    let Some(limits) = objective.limits() else {
+        return (0..theta.len()).collect();
+    };
+    (0..theta.len())
+        .filter(|&i| {
+            let ((low, high), t, outward) = (limits[i], theta[i], descent[i]);
+            low < high && !(t <= low && outward < 0.0) && !(t >= high && outward > 0.0)
+        })
+        .collect()
+}
+
+/// The share of a step that stays within the limits.
+fn cut(theta: &[f64], delta: &[f64], limits: &[(f64, f64)]) -> f64 {
+    let room = |((t, d), (low, high)): ((&f64, &f64), &(f64, f64))| match *d {
+        d if d > 0.0 => (high - t) / d,
+        d if d < 0.0 => (low - t) / d,
+        _ => f64::INFINITY,
+    };
+    theta.iter().zip(delta).zip(limits).map(room).fold(1.0, f64::min)
+}
+
+struct Step {
+    delta: Vec<f64>,
+    promised: f64,
 }
 
 #[cfg(test)]
@@ -268,6 +463,91 @@ mod tests {
             let cosine = end.at.descent[i] / (end.at.gram[i * p + i] * end.at.sum_of_squares).sqrt();
             assert!(cosine.abs() < 1e-9, "{i}: {cosine}");
         }
+    }
+
+    /// Rosenbrock's valley as a sum of squares: `(10 (y - x^2))^2 + (1 - x)^2`, with limits.
+    struct Valley {
+        limits: Option<Vec<(f64, f64)>>,
+    }
+
+    impl Objective for Valley {
+        fn is_feasible(&self, theta: &[f64]) -> bool {
+            theta.iter().all(|t| t.is_finite())
+        }
+
+        fn linearise(&self, theta: &[f64], _: &mut Workspace) -> Linearisation {
+            let (x, y) = (theta[0], theta[1]);
+            let eps = [10.0 * (y - x * x), 1.0 - x];
+            // Negative derivatives by rows of eps.
+            let psi = [[20.0 * x, -10.0], [1.0, 0.0]];
+            let product = |i: usize, j: usize| psi[0][i] * psi[0][j] + psi[1][i] * psi[1][j];
+            Linearisation {
+                sum_of_squares: eps[0] * eps[0] + eps[1] * eps[1],
+                descent: (0..2).map(|i| psi[0][i] * eps[0] + psi[1][i] * eps[1]).collect(),
+                gram: vec![product(0, 0), product(0, 1), product(1, 0), product(1, 1)],
+            }
+        }
+
+        fn output_power(&self) -> f64 {
+            1.0
+        }
+
+        fn limits(&self) -> Option<&[(f64, f64)]> {
+            self.limits.as_deref()
+        }
+    }
+
+    fn descend(valley: &Valley, method: SearchMethod, max_iterations: usize) -> Minimum {
+        let options = SearchOptions {
+            method,
+            max_iterations,
+            ..SearchOptions::default()
+        };
+        minimise(valley, vec![-1.2, 1.0], &options, None, &mut Workspace::default()).unwrap()
+    }
+
+    #[test]
+    fn every_method_goes_down_the_valley() {
+        let open = Valley { limits: None };
+        for method in [
+            SearchMethod::Automatic,
+            SearchMethod::LevenbergMarquardt,
+            SearchMethod::GaussNewton,
+        ] {
+            let end = descend(&open, method, 100);
+            assert!(end.termination.converged(), "{method:?}");
+            assert!(end.theta.iter().all(|t| (t - 1.0).abs() < 1e-8), "{method:?}");
+        }
+        // Steepest descent is slow in a valley, and goes down.
+        let slow = descend(&open, SearchMethod::SteepestDescent, 2000);
+        assert!(slow.at.sum_of_squares < 0.1, "{}", slow.at.sum_of_squares);
+        assert!(slow.termination.iterations > 100);
+    }
+
+    #[test]
+    fn limits_are_kept_and_fixed_parameters_stay() {
+        let bounded = Valley {
+            limits: Some(vec![(-2.0, 0.5), (f64::NEG_INFINITY, f64::INFINITY)]),
+        };
+        for method in [
+            SearchMethod::Automatic,
+            SearchMethod::LevenbergMarquardt,
+            SearchMethod::GaussNewton,
+        ] {
+            let end = descend(&bounded, method, 200);
+            assert!(end.termination.converged(), "{method:?}: {:?}", end.termination);
+            assert!((end.theta[0] - 0.5).abs() < 1e-12 && (end.theta[1] - 0.25).abs() < 1e-8);
+            assert_eq!(free_parameters(&bounded, &end.theta, &end.at.descent), [1]);
+        }
+        let fixed = Valley {
+            limits: Some(vec![(f64::NEG_INFINITY, f64::INFINITY), (4.0, 4.0)]),
+        };
+        let end = descend(&fixed, SearchMethod::Automatic, 200);
+        assert_eq!(end.theta[1], 4.0);
+        // Stationary in x with y = 4: 200 x (x^2 - 4) = 1 - x, on the side of the start.
+        assert!((end.theta[0] + 1.99812).abs() < 1e-4, "{}", end.theta[0]);
+        let slope = end.at.descent[0] / end.at.gram[0].sqrt();
+        assert!(slope.abs() < 1e-6);
     }
 
     #[test]
