@@ -3,7 +3,7 @@
 use std::{ops::RangeInclusive, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use hoid_ident::{InitialState, order_search::Criterion};
+use hoid_ident::{Focus, InitialState, SearchMethod, order_search::Criterion};
 use hoid_model::{
     ContinuousTransferFunction, Detrend, Structure, discretise,
     remnant::RemnantDiscretisation,
@@ -147,15 +147,39 @@ pub struct IdentifyArgs {
     /// What decides between candidates when something is searched
     #[arg(long, value_name = "NAME", default_value = "bic")]
     pub criterion: CriterionName,
-    /// Initial states of each record; auto estimates them
+    /// Initial states of each record; auto: estimate, and backcast for an output alone (ar, ma, arma)
     #[arg(long, value_name = "RULE", default_value = "auto")]
     pub initial_state: InitialStateName,
     /// Start of the search, all coefficients as f1=-1.9,f2=.92,b0=.04,... [default: own starts]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     pub start: Option<String>,
+    /// Coefficients held at a value, as d1=-0.85,f1=-1.9
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub fix: Option<String>,
+    /// Bounds of coefficients, as b0=0..0.2,f2=..0.99; an end may be left open
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub bound: Option<String>,
+    /// Guesses of coefficients with a weight W, as f1=-1.9:0.5: the loss grows by W (f1 + 1.9)^2
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub prior: Option<String>,
+    /// Loss of Huber instead of squares: residuals beyond K standard deviations count linearly
+    #[arg(long, value_name = "K", num_args = 0..=1, default_missing_value = "1.345")]
+    pub robust: Option<f64>,
+    /// What the model is to be good at: one-step prediction, or simulation from the input alone
+    #[arg(long, value_name = "WHAT", default_value = "prediction")]
+    pub focus: FocusName,
+    /// Take only models that are stable from e to u (C and F always are stable)
+    #[arg(long)]
+    pub stable: bool,
+    /// How the search steps: gn Gauss-Newton, lm Levenberg-Marquardt, grad steepest descent
+    #[arg(long, value_name = "METHOD", default_value = "auto")]
+    pub search_method: SearchMethodName,
     /// Largest number of search steps from each start
     #[arg(long, value_name = "N", default_value_t = 100)]
     pub max_iterations: usize,
+    /// Relative decrease of the loss below which the search has converged
+    #[arg(long, value_name = "X", default_value = "1e-12")]
+    pub tolerance: f64,
     /// Discretisation that is inverted to get T_n and K_n from the noise model
     #[arg(long, value_name = "NAME", default_value = "zoh")]
     pub remnant_discretisation: RemnantDiscretisationName,
@@ -251,12 +275,32 @@ macro_rules! names {
     };
 }
 
-names!(StructureName for Structure { Arx = Structure::Arx, Bj = Structure::BoxJenkins });
+names!(StructureName for Structure {
+    Arx = Structure::Arx,
+    Armax = Structure::Armax,
+    Oe = Structure::OutputError,
+    Bj = Structure::BoxJenkins,
+    Fir = Structure::Fir,
+    Ar = Structure::Ar,
+    Ma = Structure::Ma,
+    Arma = Structure::Arma,
+    Ararx = Structure::Ararx,
+    Ararmax = Structure::Ararmax,
+    General = Structure::General,
+});
+names!(FocusName for Focus { Prediction = Focus::Prediction, Simulation = Focus::Simulation });
+names!(SearchMethodName for SearchMethod {
+    Auto = SearchMethod::Automatic,
+    Gn = SearchMethod::GaussNewton,
+    Lm = SearchMethod::LevenbergMarquardt,
+    Grad = SearchMethod::SteepestDescent,
+});
 names!(CriterionName for Criterion { Loss = Criterion::Loss, Aic = Criterion::Aic, Bic = Criterion::Bic });
-names!(InitialStateName for InitialState {
-    Auto = InitialState::Estimate,
-    Zero = InitialState::Zero,
-    Estimate = InitialState::Estimate,
+names!(InitialStateName for Option<InitialState> {
+    Auto = None,
+    Zero = Some(InitialState::Zero),
+    Estimate = Some(InitialState::Estimate),
+    Backcast = Some(InitialState::Backcast),
 });
 names!(DetrendName for Detrend { None = Detrend::None, Mean = Detrend::Mean, Linear = Detrend::Linear });
 names!(NoiseDefinitionName for NoiseDefinition {

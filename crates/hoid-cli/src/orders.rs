@@ -1,8 +1,8 @@
 //! Orders, ranges and named numbers as they are typed.
 
-use std::ops::RangeInclusive;
+use std::{collections::BTreeMap, ops::RangeInclusive};
 
-use hoid_ident::OrderRanges;
+use hoid_ident::{Constraint, OrderRanges, Prior};
 use hoid_model::{Orders, SampleTime, Structure};
 
 use crate::error::CliError;
@@ -89,6 +89,67 @@ pub fn ranges(
     Ok(ranges)
 }
 
+/// `name=value` pairs of an option, each turned into what it means.
+fn named<T>(
+    option: &str,
+    text: Option<&str>,
+    parse: impl Fn(&str) -> Option<T>,
+    expected: &str,
+) -> Result<BTreeMap<String, T>, CliError> {
+    let mut all = BTreeMap::new();
+    for (name, value) in parse_pairs(text.unwrap_or_default()).map_err(|e| CliError::Usage(format!("{option}: {e}")))? {
+        let parsed =
+            parse(&value).ok_or_else(|| CliError::Usage(format!("{option} {name}={value}: expected {expected}")))?;
+        if all.insert(name.clone(), parsed).is_some() {
+            return Err(CliError::Usage(format!("{option}: {name} is given twice")));
+        }
+    }
+    Ok(all)
+}
+
+fn finite(text: &str) -> Option<f64> {
+    text.trim().parse::<f64>().ok().filter(|v| v.is_finite())
+}
+
+/// Constraints from `--fix name=value` and `--bound name=low..high`.
+pub fn constraints(fix: Option<&str>, bound: Option<&str>) -> Result<BTreeMap<String, Constraint>, CliError> {
+    let end = |text: &str, open: f64| if text.is_empty() { Some(open) } else { finite(text) };
+    let between = |text: &str| {
+        let (low, high) = text.split_once("..")?;
+        let (low, high) = (end(low, f64::NEG_INFINITY)?, end(high, f64::INFINITY)?);
+        (low <= high).then_some(Constraint::Between(low, high))
+    };
+    let mut all = named("--fix", fix, |v| finite(v).map(Constraint::Fixed), "a finite number")?;
+    for (name, limits) in named(
+        "--bound",
+        bound,
+        between,
+        "LOW..HIGH with LOW <= HIGH, either end may be left open",
+    )? {
+        if all.insert(name.clone(), limits).is_some() {
+            return Err(CliError::Usage(format!("{name} is both fixed and bounded; drop one")));
+        }
+    }
+    Ok(all)
+}
+
+/// Guesses with their weights from `name=value:weight`.
+pub fn priors(text: Option<&str>) -> Result<BTreeMap<String, Prior>, CliError> {
+    let guess = |text: &str| {
+        let (value, weight) = text.split_once(':')?;
+        Some(Prior {
+            value: finite(value)?,
+            weight: finite(weight).filter(|w| *w >= 0.0)?,
+        })
+    };
+    named(
+        "--prior",
+        text,
+        guess,
+        "VALUE:WEIGHT with a weight that is not negative",
+    )
+}
+
 /// Theta from `f1=..,b0=..`: every coefficient of the orders, each once.
 pub fn theta(orders: &Orders, text: &str) -> Result<Vec<f64>, CliError> {
     let names = orders.parameter_names();
@@ -142,6 +203,28 @@ mod tests {
         assert_eq!((some.nk, some.nd, some.nc, some.nf), (29..=29, 2..=2, 1..=1, 2..=2));
         assert!(ranges(Structure::Arx, Some("nx=2"), None, ts).is_err());
         assert!(ranges(Structure::Arx, Some("nk=2"), Some(&(3..=3)), ts).is_err());
+    }
+
+    #[test]
+    fn constraints_and_guesses_as_typed() {
+        let all = constraints(Some("d1=-0.85"), Some("b0=0..0.2, f2=..0.99,f1=-2..")).unwrap();
+        assert_eq!(all["d1"], Constraint::Fixed(-0.85));
+        assert_eq!(all["b0"], Constraint::Between(0.0, 0.2));
+        assert_eq!(all["f2"], Constraint::Between(f64::NEG_INFINITY, 0.99));
+        assert_eq!(all["f1"], Constraint::Between(-2.0, f64::INFINITY));
+        for (fix, bound) in [
+            ("d1=x", ""),
+            ("d1=1,d1=2", ""),
+            ("", "b0=2..1"),
+            ("", "b0=3"),
+            ("b0=1", "b0=0..2"),
+        ] {
+            assert!(constraints(Some(fix), Some(bound)).is_err(), "{fix} {bound}");
+        }
+        assert_eq!(priors(Some("f1=-1.9:0.5")).unwrap()["f1"].weight, 0.5);
+        for bad in ["f1=-1.9", "f1=-1.9:-1", "f1=:1"] {
+            assert!(priors(Some(bad)).is_err(), "{bad}");
+        }
     }
 
     #[test]

@@ -421,7 +421,7 @@ fn wrong_usage_ends_with_two() {
         &["identify", "c1.csv", "--nk", "5..2"],
         &["identify", "c1.csv", "--orders", "nx=2"],
         &["identify", "c1.csv", "--orders", "nk=3", "--nk", "4"],
-        &["identify", "c1.csv", "--structure", "armax"],
+        &["identify", "c1.csv", "--structure", "narmax"],
         &["identify", "c1.csv", "--start", "b0=1"],
         &["simulate", "--out", "x.csv"],
         &["simulate", "--condition", "C9", "--out", "x.csv"],

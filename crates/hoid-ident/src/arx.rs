@@ -1,8 +1,8 @@
 //! ARX by linear least squares.
 //!
 //! `u(t) = phi(t)' theta + eps(t)` with `phi = [-u(t-1) .. -u(t-na), e(t-nk) .. e(t-nk-nb+1)]` (eq. 5.31), from the first sample
-//! at which phi lies inside the record (eq. 5.33) in each record; solved by QR with column pivoting, not by the inverse of
-//! eq. 5.36.
+//! at which phi lies inside the record (eq. 5.33) in each record, or with zeros for what lies before it; solved by QR with
+//! column pivoting, not by the inverse of eq. 5.36.
 
 use hoid_model::Orders;
 
@@ -21,16 +21,21 @@ pub(crate) struct Regression {
 pub(crate) fn regress(orders: &Orders, data: &[Data<'_>], first: usize) -> Result<Regression, IdentError> {
     let rows: usize = data.iter().map(|d| d.u.len() - first).sum();
     let mut columns = Vec::with_capacity(orders.parameters() * rows);
-    for lag in 1..=orders.na {
-        for d in data {
-            columns.extend(d.u[first - lag..d.u.len() - lag].iter().map(|u| -u));
+    let mut lagged = |signal: &[f64], lag: usize, sign: f64| {
+        columns.extend(std::iter::repeat_n(
+            0.0,
+            lag.saturating_sub(first).min(signal.len() - first),
+        ));
+        if lag < signal.len() {
+            let from = first.max(lag) - lag;
+            columns.extend(signal[from..signal.len() - lag].iter().map(|x| sign * x));
         }
+    };
+    for lag in 1..=orders.na {
+        data.iter().for_each(|d| lagged(d.u, lag, -1.0));
     }
     for j in 0..orders.nb {
-        let lag = orders.nk + j;
-        for d in data {
-            columns.extend_from_slice(&d.e[first - lag..d.e.len() - lag]);
-        }
+        data.iter().for_each(|d| lagged(d.e, orders.nk + j, 1.0));
     }
     let mut y: Vec<f64> = data.iter().flat_map(|d| &d.u[first..]).copied().collect();
     let solved = LeastSquares::factor(&mut columns, &mut y);

@@ -93,6 +93,24 @@ pub enum IdentError {
         /// What is wrong with it, and the remedy.
         reason: String,
     },
+    /// A name that is no parameter of the model.
+    #[error("the model has no parameter {name}; it has {available}")]
+    UnknownParameter {
+        /// The name.
+        name: String,
+        /// The parameters there are.
+        available: String,
+    },
+    /// An option that makes no sense, alone or with the others.
+    #[error("{option}: found {found}; expected {expected}")]
+    BadOption {
+        /// The option.
+        option: String,
+        /// What was given.
+        found: String,
+        /// What would be right.
+        expected: String,
+    },
     /// Not one start led to a finite loss.
     #[error("no start of the search gave a finite loss; check the scale of the data and the orders")]
     NoFiniteLoss,

@@ -1,18 +1,33 @@
 //! From records to a fit.
 
+use std::collections::BTreeMap;
+
 use hoid_model::{Orders, PolynomialModel, Record, SampleTime, Structure};
-use nalgebra::{DMatrix, SymmetricEigen};
 
 use crate::{
-    Fit, IdentError, InitialState, Reason, SearchOptions, Termination, arx,
+    Constraint, Fit, IdentError, InitialState, Loss, Prior, Reason, SearchOptions, Termination, arx, checks,
+    information::inverse_of_free,
+    least_squares::dot,
+    objective::Informed,
     prediction_error::{Criterion, Data, Workspace, first_residual},
-    search::{Minimum, Objective, minimise},
-    starts,
+    robust::{ROUNDS, Reweighting},
+    search::{Minimum, Objective, free_parameters, minimise},
+    simulation_focus, starts,
 };
 
-/// Eigenvalue of the information matrix (scaled to a unit diagonal) below which a combination of parameters counts as not
-/// determined by the data. Rounding leaves about 1e-15 times the number of parameters.
-const SINGULAR: f64 = 1e-13;
+/// Rounds of the robust loss end when theta moves by less than this share of its standard errors.
+const SETTLED: f64 = 1e-5;
+
+/// What the fitted model is to be good at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Focus {
+    /// One-step-ahead prediction: the prediction error method, efficient where the structure is right.
+    #[default]
+    Prediction,
+    /// Simulation from the input alone: the system from e to u minimises the simulation error, and the noise model is fitted to
+    /// what is left. In a closed loop the system is then biased by the feedback.
+    Simulation,
+}
 
 /// What is to be estimated, and how.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,14 +36,25 @@ pub struct Estimator {
     pub structure: Structure,
     /// The orders.
     pub orders: Orders,
-    /// Initial states of each record. Default: estimated.
-    pub initial_state: InitialState,
-    /// Limits of the search.
+    /// Initial states of each record. Default (`None`): automatic, which is estimated where there is an input and backcast for
+    /// an output alone, whose past is as stationary as its present.
+    pub initial_state: Option<InitialState>,
+    /// Method and limits of the search.
     pub search: SearchOptions,
     /// Number of own starts from which the search runs to its end; the best minimum wins. Default 2.
     pub starts: usize,
     /// Start of the search instead of the estimator's own; theta in the order of [`Orders::parameter_names`].
     pub start: Option<Vec<f64>>,
+    /// Fixed and bounded coefficients, by name.
+    pub constraints: BTreeMap<String, Constraint>,
+    /// Coefficients that are drawn to a guess, by name.
+    pub priors: BTreeMap<String, Prior>,
+    /// How a residual counts. Default: by its square.
+    pub loss: Loss,
+    /// What the model is to be good at. Default: prediction.
+    pub focus: Focus,
+    /// True when A must be stable too, so that the model from e to u is. C and F always are. Default false.
+    pub stable: bool,
 }
 
 impl Estimator {
@@ -37,10 +63,15 @@ impl Estimator {
         Self {
             structure,
             orders,
-            initial_state: InitialState::default(),
+            initial_state: None,
             search: SearchOptions::default(),
             starts: 2,
             start: None,
+            constraints: BTreeMap::new(),
+            priors: BTreeMap::new(),
+            loss: Loss::default(),
+            focus: Focus::default(),
+            stable: false,
         }
     }
 
@@ -53,14 +84,13 @@ impl Estimator {
         }
     }
 
-    /// The rule for initial states that this structure follows: the regression of ARX is conditional on the first samples
-    /// (eq. 5.33) under either rule, it needs no states.
-    pub(crate) fn initial_state_in_use(&self) -> InitialState {
-        if self.structure.is_linear() {
+    /// The rule for initial states, the automatic one decided.
+    pub fn initial_state_in_use(&self) -> InitialState {
+        self.initial_state.unwrap_or(if self.structure.has_input() {
             InitialState::Estimate
         } else {
-            self.initial_state
-        }
+            InitialState::Backcast
+        })
     }
 
     /// Fits one model to all records: a common theta, initial states of each.
@@ -78,11 +108,15 @@ impl Estimator {
     /// As [`Estimator::fit`].
     pub fn fit_from(&self, records: &[Record], first: usize) -> Result<Fit, IdentError> {
         self.orders.check(self.structure)?;
-        let sample_time = common_sample_time(records)?;
+        checks::options(self)?;
+        if self.focus == Focus::Simulation && self.structure != Structure::OutputError {
+            return simulation_focus::fit(self, records, first);
+        }
+        let sample_time = checks::common_sample_time(records)?;
         let initial = self.initial_state_in_use();
         let first = first.max(first_residual(&self.orders, initial));
         for record in records {
-            self.check_record(record, first)?;
+            checks::record(self.structure, &self.orders, record, first)?;
         }
         let criterion = Criterion {
             orders: self.orders,
@@ -95,73 +129,179 @@ impl Estimator {
                 .collect(),
             initial,
             first,
+            weights: None,
         };
-        self.check_degrees_of_freedom(&criterion, records)?;
-        if self.structure.is_linear() {
+        checks::degrees_of_freedom(&criterion, records)?;
+        if self.is_direct(initial) {
             self.fit_linear(&criterion, sample_time)
         } else {
             self.fit_iteratively(&criterion, sample_time)
         }
     }
 
+    /// True when least squares gives the fit in one step.
+    fn is_direct(&self, initial: InitialState) -> bool {
+        self.structure.is_linear()
+            && initial != InitialState::Backcast
+            && self.constraints.is_empty()
+            && self.priors.is_empty()
+            && self.loss == Loss::Quadratic
+            && !self.stable
+    }
+
     fn fit_linear(&self, criterion: &Criterion<'_>, sample_time: SampleTime) -> Result<Fit, IdentError> {
         let solved = arx::regress(&self.orders, &criterion.data, criterion.first)?;
+        let termination = Termination {
+            reason: Reason::Direct,
+            iterations: 0,
+        };
+        let all_free = vec![false; solved.theta.len()];
         let fit = self.result(
             criterion,
             sample_time,
             solved.theta,
             solved.sum_of_squares,
-            Termination {
-                reason: Reason::Direct,
-                iterations: 0,
-            },
-            "none needed".to_owned(),
+            termination,
+            all_free,
         )?;
         let sigma2 = fit.innovation_variance;
         Ok(Fit {
             covariance: Some(solved.inverse_gram.iter().map(|g| sigma2 * g).collect()),
+            start: "none needed".to_owned(),
             ..fit
         })
     }
 
     fn fit_iteratively(&self, criterion: &Criterion<'_>, sample_time: SampleTime) -> Result<Fit, IdentError> {
         let mut workspace = Workspace::default();
+        let informed = self.inform(criterion);
         let candidates: Vec<(String, Vec<f64>)> = match &self.start {
-            Some(theta) => vec![("given".to_owned(), self.check_start(theta, criterion)?)],
+            Some(theta) => vec![("given".to_owned(), self.check_start(theta, &informed)?)],
             None => starts::propose(criterion, sample_time, &mut workspace)
                 .into_iter()
                 .take(self.starts.max(1))
-                .map(|s| (s.label, s.theta))
+                .filter_map(|s| Some((s.label, self.stabilised(s.theta)?)))
                 .collect(),
         };
         let mut best: Option<(String, Minimum)> = None;
         for (label, theta) in candidates {
             let known = best.as_ref().map(|(_, b): &(String, Minimum)| b.at.sum_of_squares);
-            let Some(minimum) = minimise(criterion, theta, &self.search, known, &mut workspace) else {
+            let Some(minimum) = minimise(&informed, theta, &self.search, known, &mut workspace) else {
                 continue;
             };
             if known.is_none_or(|known| minimum.at.sum_of_squares < known) {
                 best = Some((label, minimum));
             }
         }
-        let (label, minimum) = best.ok_or(IdentError::NoFiniteLoss)?;
+        let (start, minimum) = best.ok_or(IdentError::NoFiniteLoss)?;
+        let exact = minimum.termination.reason == Reason::ExactFit;
+        if let (Loss::Huber { threshold }, false) = (self.loss, exact) {
+            let fit = self.fit_robustly(&informed, sample_time, minimum, threshold, &mut workspace)?;
+            return Ok(Fit { start, ..fit });
+        }
+        let sum_of_squares = informed.without_prior(&minimum.theta, &minimum.at);
+        let free = free_parameters(&informed, &minimum.theta, &minimum.at.descent);
         let fit = self.result(
             criterion,
             sample_time,
             minimum.theta,
-            minimum.at.sum_of_squares,
+            sum_of_squares,
             minimum.termination,
-            label,
+            held(&free, self.orders.parameters()),
         )?;
-        if fit.termination.reason == Reason::ExactFit {
+        let fit = Fit { start, ..fit };
+        if exact {
             return Ok(fit);
         }
-        let inverse = inverse_information(&minimum.at.gram, &self.orders.parameter_names())?;
+        let inverse = inverse_of_free(&minimum.at.gram, &free, &self.orders.parameter_names())?;
         let sigma2 = fit.innovation_variance;
         Ok(Fit {
             covariance: Some(inverse.iter().map(|g| sigma2 * g).collect()),
             ..fit
         })
+    }
+
+    /// Rounds of reweighted searches from the minimum of the squares.
+    fn fit_robustly(
+        &self,
+        informed: &Informed<'_, '_>,
+        sample_time: SampleTime,
+        mut minimum: Minimum,
+        threshold: f64,
+        workspace: &mut Workspace,
+    ) -> Result<Fit, IdentError> {
+        let criterion = informed.criterion;
+        let mut rounds = Reweighting::new(threshold);
+        let mut residuals = all_residuals(criterion, &minimum.theta, workspace);
+        let (mut iterations, mut settled) = (minimum.termination.iterations, false);
+        for _ in 0..ROUNDS {
+            let Some(weights) = rounds.next(&residuals) else { break };
+            let weighted = Criterion {
+                weights: Some(&weights),
+                ..criterion.clone()
+            };
+            let objective = Informed {
+                criterion: &weighted,
+                limits: informed.limits.clone(),
+                prior: informed.prior.clone(),
+                stable: informed.stable,
+            };
+            let next = minimise(&objective, minimum.theta.clone(), &self.search, None, workspace)
+                .ok_or(IdentError::NoFiniteLoss)?;
+            iterations += next.termination.iterations;
+            let step: Vec<f64> = next.theta.iter().zip(&minimum.theta).map(|(a, b)| a - b).collect();
+            let p = step.len();
+            let curvature: f64 = (0..p)
+                .map(|i| step[i] * dot(&next.at.gram[i * p..(i + 1) * p], &step))
+                .sum();
+            settled = curvature * criterion.residuals() as f64 <= SETTLED * SETTLED * next.at.sum_of_squares;
+            minimum = next;
+            residuals = all_residuals(&weighted, &minimum.theta, workspace);
+            if settled {
+                break;
+            }
+        }
+        let reason = match minimum.termination.reason {
+            Reason::SmallDecrease if !settled => Reason::IterationLimit,
+            reason => reason,
+        };
+        let free = free_parameters(informed, &minimum.theta, &minimum.at.descent);
+        let names = self.orders.parameter_names();
+        let plain = informed.linearise(&minimum.theta, workspace);
+        let inverse = inverse_of_free(&plain.gram, &free, &names)?;
+        let variance = rounds.variance(&residuals, names.len() + criterion.states());
+        let sum_of_squares = residuals.iter().map(|r| dot(r, r)).sum();
+        let termination = Termination { reason, iterations };
+        let held = held(&free, names.len());
+        let fit = self.result(criterion, sample_time, minimum.theta, sum_of_squares, termination, held)?;
+        Ok(Fit {
+            covariance: Some(inverse.iter().map(|g| variance * g).collect()),
+            innovation_variance: rounds.scale * rounds.scale,
+            ..fit
+        })
+    }
+
+    fn inform<'c, 'a>(&self, criterion: &'c Criterion<'a>) -> Informed<'c, 'a> {
+        let names = self.orders.parameter_names();
+        let unlimited = (f64::NEG_INFINITY, f64::INFINITY);
+        let limit = |name: &String| self.constraints.get(name).map_or(unlimited, |c| c.limits());
+        let n = criterion.residuals() as f64;
+        let guess = |(i, name): (usize, &String)| {
+            let prior = self.priors.get(name)?;
+            Some((
+                i,
+                Prior {
+                    weight: n * prior.weight,
+                    ..*prior
+                },
+            ))
+        };
+        Informed {
+            criterion,
+            limits: (!self.constraints.is_empty()).then(|| names.iter().map(limit).collect()),
+            prior: names.iter().enumerate().filter_map(guess).collect(),
+            stable: self.stable,
+        }
     }
 
     fn result(
@@ -171,11 +311,13 @@ impl Estimator {
         theta: Vec<f64>,
         sum_of_squares: f64,
         termination: Termination,
-        start: String,
+        held: Vec<bool>,
     ) -> Result<Fit, IdentError> {
         let n = criterion.residuals();
-        let freedom = n - theta.len() - criterion.states();
+        let free = held.iter().filter(|held| !**held).count();
+        let freedom = n - free - criterion.states();
         Ok(Fit {
+            held,
             model: PolynomialModel::new(self.structure, self.orders, sample_time, theta)?,
             covariance: None,
             loss: sum_of_squares / n as f64,
@@ -184,62 +326,20 @@ impl Estimator {
             states: criterion.states(),
             initial_state: criterion.initial,
             termination,
-            start,
+            start: String::new(),
         })
     }
 
-    fn check_record(&self, record: &Record, first: usize) -> Result<(), IdentError> {
-        let label = || record.label().to_owned();
-        if self.structure.has_input() && record.input_channel().is_none() {
-            return Err(IdentError::NoInput {
-                structure: self.structure.to_string(),
-                label: label(),
-            });
+    /// The start with a stable A where that was asked for.
+    fn stabilised(&self, mut theta: Vec<f64>) -> Option<Vec<f64>> {
+        if self.stable {
+            let a = starts::reflected_inside(&theta[..self.orders.na])?;
+            theta[..self.orders.na].copy_from_slice(&a);
         }
-        let input = record.input_channel().filter(|_| self.structure.has_input());
-        for channel in input.into_iter().chain([record.output_channel()]) {
-            let value = channel.values[0];
-            if channel.values.iter().all(|v| *v == value) {
-                return Err(IdentError::NoExcitation {
-                    channel: channel.name.clone(),
-                    label: label(),
-                    value,
-                });
-            }
-        }
-        if self.orders.nk >= record.len() {
-            return Err(IdentError::DelayTooLong {
-                nk: self.orders.nk,
-                label: label(),
-                samples: record.len(),
-            });
-        }
-        let needed = first + self.orders.nf + self.orders.nc;
-        if record.len() <= needed {
-            return Err(IdentError::TooFewSamples {
-                label: label(),
-                samples: record.len(),
-                orders: self.orders.to_string(),
-                needed,
-            });
-        }
-        Ok(())
+        Some(theta)
     }
 
-    fn check_degrees_of_freedom(&self, criterion: &Criterion<'_>, records: &[Record]) -> Result<(), IdentError> {
-        let unknowns = self.orders.parameters() + criterion.states();
-        if criterion.residuals() > unknowns {
-            return Ok(());
-        }
-        Err(IdentError::TooFewSamples {
-            label: records[0].label().to_owned(),
-            samples: records[0].len(),
-            orders: self.orders.to_string(),
-            needed: criterion.first + unknowns.div_ceil(records.len()),
-        })
-    }
-
-    fn check_start(&self, theta: &[f64], criterion: &Criterion<'_>) -> Result<Vec<f64>, IdentError> {
+    fn check_start(&self, theta: &[f64], objective: &Informed<'_, '_>) -> Result<Vec<f64>, IdentError> {
         let bad = |reason: &str| IdentError::BadStart {
             reason: reason.to_owned(),
         };
@@ -251,113 +351,23 @@ impl Estimator {
                 self.orders.parameters()
             )));
         }
-        if !criterion.is_feasible(theta) {
+        if !objective.is_feasible(theta) {
             return Err(bad(
-                "C or F has a root on or outside the unit circle; give a stable start or none",
+                "C or F (or a polynomial that was asked to be stable) has a root on or outside the unit circle; give a stable \
+                 start or none",
             ));
         }
         Ok(theta.to_vec())
     }
 }
 
-fn common_sample_time(records: &[Record]) -> Result<SampleTime, IdentError> {
-    let first = records.first().ok_or(IdentError::NoRecords)?.sample_time();
-    match records.iter().find(|r| !first.matches(r.sample_time())) {
-        None => Ok(first),
-        Some(other) => Err(IdentError::MixedSampling {
-            label: other.label().to_owned(),
-            found: other.sample_time().s(),
-            expected: first.s(),
-        }),
-    }
+/// Which of p parameters are not free.
+fn held(free: &[usize], p: usize) -> Vec<bool> {
+    (0..p).map(|i| !free.contains(&i)).collect()
 }
 
-/// Inverse of the information matrix by its eigenvalues, scaled to a unit diagonal.
-fn inverse_information(gram: &[f64], names: &[String]) -> Result<Vec<f64>, IdentError> {
-    let p = names.len();
-    let zero: Vec<&str> = (0..p)
-        .filter(|i| gram[i * p + i].is_nan() || gram[i * p + i] <= 0.0)
-        .map(|i| names[i].as_str())
-        .collect();
-    if !zero.is_empty() {
-        return Err(IdentError::SingularInformation {
-            parameters: zero.join(", "),
-        });
-    }
-    let scale: Vec<f64> = (0..p).map(|i| gram[i * p + i].sqrt()).collect();
-    let scaled = DMatrix::from_fn(p, p, |i, j| gram[i * p + j] / (scale[i] * scale[j]));
-    let eigen = SymmetricEigen::new(scaled);
-    if let Some(k) = (0..p).find(|&k| eigen.eigenvalues[k] < SINGULAR) {
-        let direction = eigen.eigenvectors.column(k);
-        let largest = direction.amax();
-        let involved: Vec<&str> = (0..p)
-            .filter(|&i| direction[i].abs() > 0.1 * largest)
-            .map(|i| names[i].as_str())
-            .collect();
-        return Err(IdentError::SingularInformation {
-            parameters: involved.join(", "),
-        });
-    }
-    let mut inverse = vec![0.0; p * p];
-    for i in 0..p {
-        for j in 0..p {
-            let sum: f64 = (0..p)
-                .map(|k| eigen.eigenvectors[(i, k)] * eigen.eigenvectors[(j, k)] / eigen.eigenvalues[k])
-                .sum();
-            inverse[i * p + j] = sum / (scale[i] * scale[j]);
-        }
-    }
-    Ok(inverse)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// `J' J` by rows of a Jacobian given by columns.
-    fn gram(columns: &[Vec<f64>]) -> Vec<f64> {
-        let product = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).map(|(x, y)| x * y).sum();
-        columns
-            .iter()
-            .flat_map(|a| columns.iter().map(move |b| product(a, b)))
-            .collect()
-    }
-
-    fn columns() -> Vec<Vec<f64>> {
-        let column = |w: f64, size: f64| (0..50).map(|t| size * (w * f64::from(t)).sin()).collect();
-        vec![column(0.1, 1e3), column(0.7, 1.0), column(1.9, 1e-4)]
-    }
-
-    fn names() -> Vec<String> {
-        ["b0", "d1", "f1"].map(String::from).to_vec()
-    }
-
-    #[test]
-    fn inverse_information_is_the_inverse_whatever_the_units() {
-        let g = gram(&columns());
-        let inverse = inverse_information(&g, &names()).unwrap();
-        for i in 0..3 {
-            for j in 0..3 {
-                let product: f64 = (0..3).map(|k| g[i * 3 + k] * inverse[k * 3 + j]).sum();
-                let scale = (g[i * 4] / g[j * 4]).sqrt();
-                assert!((product / scale - f64::from(u8::from(i == j))).abs() < 1e-12);
-            }
-        }
-    }
-
-    #[test]
-    fn an_undetermined_combination_is_named() {
-        let mut dependent = columns();
-        dependent[2] = dependent[0].iter().map(|v| -1e-6 * v).collect();
-        match inverse_information(&gram(&dependent), &names()) {
-            Err(IdentError::SingularInformation { parameters }) => assert_eq!(parameters, "b0, f1"),
-            other => panic!("expected singular information, found {other:?}"),
-        }
-        let mut silent = columns();
-        silent[1].fill(0.0);
-        match inverse_information(&gram(&silent), &names()) {
-            Err(IdentError::SingularInformation { parameters }) => assert_eq!(parameters, "d1"),
-            other => panic!("expected singular information, found {other:?}"),
-        }
-    }
+fn all_residuals(criterion: &Criterion<'_>, theta: &[f64], workspace: &mut Workspace) -> Vec<Vec<f64>> {
+    (0..criterion.data.len())
+        .map(|record| criterion.residuals_of(theta, record, workspace))
+        .collect()
 }

@@ -25,6 +25,8 @@ pub struct Fit {
     pub(crate) initial_state: InitialState,
     pub(crate) termination: Termination,
     pub(crate) start: String,
+    /// Parameters that were fixed, or rest at a bound.
+    pub(crate) held: Vec<bool>,
 }
 
 /// Values on the time axis of a record, from sample `first` on.
@@ -74,8 +76,8 @@ impl Fit {
             .enumerate()
             .map(|(i, name)| {
                 let estimate = match &self.covariance {
-                    Some(c) => Estimate::with_variance(theta[i], c[i * p + i]),
-                    None => Estimate::fixed(theta[i]),
+                    Some(c) if !self.held[i] => Estimate::with_variance(theta[i], c[i * p + i]),
+                    _ => Estimate::fixed(theta[i]),
                 };
                 (name, estimate)
             })
@@ -107,6 +109,11 @@ impl Fit {
         self.initial_state
     }
 
+    /// For each coefficient, whether it was fixed or rests at a bound; it then has no standard error.
+    pub fn held(&self) -> &[bool] {
+        &self.held
+    }
+
     /// How the search ended.
     pub fn termination(&self) -> Termination {
         self.termination
@@ -134,8 +141,13 @@ impl Fit {
         self.loss * (1.0 + ratio) / (1.0 - ratio)
     }
 
+    /// Number p of parameters that were free.
+    pub fn free_count(&self) -> usize {
+        self.held.iter().filter(|held| !**held).count()
+    }
+
     fn parameter_count(&self) -> f64 {
-        self.model.theta().len() as f64
+        self.free_count() as f64
     }
 
     /// The operator's parameters with standard errors.
@@ -226,10 +238,11 @@ impl Fit {
             data: vec![data],
             initial: self.initial_state,
             first,
+            weights: None,
         };
         Ok(Series {
             first,
-            values: criterion.residuals_of(theta, data, &mut Workspace::default()),
+            values: criterion.residuals_of(theta, 0, &mut Workspace::default()),
         })
     }
 

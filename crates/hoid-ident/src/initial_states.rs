@@ -5,37 +5,59 @@
 //! matrix of these responses and `G = Q R`, the states of least squares are `x = -R^-1 Q' eps_0` and the residuals
 //! `eps = (I - Q Q') eps_0`. The responses die away, so that Q is short beside the record.
 //! Source: G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432.
+//!
+//! With a stationary past ([`crate::stationary_past`]) the states of the noise model have a known covariance `sigma^2 L L'`:
+//! they are `L z` with z of variance sigma^2, and z counts as further residuals. G then has the rows `[I; G L]` for them.
 
 use hoid_core::filter::divide_in_place;
 
-use crate::least_squares::{add_scaled, dot};
+use crate::{
+    least_squares::{add_scaled, dot},
+    stationary_past::StationaryPast,
+};
 
 /// Orthonormal basis of the responses to the initial states of a record, and the way back to the states.
 #[derive(Debug, Default)]
 pub(crate) struct FreeResponses {
-    /// Basis vectors from the first residual on; what follows their end is zero.
+    /// Basis vectors: first [`FreeResponses::prior_rows`] of z, then from the first residual on; what follows their end is
+    /// zero.
     q: Vec<Vec<f64>>,
     /// `G[:, kept[k]] = sum over l <= k of Q_l r[k][l]`.
     r: Vec<Vec<f64>>,
     kept: Vec<usize>,
     /// Impulse response of 1/F.
     h: Vec<f64>,
-    /// Number of states of 1/F; those of 1/C come after them.
+    /// Number of states of 1/F; those of the noise model come after them.
     nf: usize,
+    prior_rows: usize,
+}
+
+/// What the past of a record may have been.
+pub(crate) struct Past<'a> {
+    pub c: &'a [f64],
+    /// The polynomial that whitens v together with C.
+    pub d: &'a [f64],
+    pub f: &'a [f64],
+    /// Samples from the first value of w to the first residual.
+    pub lead: usize,
+    /// The past of the noise when it was stationary; else nothing is known of it.
+    pub noise: Option<&'a StationaryPast>,
+    /// Square roots of the weights of the residuals, from the first residual on; none where all count the same.
+    pub weights: Option<&'a [f64]>,
 }
 
 impl FreeResponses {
-    /// Responses of the residuals, from the first one on, to the nf initial values of w and the nc of eps.
+    /// Responses of `rows` residuals, from the first one on, to the nf initial values of w and the states of the noise model.
     ///
     /// Any free response of 1/F is a combination of its impulse response `h` started at the first nf samples (that basis stays
     /// independent even where f_nf = 0).
-    pub fn of(c: &[f64], d: &[f64], f: &[f64], rows: usize) -> Self {
-        let nd = d.len();
+    pub fn of(past: &Past<'_>, rows: usize) -> Self {
+        let Past { c, d, f, lead, .. } = *past;
         let mut columns: Vec<Vec<f64>> = Vec::new();
         let mut h = Vec::new();
         if !f.is_empty() {
-            h = impulse_response(f, rows + nd);
-            let mut s = vec![0.0; (h.len() + nd).min(rows + nd)];
+            h = impulse_response(f, rows + lead);
+            let mut s = vec![0.0; (h.len() + d.len()).min(rows + lead)];
             for (t, st) in s.iter_mut().enumerate() {
                 *st = h.get(t).copied().unwrap_or(0.0);
                 for (i, di) in d.iter().enumerate().take(t) {
@@ -43,29 +65,44 @@ impl FreeResponses {
                 }
             }
             if !c.is_empty() {
-                s.resize(rows + nd, 0.0);
+                s.resize(rows + lead, 0.0);
                 divide_in_place(c, &mut s);
             }
             // w grows with a state, the residual falls with w.
             s.iter_mut().for_each(|v| *v = -*v);
             for i in 0..f.len() {
-                // The state enters i samples after w starts, nd samples before the first residual.
-                columns.push(shifted(&s, i, nd, rows));
+                // The state enters i samples after w starts.
+                columns.push(shifted(&s, i, lead, rows));
             }
         }
-        if !c.is_empty() {
+        let prior_rows = past.noise.map_or(0, StationaryPast::states);
+        let unknown = if past.noise.is_some() { prior_rows } else { c.len() };
+        if unknown > 0 {
             let k = impulse_response(c, rows);
-            for j in 0..c.len() {
-                columns.push(shifted(&k, j, 0, rows));
+            let responses: Vec<Vec<f64>> = (0..unknown).map(|j| shifted(&k, j, 0, rows)).collect();
+            match past.noise {
+                None => columns.extend(responses),
+                Some(noise) => columns.extend((0..unknown).map(|j| noise.response(&responses, j))),
+            }
+        }
+        if let Some(weights) = past.weights {
+            for column in &mut columns {
+                column.iter_mut().zip(weights).for_each(|(x, w)| *x *= w);
             }
         }
         let mut free = Self {
             h,
             nf: f.len(),
+            prior_rows,
             ..Self::default()
         };
         for (index, column) in columns.into_iter().enumerate() {
-            free.orthonormalise(index, column);
+            let mut whole = vec![0.0; prior_rows];
+            if index >= f.len() && prior_rows > 0 {
+                whole[index - f.len()] = 1.0;
+            }
+            whole.extend(column);
+            free.orthonormalise(index, whole);
         }
         free
     }
@@ -96,12 +133,16 @@ impl FreeResponses {
         self.kept.push(index);
     }
 
-    /// Takes the best initial states into the signals: w and v from the first regressed sample on, eps from the first residual.
-    pub fn eliminate(&self, w: &mut [f64], v: &mut [f64], eps: &mut [f64]) {
-        let components: Vec<f64> = self.q.iter().map(|q| dot(q, &eps[..q.len()])).collect();
-        for (q, &component) in self.q.iter().zip(&components) {
+    /// Takes the best initial states into the signals: w and v from the first regressed sample on, eps (weighted, if there are
+    /// weights) from the first residual. Returns z, empty where the past is not random.
+    pub fn eliminate(&self, w: &mut [f64], v: &mut [f64], eps: &mut [f64]) -> Vec<f64> {
+        let components: Vec<f64> = self.basis().map(|q| dot(q, &eps[..q.len()])).collect();
+        for (q, &component) in self.basis().zip(&components) {
             add_scaled(&mut eps[..q.len()], -component, q);
         }
+        let z = (0..self.prior_rows)
+            .map(|i| -self.q.iter().zip(&components).map(|(q, c)| q[i] * c).sum::<f64>())
+            .collect();
         // R x = -Q' eps by back substitution.
         let mut states: Vec<f64> = components.iter().map(|c| -c).collect();
         for k in (0..states.len()).rev() {
@@ -110,18 +151,20 @@ impl FreeResponses {
                 states[l] -= self.r[k][l] * states[k];
             }
         }
-        // States of C do not act on w.
+        // States of the noise model do not act on w.
         for (&index, &x) in self.kept.iter().zip(&states).filter(|(index, _)| **index < self.nf) {
             if index < w.len() {
                 add_scaled(&mut w[index..], x, &self.h);
                 add_scaled(&mut v[index..], -x, &self.h);
             }
         }
+        z
     }
 
-    /// The orthonormal basis; a vector starts at the first residual, and what follows its end is zero.
-    pub fn basis(&self) -> &[Vec<f64>] {
-        &self.q
+    /// The orthonormal basis in the rows of the residuals; a vector starts at the first residual, and what follows its end is
+    /// zero.
+    pub fn basis(&self) -> impl Iterator<Item = &[f64]> {
+        self.q.iter().map(|q| &q[self.prior_rows..])
     }
 }
 

@@ -5,7 +5,9 @@
 //! | [`Estimator`] | structure, orders and options; `fit` |
 //! | `prediction_error` | the criterion of the general model and its gradients |
 //! | `initial_states` | what a record does not say about its past, eliminated exactly |
+//! | `stationary_past` | the noise before the record, when it was stationary |
 //! | `search` | damped Gauss-Newton |
+//! | `objective`, `robust`, `simulation_focus` | bounds and priors, a loss against outliers, models that are to simulate |
 //! | `starts` | where the search begins when nobody says |
 //! | `arx`, `least_squares` | linear regression by QR with column pivoting |
 //! | [`order_search`] | ranges of orders and delay, criteria, the chosen model |
@@ -13,20 +15,29 @@
 //! | [`Fit`] | model, covariance, how it ended; prediction, simulation, frequency response |
 
 mod arx;
+mod checks;
+mod constraint;
 mod error;
 mod estimator;
 mod fit;
+mod information;
 mod initial_states;
 mod least_squares;
+mod objective;
 pub mod order_search;
 mod prediction_error;
+mod robust;
 mod search;
+mod simulation_focus;
 mod starts;
+mod stationary_past;
 pub mod validation;
 
+pub use constraint::{Constraint, Prior};
 pub use error::IdentError;
-pub use estimator::Estimator;
+pub use estimator::{Estimator, Focus};
 pub use fit::{Fit, ResponsePoint, Series};
 pub use order_search::{Candidate, Choice, OrderRanges, choose_orders};
 pub use prediction_error::InitialState;
+pub use robust::Loss;
 pub use search::{Reason, SearchMethod, SearchOptions, Termination};

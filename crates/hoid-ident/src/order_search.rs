@@ -249,7 +249,9 @@ pub fn default_delay_range(sample_time: hoid_model::SampleTime) -> RangeInclusiv
 /// The operator's orders with the defaults of the command line: nk searched, and nd over 1 to 4 for Box-Jenkins.
 pub fn default_operator_ranges(structure: Structure, sample_time: hoid_model::SampleTime) -> OrderRanges {
     let mut ranges = OrderRanges::from(structure.operator_orders(1));
-    ranges.nk = default_delay_range(sample_time);
+    if structure.has_input() {
+        ranges.nk = default_delay_range(sample_time);
+    }
     if structure == Structure::BoxJenkins {
         ranges.nd = 1..=4;
     }

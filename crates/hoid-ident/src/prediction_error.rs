@@ -24,14 +24,24 @@
 //! (the states are optimal), and the Gauss-Newton matrix is `psi' (I - Q Q') psi` (the approximation of L. Kaufman, *BIT* 15
 //! (1975) 49-57). A shifted signal differs from the true derivative only by a free response of 1/F or 1/C, which lies in the
 //! span of Q: shifting stays exact.
+//!
+//! With [`InitialState::Backcast`] the past of w is unknown as before, but that of the noise is stationary
+//! ([`crate::stationary_past`]): the residuals start nd samples earlier, and the state of the noise model counts as r further
+//! residuals z. Where there is no input, A plays the part of D and the residuals start with the record.
+//!
+//! **Weights** multiply the squared residuals; they serve the robust loss.
+
+use std::borrow::Cow;
 
 use hoid_core::{filter::divide_in_place, stability::roots_inside};
 use hoid_model::Orders;
 
 use crate::{
     initial_states::FreeResponses,
+    initial_states::Past,
     least_squares::{add_scaled, dot, solve_symmetric},
     search::Objective,
+    stationary_past::StationaryPast,
 };
 
 /// What is assumed about the time before a record.
@@ -42,6 +52,9 @@ pub enum InitialState {
     /// Nothing is assumed: the initial states of each record are estimated with the parameters.
     #[default]
     Estimate,
+    /// The noise was stationary before the record as well (Box and Jenkins's unconditional sum of squares); of the response
+    /// to the input nothing is assumed.
+    Backcast,
 }
 
 /// Input and output of one record.
@@ -59,6 +72,9 @@ pub(crate) struct Criterion<'a> {
     pub initial: InitialState,
     /// First sample whose residual counts, in each record; at least [`first_residual`].
     pub first: usize,
+    /// Square roots of the weights of the residuals of each record, from the first residual on; none where all count the
+    /// same.
+    pub weights: Option<&'a [Vec<f64>]>,
 }
 
 /// First sample whose residual can be had under the rule of the module, for these orders.
@@ -66,6 +82,8 @@ pub(crate) fn first_residual(orders: &Orders, initial: InitialState) -> usize {
     match initial {
         InitialState::Zero => 0,
         InitialState::Estimate => orders.first_regressed_sample() + orders.nd,
+        InitialState::Backcast if orders.nb == 0 => 0,
+        InitialState::Backcast => orders.first_regressed_sample(),
     }
 }
 
@@ -98,6 +116,13 @@ struct Parts<'t> {
     f: &'t [f64],
 }
 
+/// What a pass over a record found besides its signals.
+struct Passed {
+    free: FreeResponses,
+    noise: Option<StationaryPast>,
+    z: Vec<f64>,
+}
+
 impl<'t> Parts<'t> {
     fn split(orders: &Orders, theta: &'t [f64]) -> Self {
         let (a, rest) = theta.split_at(orders.na);
@@ -119,20 +144,15 @@ impl Criterion<'_> {
         match self.initial {
             InitialState::Zero => 0,
             InitialState::Estimate => self.data.len() * (self.orders.nf + self.orders.nc),
+            // The states of the noise are random numbers with a known variance, not parameters.
+            InitialState::Backcast => self.data.len() * self.orders.nf,
         }
     }
 
     /// Sum of squared residuals, without derivatives.
     #[cfg(test)]
     pub fn sum_of_squares(&self, theta: &[f64], workspace: &mut Workspace) -> f64 {
-        self.data
-            .iter()
-            .map(|data| {
-                self.residual_pass(theta, *data, workspace);
-                let eps = &workspace.eps[workspace.pad + self.first..];
-                dot(eps, eps)
-            })
-            .sum()
+        self.linearise(theta, workspace).sum_of_squares
     }
 
     /// A and B of least squares for the other coefficients of theta, in one step because the residual is affine in them, and
@@ -146,13 +166,14 @@ impl Criterion<'_> {
             descent: vec![0.0; linear],
             gram: vec![0.0; linear * linear],
         };
-        for data in &self.data {
-            let free = self.residual_pass(&theta, *data, workspace);
+        for index in 0..self.data.len() {
+            let passed = self.residual_pass(&theta, index, workspace);
+            let data = &self.data[index];
             let parts = Parts::split(&self.orders, &theta);
             self.filter_output(&parts, *data, workspace);
             self.filter_input(&parts, *data, workspace);
-            let columns = self.columns(data.u.len(), workspace, &[Block::A, Block::B]);
-            self.accumulate(&free, &columns, data.u.len(), workspace, &mut total);
+            let columns = self.columns(&parts, data.u.len(), workspace, &[Block::A, Block::B]);
+            self.accumulate(&passed, &columns, index, workspace, &mut total);
         }
         let best = solve_symmetric(&total.gram, &total.descent)?;
         let gained = dot(&best, &total.descent);
@@ -161,9 +182,29 @@ impl Criterion<'_> {
     }
 
     /// Residuals of one record, from [`Criterion::first`] on.
-    pub fn residuals_of(&self, theta: &[f64], data: Data<'_>, workspace: &mut Workspace) -> Vec<f64> {
-        self.residual_pass(theta, data, workspace);
+    pub fn residuals_of(&self, theta: &[f64], record: usize, workspace: &mut Workspace) -> Vec<f64> {
+        self.residual_pass(theta, record, workspace);
         workspace.eps[workspace.pad + self.first..].to_vec()
+    }
+
+    /// Columns of psi in one record, from the first residual on, with the initial states projected out.
+    pub fn jacobian(&self, theta: &[f64], record: usize, workspace: &mut Workspace) -> Vec<Vec<f64>> {
+        let passed = self.residual_pass(theta, record, workspace);
+        let data = self.data[record];
+        self.gradient_pass(theta, data, workspace);
+        let parts = Parts::split(&self.orders, theta);
+        let project = |(column, sign): (Cow<'_, [f64]>, f64)| {
+            let mut column: Vec<f64> = column.iter().map(|x| sign * x).collect();
+            let components: Vec<f64> = passed.free.basis().map(|q| dot(q, &column[..q.len()])).collect();
+            for (q, component) in passed.free.basis().zip(components) {
+                add_scaled(&mut column[..q.len()], -component, q);
+            }
+            column
+        };
+        self.columns(&parts, data.u.len(), workspace, &Block::ALL)
+            .into_iter()
+            .map(project)
+            .collect()
     }
 
     /// First sample at which w and v are computed.
@@ -171,11 +212,22 @@ impl Criterion<'_> {
         match self.initial {
             InitialState::Zero => 0,
             InitialState::Estimate => self.first - self.orders.nd,
+            InitialState::Backcast => self.first,
         }
     }
 
-    fn residual_pass(&self, theta: &[f64], data: Data<'_>, ws: &mut Workspace) -> FreeResponses {
+    /// The polynomial whose past is that of the noise: D, and A where there is no input.
+    fn noise_poles<'t>(&self, parts: &Parts<'t>) -> &'t [f64] {
+        if self.orders.nb == 0 && self.orders.nd == 0 {
+            parts.a
+        } else {
+            parts.d
+        }
+    }
+
+    fn residual_pass(&self, theta: &[f64], record: usize, ws: &mut Workspace) -> Passed {
         let parts = Parts::split(&self.orders, theta);
+        let data = self.data[record];
         let n = data.u.len();
         let o = &self.orders;
         let pad = o.na.max(o.nb).max(o.nc).max(o.nd).max(o.nf);
@@ -183,7 +235,7 @@ impl Criterion<'_> {
         let regressed = self.first_regressed();
         let start = match self.initial {
             InitialState::Zero => 0,
-            InitialState::Estimate => self.first,
+            InitialState::Estimate | InitialState::Backcast => self.first,
         };
 
         ws.w.fill(0.0);
@@ -212,18 +264,37 @@ impl Criterion<'_> {
         }
         whiten(parts.c, parts.d, &ws.v, &mut ws.eps, pad + start);
 
-        match self.initial {
-            InitialState::Zero => FreeResponses::default(),
-            InitialState::Estimate => {
-                let free = FreeResponses::of(parts.c, parts.d, parts.f, n - self.first);
-                free.eliminate(
-                    &mut ws.w[pad + regressed..],
-                    &mut ws.v[pad + regressed..],
-                    &mut ws.eps[pad + self.first..],
-                );
-                free
-            }
+        let weights = self.weights.map(|all| all[record].as_slice());
+        let eps = &mut ws.eps[pad + self.first..];
+        if let Some(weights) = weights {
+            eps.iter_mut().zip(weights).for_each(|(x, w)| *x *= w);
         }
+        let mut passed = Passed {
+            free: FreeResponses::default(),
+            noise: None,
+            z: Vec::new(),
+        };
+        if self.initial != InitialState::Zero {
+            if self.initial == InitialState::Backcast {
+                passed.noise = StationaryPast::of(parts.c, self.noise_poles(&parts));
+            }
+            let past = Past {
+                c: parts.c,
+                d: parts.d,
+                f: parts.f,
+                lead: self.first - regressed,
+                noise: passed.noise.as_ref(),
+                weights,
+            };
+            passed.free = FreeResponses::of(&past, n - self.first);
+            passed.z = passed
+                .free
+                .eliminate(&mut ws.w[pad + regressed..], &mut ws.v[pad + regressed..], eps);
+        }
+        if let Some(weights) = weights {
+            eps.iter_mut().zip(weights).for_each(|(x, w)| *x /= w);
+        }
+        passed
     }
 
     /// The signals whose shifts are the columns of psi.
@@ -249,7 +320,7 @@ impl Criterion<'_> {
         }
     }
 
-    /// `(D/C) u`.
+    /// `(D/C) u`; with a stationary past u, because each shift is cut at the first residual before it is whitened.
     fn filter_output(&self, parts: &Parts<'_>, data: Data<'_>, ws: &mut Workspace) {
         if self.orders.na == 0 {
             return;
@@ -257,10 +328,10 @@ impl Criterion<'_> {
         let pad = ws.pad;
         ws.scratch[..pad].fill(0.0);
         ws.scratch[pad..].copy_from_slice(data.u);
-        whiten(parts.c, parts.d, &ws.scratch, &mut ws.filtered[Block::A as usize], pad);
+        self.whiten_signal(parts, ws, Block::A, pad);
     }
 
-    /// `(D/(C F)) e(t-nk)`.
+    /// `(D/(C F)) e(t-nk)`; with a stationary past `(1/F) e(t-nk)`.
     fn filter_input(&self, parts: &Parts<'_>, data: Data<'_>, ws: &mut Workspace) {
         let (nk, pad, n) = (self.orders.nk, ws.pad, data.u.len());
         if self.orders.nb == 0 {
@@ -273,65 +344,117 @@ impl Criterion<'_> {
         ws.scratch[..pad + nk].fill(0.0);
         ws.scratch[pad + nk..].copy_from_slice(&data.e[..n - nk]);
         divide_in_place(parts.f, &mut ws.scratch[pad + nk..]);
-        whiten(
-            parts.c,
-            parts.d,
-            &ws.scratch,
-            &mut ws.filtered[Block::B as usize],
-            pad + nk,
-        );
+        self.whiten_signal(parts, ws, Block::B, pad + nk);
+    }
+
+    fn whiten_signal(&self, parts: &Parts<'_>, ws: &mut Workspace, block: Block, from: usize) {
+        let signal = &mut ws.filtered[block as usize];
+        if self.initial == InitialState::Backcast {
+            signal.copy_from_slice(&ws.scratch);
+        } else {
+            whiten(parts.c, parts.d, &ws.scratch, signal, from);
+        }
     }
 
     /// Columns of psi with their signs, in the order of theta, from the first residual on.
-    fn columns<'w>(&self, n: usize, ws: &'w Workspace, blocks: &[Block]) -> Vec<(&'w [f64], f64)> {
+    fn columns<'w>(
+        &self,
+        parts: &Parts<'_>,
+        n: usize,
+        ws: &'w Workspace,
+        blocks: &[Block],
+    ) -> Vec<(Cow<'w, [f64]>, f64)> {
         let (first, end) = (ws.pad + self.first, ws.pad + n);
-        blocks
-            .iter()
-            .flat_map(|&block| {
-                let (from, count, sign) = block.shifts(&self.orders);
-                let signal = &ws.filtered[block as usize];
-                (from..from + count).map(move |j| (&signal[first - j..end - j], sign))
-            })
-            .collect()
+        let mut columns = Vec::new();
+        for &block in blocks {
+            let (from, count, sign) = block.shifts(&self.orders);
+            let signal = &ws.filtered[block as usize];
+            for j in from..from + count {
+                let shifted = &signal[first - j..end - j];
+                let late = self.initial == InitialState::Backcast && matches!(block, Block::A | Block::B);
+                let column = if late {
+                    let mut whitened = vec![0.0; shifted.len()];
+                    whiten(parts.c, parts.d, shifted, &mut whitened, 0);
+                    Cow::Owned(whitened)
+                } else {
+                    Cow::Borrowed(shifted)
+                };
+                columns.push((column, sign));
+            }
+        }
+        columns
     }
 
     /// Adds one record to the normal equations of these columns.
     fn accumulate(
         &self,
-        free: &FreeResponses,
-        columns: &[(&[f64], f64)],
-        n: usize,
+        passed: &Passed,
+        columns: &[(Cow<'_, [f64]>, f64)],
+        record: usize,
         ws: &Workspace,
         total: &mut Linearisation,
     ) {
-        let eps = &ws.eps[ws.pad + self.first..ws.pad + n];
-        total.sum_of_squares += dot(eps, eps);
-        let p = columns.len();
-        // Components of each column in the space of the initial states.
-        let inside: Vec<Vec<f64>> = columns
+        let Some(all) = self.weights else {
+            return add_products(passed, columns, &ws.eps[ws.pad + self.first..], total);
+        };
+        let weighted = |x: &[f64]| -> Vec<f64> { x.iter().zip(&all[record]).map(|(x, w)| x * w).collect() };
+        let columns: Vec<(Cow<'_, [f64]>, f64)> = columns
             .iter()
-            .map(|(column, sign)| free.basis().iter().map(|q| sign * dot(q, &column[..q.len()])).collect())
+            .map(|(x, sign)| (Cow::Owned(weighted(x)), *sign))
             .collect();
-        for i in 0..p {
-            let (column, sign) = columns[i];
-            total.descent[i] += sign * dot(column, eps);
-            for j in 0..=i {
-                let (other, other_sign) = columns[j];
-                let product = sign * other_sign * dot(column, other) - dot(&inside[i], &inside[j]);
-                total.gram[i * p + j] += product;
-                if i != j {
-                    total.gram[j * p + i] += product;
-                }
+        add_products(passed, &columns, &weighted(&ws.eps[ws.pad + self.first..]), total);
+    }
+
+    /// What the penalty on the stationary past adds to the descent.
+    fn add_penalty(&self, passed: &Passed, total: &mut Linearisation) {
+        let Some(noise) = &passed.noise else { return };
+        let o = &self.orders;
+        total.sum_of_squares += dot(&passed.z, &passed.z);
+        let (poles, poles_at) = if o.nb == 0 && o.nd == 0 {
+            (o.na, 0)
+        } else {
+            (o.nd, o.na + o.nb + o.nc)
+        };
+        let (by_c, by_d) = noise.descent(&passed.z, o.nc, poles);
+        add_scaled(&mut total.descent[o.na + o.nb..], 1.0, &by_c);
+        add_scaled(&mut total.descent[poles_at..], 1.0, &by_d);
+    }
+}
+
+/// Products of the residuals and the columns of psi, with the initial states projected out.
+fn add_products(passed: &Passed, columns: &[(Cow<'_, [f64]>, f64)], eps: &[f64], total: &mut Linearisation) {
+    total.sum_of_squares += dot(eps, eps);
+    let p = columns.len();
+    // Components of each column in the space of the initial states.
+    let inside: Vec<Vec<f64>> = columns
+        .iter()
+        .map(|(column, sign)| {
+            let component = |q: &[f64]| sign * dot(q, &column[..q.len()]);
+            passed.free.basis().map(component).collect()
+        })
+        .collect();
+    for i in 0..p {
+        let (column, sign) = &columns[i];
+        total.descent[i] += sign * dot(column, eps);
+        for j in 0..=i {
+            let (other, other_sign) = &columns[j];
+            let product = sign * other_sign * dot(column, other) - dot(&inside[i], &inside[j]);
+            total.gram[i * p + j] += product;
+            if i != j {
+                total.gram[j * p + i] += product;
             }
         }
     }
 }
 
 impl Objective for Criterion<'_> {
-    /// Roots of C and F inside the unit circle.
+    /// Roots of C and F inside the unit circle; a stationary past needs those of the noise poles there too.
     fn is_feasible(&self, theta: &[f64]) -> bool {
         let parts = Parts::split(&self.orders, theta);
-        theta.iter().all(|v| v.is_finite()) && roots_inside(parts.f, 1.0) && roots_inside(parts.c, 1.0)
+        theta.iter().all(|v| v.is_finite())
+            && roots_inside(parts.f, 1.0)
+            && roots_inside(parts.c, 1.0)
+            && (self.initial != InitialState::Backcast || roots_inside(self.noise_poles(&parts), 1.0))
     }
 
     fn linearise(&self, theta: &[f64], workspace: &mut Workspace) -> Linearisation {
@@ -341,11 +464,12 @@ impl Objective for Criterion<'_> {
             descent: vec![0.0; p],
             gram: vec![0.0; p * p],
         };
-        for data in &self.data {
-            let free = self.residual_pass(theta, *data, workspace);
+        for (index, data) in self.data.iter().enumerate() {
+            let passed = self.residual_pass(theta, index, workspace);
             self.gradient_pass(theta, *data, workspace);
-            let columns = self.columns(data.u.len(), workspace, &Block::ALL);
-            self.accumulate(&free, &columns, data.u.len(), workspace, &mut total);
+            let columns = self.columns(&Parts::split(&self.orders, theta), data.u.len(), workspace, &Block::ALL);
+            self.accumulate(&passed, &columns, index, workspace, &mut total);
+            self.add_penalty(&passed, &mut total);
         }
         total
     }
@@ -483,6 +607,21 @@ mod tests {
                 },
                 vec![0.3, -0.4, 0.1, -0.9],
             ),
+            (
+                Orders {
+                    na: 2,
+                    nc: 1,
+                    ..Orders::default()
+                },
+                vec![-1.5, 0.6, 0.4],
+            ),
+            (
+                Orders {
+                    nc: 2,
+                    ..Orders::default()
+                },
+                vec![0.5, 0.2],
+            ),
         ]
     }
 
@@ -492,13 +631,14 @@ mod tests {
             orders,
             data,
             initial,
+            weights: None,
         }
     }
 
     #[test]
     fn gradient_agrees_with_finite_differences_in_both_modes() {
         let (e, u) = record(300);
-        for initial in [InitialState::Zero, InitialState::Estimate] {
+        for initial in [InitialState::Zero, InitialState::Estimate, InitialState::Backcast] {
             for (orders, theta) in cases() {
                 let data = vec![
                     Data { e: &e, u: &u },
@@ -545,7 +685,7 @@ mod tests {
             ..Orders::default()
         };
         let c = criterion(orders, vec![Data { e: &e, u: &u }], InitialState::Zero);
-        let eps = c.residuals_of(&theta, c.data[0], &mut Workspace::default());
+        let eps = c.residuals_of(&theta, 0, &mut Workspace::default());
         // Written out sample by sample with zeros before the record.
         let get = |x: &[f64], t: usize, lag: usize| if t >= lag { x[t - lag] } else { 0.0 };
         let (mut w, mut v, mut r) = (vec![], vec![], vec![]);
@@ -564,10 +704,18 @@ mod tests {
         let (e, u) = record(300);
         for (orders, theta) in cases() {
             let c = criterion(orders, vec![Data { e: &e, u: &u }], InitialState::Estimate);
-            let eps = c.residuals_of(&theta, c.data[0], &mut Workspace::default());
+            let eps = c.residuals_of(&theta, 0, &mut Workspace::default());
             let parts = Parts::split(&orders, &theta);
-            let free = FreeResponses::of(parts.c, parts.d, parts.f, eps.len());
-            assert_eq!(free.basis().len(), orders.nf + orders.nc, "{orders}");
+            let past = Past {
+                c: parts.c,
+                d: parts.d,
+                f: parts.f,
+                lead: orders.nd,
+                noise: None,
+                weights: None,
+            };
+            let free = FreeResponses::of(&past, eps.len());
+            assert_eq!(free.basis().count(), orders.nf + orders.nc, "{orders}");
             for q in free.basis() {
                 assert!(dot(q, &eps[..q.len()]).abs() < 1e-12);
             }
@@ -596,16 +744,79 @@ mod tests {
         };
         let c = criterion(orders, vec![data], InitialState::Estimate);
         assert!(
-            c.residuals_of(&theta, data, &mut Workspace::default())
+            c.residuals_of(&theta, 0, &mut Workspace::default())
                 .iter()
                 .all(|v| v.abs() < 1e-13)
         );
         let zero = criterion(orders, vec![data], InitialState::Zero);
         assert!(
-            zero.residuals_of(&theta, data, &mut Workspace::default())
+            zero.residuals_of(&theta, 0, &mut Workspace::default())
                 .iter()
                 .any(|v| v.abs() > 1e-2)
         );
+    }
+
+    #[test]
+    fn the_unconditional_sum_of_squares_is_that_of_the_covariance_matrix() {
+        let (_, u) = record(60);
+        let orders = Orders {
+            na: 2,
+            nc: 1,
+            ..Orders::default()
+        };
+        let theta = vec![-1.5, 0.7, 0.4];
+        let c = criterion(orders, vec![Data { e: &[], u: &u }], InitialState::Backcast);
+        let ours = c.linearise(&theta, &mut Workspace::default()).sum_of_squares;
+        // Autocovariance of C/A eps from its impulse response; the poles have the modulus 0.84, 0.84^400 = 1e-30.
+        let mut h = vec![1.0, 0.4 + 1.5];
+        for t in 2..800 {
+            h.push(1.5 * h[t - 1] - 0.7 * h[t - 2]);
+        }
+        let r: Vec<f64> = (0..60).map(|k| dot(&h[k..], &h[..800 - k])).collect();
+        let sigma = nalgebra::DMatrix::from_fn(60, 60, |i, j| r[i.abs_diff(j)]);
+        let v = nalgebra::DVector::from_column_slice(&u);
+        let exact = v.dot(&sigma.cholesky().unwrap().solve(&v));
+        assert!((ours - exact).abs() < 1e-11 * exact, "{ours} {exact}");
+    }
+
+    #[test]
+    fn weights_act_as_a_diagonal_matrix_and_keep_the_gradient_exact() {
+        let (e, u) = record(200);
+        for initial in [InitialState::Zero, InitialState::Estimate, InitialState::Backcast] {
+            for (orders, theta) in cases().into_iter().take(4) {
+                let plain = criterion(orders, vec![Data { e: &e, u: &u }], initial);
+                let weights = vec![
+                    (plain.first..200)
+                        .map(|t| if t % 7 == 0 { 0.3 } else { 1.0 })
+                        .collect::<Vec<f64>>(),
+                ];
+                let weighted = Criterion {
+                    weights: Some(&weights),
+                    ..plain.clone()
+                };
+                let mut ws = Workspace::default();
+                let exact = weighted.linearise(&theta, &mut ws);
+                let eps = weighted.residuals_of(&theta, 0, &mut ws);
+                let by_hand: f64 = eps.iter().zip(&weights[0]).map(|(e, w)| (e * w) * (e * w)).sum();
+                if initial != InitialState::Backcast {
+                    assert!((by_hand - exact.sum_of_squares).abs() < 1e-12 * by_hand);
+                }
+                for i in 0..theta.len() {
+                    let h = 1e-5;
+                    let mut at = |delta: f64| {
+                        let mut shifted = theta.clone();
+                        shifted[i] += delta;
+                        weighted.sum_of_squares(&shifted, &mut ws)
+                    };
+                    let slope = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
+                    let scale = exact.gram[i * theta.len() + i].sqrt() * exact.sum_of_squares.sqrt();
+                    assert!(
+                        (slope + 2.0 * exact.descent[i]).abs() < 1e-7 * scale,
+                        "{initial:?} {orders}"
+                    );
+                }
+            }
+        }
     }
 
     #[test]

@@ -432,6 +432,7 @@ mod tests {
             data: vec![Data { e, u }],
             initial: InitialState::Estimate,
             first: first_residual(&orders(), InitialState::Estimate),
+            weights: None,
         };
         minimise(
             &criterion,
@@ -560,6 +561,7 @@ mod tests {
             data: vec![Data { e: &e, u: &u }],
             initial: InitialState::Zero,
             first: 0,
+            weights: None,
         };
         let limited = SearchOptions {
             max_iterations: 1,

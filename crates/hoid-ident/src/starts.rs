@@ -143,7 +143,7 @@ fn steiglitz_mcbride(criterion: &Criterion<'_>, mut f: Vec<f64>) -> Option<Vec<f
 }
 
 /// The same polynomial with each root outside the circle replaced by the inverse of its conjugate.
-fn reflected_inside(coefficients: &[f64]) -> Option<Vec<f64>> {
+pub(crate) fn reflected_inside(coefficients: &[f64]) -> Option<Vec<f64>> {
     if roots_inside(coefficients, 1.0) {
         return Some(coefficients.to_vec());
     }
@@ -188,7 +188,8 @@ fn complete(criterion: &Criterion<'_>, f: &[f64], workspace: &mut Workspace) -> 
         let left: Vec<Vec<f64>> = white
             .data
             .iter()
-            .map(|data| white.residuals_of(&start, *data, workspace))
+            .enumerate()
+            .map(|(index, _)| white.residuals_of(&start, index, workspace))
             .collect();
         let (c, d) = noise_model(&left, o.nc, o.nd);
         theta.clone_from(&best);

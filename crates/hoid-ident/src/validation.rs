@@ -79,8 +79,8 @@ impl Fit {
                 nrmse_prediction: nrmse_fit(output, &predicted),
             },
             autocorrelation: autocorrelation(&residuals, LARGEST_LAG),
-            cross_correlation: match record.input().get(first..) {
-                Some(input) => cross_correlation(&residuals, input, LARGEST_LAG),
+            cross_correlation: match record.input_channel() {
+                Some(input) => cross_correlation(&residuals, &input.values[first..], LARGEST_LAG),
                 None => Correlation {
                     lags: Vec::new(),
                     values: Vec::new(),

@@ -17,10 +17,11 @@ const LARGEST_FACTOR: usize = 100;
 pub(crate) fn record_of(table: Table<'_>, options: &ReadOptions) -> Result<ReadRecord, IoError> {
     let file = table.source.file().to_owned();
     let names = table.names();
-    let input = options.input.resolve(&names, &file)?;
-    let output = options.output.resolve(&names, &file)?;
-    if input == output {
-        let asked = options.input.to_string();
+    let resolve = |expression: &ColumnExpression| expression.resolve(&names, &file);
+    let input = options.input.as_ref().map(resolve).transpose()?;
+    let output = resolve(&options.output)?;
+    if input == Some(output) {
+        let asked = options.output.to_string();
         return Err(IoError::SameColumn { file, asked });
     }
     let time = names.iter().position(|name| *name == "t");
@@ -30,7 +31,8 @@ pub(crate) fn record_of(table: Table<'_>, options: &ReadOptions) -> Result<ReadR
     }
     let mut reader = Reader { table, options, file };
     let grid = reader.grid(time)?;
-    reader.record(grid, time, [(input, &options.input), (output, &options.output)])
+    let input = input.zip(options.input.as_ref());
+    reader.record(grid, time, input, (output, &options.output))
 }
 
 /// Where the samples of the record come from.
@@ -309,10 +311,12 @@ impl Reader<'_> {
         mut self,
         grid: Grid,
         time: Option<usize>,
-        signals: [(Signal, &ColumnExpression); 2],
+        input: Option<(Signal, &ColumnExpression)>,
+        output: (Signal, &ColumnExpression),
     ) -> Result<ReadRecord, IoError> {
+        let signals = || input.into_iter().chain([output]);
         let used = |column: usize| {
-            signals.iter().any(|(signal, _)| match *signal {
+            signals().any(|(signal, _)| match signal {
                 Signal::Column(a) | Signal::Negative(a) => a == column,
                 Signal::Difference(a, b) => a == column || b == column,
             })
@@ -340,15 +344,18 @@ impl Reader<'_> {
                 }
             }
         }
-        let [input, output] = signals.map(|(signal, expression)| combine(signal, expression, &columns));
-        for (signal, _) in signals {
+        let of = |(signal, expression): (Signal, &ColumnExpression)| combine(signal, expression, &columns);
+        let channels = (input.map(of), of(output));
+        for (signal, _) in signals() {
             if let Signal::Column(column) = signal {
                 columns[column] = None;
             }
         }
-        let mut record = Record::new(grid.sample_time, input, output)
-            .map_err(|source| self.model(source))?
-            .starting_at(grid.start_s);
+        let record = match channels {
+            (Some(input), output) => Record::new(grid.sample_time, input, output),
+            (None, output) => Record::of_output(grid.sample_time, output),
+        };
+        let mut record = record.map_err(|source| self.model(source))?.starting_at(grid.start_s);
         for channel in columns.into_iter().flatten() {
             record = record.with_channel(channel).map_err(|source| self.model(source))?;
         }

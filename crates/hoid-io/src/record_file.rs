@@ -50,8 +50,8 @@ pub struct Repair {
 /// How to read a record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadOptions {
-    /// Input of the person; `e` by default.
-    pub input: ColumnExpression,
+    /// Input of the person; `e` by default. `None` reads an output alone, for the structures without input.
+    pub input: Option<ColumnExpression>,
     /// Output of the person; `u` by default.
     pub output: ColumnExpression,
     /// Sampling frequency in Hz. It wins over the column t, which then gives only the time of the first sample (0 when there
@@ -66,7 +66,7 @@ pub struct ReadOptions {
 impl Default for ReadOptions {
     fn default() -> Self {
         Self {
-            input: ColumnExpression::column("e"),
+            input: Some(ColumnExpression::column("e")),
             output: ColumnExpression::column("u"),
             sampling_hz: None,
             span_s: (None, None),

@@ -47,7 +47,7 @@ impl Desk {
 
 fn options(input: &str, output: &str) -> ReadOptions {
     ReadOptions {
-        input: input.parse().unwrap(),
+        input: Some(input.parse().unwrap()),
         output: output.parse().unwrap(),
         ..ReadOptions::default()
     }
@@ -504,7 +504,7 @@ fn damaged_files_never_panic() {
             }
         }
         let options = ReadOptions {
-            input: ["e", "u-e", "-e"][draw.below(3)].parse().unwrap(),
+            input: Some(["e", "u-e", "-e"][draw.below(3)].parse().unwrap()),
             sampling_hz: [None, None, Some(100.0)][draw.below(3)],
             span_s: [(None, None), (Some(0.0), None), (Some(-1.0), Some(1.5))][draw.below(3)],
             repair: Repair {

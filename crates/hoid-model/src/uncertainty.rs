@@ -167,6 +167,12 @@ pub fn remnant_estimate(
     how: RemnantDiscretisation,
 ) -> Result<RemnantEstimate, NotConvertible> {
     let d = model.d();
+    if !model.a().is_empty() {
+        return Err(NotConvertible::NotARemnantFilter {
+            order: d.len(),
+            reason: "the noise passes through A as well".to_owned(),
+        });
+    }
     let found = remnant::retrieve(d, innovation_sd, model.sample_time(), how)?;
     let [by_time, by_gain] = remnant::retrieval_jacobian(d, innovation_sd, model.sample_time(), how)?;
     let orders = model.orders();

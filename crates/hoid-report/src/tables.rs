@@ -221,7 +221,7 @@ pub fn no_remnant(fit: &Fit) -> Option<String> {
 /// How the fit came about: label and text.
 pub fn course(fit: &Fit, records: &[Record]) -> Vec<Value> {
     let end = fit.termination();
-    let (n, p, s) = (fit.residual_count(), fit.parameters().len(), fit.state_count());
+    let (n, p, s) = (fit.residual_count(), fit.free_count(), fit.state_count());
     let unit = output_unit(records);
     let divisor = n.saturating_sub(p + s);
     let initial = match fit.initial_state() {
@@ -230,6 +230,12 @@ pub fn course(fit: &Fit, records: &[Record]) -> Vec<Value> {
             "conditional on the first samples of each record; no initial states are needed".to_owned()
         }
         InitialState::Estimate => format!("estimated with the parameters, {s} in all"),
+        InitialState::Backcast if s == 0 => "backcast: the noise was stationary before each record".to_owned(),
+        InitialState::Backcast => {
+            format!(
+                "backcast: the noise was stationary before each record; {s} states of the input's response estimated"
+            )
+        }
     };
     let steps = match end.iterations {
         1 => "1 step".to_owned(),

@@ -211,7 +211,7 @@ fn a_start_from_rest_biases_the_gains_and_estimated_states_do_not() {
     let errors = |initial_state: InitialState| -> Vec<f64> {
         let structure = Structure::BoxJenkins;
         let estimator = Estimator {
-            initial_state,
+            initial_state: Some(initial_state),
             ..Estimator::new(structure, structure.operator_orders(NK))
         };
         let relative = |r: &Record| 100.0 * (estimator.fit(std::slice::from_ref(r)).unwrap().model().b()[0] / b0 - 1.0);

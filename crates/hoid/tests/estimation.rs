@@ -166,7 +166,7 @@ fn other_orders_find_the_truth_from_own_starts() {
         let record = open_loop(b, c, d, f, 6000);
         for initial_state in [InitialState::Estimate, InitialState::Zero] {
             let fit = Estimator {
-                initial_state,
+                initial_state: Some(initial_state),
                 ..Estimator::new(Structure::BoxJenkins, orders)
             }
             .fit(std::slice::from_ref(&record))
@@ -258,7 +258,7 @@ fn no_length_and_no_order_makes_it_panic() {
                             }
                         };
                         let estimator = Estimator {
-                            initial_state,
+                            initial_state: Some(initial_state),
                             ..Estimator::new(structure, orders)
                         };
                         if let Ok(fit) = estimator.fit(&record) {

@@ -40,7 +40,7 @@ fn trials(directory: &PathBuf, person: &str, plant: &str) -> Vec<Record> {
         .collect();
     files.sort();
     let options = ReadOptions {
-        input: "r-y".parse().unwrap(),
+        input: Some("r-y".parse().unwrap()),
         // Two periods of the disturbance after the ramp.
         span_s: (Some(5.0), Some(45.0)),
         ..ReadOptions::default()

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use hoid_ident::{
-    Choice, Estimator, Fit, SearchOptions,
+    Choice, Estimator, Fit, Loss, SearchOptions,
     order_search::{Criterion, OrderRanges, choose_orders_with},
 };
 use hoid_io::{ReadOptions, Repair, make_directory, read_record, write_atomically};
@@ -21,12 +21,9 @@ use crate::{
 };
 
 pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
-    let records = args
-        .records
-        .iter()
-        .map(|path| read(path, &args.read))
-        .collect::<Result<Vec<_>, _>>()?;
     let structure = Structure::from(args.structure);
+    let read = |path: &PathBuf| read(path, &args.read, structure.has_input());
+    let records = args.records.iter().map(read).collect::<Result<Vec<_>, _>>()?;
     let ranges = orders::ranges(
         structure,
         args.orders.as_deref(),
@@ -36,7 +33,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let (fit, choice) = fit(args, structure, &ranges, &records)?;
     // Read before anything is written: a bad validation file leaves nothing behind.
     let validation = match &args.validate {
-        Some(path) => Some((path.display().to_string(), fit.quality(&[read(path, &args.read)?])?)),
+        Some(path) => Some((path.display().to_string(), fit.quality(&[read(path)?])?)),
         None => None,
     };
     let files: Vec<String> = args.records.iter().map(|p| p.display().to_string()).collect();
@@ -94,10 +91,10 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
 }
 
 /// Reads a record as the options say; what was repaired or left out goes to standard error.
-fn read(path: &Path, args: &ReadArgs) -> Result<Record, CliError> {
+fn read(path: &Path, args: &ReadArgs, with_input: bool) -> Result<Record, CliError> {
     let column = |text: &str| text.parse().map_err(CliError::from);
     let options = ReadOptions {
-        input: column(&args.input)?,
+        input: if with_input { Some(column(&args.input)?) } else { None },
         output: column(&args.output)?,
         sampling_hz: args.fs,
         span_s: (args.from, args.to),
@@ -123,9 +120,17 @@ fn fit(
     let mut estimator = Estimator {
         initial_state: args.initial_state.into(),
         search: SearchOptions {
+            method: args.search_method.into(),
             max_iterations: args.max_iterations,
-            ..SearchOptions::default()
+            tolerance: args.tolerance,
         },
+        constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
+        priors: orders::priors(args.prior.as_deref())?,
+        loss: args
+            .robust
+            .map_or(Loss::Quadratic, |threshold| Loss::Huber { threshold }),
+        focus: args.focus.into(),
+        stable: args.stable,
         ..Estimator::new(structure, combinations[0])
     };
     if let [orders] = combinations.as_slice() {
@@ -185,9 +190,33 @@ fn settings(args: &IdentifyArgs, structure: Structure, ranges: &OrderRanges) -> 
             format!("{} to {}", or_all(read.from, "start"), or_all(read.to, "end")),
         ),
         ("detrend".to_owned(), format!("{:?}", read.detrend).to_lowercase()),
+        ("focus".to_owned(), format!("{:?}", args.focus).to_lowercase()),
         ("start".to_owned(), args.start.clone().unwrap_or("own".to_owned())),
+        (
+            "search".to_owned(),
+            format!(
+                "{}, relative tolerance {}",
+                format!("{:?}", args.search_method).to_lowercase(),
+                args.tolerance
+            ),
+        ),
         ("largest number of steps".to_owned(), args.max_iterations.to_string()),
     ];
+    let given = [("fixed", &args.fix), ("bounds", &args.bound), ("prior", &args.prior)];
+    for (name, text) in given {
+        if let Some(text) = text {
+            list.push((name.to_owned(), text.clone()));
+        }
+    }
+    if let Some(threshold) = args.robust {
+        list.push((
+            "robust loss".to_owned(),
+            format!("Huber, {threshold} standard deviations"),
+        ));
+    }
+    if args.stable {
+        list.push(("stable models only".to_owned(), "yes".to_owned()));
+    }
     if read.resample || read.fill {
         list.push((
             "repair".to_owned(),

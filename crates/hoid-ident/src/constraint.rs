@@ -1,0 +1,40 @@
+//! What is known of a parameter beforehand: a value, a range, or a guess with a weight.
+
+/// A parameter that is not free.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Constraint {
+    /// Held at this value.
+    Fixed(f64),
+    /// Kept between a lower and an upper bound; either may be infinite.
+    Between(f64, f64),
+}
+
+impl Constraint {
+    /// Lower and upper bound; equal for a fixed parameter.
+    pub fn limits(self) -> (f64, f64) {
+        match self {
+            Self::Fixed(value) => (value, value),
+            Self::Between(low, high) => (low, high),
+        }
+    }
+
+    /// True for numbers that are in order: a finite value, or a lower bound that does not exceed the upper one.
+    pub fn is_sound(self) -> bool {
+        match self {
+            Self::Fixed(value) => value.is_finite(),
+            Self::Between(low, high) => low <= high,
+        }
+    }
+}
+
+/// A guess theta* of one parameter: the loss grows by `weight (theta - theta*)^2`.
+///
+/// A weight of `sigma^2 / (N s^2)` stands for knowledge of theta* with the standard deviation s (innovation variance sigma^2, N
+/// residuals).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prior {
+    /// The guess theta*.
+    pub value: f64,
+    /// Its weight in the loss, in units of the loss over those of the parameter squared.
+    pub weight: f64,
+}

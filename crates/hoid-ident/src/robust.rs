@@ -1,0 +1,117 @@
+//! A loss that outliers cannot dominate.
+//!
+//! Huber's loss of a residual in units of the scale s, `rho(r) = r^2/2` for `|r| <= k` and `k |r| - k^2/2` beyond (P. J. Huber,
+//! *Robust Statistics*, 1981, section 7.8), is minimised by iteratively reweighted least squares: the weights
+//! `w = min(1, k/|r|)` of one search are those of the residuals that the search before left. Each round lowers the loss. The
+//! scale is the median absolute residual over 0.6745, from the residuals of the round before; it is held after [`SCALES`] rounds,
+//! so that the rounds settle.
+//!
+//! Covariance (Huber, eq. 7.6.8, for residuals that are independent of the gradient):
+//! `s^2 kappa (psi' psi)^-1`, `kappa = mean(rho'^2) / mean(rho'')^2`, with the unweighted psi.
+
+/// Rounds in which the scale is estimated anew.
+const SCALES: usize = 10;
+
+/// Largest number of rounds.
+pub(crate) const ROUNDS: usize = 50;
+
+/// How a residual counts.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Loss {
+    /// By its square.
+    #[default]
+    Quadratic,
+    /// By its square up to `threshold` times the scale of the residuals, linearly beyond (Huber). 1.345 keeps 95 % of the
+    /// efficiency where the noise is Gaussian after all.
+    Huber {
+        /// Threshold k in units of the scale.
+        threshold: f64,
+    },
+}
+
+/// Weights of Huber's loss over the rounds.
+#[derive(Debug)]
+pub(crate) struct Reweighting {
+    threshold: f64,
+    pub scale: f64,
+    round: usize,
+}
+
+impl Reweighting {
+    /// Before the first round.
+    pub fn new(threshold: f64) -> Self {
+        Self {
+            threshold,
+            scale: f64::NAN,
+            round: 0,
+        }
+    }
+
+    /// Square roots of the weights for the next round, by the residuals of each record. `None` when the residuals have no
+    /// scale (half of them are zero).
+    pub fn next(&mut self, residuals: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+        if self.round < SCALES {
+            self.scale = median_absolute(residuals) / 0.674_489_750_196_081_7;
+        }
+        self.round += 1;
+        let bound = self.threshold * self.scale;
+        let weight = |r: &f64| (bound / r.abs()).min(1.0).sqrt();
+        (bound > 0.0).then(|| residuals.iter().map(|r| r.iter().map(weight).collect()).collect())
+    }
+
+    /// Factor of `(psi' psi)^-1` in the covariance, by n - p degrees of freedom.
+    pub fn variance(&self, residuals: &[Vec<f64>], unknowns: usize) -> f64 {
+        let (mut n, mut inside, mut square) = (0_usize, 0_usize, 0.0);
+        for r in residuals.iter().flatten().map(|r| r / self.scale) {
+            n += 1;
+            inside += usize::from(r.abs() <= self.threshold);
+            square += r.clamp(-self.threshold, self.threshold).powi(2);
+        }
+        let (n, inside) = (n as f64, inside as f64);
+        self.scale * self.scale * (square / (n - unknowns as f64)) / (inside / n).powi(2)
+    }
+}
+
+fn median_absolute(residuals: &[Vec<f64>]) -> f64 {
+    let mut sizes: Vec<f64> = residuals.iter().flatten().map(|r| r.abs()).collect();
+    if sizes.is_empty() {
+        return 0.0;
+    }
+    let middle = sizes.len() / 2;
+    *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_fall_beyond_the_threshold_only() {
+        let mut rounds = Reweighting::new(1.345);
+        let residuals = vec![vec![0.5, -1.0, 1.5], vec![100.0, -0.2]];
+        let weights = rounds.next(&residuals).unwrap();
+        assert!((rounds.scale - 1.0 / 0.674_489_750_196_081_7).abs() < 1e-12);
+        assert_eq!(weights[0], [1.0, 1.0, 1.0]);
+        assert!((weights[1][0].powi(2) - 1.345 * rounds.scale / 100.0).abs() < 1e-12);
+        assert!(Reweighting::new(1.345).next(&[vec![0.0; 5]]).is_none());
+    }
+
+    #[test]
+    fn gaussian_residuals_lose_five_per_cent_of_efficiency() {
+        // Sums of twelve uniform numbers are normal to a per cent.
+        let mut state = 3_u64;
+        let mut uniform = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let r: Vec<f64> = (0..200_000)
+            .map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0)
+            .collect();
+        let mut rounds = Reweighting::new(1.345);
+        rounds.next(&[r.clone()]);
+        let variance = rounds.variance(&[r], 0);
+        assert!((variance - 1.0 / 0.95).abs() < 0.02, "{variance}");
+    }
+}

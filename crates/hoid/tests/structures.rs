@@ -1,0 +1,411 @@
+//! All structures of Table 5.1 find the truth from their own starts, and each option does what it says.
+#![allow(clippy::unwrap_used)]
+
+use hoid::{
+    ident::{Constraint, Focus, IdentError, Loss, Prior, SearchMethod},
+    prelude::*,
+};
+
+/// Normal deviates from sums of uniform numbers.
+struct Draw(u64);
+
+impl Draw {
+    fn normal(&mut self) -> f64 {
+        (0..12)
+            .map(|_| {
+                self.0 = self
+                    .0
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
+                (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+            })
+            .sum::<f64>()
+            - 6.0
+    }
+}
+
+/// Polynomials of a textbook system with the same names as in the model.
+#[derive(Clone, Copy, Default)]
+struct Truth<'a> {
+    a: &'a [f64],
+    b: &'a [f64],
+    c: &'a [f64],
+    d: &'a [f64],
+    f: &'a [f64],
+}
+
+const POLES: &[f64] = &[-1.5, 0.7];
+const GAINS: &[f64] = &[1.0, 0.5];
+
+impl Truth<'_> {
+    fn of(structure: Structure) -> Self {
+        let keep = |letter: char, p: &'static [f64]| {
+            if structure.polynomials().contains(letter) {
+                p
+            } else {
+                &[]
+            }
+        };
+        let general = structure == Structure::General;
+        Truth {
+            a: if general { &[-0.6] } else { keep('a', POLES) },
+            b: keep('b', GAINS),
+            c: keep('c', &[0.5]),
+            d: keep('d', &[-0.8]),
+            f: keep('f', POLES),
+        }
+    }
+
+    fn orders(&self) -> Orders {
+        Orders {
+            na: self.a.len(),
+            nb: self.b.len(),
+            nc: self.c.len(),
+            nd: self.d.len(),
+            nf: self.f.len(),
+            nk: usize::from(!self.b.is_empty()),
+        }
+    }
+
+    fn theta(&self) -> Vec<f64> {
+        [self.a, self.b, self.c, self.d, self.f].concat()
+    }
+
+    /// A record of n samples that is cut out of a longer one.
+    fn record(&self, n: usize, noise: f64, seed: u64) -> Record {
+        self.record_behind(500, n, noise, seed)
+    }
+
+    /// A record of n samples behind a run-in, with white input of unit variance and innovations of the given size.
+    fn record_behind(&self, run_in: usize, n: usize, noise: f64, seed: u64) -> Record {
+        let mut draw = Draw(seed);
+        let past = |x: &[f64], p: &[f64], first: usize| -> f64 {
+            p.iter()
+                .enumerate()
+                .filter_map(|(i, pi)| Some(pi * x.get(x.len().checked_sub(i + first)?)?))
+                .sum()
+        };
+        let (mut e, mut w, mut eps, mut v, mut u) = (vec![], vec![], vec![], vec![], vec![]);
+        for _ in 0..n + run_in {
+            w.push(past(&e, self.b, 1) - past(&w, self.f, 1));
+            e.push(draw.normal());
+            let innovation = noise * draw.normal();
+            v.push(innovation + past(&eps, self.c, 1) - past(&v, self.d, 1));
+            eps.push(innovation);
+            let t = u.len();
+            u.push(w[t] + v[t] - past(&u, self.a, 1));
+        }
+        let ts = SampleTime::HUNDREDTH;
+        let output = Channel::new("u", "deg", u.split_off(run_in));
+        if self.b.is_empty() {
+            Record::of_output(ts, output).unwrap()
+        } else {
+            Record::new(ts, Channel::new("e", "deg", e.split_off(run_in)), output).unwrap()
+        }
+    }
+}
+
+fn estimator(structure: Structure) -> Estimator {
+    Estimator::new(structure, Truth::of(structure).orders())
+}
+
+/// Distance of each coefficient from the truth in standard errors.
+fn distances(fit: &Fit, truth: &[f64]) -> Vec<f64> {
+    let parameters = fit.parameters();
+    parameters
+        .iter()
+        .zip(truth)
+        .filter_map(|((_, e), t)| Some((e.value - t) / e.standard_error?))
+        .collect()
+}
+
+#[test]
+fn every_structure_finds_the_truth_under_every_rule_for_its_past() {
+    for structure in Structure::ALL {
+        let truth = Truth::of(structure);
+        let cut_out = truth.record(4000, 0.5, 7);
+        let from_rest = truth.record_behind(0, 4000, 0.5, 7);
+        for rule in [
+            None,
+            Some(InitialState::Zero),
+            Some(InitialState::Estimate),
+            Some(InitialState::Backcast),
+        ] {
+            // The rule of zeros is right for a record that starts at rest.
+            let record = if rule == Some(InitialState::Zero) {
+                &from_rest
+            } else {
+                &cut_out
+            };
+            let fit = Estimator {
+                initial_state: rule,
+                ..estimator(structure)
+            }
+            .fit(std::slice::from_ref(record))
+            .unwrap();
+            assert!(fit.termination().converged(), "{structure} {rule:?}");
+            let far = distances(&fit, &truth.theta());
+            assert_eq!(far.len(), truth.theta().len());
+            assert!(far.iter().all(|d| d.abs() < 4.0), "{structure} {rule:?}: {far:.1?}");
+            let variance = fit.innovation_variance();
+            // 4000 samples know the variance to 2 %.
+            assert!((variance / 0.25 - 1.0).abs() < 0.09, "{structure} {rule:?}: {variance}");
+        }
+    }
+}
+
+#[test]
+fn standard_errors_of_every_structure_cover_the_truth() {
+    let runs = 200;
+    for structure in Structure::ALL {
+        let truth = Truth::of(structure);
+        let mut inside = vec![0; truth.theta().len()];
+        for seed in 0..runs {
+            let record = truth.record(400, 0.5, 1000 + seed);
+            let fit = estimator(structure).fit(&[record]).unwrap();
+            for (count, d) in inside.iter_mut().zip(distances(&fit, &truth.theta())) {
+                *count += u32::from(d.abs() < 1.96);
+            }
+        }
+        let shares: Vec<f64> = inside.iter().map(|c| f64::from(*c) / runs as f64).collect();
+        println!("{structure}: {shares:.3?}");
+        // 200 runs leave a standard error of 1.5 %; four of that.
+        assert!(shares.iter().all(|s| *s > 0.89), "{structure}: {shares:.3?}");
+    }
+}
+
+#[test]
+fn search_methods_end_in_the_same_minimum() {
+    let record = Truth::of(Structure::BoxJenkins).record(1000, 0.5, 3);
+    let loss = |method| {
+        let mut e = estimator(Structure::BoxJenkins);
+        e.search.method = method;
+        e.search.max_iterations = 3000;
+        let fit = e.fit(std::slice::from_ref(&record)).unwrap();
+        assert!(fit.termination().converged(), "{method:?}: {:?}", fit.termination());
+        fit.loss()
+    };
+    let reference = loss(SearchMethod::LevenbergMarquardt);
+    for method in [
+        SearchMethod::Automatic,
+        SearchMethod::GaussNewton,
+        SearchMethod::SteepestDescent,
+    ] {
+        assert!((loss(method) / reference - 1.0).abs() < 1e-9, "{method:?}");
+    }
+}
+
+#[test]
+fn fixed_and_bounded_coefficients_keep_their_word() {
+    let truth = Truth::of(Structure::BoxJenkins);
+    let record = truth.record(2000, 0.5, 4);
+    let mut e = estimator(Structure::BoxJenkins);
+    let free = e.fit(std::slice::from_ref(&record)).unwrap();
+    e.constraints.insert("d1".into(), Constraint::Fixed(-0.8));
+    e.constraints.insert("f2".into(), Constraint::Between(0.5, 0.65));
+    let fit = e.fit(std::slice::from_ref(&record)).unwrap();
+    let parameters = fit.parameters();
+    let of = |name: &str| parameters.iter().find(|(n, _)| n == name).unwrap().1;
+    assert_eq!((of("d1").value, of("d1").standard_error), (-0.8, None));
+    assert_eq!((of("f2").value, of("f2").standard_error), (0.65, None));
+    assert!(of("f1").standard_error.is_some() && fit.loss() > free.loss());
+    assert_eq!(fit.free_count(), truth.theta().len() - 2);
+    // A bound that does not bind changes nothing.
+    e.constraints.clear();
+    e.constraints.insert("f2".into(), Constraint::Between(0.0, 0.99));
+    let loose = e.fit(std::slice::from_ref(&record)).unwrap();
+    for (a, b) in loose.model().theta().iter().zip(free.model().theta()) {
+        assert!((a - b).abs() < 1e-6);
+    }
+    // Linear structures obey as well.
+    let mut arx = estimator(Structure::Arx);
+    arx.constraints.insert("b1".into(), Constraint::Fixed(0.0));
+    let fit = arx.fit(&[Truth::of(Structure::Arx).record(500, 0.5, 5)]).unwrap();
+    assert_eq!(fit.model().b()[1], 0.0);
+    for (name, bad) in [
+        ("x9", Constraint::Fixed(0.0)),
+        ("f1", Constraint::Between(1.0, 0.0)),
+        ("f1", Constraint::Fixed(f64::NAN)),
+    ] {
+        let mut e = estimator(Structure::BoxJenkins);
+        e.constraints.insert(name.into(), bad);
+        assert!(e.fit(std::slice::from_ref(&record)).is_err());
+    }
+}
+
+#[test]
+fn a_prior_draws_by_its_weight() {
+    let record = Truth::of(Structure::OutputError).record(500, 0.5, 6);
+    let at = |weight: f64| {
+        let mut e = estimator(Structure::OutputError);
+        e.priors.insert("f2".into(), Prior { value: 0.5, weight });
+        e.fit(std::slice::from_ref(&record)).unwrap()
+    };
+    let (none, some, strong) = (at(0.0), at(1.0), at(1e6));
+    let f2 = |fit: &Fit| fit.model().f()[1];
+    let plain = estimator(Structure::OutputError)
+        .fit(std::slice::from_ref(&record))
+        .unwrap();
+    assert!((f2(&none) - f2(&plain)).abs() < 1e-9);
+    assert!(f2(&none) > f2(&some) && f2(&some) > f2(&strong));
+    assert!((f2(&strong) - 0.5).abs() < 1e-3);
+    // The loss is that of the residuals, without the penalty.
+    assert!(strong.loss() > plain.loss() && strong.loss() < 100.0 * plain.loss());
+    // Three parameters of equal weight at the truth: the posterior mean of a linear problem, by hand.
+    let record = Truth::of(Structure::Fir).record(300, 0.5, 8);
+    let mut fir = estimator(Structure::Fir);
+    for name in ["b0", "b1"] {
+        fir.priors.insert(
+            name.into(),
+            Prior {
+                value: 0.0,
+                weight: 0.3,
+            },
+        );
+    }
+    let fit = fir.fit(std::slice::from_ref(&record)).unwrap();
+    let (e, u) = (record.input(), record.output());
+    let rows: Vec<usize> = (2..300).collect();
+    let sum = |f: &dyn Fn(usize) -> f64| rows.iter().map(|&t| f(t)).sum::<f64>();
+    let ridge = 0.3 * rows.len() as f64;
+    let (g00, g11) = (
+        sum(&|t| e[t - 1] * e[t - 1]) + ridge,
+        sum(&|t| e[t - 2] * e[t - 2]) + ridge,
+    );
+    let (g01, r0, r1) = (
+        sum(&|t| e[t - 1] * e[t - 2]),
+        sum(&|t| e[t - 1] * u[t]),
+        sum(&|t| e[t - 2] * u[t]),
+    );
+    let det = g00 * g11 - g01 * g01;
+    assert!((fit.model().b()[0] - (g11 * r0 - g01 * r1) / det).abs() < 1e-9);
+    assert!((fit.model().b()[1] - (g00 * r1 - g01 * r0) / det).abs() < 1e-9);
+}
+
+#[test]
+fn a_robust_loss_shrugs_at_outliers() {
+    let truth = Truth::of(Structure::OutputError);
+    let runs = 40;
+    let (mut plain_error, mut robust_error, mut inside) = (0.0, 0.0, 0);
+    for seed in 0..runs {
+        let clean = truth.record(1500, 0.5, 50 + seed);
+        let spoilt: Vec<f64> = clean
+            .output()
+            .iter()
+            .enumerate()
+            .map(|(t, u)| if t % 97 == 13 { u + 20.0 } else { *u })
+            .collect();
+        let record = Record::new(
+            clean.sample_time(),
+            clean.input_channel().unwrap().clone(),
+            Channel::new("u", "deg", spoilt),
+        )
+        .unwrap();
+        let error = |fit: &Fit| (fit.model().f()[0] + 1.5).abs() + (fit.model().b()[0] - 1.0).abs();
+        let mut e = estimator(Structure::OutputError);
+        plain_error += error(&e.fit(std::slice::from_ref(&record)).unwrap());
+        e.loss = Loss::Huber { threshold: 1.345 };
+        let fit = e.fit(std::slice::from_ref(&record)).unwrap();
+        assert!(fit.termination().converged(), "{:?}", fit.termination());
+        robust_error += error(&fit);
+        // With white noise and no outliers the robust error bars still cover.
+        let white = Truth::of(Structure::OutputError).record(600, 0.5, 500 + seed);
+        let fit = e.fit(&[white]).unwrap();
+        inside += distances(&fit, &Truth::of(Structure::OutputError).theta())
+            .iter()
+            .filter(|d| d.abs() < 1.96)
+            .count();
+    }
+    println!("mean error: squares {plain_error:.4}, Huber {robust_error:.4} (sum over {runs} runs)");
+    assert!(robust_error < 0.5 * plain_error);
+    let share = inside as f64 / (4 * runs) as f64;
+    // 160 intervals: standard error 1.7 %.
+    assert!(share > 0.88, "{share}");
+    let mut bad = estimator(Structure::Arx);
+    bad.loss = Loss::Huber { threshold: 0.0 };
+    let record = truth.record(100, 0.5, 1);
+    assert!(matches!(bad.fit(&[record]), Err(IdentError::BadOption { .. })));
+}
+
+#[test]
+fn the_focus_on_simulation_minimises_the_simulation_error_and_its_bars_cover() {
+    // An ARX model of an output-error system: the equation error is biased, the simulation error is not.
+    let truth = Truth::of(Structure::OutputError);
+    let record = truth.record(2000, 2.0, 11);
+    let arx = Orders {
+        na: 2,
+        nb: 2,
+        nk: 1,
+        ..Orders::default()
+    };
+    let mut e = Estimator::new(Structure::Arx, arx);
+    let prediction = e.fit(std::slice::from_ref(&record)).unwrap();
+    e.focus = Focus::Simulation;
+    let simulation = e.fit(std::slice::from_ref(&record)).unwrap();
+    let vaf = |fit: &Fit| fit.quality(std::slice::from_ref(&record)).unwrap().vaf_simulation;
+    assert!((prediction.model().a()[0] + 1.5).abs() > 0.3);
+    assert!((simulation.model().a()[0] + 1.5).abs() < 0.05);
+    assert!(vaf(&simulation) > vaf(&prediction));
+    // Coloured noise: coverage of the system's coefficients.
+    let truth = Truth::of(Structure::BoxJenkins);
+    let runs = 200;
+    let mut inside = vec![0; truth.theta().len()];
+    for seed in 0..runs {
+        let mut e = estimator(Structure::BoxJenkins);
+        e.focus = Focus::Simulation;
+        let fit = e.fit(&[truth.record(600, 0.5, 3000 + seed)]).unwrap();
+        for (count, d) in inside.iter_mut().zip(distances(&fit, &truth.theta())) {
+            *count += u32::from(d.abs() < 1.96);
+        }
+    }
+    let shares: Vec<f64> = inside.iter().map(|c| f64::from(*c) / runs as f64).collect();
+    println!("focus on simulation: {shares:.3?}");
+    assert!(shares.iter().all(|s| *s > 0.89), "{shares:.3?}");
+    let mut both = estimator(Structure::General);
+    both.focus = Focus::Simulation;
+    assert!(matches!(
+        both.fit(&[Truth::of(Structure::General).record(300, 0.5, 1)]),
+        Err(IdentError::BadOption { .. })
+    ));
+}
+
+#[test]
+fn a_stable_model_can_be_asked_for() {
+    // The output grows: least squares says unstable, and with `stable` the best stable model is given.
+    let ts = SampleTime::HUNDREDTH;
+    let mut draw = Draw(5);
+    let e: Vec<f64> = (0..120).map(|_| draw.normal()).collect();
+    let mut u = vec![0.0];
+    for t in 1..120 {
+        u.push(1.03 * u[t - 1] + e[t - 1] + 0.1 * draw.normal());
+    }
+    let record = Record::new(ts, Channel::new("e", "", e), Channel::new("u", "", u)).unwrap();
+    let orders = Orders {
+        na: 1,
+        nb: 1,
+        nk: 1,
+        ..Orders::default()
+    };
+    let mut arx = Estimator::new(Structure::Arx, orders);
+    assert!(!arx.fit(std::slice::from_ref(&record)).unwrap().model().is_stable());
+    arx.stable = true;
+    let fit = arx.fit(std::slice::from_ref(&record)).unwrap();
+    assert!(fit.model().is_stable());
+}
+
+#[test]
+fn records_without_input_are_told_from_those_with() {
+    let alone = Truth::of(Structure::Arma).record(200, 1.0, 2);
+    assert!(matches!(
+        estimator(Structure::Arx).fit(std::slice::from_ref(&alone)),
+        Err(IdentError::NoInput { .. })
+    ));
+    let fit = estimator(Structure::Arma).fit(std::slice::from_ref(&alone)).unwrap();
+    let v = fit.validate(&alone).unwrap();
+    assert!(v.cross_correlation.lags.is_empty() && v.quality.vaf_simulation == 0.0);
+    assert!(v.quality.vaf_prediction > 50.0);
+    assert!(fit.operator().is_err());
+    // A record with an input serves as well; the input is not looked at.
+    let with = Truth::of(Structure::Arx).record(200, 1.0, 2);
+    assert!(estimator(Structure::Ar).fit(&[with]).is_ok());
+}
