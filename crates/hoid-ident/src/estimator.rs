@@ -11,7 +11,7 @@ use crate::{
     objective::Informed,
     prediction_error::{Criterion, Data, Workspace, first_residual},
     robust::{ROUNDS, Reweighting},
-    search::{Minimum, Objective, free_parameters, minimise},
+    search::{Minimum, Objective, free_parameters, leads_to, minimise},
     simulation_focus, starts,
 };
 
@@ -185,6 +185,11 @@ impl Estimator {
         };
         let mut best: Option<(String, Minimum)> = None;
         for (label, theta) in candidates {
+            if let Some((_, known)) = &best
+                && leads_to(known, &informed, &theta, &mut workspace)
+            {
+                continue;
+            }
             let known = best.as_ref().map(|(_, b): &(String, Minimum)| b.at.sum_of_squares);
             let Some(minimum) = minimise(&informed, theta, &self.search, known, &mut workspace) else {
                 continue;

@@ -8,7 +8,7 @@
 //! | `stationary_past` | the noise before the record, when it was stationary |
 //! | `search` | damped Gauss-Newton |
 //! | `objective`, `robust`, `simulation_focus` | bounds and priors, a loss against outliers, models that are to simulate |
-//! | `starts` | where the search begins when nobody says |
+//! | `starts`, `continuation` | where the search begins when nobody says |
 //! | `arx`, `least_squares` | linear regression by QR with column pivoting |
 //! | [`order_search`] | ranges of orders and delay, criteria, the chosen model |
 //! | [`validation`] | VAF, NRMSE, residual tests |
@@ -17,6 +17,7 @@
 mod arx;
 mod checks;
 mod constraint;
+mod continuation;
 mod error;
 mod estimator;
 mod fit;

@@ -179,6 +179,29 @@ pub(crate) fn minimise(
     })
 }
 
+/// True when a start lies in the basin of a minimum that is known: its loss is what the quadratic model around the minimum says
+/// of it, so that a search from there would end in the same place.
+pub(crate) fn leads_to(
+    minimum: &Minimum,
+    objective: &impl Objective,
+    start: &[f64],
+    workspace: &mut Workspace,
+) -> bool {
+    let p = start.len();
+    let delta: Vec<f64> = start.iter().zip(&minimum.theta).map(|(a, b)| a - b).collect();
+    let rise: f64 = (0..p)
+        .map(|i| delta[i] * dot(&minimum.at.gram[i * p..(i + 1) * p], &delta))
+        .sum();
+    if !objective.is_feasible(start) || rise.is_nan() || rise > BASIN * minimum.at.sum_of_squares {
+        return false;
+    }
+    let found = objective.linearise(start, workspace).sum_of_squares - minimum.at.sum_of_squares;
+    (found - rise).abs() <= 0.1 * rise
+}
+
+/// Relative rise of the loss up to which a start is held against the quadratic model of a minimum.
+const BASIN: f64 = 0.05;
+
 /// Steps of steepest descent that help a search that cannot go on.
 const STEEPEST_HELP: usize = 10;
 
@@ -196,7 +219,7 @@ impl<O: Objective> Search<'_, O> {
     /// Steps of one method until it ends. `None` when the loss is not finite or the rival will not be beaten.
     fn descend(&mut self, method: SearchMethod, max_iterations: usize) -> Option<Reason> {
         let power = self.objective.output_power();
-        let (mut mu, mut growth) = (1e-3, 2.0);
+        let (mut mu, mut growth) = (1e-6, 8.0);
         loop {
             if !self.at.sum_of_squares.is_finite() {
                 return None;
