@@ -332,6 +332,7 @@ impl Estimator {
             initial_state: criterion.initial,
             termination,
             start: String::new(),
+            output_variance: criterion.output_variance(),
         })
     }
 

@@ -27,6 +27,8 @@ pub struct Fit {
     pub(crate) start: String,
     /// Parameters that were fixed, or rest at a bound.
     pub(crate) held: Vec<bool>,
+    /// Variance of the output over the residuals that count.
+    pub(crate) output_variance: f64,
 }
 
 /// Values on the time axis of a record, from sample `first` on.
@@ -139,6 +141,40 @@ impl Fit {
     pub fn fpe(&self) -> f64 {
         let ratio = self.parameter_count() / self.residuals as f64;
         self.loss * (1.0 + ratio) / (1.0 - ratio)
+    }
+
+    /// Akaike's criterion with the correction for short records, `AIC + 2 p (p + 1)/(n - p - 1)` (C. M. Hurvich and C.-L. Tsai,
+    /// *Biometrika* 76 (1989) 297-307); infinite where n does not exceed p + 1.
+    pub fn aicc(&self) -> f64 {
+        let (n, p) = (self.residuals as f64, self.parameter_count());
+        if n > p + 1.0 {
+            self.aic() + 2.0 * p * (p + 1.0) / (n - p - 1.0)
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// Rissanen's minimum description length `V (1 + p ln n / n)`.
+    pub fn mdl(&self) -> f64 {
+        let (n, p) = (self.residuals as f64, self.parameter_count());
+        self.loss * (1.0 + p * n.ln() / n)
+    }
+
+    /// Young's criterion `ln(V / var u) + ln( (1/p) sum_i var theta_i / theta_i^2 )` over the free coefficients of A, B and F
+    /// (P. C. Young, *Recursive Estimation and Time-Series Analysis*, 2011, section 6.7): the more negative, the better the
+    /// fit for well determined coefficients. `None` without standard errors or where a coefficient is zero.
+    pub fn yic(&self) -> Option<f64> {
+        let relative: Option<Vec<f64>> = self
+            .parameters()
+            .iter()
+            .zip(&self.held)
+            .filter(|((name, _), held)| !**held && name.starts_with(['a', 'b', 'f']))
+            .map(|((_, e), _)| Some((e.standard_error? / e.value).powi(2)))
+            .collect();
+        let relative = relative.filter(|r| !r.is_empty())?;
+        let mean = relative.iter().sum::<f64>() / relative.len() as f64;
+        let yic = (self.loss / self.output_variance).ln() + mean.ln();
+        yic.is_finite().then_some(yic)
     }
 
     /// Number p of parameters that were free.

@@ -12,12 +12,14 @@
 //! | `arx`, `least_squares` | linear regression by QR with column pivoting |
 //! | [`order_search`] | ranges of orders and delay, criteria, the chosen model |
 //! | [`validation`] | VAF, NRMSE, residual tests |
+//! | `derived` | poles, zeros, crossover and margins with standard errors |
 //! | [`Fit`] | model, covariance, how it ended; prediction, simulation, frequency response |
 
 mod arx;
 mod checks;
 mod constraint;
 mod continuation;
+mod derived;
 mod error;
 mod estimator;
 mod fit;
@@ -35,6 +37,7 @@ mod stationary_past;
 pub mod validation;
 
 pub use constraint::{Constraint, Prior};
+pub use derived::{MarginEstimates, Root};
 pub use error::IdentError;
 pub use estimator::{Estimator, Focus};
 pub use fit::{Fit, ResponsePoint, Series};

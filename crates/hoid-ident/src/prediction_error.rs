@@ -148,6 +148,14 @@ impl Criterion<'_> {
         self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
     }
 
+    /// Variance of the output around its mean, over the samples whose residuals count.
+    pub fn output_variance(&self) -> f64 {
+        let outputs = || self.data.iter().flat_map(|d| &d.u[self.first..]);
+        let n = self.residuals() as f64;
+        let mean = outputs().sum::<f64>() / n;
+        outputs().map(|u| (u - mean) * (u - mean)).sum::<f64>() / n
+    }
+
     /// Number of initial states over all records.
     pub fn states(&self) -> usize {
         match self.initial {
