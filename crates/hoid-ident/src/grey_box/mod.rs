@@ -35,6 +35,10 @@ use layout::{Layout, SLOTS, TIME_CONSTANT};
 use objective::PhysicalCriterion;
 use starts::Start;
 
+/// Relative decrease of the loss, and steps, at which the search of an order ends while orders are compared.
+const QUICK_TOLERANCE: f64 = 1e-7;
+const QUICK_ITERATIONS: usize = 30;
+
 /// What is to be estimated in physical parameters, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GreyBox {
@@ -109,30 +113,41 @@ impl GreyBox {
         let nearest = starts.first().cloned();
         starts.extend(nearest.and_then(|nearest| starts::box_jenkins(records, &nearest, highest)));
 
-        let (mut fits, mut candidates) = (Vec::new(), Vec::new());
-        let mut before: Option<Vec<f64>> = None;
-        for criterion in &criteria {
-            let found = self.fit_order(criterion, &starts, before.as_deref(), &mut workspace);
-            candidates.push(OrderCandidate {
-                order: criterion.layout.order,
-                outcome: found.as_ref().map_err(Clone::clone).map(|fit| OrderFigures {
-                    loss: fit.loss(),
-                    aic: fit.aic(),
-                    bic: fit.bic(),
-                    converged: fit.termination().converged(),
-                }),
-            });
-            before = found.as_ref().ok().map(|fit| fit.eta.clone());
-            fits.extend(found.ok());
+        if let [criterion] = criteria.as_slice() {
+            let fit = self.fit_order(criterion, &starts, None, &self.search, &mut workspace)?;
+            let candidates = vec![candidate(criterion, Ok(&fit))];
+            return Ok(GreyBoxFit { candidates, ..fit });
         }
-        let best = fits.into_iter().min_by(|a, b| a.bic().total_cmp(&b.bic()));
-        match best {
-            Some(best) => Ok(GreyBoxFit { candidates, ..best }),
-            None => Err(candidates
-                .into_iter()
-                .find_map(|c| c.outcome.err())
-                .unwrap_or(IdentError::NoFiniteLoss)),
+        // To compare orders the loss need not be known to the last digit; a wrong order converges slowly.
+        let quick = SearchOptions {
+            tolerance: self.search.tolerance.max(QUICK_TOLERANCE),
+            max_iterations: self.search.max_iterations.min(QUICK_ITERATIONS),
+            ..self.search
+        };
+        let (mut candidates, mut before) = (Vec::new(), None::<GreyBoxFit>);
+        let mut best: Option<(usize, GreyBoxFit)> = None;
+        for (i, criterion) in criteria.iter().enumerate() {
+            let eta = before.as_ref().map(|fit| fit.eta.as_slice());
+            let found = self.fit_order(criterion, &starts, eta, &quick, &mut workspace);
+            candidates.push(candidate(criterion, found.as_ref()));
+            before = found.ok();
+            if let Some(fit) = &before
+                && best.as_ref().is_none_or(|(_, known)| fit.bic() < known.bic())
+            {
+                best = Some((i, fit.clone()));
+            }
         }
+        let Some((i, rough)) = best else {
+            let reason = candidates.into_iter().find_map(|c| c.outcome.err());
+            return Err(reason.unwrap_or(IdentError::NoFiniteLoss));
+        };
+        let polished = criteria[i].search(rough.eta.clone(), &self.search, None, &mut workspace);
+        let fit = match polished {
+            Some(minimum) => self.result(&criteria[i], minimum, rough.start)?,
+            None => rough,
+        };
+        candidates[i] = candidate(&criteria[i], Ok(&fit));
+        Ok(GreyBoxFit { candidates, ..fit })
     }
 
     fn check_orders(&self) -> Result<(), IdentError> {
@@ -180,6 +195,7 @@ impl GreyBox {
         criterion: &PhysicalCriterion<'_>,
         starts: &[Start],
         before: Option<&[f64]>,
+        search: &SearchOptions,
         workspace: &mut Workspace,
     ) -> Result<GreyBoxFit, IdentError> {
         let mut etas: Vec<(String, Vec<f64>)> = Vec::new();
@@ -204,7 +220,7 @@ impl GreyBox {
                 continue;
             }
             let known = best.as_ref().map(|(_, b): &(String, Minimum)| b.at.sum_of_squares);
-            let Some(minimum) = criterion.search(eta, &self.search, known, workspace) else {
+            let Some(minimum) = criterion.search(eta, search, known, workspace) else {
                 continue;
             };
             if known.is_none_or(|known| minimum.at.sum_of_squares < known) {
@@ -287,5 +303,17 @@ impl GreyBox {
             start,
             candidates: Vec::new(),
         })
+    }
+}
+
+fn candidate(criterion: &PhysicalCriterion<'_>, found: Result<&GreyBoxFit, &IdentError>) -> OrderCandidate {
+    OrderCandidate {
+        order: criterion.layout.order,
+        outcome: found.map_err(Clone::clone).map(|fit| OrderFigures {
+            loss: fit.loss(),
+            aic: fit.aic(),
+            bic: fit.bic(),
+            converged: fit.termination().converged(),
+        }),
     }
 }
