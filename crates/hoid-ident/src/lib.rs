@@ -10,6 +10,7 @@
 //! | `objective`, `robust`, `simulation_focus` | bounds and priors, a loss against outliers, models that are to simulate |
 //! | `starts`, `continuation` | where the search begins when nobody says |
 //! | `arx`, `least_squares` | linear regression by QR with column pivoting |
+//! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
 //! | [`order_search`] | ranges of orders and delay, criteria, the chosen model |
 //! | [`validation`] | VAF, NRMSE, residual tests |
 //! | `derived` | poles, zeros, crossover and margins with standard errors |
@@ -23,6 +24,7 @@ mod derived;
 mod error;
 mod estimator;
 mod fit;
+pub mod grey_box;
 mod information;
 mod initial_states;
 mod least_squares;
@@ -41,6 +43,7 @@ pub use derived::{MarginEstimates, Root};
 pub use error::IdentError;
 pub use estimator::{Estimator, Focus};
 pub use fit::{Fit, ResponsePoint, Series};
+pub use grey_box::{GreyBox, GreyBoxFit};
 pub use order_search::{Candidate, Choice, OrderRanges, choose_orders};
 pub use prediction_error::InitialState;
 pub use robust::Loss;

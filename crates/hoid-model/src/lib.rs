@@ -13,7 +13,9 @@
 //! | [`discretise`] | the discretisations of Table 5.2 for general transfer functions |
 //! | [`second_order`] | exact zero-order hold of second-order systems, both ways, with derivatives |
 //! | [`operator`] | [`OperatorParameters`] and their discrete model |
+//! | [`delayed_operator`](mod@delayed_operator) | the operator with a delay of any fraction of a sample |
 //! | [`remnant`] | the remnant filter, its discretisations and its retrieval |
+//! | [`remnant_noise`] | the noise model of the exactly held remnant as a function of T_n, with derivatives |
 //! | [`uncertainty`] | standard errors of derived quantities by the delta method |
 //! | [`controlled_element`], [`forcing`], [`schedule`], [`scenario`] | the task: plant, target signal, change over time, conditions C1-C6 |
 //! | [`margins`] | crossover frequency, phase and gain margin |
@@ -22,6 +24,7 @@
 mod error;
 
 pub mod controlled_element;
+pub mod delayed_operator;
 pub mod discretise;
 pub mod forcing;
 pub mod margins;
@@ -31,6 +34,7 @@ pub mod polynomial_model;
 pub mod record;
 pub mod remnant;
 pub mod remnant_gain;
+pub mod remnant_noise;
 pub mod sample_time;
 pub mod scenario;
 pub mod schedule;
@@ -39,6 +43,7 @@ pub mod structure;
 pub mod transfer_function;
 pub mod uncertainty;
 
+pub use delayed_operator::{DelayedOperator, delayed_operator, delayed_operator_jacobian};
 pub use error::{ModelError, NotConvertible};
 pub use num_complex::Complex64;
 pub use operator::{DiscreteOperator, OperatorParameters};
