@@ -9,7 +9,7 @@ use crate::{
     information::inverse_of_free,
     least_squares::dot,
     objective::Informed,
-    prediction_error::{Criterion, Data, Workspace, first_residual},
+    prediction_error::{Criterion, Data, Workspace, first_residual, output_variance},
     robust::{ROUNDS, Reweighting},
     search::{Minimum, Objective, free_parameters, leads_to, minimise},
     simulation_focus, starts,
@@ -332,7 +332,7 @@ impl Estimator {
             initial_state: criterion.initial,
             termination,
             start: String::new(),
-            output_variance: criterion.output_variance(),
+            output_variance: output_variance(&criterion.data, criterion.first),
         })
     }
 

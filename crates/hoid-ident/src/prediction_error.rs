@@ -87,6 +87,14 @@ pub(crate) fn first_residual(orders: &Orders, initial: InitialState) -> usize {
     }
 }
 
+/// Variance of the output around its mean, from sample `first` of each record on.
+pub(crate) fn output_variance(data: &[Data<'_>], first: usize) -> f64 {
+    let outputs = || data.iter().flat_map(|d| &d.u[first..]);
+    let n = outputs().count() as f64;
+    let mean = outputs().sum::<f64>() / n;
+    outputs().map(|u| (u - mean) * (u - mean)).sum::<f64>() / n
+}
+
 /// Sum of squares, `psi' eps` and the projected `psi' psi` (by rows).
 #[derive(Debug, Clone)]
 pub(crate) struct Linearisation {
@@ -146,14 +154,6 @@ impl Criterion<'_> {
     /// Number of residuals over all records.
     pub fn residuals(&self) -> usize {
         self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
-    }
-
-    /// Variance of the output around its mean, over the samples whose residuals count.
-    pub fn output_variance(&self) -> f64 {
-        let outputs = || self.data.iter().flat_map(|d| &d.u[self.first..]);
-        let n = self.residuals() as f64;
-        let mean = outputs().sum::<f64>() / n;
-        outputs().map(|u| (u - mean) * (u - mean)).sum::<f64>() / n
     }
 
     /// Number of initial states over all records.

@@ -24,7 +24,7 @@ use hoid_model::{PolynomialModel, Record, SampleTime, Structure, remnant::HIGHES
 use crate::{
     Constraint, Fit, IdentError, InitialState, Reason, SearchOptions, checks,
     information::inverse_of_free,
-    prediction_error::{Data, Workspace, first_residual},
+    prediction_error::{Data, Workspace, first_residual, output_variance},
     search::{Minimum, leads_to},
 };
 
@@ -286,6 +286,7 @@ impl GreyBox {
                 termination: minimum.termination,
                 start: start.clone(),
                 held: vec![false; polynomials.jacobian.len()],
+                output_variance: output_variance(&criterion.data, criterion.first),
             });
         }
         Ok(GreyBoxFit {
