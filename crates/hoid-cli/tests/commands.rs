@@ -183,9 +183,18 @@ fn several_records_start_validation_report_and_margins() {
     let (value, error) = (&crossover["value"], &crossover["standard_error"]);
     let off = value.as_f64().unwrap() - 1.5635;
     // Two records; five standard errors.
-    assert!(off.abs() < 0.1 && off.abs() < 5.0 * error.as_f64().unwrap(), "{crossover}");
+    assert!(
+        off.abs() < 0.1 && off.abs() < 5.0 * error.as_f64().unwrap(),
+        "{crossover}"
+    );
     assert_eq!(found["residual_tests"].as_array().unwrap().len(), 2);
-    assert!(found["roots"].as_array().unwrap().iter().any(|r| r["polynomial"] == "f"));
+    assert!(
+        found["roots"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|r| r["polynomial"] == "f")
+    );
     assert!(found["validation"]["vaf_simulation"].as_f64().unwrap() > 85.0);
     let page = fs::read_to_string(d.join("out/report.html")).unwrap();
     assert!(page.contains("<svg") && page.contains("again.csv"), "{}", page.len());
