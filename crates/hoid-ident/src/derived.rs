@@ -184,6 +184,7 @@ mod tests {
             },
             start: String::new(),
             output_variance: 1.0,
+            physical: None,
         }
     }
 

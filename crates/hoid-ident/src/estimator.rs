@@ -333,6 +333,7 @@ impl Estimator {
             termination,
             start: String::new(),
             output_variance: output_variance(&criterion.data, criterion.first),
+            physical: None,
         })
     }
 

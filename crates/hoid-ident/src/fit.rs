@@ -29,6 +29,19 @@ pub struct Fit {
     pub(crate) held: Vec<bool>,
     /// Variance of the output over the residuals that count.
     pub(crate) output_variance: f64,
+    /// The physical parameters that theta was computed from, for a grey box.
+    pub(crate) physical: Option<Box<Physical>>,
+}
+
+/// What a grey box fitted: theta is a function of these.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Physical {
+    /// Name and estimate of each parameter.
+    pub parameters: Vec<(String, Estimate)>,
+    /// Number of parameters that were free.
+    pub free: usize,
+    pub operator: Result<OperatorEstimate, NotConvertible>,
+    pub remnant: Option<RemnantEstimate>,
 }
 
 /// Values on the time axis of a record, from sample `first` on.
@@ -68,8 +81,12 @@ impl Fit {
         self.covariance.as_deref()
     }
 
-    /// Name, value and standard error of each coefficient.
+    /// Name, value and standard error of each parameter: the coefficients of theta, or the physical parameters that a grey box
+    /// fitted.
     pub fn parameters(&self) -> Vec<(String, Estimate)> {
+        if let Some(physical) = &self.physical {
+            return physical.parameters.clone();
+        }
         let theta = self.model.theta();
         let p = theta.len();
         self.orders()
@@ -179,6 +196,9 @@ impl Fit {
 
     /// Number p of parameters that were free.
     pub fn free_count(&self) -> usize {
+        if let Some(physical) = &self.physical {
+            return physical.free;
+        }
         self.held.iter().filter(|held| !**held).count()
     }
 
@@ -191,6 +211,9 @@ impl Fit {
     /// # Errors
     /// [`NotConvertible`] with the reason.
     pub fn operator(&self) -> Result<OperatorEstimate, NotConvertible> {
+        if let Some(physical) = &self.physical {
+            return physical.operator.clone();
+        }
         let p = self.model.theta().len();
         match &self.covariance {
             Some(covariance) => operator_estimate(&self.model, covariance),
@@ -198,11 +221,31 @@ impl Fit {
         }
     }
 
-    /// T_n and K_n of the remnant filter that the noise model stands for.
+    /// True for a grey box, whose theta is a function of physical parameters.
+    pub fn is_grey_box(&self) -> bool {
+        self.physical.is_some()
+    }
+
+    /// Structure and orders as in print.
+    pub fn title(&self) -> String {
+        match &self.physical {
+            Some(_) => format!("Grey box with a remnant of order m = {}", self.orders().nd),
+            None => format!("{}({})", self.model.structure(), self.orders()),
+        }
+    }
+
+    /// T_n and K_n of the remnant filter that the noise model stands for. A grey box has fitted them as they are held over each
+    /// sample, whatever `how`.
     ///
     /// # Errors
     /// [`NotConvertible`] with the reason.
     pub fn remnant(&self, how: RemnantDiscretisation) -> Result<RemnantEstimate, NotConvertible> {
+        if let Some(physical) = &self.physical {
+            return physical.remnant.ok_or_else(|| NotConvertible::NotARemnantFilter {
+                order: 0,
+                reason: "m = 0, the remnant is white".to_owned(),
+            });
+        }
         let variance_of_sd = self.innovation_variance / (2.0 * self.residuals as f64);
         remnant_estimate(
             &self.model,

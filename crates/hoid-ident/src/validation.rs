@@ -128,6 +128,8 @@ impl Fit {
             .zip(self.held())
             .filter(|(name, held)| of_noise(name) && !**held)
             .count();
+        // A grey box has one parameter in its noise model, T_n.
+        let free = if self.is_grey_box() { free.min(1) } else { free };
         Ok(Validation {
             ljung_box: ljung_box(&autocorrelation, residuals.len(), free),
             quality: Quality {

@@ -159,9 +159,13 @@ fn squared(unit: &str) -> String {
 /// Coefficient, value, standard error, 95 % interval.
 pub fn coefficients(fit: &Fit) -> Vec<Value> {
     let rows = fit.parameters().into_iter().map(|(name, estimate)| {
-        let (letter, index) = name.split_at(1);
         let (value, error) = with_uncertainty(estimate.value, estimate.standard_error);
-        let name = html(format!("<i>{letter}</i><sub>{index}</sub>"));
+        let name = if fit.is_grey_box() {
+            Value::from(name)
+        } else {
+            let (letter, index) = name.split_at(1);
+            html(format!("<i>{letter}</i><sub>{index}</sub>"))
+        };
         context! { name, value, error, interval => interval(estimate.value, estimate.standard_error, Z_95) }
     });
     rows.collect()

@@ -23,6 +23,7 @@ use hoid_model::{PolynomialModel, Record, SampleTime, Structure, remnant::HIGHES
 
 use crate::{
     Constraint, Fit, IdentError, InitialState, Reason, SearchOptions, checks,
+    fit::Physical,
     information::inverse_of_free,
     prediction_error::{Data, Workspace, first_residual, output_variance},
     search::{Minimum, leads_to},
@@ -287,9 +288,10 @@ impl GreyBox {
                 start: start.clone(),
                 held: vec![false; polynomials.jacobian.len()],
                 output_variance: output_variance(&criterion.data, criterion.first),
+                physical: None,
             });
         }
-        Ok(GreyBoxFit {
+        let mut fit = GreyBoxFit {
             layout: layout.clone(),
             eta,
             covariance,
@@ -303,7 +305,17 @@ impl GreyBox {
             termination: minimum.termination,
             start,
             candidates: Vec::new(),
-        })
+        };
+        for record in 0..fit.fits.len() {
+            let physical = Physical {
+                parameters: fit.parameters(),
+                free: fit.parameters,
+                operator: fit.operator(record),
+                remnant: fit.remnant(record),
+            };
+            fit.fits[record].physical = Some(Box::new(physical));
+        }
+        Ok(fit)
     }
 }
 

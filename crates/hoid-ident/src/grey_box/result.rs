@@ -172,8 +172,8 @@ impl GreyBoxFit {
     }
 
     /// The same model as polynomials, for prediction, simulation and the frequency response with its bands: Box-Jenkins with
-    /// three coefficients in B. Its covariance is `J P J'` and singular, as theta has more elements than eta; information
-    /// criteria and operator are to be taken from here, not from there.
+    /// three coefficients in B. Its covariance is `J P J'` and singular, as theta has more elements than eta; parameters, criteria,
+    /// operator and remnant are those of this fit.
     pub fn polynomial_fit(&self, record: usize) -> &Fit {
         &self.fits[self.known(record)]
     }
