@@ -10,6 +10,7 @@
 //! | `objective`, `robust`, `simulation_focus` | bounds and priors, a loss against outliers, models that are to simulate |
 //! | `starts` | where the search begins when nobody says |
 //! | `arx`, `least_squares` | linear regression by QR with column pivoting |
+//! | [`instrumental`] | instrumental variables, in open and closed loop |
 //! | [`order_search`] | ranges of orders and delay, criteria, the chosen model |
 //! | [`validation`] | VAF, NRMSE, residual tests |
 //! | [`Fit`] | model, covariance, how it ended; prediction, simulation, frequency response |
@@ -22,6 +23,7 @@ mod estimator;
 mod fit;
 mod information;
 mod initial_states;
+pub mod instrumental;
 mod least_squares;
 mod objective;
 pub mod order_search;
@@ -37,6 +39,7 @@ pub use constraint::{Constraint, Prior};
 pub use error::IdentError;
 pub use estimator::{Estimator, Focus};
 pub use fit::{Fit, ResponsePoint, Series};
+pub use instrumental::{InstrumentalVariable, Instruments, IvMethod};
 pub use order_search::{Candidate, Choice, OrderRanges, choose_orders};
 pub use prediction_error::InitialState;
 pub use robust::Loss;
