@@ -5,8 +5,6 @@
 //! Consistent in an open loop for any noise; in a closed loop its poles are biased like those of ARX, but less. About ten passes
 //! over the data.
 
-use std::borrow::Cow;
-
 use hoid_model::Orders;
 
 use crate::{
@@ -16,7 +14,7 @@ use crate::{
     starts::noise_model,
 };
 
-use super::equation::{Prefilter, Problem};
+use super::equation::{Prefilter, Problem, Source};
 
 /// Theta for the orders of the criterion; `None` where A and F are both there (the chain does not tell their poles apart), where
 /// there is no input, and where the data do not carry it.
@@ -25,8 +23,7 @@ pub(crate) fn instrument_chain(criterion: &Criterion<'_>) -> Option<Vec<f64>> {
     if o.nb == 0 || (o.na > 0 && o.nf > 0) {
         return None;
     }
-    let source = criterion.data.iter().map(|d| Cow::Borrowed(d.e)).collect();
-    let problem = Problem::new(&o, criterion.data.clone(), source);
+    let problem = Problem::new(&o, criterion.data.clone(), Source::measured(&criterion.data));
     let white_orders = Orders { nc: 0, nd: 0, ..o };
     let white = Criterion {
         orders: white_orders,
@@ -42,7 +39,7 @@ pub(crate) fn instrument_chain(criterion: &Criterion<'_>) -> Option<Vec<f64>> {
     let mut system = problem.least_squares(Prefilter::default()).ok()?;
     for _ in 0..2 {
         let (stable, _) = problem.stabilised(&system).ok()?;
-        let equation = problem.equation(Prefilter::default(), &problem.simulate(&stable));
+        let equation = problem.equation(Prefilter::default(), &stable);
         system = problem.solve(&equation).ok()?;
     }
     if o.nf > 0 {

@@ -12,7 +12,7 @@
 //! ch. 5). R is that of a long autoregression `D r = eps` of the residual: `Z' R Z = lambda (H'Z)' (H'Z)`, with H' the filter 1/D run
 //! backwards in time. Where the filter has made the residual white it is Ljung's (15.29), `lambda (Z'Z)^-1` for Z = Phi.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, ops::Range};
 
 use hoid_core::filter::{divide_in_place, moving_sum, multiply};
 use hoid_model::{Orders, polynomial::product, polynomial_model::monic};
@@ -54,14 +54,33 @@ impl Prefilter<'_> {
     }
 }
 
-/// Data, noise-free input and orders. The system is a vector `[f_1 .. f_n, b_0 .. ]`, with A in place of F for ARX.
+/// A noise-free input.
+#[derive(Debug, Clone)]
+pub(super) struct Source<'a> {
+    /// The input of each record, whole.
+    pub inputs: Vec<Cow<'a, [f64]>>,
+    /// Samples in which instruments are made of it, counted through all records.
+    pub samples: Range<usize>,
+}
+
+impl<'a> Source<'a> {
+    /// The measured inputs, for all samples.
+    pub fn measured(data: &[Data<'a>]) -> Vec<Self> {
+        vec![Self {
+            inputs: data.iter().map(|d| Cow::Borrowed(d.e)).collect(),
+            samples: 0..usize::MAX,
+        }]
+    }
+}
+
+/// Data, noise-free inputs and orders. The system is a vector `[f_1 .. f_n, b_0 .. ]`, with A in place of F for ARX.
 pub(super) struct Problem<'a> {
     pub poles: usize,
     pub nb: usize,
     pub nk: usize,
     pub data: Vec<Data<'a>>,
-    /// Noise-free input of each record.
-    pub source: Vec<Cow<'a, [f64]>>,
+    /// Noise-free inputs; each serves in its own rows.
+    pub sources: Vec<Source<'a>>,
     /// First row of each record.
     pub first: usize,
     names: Vec<String>,
@@ -79,7 +98,7 @@ pub(super) struct Equation {
 
 impl<'a> Problem<'a> {
     /// The equation of these orders; na and nf are not both positive.
-    pub fn new(orders: &Orders, data: Vec<Data<'a>>, source: Vec<Cow<'a, [f64]>>) -> Self {
+    pub fn new(orders: &Orders, data: Vec<Data<'a>>, sources: Vec<Source<'a>>) -> Self {
         let letter = if orders.na > 0 { 'a' } else { 'f' };
         let poles = orders.na + orders.nf;
         let names = (1..=poles)
@@ -91,20 +110,20 @@ impl<'a> Problem<'a> {
             nb: orders.nb,
             nk: orders.nk,
             data,
-            source,
+            sources,
             first: poles.max(orders.nk + orders.nb - 1),
             names,
         }
     }
 
     /// The same equation for other signals.
-    pub fn of<'b>(&self, data: Vec<Data<'b>>, source: Vec<Cow<'b, [f64]>>) -> Problem<'b> {
+    pub fn of<'b>(&self, data: Vec<Data<'b>>, sources: Vec<Source<'b>>) -> Problem<'b> {
         Problem {
             poles: self.poles,
             nb: self.nb,
             nk: self.nk,
             data,
-            source,
+            sources,
             first: self.first,
             names: self.names.clone(),
         }
@@ -137,39 +156,66 @@ impl<'a> Problem<'a> {
             .collect()
     }
 
-    /// `(B/F) q^-nk x` of a system with stable F and the noise-free input x.
-    pub fn simulate(&self, system: &[f64]) -> Columns {
+    /// `(B/F) q^-nk x` of a system with stable F and a noise-free input x.
+    fn simulate(&self, system: &[f64], x: &[f64]) -> Vec<f64> {
         let (f, b) = system.split_at(self.poles);
-        self.source
-            .iter()
-            .map(|x| {
-                let (extended, past) = with_past(x);
-                let mut output = vec![0.0; extended.len()];
-                moving_sum(b, self.nk, &extended, &mut output);
-                divide_in_place(f, &mut output);
-                output.drain(..past);
-                output
-            })
-            .collect()
+        let (extended, past) = with_past(x);
+        let mut output = vec![0.0; extended.len()];
+        moving_sum(b, self.nk, &extended, &mut output);
+        divide_in_place(f, &mut output);
+        output.drain(..past);
+        output
     }
 
-    /// The filtered equation with instruments from the noise-free input and this noise-free output.
-    pub fn equation(&self, filter: Prefilter<'_>, noise_free_output: &[Vec<f64>]) -> Equation {
+    /// The filtered equation with instruments from the noise-free inputs and what this system (with stable F) makes of them.
+    pub fn equation(&self, filter: Prefilter<'_>, system: &[f64]) -> Equation {
         let measured: Vec<(&[f64], &[f64])> = self.data.iter().map(|d| (d.u, d.e)).collect();
-        let noise_free: Vec<(&[f64], &[f64])> = noise_free_output
-            .iter()
-            .zip(&self.source)
-            .map(|(u, e)| (u.as_slice(), e.as_ref()))
-            .collect();
         let mut equation = Equation {
             y: self.filtered_output(filter),
             phi: self.columns(filter, &measured),
-            z: self.columns(filter, &noise_free),
+            z: self.instruments(filter, system),
         };
         let free = self.free_responses(filter);
         let all = equation.phi.iter_mut().chain(&mut equation.z).chain([&mut equation.y]);
         all.for_each(|column| eliminate(&free, column));
         equation
+    }
+
+    fn instruments(&self, filter: Prefilter<'_>, system: &[f64]) -> Columns {
+        let mut z = Columns::new();
+        for source in &self.sources {
+            let outputs: Vec<Vec<f64>> = source.inputs.iter().map(|x| self.simulate(system, x)).collect();
+            let pairs: Vec<(&[f64], &[f64])> = outputs
+                .iter()
+                .zip(&source.inputs)
+                .map(|(u, e)| (u.as_slice(), e.as_ref()))
+                .collect();
+            let columns = self.columns(filter, &pairs);
+            if z.is_empty() {
+                z = columns;
+                continue;
+            }
+            for rows in self.rows_of(&source.samples, filter.d.len()) {
+                for (to, from) in z.iter_mut().zip(&columns) {
+                    to[rows.clone()].copy_from_slice(&from[rows.clone()]);
+                }
+            }
+        }
+        z
+    }
+
+    /// Rows of a range of samples that is counted through all records.
+    fn rows_of(&self, samples: &Range<usize>, order_of_d: usize) -> Vec<Range<usize>> {
+        let (mut sample, mut row) = (0, 0);
+        let mut found = Vec::new();
+        for (data, rows) in self.data.iter().zip(self.rows(order_of_d)) {
+            let first = sample + data.u.len() - rows;
+            let within = |s: usize| row + s.clamp(first, first + rows) - first;
+            found.push(within(samples.start)..within(samples.end));
+            sample += data.u.len();
+            row += rows;
+        }
+        found
     }
 
     fn filtered_output(&self, filter: Prefilter<'_>) -> Vec<f64> {

@@ -6,25 +6,28 @@
 //!
 //! whose weights are found by least squares (B. Wahlberg, *IEEE Trans. Automatic Control* 36 (1991) 551-562). A few dozen of them
 //! span the seconds that a loop remembers, where a finite impulse response would need hundreds of lags; the expansion is always
-//! stable; and for a sum of sinusoids it is the projection on their lines. Whatever its quality, the sum is made of f_t alone, at
-//! rest at the start of the record, so that the noise reaches it only through the weights: a share `K/N` of the noise power with
-//! K filters and N samples. Poor quality costs variance, not bias.
+//! stable; and for a sum of sinusoids it is the projection on their lines.
+//!
+//! The sum is made of f_t alone, so that the noise can reach it only through the weights: the noise of the record at the very
+//! lines of f_t, which is a good part of it where noise and f_t are both slow. So the record is cut into blocks, and the instruments
+//! of a block are made with weights from the other blocks (split-sample instruments, J. D. Angrist and A. B. Krueger, *J. Business
+//! Econ. Stat.* 13 (1995) 225-235), whose noise is independent of that in the block. Poor weights then cost variance, not bias.
 //!
 //! The construction of instruments from an external signal is that of M. Gilson, H. Garnier, P. C. Young and P. Van den Hof, *IET
 //! Control Theory Appl.* 5 (2011) 1147-1154; they use the known controller, which a person in the loop does not offer.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, ops::Range};
 
 use hoid_core::filter::divide_in_place;
 use hoid_model::Record;
 
 use crate::{
     IdentError,
-    least_squares::{add_scaled, dot},
+    least_squares::{add_scaled, dot, solve_symmetric},
     prediction_error::Data,
 };
 
-use super::equation::{orthonormal, with_past};
+use super::equation::{Source, cut, orthonormal, with_past};
 
 /// Time constants of the filters in samples; the one with the smallest rest is taken.
 const TIME_CONSTANTS: [f64; 3] = [4.0, 16.0, 64.0];
@@ -32,6 +35,10 @@ const TIME_CONSTANTS: [f64; 3] = [4.0, 16.0, 64.0];
 const FILTERS: usize = 24;
 /// Samples for each filter.
 const SAMPLES_EACH: usize = 10;
+/// Blocks whose input is made with weights from the others.
+const BLOCKS: usize = 4;
+/// Pull of the weights to zero, against filters whose output lies in one block alone. The scale of an instrument does not matter.
+const RIDGE: f64 = 0.02;
 
 /// The external signal of each record.
 ///
@@ -72,35 +79,73 @@ pub(super) fn signals<'a>(records: &'a [Record], name: &str) -> Result<Vec<&'a [
     Ok(found)
 }
 
-/// The part of each input that follows the external signals.
-pub(super) fn noise_free<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Cow<'a, [f64]>> {
+/// The part of each input that follows the external signals, once for each block of samples with weights from the others.
+pub(super) fn noise_free<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Source<'a>> {
     let inputs: Vec<&[f64]> = data.iter().map(|d| d.e).collect();
-    following(external, &inputs).into_iter().map(Cow::Owned).collect()
+    let lengths: Vec<usize> = inputs.iter().map(|e| e.len()).collect();
+    let samples: usize = lengths.iter().sum();
+    let target = inputs.concat();
+    let basis = best_basis(external, &inputs);
+    let whole: Vec<f64> = basis.iter().map(|q| dot(q, &target)).collect();
+    (0..BLOCKS)
+        .map(|k| {
+            let block = k * samples / BLOCKS..(k + 1) * samples / BLOCKS;
+            let weights = weights_of_others(&basis, &whole, &target, block.clone()).unwrap_or_else(|| whole.clone());
+            let sum = combination(&basis, &weights, samples);
+            Source {
+                inputs: cut(&sum, &lengths).into_iter().map(Cow::Owned).collect(),
+                samples: block,
+            }
+        })
+        .collect()
+}
+
+/// Weights of least squares on the samples outside of a block, drawn a little to zero.
+fn weights_of_others(basis: &[Vec<f64>], whole: &[f64], target: &[f64], block: Range<usize>) -> Option<Vec<f64>> {
+    let p = basis.len();
+    let mut gram = vec![0.0; p * p];
+    let mut right = whole.to_vec();
+    for i in 0..p {
+        let inside = &basis[i][block.clone()];
+        right[i] -= dot(inside, &target[block.clone()]);
+        for j in 0..p {
+            let unit = if i == j { 1.0 + RIDGE } else { 0.0 };
+            gram[i * p + j] = unit - dot(inside, &basis[j][block.clone()]);
+        }
+    }
+    solve_symmetric(&gram, &right)
 }
 
 /// The part of each target that follows its driving signal, through one filter for all records.
 pub(super) fn following(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
-    let samples: usize = targets.iter().map(|t| t.len()).sum();
-    let filters = FILTERS.min(samples / SAMPLES_EACH).max(1);
-    let target: Vec<f64> = targets.concat();
-    let mut best: Option<(f64, Vec<f64>)> = None;
+    let lengths: Vec<usize> = targets.iter().map(|t| t.len()).collect();
+    let target = targets.concat();
+    let basis = best_basis(driving, targets);
+    let weights: Vec<f64> = basis.iter().map(|q| dot(q, &target)).collect();
+    cut(&combination(&basis, &weights, target.len()), &lengths)
+}
+
+fn combination(basis: &[Vec<f64>], weights: &[f64], samples: usize) -> Vec<f64> {
+    let mut sum = vec![0.0; samples];
+    for (q, weight) in basis.iter().zip(weights) {
+        add_scaled(&mut sum, *weight, q);
+    }
+    sum
+}
+
+/// Orthonormal basis of the filters' outputs, over all records, with the time constant that explains most of the targets.
+fn best_basis(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
+    let target = targets.concat();
+    let filters = FILTERS.min(target.len() / SAMPLES_EACH).max(1);
+    let mut best = (-1.0, Vec::new());
     for time_constant in TIME_CONSTANTS {
-        let columns = laguerre(driving, (-1.0 / time_constant).exp(), filters);
-        let (basis, _) = orthonormal(&columns);
-        let mut sum = vec![0.0; samples];
-        let mut explained = 0.0;
-        for q in &basis {
-            let component = dot(q, &target);
-            explained += component * component;
-            add_scaled(&mut sum, component, q);
-        }
-        if best.as_ref().is_none_or(|(most, _)| explained > *most) {
-            best = Some((explained, sum));
+        let (basis, _) = orthonormal(&laguerre(driving, (-1.0 / time_constant).exp(), filters));
+        let explained: f64 = basis.iter().map(|q| dot(q, &target).powi(2)).sum();
+        if explained > best.0 {
+            best = (explained, basis);
         }
     }
-    let sum = best.map(|(_, sum)| sum).unwrap_or_default();
-    let rows: Vec<usize> = targets.iter().map(|t| t.len()).collect();
-    super::equation::cut(&sum, &rows)
+    best.1
 }
 
 /// Outputs of the filters with the pole p, over all records.

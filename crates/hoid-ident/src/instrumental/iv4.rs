@@ -23,7 +23,7 @@ const ROWS_EACH: usize = 10;
 
 pub(super) fn solve(problem: &Problem<'_>) -> Result<Solution, IdentError> {
     let (start, _) = problem.stabilised(&problem.least_squares(Prefilter::default())?)?;
-    let second = problem.equation(Prefilter::default(), &problem.simulate(&start));
+    let second = problem.equation(Prefilter::default(), &start);
     let system = problem.solve(&second)?;
     let rows = problem.rows(0);
     let shortest = rows.iter().min().copied().unwrap_or(0);
@@ -34,7 +34,7 @@ pub(super) fn solve(problem: &Problem<'_>) -> Result<Solution, IdentError> {
         ..Prefilter::default()
     };
     let (stable, _) = problem.stabilised(&system)?;
-    let last = problem.equation(filter, &problem.simulate(&stable));
+    let last = problem.equation(filter, &stable);
     let theta = problem.solve(&last)?;
     let residual = cut(&last.residual(&theta), &problem.rows(order));
     Ok(Solution {

@@ -31,7 +31,7 @@ mod refined;
 mod rivbj;
 mod sriv;
 
-use std::{borrow::Cow, fmt};
+use std::fmt;
 
 use hoid_model::{Orders, PolynomialModel, Record, Structure};
 
@@ -40,7 +40,7 @@ use crate::{
     least_squares::dot,
     prediction_error::{Criterion, Data, Workspace, first_residual},
 };
-use equation::Problem;
+use equation::{Problem, Source};
 
 // The search for starts takes it up.
 #[allow(unused_imports)]
@@ -173,11 +173,11 @@ impl InstrumentalVariable {
             weights: None,
         };
         checks::degrees_of_freedom(&criterion, records)?;
-        let source = match &self.instruments {
-            Instruments::Simulated => criterion.data.iter().map(|d| Cow::Borrowed(d.e)).collect(),
+        let sources = match &self.instruments {
+            Instruments::Simulated => Source::measured(&criterion.data),
             Instruments::External(name) => external::noise_free(&external::signals(records, name)?, &criterion.data),
         };
-        let problem = Problem::new(&self.orders, criterion.data.clone(), source);
+        let problem = Problem::new(&self.orders, criterion.data.clone(), sources);
         self.check_rows(&problem, records)?;
         let solution = match self.method {
             IvMethod::Iv4 => iv4::solve(&problem)?,

@@ -58,7 +58,7 @@ pub(super) fn iterate(
             d: &noise.d,
             f: &system[..problem.poles],
         };
-        let equation = problem.equation(filter, &problem.simulate(&system));
+        let equation = problem.equation(filter, &system);
         let next = problem.solve(&equation)?;
         iterations += 1;
         let mut step = vec![0.0; equation.y.len()];
@@ -101,20 +101,16 @@ fn start(problem: &Problem<'_>) -> Result<Vec<f64>, IdentError> {
 }
 
 fn of_noise_free_parts(problem: &Problem<'_>) -> Result<Vec<f64>, IdentError> {
-    let delayed: Vec<Vec<f64>> = problem
-        .source
-        .iter()
-        .map(|x| {
-            let mut late = vec![0.0; problem.nk];
-            late.extend_from_slice(&x[..x.len() - problem.nk]);
-            late
-        })
-        .collect();
+    let Some(source) = problem.sources.first() else {
+        return problem.least_squares(Prefilter::default());
+    };
+    let late = |x: &[f64]| [&vec![0.0; problem.nk], &x[..x.len() - problem.nk]].concat();
+    let delayed: Vec<Vec<f64>> = source.inputs.iter().map(|x| late(x)).collect();
     let driving: Vec<&[f64]> = delayed.iter().map(Vec::as_slice).collect();
     let outputs: Vec<&[f64]> = problem.data.iter().map(|d| d.u).collect();
     let clean = following(&driving, &outputs);
-    let data = clean.iter().zip(&problem.source).map(|(u, e)| Data { e, u }).collect();
-    let parts = problem.of(data, problem.source.clone());
+    let data = clean.iter().zip(&source.inputs).map(|(u, e)| Data { e, u }).collect();
+    let parts = problem.of(data, Vec::new());
     let mut system = parts.least_squares(Prefilter::default())?;
     for _ in 0..START_ROUNDS {
         (system, _) = parts.stabilised(&system)?;
