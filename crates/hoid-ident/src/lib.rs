@@ -11,6 +11,7 @@
 //! | `starts`, `continuation` | where the search begins when nobody says |
 //! | `arx`, `least_squares` | linear regression by QR with column pivoting |
 //! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
+//! | [`instrumental`] | instrumental variables, in open and closed loop |
 //! | [`order_search`] | ranges of orders and delay, criteria, the chosen model |
 //! | [`validation`] | VAF, NRMSE, residual tests |
 //! | `derived` | poles, zeros, crossover and margins with standard errors |
@@ -27,6 +28,7 @@ mod fit;
 pub mod grey_box;
 mod information;
 mod initial_states;
+pub mod instrumental;
 mod least_squares;
 mod objective;
 pub mod order_search;
@@ -44,6 +46,7 @@ pub use error::IdentError;
 pub use estimator::{Estimator, Focus};
 pub use fit::{Fit, ResponsePoint, Series};
 pub use grey_box::{GreyBox, GreyBoxFit};
+pub use instrumental::{InstrumentalVariable, Instruments, IvMethod};
 pub use order_search::{Candidate, Choice, OrderRanges, choose_orders};
 pub use prediction_error::InitialState;
 pub use robust::Loss;

@@ -89,6 +89,10 @@ pub enum Reason {
     IterationLimit,
     /// No step lowers the loss although the gradient is not zero; often the loss falls only across the border of stability.
     NoDescent,
+    /// An iteration of instrumental variables that moves the parameters no more.
+    Settled,
+    /// Instrumental variables came to rest with a pole outside the unit circle, which was then reflected into it.
+    UnstableEstimate,
 }
 
 impl fmt::Display for Reason {
@@ -99,6 +103,10 @@ impl fmt::Display for Reason {
             Self::ExactFit => "converged: the residuals are zero up to rounding",
             Self::IterationLimit => "not converged: iteration limit reached",
             Self::NoDescent => "not converged: no step inside the region of stable C and F lowers the loss",
+            Self::Settled => "converged: a further iteration does not move the parameters",
+            Self::UnstableEstimate => {
+                "not converged: the estimate had a pole outside the unit circle, reflected into it"
+            }
         })
     }
 }
@@ -115,7 +123,10 @@ pub struct Termination {
 impl Termination {
     /// True when a minimum was reached.
     pub fn converged(&self) -> bool {
-        matches!(self.reason, Reason::Direct | Reason::SmallDecrease | Reason::ExactFit)
+        matches!(
+            self.reason,
+            Reason::Direct | Reason::SmallDecrease | Reason::ExactFit | Reason::Settled
+        )
     }
 }
 

@@ -252,7 +252,7 @@ fn time_series(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Option<(
 
 /// C and D of `v = (C/D) eps` by Hannan and Rissanen (*Biometrika* 69 (1982) 81-94): with nc = 0 one autoregression, else a long
 /// autoregression for eps first and then a regression on past v and past eps. Zeros where that is singular.
-fn noise_model(v: &[Vec<f64>], nc: usize, nd: usize) -> (Vec<f64>, Vec<f64>) {
+pub(crate) fn noise_model(v: &[Vec<f64>], nc: usize, nd: usize) -> (Vec<f64>, Vec<f64>) {
     let nothing = (vec![0.0; nc], vec![0.0; nd]);
     if nc == 0 {
         let lags: Vec<(usize, usize)> = (1..=nd).map(|i| (0, i)).collect();
