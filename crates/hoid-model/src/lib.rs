@@ -13,6 +13,7 @@
 //! | [`discretise`] | the discretisations of Table 5.2 for general transfer functions |
 //! | [`second_order`] | exact zero-order hold of second-order systems, both ways, with derivatives |
 //! | [`operator`] | [`OperatorParameters`] and their discrete model |
+//! | [`delayed_operator`](mod@delayed_operator) | the operator with a delay of any fraction of a sample |
 //! | [`remnant`] | the remnant filter, its discretisations and its retrieval |
 //! | [`uncertainty`] | standard errors of derived quantities by the delta method |
 //! | [`controlled_element`], [`forcing`], [`schedule`], [`scenario`] | the task: plant, target signal, change over time, conditions C1-C6 |
@@ -22,6 +23,7 @@
 mod error;
 
 pub mod controlled_element;
+pub mod delayed_operator;
 pub mod discretise;
 pub mod forcing;
 pub mod margins;
@@ -39,6 +41,7 @@ pub mod structure;
 pub mod transfer_function;
 pub mod uncertainty;
 
+pub use delayed_operator::{DelayedOperator, delayed_operator, delayed_operator_jacobian};
 pub use error::{ModelError, NotConvertible};
 pub use num_complex::Complex64;
 pub use operator::{DiscreteOperator, OperatorParameters};

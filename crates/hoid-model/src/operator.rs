@@ -209,7 +209,7 @@ pub fn retrieval_jacobian(operator: &OperatorParameters, sample_time: SampleTime
 }
 
 /// `e^h C(x)`, `e^h S(x)`, `e^h G(x)` with `C = cosh sqrt x`, `S = sinh sqrt x / sqrt x`, `G = dS/dx`.
-fn scaled_hyperbolics(h: f64, x: f64) -> (f64, f64, f64) {
+pub(crate) fn scaled_hyperbolics(h: f64, x: f64) -> (f64, f64, f64) {
     let e = h.exp();
     if x.abs() < 0.25 {
         // Power series: C = sum x^k/(2k)!, S = sum x^k/(2k+1)!, G = sum (k+1) x^k/(2k+3)!.

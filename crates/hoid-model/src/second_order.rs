@@ -191,7 +191,7 @@ pub fn unhold_biproper(
 
 /// Two poles times Ts: their sum, product, and the values themselves.
 #[derive(Debug, Clone, Copy)]
-struct PolePair {
+pub(crate) struct PolePair {
     sum: f64,
     product: f64,
     poles: Poles,
@@ -206,7 +206,7 @@ enum Poles {
 }
 
 impl PolePair {
-    fn from_sum_and_product(sum: f64, product: f64) -> Self {
+    pub(crate) fn from_sum_and_product(sum: f64, product: f64) -> Self {
         let half = sum / 2.0;
         let x = half * half - product;
         let poles = if x < 0.0 {
@@ -269,7 +269,7 @@ impl PolePair {
     }
 
     /// `exp[z1, z2]`.
-    fn phi1(self) -> f64 {
+    pub(crate) fn phi1(self) -> f64 {
         match self.poles {
             Poles::Real(a, b) => a.min(b).exp() * expm1_ratio((a - b).abs()),
             Poles::Complex(alpha, beta) => alpha.exp() * sin_ratio(beta),
@@ -285,7 +285,7 @@ impl PolePair {
     }
 
     /// `exp[0, z1, z2]`.
-    fn phi2(self) -> f64 {
+    pub(crate) fn phi2(self) -> f64 {
         let largest = match self.poles {
             Poles::Real(a, b) => a.abs().max(b.abs()),
             Poles::Complex(..) => self.product.sqrt(),

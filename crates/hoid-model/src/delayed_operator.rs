@@ -1,0 +1,469 @@
+//! Exact zero-order hold of the operator with a real delay: any fraction of a sample.
+//!
+//! `H(s) = (K_e + K_e_dot s) omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}` with `tau = l Ts + delta`, `0 <= delta < Ts`.
+//! An error that is held over each sample reaches the states in two parts,
+//!
+//! `x_{k+1} = Phi(Ts) x_k + Phi(Ts - delta) Gamma(delta) e_{k-l-1} + Gamma(Ts - delta) e_{k-l}`,
+//!
+//! so that the discrete model is `q^-nk (b0 + b1 q^-1 + b2 q^-2)/(1 + f1 q^-1 + f2 q^-2)` with `nk = l + 1` (K. J. Åström and
+//! B. Wittenmark, *Computer-Controlled Systems*, 1997, section 2.3; E. I. Jury, *Theory and Application of the z-Transform
+//! Method*, 1964: the modified z-transform). With the step response `s(t)` of the operator without its delay, continued
+//! analytically to negative t, where it obeys the same difference equation,
+//!
+//! - `b0 = s(Ts - delta)`;
+//! - `b2 = f2 s(-delta)`;
+//! - `b0 + b1 + b2 = K_e (1 + f1 + f2)`, the gain at zero frequency.
+//!
+//! `s(t) = omega^2 (K_e_dot t phi1 + K_e t^2 phi2)` with the divided differences of [`crate::second_order`] at the poles times
+//! t: one formula for complex, double and real poles. delta = 0 gives b2 = 0 and the hold of [`crate::operator`].
+//!
+//! The model is linear in K_e and K_e_dot. Its response is continuous in tau and has a kink where tau is a whole number of
+//! samples: the step response starts with the slope `omega^2 K_e_dot`. Derivatives there are those for growing tau.
+
+use crate::{
+    ModelError, OperatorParameters, SampleTime,
+    operator::scaled_hyperbolics,
+    second_order::{PolePair, SecondOrder},
+};
+
+/// `q^-nk (b0 + b1 q^-1 + b2 q^-2) / (1 + f1 q^-1 + f2 q^-2)`: the operator with any delay behind a zero-order hold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DelayedOperator {
+    /// Delay of b0 in samples: the whole samples of tau_e and the one of the hold.
+    pub nk: usize,
+    /// `[b0, b1, b2]`; b2 = 0 for a whole number of samples.
+    pub b: [f64; 3],
+    /// `[f1, f2]`.
+    pub f: [f64; 2],
+}
+
+/// Names of the parameters, in the order of every array here; units deg/deg, s, rad/s, 1, s.
+pub const DELAYED_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
+
+/// Distance from a whole number of samples, in samples, that counts as rounding: `0.29 / 0.01` is `28.999999999999996`.
+const ROUNDING: f64 = 1e-12;
+
+/// `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` of operator parameters.
+pub fn delayed_parameters(operator: &OperatorParameters) -> [f64; 5] {
+    [
+        operator.k_e,
+        operator.k_e_dot(),
+        operator.omega_nm_rad_s,
+        operator.zeta_nm,
+        operator.tau_e_s,
+    ]
+}
+
+/// The exact discrete model of `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` for an error held over each sample.
+///
+/// # Errors
+/// [`ModelError::OutOfRange`] when a parameter is not finite, omega_nm is not positive, the delay is negative, or a
+/// coefficient is not finite (a pole so fast that its exponential overflows).
+pub fn delayed_operator(parameters: [f64; 5], sample_time: SampleTime) -> Result<DelayedOperator, ModelError> {
+    let (nk, delta) = split_delay(parameters, sample_time)?;
+    let [k_e, k_e_dot, omega, zeta, _] = parameters;
+    let ts = sample_time.s();
+    let w2 = omega * omega;
+    let whole = SecondOrder {
+        b0: w2 * k_e_dot,
+        b1: w2 * k_e,
+        a1: 2.0 * zeta * omega,
+        a2: w2,
+    }
+    .hold(sample_time)?;
+    let (early, late) = (Gains::at(ts - delta, omega, zeta), Gains::at(-delta, omega, zeta));
+    let b0 = early.step_response(k_e, k_e_dot);
+    let b2 = whole.f2 * late.step_response(k_e, k_e_dot);
+    let operator = DelayedOperator {
+        nk,
+        b: [b0, whole.b0 + whole.b1 - b0 - b2, b2],
+        f: [whole.f1, whole.f2],
+    };
+    match operator.b.iter().find(|b| !b.is_finite()) {
+        None => Ok(operator),
+        Some(&found) => Err(ModelError::OutOfRange {
+            quantity: "a coefficient of B",
+            found,
+            expected: "a finite number; check the poles against the sample time",
+        }),
+    }
+}
+
+/// Jacobian of `[b0, b1, b2, f1, f2]` (rows) with respect to `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` (columns), nk held.
+///
+/// # Errors
+/// As [`delayed_operator`].
+pub fn delayed_operator_jacobian(parameters: [f64; 5], sample_time: SampleTime) -> Result<[[f64; 5]; 5], ModelError> {
+    let (_, delta) = split_delay(parameters, sample_time)?;
+    let f2 = delayed_operator(parameters, sample_time)?.f[1];
+    let [k_e, k_e_dot, omega, zeta, _] = parameters;
+    let ts = sample_time.s();
+    let whole = Slopes::at(ts, omega, zeta);
+    let (early, late) = (Slopes::at(ts - delta, omega, zeta), Slopes::at(-delta, omega, zeta));
+    let late_response = late.gains.step_response(k_e, k_e_dot);
+    // f2 = e^{-2 zeta omega Ts}.
+    let (f2_omega, f2_zeta) = (-2.0 * zeta * ts * f2, -2.0 * omega * ts * f2);
+    // f1 = -2 E C, and the sum of B is K_e (1 + f1 + f2).
+    let (f1_omega, f1_zeta) = (-2.0 * whole.cosine_omega, -2.0 * whole.cosine_zeta);
+    let sum = 1.0 - 2.0 * whole.cosine + f2;
+
+    let b0 = early.row(k_e, k_e_dot);
+    let mut b2 = late.row(k_e, k_e_dot).map(|d| f2 * d);
+    b2[2] += f2_omega * late_response;
+    b2[3] += f2_zeta * late_response;
+    let total = [sum, 0.0, k_e * (f1_omega + f2_omega), k_e * (f1_zeta + f2_zeta), 0.0];
+    Ok([
+        b0,
+        std::array::from_fn(|j| total[j] - b0[j] - b2[j]),
+        b2,
+        [0.0, 0.0, f1_omega, f1_zeta, 0.0],
+        [0.0, 0.0, f2_omega, f2_zeta, 0.0],
+    ])
+}
+
+/// nk and the fraction delta in s of parameters that have a meaning.
+fn split_delay(parameters: [f64; 5], sample_time: SampleTime) -> Result<(usize, f64), ModelError> {
+    let quantities = [
+        "error gain K_e",
+        "error-rate gain K_e_dot in s",
+        "neuromuscular frequency omega_nm in rad/s",
+        "neuromuscular damping zeta_nm",
+        "delay tau_e in s",
+    ];
+    for (i, (&found, quantity)) in parameters.iter().zip(quantities).enumerate() {
+        let in_range = match i {
+            2 => found > 0.0,
+            4 => found >= 0.0,
+            _ => true,
+        };
+        if !(found.is_finite() && in_range) {
+            return Err(ModelError::OutOfRange {
+                quantity,
+                found,
+                expected: "a finite number, positive for omega_nm, zero or more for tau_e",
+            });
+        }
+    }
+    let (tau, ts) = (parameters[4], sample_time.s());
+    let samples = tau / ts;
+    if samples > 1e9 {
+        return Err(ModelError::OutOfRange {
+            quantity: "delay tau_e in s",
+            found: tau,
+            expected: "fewer than 1e9 samples; check its unit against that of the sample time",
+        });
+    }
+    let nearest = samples.round();
+    if (samples - nearest).abs() <= ROUNDING * (1.0 + nearest) {
+        return Ok((nearest as usize + 1, 0.0));
+    }
+    let whole = samples.floor();
+    Ok((whole as usize + 1, (tau - whole * ts).clamp(0.0, ts)))
+}
+
+/// What K_e and K_e_dot contribute to the step response at one time.
+#[derive(Debug, Clone, Copy)]
+struct Gains {
+    /// `omega^2 t^2 phi2`.
+    step: f64,
+    /// `omega^2 t phi1`.
+    rate: f64,
+}
+
+impl Gains {
+    fn at(t: f64, omega: f64, zeta: f64) -> Self {
+        let q = omega * omega * t * t;
+        let poles = PolePair::from_sum_and_product(-2.0 * zeta * omega * t, q);
+        Self {
+            step: q * poles.phi2(),
+            rate: omega * omega * t * poles.phi1(),
+        }
+    }
+
+    fn step_response(self, k_e: f64, k_e_dot: f64) -> f64 {
+        k_e * self.step + k_e_dot * self.rate
+    }
+}
+
+/// The gains with their derivatives, and `E C` with its own (for f1).
+///
+/// With `s = -2 zeta omega t`, `q = omega^2 t^2`, `E = e^{s/2}` and C, S, G of `x = s^2/4 - q` as in [`crate::operator`]: `phi1 = E S`,
+/// `q phi2 = 1 - E C + (s/2) E S`; `x_s = s/2`, `x_q = -1`, `dC/dx = S/2`, `dS/dx = G`.
+#[derive(Debug, Clone, Copy)]
+struct Slopes {
+    gains: Gains,
+    step_omega: f64,
+    step_zeta: f64,
+    step_t: f64,
+    rate_omega: f64,
+    rate_zeta: f64,
+    rate_t: f64,
+    cosine: f64,
+    cosine_omega: f64,
+    cosine_zeta: f64,
+}
+
+impl Slopes {
+    fn at(t: f64, omega: f64, zeta: f64) -> Self {
+        let s = -2.0 * zeta * omega * t;
+        let w2 = omega * omega;
+        let q = w2 * t * t;
+        let (ec, es, eg) = scaled_hyperbolics(s / 2.0, s * s / 4.0 - q);
+        let (ec_s, ec_q) = (ec / 2.0 + es * s / 4.0, -es / 2.0);
+        let (es_s, es_q) = (es / 2.0 + eg * s / 2.0, -eg);
+        let (step_s, step_q) = (-ec_s + es / 2.0 + s / 2.0 * es_s, -ec_q + s / 2.0 * es_q);
+        let along = |by_s: f64, by_q: f64| {
+            (
+                by_s * (-2.0 * zeta * t) + by_q * (2.0 * omega * t * t),
+                by_s * (-2.0 * omega * t),
+            )
+        };
+        let (cosine_omega, cosine_zeta) = along(ec_s, ec_q);
+        let (step_omega, step_zeta) = along(step_s, step_q);
+        let (es_omega, es_zeta) = along(es_s, es_q);
+        Self {
+            gains: Gains::at(t, omega, zeta),
+            step_omega,
+            step_zeta,
+            // The impulse response, and its own slope.
+            step_t: w2 * t * es,
+            rate_omega: 2.0 * omega * t * es + w2 * t * es_omega,
+            rate_zeta: w2 * t * es_zeta,
+            rate_t: w2 * (ec + s / 2.0 * es),
+            cosine: ec,
+            cosine_omega,
+            cosine_zeta,
+        }
+    }
+
+    /// Derivatives of the step response with respect to the parameters; t falls as tau grows.
+    fn row(&self, k_e: f64, k_e_dot: f64) -> [f64; 5] {
+        [
+            self.gains.step,
+            self.gains.rate,
+            k_e * self.step_omega + k_e_dot * self.rate_omega,
+            k_e * self.step_zeta + k_e_dot * self.rate_zeta,
+            -(k_e * self.step_t + k_e_dot * self.rate_t),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+    use crate::operator::discretisation_jacobian;
+
+    fn ts() -> SampleTime {
+        SampleTime::new(0.01).unwrap()
+    }
+
+    /// Complex, double, nearly double, real, fast and slow, lightly damped, unstable; signs of both gains.
+    fn cases() -> Vec<[f64; 5]> {
+        let poles = [
+            (11.25, 0.35),
+            (11.25, 1.0),
+            (11.25, 1.0 + 1e-9),
+            (11.25, 1.7),
+            (60.0, 0.1),
+            (60.0, 3.0),
+            (2.0, 0.05),
+            (150.0, 0.6),
+            (300.0, 0.2),
+            (9.0, -0.1),
+        ];
+        let gains = [(0.09, 0.036), (-0.3, 0.05), (0.0, 0.04), (0.07, 0.0), (0.2, -0.03)];
+        let delays = [0.0, 0.003, 0.0099, 0.28, 0.2837, 0.29, 0.295, 0.2999];
+        let mut all = Vec::new();
+        for (i, &(omega, zeta)) in poles.iter().enumerate() {
+            for (j, &tau) in delays.iter().enumerate() {
+                let (k_e, k_e_dot) = gains[(i + j) % gains.len()];
+                all.push([k_e, k_e_dot, omega, zeta, tau]);
+            }
+        }
+        all
+    }
+
+    /// Impulse response of the discrete model to a pulse of one sample.
+    fn response(operator: &DelayedOperator, n: usize) -> Vec<f64> {
+        let mut y: Vec<f64> = Vec::with_capacity(n);
+        for k in 0..n {
+            let forced = k
+                .checked_sub(operator.nk)
+                .and_then(|j| operator.b.get(j))
+                .unwrap_or(&0.0);
+            let past = |lag: usize| if k >= lag { y[k - lag] } else { 0.0 };
+            y.push(forced - operator.f[0] * past(1) - operator.f[1] * past(2));
+        }
+        y
+    }
+
+    /// The same by the matrix exponentials of the states in controllable canonical form.
+    fn by_matrix_exponentials(p: [f64; 5], n: usize) -> Vec<f64> {
+        let [k_e, k_e_dot, omega, zeta, tau] = p;
+        let w2 = omega * omega;
+        let extended = |t: f64| {
+            let m = DMatrix::from_row_slice(3, 3, &[0.0, 1.0, 0.0, -w2, -2.0 * zeta * omega, 1.0, 0.0, 0.0, 0.0]) * t;
+            let e = m.exp();
+            (
+                e.view((0, 0), (2, 2)).into_owned(),
+                DVector::from_column_slice(e.view((0, 2), (2, 1)).into_owned().as_slice()),
+            )
+        };
+        let l = (tau / 0.01 + 1e-9).floor();
+        let delta = (tau - 0.01 * l).max(0.0);
+        let (phi, _) = extended(0.01);
+        let (phi_rest, gamma_rest) = extended(0.01 - delta);
+        let (_, gamma_delta) = extended(delta);
+        let pulse = |k: i64| if k == 0 { 1.0 } else { 0.0 };
+        let mut x = DVector::zeros(2);
+        let mut y = Vec::with_capacity(n);
+        for k in 0..n as i64 {
+            y.push(w2 * (k_e * x[0] + k_e_dot * x[1]));
+            let lag = k - l as i64;
+            x = &phi * x + &phi_rest * &gamma_delta * pulse(lag - 1) + &gamma_rest * pulse(lag);
+        }
+        y
+    }
+
+    #[test]
+    fn agrees_with_matrix_exponentials() {
+        for p in cases() {
+            let ours = response(&delayed_operator(p, ts()).unwrap(), 80);
+            let theirs = by_matrix_exponentials(p, 80);
+            let size = theirs.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+            for (k, (a, b)) in ours.iter().zip(&theirs).enumerate() {
+                // The recursion of the difference equation loses digits by 1/|1 + f1 + f2| at most 2500 here.
+                assert!((a - b).abs() < 2e-12 * size, "{p:?} sample {k}: {a} and {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn whole_samples_are_the_hold_of_the_operator() {
+        for tau in [0.0, 0.01, 0.28, 0.29, 0.57] {
+            let operator = OperatorParameters {
+                k_e: 0.09,
+                t_l_s: 0.4,
+                omega_nm_rad_s: 11.25,
+                zeta_nm: 0.35,
+                tau_e_s: tau,
+            };
+            let ours = delayed_operator(delayed_parameters(&operator), ts()).unwrap();
+            let known = operator.discretise(ts()).unwrap();
+            assert_eq!((ours.nk, ours.b[2]), (known.nk, 0.0));
+            // The same formulas, in another order of the products.
+            assert!((ours.b[0] - known.held.b0).abs() < 1e-16 && (ours.b[1] - known.held.b1).abs() < 1e-16);
+            assert_eq!(ours.f, [known.held.f1, known.held.f2]);
+            let jacobian = delayed_operator_jacobian(delayed_parameters(&operator), ts()).unwrap();
+            let expected = discretisation_jacobian(&operator, ts());
+            for (row, known) in [0, 1, 3, 4].into_iter().zip(expected) {
+                for (a, b) in jacobian[row].iter().zip(known) {
+                    // Both cancel in 1 - E C + (s/2) E S, by a factor of 100.
+                    assert!((a - b).abs() < 1e-13 * (1.0 + b.abs()), "{row}: {a} and {b}");
+                }
+            }
+        }
+        // The reference task: nk = 29 at 0.28 s.
+        let s1 = delayed_operator([0.09, 0.036, 11.25, 0.35, 0.28], ts()).unwrap();
+        assert_eq!(s1.nk, 29);
+        assert!((s1.b[0] - 0.0442765923).abs() < 5e-11 && (s1.b[1] + 0.0431823806).abs() < 5e-11);
+    }
+
+    #[test]
+    fn jacobian_agrees_with_finite_differences() {
+        for p in cases() {
+            let exact = delayed_operator_jacobian(p, ts()).unwrap();
+            let at = |p: [f64; 5]| {
+                let d = delayed_operator(p, ts()).unwrap();
+                [d.b[0], d.b[1], d.b[2], d.f[0], d.f[1]]
+            };
+            for j in 0..5 {
+                // Inside the sample: the whole ones have derivatives on one side only, tested beside.
+                if j == 4 && [0.0, 0.28, 0.29].contains(&p[4]) {
+                    continue;
+                }
+                let h = match j {
+                    0 | 1 => 1e-3,
+                    4 => 1e-7,
+                    _ => 1e-5 * p[j].abs(),
+                };
+                let (mut up, mut down) = (p, p);
+                up[j] += h;
+                down[j] -= h;
+                let (up, down) = (at(up), at(down));
+                let scale = (0..5).map(|k| exact[k][j].abs()).fold(0.0, f64::max);
+                for i in 0..5 {
+                    let difference = (up[i] - down[i]) / (2.0 * h);
+                    // Central differences: truncation h^2 and rounding eps/h against derivatives of 1e-3 and more.
+                    assert!(
+                        (exact[i][j] - difference).abs() < 1e-7 * scale + 1e-10,
+                        "{p:?} row {i} by {}: {} and {difference}",
+                        DELAYED_NAMES[j],
+                        exact[i][j]
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn derivatives_at_a_whole_sample_are_those_for_growing_delay() {
+        let p = [0.09, 0.036, 11.25, 0.35, 0.28];
+        let exact = delayed_operator_jacobian(p, ts()).unwrap();
+        let at = |h: f64| delayed_operator([p[0], p[1], p[2], p[3], p[4] + h], ts()).unwrap().b;
+        for i in 0..3 {
+            let h = 1e-5;
+            // Second order from one side.
+            let difference = (-3.0 * at(0.0)[i] + 4.0 * at(h)[i] - at(2.0 * h)[i]) / (2.0 * h);
+            assert!((exact[i][4] - difference).abs() < 1e-6 * exact[0][4].abs(), "{i}");
+        }
+    }
+
+    #[test]
+    fn the_response_is_continuous_where_the_delay_crosses_a_sample() {
+        for (omega, zeta) in [(11.25, 0.35), (60.0, 1.0), (40.0, 2.0)] {
+            let at = |tau: f64| delayed_operator([0.09, 0.036, omega, zeta, tau], ts()).unwrap();
+            let (before, there, after) = (at(0.28 - 1e-9), at(0.28), at(0.28 + 1e-9));
+            assert_eq!([before.nk, there.nk, after.nk], [28, 29, 29]);
+            let (a, b, c) = (response(&before, 90), response(&there, 90), response(&after, 90));
+            for k in 0..90 {
+                // 1e-9 s times the slope of the response, omega^2 K_e_dot at most.
+                let bound = 2e-9 * omega * omega * 0.036 + 1e-13;
+                assert!(
+                    (a[k] - b[k]).abs() < bound && (c[k] - b[k]).abs() < bound,
+                    "{omega} {k}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn linear_in_both_gains() {
+        let at = |k_e, k_e_dot| delayed_operator([k_e, k_e_dot, 11.25, 0.35, 0.2837], ts()).unwrap().b;
+        let (a, b, both) = (at(1.0, 0.0), at(0.0, 1.0), at(0.09, 0.036));
+        for i in 0..3 {
+            assert!((0.09 * a[i] + 0.036 * b[i] - both[i]).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn bad_parameters_are_errors() {
+        let good = [0.09, 0.036, 11.25, 0.35, 0.2837];
+        for j in 0..5 {
+            for bad in [f64::NAN, f64::INFINITY] {
+                let mut p = good;
+                p[j] = bad;
+                assert!(delayed_operator(p, ts()).is_err() && delayed_operator_jacobian(p, ts()).is_err());
+            }
+        }
+        for (j, bad) in [(2, 0.0), (2, -1.0), (4, -1e-9), (4, 1e9)] {
+            let mut p = good;
+            p[j] = bad;
+            assert!(delayed_operator(p, ts()).is_err(), "{j} {bad}");
+        }
+        // An exponential that overflows.
+        assert!(delayed_operator([0.09, 0.036, 300.0, -1e4, 0.2837], ts()).is_err());
+    }
+}
