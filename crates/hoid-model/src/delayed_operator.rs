@@ -60,7 +60,22 @@ pub fn delayed_parameters(operator: &OperatorParameters) -> [f64; 5] {
 /// [`ModelError::OutOfRange`] when a parameter is not finite, omega_nm is not positive, the delay is negative, or a
 /// coefficient is not finite (a pole so fast that its exponential overflows).
 pub fn delayed_operator(parameters: [f64; 5], sample_time: SampleTime) -> Result<DelayedOperator, ModelError> {
-    let (nk, delta) = split_delay(parameters, sample_time)?;
+    let whole_samples = whole_samples(parameters[4], sample_time)?;
+    delayed_operator_within(whole_samples, parameters, sample_time)
+}
+
+/// As [`delayed_operator`], written with a given whole number l of samples in the delay: for `l Ts <= tau <= (l + 1) Ts`, both
+/// ends included, so that inside each sample the model and its derivatives are smooth functions up to the borders.
+///
+/// # Errors
+/// As [`delayed_operator`]; also when tau_e does not lie within that sample.
+pub fn delayed_operator_within(
+    whole_samples: usize,
+    parameters: [f64; 5],
+    sample_time: SampleTime,
+) -> Result<DelayedOperator, ModelError> {
+    let delta = fraction(whole_samples, parameters, sample_time)?;
+    let nk = whole_samples + 1;
     let [k_e, k_e_dot, omega, zeta, _] = parameters;
     let ts = sample_time.s();
     let w2 = omega * omega;
@@ -94,8 +109,21 @@ pub fn delayed_operator(parameters: [f64; 5], sample_time: SampleTime) -> Result
 /// # Errors
 /// As [`delayed_operator`].
 pub fn delayed_operator_jacobian(parameters: [f64; 5], sample_time: SampleTime) -> Result<[[f64; 5]; 5], ModelError> {
-    let (_, delta) = split_delay(parameters, sample_time)?;
-    let f2 = delayed_operator(parameters, sample_time)?.f[1];
+    let whole_samples = whole_samples(parameters[4], sample_time)?;
+    delayed_operator_jacobian_within(whole_samples, parameters, sample_time)
+}
+
+/// The Jacobian of [`delayed_operator_within`].
+///
+/// # Errors
+/// As [`delayed_operator_within`].
+pub fn delayed_operator_jacobian_within(
+    whole_samples: usize,
+    parameters: [f64; 5],
+    sample_time: SampleTime,
+) -> Result<[[f64; 5]; 5], ModelError> {
+    let delta = fraction(whole_samples, parameters, sample_time)?;
+    let f2 = delayed_operator_within(whole_samples, parameters, sample_time)?.f[1];
     let [k_e, k_e_dot, omega, zeta, _] = parameters;
     let ts = sample_time.s();
     let whole = Slopes::at(ts, omega, zeta);
@@ -121,8 +149,26 @@ pub fn delayed_operator_jacobian(parameters: [f64; 5], sample_time: SampleTime) 
     ])
 }
 
-/// nk and the fraction delta in s of parameters that have a meaning.
-fn split_delay(parameters: [f64; 5], sample_time: SampleTime) -> Result<(usize, f64), ModelError> {
+/// Whole samples l of a delay: the largest number with `l Ts <= tau`, up to rounding.
+///
+/// # Errors
+/// [`ModelError::OutOfRange`] when the delay is negative, not finite or longer than 1e9 samples.
+pub fn whole_samples(tau_e_s: f64, sample_time: SampleTime) -> Result<usize, ModelError> {
+    let samples = tau_e_s / sample_time.s();
+    if !(0.0..=1e9).contains(&samples) {
+        return Err(ModelError::OutOfRange {
+            quantity: "delay tau_e in s",
+            found: tau_e_s,
+            expected: "zero or more, and fewer than 1e9 samples; check its unit against that of the sample time",
+        });
+    }
+    let nearest = samples.round();
+    let near = (samples - nearest).abs() <= ROUNDING * (1.0 + nearest);
+    Ok(if near { nearest } else { samples.floor() } as usize)
+}
+
+/// The fraction delta in s behind the whole samples, of parameters that have a meaning.
+fn fraction(whole_samples: usize, parameters: [f64; 5], sample_time: SampleTime) -> Result<f64, ModelError> {
     let quantities = [
         "error gain K_e",
         "error-rate gain K_e_dot in s",
@@ -131,34 +177,31 @@ fn split_delay(parameters: [f64; 5], sample_time: SampleTime) -> Result<(usize, 
         "delay tau_e in s",
     ];
     for (i, (&found, quantity)) in parameters.iter().zip(quantities).enumerate() {
-        let in_range = match i {
-            2 => found > 0.0,
-            4 => found >= 0.0,
-            _ => true,
-        };
-        if !(found.is_finite() && in_range) {
+        if !found.is_finite() || (i == 2 && found <= 0.0) {
             return Err(ModelError::OutOfRange {
                 quantity,
                 found,
-                expected: "a finite number, positive for omega_nm, zero or more for tau_e",
+                expected: "a finite number, positive for omega_nm",
             });
         }
     }
     let (tau, ts) = (parameters[4], sample_time.s());
-    let samples = tau / ts;
-    if samples > 1e9 {
+    let whole = whole_samples as f64;
+    let delta = tau - whole * ts;
+    let rounding = ROUNDING * (1.0 + whole) * ts;
+    if delta < -rounding || delta > ts + rounding {
         return Err(ModelError::OutOfRange {
             quantity: "delay tau_e in s",
             found: tau,
-            expected: "fewer than 1e9 samples; check its unit against that of the sample time",
+            expected: "a time within the sample that is asked for",
         });
     }
-    let nearest = samples.round();
-    if (samples - nearest).abs() <= ROUNDING * (1.0 + nearest) {
-        return Ok((nearest as usize + 1, 0.0));
-    }
-    let whole = samples.floor();
-    Ok((whole as usize + 1, (tau - whole * ts).clamp(0.0, ts)))
+    // A whole number of samples, or one more, up to rounding.
+    Ok(match delta {
+        d if d <= rounding => 0.0,
+        d if d >= ts - rounding => ts,
+        d => d,
+    })
 }
 
 /// What K_e and K_e_dot contribute to the step response at one time.
@@ -437,6 +480,32 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn both_samples_give_the_same_response_at_their_border() {
+        let p = [0.09, 0.036, 11.25, 0.35, 0.28];
+        let (above, below) = (
+            delayed_operator_within(28, p, ts()).unwrap(),
+            delayed_operator_within(27, p, ts()).unwrap(),
+        );
+        assert_eq!((above.nk, below.nk, below.b[0]), (29, 28, 0.0));
+        for i in 0..2 {
+            assert!((above.b[i] - below.b[i + 1]).abs() < 1e-15);
+        }
+        // From below the slope is that of the sample below.
+        let at = |h: f64| {
+            delayed_operator_within(27, [p[0], p[1], p[2], p[3], p[4] - h], ts())
+                .unwrap()
+                .b
+        };
+        let exact = delayed_operator_jacobian_within(27, p, ts()).unwrap();
+        let h = 1e-5;
+        for i in 0..3 {
+            let difference = (3.0 * at(0.0)[i] - 4.0 * at(h)[i] + at(2.0 * h)[i]) / (2.0 * h);
+            assert!((exact[i][4] - difference).abs() < 1e-6 * exact[0][4].abs(), "{i}");
+        }
+        assert!(delayed_operator_within(29, p, ts()).is_err() && delayed_operator_within(26, p, ts()).is_err());
     }
 
     #[test]
