@@ -10,6 +10,7 @@
 //! | `objective`, `robust`, `simulation_focus` | bounds and priors, a loss against outliers, models that are to simulate |
 //! | `starts` | where the search begins when nobody says |
 //! | `arx`, `least_squares` | linear regression by QR with column pivoting |
+//! | [`TimeVarying`] | gains that follow a sigmoid, with the time and the rate of the change |
 //! | [`order_search`] | ranges of orders and delay, criteria, the chosen model |
 //! | [`validation`] | VAF, NRMSE, residual tests |
 //! | [`Fit`] | model, covariance, how it ended; prediction, simulation, frequency response |
@@ -31,6 +32,7 @@ mod search;
 mod simulation_focus;
 mod starts;
 mod stationary_past;
+mod time_varying;
 pub mod validation;
 
 pub use constraint::{Constraint, Prior};
@@ -41,3 +43,6 @@ pub use order_search::{Candidate, Choice, OrderRanges, choose_orders};
 pub use prediction_error::InitialState;
 pub use robust::Loss;
 pub use search::{Reason, SearchMethod, SearchOptions, Termination};
+pub use time_varying::{
+    ChangeParameter, Comparison, GainsAt, NoiseLevel, Remark, TIME_VARYING_NAMES, TimeVarying, TimeVaryingFit,
+};
