@@ -95,6 +95,8 @@ fn study(condition: Condition, n: u64, estimator: &TimeVarying) -> Study {
     let mut with_error = vec![0; truth.len()];
     let mut se = vec![Vec::new(); truth.len()];
     let (mut converged, mut found) = (0, 0);
+    let mut li = [0; 3];
+    let mut widths = [vec![], vec![]];
     let t0 = std::time::Instant::now();
     for record in runs(condition, n) {
         let fit = estimator.fit(std::slice::from_ref(&record)).unwrap();
@@ -106,14 +108,16 @@ fn study(condition: Condition, n: u64, estimator: &TimeVarying) -> Study {
             if let Some(s) = e.standard_error {
                 with_error[i] += 1;
                 se[i].push(s);
-                let covers = if *name == "G" {
-                    let (low, high) = fit.rate_interval(1.96).unwrap();
-                    low < *true_value && *true_value < high
-                } else {
-                    (e.value - true_value).abs() < 1.96 * s
-                };
-                inside[i] += u64::from(covers);
+                inside[i] += u64::from((e.value - true_value).abs() < 1.96 * s);
             }
+        }
+        if let (Some(m), Some(g)) = (fit.midpoint_interval(), fit.rate_interval()) {
+            let within = |(l, h): (f64, f64), x: f64| u64::from(l <= x && x <= h);
+            li[0] += within(m, truth[4].1);
+            li[1] += within(g, truth[5].1);
+            widths[0].push(m.1 - m.0);
+            widths[1].push(g.0);
+            li[2] += u64::from(fit.is_change_point());
         }
         if std::env::var("V").is_ok() {
             println!(
@@ -130,6 +134,17 @@ fn study(condition: Condition, n: u64, estimator: &TimeVarying) -> Study {
     println!(
         "{condition}: converged {converged}/{n}, change found {found}/{n}, {:?} per fit",
         t0.elapsed() / n as u32
+    );
+    for w in &mut widths {
+        w.sort_by(f64::total_cmp);
+    }
+    println!(
+        "  intervals: t_M {} G {} change points {} median width t_M {:?} low of G {:?}",
+        li[0],
+        li[1],
+        li[2],
+        widths[0].get(n as usize / 2),
+        widths[1].get(n as usize / 2)
     );
     let mut rows = Vec::new();
     for (i, (name, true_value)) in truth.iter().enumerate() {

@@ -38,8 +38,12 @@ const ZETA_LIMITS: (f64, f64) = (1e-4, 100.0);
 const HIGHEST_FREQUENCY: f64 = 0.999;
 /// Share of the span at either end in which t_M is not sought by default: less of a record does not determine two gains.
 const ENDS: f64 = 0.05;
-/// Largest rate times the sample time: nine tenths of the change lie within one sample.
-pub(crate) const FASTEST: f64 = 10.0;
+/// Largest rate times the sample time: four fifths of the change take two samples (2 ln 9 = 4.4). A faster one looks the same,
+/// and its likelihood would be a staircase in t_M, with a step for each sample (here its slope varies by 2 % with the place of
+/// t_M between two samples, for twice the rate by 50 %).
+pub(crate) const FASTEST: f64 = 2.0;
+/// Largest rate times the sample time that can be given.
+const FASTEST_GIVEN: f64 = 10.0;
 /// Smallest rate times the span: nine tenths of the change fill it (2 ln 19 = 5.9), and its ends are hardly told from a line.
 const SLOWEST: f64 = 5.0;
 
@@ -81,10 +85,10 @@ pub(crate) fn limits(
         // What has a meaning at all, and what is sought unless the user says otherwise.
         let (widest, usual) = match i {
             MIDPOINT => ((from, to), (from + ENDS * span, to - ENDS * span)),
-            LOG_RATE => (
-                (SLOWEST / span, FASTEST / frame.ts_s),
-                (SLOWEST / span, FASTEST / frame.ts_s),
-            ),
+            LOG_RATE => {
+                let slowest = SLOWEST / span;
+                ((slowest, FASTEST_GIVEN / frame.ts_s), (slowest, FASTEST / frame.ts_s))
+            }
             OMEGA => {
                 let range = (1e-3, HIGHEST_FREQUENCY * std::f64::consts::PI / frame.ts_s);
                 (range, range)
@@ -232,7 +236,7 @@ mod tests {
         assert_eq!(usual.len(), 10);
         assert_eq!(usual[MIDPOINT], (4.0, 76.0));
         assert_eq!(usual[DELAY], (0.05, 0.6));
-        assert!((usual[LOG_RATE].1.exp() - 1000.0).abs() < 1e-9);
+        assert!((usual[LOG_RATE].1.exp() - 200.0).abs() < 1e-9);
         let with = |name: &str, c: Constraint| limits(1, &frame(), &BTreeMap::from([(name.to_owned(), c)]));
         assert_eq!(with("t_M", Constraint::Fixed(79.0)).unwrap()[MIDPOINT], (79.0, 79.0));
         assert_eq!(

@@ -24,6 +24,7 @@ use crate::{
     search::{Minimum, minimise},
 };
 
+mod interval;
 mod layout;
 mod noise_level;
 mod objective;
@@ -54,7 +55,7 @@ pub struct TimeVarying {
     /// Shortest and longest delay tau_e, s; any fraction of a sample. Equal ends fix it.
     pub delay_range_s: (f64, f64),
     /// Fixed and bounded parameters by name ([`TIME_VARYING_NAMES`], d1 ...). By default t_M lies in the middle nine tenths of
-    /// the span that the records have in common, and G between 5/span and 10/Ts.
+    /// the span that the records have in common, and G between 5/span and 2/Ts.
     pub constraints: BTreeMap<String, Constraint>,
     /// Size of the innovations over the record.
     pub noise_level: NoiseLevel,
@@ -62,6 +63,8 @@ pub struct TimeVarying {
     pub start: Option<Vec<f64>>,
     /// Method and limits of each search.
     pub search: SearchOptions,
+    /// Whether t_M and G get likelihood intervals; they take about as long as the fit. Default true.
+    pub likelihood_intervals: bool,
 }
 
 impl Default for TimeVarying {
@@ -74,6 +77,7 @@ impl Default for TimeVarying {
             noise_level: NoiseLevel::default(),
             start: None,
             search: SearchOptions::default(),
+            likelihood_intervals: true,
         }
     }
 }
@@ -82,6 +86,8 @@ impl Default for TimeVarying {
 const ROUNDS: usize = 20;
 /// Rounds end when the ratio of the levels moves by less than this share; its own standard error is `1/sqrt n`, about 1 %.
 const SETTLED: f64 = 1e-6;
+/// Lower minima that the walks along t_M and G may come upon before the fit is left at the last one.
+const MOST_LOWER: usize = 3;
 /// Distance to the border of a sample, in samples, below which the next sample is tried.
 const NEAR_BORDER: f64 = 1e-6;
 
@@ -94,32 +100,60 @@ impl TimeVarying {
     pub fn fit(&self, records: &[Record]) -> Result<TimeVaryingFit, IdentError> {
         let sample_time = checks::common_sample_time(records)?;
         let mut criterion = self.criterion(records, sample_time)?;
-        let (start, mut minimum) = self.best_minimum(&criterion, records)?;
-        let mut levels = None;
-        if self.noise_level == NoiseLevel::Changing {
-            let mut iterations = minimum.termination.iterations;
-            for round in 0..ROUNDS {
-                let Some(found) = levels_at(&criterion, &minimum.theta) else {
-                    break;
-                };
-                let before = levels.replace(found);
-                let ratio = |s: [f64; 2]| s[1] / s[0];
-                if before.is_some_and(|b: [f64; 2]| (ratio(found) / ratio(b) - 1.0).abs() < SETTLED) {
-                    break;
+        let (start, minimum) = self.best_minimum(&criterion, records)?;
+        let (mut minimum, mut levels) = self.with_levels(&mut criterion, minimum)?;
+        let mut fit;
+        let mut lower = 0;
+        loop {
+            let constant = self.without_change(&criterion, &minimum.theta)?;
+            fit = result::assemble(&criterion, &minimum, start.clone(), &constant, levels)?;
+            if !self.likelihood_intervals {
+                break;
+            }
+            match fit.add_intervals(&criterion, &minimum) {
+                Some(theta) if lower < MOST_LOWER => {
+                    lower += 1;
+                    let iterations = minimum.termination.iterations;
+                    let found = search(&criterion, theta, &self.search, None).ok_or(IdentError::NoFiniteLoss)?;
+                    (minimum, levels) = self.with_levels(&mut criterion, found)?;
+                    minimum.termination.iterations += iterations;
                 }
-                criterion.weights = Some(noise_level::weights(found, &shares(&criterion, &minimum.theta)));
-                let next =
-                    search(&criterion, minimum.theta.clone(), &self.search, None).ok_or(IdentError::NoFiniteLoss)?;
-                iterations += next.termination.iterations;
-                minimum = next;
-                minimum.termination.iterations = iterations;
-                if round + 1 == ROUNDS && minimum.termination.reason == Reason::SmallDecrease {
-                    minimum.termination.reason = Reason::IterationLimit;
-                }
+                _ => break,
             }
         }
-        let constant = self.without_change(&criterion, &minimum.theta)?;
-        result::assemble(criterion, minimum, start, constant, levels)
+        Ok(fit)
+    }
+
+    /// The minimum with the noise levels found in turn with the fit.
+    fn with_levels(
+        &self,
+        criterion: &mut ChangeCriterion<'_>,
+        mut minimum: Minimum,
+    ) -> Result<(Minimum, Option<[f64; 2]>), IdentError> {
+        let mut levels = None;
+        if self.noise_level == NoiseLevel::Constant {
+            return Ok((minimum, levels));
+        }
+        let mut iterations = minimum.termination.iterations;
+        for round in 0..ROUNDS {
+            let Some(found) = levels_at(criterion, &minimum.theta) else {
+                break;
+            };
+            let before = levels.replace(found);
+            let ratio = |s: [f64; 2]| s[1] / s[0];
+            if before.is_some_and(|b: [f64; 2]| (ratio(found) / ratio(b) - 1.0).abs() < SETTLED) {
+                break;
+            }
+            criterion.weights = Some(noise_level::weights(found, &shares(criterion, &minimum.theta)));
+            let next = search(criterion, minimum.theta, &self.search, None).ok_or(IdentError::NoFiniteLoss)?;
+            iterations += next.termination.iterations;
+            minimum = next;
+            minimum.termination.iterations = iterations;
+            if round + 1 == ROUNDS && minimum.termination.reason == Reason::SmallDecrease {
+                minimum.termination.reason = Reason::IterationLimit;
+            }
+        }
+        Ok((minimum, levels))
     }
 
     fn criterion<'a>(&self, records: &'a [Record], sample_time: SampleTime) -> Result<ChangeCriterion<'a>, IdentError> {
@@ -173,7 +207,6 @@ impl TimeVarying {
             sample: None,
             changes: true,
             weights: None,
-            secant_s: 0.0,
         };
         for record in records {
             checks::record(hoid_model::Structure::BoxJenkins, &orders, record, criterion.first)?;

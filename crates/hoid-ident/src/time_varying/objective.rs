@@ -53,8 +53,6 @@ pub(crate) struct ChangeCriterion<'a> {
     pub changes: bool,
     /// Weights of the residuals of each record, from the first residual on; none where all count the same.
     pub weights: Option<Vec<Vec<f64>>>,
-    /// Half the width over which the derivative for t_M is a difference quotient; zero for the derivative itself.
-    pub secant_s: f64,
 }
 
 /// The operator with unit gains at one theta, and the derivatives for omega, zeta and tau.
@@ -190,12 +188,7 @@ impl ChangeCriterion<'_> {
                 if !self.changes {
                     return Instant::constant(theta);
                 }
-                let mut here = Instant::at(theta, at(t));
-                if self.secant_s > 0.0 {
-                    let shifted = |h: f64| Instant::at(theta, at(t) - h).share;
-                    here.by_midpoint = (shifted(self.secant_s) - shifted(-self.secant_s)) / (2.0 * self.secant_s);
-                }
-                here
+                Instant::at(theta, at(t))
             })
             .collect()
     }
@@ -230,7 +223,8 @@ impl ChangeCriterion<'_> {
             .map(|age| {
                 let tail = |h: &'_ Vec<f64>| h.get(begin - age..).unwrap_or(&[]).to_vec();
                 let mut column = respond(&tail(&h[0]), &tail(&h[1]));
-                column.resize(n - from, 0.0);
+                // Room for D behind its end.
+                column.resize((column.len().max(PAST) + self.nd).min(n - from), 0.0);
                 column
             })
             .collect();
@@ -309,8 +303,12 @@ fn eliminate(columns: Vec<Vec<f64>>, eps: &mut [f64]) -> (Vec<Vec<f64>>, Vec<f64
         // Twice, for orthogonality to rounding.
         for _ in 0..2 {
             for (q, component) in basis.iter().zip(&mut row) {
-                let part = dot(q, &column);
+                let common = q.len().min(column.len());
+                let part = dot(&q[..common], &column[..common]);
                 *component += part;
+                if column.len() < q.len() {
+                    column.resize(q.len(), 0.0);
+                }
                 add_scaled(&mut column, -part, q);
             }
         }
@@ -324,7 +322,7 @@ fn eliminate(columns: Vec<Vec<f64>>, eps: &mut [f64]) -> (Vec<Vec<f64>>, Vec<f64
         r.push(row);
         kept.push(j);
     }
-    let mut taken: Vec<f64> = basis.iter().map(|q| dot(q, eps)).collect();
+    let mut taken: Vec<f64> = basis.iter().map(|q| dot(q, &eps[..q.len()])).collect();
     for (q, &part) in basis.iter().zip(&taken) {
         add_scaled(eps, -part, q);
     }
@@ -366,7 +364,7 @@ impl Objective for ChangeCriterion<'_> {
             let columns = self.columns(theta, record, &pass);
             let components: Vec<Vec<f64>> = columns
                 .iter()
-                .map(|x| pass.basis.iter().map(|q| dot(q, x)).collect())
+                .map(|x| pass.basis.iter().map(|q| dot(q, &x[..q.len()])).collect())
                 .collect();
             for i in 0..p {
                 total.descent[i] += dot(&columns[i], &pass.eps);

@@ -8,6 +8,7 @@ use hoid_model::{
 };
 
 use super::{
+    interval::{Interval, Walk, is_change_point, likelihood_interval},
     layout::{
         DELAY, FASTEST, Instant, K_E, LOG_RATE, MIDPOINT, NOISE, OF_THE_CHANGE, OMEGA, T_L, TIME_VARYING_NAMES, ZETA,
         names,
@@ -29,8 +30,8 @@ pub enum Remark {
     Fixed,
     /// It rests at a bound.
     AtBound,
-    /// G rests at its upper bound: nine tenths of the change lie within a sample, and how fast it was cannot be told.
-    WithinOneSample,
+    /// G rests at its upper bound: the change takes no longer than two samples, and how fast it was cannot be told.
+    Abrupt,
     /// The records show no change (BIC), so that its time and its rate mean nothing.
     NoChange,
     /// The data do not determine it.
@@ -42,9 +43,7 @@ impl fmt::Display for Remark {
         f.write_str(match self {
             Self::Fixed => "fixed",
             Self::AtBound => "rests at a bound",
-            Self::WithinOneSample => {
-                "at its upper bound: the change takes no longer than a sample, its rate cannot be told"
-            }
+            Self::Abrupt => "at its upper bound: the change takes no longer than two samples, its rate cannot be told",
             Self::NoChange => "the records show no change: its time and its rate mean nothing",
             Self::Undetermined => "not determined by the data",
         })
@@ -98,6 +97,9 @@ pub struct TimeVaryingFit {
     theta: Vec<f64>,
     covariance: Option<Vec<f64>>,
     remarks: Vec<Option<Remark>>,
+    midpoint_interval: Option<Interval>,
+    rate_interval: Option<Interval>,
+    change_point: bool,
     loss: f64,
     innovation_variance: f64,
     levels: Option<[f64; 2]>,
@@ -111,13 +113,13 @@ pub struct TimeVaryingFit {
 
 /// Everything from the two minima.
 pub(super) fn assemble(
-    mut criterion: ChangeCriterion<'_>,
-    minimum: Minimum,
+    criterion: &ChangeCriterion<'_>,
+    minimum: &Minimum,
     start: String,
-    constant: Minimum,
+    constant: &Minimum,
     levels: Option<[f64; 2]>,
 ) -> Result<TimeVaryingFit, IdentError> {
-    let theta = minimum.theta;
+    let theta = minimum.theta.clone();
     let p = theta.len();
     let (n, states) = (criterion.residuals(), criterion.states());
     let sum_of_squares = minimum.at.sum_of_squares;
@@ -138,41 +140,30 @@ pub(super) fn assemble(
     };
     let change_found = comparison.bic_difference > 0.0;
 
-    let mut free = free_parameters(&criterion, &theta, &minimum.at.descent);
+    let mut free = free_parameters(criterion, &theta, &minimum.at.descent);
     let mut remarks: Vec<Option<Remark>> = (0..p)
         .map(|i| {
             let (low, high) = criterion.limits[i];
             match i {
                 _ if low == high => Some(Remark::Fixed),
                 LOG_RATE | MIDPOINT if !change_found => Some(Remark::NoChange),
-                LOG_RATE if theta[i] >= fastest(&criterion) => Some(Remark::WithinOneSample),
+                LOG_RATE if theta[i] >= fastest(criterion) => Some(Remark::Abrupt),
                 _ if theta[i] <= low || theta[i] >= high => Some(Remark::AtBound),
                 _ => None,
             }
         })
         .collect();
     // A rate at its bound is held even if the loss is flat there.
-    free.retain(|&i| !matches!(remarks[i], Some(Remark::AtBound | Remark::WithinOneSample)));
+    free.retain(|&i| !matches!(remarks[i], Some(Remark::AtBound | Remark::Abrupt)));
     let exact = minimum.termination.reason == Reason::ExactFit;
     let covariance = if exact {
         None
     } else {
-        let within_a_sample = remarks[LOG_RATE] == Some(Remark::WithinOneSample);
-        let mut at = minimum.at;
-        if within_a_sample {
-            // A step within a sample leaves no derivative for t_M; the difference over two samples stands for it.
-            criterion.secant_s = criterion.sample_time.s();
-            at = criterion.linearise(&theta, &mut Workspace::default());
-        }
-        let mut covariance = invert(&at, &mut free, &mut remarks, &names(criterion.nd))?;
+        let mut covariance = invert(&minimum.at, &mut free, &mut remarks, &names(criterion.nd))?;
         covariance.iter_mut().for_each(|c| *c *= innovation_variance);
-        if within_a_sample && remarks[MIDPOINT].is_none() {
-            // Where within the sample cannot be told: evenly spread.
-            covariance[MIDPOINT * p + MIDPOINT] += criterion.sample_time.s().powi(2) / 12.0;
-        }
         Some(covariance)
     };
-    let constant_operator = constant_operator(&criterion, &constant)?;
+    let constant_operator = constant_operator(criterion, constant)?;
     Ok(TimeVaryingFit {
         nd: criterion.nd,
         sample_time: criterion.sample_time,
@@ -189,10 +180,13 @@ pub(super) fn assemble(
         theta,
         covariance,
         remarks,
+        midpoint_interval: None,
+        rate_interval: None,
+        change_point: false,
     })
 }
 
-/// ln G from which the change lies within a sample, up to rounding.
+/// ln G from which the change counts as abrupt, up to rounding.
 fn fastest(criterion: &ChangeCriterion<'_>) -> f64 {
     (FASTEST / criterion.sample_time.s()).ln() - 1e-9
 }
@@ -313,13 +307,47 @@ impl TimeVaryingFit {
         Some((0..p * p).map(|k| c[k] * scale(k / p) * scale(k % p)).collect())
     }
 
-    /// Interval of G in 1/s, `factor` standard errors of ln G to either side (1.96 for 95 %): closer to the nominal coverage
-    /// than one that is symmetric in G. `None` where G has no standard error.
-    pub fn rate_interval(&self, factor: f64) -> Option<(f64, f64)> {
-        self.estimate_of(LOG_RATE).standard_error?;
-        let variance = self.covariance.as_ref()?[LOG_RATE * self.theta.len() + LOG_RATE];
-        let (centre, half) = (self.theta[LOG_RATE], factor * variance.sqrt());
-        Some(((centre - half).exp(), (centre + half).exp()))
+    /// Likelihood intervals of t_M and G, if there was a change and noise. Returns theta where the loss is lower than at
+    /// the minimum, if the walk along t_M or G comes upon such a place.
+    pub(super) fn add_intervals(&mut self, criterion: &ChangeCriterion<'_>, minimum: &Minimum) -> Option<Vec<f64>> {
+        let p = self.theta.len();
+        if !self.change_found() {
+            return None;
+        }
+        let standard_errors: Vec<Option<f64>> = {
+            let covariance = self.covariance.as_ref()?;
+            (0..p)
+                .map(|i| Some(covariance[i * p + i].sqrt()).filter(|s| *s > 0.0))
+                .collect()
+        };
+        self.change_point = is_change_point(&self.theta, standard_errors[MIDPOINT]);
+        for place in [MIDPOINT, LOG_RATE] {
+            if self.remarks[place] == Some(Remark::Fixed) {
+                continue;
+            }
+            match likelihood_interval(criterion, minimum, place, standard_errors[place], self.change_point) {
+                Walk::Lower(theta) => return Some(theta),
+                Walk::Found(interval) if place == MIDPOINT => self.midpoint_interval = Some(interval),
+                Walk::Found(interval) => self.rate_interval = Some(interval),
+            }
+        }
+        None
+    }
+
+    /// 95 % likelihood interval of t_M in s; `None` without noise, without a change, or if it was not asked for.
+    pub fn midpoint_interval(&self) -> Option<(f64, f64)> {
+        self.midpoint_interval.map(|i| (i.low, i.high))
+    }
+
+    /// 95 % likelihood interval of G in 1/s, open to infinity where the change may have been abrupt; else as
+    /// [`TimeVaryingFit::midpoint_interval`].
+    pub fn rate_interval(&self) -> Option<(f64, f64)> {
+        self.rate_interval.map(|i| (i.low, i.high))
+    }
+
+    /// True where the change is too fast for t_M to have an error that is normally distributed: a change point.
+    pub fn is_change_point(&self) -> bool {
+        self.change_point
     }
 
     /// The operator before the change.
@@ -473,7 +501,6 @@ impl TimeVaryingFit {
             sample: None,
             changes: true,
             weights: None,
-            secant_s: 0.0,
         };
         let values = criterion.residuals_of(theta, 0).ok_or(IdentError::NoFiniteLoss)?;
         Ok(Series { first, values })

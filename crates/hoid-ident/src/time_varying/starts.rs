@@ -21,7 +21,7 @@ const RATES: [f64; 3] = [0.5, 5.0, 100.0];
 /// Times of the change in the grid.
 const MIDPOINTS: usize = 12;
 /// Time between the delays that are tried, s: the search finds its way from a distance of a tenth of the period of the poles.
-const DELAY_STEP_S: f64 = 0.04;
+const DELAY_STEP_S: f64 = 0.06;
 /// Poles where the windows give none: omega_nm in rad/s, zeta_nm.
 const GRID: [(f64, f64); 3] = [(6.0, 0.4), (11.0, 0.4), (18.0, 0.4)];
 /// d1 where the windows give none.

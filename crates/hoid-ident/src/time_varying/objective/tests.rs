@@ -33,7 +33,6 @@ fn criterion<'a>(e: &'a [f64], u: &'a [f64], nd: usize) -> ChangeCriterion<'a> {
         sample: None,
         changes: true,
         weights: None,
-        secant_s: 0.0,
     }
 }
 
@@ -79,7 +78,7 @@ fn columns_are_the_derivatives_of_the_residuals_up_to_the_initial_states() {
     let columns = c.columns(&theta, 0, &pass);
     let project = |x: &mut Vec<f64>| {
         for q in &pass.basis {
-            let part = dot(q, x);
+            let part = dot(q, &x[..q.len()]);
             add_scaled(x, -part, q);
         }
     };
