@@ -12,6 +12,7 @@
 //! | `arx`, `least_squares` | linear regression by QR with column pivoting |
 //! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
 //! | [`instrumental`] | instrumental variables, in open and closed loop |
+//! | [`TimeVarying`] | gains that follow a sigmoid, with the time and the rate of the change |
 //! | [`order_search`] | ranges of orders and delay, criteria, the chosen model |
 //! | [`validation`] | VAF, NRMSE, residual tests |
 //! | `derived` | poles, zeros, crossover and margins with standard errors |
@@ -38,6 +39,7 @@ mod search;
 mod simulation_focus;
 mod starts;
 mod stationary_past;
+mod time_varying;
 pub mod validation;
 
 pub use constraint::{Constraint, Prior};
@@ -51,3 +53,6 @@ pub use order_search::{Candidate, Choice, OrderRanges, choose_orders};
 pub use prediction_error::InitialState;
 pub use robust::Loss;
 pub use search::{Reason, SearchMethod, SearchOptions, Termination};
+pub use time_varying::{
+    ChangeParameter, Comparison, GainsAt, NoiseLevel, Remark, TIME_VARYING_NAMES, TimeVarying, TimeVaryingFit,
+};

@@ -38,7 +38,7 @@ use hoid_model::{Orders, PolynomialModel, Record, Structure};
 use crate::{
     Fit, IdentError, InitialState, Reason, Termination, checks,
     least_squares::dot,
-    prediction_error::{Criterion, Data, Workspace, first_residual},
+    prediction_error::{Criterion, Data, Workspace, first_residual, output_variance},
 };
 use equation::{Problem, Source};
 
@@ -222,6 +222,8 @@ impl InstrumentalVariable {
             termination,
             start: format!("{}, {}", self.method, self.instruments),
             held: vec![false; p],
+            output_variance: output_variance(&criterion.data, criterion.first),
+            physical: None,
         })
     }
 

@@ -1,0 +1,508 @@
+//! The fitted change with its uncertainty.
+
+use std::fmt;
+
+use hoid_model::{
+    Record,
+    uncertainty::{Estimate, OperatorEstimate, variance_along},
+};
+
+use super::{
+    interval::{Interval, Walk, is_change_point, likelihood_interval},
+    layout::{
+        DELAY, FASTEST, Instant, K_E, LOG_RATE, MIDPOINT, NOISE, OF_THE_CHANGE, OMEGA, T_L, TIME_VARYING_NAMES, ZETA,
+        names,
+    },
+    objective::{ChangeCriterion, Data},
+};
+use crate::{
+    IdentError, Reason, Series, Termination, checks,
+    information::inverse_of_free,
+    prediction_error::Linearisation,
+    search::{Minimum, free_parameters},
+};
+
+/// Why a parameter has no standard error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Remark {
+    /// It was fixed.
+    Fixed,
+    /// It rests at a bound.
+    AtBound,
+    /// G rests at its upper bound: the change takes no longer than two samples, and how fast it was cannot be told.
+    Abrupt,
+    /// The records show no change (BIC), so that its time and its rate mean nothing.
+    NoChange,
+    /// The data do not determine it.
+    Undetermined,
+}
+
+impl fmt::Display for Remark {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Fixed => "fixed",
+            Self::AtBound => "rests at a bound",
+            Self::Abrupt => "at its upper bound: the change takes no longer than two samples, its rate cannot be told",
+            Self::NoChange => "the records show no change: its time and its rate mean nothing",
+            Self::Undetermined => "not determined by the data",
+        })
+    }
+}
+
+/// One parameter of the fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChangeParameter {
+    /// Name.
+    pub name: String,
+    /// Unit; empty for none.
+    pub unit: &'static str,
+    /// Estimate.
+    pub estimate: Estimate,
+    /// Why it has no standard error, where it has none.
+    pub remark: Option<Remark>,
+}
+
+/// Gains in force at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GainsAt {
+    /// Time on the axis of the record, s.
+    pub time_s: f64,
+    /// Error gain K_e, deg/deg.
+    pub k_e: Estimate,
+    /// Lead time constant T_L, s.
+    pub t_l_s: Estimate,
+    /// Error-rate gain K_e_dot, s.
+    pub k_e_dot: Estimate,
+}
+
+/// The fit against the one without a change.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Comparison {
+    /// `n ln(V_0/V_1)`.
+    pub likelihood_ratio: f64,
+    /// Parameters that the change adds: those of K_e2, T_L2, t_M and G that were not fixed.
+    pub extra_parameters: usize,
+    /// BIC without the change minus BIC with it; positive where the change is worth its parameters.
+    pub bic_difference: f64,
+}
+
+/// An operator who changes once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimeVaryingFit {
+    nd: usize,
+    sample_time: hoid_model::SampleTime,
+    first: usize,
+    /// With ln G.
+    theta: Vec<f64>,
+    covariance: Option<Vec<f64>>,
+    remarks: Vec<Option<Remark>>,
+    midpoint_interval: Option<Interval>,
+    rate_interval: Option<Interval>,
+    change_point: bool,
+    loss: f64,
+    innovation_variance: f64,
+    levels: Option<[f64; 2]>,
+    residuals: usize,
+    states: usize,
+    termination: Termination,
+    start: String,
+    comparison: Comparison,
+    constant: OperatorEstimate,
+}
+
+/// Everything from the two minima.
+pub(super) fn assemble(
+    criterion: &ChangeCriterion<'_>,
+    minimum: &Minimum,
+    start: String,
+    constant: &Minimum,
+    levels: Option<[f64; 2]>,
+) -> Result<TimeVaryingFit, IdentError> {
+    let theta = minimum.theta.clone();
+    let p = theta.len();
+    let (n, states) = (criterion.residuals(), criterion.states());
+    let sum_of_squares = minimum.at.sum_of_squares;
+    let not_fixed = criterion.limits.iter().filter(|(low, high)| low < high).count();
+    let innovation_variance = sum_of_squares / (n - not_fixed - states) as f64;
+    let extra_parameters = OF_THE_CHANGE
+        .iter()
+        .filter(|&&i| criterion.limits[i].0 < criterion.limits[i].1)
+        .count();
+    // An exact fit without a change leaves two losses of rounding errors, which say nothing.
+    let both_exact = constant.termination.reason == Reason::ExactFit;
+    let ratio = (constant.at.sum_of_squares / sum_of_squares).ln();
+    let likelihood_ratio = if both_exact { 0.0 } else { n as f64 * ratio };
+    let comparison = Comparison {
+        likelihood_ratio,
+        extra_parameters,
+        bic_difference: likelihood_ratio - extra_parameters as f64 * (n as f64).ln(),
+    };
+    let change_found = comparison.bic_difference > 0.0;
+
+    let mut free = free_parameters(criterion, &theta, &minimum.at.descent);
+    let mut remarks: Vec<Option<Remark>> = (0..p)
+        .map(|i| {
+            let (low, high) = criterion.limits[i];
+            match i {
+                _ if low == high => Some(Remark::Fixed),
+                LOG_RATE | MIDPOINT if !change_found => Some(Remark::NoChange),
+                LOG_RATE if theta[i] >= fastest(criterion) => Some(Remark::Abrupt),
+                _ if theta[i] <= low || theta[i] >= high => Some(Remark::AtBound),
+                _ => None,
+            }
+        })
+        .collect();
+    // A rate at its bound is held even if the loss is flat there.
+    free.retain(|&i| !matches!(remarks[i], Some(Remark::AtBound | Remark::Abrupt)));
+    let exact = minimum.termination.reason == Reason::ExactFit;
+    let covariance = if exact {
+        None
+    } else {
+        let mut covariance = invert(&minimum.at, &mut free, &mut remarks, &names(criterion.nd))?;
+        covariance.iter_mut().for_each(|c| *c *= innovation_variance);
+        Some(covariance)
+    };
+    let constant_operator = constant_operator(criterion, constant)?;
+    Ok(TimeVaryingFit {
+        nd: criterion.nd,
+        sample_time: criterion.sample_time,
+        first: criterion.first,
+        loss: sum_of_squares / n as f64,
+        innovation_variance,
+        levels,
+        residuals: n,
+        states,
+        termination: minimum.termination,
+        start,
+        comparison,
+        constant: constant_operator,
+        theta,
+        covariance,
+        remarks,
+        midpoint_interval: None,
+        rate_interval: None,
+        change_point: false,
+    })
+}
+
+/// ln G from which the change counts as abrupt, up to rounding.
+fn fastest(criterion: &ChangeCriterion<'_>) -> f64 {
+    (FASTEST / criterion.sample_time.s()).ln() - 1e-9
+}
+
+/// Inverse of the information of the free parameters. Time and rate of a change that leaves no trace are taken out.
+fn invert(
+    at: &Linearisation,
+    free: &mut Vec<usize>,
+    remarks: &mut [Option<Remark>],
+    names: &[String],
+) -> Result<Vec<f64>, IdentError> {
+    match inverse_of_free(&at.gram, free, names) {
+        Err(IdentError::SingularInformation { .. }) if free.contains(&MIDPOINT) || free.contains(&LOG_RATE) => {
+            free.retain(|i| ![MIDPOINT, LOG_RATE].contains(i));
+            for i in [MIDPOINT, LOG_RATE] {
+                remarks[i] = remarks[i].or(Some(Remark::Undetermined));
+            }
+            inverse_of_free(&at.gram, free, names)
+        }
+        other => other,
+    }
+}
+
+fn constant_operator(criterion: &ChangeCriterion<'_>, minimum: &Minimum) -> Result<OperatorEstimate, IdentError> {
+    let theta = &minimum.theta;
+    let mut constant = ChangeCriterion {
+        changes: false,
+        ..criterion.clone()
+    };
+    for place in OF_THE_CHANGE {
+        constant.limits[place] = (theta[place], theta[place]);
+    }
+    let free = free_parameters(&constant, theta, &minimum.at.descent);
+    let covariance = if minimum.termination.reason == Reason::ExactFit {
+        None
+    } else {
+        let freedom = criterion.residuals() - free.len() - criterion.states();
+        let variance = minimum.at.sum_of_squares / freedom as f64;
+        let mut inverse = inverse_of_free(&minimum.at.gram, &free, &names(criterion.nd))?;
+        inverse.iter_mut().for_each(|c| *c *= variance);
+        Some(inverse)
+    };
+    Ok(operator(theta, covariance.as_deref(), 0))
+}
+
+/// The operator at one end.
+fn operator(theta: &[f64], covariance: Option<&[f64]>, end: usize) -> OperatorEstimate {
+    let along = |value: f64, parts: &[(usize, f64)]| match covariance {
+        None => Estimate::fixed(value),
+        Some(covariance) => {
+            let mut gradient = vec![0.0; theta.len()];
+            for &(i, g) in parts {
+                gradient[i] = g;
+            }
+            estimate(value, variance_along(&gradient, covariance))
+        }
+    };
+    let single = |i: usize| along(theta[i], &[(i, 1.0)]);
+    let (k_e, t_l) = (theta[K_E[end]], theta[T_L[end]]);
+    OperatorEstimate {
+        k_e: single(K_E[end]),
+        t_l_s: single(T_L[end]),
+        k_e_dot: along(k_e * t_l, &[(K_E[end], t_l), (T_L[end], k_e)]),
+        omega_nm_rad_s: single(OMEGA),
+        zeta_nm: single(ZETA),
+        tau_e_s: single(DELAY),
+    }
+}
+
+/// No variance, no standard error: what was held has none.
+fn estimate(value: f64, variance: f64) -> Estimate {
+    if variance > 0.0 {
+        Estimate::with_variance(value, variance)
+    } else {
+        Estimate::fixed(value)
+    }
+}
+
+impl TimeVaryingFit {
+    /// All parameters: those of [`TIME_VARYING_NAMES`], then d1 ... d_nd.
+    pub fn parameters(&self) -> Vec<ChangeParameter> {
+        let names = names(self.nd).into_iter().enumerate();
+        names
+            .map(|(i, name)| ChangeParameter {
+                name,
+                unit: TIME_VARYING_NAMES.get(i).map_or("", |(_, unit)| unit),
+                estimate: self.estimate_of(i),
+                remark: self.remarks[i],
+            })
+            .collect()
+    }
+
+    /// One parameter by name.
+    pub fn parameter(&self, name: &str) -> Option<ChangeParameter> {
+        self.parameters().into_iter().find(|p| p.name == name)
+    }
+
+    fn estimate_of(&self, i: usize) -> Estimate {
+        let value = if i == LOG_RATE {
+            self.theta[i].exp()
+        } else {
+            self.theta[i]
+        };
+        let silent = matches!(self.remarks[i], Some(Remark::NoChange | Remark::Undetermined));
+        match self.covariance() {
+            Some(c) if !silent => estimate(value, c[i * self.theta.len() + i]),
+            _ => Estimate::fixed(value),
+        }
+    }
+
+    /// Covariance of the parameters in the order and the units of [`TimeVaryingFit::parameters`], by rows; zero for what was
+    /// held, `None` for an exact fit.
+    pub fn covariance(&self) -> Option<Vec<f64>> {
+        let p = self.theta.len();
+        let rate = self.theta[LOG_RATE].exp();
+        let scale = |i: usize| if i == LOG_RATE { rate } else { 1.0 };
+        let c = self.covariance.as_ref()?;
+        Some((0..p * p).map(|k| c[k] * scale(k / p) * scale(k % p)).collect())
+    }
+
+    /// Likelihood intervals of t_M and G, if there was a change and noise. Returns theta where the loss is lower than at
+    /// the minimum, if the walk along t_M or G comes upon such a place.
+    pub(super) fn add_intervals(&mut self, criterion: &ChangeCriterion<'_>, minimum: &Minimum) -> Option<Vec<f64>> {
+        let p = self.theta.len();
+        if !self.change_found() {
+            return None;
+        }
+        let standard_errors: Vec<Option<f64>> = {
+            let covariance = self.covariance.as_ref()?;
+            (0..p)
+                .map(|i| Some(covariance[i * p + i].sqrt()).filter(|s| *s > 0.0))
+                .collect()
+        };
+        self.change_point = is_change_point(&self.theta, standard_errors[MIDPOINT]);
+        for place in [MIDPOINT, LOG_RATE] {
+            if self.remarks[place] == Some(Remark::Fixed) {
+                continue;
+            }
+            match likelihood_interval(criterion, minimum, place, standard_errors[place], self.change_point) {
+                Walk::Lower(theta) => return Some(theta),
+                Walk::Found(interval) if place == MIDPOINT => self.midpoint_interval = Some(interval),
+                Walk::Found(interval) => self.rate_interval = Some(interval),
+            }
+        }
+        None
+    }
+
+    /// 95 % likelihood interval of t_M in s; `None` without noise, without a change, or if it was not asked for.
+    pub fn midpoint_interval(&self) -> Option<(f64, f64)> {
+        self.midpoint_interval.map(|i| (i.low, i.high))
+    }
+
+    /// 95 % likelihood interval of G in 1/s, open to infinity where the change may have been abrupt; else as
+    /// [`TimeVaryingFit::midpoint_interval`].
+    pub fn rate_interval(&self) -> Option<(f64, f64)> {
+        self.rate_interval.map(|i| (i.low, i.high))
+    }
+
+    /// True where the change is too fast for t_M to have an error that is normally distributed: a change point.
+    pub fn is_change_point(&self) -> bool {
+        self.change_point
+    }
+
+    /// The operator before the change.
+    pub fn initial_operator(&self) -> OperatorEstimate {
+        operator(&self.theta, self.covariance.as_deref(), 0)
+    }
+
+    /// The operator after the change.
+    pub fn last_operator(&self) -> OperatorEstimate {
+        operator(&self.theta, self.covariance.as_deref(), 1)
+    }
+
+    /// The operator of the fit without a change.
+    pub fn constant_operator(&self) -> OperatorEstimate {
+        self.constant
+    }
+
+    /// The fit against the one without a change.
+    pub fn comparison(&self) -> Comparison {
+        self.comparison
+    }
+
+    /// True where the change is worth its parameters by the BIC. Otherwise t_M and G mean nothing
+    /// ([`Remark::NoChange`]), and [`TimeVaryingFit::constant_operator`] describes the records.
+    pub fn change_found(&self) -> bool {
+        self.comparison.bic_difference > 0.0
+    }
+
+    /// Gains in force at a time on the axis of the record, with standard errors by the delta method, those of t_M and G
+    /// included.
+    pub fn gains_at(&self, time_s: f64) -> GainsAt {
+        let here = Instant::at(&self.theta, time_s);
+        let (step_k, step_t) = (
+            self.theta[K_E[1]] - self.theta[K_E[0]],
+            self.theta[T_L[1]] - self.theta[T_L[0]],
+        );
+        let gradient = |by_k: f64, by_t: f64| {
+            let mut g = vec![0.0; self.theta.len()];
+            (g[K_E[0]], g[K_E[1]]) = (by_k * (1.0 - here.share), by_k * here.share);
+            (g[T_L[0]], g[T_L[1]]) = (by_t * (1.0 - here.share), by_t * here.share);
+            let by_share = by_k * step_k + by_t * step_t;
+            (g[MIDPOINT], g[LOG_RATE]) = (by_share * here.by_midpoint, by_share * here.by_log_rate);
+            g
+        };
+        let along = |value: f64, by_k: f64, by_t: f64| match &self.covariance {
+            Some(c) => estimate(value, variance_along(&gradient(by_k, by_t), c)),
+            None => Estimate::fixed(value),
+        };
+        GainsAt {
+            time_s,
+            k_e: along(here.k_e, 1.0, 0.0),
+            t_l_s: along(here.t_l, 0.0, 1.0),
+            k_e_dot: along(here.k_e_dot(), here.t_l, here.k_e),
+        }
+    }
+
+    /// [`TimeVaryingFit::gains_at`] at every sample of a record.
+    pub fn trace(&self, record: &Record) -> Vec<GainsAt> {
+        record.times_s().into_iter().map(|t| self.gains_at(t)).collect()
+    }
+
+    /// Coefficients of D.
+    pub fn d(&self) -> &[f64] {
+        &self.theta[NOISE..]
+    }
+
+    /// Loss: mean of the squared residuals, weighted where the noise level changes (weights with the geometric mean 1).
+    pub fn loss(&self) -> f64 {
+        self.loss
+    }
+
+    /// `sum eps^2/(n - p - s)` of the same residuals, with p parameters and s initial states.
+    pub fn innovation_variance(&self) -> f64 {
+        self.innovation_variance
+    }
+
+    /// Standard deviation of the innovations before and after the change; `None` where the same throughout was asked for, or
+    /// the residuals have no size.
+    pub fn noise_levels(&self) -> Option<[f64; 2]> {
+        self.levels
+    }
+
+    /// Number n of residuals.
+    pub fn residual_count(&self) -> usize {
+        self.residuals
+    }
+
+    /// Number s of initial states that were estimated.
+    pub fn state_count(&self) -> usize {
+        self.states
+    }
+
+    /// How the search ended.
+    pub fn termination(&self) -> Termination {
+        self.termination
+    }
+
+    /// The start that won.
+    pub fn start(&self) -> &str {
+        &self.start
+    }
+
+    /// One-step-ahead residuals on a record (not weighted), its initial state estimated.
+    ///
+    /// # Errors
+    /// [`IdentError::MixedSampling`], [`IdentError::TooFewSamples`].
+    pub fn residuals(&self, record: &Record) -> Result<Series, IdentError> {
+        self.errors_of(&self.theta, self.nd, record)
+    }
+
+    /// Output of the operator alone, without noise model; the initial state is that of the least simulation error.
+    ///
+    /// # Errors
+    /// As [`TimeVaryingFit::residuals`].
+    pub fn simulate(&self, record: &Record) -> Result<Series, IdentError> {
+        let errors = self.errors_of(&self.theta[..NOISE], 0, record)?;
+        let output = &record.output()[errors.first..];
+        Ok(Series {
+            first: errors.first,
+            values: output.iter().zip(&errors.values).map(|(u, e)| u - e).collect(),
+        })
+    }
+
+    fn errors_of(&self, theta: &[f64], nd: usize, record: &Record) -> Result<Series, IdentError> {
+        if !self.sample_time.matches(record.sample_time()) {
+            return Err(IdentError::MixedSampling {
+                label: record.label().to_owned(),
+                found: record.sample_time().s(),
+                expected: self.sample_time.s(),
+            });
+        }
+        let first = self.first - self.nd + nd;
+        let orders = hoid_model::Orders {
+            nb: 3,
+            nd,
+            nf: 2,
+            nk: self.first - self.nd,
+            ..hoid_model::Orders::default()
+        };
+        checks::record(hoid_model::Structure::BoxJenkins, &orders, record, first)?;
+        let criterion = ChangeCriterion {
+            data: vec![Data {
+                e: record.input(),
+                u: record.output(),
+                start_s: record.time_s(0),
+            }],
+            sample_time: self.sample_time,
+            nd,
+            first,
+            limits: Vec::new(),
+            sample: None,
+            changes: true,
+            weights: None,
+        };
+        let values = criterion.residuals_of(theta, 0).ok_or(IdentError::NoFiniteLoss)?;
+        Ok(Series { first, values })
+    }
+}
