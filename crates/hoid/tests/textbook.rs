@@ -262,3 +262,28 @@ fn on_a_short_series_the_rule_decides() {
     assert!(away(InitialState::Estimate) < 1.0);
     assert!(away(InitialState::Zero) > 1.0);
 }
+
+/// A search that starts from the truth ends in one minimum; a better one may exist (`general`: A and D with their roots exchanged).
+#[test]
+fn own_starts_end_no_higher_than_the_truth_does() {
+    for case in cases() {
+        if case["truth"].is_null() {
+            continue;
+        }
+        for rule in [InitialState::Zero, InitialState::Estimate, InitialState::Backcast] {
+            let own = fit(&case, rule);
+            let from_truth = Estimator {
+                start: Some(numbers(&case["truth"])),
+                ..estimator(&case, rule)
+            };
+            let other = from_truth.fit(&[record(&case, SampleTime::new(1.0).unwrap())]).unwrap();
+            assert!(
+                own.loss() < other.loss() * (1.0 + LOSS),
+                "{} {rule:?}: {} against {}",
+                name(&case),
+                own.loss(),
+                other.loss()
+            );
+        }
+    }
+}
