@@ -82,6 +82,8 @@ impl Default for TimeVarying {
     }
 }
 
+/// Steps from each start before the best of them is followed to its end.
+const LOOK: usize = 30;
 /// Rounds of fit and noise levels in turn.
 const ROUNDS: usize = 20;
 /// Rounds end when the ratio of the levels moves by less than this share; its own standard error is `1/sqrt n`, about 1 %.
@@ -235,17 +237,28 @@ impl TimeVarying {
                 .map(|s| (s.label, s.theta))
                 .collect(),
         };
+        // A look at each start, then the best to its end.
+        let look = SearchOptions {
+            max_iterations: self.search.max_iterations.min(LOOK),
+            ..self.search
+        };
         let mut best: Option<(String, Minimum)> = None;
         for (label, theta) in candidates {
             let known = best.as_ref().map(|(_, b)| b.at.sum_of_squares);
-            let Some(minimum) = search(criterion, theta, &self.search, known) else {
+            let Some(minimum) = minimise(criterion, theta, &look, known, &mut Workspace::default()) else {
                 continue;
             };
             if known.is_none_or(|known| minimum.at.sum_of_squares < known) {
                 best = Some((label, minimum));
             }
         }
-        best.ok_or(IdentError::NoFiniteLoss)
+        let (label, seen) = best.ok_or(IdentError::NoFiniteLoss)?;
+        if seen.termination.converged() {
+            return Ok((label, seen));
+        }
+        let mut minimum = search(criterion, seen.theta, &self.search, None).ok_or(IdentError::NoFiniteLoss)?;
+        minimum.termination.iterations += seen.termination.iterations;
+        Ok((label, minimum))
     }
 
     fn given_start(&self, start: &[f64]) -> Result<Vec<f64>, IdentError> {
