@@ -1,6 +1,6 @@
 //! The fit of an operator who changes once: recovery without noise, bias, spread and coverage over simulated runs, and what is
 //! said when nothing changes.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::collections::BTreeMap;
 

@@ -15,7 +15,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_model::{Record, SampleTime};
+use hoid_model::{Orders, Record, SampleTime, Structure, delayed_operator::whole_samples};
 
 use crate::{
     Constraint, IdentError, Reason, SearchOptions, checks,
@@ -185,13 +185,13 @@ impl TimeVarying {
             delay_range_s: self.delay_range_s,
         };
         let limits = limits(self.nd, &frame, &self.constraints)?;
-        let longest = hoid_model::delayed_operator::whole_samples(limits[DELAY].1, sample_time)? + 1;
-        let orders = hoid_model::Orders {
+        let longest = whole_samples(limits[DELAY].1, sample_time)? + 1;
+        let orders = Orders {
             nb: 3,
             nd: self.nd,
             nf: 2,
             nk: longest,
-            ..hoid_model::Orders::default()
+            ..Orders::default()
         };
         let criterion = ChangeCriterion {
             data: records
@@ -211,7 +211,7 @@ impl TimeVarying {
             weights: None,
         };
         for record in records {
-            checks::record(hoid_model::Structure::BoxJenkins, &orders, record, criterion.first)?;
+            checks::record(Structure::BoxJenkins, &orders, record, criterion.first)?;
         }
         let unknowns = criterion.limits.len() + criterion.states();
         if criterion.residuals() <= unknowns {

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use hoid_model::{
-    Record,
+    Orders, Record, SampleTime, Structure,
     uncertainty::{Estimate, OperatorEstimate, variance_along},
 };
 
@@ -94,7 +94,7 @@ pub struct Comparison {
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeVaryingFit {
     nd: usize,
-    sample_time: hoid_model::SampleTime,
+    sample_time: SampleTime,
     first: usize,
     /// With ln G.
     theta: Vec<f64>,
@@ -515,14 +515,14 @@ impl TimeVaryingFit {
             });
         }
         let first = self.first - self.nd + nd;
-        let orders = hoid_model::Orders {
+        let orders = Orders {
             nb: 3,
             nd,
             nf: 2,
             nk: self.first - self.nd,
-            ..hoid_model::Orders::default()
+            ..Orders::default()
         };
-        checks::record(hoid_model::Structure::BoxJenkins, &orders, record, first)?;
+        checks::record(Structure::BoxJenkins, &orders, record, first)?;
         let criterion = ChangeCriterion {
             data: vec![Data {
                 e: record.input(),
