@@ -1,9 +1,11 @@
 //! The fit of an operator who changes once: recovery without noise, bias, spread and coverage over simulated runs, and what is
 //! said when nothing changes.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+use std::collections::BTreeMap;
 
 use hoid::{
-    ident::{IdentError, NoiseLevel, Remark, TimeVarying, TimeVaryingFit},
+    ident::{Constraint, IdentError, NoiseLevel, Reason, Remark, TimeVarying, TimeVaryingFit},
     model::scenario::RemnantStrength,
     prelude::*,
 };
@@ -63,129 +65,334 @@ fn value(fit: &TimeVaryingFit, name: &str) -> Estimate {
     fit.parameter(name).unwrap().estimate
 }
 
+/// Without the walks along t_M and G.
+fn quick() -> TimeVarying {
+    TimeVarying {
+        likelihood_intervals: false,
+        ..TimeVarying::default()
+    }
+}
+
+fn one(record: &Record) -> &[Record] {
+    std::slice::from_ref(record)
+}
+
 #[test]
 fn a_change_without_noise_is_recovered() {
     for condition in [Condition::C3, Condition::C4, Condition::C5, Condition::C6] {
         let record = without_noise(condition);
-        let fit = TimeVarying::default().fit(std::slice::from_ref(&record)).unwrap();
+        let fit = TimeVarying::default().fit(one(&record)).unwrap();
         let worst = truth(condition)
             .into_iter()
             .filter(|(name, _)| *name != "d1")
             .map(|(name, true_value)| (value(&fit, name).value / true_value - 1.0).abs())
             .fold(0.0, f64::max);
         println!(
-            "{condition}: largest relative error {worst:.1e}, loss {:.1e}, {:?}, {}",
+            "{condition}: largest relative error {worst:.1e}, loss {:.1e}, {} steps from: {}",
             fit.loss(),
-            fit.termination(),
+            fit.termination().iterations,
             fit.start()
         );
+        assert_eq!(fit.termination().reason, Reason::ExactFit);
+        // Residuals of 1e-15 of the output, information matrix of condition 1e4 at most.
+        assert!(worst < 1e-10 && fit.change_found());
+        // Nothing can be said about the noise: no standard errors, no intervals.
+        assert!(fit.covariance().is_none() && fit.midpoint_interval().is_none());
+        let here = fit.gains_at(30.0);
+        assert!((here.k_e.value - record.channel("K_e").unwrap()[3000]).abs() < 1e-11);
+        assert!((here.t_l_s.value - record.channel("T_L").unwrap()[3000]).abs() < 1e-10);
     }
 }
 
-/// Numbers over the runs of one condition.
-struct Study {
-    rows: Vec<(String, f64, f64, f64, f64)>,
-    converged: f64,
-}
-
-fn study(condition: Condition, n: u64, estimator: &TimeVarying) -> Study {
+/// Runs of one condition, every parameter printed; what must hold is asserted with the Monte Carlo error in mind.
+fn study(condition: Condition, n: u64) {
     let truth = truth(condition);
     let mut errors = vec![Vec::new(); truth.len()];
+    let mut standard_errors = vec![Vec::new(); truth.len()];
     let mut inside = vec![0; truth.len()];
-    let mut with_error = vec![0; truth.len()];
-    let mut se = vec![Vec::new(); truth.len()];
-    let (mut converged, mut found) = (0, 0);
-    let mut li = [0; 3];
-    let mut widths = [vec![], vec![]];
-    let t0 = std::time::Instant::now();
+    let (mut midpoints, mut rates, mut change_points) = (0, 0, 0);
+    let mut widths = Vec::new();
     for record in runs(condition, n) {
-        let fit = estimator.fit(std::slice::from_ref(&record)).unwrap();
-        converged += u64::from(fit.termination().converged());
-        found += u64::from(fit.change_found());
+        let fit = TimeVarying::default().fit(one(&record)).unwrap();
+        assert!(fit.termination().converged(), "{}", fit.termination().reason);
+        assert!(fit.change_found());
         for (i, (name, true_value)) in truth.iter().enumerate() {
-            let e = value(&fit, name);
-            errors[i].push(e.value - true_value);
-            if let Some(s) = e.standard_error {
-                with_error[i] += 1;
-                se[i].push(s);
-                inside[i] += u64::from((e.value - true_value).abs() < 1.96 * s);
+            let parameter = fit.parameter(name).unwrap();
+            let error = parameter.estimate.value - true_value;
+            errors[i].push(error);
+            // A standard error, or a reason why there is none.
+            assert!(
+                parameter.estimate.standard_error.is_some() == parameter.remark.is_none(),
+                "{name}"
+            );
+            if let Some(s) = parameter.estimate.standard_error {
+                standard_errors[i].push(s);
+                inside[i] += usize::from(error.abs() < 1.96 * s);
             }
         }
-        if let (Some(m), Some(g)) = (fit.midpoint_interval(), fit.rate_interval()) {
-            let within = |(l, h): (f64, f64), x: f64| u64::from(l <= x && x <= h);
-            li[0] += within(m, truth[4].1);
-            li[1] += within(g, truth[5].1);
-            widths[0].push(m.1 - m.0);
-            widths[1].push(g.0);
-            li[2] += u64::from(fit.is_change_point());
-        }
-        if std::env::var("V").is_ok() {
-            println!(
-                "   t_M {:.3?} G {:.3?} tau {:.4?} {:?} {} [{}]",
-                value(&fit, "t_M"),
-                value(&fit, "G"),
-                value(&fit, "tau_e").value,
-                fit.termination(),
-                fit.comparison().likelihood_ratio,
-                fit.start()
-            );
-        }
+        let (low, high) = fit.midpoint_interval().unwrap();
+        widths.push(high - low);
+        midpoints += u64::from((low..=high).contains(&(SPAN_S / 2.0)));
+        let (low, high) = fit.rate_interval().unwrap();
+        rates += u64::from((low..=high).contains(&truth[5].1));
+        change_points += u64::from(fit.is_change_point());
     }
+    let median = |values: &mut Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    };
     println!(
-        "{condition}: converged {converged}/{n}, change found {found}/{n}, {:?} per fit",
-        t0.elapsed() / n as u32
+        "{condition}, {n} runs, all converged, all with a change: 95 % likelihood intervals cover t_M {midpoints}, G {rates} times; \
+         median width for t_M {:.2} s; {change_points} change points",
+        median(&mut widths)
     );
-    for w in &mut widths {
-        w.sort_by(f64::total_cmp);
-    }
-    println!(
-        "  intervals: t_M {} G {} change points {} median width t_M {:?} low of G {:?}",
-        li[0],
-        li[1],
-        li[2],
-        widths[0].get(n as usize / 2),
-        widths[1].get(n as usize / 2)
-    );
-    let mut rows = Vec::new();
+    let (mut regular, mut covered) = (0, 0);
     for (i, (name, true_value)) in truth.iter().enumerate() {
-        let count = errors[i].len() as f64;
-        let mean = errors[i].iter().sum::<f64>() / count;
-        let spread = (errors[i].iter().map(|e| (e - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
-        let mut s = se[i].clone();
-        s.sort_by(f64::total_cmp);
-        let median = s.get(s.len() / 2).copied().unwrap_or(f64::NAN);
-        let coverage = f64::from(inside[i] as u32) / f64::from(with_error[i].max(1));
+        let mean = errors[i].iter().sum::<f64>() / n as f64;
+        let spread = (errors[i].iter().map(|e| (e - mean).powi(2)).sum::<f64>() / (n - 1) as f64).sqrt();
+        let with = standard_errors[i].len();
         println!(
-            "  {name:9} true {true_value:9.4}  bias {mean:+.5} ({:+.2} s.e.)  spread {spread:.5}  median s.e. {median:.5}  covered {inside}/{}",
-            mean / spread * count.sqrt(),
-            with_error[i],
-            inside = inside[i],
+            "  {name:9}{true_value:9.4}  bias {mean:+.5} ({:+.1} s.e.)  spread {spread:.5}  median error {:.5}  median s.e. {:.5}  \
+             95 % covers {} of {with}",
+            mean / spread * (n as f64).sqrt(),
+            median(&mut errors[i].iter().map(|e| e.abs()).collect()),
+            median(&mut standard_errors[i]),
+            inside[i],
         );
-        rows.push(((*name).to_owned(), mean, spread, median, coverage));
+        if !["t_M", "G"].contains(name) {
+            regular += with;
+            covered += inside[i];
+            // d1 is drawn to zero by what the operator's parameters take from the slow noise: 0.0019, a third of its error.
+            let allowed = 4.0 / (n as f64).sqrt() + if *name == "d1" { 0.4 } else { 0.0 };
+            assert!(mean.abs() < allowed * spread, "{name}");
+        }
     }
-    Study {
-        rows,
-        converged: converged as f64 / n as f64,
+    let share = covered as f64 / regular as f64;
+    println!("  all but t_M and G: {:.1} % covered", 100.0 * share);
+    // 8 n intervals, of which gains and lead times come in pairs: a standard error of 2.2 % for n = 25, four of that.
+    assert!(share > 0.86);
+    // One of 25 has a standard error of 4.4 %: four of that below 95 %.
+    assert!(midpoints as f64 > 0.77 * n as f64 && rates as f64 > 0.77 * n as f64);
+}
+
+#[test]
+fn slow_change_to_the_double_integrator() {
+    study(Condition::C3, 25);
+}
+
+#[test]
+fn abrupt_change_to_the_double_integrator() {
+    study(Condition::C4, 25);
+}
+
+#[test]
+fn slow_change_to_the_single_integrator() {
+    study(Condition::C5, 25);
+}
+
+#[test]
+fn abrupt_change_to_the_single_integrator() {
+    study(Condition::C6, 25);
+}
+
+#[test]
+fn where_nothing_changes_it_is_said() {
+    for condition in [Condition::C1, Condition::C2] {
+        let (mut inside, mut largest) = (0, 0.0_f64);
+        let n = 10;
+        for record in runs(condition, n) {
+            let fit = TimeVarying::default().fit(one(&record)).unwrap();
+            assert!(fit.termination().converged(), "{}", fit.termination().reason);
+            assert!(!fit.change_found() && fit.comparison().extra_parameters == 4);
+            largest = largest.max(fit.comparison().likelihood_ratio);
+            for name in ["t_M", "G", "K_e2"] {
+                let parameter = fit.parameter(name).unwrap();
+                assert_eq!(parameter.remark, Some(Remark::NoChange), "{name}");
+                assert_eq!(parameter.estimate.standard_error, None, "{name}");
+            }
+            assert!(fit.midpoint_interval().is_none() && fit.rate_interval().is_none());
+            // The gains are those of a stationary fit, with their errors.
+            let here = fit.gains_at(20.0);
+            let truth = truth(condition);
+            for (estimate, true_value) in [(here.k_e, truth[0].1), (here.t_l_s, truth[2].1)] {
+                inside += u64::from((estimate.value - true_value).abs() < 1.96 * estimate.standard_error.unwrap());
+            }
+            assert_eq!(fit.gains_at(70.0).k_e, here.k_e);
+        }
+        println!(
+            "{condition}: gains covered {inside} of {}, largest likelihood ratio {largest:.1}",
+            2 * n
+        );
+        // 20 intervals in pairs: a standard error of 7 %; four of that.
+        assert!(inside >= 13);
+    }
+    let exact = TimeVarying::default().fit(&[without_noise(Condition::C1)]).unwrap();
+    assert!(!exact.change_found());
+    assert!((exact.constant_operator().k_e.value - 0.09).abs() < 1e-9);
+}
+
+#[test]
+fn a_record_without_a_change_agrees_with_box_jenkins() {
+    let record = &runs(Condition::C1, 1)[0];
+    let ours = TimeVarying {
+        delay_range_s: (0.28, 0.28),
+        noise_level: NoiseLevel::Constant,
+        ..quick()
+    }
+    .fit(one(record))
+    .unwrap()
+    .constant_operator();
+    let theirs = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29))
+        .fit(one(record))
+        .unwrap()
+        .operator()
+        .unwrap();
+    for ((name, _, a), (_, _, b)) in ours.rows().into_iter().zip(theirs.rows()) {
+        let Some(s) = b.standard_error else { continue };
+        // Box-Jenkins starts its residuals one sample earlier or later: a 1/8000 of the information.
+        assert!(
+            (a.value - b.value).abs() < 0.05 * s,
+            "{name}: {} and {}",
+            a.value,
+            b.value
+        );
+        assert!((a.standard_error.unwrap() / s - 1.0).abs() < 0.01, "{name}");
+    }
+    assert_eq!(ours.tau_e_s.standard_error, None);
+}
+
+#[test]
+fn several_records_sharpen_the_change() {
+    let records = runs(Condition::C5, 4);
+    let single = quick().fit(&records[..1]).unwrap();
+    let all = quick().fit(&records).unwrap();
+    assert_eq!((single.state_count(), all.state_count()), (2, 8));
+    for name in ["K_e1", "K_e2", "T_L1", "T_L2", "t_M", "omega_nm", "tau_e"] {
+        let ratio = value(&single, name).standard_error.unwrap() / value(&all, name).standard_error.unwrap();
+        // Four times the data halve the error; that of t_M hangs on the error signal around the change.
+        assert!((1.3..3.2).contains(&ratio), "{name}: {ratio}");
     }
 }
 
 #[test]
-fn c3() {
-    study(Condition::C3, 40, &TimeVarying::default());
+fn parameters_can_be_held_and_the_time_axis_moved() {
+    let record = &runs(Condition::C3, 1)[0];
+    let constraints = BTreeMap::from([
+        ("G".to_owned(), Constraint::Fixed(0.5)),
+        ("tau_e".to_owned(), Constraint::Fixed(0.28)),
+    ]);
+    let held = TimeVarying {
+        constraints,
+        ..TimeVarying::default()
+    };
+    let fit = held.fit(one(record)).unwrap();
+    for (name, fixed) in [("G", 0.5), ("tau_e", 0.28)] {
+        let parameter = fit.parameter(name).unwrap();
+        assert!((parameter.estimate.value - fixed).abs() < 1e-12);
+        assert_eq!(
+            (parameter.remark, parameter.estimate.standard_error),
+            (Some(Remark::Fixed), None)
+        );
+    }
+    assert_eq!(fit.rate_interval(), None);
+    assert!(fit.midpoint_interval().is_some());
+
+    let moved = record.clone().starting_at(100.0);
+    let later = held.fit(one(&moved)).unwrap();
+    let shift = value(&later, "t_M").value - value(&fit, "t_M").value;
+    // Of a standard error of half a second; the search stops at 1e-4 of it.
+    assert!((shift - 100.0).abs() < 1e-3, "{shift}");
+
+    let trace = fit.trace(record);
+    assert_eq!(trace.len(), record.len());
+    assert!((trace[0].k_e.value - value(&fit, "K_e1").value).abs() < 1e-6);
+    assert!(trace.iter().all(|g| g.t_l_s.standard_error.unwrap() > 0.0));
 }
+
 #[test]
-fn c4() {
-    study(Condition::C4, 40, &TimeVarying::default());
+fn residuals_and_simulation_of_a_fit() {
+    let record = &runs(Condition::C6, 1)[0];
+    let fit = TimeVarying {
+        noise_level: NoiseLevel::Constant,
+        ..quick()
+    }
+    .fit(one(record))
+    .unwrap();
+    let residuals = fit.residuals(record).unwrap();
+    assert_eq!(residuals.values.len(), fit.residual_count());
+    let mean = residuals.values.iter().map(|e| e * e).sum::<f64>() / residuals.values.len() as f64;
+    assert!((mean / fit.loss() - 1.0).abs() < 1e-9);
+    // What is left of u is the remnant.
+    let simulated = fit.simulate(record).unwrap();
+    let (u, n) = (
+        &record.output()[simulated.first..],
+        &record.channel("n").unwrap()[simulated.first..],
+    );
+    let left: f64 = u
+        .iter()
+        .zip(&simulated.values)
+        .zip(n)
+        .map(|((u, w), n)| (u - w - n).powi(2))
+        .sum();
+    let noise: f64 = n.iter().map(|n| n * n).sum();
+    // 9 parameters, several of them of the slow part of the noise, of some hundred independent values of it.
+    assert!(left < 0.1 * noise, "{left} {noise}");
+    let levels = quick().fit(one(record)).unwrap().noise_levels().unwrap();
+    let k_n = record.channel("K_n").unwrap();
+    let ratio = levels[1] / levels[0] / (k_n[8000] / k_n[0]);
+    // 4000 values on either side give either level to 1.1 %.
+    assert!((ratio - 1.0).abs() < 0.06, "{ratio}");
 }
+
 #[test]
-fn c5() {
-    study(Condition::C5, 40, &TimeVarying::default());
-}
-#[test]
-fn c6() {
-    study(Condition::C6, 40, &TimeVarying::default());
-}
-#[test]
-fn c1() {
-    study(Condition::C1, 40, &TimeVarying::default());
+fn what_cannot_be_fitted_is_refused() {
+    let record = runs(Condition::C4, 1).remove(0);
+    let error = |estimator: TimeVarying, records: &[Record]| estimator.fit(records).unwrap_err();
+    assert!(matches!(error(quick(), &[]), IdentError::NoRecords));
+    let short = record.span(0.0, 0.65).unwrap();
+    assert!(matches!(error(quick(), one(&short)), IdentError::TooFewSamples { .. }));
+    let shorter = record.span(0.0, 0.3).unwrap();
+    assert!(matches!(error(quick(), one(&shorter)), IdentError::DelayTooLong { .. }));
+    let apart = [record.span(0.0, 20.0).unwrap(), record.span(30.0, 50.0).unwrap()];
+    assert!(error(quick(), &apart).to_string().contains("no time in common"));
+    for range in [(0.3, 0.2), (-0.1, 0.2), (f64::NAN, 0.3), (0.1, f64::INFINITY)] {
+        let estimator = TimeVarying {
+            delay_range_s: range,
+            ..quick()
+        };
+        assert!(
+            error(estimator, one(&record)).to_string().contains("tau_e"),
+            "{range:?}"
+        );
+    }
+    let start = |start: Vec<f64>| TimeVarying {
+        start: Some(start),
+        ..quick()
+    };
+    let good = vec![0.09, 0.07, 0.4, 1.2, 41.0, 10.0, 11.0, 0.4, 0.28, -0.8];
+    assert!(start(good.clone()).fit(one(&record)).is_ok());
+    assert!(matches!(
+        error(start(good[..9].to_vec()), one(&record)),
+        IdentError::BadStart { .. }
+    ));
+    for (i, wrong) in [(5, 0.0), (6, -1.0), (0, f64::NAN)] {
+        let mut bad = good.clone();
+        bad[i] = wrong;
+        assert!(
+            matches!(error(start(bad), one(&record)), IdentError::BadStart { .. }),
+            "{i}"
+        );
+    }
+    let silent = Record::new(
+        record.sample_time(),
+        Channel::new("e", "deg", vec![0.0; 500]),
+        Channel::new("u", "deg", record.output()[..500].to_vec()),
+    )
+    .unwrap();
+    assert!(matches!(error(quick(), one(&silent)), IdentError::NoExcitation { .. }));
+    // A few seconds only: whatever comes out, it is said.
+    let brief = record.span(39.0, 44.0).unwrap();
+    if let Ok(fit) = TimeVarying::default().fit(one(&brief)) {
+        assert!(fit.parameters().iter().all(|p| p.estimate.value.is_finite()));
+    }
 }

@@ -1,7 +1,7 @@
 //! Likelihood intervals of t_M and G.
 //!
 //! An interval holds the values at which the other parameters, searched anew, lose little: `n ln(V(x)/V) <= q`. It needs no
-//! parabola. For G, and for t_M where the change is resolved (its standard error is smaller than the width 1/G of the change), the
+//! parabola. For G, and for t_M where the change is resolved (two standard errors are less than the width 1/G of the change), the
 //! loss is chi-square with one degree of freedom: q = 3.84 for 95 %. An abrupt change is a change point instead: the loss at the
 //! true t_M is distributed as the larger of two exponential variables, `P(loss <= q) = (1 - e^{-q/2})^2`, q = 7.35 for 95 %
 //! (B. E. Hansen, *Econometrica* 68 (2000) 575-603, theorem 2).
@@ -44,10 +44,10 @@ pub(crate) enum Walk {
     Lower(Vec<f64>),
 }
 
-/// Whether t_M is a change point rather than a regular parameter.
-pub(crate) fn is_change_point(theta: &[f64], standard_error: Option<f64>) -> bool {
-    let width = (-theta[LOG_RATE]).exp();
-    standard_error.is_none_or(|s| s >= width)
+/// Whether t_M, with this standard error of a regular parameter, is a change point.
+pub(crate) fn is_change_point(theta: &[f64], standard_error: f64) -> bool {
+    // Derivatives at one t_M say nothing about another one a width of the change away: the ends of a 95 % interval.
+    2.0 * standard_error >= (-theta[LOG_RATE]).exp()
 }
 
 /// 95 % interval of t_M or ln G around a minimum, `standard_error` its own where it has one.

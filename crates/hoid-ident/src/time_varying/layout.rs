@@ -47,6 +47,9 @@ const FASTEST_GIVEN: f64 = 10.0;
 /// Smallest rate times the span: nine tenths of the change fill it (2 ln 19 = 5.9), and its ends are hardly told from a line.
 const SLOWEST: f64 = 5.0;
 
+/// Argument from which `e^-x` is zero in double precision.
+const NOTHING: f64 = 746.0;
+
 /// What bounds depend on.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Frame {
@@ -140,7 +143,8 @@ impl Instant {
     pub fn at(theta: &[f64], t_s: f64) -> Self {
         let rate = theta[LOG_RATE].exp();
         let x = rate * (t_s - theta[MIDPOINT]);
-        let far = (-x.abs()).exp();
+        // The exponential is zero there, and slow.
+        let far = if x.abs() > NOTHING { 0.0 } else { (-x.abs()).exp() };
         let rest = far / (1.0 + far);
         let share = if x < 0.0 { rest } else { 1.0 - rest };
         let slope = rest / (1.0 + far);
@@ -155,7 +159,7 @@ impl Instant {
         Self {
             share,
             by_midpoint: -rate * slope,
-            by_log_rate: x * slope,
+            by_log_rate: if slope > 0.0 { x * slope } else { 0.0 },
             k_e: between(K_E),
             t_l: between(T_L),
         }

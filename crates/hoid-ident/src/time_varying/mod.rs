@@ -15,7 +15,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_model::{Record, SampleTime};
+use hoid_model::{Orders, Record, SampleTime, Structure, delayed_operator::whole_samples};
 
 use crate::{
     Constraint, IdentError, Reason, SearchOptions, checks,
@@ -82,6 +82,8 @@ impl Default for TimeVarying {
     }
 }
 
+/// Steps from each start before the best of them is followed to its end.
+const LOOK: usize = 30;
 /// Rounds of fit and noise levels in turn.
 const ROUNDS: usize = 20;
 /// Rounds end when the ratio of the levels moves by less than this share; its own standard error is `1/sqrt n`, about 1 %.
@@ -183,13 +185,13 @@ impl TimeVarying {
             delay_range_s: self.delay_range_s,
         };
         let limits = limits(self.nd, &frame, &self.constraints)?;
-        let longest = hoid_model::delayed_operator::whole_samples(limits[DELAY].1, sample_time)? + 1;
-        let orders = hoid_model::Orders {
+        let longest = whole_samples(limits[DELAY].1, sample_time)? + 1;
+        let orders = Orders {
             nb: 3,
             nd: self.nd,
             nf: 2,
             nk: longest,
-            ..hoid_model::Orders::default()
+            ..Orders::default()
         };
         let criterion = ChangeCriterion {
             data: records
@@ -209,7 +211,7 @@ impl TimeVarying {
             weights: None,
         };
         for record in records {
-            checks::record(hoid_model::Structure::BoxJenkins, &orders, record, criterion.first)?;
+            checks::record(Structure::BoxJenkins, &orders, record, criterion.first)?;
         }
         let unknowns = criterion.limits.len() + criterion.states();
         if criterion.residuals() <= unknowns {
@@ -235,17 +237,28 @@ impl TimeVarying {
                 .map(|s| (s.label, s.theta))
                 .collect(),
         };
+        // A look at each start, then the best to its end.
+        let look = SearchOptions {
+            max_iterations: self.search.max_iterations.min(LOOK),
+            ..self.search
+        };
         let mut best: Option<(String, Minimum)> = None;
         for (label, theta) in candidates {
             let known = best.as_ref().map(|(_, b)| b.at.sum_of_squares);
-            let Some(minimum) = search(criterion, theta, &self.search, known) else {
+            let Some(minimum) = minimise(criterion, theta, &look, known, &mut Workspace::default()) else {
                 continue;
             };
             if known.is_none_or(|known| minimum.at.sum_of_squares < known) {
                 best = Some((label, minimum));
             }
         }
-        best.ok_or(IdentError::NoFiniteLoss)
+        let (label, seen) = best.ok_or(IdentError::NoFiniteLoss)?;
+        if seen.termination.converged() {
+            return Ok((label, seen));
+        }
+        let mut minimum = search(criterion, seen.theta, &self.search, None).ok_or(IdentError::NoFiniteLoss)?;
+        minimum.termination.iterations += seen.termination.iterations;
+        Ok((label, minimum))
     }
 
     fn given_start(&self, start: &[f64]) -> Result<Vec<f64>, IdentError> {

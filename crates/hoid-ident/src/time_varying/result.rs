@@ -3,7 +3,7 @@
 use std::fmt;
 
 use hoid_model::{
-    Record,
+    Orders, Record, SampleTime, Structure,
     uncertainty::{Estimate, OperatorEstimate, variance_along},
 };
 
@@ -32,8 +32,10 @@ pub enum Remark {
     AtBound,
     /// G rests at its upper bound: the change takes no longer than two samples, and how fast it was cannot be told.
     Abrupt,
-    /// The records show no change (BIC), so that its time and its rate mean nothing.
+    /// The records show no change (BIC): t_M and G mean nothing, and gains on either side of it are chosen by chance.
     NoChange,
+    /// The change is too fast for a normal error: the likelihood interval holds.
+    ChangePoint,
     /// The data do not determine it.
     Undetermined,
 }
@@ -44,7 +46,8 @@ impl fmt::Display for Remark {
             Self::Fixed => "fixed",
             Self::AtBound => "rests at a bound",
             Self::Abrupt => "at its upper bound: the change takes no longer than two samples, its rate cannot be told",
-            Self::NoChange => "the records show no change: its time and its rate mean nothing",
+            Self::NoChange => "the records show no change: take the fit without one",
+            Self::ChangePoint => "the change is too fast for a normal error: take the likelihood interval",
             Self::Undetermined => "not determined by the data",
         })
     }
@@ -91,7 +94,7 @@ pub struct Comparison {
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeVaryingFit {
     nd: usize,
-    sample_time: hoid_model::SampleTime,
+    sample_time: SampleTime,
     first: usize,
     /// With ln G.
     theta: Vec<f64>,
@@ -146,7 +149,7 @@ pub(super) fn assemble(
             let (low, high) = criterion.limits[i];
             match i {
                 _ if low == high => Some(Remark::Fixed),
-                LOG_RATE | MIDPOINT if !change_found => Some(Remark::NoChange),
+                _ if i <= LOG_RATE && !change_found => Some(Remark::NoChange),
                 LOG_RATE if theta[i] >= fastest(criterion) => Some(Remark::Abrupt),
                 _ if theta[i] <= low || theta[i] >= high => Some(Remark::AtBound),
                 _ => None,
@@ -163,6 +166,15 @@ pub(super) fn assemble(
         covariance.iter_mut().for_each(|c| *c *= innovation_variance);
         Some(covariance)
     };
+    let of_midpoint = covariance
+        .as_ref()
+        .map(|c: &Vec<f64>| c[MIDPOINT * p + MIDPOINT].sqrt());
+    let change_point = change_found && of_midpoint.is_some_and(|s| is_change_point(&theta, s));
+    if change_point {
+        for place in [MIDPOINT, LOG_RATE] {
+            remarks[place] = remarks[place].or(Some(Remark::ChangePoint));
+        }
+    }
     let constant_operator = constant_operator(criterion, constant)?;
     Ok(TimeVaryingFit {
         nd: criterion.nd,
@@ -182,7 +194,7 @@ pub(super) fn assemble(
         remarks,
         midpoint_interval: None,
         rate_interval: None,
-        change_point: false,
+        change_point,
     })
 }
 
@@ -290,9 +302,8 @@ impl TimeVaryingFit {
         } else {
             self.theta[i]
         };
-        let silent = matches!(self.remarks[i], Some(Remark::NoChange | Remark::Undetermined));
         match self.covariance() {
-            Some(c) if !silent => estimate(value, c[i * self.theta.len() + i]),
+            Some(c) if self.remarks[i].is_none() => estimate(value, c[i * self.theta.len() + i]),
             _ => Estimate::fixed(value),
         }
     }
@@ -314,21 +325,29 @@ impl TimeVaryingFit {
         if !self.change_found() {
             return None;
         }
-        let standard_errors: Vec<Option<f64>> = {
-            let covariance = self.covariance.as_ref()?;
-            (0..p)
-                .map(|i| Some(covariance[i * p + i].sqrt()).filter(|s| *s > 0.0))
-                .collect()
-        };
-        self.change_point = is_change_point(&self.theta, standard_errors[MIDPOINT]);
-        for place in [MIDPOINT, LOG_RATE] {
+        let covariance = self.covariance.as_ref()?;
+        let standard_error = |i: usize| Some(covariance[i * p + i].sqrt()).filter(|s| *s > 0.0);
+        let standard_errors = [MIDPOINT, LOG_RATE].map(standard_error);
+        for (place, standard_error) in [MIDPOINT, LOG_RATE].into_iter().zip(standard_errors) {
             if self.remarks[place] == Some(Remark::Fixed) {
                 continue;
             }
-            match likelihood_interval(criterion, minimum, place, standard_errors[place], self.change_point) {
+            match likelihood_interval(criterion, minimum, place, standard_error, self.change_point) {
                 Walk::Lower(theta) => return Some(theta),
                 Walk::Found(interval) if place == MIDPOINT => self.midpoint_interval = Some(interval),
                 Walk::Found(interval) => self.rate_interval = Some(interval),
+            }
+        }
+        if self.change_point
+            && let (Some(interval), Some(covariance)) = (self.midpoint_interval, self.covariance.as_mut())
+        {
+            // A normal error with the same interval.
+            for i in 0..p {
+                (covariance[MIDPOINT * p + i], covariance[i * p + MIDPOINT]) = (0.0, 0.0);
+            }
+            covariance[MIDPOINT * p + MIDPOINT] = ((interval.high - interval.low) / (2.0 * 1.96)).powi(2);
+            if self.remarks[MIDPOINT] == Some(Remark::ChangePoint) {
+                self.remarks[MIDPOINT] = None;
             }
         }
         None
@@ -376,25 +395,41 @@ impl TimeVaryingFit {
         self.comparison.bic_difference > 0.0
     }
 
-    /// Gains in force at a time on the axis of the record, with standard errors by the delta method, those of t_M and G
-    /// included.
+    /// Gains in force at a time on the axis of the record, with standard errors: those of the sigmoid where the records show a
+    /// change, else those of the fit without one.
+    ///
+    /// The errors are those of the delta method, t_M and G included. Around a change point, where the sigmoid is no line over
+    /// the interval of t_M, `step^2 p (1 - p)` stands for the latter, with p the probability that the change has happened.
     pub fn gains_at(&self, time_s: f64) -> GainsAt {
+        if !self.change_found() {
+            return GainsAt {
+                time_s,
+                k_e: self.constant.k_e,
+                t_l_s: self.constant.t_l_s,
+                k_e_dot: self.constant.k_e_dot,
+            };
+        }
         let here = Instant::at(&self.theta, time_s);
-        let (step_k, step_t) = (
-            self.theta[K_E[1]] - self.theta[K_E[0]],
-            self.theta[T_L[1]] - self.theta[T_L[0]],
-        );
-        let gradient = |by_k: f64, by_t: f64| {
-            let mut g = vec![0.0; self.theta.len()];
+        let p = self.theta.len();
+        let step = |[first, last]: [usize; 2]| self.theta[last] - self.theta[first];
+        let along = |value: f64, by_k: f64, by_t: f64| {
+            let Some(covariance) = &self.covariance else {
+                return Estimate::fixed(value);
+            };
+            let mut g = vec![0.0; p];
             (g[K_E[0]], g[K_E[1]]) = (by_k * (1.0 - here.share), by_k * here.share);
             (g[T_L[0]], g[T_L[1]]) = (by_t * (1.0 - here.share), by_t * here.share);
-            let by_share = by_k * step_k + by_t * step_t;
-            (g[MIDPOINT], g[LOG_RATE]) = (by_share * here.by_midpoint, by_share * here.by_log_rate);
-            g
-        };
-        let along = |value: f64, by_k: f64, by_t: f64| match &self.covariance {
-            Some(c) => estimate(value, variance_along(&gradient(by_k, by_t), c)),
-            None => Estimate::fixed(value),
+            let by_share = by_k * step(K_E) + by_t * step(T_L);
+            let mut of_time = 0.0;
+            if self.change_point {
+                let x = (time_s - self.theta[MIDPOINT]) / covariance[MIDPOINT * p + MIDPOINT].sqrt();
+                // The logistic function that is nearest to the normal distribution.
+                let happened = 1.0 / (1.0 + (-1.702 * x).exp());
+                of_time = by_share * by_share * happened * (1.0 - happened);
+            } else {
+                (g[MIDPOINT], g[LOG_RATE]) = (by_share * here.by_midpoint, by_share * here.by_log_rate);
+            }
+            estimate(value, variance_along(&g, covariance) + of_time)
         };
         GainsAt {
             time_s,
@@ -480,14 +515,14 @@ impl TimeVaryingFit {
             });
         }
         let first = self.first - self.nd + nd;
-        let orders = hoid_model::Orders {
+        let orders = Orders {
             nb: 3,
             nd,
             nf: 2,
             nk: self.first - self.nd,
-            ..hoid_model::Orders::default()
+            ..Orders::default()
         };
-        checks::record(hoid_model::Structure::BoxJenkins, &orders, record, first)?;
+        checks::record(Structure::BoxJenkins, &orders, record, first)?;
         let criterion = ChangeCriterion {
             data: vec![Data {
                 e: record.input(),

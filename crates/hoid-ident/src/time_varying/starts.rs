@@ -12,7 +12,7 @@ use super::{
     objective::{ChangeCriterion, UnitOperator},
 };
 use crate::{
-    Estimator, Fit,
+    Estimator, Fit, SearchMethod, SearchOptions,
     least_squares::{add_scaled, dot, solve_symmetric},
 };
 
@@ -22,6 +22,12 @@ const RATES: [f64; 3] = [0.5, 5.0, 100.0];
 const MIDPOINTS: usize = 12;
 /// Time between the delays that are tried, s: the search finds its way from a distance of a tenth of the period of the poles.
 const DELAY_STEP_S: f64 = 0.06;
+/// Searches in the windows: a start need not be exact.
+const COARSE: SearchOptions = SearchOptions {
+    method: SearchMethod::LevenbergMarquardt,
+    max_iterations: 15,
+    tolerance: 1e-6,
+};
 /// Poles where the windows give none: omega_nm in rad/s, zeta_nm.
 const GRID: [(f64, f64); 3] = [(6.0, 0.4), (11.0, 0.4), (18.0, 0.4)];
 /// d1 where the windows give none.
@@ -53,12 +59,17 @@ pub(crate) fn propose(criterion: &ChangeCriterion<'_>, records: &[Record]) -> Ve
     let (low, high) = criterion.limits[LOG_RATE];
     let mut rates: Vec<f64> = RATES.iter().map(|g| g.ln().clamp(low, high)).collect();
     rates.dedup();
+    // The poles that do best with the middling rate serve all.
+    let middling = rates[rates.len() / 2];
+    let ranked = frozen
+        .iter()
+        .filter_map(|f| Some((f, on_grid(criterion, f, middling)?.0)));
+    let Some((chosen, _)) = ranked.min_by(|a, b| a.1.total_cmp(&b.1)) else {
+        return Vec::new();
+    };
     let mut starts: Vec<Start> = rates
         .into_iter()
-        .filter_map(|rate| {
-            let all = frozen.iter().filter_map(|f| best_midpoint(criterion, f, rate));
-            all.min_by(|a, b| a.rank.total_cmp(&b.rank))
-        })
+        .filter_map(|rate| best_midpoint(criterion, chosen, rate))
         .collect();
     starts.sort_by(|a, b| a.rank.total_cmp(&b.rank));
     starts
@@ -87,10 +98,13 @@ fn of_windows(criterion: &ChangeCriterion<'_>, records: &[Record]) -> Vec<Frozen
     for (part, name) in [(0, "first"), (2, "last")] {
         let windows: Option<Vec<Record>> = records.iter().map(|r| third(r, part)).collect();
         let Some(windows) = windows else { continue };
-        let fits = delays(criterion)
-            .into_iter()
-            .filter_map(|nk| fit(criterion, &windows, nk));
-        let Some(best) = fits.min_by(|a, b| a.loss().total_cmp(&b.loss())) else {
+        // Each delay goes on from the model of the one before.
+        let mut fits: Vec<Fit> = Vec::new();
+        for nk in delays(criterion) {
+            let before = fits.last().map(|f| f.model().theta().to_vec());
+            fits.extend(fit(criterion, &windows, nk, before));
+        }
+        let Some(best) = fits.into_iter().min_by(|a, b| a.loss().total_cmp(&b.loss())) else {
             continue;
         };
         if let Ok(operator) = best.operator() {
@@ -108,7 +122,7 @@ fn of_windows(criterion: &ChangeCriterion<'_>, records: &[Record]) -> Vec<Frozen
     found
 }
 
-fn fit(criterion: &ChangeCriterion<'_>, windows: &[Record], nk: usize) -> Option<Fit> {
+fn fit(criterion: &ChangeCriterion<'_>, windows: &[Record], nk: usize, start: Option<Vec<f64>>) -> Option<Fit> {
     let orders = Orders {
         nb: 2,
         nd: criterion.nd,
@@ -118,6 +132,8 @@ fn fit(criterion: &ChangeCriterion<'_>, windows: &[Record], nk: usize) -> Option
     };
     let estimator = Estimator {
         starts: 1,
+        search: COARSE,
+        start,
         ..Estimator::new(Structure::BoxJenkins, orders)
     };
     // Only models that are operators have poles to give.
@@ -170,23 +186,42 @@ fn frozen_theta(criterion: &ChangeCriterion<'_>, operator: &OperatorParameters, 
     theta
 }
 
-/// The best time of a change with the given ln G.
-fn best_midpoint(criterion: &ChangeCriterion<'_>, frozen: &Frozen, log_rate: f64) -> Option<Start> {
+/// Rank and theta for one change, the gains being best.
+fn rank_at(ranking: &Ranking<'_, '_>, theta: &[f64], t_m: f64) -> Option<(f64, Vec<f64>)> {
+    let mut there = theta.to_vec();
+    there[MIDPOINT] = t_m;
+    let (rank, gains) = ranking.best_gains(Some(&there))?;
+    set_gains(&mut there, gains);
+    Some((rank, there))
+}
+
+/// Time between two points of the grid of t_M.
+fn grid_step(criterion: &ChangeCriterion<'_>) -> f64 {
+    let (low, high) = criterion.limits[MIDPOINT];
+    (high - low) / MIDPOINTS as f64
+}
+
+/// The best t_M of the grid for the given ln G.
+fn on_grid<'c, 'a>(
+    criterion: &'c ChangeCriterion<'a>,
+    frozen: &Frozen,
+    log_rate: f64,
+) -> Option<(f64, Vec<f64>, Ranking<'c, 'a>)> {
     let mut theta = frozen.theta.clone();
     theta[LOG_RATE] = log_rate;
     let ranking = Ranking::new(criterion, &theta)?;
     let (low, high) = criterion.limits[MIDPOINT];
-    let rank_at = |t_m: f64| {
-        let mut there = theta.clone();
-        there[MIDPOINT] = t_m;
-        let (rank, gains) = ranking.best_gains(Some(&there))?;
-        set_gains(&mut there, gains);
-        Some((rank, there))
-    };
     let count = if low < high { MIDPOINTS } else { 1 };
-    let mut step = (high - low) / count as f64;
-    let grid = (0..count).filter_map(|i| rank_at(low + (i as f64 + 0.5) * step));
-    let mut best = grid.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let grid = (0..count).filter_map(|i| rank_at(&ranking, &theta, low + (i as f64 + 0.5) * grid_step(criterion)));
+    let (rank, best) = grid.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some((rank, best, ranking))
+}
+
+/// The best t_M for the given ln G.
+fn best_midpoint(criterion: &ChangeCriterion<'_>, frozen: &Frozen, log_rate: f64) -> Option<Start> {
+    let (rank, theta, ranking) = on_grid(criterion, frozen, log_rate)?;
+    let (low, high) = criterion.limits[MIDPOINT];
+    let (mut best, mut step) = ((rank, theta), grid_step(criterion));
     // To a tenth of the width of the change, or a sample.
     let finest = (0.1 * (-log_rate).exp()).max(criterion.sample_time.s());
     while step > finest {
@@ -194,7 +229,7 @@ fn best_midpoint(criterion: &ChangeCriterion<'_>, frozen: &Frozen, log_rate: f64
         let t_m = best.1[MIDPOINT];
         for there in [t_m - step, t_m + step] {
             if (low..=high).contains(&there)
-                && let Some(found) = rank_at(there)
+                && let Some(found) = rank_at(&ranking, &best.1, there)
                 && found.0 < best.0
             {
                 best = found;
@@ -279,8 +314,12 @@ impl<'c, 'a> Ranking<'c, 'a> {
             power += dot(&target, &target);
             for i in 0..columns_count {
                 rhs[i] += dot(&columns[i], &target);
-                for j in 0..columns_count {
-                    gram[i * columns_count + j] += dot(&columns[i], &columns[j]);
+                for j in 0..=i {
+                    let product = dot(&columns[i], &columns[j]);
+                    gram[i * columns_count + j] += product;
+                    if i != j {
+                        gram[j * columns_count + i] += product;
+                    }
                 }
             }
         }
