@@ -42,8 +42,7 @@ use crate::{
 };
 use equation::{Problem, Source};
 
-// The search for starts takes it up.
-#[allow(unused_imports)]
+#[allow(unused_imports)] // As in its own file.
 pub(crate) use chain::instrument_chain;
 
 /// Residuals below this share of the output, in amplitude, are rounding.
