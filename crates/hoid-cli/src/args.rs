@@ -186,6 +186,9 @@ pub struct IdentifyArgs {
     /// Controlled element NUM/DEN by descending powers of s, as 90/1,6,0: adds crossover frequency and margins
     #[arg(long, value_name = "NUM/DEN", value_parser = parse_transfer_function, allow_hyphen_values = true)]
     pub controlled_element: Option<ContinuousTransferFunction>,
+    /// Also judge the prediction K samples ahead
+    #[arg(long, value_name = "K")]
+    pub horizon: Option<usize>,
     /// Another record to judge the model on
     #[arg(long, value_name = "FILE")]
     pub validate: Option<PathBuf>,
@@ -295,7 +298,15 @@ names!(SearchMethodName for SearchMethod {
     Lm = SearchMethod::LevenbergMarquardt,
     Grad = SearchMethod::SteepestDescent,
 });
-names!(CriterionName for Criterion { Loss = Criterion::Loss, Aic = Criterion::Aic, Bic = Criterion::Bic });
+names!(CriterionName for Criterion {
+    Loss = Criterion::Loss,
+    Aic = Criterion::Aic,
+    Aicc = Criterion::Aicc,
+    Bic = Criterion::Bic,
+    Fpe = Criterion::Fpe,
+    Mdl = Criterion::Mdl,
+    Yic = Criterion::Yic,
+});
 names!(InitialStateName for Option<InitialState> {
     Auto = None,
     Zero = Some(InitialState::Zero),

@@ -1,6 +1,9 @@
 //! Results as JSON objects, the contract with other programs.
 
-use hoid_ident::{Choice, Fit, IdentError, validation::Quality};
+use hoid_ident::{
+    Choice, Fit, IdentError, MarginEstimates, Root,
+    validation::{Quality, Validation},
+};
 use hoid_model::{
     NotConvertible, Orders, Record,
     margins::Margins,
@@ -67,6 +70,43 @@ pub fn margins(m: &Margins) -> Map<String, Value> {
     map
 }
 
+fn margin_estimates(m: &MarginEstimates) -> Value {
+    let or_null = |e: &Option<Estimate>| e.as_ref().map_or(Value::Null, estimate);
+    json!({
+        "crossover_rad_s": or_null(&m.crossover_rad_s),
+        "phase_margin_deg": or_null(&m.phase_margin_deg),
+        "gain_margin_db": or_null(&m.gain_margin_db),
+        "phase_crossover_rad_s": or_null(&m.phase_crossover_rad_s),
+    })
+}
+
+fn root(r: &Root, sample_time_s: f64) -> Value {
+    let of_s = r.frequency_and_damping(sample_time_s);
+    json!({
+        "polynomial": r.polynomial.to_string(),
+        "real": number(r.value.re),
+        "imaginary": number(r.value.im),
+        "standard_error_real": optional(r.standard_error.map(|e| e.0)),
+        "standard_error_imaginary": optional(r.standard_error.map(|e| e.1)),
+        "frequency_rad_s": optional(of_s.map(|s| s.0)),
+        "damping": optional(of_s.map(|s| s.1)),
+    })
+}
+
+fn residual_tests(v: &Validation) -> Value {
+    let signs = v.signs();
+    json!({
+        "ljung_box": v.ljung_box.map_or(Value::Null, |t| json!({
+            "statistic": number(t.statistic),
+            "degrees_of_freedom": t.degrees_of_freedom,
+            "p_value": number(t.p_value),
+        })),
+        "coloured_residuals": signs.coloured_residuals,
+        "under_modelled": signs.under_modelled,
+        "feedback": signs.feedback,
+    })
+}
+
 fn quality(q: &Quality, fit: &Fit) -> Value {
     json!({
         "vaf_simulation": number(q.vaf_simulation),
@@ -74,8 +114,11 @@ fn quality(q: &Quality, fit: &Fit) -> Value {
         "nrmse_simulation": number(q.nrmse_simulation),
         "nrmse_prediction": number(q.nrmse_prediction),
         "aic": number(fit.aic()),
+        "aicc": number(fit.aicc()),
         "bic": number(fit.bic()),
         "fpe": number(fit.fpe()),
+        "mdl": number(fit.mdl()),
+        "yic": optional(fit.yic()),
     })
 }
 
@@ -88,7 +131,11 @@ pub struct Identified<'a> {
     pub quality: Quality,
     pub operator: &'a Result<OperatorEstimate, NotConvertible>,
     pub remnant: Option<&'a Result<RemnantEstimate, NotConvertible>>,
-    pub margins: Option<&'a Margins>,
+    pub margins: Option<&'a MarginEstimates>,
+    /// Residual tests on each record.
+    pub validations: &'a [Validation],
+    /// Horizon, VAF and NRMSE of the prediction that far ahead.
+    pub ahead: Option<(usize, f64, f64)>,
     pub validation: Option<(&'a str, Quality)>,
     pub settings: &'a [(String, String)],
 }
@@ -135,7 +182,16 @@ impl Identified<'_> {
         set("operator", operator(self.operator));
         set("remnant", self.remnant.map_or(Value::Null, remnant));
         if let Some(m) = self.margins {
-            set("open_loop", Value::Object(margins(m)));
+            set("open_loop", margin_estimates(m));
+        }
+        let ts = fit.model().sample_time().s();
+        set("roots", fit.roots().iter().map(|r| root(r, ts)).collect());
+        set("residual_tests", self.validations.iter().map(residual_tests).collect());
+        if let Some((k, vaf, nrmse)) = self.ahead {
+            set(
+                "prediction_ahead",
+                json!({"horizon": k, "vaf": number(vaf), "nrmse": number(nrmse)}),
+            );
         }
         if let Some((file, q)) = &self.validation {
             set(
@@ -149,6 +205,11 @@ impl Identified<'_> {
                 }),
             );
         }
+        let interval = self.choice.and_then(Choice::delay_interval);
+        set(
+            "delay_interval",
+            interval.map_or(Value::Null, |(low, high)| json!([low, high])),
+        );
         set("candidates", self.choice.map_or(json!([]), candidates));
         let settings: Map<String, Value> = self.settings.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
         set("settings", Value::Object(settings));
@@ -162,7 +223,11 @@ fn candidates(choice: &Choice) -> Value {
             "orders": orders(&c.orders),
             "loss": number(f.loss),
             "aic": number(f.aic),
+            "aicc": number(f.aicc),
             "bic": number(f.bic),
+            "fpe": number(f.fpe),
+            "mdl": number(f.mdl),
+            "yic": optional(f.yic),
             "converged": f.converged,
         }),
         Err(reason) => json!({"orders": orders(&c.orders), "error": IdentError::to_string(reason)}),

@@ -1,10 +1,13 @@
 //! Results as tables for people.
 
 use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
-use hoid_ident::{Choice, Fit, order_search::Criterion, validation::Quality};
+use hoid_ident::{
+    Choice, Fit, MarginEstimates,
+    order_search::Criterion,
+    validation::{Quality, Validation},
+};
 use hoid_model::{
     NotConvertible,
-    margins::Margins,
     remnant::RemnantDiscretisation,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
@@ -125,9 +128,20 @@ fn not_convertible(reason: &NotConvertible) -> String {
 }
 
 /// Crossover and margins in a line.
-pub fn margins(m: &Margins) -> String {
-    let or_none = |value: Option<f64>, unit: &str| match value {
-        Some(v) => format!("{v:.4} {unit}"),
+pub fn margins(m: &MarginEstimates) -> String {
+    let or_none = |value: Option<Estimate>, unit: &str| match value {
+        Some(e) => {
+            let (value, error) = match e.standard_error {
+                Some(_) => with_uncertainty(&e),
+                None => (format!("{:.4}", e.value), String::new()),
+            };
+            let error = if error.is_empty() {
+                error
+            } else {
+                format!(" (standard error {error})")
+            };
+            format!("{value} {unit}{error}")
+        }
         None => "none".to_owned(),
     };
     format!(
@@ -139,6 +153,66 @@ pub fn margins(m: &Margins) -> String {
     )
 }
 
+/// Poles and zeros with their natural frequency and damping.
+pub fn roots(fit: &Fit) -> String {
+    let ts = fit.model().sample_time().s();
+    let mut rows = table(&["root", "real", "imaginary", "standard errors", "rad/s", "damping"]);
+    let all = fit.roots();
+    if all.is_empty() {
+        return String::new();
+    }
+    for root in all {
+        let what = match root.polynomial {
+            'a' => "pole (A)",
+            'f' => "pole (F)",
+            'd' => "noise pole (D)",
+            'c' => "noise zero (C)",
+            _ => "zero (B)",
+        };
+        let errors = match root.standard_error {
+            Some((re, im)) if re.is_finite() && im.is_finite() => format!("{re:.1e}, {im:.1e}"),
+            _ => "-".to_owned(),
+        };
+        let (frequency, damping) = match root.frequency_and_damping(ts) {
+            Some((frequency, damping)) => (format!("{frequency:.3}"), format!("{damping:.3}")),
+            None => ("-".to_owned(), "-".to_owned()),
+        };
+        rows.add_row([
+            what.to_owned(),
+            format!("{:.6}", root.value.re),
+            format!("{:.6}", root.value.im),
+            errors,
+            frequency,
+            damping,
+        ]);
+    }
+    format!("{rows}\n")
+}
+
+/// What the residuals say.
+pub fn residual_tests(v: &Validation) -> String {
+    let mut text = match v.ljung_box {
+        Some(t) => format!(
+            "Residuals: Ljung-Box Q = {:.1} with {} degrees of freedom, p = {:.3}.\n",
+            t.statistic, t.degrees_of_freedom, t.p_value
+        ),
+        None => String::new(),
+    };
+    let signs = v.signs();
+    if signs.coloured_residuals {
+        text.push_str(
+            "They are not white: a richer noise model (nd, nc) would serve, and in a closed loop bias less.\n",
+        );
+    }
+    if signs.under_modelled {
+        text.push_str("They follow the input at positive lags: the model misses dynamics, or has the wrong delay.\n");
+    }
+    if signs.feedback {
+        text.push_str("The input follows them (negative lags): there is feedback, as in every closed loop.\n");
+    }
+    text
+}
+
 /// The best candidates of a search.
 pub fn candidates(choice: &Choice) -> String {
     let mut good: Vec<_> = choice
@@ -146,30 +220,42 @@ pub fn candidates(choice: &Choice) -> String {
         .iter()
         .filter_map(|c| c.outcome.as_ref().ok().map(|f| (c.orders, f)))
         .collect();
-    let key = match choice.criterion {
-        Criterion::Loss => "loss",
-        Criterion::Aic => "AIC",
-        Criterion::Bic => "BIC",
-    };
+    let key = choice.criterion.name();
     good.sort_by(|a, b| {
         let value = |f: &hoid_ident::order_search::CandidateFigures| f.value(choice.criterion);
         value(a.1).total_cmp(&value(b.1))
     });
-    let mut rows = table(&["candidate", "loss", "AIC", "BIC", ""]);
+    // The usual columns, and the one that decided where it is another.
+    let decides = !matches!(choice.criterion, Criterion::Loss | Criterion::Aic | Criterion::Bic);
+    let mut header = vec!["candidate", "loss", "AIC", "BIC", ""];
+    if decides {
+        header.insert(4, key);
+    }
+    let mut rows = table(&header);
     for (orders, f) in good.iter().take(CANDIDATES_SHOWN) {
-        rows.add_row([
+        let mut row = vec![
             orders.to_string(),
             numbers::plain(f.loss),
             format!("{:.1}", f.aic),
             format!("{:.1}", f.bic),
             if f.converged { "" } else { "not converged" }.to_owned(),
-        ]);
+        ];
+        if decides {
+            row.insert(4, numbers::plain(f.value(choice.criterion)));
+        }
+        rows.add_row(row);
     }
     let failed = choice.candidates.len() - good.len();
     let mut text = format!(
         "Searched {} candidates, smallest {key} first; all on the same samples.\n{rows}\n",
         choice.candidates.len()
     );
+    if let Some((low, high)) = choice.delay_interval() {
+        text.push_str(&format!(
+            "Delay: nk = {low} to {high} lie within the 95 % likelihood interval of nk = {}.\n",
+            choice.fit.orders().nk
+        ));
+    }
     if failed > 0 {
         text.push_str(&format!(
             "{failed} candidates could not be fitted; --json lists the reasons.\n"

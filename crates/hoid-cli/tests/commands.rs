@@ -179,8 +179,22 @@ fn several_records_start_validation_report_and_margins() {
     let found = json(d, &arguments);
     assert_eq!(found["records"].as_array().unwrap().len(), 2);
     assert_eq!(found["start"], "given");
-    let crossover = found["open_loop"]["crossover_rad_s"].as_f64().unwrap();
-    assert!((crossover - 1.5635).abs() < 0.1, "{crossover}");
+    let crossover = &found["open_loop"]["crossover_rad_s"];
+    let (value, error) = (&crossover["value"], &crossover["standard_error"]);
+    let off = value.as_f64().unwrap() - 1.5635;
+    // Two records; five standard errors.
+    assert!(
+        off.abs() < 0.1 && off.abs() < 5.0 * error.as_f64().unwrap(),
+        "{crossover}"
+    );
+    assert_eq!(found["residual_tests"].as_array().unwrap().len(), 2);
+    assert!(
+        found["roots"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|r| r["polynomial"] == "f")
+    );
     assert!(found["validation"]["vaf_simulation"].as_f64().unwrap() > 85.0);
     let page = fs::read_to_string(d.join("out/report.html")).unwrap();
     assert!(page.contains("<svg") && page.contains("again.csv"), "{}", page.len());

@@ -14,16 +14,7 @@ pub fn divide_in_place(d: &[f64], x: &mut [f64]) {
                 *value = y1;
             }
         }
-        [d1, d2] => {
-            let (mut y1, mut y2) = (0.0, 0.0);
-            for value in x {
-                // The older term first: only the last product waits for the previous sample.
-                let y = (*value - d2 * y2) - d1 * y1;
-                y2 = y1;
-                y1 = y;
-                *value = y;
-            }
-        }
+        [d1, d2] => divide_by_second_order(d1, d2, x),
         _ => {
             for t in 0..x.len() {
                 let mut y = x[t];
@@ -33,6 +24,35 @@ pub fn divide_in_place(d: &[f64], x: &mut [f64]) {
                 x[t] = y;
             }
         }
+    }
+}
+
+/// `x <- x / (1 + d_1 q^-1 + d_2 q^-2)`, four samples at a time.
+///
+/// Sample by sample each value waits for the one before it. Written out over four samples with the impulse response h,
+/// `y(t+k) = sum_{i<=k} h_i x(t+k-i) + h_{k+1} y(t-1) - d_2 h_k y(t-2)`, all four wait for y(t-1) and y(t-2) alone.
+fn divide_by_second_order(d1: f64, d2: f64, x: &mut [f64]) {
+    let h1 = -d1;
+    let h2 = -d1 * h1 - d2;
+    let h3 = -d1 * h2 - d2 * h1;
+    let h4 = -d1 * h3 - d2 * h2;
+    let (mut y1, mut y2) = (0.0, 0.0);
+    let mut blocks = x.chunks_exact_mut(4);
+    for block in &mut blocks {
+        let [x0, x1, x2, x3] = [block[0], block[1], block[2], block[3]];
+        let z = -d2 * y2;
+        // The own share of the inputs first: only the last sums wait for the block before.
+        block[0] = (x0 + z) + h1 * y1;
+        block[1] = (x1 + h1 * x0 + h1 * z) + h2 * y1;
+        let third = (x2 + h1 * x1 + h2 * x0 + h2 * z) + h3 * y1;
+        let fourth = (x3 + h1 * x2 + h2 * x1 + h3 * x0 + h3 * z) + h4 * y1;
+        (block[2], block[3]) = (third, fourth);
+        (y1, y2) = (fourth, third);
+    }
+    for value in blocks.into_remainder() {
+        let y = (*value - d2 * y2) - d1 * y1;
+        (y2, y1) = (y1, y);
+        *value = y;
     }
 }
 

@@ -79,6 +79,25 @@ pub enum IdentError {
         /// The dependent columns by name.
         columns: String,
     },
+    /// Instruments that depend on each other, or do not follow the regressors.
+    #[error(
+        "the instruments are singular: {dependence}; the signal that they are made of does not excite so many parameters: lower the \
+         orders or use one with more frequencies"
+    )]
+    SingularInstruments {
+        /// Which instrument depends on which.
+        dependence: String,
+    },
+    /// A channel that a record does not have.
+    #[error("record {label} has no channel {channel} to make instruments of; it has {available}")]
+    NoChannel {
+        /// The channel that was asked for.
+        channel: String,
+        /// The record.
+        label: String,
+        /// The channels there are.
+        available: String,
+    },
     /// An information matrix that has no inverse.
     #[error(
         "the data do not determine {parameters}: the information matrix is singular (a pole and a zero that cancel, or too little excitation); lower the orders"

@@ -9,9 +9,9 @@ use crate::{
     information::inverse_of_free,
     least_squares::dot,
     objective::Informed,
-    prediction_error::{Criterion, Data, Workspace, first_residual},
+    prediction_error::{Criterion, Data, Workspace, first_residual, output_variance},
     robust::{ROUNDS, Reweighting},
-    search::{Minimum, Objective, free_parameters, minimise},
+    search::{Minimum, Objective, free_parameters, leads_to, minimise},
     simulation_focus, starts,
 };
 
@@ -185,6 +185,11 @@ impl Estimator {
         };
         let mut best: Option<(String, Minimum)> = None;
         for (label, theta) in candidates {
+            if let Some((_, known)) = &best
+                && leads_to(known, &informed, &theta, &mut workspace)
+            {
+                continue;
+            }
             let known = best.as_ref().map(|(_, b): &(String, Minimum)| b.at.sum_of_squares);
             let Some(minimum) = minimise(&informed, theta, &self.search, known, &mut workspace) else {
                 continue;
@@ -327,6 +332,8 @@ impl Estimator {
             initial_state: criterion.initial,
             termination,
             start: String::new(),
+            output_variance: output_variance(&criterion.data, criterion.first),
+            physical: None,
         })
     }
 

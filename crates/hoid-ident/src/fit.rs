@@ -27,6 +27,21 @@ pub struct Fit {
     pub(crate) start: String,
     /// Parameters that were fixed, or rest at a bound.
     pub(crate) held: Vec<bool>,
+    /// Variance of the output over the residuals that count.
+    pub(crate) output_variance: f64,
+    /// The physical parameters that theta was computed from, for a grey box.
+    pub(crate) physical: Option<Box<Physical>>,
+}
+
+/// What a grey box fitted: theta is a function of these.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Physical {
+    /// Name and estimate of each parameter.
+    pub parameters: Vec<(String, Estimate)>,
+    /// Number of parameters that were free.
+    pub free: usize,
+    pub operator: Result<OperatorEstimate, NotConvertible>,
+    pub remnant: Option<RemnantEstimate>,
 }
 
 /// Values on the time axis of a record, from sample `first` on.
@@ -66,8 +81,12 @@ impl Fit {
         self.covariance.as_deref()
     }
 
-    /// Name, value and standard error of each coefficient.
+    /// Name, value and standard error of each parameter: the coefficients of theta, or the physical parameters that a grey box
+    /// fitted.
     pub fn parameters(&self) -> Vec<(String, Estimate)> {
+        if let Some(physical) = &self.physical {
+            return physical.parameters.clone();
+        }
         let theta = self.model.theta();
         let p = theta.len();
         self.orders()
@@ -141,8 +160,45 @@ impl Fit {
         self.loss * (1.0 + ratio) / (1.0 - ratio)
     }
 
+    /// Akaike's criterion with the correction for short records, `AIC + 2 p (p + 1)/(n - p - 1)` (C. M. Hurvich and C.-L. Tsai,
+    /// *Biometrika* 76 (1989) 297-307); infinite where n does not exceed p + 1.
+    pub fn aicc(&self) -> f64 {
+        let (n, p) = (self.residuals as f64, self.parameter_count());
+        if n > p + 1.0 {
+            self.aic() + 2.0 * p * (p + 1.0) / (n - p - 1.0)
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// Rissanen's minimum description length `V (1 + p ln n / n)`.
+    pub fn mdl(&self) -> f64 {
+        let (n, p) = (self.residuals as f64, self.parameter_count());
+        self.loss * (1.0 + p * n.ln() / n)
+    }
+
+    /// Young's criterion `ln(V / var u) + ln( (1/p) sum_i var theta_i / theta_i^2 )` over the free coefficients of A, B and F
+    /// (P. C. Young, *Recursive Estimation and Time-Series Analysis*, 2011, section 6.7): the more negative, the better the
+    /// fit for well determined coefficients. `None` without standard errors or where a coefficient is zero.
+    pub fn yic(&self) -> Option<f64> {
+        let relative: Option<Vec<f64>> = self
+            .parameters()
+            .iter()
+            .zip(&self.held)
+            .filter(|((name, _), held)| !**held && name.starts_with(['a', 'b', 'f']))
+            .map(|((_, e), _)| Some((e.standard_error? / e.value).powi(2)))
+            .collect();
+        let relative = relative.filter(|r| !r.is_empty())?;
+        let mean = relative.iter().sum::<f64>() / relative.len() as f64;
+        let yic = (self.loss / self.output_variance).ln() + mean.ln();
+        yic.is_finite().then_some(yic)
+    }
+
     /// Number p of parameters that were free.
     pub fn free_count(&self) -> usize {
+        if let Some(physical) = &self.physical {
+            return physical.free;
+        }
         self.held.iter().filter(|held| !**held).count()
     }
 
@@ -155,6 +211,9 @@ impl Fit {
     /// # Errors
     /// [`NotConvertible`] with the reason.
     pub fn operator(&self) -> Result<OperatorEstimate, NotConvertible> {
+        if let Some(physical) = &self.physical {
+            return physical.operator.clone();
+        }
         let p = self.model.theta().len();
         match &self.covariance {
             Some(covariance) => operator_estimate(&self.model, covariance),
@@ -162,11 +221,31 @@ impl Fit {
         }
     }
 
-    /// T_n and K_n of the remnant filter that the noise model stands for.
+    /// True for a grey box, whose theta is a function of physical parameters.
+    pub fn is_grey_box(&self) -> bool {
+        self.physical.is_some()
+    }
+
+    /// Structure and orders as in print.
+    pub fn title(&self) -> String {
+        match &self.physical {
+            Some(_) => format!("Grey box with a remnant of order m = {}", self.orders().nd),
+            None => format!("{}({})", self.model.structure(), self.orders()),
+        }
+    }
+
+    /// T_n and K_n of the remnant filter that the noise model stands for. A grey box has fitted them as they are held over each
+    /// sample, whatever `how`.
     ///
     /// # Errors
     /// [`NotConvertible`] with the reason.
     pub fn remnant(&self, how: RemnantDiscretisation) -> Result<RemnantEstimate, NotConvertible> {
+        if let Some(physical) = &self.physical {
+            return physical.remnant.ok_or_else(|| NotConvertible::NotARemnantFilter {
+                order: 0,
+                reason: "m = 0, the remnant is white".to_owned(),
+            });
+        }
         let variance_of_sd = self.innovation_variance / (2.0 * self.residuals as f64);
         remnant_estimate(
             &self.model,

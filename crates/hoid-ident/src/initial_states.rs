@@ -177,7 +177,7 @@ fn shifted(response: &[f64], delay: usize, lead: usize, rows: usize) -> Vec<f64>
     column
 }
 
-/// Impulse response of `1/D`, until it has died away (1e-20 of its largest value) or `longest` is reached.
+/// Impulse response of `1/D`, until it has died away (1e-16 of its largest value) or `longest` is reached.
 fn impulse_response(d: &[f64], longest: usize) -> Vec<f64> {
     const BLOCK: usize = 128;
     let order = d.len();
@@ -205,7 +205,7 @@ fn impulse_response(d: &[f64], longest: usize) -> Vec<f64> {
         }
         let size = h[from..].iter().fold(0.0_f64, |m, y| m.max(y.abs()));
         largest = largest.max(size);
-        if size < 1e-20 * largest {
+        if size < 1e-16 * largest {
             break;
         }
     }

@@ -8,21 +8,28 @@
 //! | `stationary_past` | the noise before the record, when it was stationary |
 //! | `search` | damped Gauss-Newton |
 //! | `objective`, `robust`, `simulation_focus` | bounds and priors, a loss against outliers, models that are to simulate |
-//! | `starts` | where the search begins when nobody says |
+//! | `starts`, `continuation` | where the search begins when nobody says |
 //! | `arx`, `least_squares` | linear regression by QR with column pivoting |
+//! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
+//! | [`instrumental`] | instrumental variables, in open and closed loop |
 //! | [`TimeVarying`] | gains that follow a sigmoid, with the time and the rate of the change |
 //! | [`order_search`] | ranges of orders and delay, criteria, the chosen model |
 //! | [`validation`] | VAF, NRMSE, residual tests |
+//! | `derived` | poles, zeros, crossover and margins with standard errors |
 //! | [`Fit`] | model, covariance, how it ended; prediction, simulation, frequency response |
 
 mod arx;
 mod checks;
 mod constraint;
+mod continuation;
+mod derived;
 mod error;
 mod estimator;
 mod fit;
+pub mod grey_box;
 mod information;
 mod initial_states;
+pub mod instrumental;
 mod least_squares;
 mod objective;
 pub mod order_search;
@@ -36,9 +43,12 @@ mod time_varying;
 pub mod validation;
 
 pub use constraint::{Constraint, Prior};
+pub use derived::{MarginEstimates, Root};
 pub use error::IdentError;
 pub use estimator::{Estimator, Focus};
 pub use fit::{Fit, ResponsePoint, Series};
+pub use grey_box::{GreyBox, GreyBoxFit};
+pub use instrumental::{InstrumentalVariable, Instruments, IvMethod};
 pub use order_search::{Candidate, Choice, OrderRanges, choose_orders};
 pub use prediction_error::InitialState;
 pub use robust::Loss;

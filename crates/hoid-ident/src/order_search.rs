@@ -109,9 +109,32 @@ pub enum Criterion {
     Loss,
     /// Akaike.
     Aic,
+    /// Akaike with the correction for short records.
+    Aicc,
     /// Schwarz.
     #[default]
     Bic,
+    /// Akaike's final prediction error.
+    Fpe,
+    /// Rissanen's minimum description length.
+    Mdl,
+    /// Young's criterion: the fit against the relative errors of the coefficients.
+    Yic,
+}
+
+impl Criterion {
+    /// Name as in print.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Loss => "loss",
+            Self::Aic => "AIC",
+            Self::Aicc => "AICc",
+            Self::Bic => "BIC",
+            Self::Fpe => "FPE",
+            Self::Mdl => "MDL",
+            Self::Yic => "YIC",
+        }
+    }
 }
 
 /// One candidate of a search.
@@ -130,19 +153,47 @@ pub struct CandidateFigures {
     pub loss: f64,
     /// Akaike's criterion.
     pub aic: f64,
+    /// Akaike's criterion corrected.
+    pub aicc: f64,
     /// Schwarz's criterion.
     pub bic: f64,
+    /// Final prediction error.
+    pub fpe: f64,
+    /// Minimum description length.
+    pub mdl: f64,
+    /// Young's criterion; `None` without standard errors.
+    pub yic: Option<f64>,
+    /// Number of residuals, the same for all candidates.
+    pub residuals: usize,
     /// True when the search reached a minimum.
     pub converged: bool,
 }
 
 impl CandidateFigures {
+    fn of(fit: &Fit) -> Self {
+        Self {
+            loss: fit.loss(),
+            aic: fit.aic(),
+            aicc: fit.aicc(),
+            bic: fit.bic(),
+            fpe: fit.fpe(),
+            mdl: fit.mdl(),
+            yic: fit.yic(),
+            residuals: fit.residual_count(),
+            converged: fit.termination().converged(),
+        }
+    }
+
     /// The figure that the criterion compares.
     pub fn value(&self, criterion: Criterion) -> f64 {
         match criterion {
             Criterion::Loss => self.loss,
             Criterion::Aic => self.aic,
+            Criterion::Aicc => self.aicc,
             Criterion::Bic => self.bic,
+            Criterion::Fpe => self.fpe,
+            Criterion::Mdl => self.mdl,
+            Criterion::Yic => self.yic.unwrap_or(f64::INFINITY),
         }
     }
 }
@@ -201,25 +252,16 @@ pub fn choose_orders_with(
         starts: 1,
         ..template.clone()
     };
-    // Collected by index: the table does not depend on the number of threads.
-    let candidates: Vec<Candidate> = combinations
+    // Delays in blocks: within one, each delay starts from its neighbour. The blocks are the same for any number of threads, and
+    // the results are collected by index, so that the table does not depend on them.
+    let delays = ranges.nk.clone().count();
+    let blocks: Vec<&[Orders]> = combinations
+        .chunks(delays)
+        .flat_map(|row| row.chunks(NEIGHBOURS))
+        .collect();
+    let candidates: Vec<Candidate> = blocks
         .into_par_iter()
-        .map(|orders| {
-            let candidate = Candidate {
-                orders,
-                outcome: quick
-                    .with_orders(orders)
-                    .fit_from(records, first)
-                    .map(|fit| CandidateFigures {
-                        loss: fit.loss(),
-                        aic: fit.aic(),
-                        bic: fit.bic(),
-                        converged: fit.termination().converged(),
-                    }),
-            };
-            each();
-            candidate
-        })
+        .flat_map_iter(|block| fit_neighbours(&quick, block, records, first, each))
         .collect();
     let best = candidates
         .iter()
@@ -238,6 +280,73 @@ pub fn choose_orders_with(
         criterion,
     })
 }
+
+/// Delays that are fitted one from the other.
+const NEIGHBOURS: usize = 12;
+
+/// Fits orders that differ by their delay alone, each from the coefficients of the one before.
+fn fit_neighbours(
+    quick: &Estimator,
+    block: &[Orders],
+    records: &[Record],
+    first: usize,
+    each: &(dyn Fn() + Sync),
+) -> Vec<Candidate> {
+    let mut neighbour: Option<Vec<f64>> = None;
+    block
+        .iter()
+        .map(|&orders| {
+            let own = quick.with_orders(orders);
+            let from_neighbour = neighbour.take().and_then(|theta| {
+                let fit = Estimator {
+                    start: Some(theta),
+                    ..own.clone()
+                }
+                .fit_from(records, first);
+                fit.ok().filter(|fit| fit.termination().converged())
+            });
+            let fit = from_neighbour.map_or_else(|| own.fit_from(records, first), Ok);
+            neighbour = fit.as_ref().ok().map(|fit| fit.model().theta().to_vec());
+            each();
+            Candidate {
+                orders,
+                outcome: fit.as_ref().map(CandidateFigures::of).map_err(Clone::clone),
+            }
+        })
+        .collect()
+}
+
+impl Choice {
+    /// Delays nk that the data do not tell from the best one, the other orders being those of the chosen model: the smallest
+    /// and the largest with `n ln(V/V_min) <= 3.84`, the 95 % point of chi-square with one degree of freedom (a profile
+    /// likelihood interval; nk moves in whole samples, so that it is coarse where one sample changes the loss much). `None`
+    /// when fewer than two delays were fitted.
+    pub fn delay_interval(&self) -> Option<(usize, usize)> {
+        let chosen = self.fit.orders();
+        let profile: Vec<(usize, f64, usize)> = self
+            .candidates
+            .iter()
+            .filter(|c| {
+                Orders {
+                    nk: chosen.nk,
+                    ..c.orders
+                } == chosen
+            })
+            .filter_map(|c| c.outcome.as_ref().ok().map(|f| (c.orders.nk, f.loss, f.residuals)))
+            .collect();
+        let smallest = profile.iter().map(|p| p.1).reduce(f64::min)?;
+        let inside = || {
+            profile
+                .iter()
+                .filter(|(_, loss, n)| *n as f64 * (loss / smallest).ln() <= CHI_SQUARE_95)
+                .map(|p| p.0)
+        };
+        (profile.len() > 1).then_some((inside().min()?, inside().max()?))
+    }
+}
+
+/// 95 % point of chi-square with one degree of freedom.
+const CHI_SQUARE_95: f64 = 3.841_458_820_694_124;
 
 /// Delays from 0.05 to 0.6 s, as people have them, in samples: the default range of nk.
 pub fn default_delay_range(sample_time: hoid_model::SampleTime) -> RangeInclusive<usize> {

@@ -87,6 +87,14 @@ pub(crate) fn first_residual(orders: &Orders, initial: InitialState) -> usize {
     }
 }
 
+/// Variance of the output around its mean, from sample `first` of each record on.
+pub(crate) fn output_variance(data: &[Data<'_>], first: usize) -> f64 {
+    let outputs = || data.iter().flat_map(|d| &d.u[first..]);
+    let n = outputs().count() as f64;
+    let mean = outputs().sum::<f64>() / n;
+    outputs().map(|u| (u - mean) * (u - mean)).sum::<f64>() / n
+}
+
 /// Sum of squares, `psi' eps` and the projected `psi' psi` (by rows).
 #[derive(Debug, Clone)]
 pub(crate) struct Linearisation {
@@ -99,6 +107,7 @@ pub(crate) struct Linearisation {
 #[derive(Debug, Default)]
 pub(crate) struct Workspace {
     pad: usize,
+    s: Vec<f64>,
     w: Vec<f64>,
     v: Vec<f64>,
     eps: Vec<f64>,
@@ -114,6 +123,14 @@ struct Parts<'t> {
     c: &'t [f64],
     d: &'t [f64],
     f: &'t [f64],
+}
+
+/// A column of psi.
+struct Column<'w> {
+    values: Cow<'w, [f64]>,
+    sign: f64,
+    /// True when this is the column before it, one sample later.
+    follows: bool,
 }
 
 /// What a pass over a record found besides its signals.
@@ -171,7 +188,7 @@ impl Criterion<'_> {
             let data = &self.data[index];
             let parts = Parts::split(&self.orders, &theta);
             self.filter_output(&parts, *data, workspace);
-            self.filter_input(&parts, *data, workspace);
+            self.whiten_input(&parts, workspace);
             let columns = self.columns(&parts, data.u.len(), workspace, &[Block::A, Block::B]);
             self.accumulate(&passed, &columns, index, workspace, &mut total);
         }
@@ -193,8 +210,8 @@ impl Criterion<'_> {
         let data = self.data[record];
         self.gradient_pass(theta, data, workspace);
         let parts = Parts::split(&self.orders, theta);
-        let project = |(column, sign): (Cow<'_, [f64]>, f64)| {
-            let mut column: Vec<f64> = column.iter().map(|x| sign * x).collect();
+        let project = |column: Column<'_>| {
+            let mut column: Vec<f64> = column.values.iter().map(|x| column.sign * x).collect();
             let components: Vec<f64> = passed.free.basis().map(|q| dot(q, &column[..q.len()])).collect();
             for (q, component) in passed.free.basis().zip(components) {
                 add_scaled(&mut column[..q.len()], -component, q);
@@ -238,15 +255,12 @@ impl Criterion<'_> {
             InitialState::Estimate | InitialState::Backcast => self.first,
         };
 
+        self.filter_input(&parts, data, ws);
         ws.w.fill(0.0);
         for (j, &bj) in parts.b.iter().enumerate() {
-            let lag = o.nk + j;
-            let from = regressed.max(lag);
-            if from < n {
-                add_scaled(&mut ws.w[pad + from..], bj, &data.e[from - lag..n - lag]);
-            }
+            let (from, to) = (pad + regressed, pad + n);
+            add_scaled(&mut ws.w[from..], bj, &ws.s[from - j..to - j]);
         }
-        divide_in_place(parts.f, &mut ws.w[pad + regressed..]);
 
         ws.v[..pad + regressed].fill(0.0);
         for ((v, w), u) in ws.v[pad + regressed..]
@@ -303,13 +317,14 @@ impl Criterion<'_> {
         let (o, pad) = (&self.orders, ws.pad);
         let regressed = self.first_regressed();
         self.filter_output(&parts, data, ws);
-        self.filter_input(&parts, data, ws);
+        self.whiten_input(&parts, ws);
         let [_, _, xc, xd, xf] = &mut ws.filtered;
         if o.nc > 0 {
             xc.copy_from_slice(&ws.eps);
             divide_in_place(parts.c, &mut xc[pad..]);
         }
-        if o.nd > 0 {
+        // Without C the signal of D is v itself.
+        if o.nd > 0 && o.nc > 0 {
             xd.copy_from_slice(&ws.v);
             divide_in_place(parts.c, &mut xd[pad..]);
         }
@@ -328,58 +343,66 @@ impl Criterion<'_> {
         let pad = ws.pad;
         ws.scratch[..pad].fill(0.0);
         ws.scratch[pad..].copy_from_slice(data.u);
-        self.whiten_signal(parts, ws, Block::A, pad);
-    }
-
-    /// `(D/(C F)) e(t-nk)`; with a stationary past `(1/F) e(t-nk)`.
-    fn filter_input(&self, parts: &Parts<'_>, data: Data<'_>, ws: &mut Workspace) {
-        let (nk, pad, n) = (self.orders.nk, ws.pad, data.u.len());
-        if self.orders.nb == 0 {
-            return;
-        }
-        if nk >= n {
-            ws.filtered[Block::B as usize].fill(0.0);
-            return;
-        }
-        ws.scratch[..pad + nk].fill(0.0);
-        ws.scratch[pad + nk..].copy_from_slice(&data.e[..n - nk]);
-        divide_in_place(parts.f, &mut ws.scratch[pad + nk..]);
-        self.whiten_signal(parts, ws, Block::B, pad + nk);
-    }
-
-    fn whiten_signal(&self, parts: &Parts<'_>, ws: &mut Workspace, block: Block, from: usize) {
-        let signal = &mut ws.filtered[block as usize];
+        let signal = &mut ws.filtered[Block::A as usize];
         if self.initial == InitialState::Backcast {
             signal.copy_from_slice(&ws.scratch);
         } else {
-            whiten(parts.c, parts.d, &ws.scratch, signal, from);
+            whiten(parts.c, parts.d, &ws.scratch, signal, pad);
         }
     }
 
-    /// Columns of psi with their signs, in the order of theta, from the first residual on.
-    fn columns<'w>(
-        &self,
-        parts: &Parts<'_>,
-        n: usize,
-        ws: &'w Workspace,
-        blocks: &[Block],
-    ) -> Vec<(Cow<'w, [f64]>, f64)> {
+    /// `s = (1/F) e(t-nk)`, of which w is a moving sum: `w = B s`. Where the initial states are estimated, w may differ from the
+    /// response that starts at rest by a free response of 1/F.
+    fn filter_input(&self, parts: &Parts<'_>, data: Data<'_>, ws: &mut Workspace) {
+        let (pad, n) = (ws.pad, data.u.len());
+        if self.orders.nb == 0 {
+            return;
+        }
+        let from = pad + self.orders.nk.min(n);
+        ws.s[..from].fill(0.0);
+        ws.s[from..].copy_from_slice(&data.e[..pad + n - from]);
+        divide_in_place(parts.f, &mut ws.s[from..]);
+    }
+
+    /// `(D/C) s`; with a stationary past s.
+    fn whiten_input(&self, parts: &Parts<'_>, ws: &mut Workspace) {
+        if self.orders.nb == 0 {
+            return;
+        }
+        let from = ws.pad + self.orders.nk.min(ws.s.len() - ws.pad);
+        let signal = &mut ws.filtered[Block::B as usize];
+        if self.initial == InitialState::Backcast {
+            signal.copy_from_slice(&ws.s);
+        } else {
+            whiten(parts.c, parts.d, &ws.s, signal, from);
+        }
+    }
+
+    /// Columns of psi, in the order of theta, from the first residual on.
+    fn columns<'w>(&self, parts: &Parts<'_>, n: usize, ws: &'w Workspace, blocks: &[Block]) -> Vec<Column<'w>> {
         let (first, end) = (ws.pad + self.first, ws.pad + n);
-        let mut columns = Vec::new();
+        let mut columns = Vec::with_capacity(self.orders.parameters());
         for &block in blocks {
             let (from, count, sign) = block.shifts(&self.orders);
-            let signal = &ws.filtered[block as usize];
+            let signal = match block {
+                Block::D if self.orders.nc == 0 => &ws.v,
+                _ => &ws.filtered[block as usize],
+            };
+            let late = self.initial == InitialState::Backcast && matches!(block, Block::A | Block::B);
             for j in from..from + count {
                 let shifted = &signal[first - j..end - j];
-                let late = self.initial == InitialState::Backcast && matches!(block, Block::A | Block::B);
-                let column = if late {
+                let values = if late {
                     let mut whitened = vec![0.0; shifted.len()];
                     whiten(parts.c, parts.d, shifted, &mut whitened, 0);
                     Cow::Owned(whitened)
                 } else {
                     Cow::Borrowed(shifted)
                 };
-                columns.push((column, sign));
+                columns.push(Column {
+                    values,
+                    sign,
+                    follows: j > from && !late,
+                });
             }
         }
         columns
@@ -389,7 +412,7 @@ impl Criterion<'_> {
     fn accumulate(
         &self,
         passed: &Passed,
-        columns: &[(Cow<'_, [f64]>, f64)],
+        columns: &[Column<'_>],
         record: usize,
         ws: &Workspace,
         total: &mut Linearisation,
@@ -398,9 +421,13 @@ impl Criterion<'_> {
             return add_products(passed, columns, &ws.eps[ws.pad + self.first..], total);
         };
         let weighted = |x: &[f64]| -> Vec<f64> { x.iter().zip(&all[record]).map(|(x, w)| x * w).collect() };
-        let columns: Vec<(Cow<'_, [f64]>, f64)> = columns
+        let columns: Vec<Column<'_>> = columns
             .iter()
-            .map(|(x, sign)| (Cow::Owned(weighted(x)), *sign))
+            .map(|column| Column {
+                values: Cow::Owned(weighted(&column.values)),
+                sign: column.sign,
+                follows: false,
+            })
             .collect();
         add_products(passed, &columns, &weighted(&ws.eps[ws.pad + self.first..]), total);
     }
@@ -422,23 +449,35 @@ impl Criterion<'_> {
 }
 
 /// Products of the residuals and the columns of psi, with the initial states projected out.
-fn add_products(passed: &Passed, columns: &[(Cow<'_, [f64]>, f64)], eps: &[f64], total: &mut Linearisation) {
+///
+/// Two columns that are the ones before them, a sample later, have the product of those up to the samples at both ends, so that
+/// each pair of signals costs one pass a shift instead of one a pair of shifts.
+fn add_products(passed: &Passed, columns: &[Column<'_>], eps: &[f64], total: &mut Linearisation) {
     total.sum_of_squares += dot(eps, eps);
-    let p = columns.len();
-    // Components of each column in the space of the initial states.
-    let inside: Vec<Vec<f64>> = columns
-        .iter()
-        .map(|(column, sign)| {
-            let component = |q: &[f64]| sign * dot(q, &column[..q.len()]);
-            passed.free.basis().map(component).collect()
-        })
-        .collect();
-    for i in 0..p {
-        let (column, sign) = &columns[i];
-        total.descent[i] += sign * dot(column, eps);
-        for j in 0..=i {
-            let (other, other_sign) = &columns[j];
-            let product = sign * other_sign * dot(column, other) - dot(&inside[i], &inside[j]);
+    let (p, last) = (columns.len(), eps.len() - 1);
+    // Components of each column in the space of the initial states, one row a column.
+    let states = passed.free.basis().count();
+    let mut inside = Vec::with_capacity(p * states);
+    for column in columns {
+        inside.extend(passed.free.basis().map(|q| dot(q, &column.values[..q.len()])));
+    }
+    let mut raw = vec![0.0; p * p];
+    for (i, column) in columns.iter().enumerate() {
+        total.descent[i] += column.sign * dot(&column.values, eps);
+        for (j, other) in columns[..=i].iter().enumerate() {
+            let product = if column.follows && other.follows {
+                let (x, y) = (&columns[i - 1].values, &columns[j - 1].values);
+                raw[(i - 1) * p + j - 1] + column.values[0] * other.values[0] - x[last] * y[last]
+            } else {
+                dot(&column.values, &other.values)
+            };
+            raw[i * p + j] = product;
+            let projected = product
+                - dot(
+                    &inside[i * states..(i + 1) * states],
+                    &inside[j * states..(j + 1) * states],
+                );
+            let product = column.sign * other.sign * projected;
             total.gram[i * p + j] += product;
             if i != j {
                 total.gram[j * p + i] += product;
@@ -508,7 +547,7 @@ impl Workspace {
     /// Makes room for a record; every pass writes all of a signal before it reads it, zeros in front included.
     fn make_room(&mut self, pad: usize, n: usize) {
         self.pad = pad;
-        for signal in [&mut self.w, &mut self.v, &mut self.eps, &mut self.scratch]
+        for signal in [&mut self.s, &mut self.w, &mut self.v, &mut self.eps, &mut self.scratch]
             .into_iter()
             .chain(&mut self.filtered)
         {
@@ -524,15 +563,31 @@ fn whiten(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
         return;
     }
     y[..from].fill(0.0);
-    y[from..].copy_from_slice(&x[from..]);
+    match *d {
+        // The first lag in the same pass as the copy.
+        [d1, ref rest @ ..] if from > 0 => {
+            for ((y, x0), x1) in y[from..].iter_mut().zip(&x[from..]).zip(&x[from - 1..]) {
+                *y = x0 + d1 * x1;
+            }
+            add_lags(rest, 2, x, y, from);
+        }
+        _ => {
+            y[from..].copy_from_slice(&x[from..]);
+            add_lags(d, 1, x, y, from);
+        }
+    }
+    divide_in_place(c, &mut y[from..]);
+}
+
+/// `y(t) += sum_i d_i x(t - first_lag - i)` from index `from` on.
+fn add_lags(d: &[f64], first_lag: usize, x: &[f64], y: &mut [f64], from: usize) {
     for (i, &di) in d.iter().enumerate() {
-        let lag = i + 1;
+        let lag = first_lag + i;
         let start = from.max(lag);
         if start < x.len() {
             add_scaled(&mut y[start..], di, &x[start - lag..x.len() - lag]);
         }
     }
-    divide_in_place(c, &mut y[from..]);
 }
 
 #[cfg(test)]

@@ -110,7 +110,7 @@ mod tests {
             .map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0)
             .collect();
         let mut rounds = Reweighting::new(1.345);
-        rounds.next(&[r.clone()]);
+        rounds.next(std::slice::from_ref(&r));
         let variance = rounds.variance(&[r], 0);
         assert!((variance - 1.0 / 0.95).abs() < 0.02, "{variance}");
     }

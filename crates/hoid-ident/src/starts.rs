@@ -3,12 +3,12 @@
 //! Everything hangs on the poles: given F, the model is linear in B, and given B and F the noise model is a linear
 //! autoregression. So each start is a proposal for F that is completed by linear least squares:
 //!
-//! 1. `arx`: A of an ARX fit. Badly biased where the noise poles are not those of the system (m0 = 1: a2 near 0), so never
-//!    alone.
-//! 2. `steiglitz-mcbride`: ARX again on input and output filtered by 1/F of the step before, a few times (K. Steiglitz and
-//!    L. E. McBride, *IEEE Trans. Automatic Control* 10 (1965) 461-464).
-//! 3. `pole grid`: for two poles and more, neuromuscular frequencies from 3 to 24 rad/s with damping 0.25 and 0.7, as people
-//!    have them, through the exact zero-order hold.
+//! 1. `low-pass continuation`: the minimum on the averaged record ([`crate::continuation`]), searched from the pole grid.
+//! 2. `pole grid`, where the record is too short for that: for two poles and more, neuromuscular frequencies from 3 to 24 rad/s
+//!    with damping 0.25 and 0.7, as people have them, through the exact zero-order hold.
+//! 3. `steiglitz-mcbride`: ARX, and again on input and output filtered by 1/F of the step before, a few times (K. Steiglitz and
+//!    L. E. McBride, *IEEE Trans. Automatic Control* 10 (1965) 461-464). The `arx` poles themselves, badly biased where the
+//!    noise poles are not those of the system (m0 = 1: a2 near 0), only where that fails.
 //!
 //! The proposals are ranked by their loss with the initial states eliminated; the search runs from the best of them, and the
 //! best minimum wins.
@@ -17,11 +17,14 @@ use hoid_core::stability::roots_inside;
 use hoid_model::{Complex64, Orders, SampleTime, polynomial, polynomial_model::monic};
 
 use crate::{
-    arx,
+    continuation,
     least_squares::{dot, solve_symmetric},
     prediction_error::{Criterion, Data, InitialState, Workspace, first_residual},
     search::Objective,
 };
+
+/// Steps of Steiglitz and McBride.
+const STEIGLITZ_MCBRIDE_STEPS: usize = 4;
 
 /// A start of the search, with its name.
 #[derive(Debug, Clone)]
@@ -41,17 +44,77 @@ const EXTRA_POLE: f64 = 0.3;
 const COMPLETED: usize = 4;
 
 /// The best starts, best first.
-///
-/// All proposals are ranked with the noise model of the first one, which costs one pass each; the best few get a noise model
-/// of their own and are ranked again.
 pub(crate) fn propose(criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> Vec<Start> {
-    let proposals = pole_proposals(criterion, sample_time);
-    let reference = proposals.iter().find_map(|(_, f)| complete(criterion, f, workspace));
-    let Some((reference, _)) = reference else {
+    if criterion.orders.nf == 0 {
+        return completed(criterion, vec![("linear".to_owned(), Vec::new())], workspace);
+    }
+    let slow = continuation::propose(criterion, sample_time, workspace);
+    let mut proposals: Vec<(String, Vec<f64>)> = slow
+        .f
+        .into_iter()
+        .map(|f| ("low-pass continuation".to_owned(), f))
+        .collect();
+    if proposals.is_empty() {
+        proposals = ranked_grid(criterion, sample_time, COMPLETED, workspace);
+    }
+    if !slow.complete
+        && let Some(f) = arx_poles(criterion, &criterion.data, workspace)
+    {
+        match steiglitz_mcbride(criterion, f.clone(), workspace) {
+            Some(better) => proposals.push(("steiglitz-mcbride".to_owned(), better)),
+            None => proposals.push(("arx".to_owned(), f)),
+        }
+    }
+    completed(criterion, proposals, workspace)
+}
+
+/// The best starts of the pole grid alone.
+pub(crate) fn from_grid(
+    criterion: &Criterion<'_>,
+    sample_time: SampleTime,
+    count: usize,
+    workspace: &mut Workspace,
+) -> Vec<Start> {
+    let proposals = ranked_grid(criterion, sample_time, count, workspace);
+    completed(criterion, proposals, workspace)
+}
+
+/// Proposals with A, B and a noise model of their own, best first.
+fn completed(criterion: &Criterion<'_>, proposals: Vec<(String, Vec<f64>)>, workspace: &mut Workspace) -> Vec<Start> {
+    let mut starts: Vec<(Start, f64)> = proposals
+        .into_iter()
+        .filter_map(|(label, f)| {
+            let (theta, value) = complete(criterion, &f, workspace)?;
+            Some((Start { label, theta }, value))
+        })
+        .collect();
+    starts.sort_by(|a, b| a.1.total_cmp(&b.1));
+    starts.into_iter().map(|(start, _)| start).collect()
+}
+
+/// The pole grid, best first: all are ranked with the noise model of the first one, which costs one pass each.
+fn ranked_grid(
+    criterion: &Criterion<'_>,
+    sample_time: SampleTime,
+    count: usize,
+    workspace: &mut Workspace,
+) -> Vec<(String, Vec<f64>)> {
+    let o = &criterion.orders;
+    let grid: Vec<(String, Vec<f64>)> = GRID_OMEGA
+        .into_iter()
+        .flat_map(|omega| GRID_ZETA.map(|zeta| (omega, zeta)))
+        // One pole has no damping.
+        .filter(|(_, zeta)| o.nf > 1 || *zeta == GRID_ZETA[0])
+        .map(|(omega, zeta)| {
+            let poles = grid_poles(o.nf, omega, zeta, sample_time.s());
+            let f = polynomial::from_roots(&poles)[1..].to_vec();
+            (format!("pole grid {omega} rad/s, damping {zeta}"), f)
+        })
+        .collect();
+    let Some((reference, _)) = grid.iter().find_map(|(_, f)| complete(criterion, f, workspace)) else {
         return Vec::new();
     };
-    let o = &criterion.orders;
-    let mut ranked: Vec<(String, Vec<f64>, f64)> = proposals
+    let mut ranked: Vec<(String, Vec<f64>, f64)> = grid
         .into_iter()
         .filter_map(|(label, f)| {
             let mut theta = reference.clone();
@@ -61,41 +124,7 @@ pub(crate) fn propose(criterion: &Criterion<'_>, sample_time: SampleTime, worksp
         })
         .collect();
     ranked.sort_by(|a, b| a.2.total_cmp(&b.2));
-    let mut starts: Vec<(Start, f64)> = ranked
-        .into_iter()
-        .take(COMPLETED)
-        .filter_map(|(label, f, _)| {
-            let (theta, value) = complete(criterion, &f, workspace)?;
-            Some((Start { label, theta }, value))
-        })
-        .collect();
-    starts.sort_by(|a, b| a.1.total_cmp(&b.1));
-    starts.into_iter().map(|(start, _)| start).collect()
-}
-
-fn pole_proposals(criterion: &Criterion<'_>, sample_time: SampleTime) -> Vec<(String, Vec<f64>)> {
-    let nf = criterion.orders.nf;
-    if nf == 0 {
-        return vec![("linear".to_owned(), Vec::new())];
-    }
-    let mut proposals = Vec::new();
-    if let Some(f) = arx_poles(criterion, &criterion.data) {
-        proposals.push(("arx".to_owned(), f.clone()));
-        if let Some(f) = steiglitz_mcbride(criterion, f) {
-            proposals.push(("steiglitz-mcbride".to_owned(), f));
-        }
-    }
-    for omega in GRID_OMEGA {
-        for zeta in GRID_ZETA {
-            let poles = grid_poles(nf, omega, zeta, sample_time.s());
-            let f = polynomial::from_roots(&poles)[1..].to_vec();
-            proposals.push((format!("pole grid {omega} rad/s, damping {zeta}"), f));
-            if nf == 1 {
-                break;
-            }
-        }
-    }
-    proposals
+    ranked.into_iter().take(count).map(|(label, f, _)| (label, f)).collect()
 }
 
 fn grid_poles(nf: usize, omega: f64, zeta: f64, ts: f64) -> Vec<Complex64> {
@@ -109,35 +138,38 @@ fn grid_poles(nf: usize, omega: f64, zeta: f64, ts: f64) -> Vec<Complex64> {
 }
 
 /// A of an ARX fit with as many poles as F has, unstable ones reflected into the circle.
-fn arx_poles(criterion: &Criterion<'_>, data: &[Data<'_>]) -> Option<Vec<f64>> {
+fn arx_poles(criterion: &Criterion<'_>, data: &[Data<'_>], workspace: &mut Workspace) -> Option<Vec<f64>> {
     let orders = Orders {
         na: criterion.orders.nf,
         nb: criterion.orders.nb,
         nk: criterion.orders.nk,
         ..Orders::default()
     };
-    let first = criterion.first.max(first_residual(&orders, InitialState::Estimate));
-    if data.iter().any(|d| d.u.len() <= first) {
+    let equation_error = Criterion {
+        orders,
+        data: data.to_vec(),
+        initial: InitialState::Estimate,
+        first: criterion.first.max(first_residual(&orders, InitialState::Estimate)),
+        weights: None,
+    };
+    if data.iter().any(|d| d.u.len() <= equation_error.first) {
         return None;
     }
-    let fitted = arx::regress(&orders, data, first).ok()?;
-    reflected_inside(&fitted.theta[..orders.na])
+    let (theta, _) = equation_error.best_linear_part(&vec![0.0; orders.parameters()], workspace)?;
+    reflected_inside(&theta[..orders.na])
 }
 
-fn steiglitz_mcbride(criterion: &Criterion<'_>, mut f: Vec<f64>) -> Option<Vec<f64>> {
-    for _ in 0..4 {
-        let filtered: Vec<(Vec<f64>, Vec<f64>)> = criterion
-            .data
-            .iter()
-            .map(|d| {
-                let (mut e, mut u) = (d.e.to_vec(), d.u.to_vec());
-                hoid_core::filter::divide_in_place(&f, &mut e);
-                hoid_core::filter::divide_in_place(&f, &mut u);
-                (e, u)
-            })
-            .collect();
+fn steiglitz_mcbride(criterion: &Criterion<'_>, mut f: Vec<f64>, workspace: &mut Workspace) -> Option<Vec<f64>> {
+    let mut filtered: Vec<(Vec<f64>, Vec<f64>)> = criterion.data.iter().map(|d| (d.e.to_vec(), d.u.to_vec())).collect();
+    for _ in 0..STEIGLITZ_MCBRIDE_STEPS {
+        for ((e, u), d) in filtered.iter_mut().zip(&criterion.data) {
+            e.copy_from_slice(d.e);
+            u.copy_from_slice(d.u);
+            hoid_core::filter::divide_in_place(&f, e);
+            hoid_core::filter::divide_in_place(&f, u);
+        }
         let data: Vec<Data<'_>> = filtered.iter().map(|(e, u)| Data { e, u }).collect();
-        f = arx_poles(criterion, &data)?;
+        f = arx_poles(criterion, &data, workspace)?;
     }
     Some(f)
 }
@@ -220,7 +252,7 @@ fn time_series(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Option<(
 
 /// C and D of `v = (C/D) eps` by Hannan and Rissanen (*Biometrika* 69 (1982) 81-94): with nc = 0 one autoregression, else a long
 /// autoregression for eps first and then a regression on past v and past eps. Zeros where that is singular.
-fn noise_model(v: &[Vec<f64>], nc: usize, nd: usize) -> (Vec<f64>, Vec<f64>) {
+pub(crate) fn noise_model(v: &[Vec<f64>], nc: usize, nd: usize) -> (Vec<f64>, Vec<f64>) {
     let nothing = (vec![0.0; nc], vec![0.0; nd]);
     if nc == 0 {
         let lags: Vec<(usize, usize)> = (1..=nd).map(|i| (0, i)).collect();

@@ -6,11 +6,14 @@
 //! - cross-correlation of residuals and input, `r_eps,e(k) / sqrt(r_eps(0) r_e(0))`, with the bounds
 //!   `+- z sqrt( (1/n) sum_k rho_eps(k) rho_e(k) )` that hold when the residuals need not be white (Ljung, *System
 //!   Identification*, 1999, eq. 16.56). At positive lags it tells of dynamics that the model missed; at negative lags
-//!   (the residual leads the input) of feedback, which a closed loop always has.
+//!   (the residual leads the input) of feedback, which a closed loop always has;
+//! - whiteness by `Q = n (n + 2) sum_k r_k^2/(n - k)`, chi-square distributed for white residuals (G. M. Ljung and G. E. P. Box,
+//!   *Biometrika* 65 (1978) 297-303).
 
-use hoid_model::Record;
+use hoid_model::{Record, polynomial::product, polynomial_model::monic};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::{Fit, IdentError, least_squares::dot};
+use crate::{Fit, IdentError, Series, least_squares::dot};
 
 /// Largest lag of the residual tests, in samples.
 pub const LARGEST_LAG: usize = 50;
@@ -42,6 +45,32 @@ pub struct Correlation {
     pub bound_99: f64,
 }
 
+/// Test of Ljung and Box: are the residuals white?
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LjungBox {
+    /// `Q = n (n + 2) sum_k r_k^2/(n - k)` over the lags 1 to [`LARGEST_LAG`].
+    pub statistic: f64,
+    /// Lags less the free coefficients of the noise model (those of A, C and D).
+    pub degrees_of_freedom: usize,
+    /// Probability of a larger Q for white residuals.
+    pub p_value: f64,
+}
+
+/// What the residual tests say. A lag outside its 99 % bound is expected once in a hundred; more than [`SHARE_ALLOWED`] of
+/// them is a sign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Signs {
+    /// The residuals are not white at the 1 % level: the noise model is too small.
+    pub coloured_residuals: bool,
+    /// The residuals follow the input at positive lags: the model misses dynamics, or has the wrong delay.
+    pub under_modelled: bool,
+    /// The input follows the residuals at negative lags: the output is fed back to the input, as in every closed loop.
+    pub feedback: bool,
+}
+
+/// Share of lags outside the 99 % bound above which a correlation counts as present.
+pub const SHARE_ALLOWED: f64 = 0.06;
+
 /// Simulated and predicted output of a model on a record, with what follows from them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Validation {
@@ -57,6 +86,25 @@ pub struct Validation {
     pub autocorrelation: Correlation,
     /// Cross-correlation of residuals and input, lags from minus to plus [`LARGEST_LAG`]; no lags without an input.
     pub cross_correlation: Correlation,
+    /// Whiteness of the residuals; `None` when there are fewer lags than coefficients of the noise model.
+    pub ljung_box: Option<LjungBox>,
+}
+
+impl Validation {
+    /// What the residual tests say.
+    pub fn signs(&self) -> Signs {
+        let outside = |keep: fn(i64) -> bool| {
+            let c = &self.cross_correlation;
+            let lags = || c.lags.iter().zip(&c.values).filter(|(k, _)| keep(**k));
+            let beyond = lags().filter(|(_, r)| r.abs() > c.bound_99).count();
+            beyond as f64 > SHARE_ALLOWED * lags().count() as f64
+        };
+        Signs {
+            coloured_residuals: self.ljung_box.is_some_and(|t| t.p_value < 0.01),
+            under_modelled: outside(|k| k >= 0),
+            feedback: outside(|k| k < 0),
+        }
+    }
 }
 
 impl Fit {
@@ -71,14 +119,26 @@ impl Fit {
         let predicted = predicted.values[first - predicted.first..].to_vec();
         let output = &record.output()[first..];
         let residuals: Vec<f64> = output.iter().zip(&predicted).map(|(u, p)| u - p).collect();
+        let autocorrelation = autocorrelation(&residuals, LARGEST_LAG);
+        let o = self.orders();
+        let of_noise = |name: &str| name.starts_with(['a', 'c', 'd']);
+        let free = o
+            .parameter_names()
+            .iter()
+            .zip(self.held())
+            .filter(|(name, held)| of_noise(name) && !**held)
+            .count();
+        // A grey box has one parameter in its noise model, T_n.
+        let free = if self.is_grey_box() { free.min(1) } else { free };
         Ok(Validation {
+            ljung_box: ljung_box(&autocorrelation, residuals.len(), free),
             quality: Quality {
                 vaf_simulation: vaf(output, &simulated),
                 vaf_prediction: vaf(output, &predicted),
                 nrmse_simulation: nrmse_fit(output, &simulated),
                 nrmse_prediction: nrmse_fit(output, &predicted),
             },
-            autocorrelation: autocorrelation(&residuals, LARGEST_LAG),
+            autocorrelation,
             cross_correlation: match record.input_channel() {
                 Some(input) => cross_correlation(&residuals, &input.values[first..], LARGEST_LAG),
                 None => Correlation {
@@ -95,6 +155,38 @@ impl Fit {
 }
 
 impl Fit {
+    /// Prediction of the output k samples ahead, the input being known: `u - sum_{j<k} h_j eps(t-j)` with h the impulse response
+    /// of the noise filter C/(A D) (L. Ljung, *System Identification*, 1999, eq. 3.31). k = 1 is [`Fit::predict`]; for large k,
+    /// and a stable noise filter, it goes over into [`Fit::simulate`].
+    ///
+    /// # Errors
+    /// As [`Fit::residuals`]; [`IdentError::BadOption`] for k = 0.
+    pub fn predict_ahead(&self, record: &Record, k: usize) -> Result<Series, IdentError> {
+        if k == 0 {
+            return Err(IdentError::BadOption {
+                option: "the prediction horizon".to_owned(),
+                found: "0".to_owned(),
+                expected: "one sample or more".to_owned(),
+            });
+        }
+        let eps = self.residuals(record)?;
+        let m = self.model();
+        let mut h = monic(m.c());
+        h.resize(k, 0.0);
+        let poles = product(&monic(m.a()), &monic(m.d()));
+        hoid_core::filter::divide_in_place(&poles[1..], &mut h);
+        let mut errors = vec![0.0; eps.values.len()];
+        hoid_core::filter::moving_sum(&h, 0, &eps.values, &mut errors);
+        // Before that the residuals of the last k samples are not all known.
+        let skipped = (k - 1).min(errors.len());
+        let first = eps.first + skipped;
+        let output = &record.output()[first..];
+        Ok(Series {
+            first,
+            values: output.iter().zip(&errors[skipped..]).map(|(u, e)| u - e).collect(),
+        })
+    }
+
     /// VAF and NRMSE over several records together: the squared errors of all of them against the power (for NRMSE, the
     /// spread around the mean of each record) of all of them.
     ///
@@ -189,6 +281,20 @@ fn autocorrelation(residuals: &[f64], largest: usize) -> Correlation {
     }
 }
 
+fn ljung_box(correlation: &Correlation, n: usize, free: usize) -> Option<LjungBox> {
+    let lags = correlation.lags.len();
+    let degrees_of_freedom = lags.checked_sub(free).filter(|d| *d > 0)?;
+    let n = n as f64;
+    let terms = correlation.lags.iter().zip(&correlation.values);
+    let statistic = n * (n + 2.0) * terms.map(|(k, r)| r * r / (n - *k as f64)).sum::<f64>();
+    let chi_square = ChiSquared::new(degrees_of_freedom as f64).ok()?;
+    Some(LjungBox {
+        statistic,
+        degrees_of_freedom,
+        p_value: chi_square.sf(statistic),
+    })
+}
+
 fn cross_correlation(residuals: &[f64], input: &[f64], largest: usize) -> Correlation {
     let (x, y) = (centred(residuals), centred(input));
     let (power_x, power_y) = (covariance_at(&x, &x, 0), covariance_at(&y, &y, 0));
@@ -267,6 +373,21 @@ mod tests {
             .0];
         assert_eq!(peak, 7);
         assert!((cross.bound_99 - Z_99 / (x.len() as f64).sqrt()).abs() < 0.1 * cross.bound_99);
+    }
+
+    #[test]
+    fn ljung_and_box_as_published() {
+        // r = 0.1, -0.2, n = 100: Q = 100 * 102 * (0.01/99 + 0.04/98) = 5.1936; chi-square with 2 degrees: exp(-Q/2).
+        let correlation = Correlation {
+            lags: vec![1, 2],
+            values: vec![0.1, -0.2],
+            bound_99: 0.0,
+        };
+        let test = ljung_box(&correlation, 100, 0).unwrap();
+        assert!((test.statistic - 5.193_568).abs() < 1e-6, "{}", test.statistic);
+        assert!((test.p_value - (-test.statistic / 2.0).exp()).abs() < 1e-12);
+        assert_eq!(ljung_box(&correlation, 100, 1).unwrap().degrees_of_freedom, 1);
+        assert!(ljung_box(&correlation, 100, 2).is_none());
     }
 
     #[test]

@@ -15,6 +15,7 @@
 //! | [`operator`] | [`OperatorParameters`] and their discrete model |
 //! | [`delayed_operator`](mod@delayed_operator) | the operator with a delay of any fraction of a sample |
 //! | [`remnant`] | the remnant filter, its discretisations and its retrieval |
+//! | [`remnant_noise`] | the noise model of the exactly held remnant as a function of T_n, with derivatives |
 //! | [`uncertainty`] | standard errors of derived quantities by the delta method |
 //! | [`controlled_element`], [`forcing`], [`schedule`], [`scenario`] | the task: plant, target signal, change over time, conditions C1-C6 |
 //! | [`margins`] | crossover frequency, phase and gain margin |
@@ -33,6 +34,7 @@ pub mod polynomial_model;
 pub mod record;
 pub mod remnant;
 pub mod remnant_gain;
+pub mod remnant_noise;
 pub mod sample_time;
 pub mod scenario;
 pub mod schedule;

@@ -107,7 +107,7 @@ impl RemnantFilter {
     }
 
     /// `a = Ts/T_n` of a filter that passes the checks.
-    fn ratio(&self, sample_time: SampleTime) -> Result<f64, ModelError> {
+    pub(crate) fn ratio(&self, sample_time: SampleTime) -> Result<f64, ModelError> {
         self.check()?;
         let a = sample_time.s() / self.time_constant_s;
         if !(SMALLEST_RATIO..=1.0 / SMALLEST_RATIO).contains(&a) {
@@ -302,7 +302,7 @@ fn binomial(n: usize, k: usize) -> f64 {
 }
 
 /// `(1 - alpha q^-1)^m`.
-fn denominator(order: usize, alpha: f64) -> Vec<f64> {
+pub(crate) fn denominator(order: usize, alpha: f64) -> Vec<f64> {
     (0..=order)
         .map(|i| binomial(order, i) * (-alpha).powi(i as i32))
         .collect()
@@ -375,40 +375,62 @@ fn held_numerator_derivative(order: usize, a: f64) -> Vec<f64> {
 }
 
 /// The numerator of the zero-order hold with its zeros inside the unit circle, for K_n = 1.
-struct Factored {
-    c: Vec<f64>,
-    innovation_sd: f64,
+pub(crate) struct Factored {
+    pub c: Vec<f64>,
+    /// Derivative of c with respect to `a = Ts/T_n`.
+    pub c_derivative: Vec<f64>,
+    pub innovation_sd: f64,
     /// Derivative of `ln innovation_sd` with respect to a.
-    log_derivative: f64,
+    pub log_derivative: f64,
 }
 
 impl Factored {
-    fn new(order: usize, a: f64) -> Self {
+    pub fn new(order: usize, a: f64) -> Self {
         let numerator = held_numerator(order, a);
         let derivative = held_numerator_derivative(order, a);
         let mut sd = numerator[0];
         let mut log_derivative = derivative[0] / numerator[0];
-        let mut inside = Vec::with_capacity(order - 1);
+        let degree = numerator.len() - 1;
+        let slope: Vec<f64> = numerator[..degree]
+            .iter()
+            .enumerate()
+            .map(|(i, n)| (degree - i) as f64 * n)
+            .collect();
+        let at = |p: &[f64], z: Complex64| p.iter().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * z + c);
+        let (mut inside, mut moves) = (Vec::with_capacity(degree), Vec::with_capacity(degree));
         // At most three roots of positive coefficients: found unless a is so large that all but n_1 vanish.
         for zero in polynomial::roots(&numerator).unwrap_or_default() {
+            // N(zeta, a) = 0 moves the zero by -N_a/N_zeta.
+            let moved = -at(&derivative, zero) / at(&slope, zero);
             if zero.norm() <= 1.0 {
                 inside.push(zero);
+                moves.push(moved);
                 continue;
             }
-            inside.push(1.0 / zero.conj());
+            let reflected = 1.0 / zero.conj();
+            inside.push(reflected);
+            moves.push(-moved.conj() * reflected * reflected);
             sd *= zero.norm();
-            // N(zeta, a) = 0 moves the zero by -N_a/N_zeta.
-            let at = |p: &[f64]| p.iter().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * zero + c);
-            let degree = numerator.len() - 1;
-            let slope: Vec<f64> = numerator[..degree]
-                .iter()
-                .enumerate()
-                .map(|(i, n)| (degree - i) as f64 * n)
-                .collect();
-            log_derivative += (-at(&derivative) / (at(&slope) * zero)).re;
+            log_derivative += (moved / zero).re;
+        }
+        // dC = - sum over i of dzeta_i q^-1 prod over j != i of (1 - zeta_j q^-1).
+        let mut c_derivative = vec![0.0; inside.len() + 1];
+        for (i, moved) in moves.iter().enumerate() {
+            let mut rest = vec![Complex64::new(1.0, 0.0)];
+            for zero in inside.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, z)| z) {
+                rest.push(Complex64::new(0.0, 0.0));
+                for k in (1..rest.len()).rev() {
+                    let lower = rest[k - 1];
+                    rest[k] -= zero * lower;
+                }
+            }
+            for (k, r) in rest.iter().enumerate() {
+                c_derivative[k + 1] -= (moved * r).re;
+            }
         }
         Self {
             c: polynomial::from_roots(&inside),
+            c_derivative,
             innovation_sd: sd,
             log_derivative,
         }

@@ -67,7 +67,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ],
         models: vec![
             section("ARX", &arx, None, None),
-            section("BJ", &choice.fit, Some(&choice), loop_margins),
+            section("BJ", &choice.fit, Some(&choice), loop_margins.map(Into::into)),
         ],
         notes: Vec::new(),
     };

@@ -1,10 +1,10 @@
 //! One self-contained HTML page about the models fitted to a record or to several.
 
 use hoid_ident::{
-    Choice, Fit,
+    Choice, Fit, MarginEstimates,
     validation::{Correlation, Quality, Validation},
 };
-use hoid_model::{OperatorParameters, Record, margins::Margins};
+use hoid_model::{OperatorParameters, Record};
 use minijinja::{Environment, UndefinedBehavior, Value, context};
 
 use crate::{
@@ -45,7 +45,7 @@ pub struct ModelSection<'a> {
     /// The operator behind the records, where it is known (simulation).
     pub truth: Option<OperatorParameters>,
     /// Margins of the loop of this model and the controlled element, where that is known.
-    pub margins: Option<Margins>,
+    pub margins: Option<MarginEstimates>,
 }
 
 impl Report<'_> {

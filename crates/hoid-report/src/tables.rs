@@ -1,11 +1,11 @@
 //! The tables of the page as values for the template. Where a number does not exist there is a dash and, beside it, the reason.
 
 use hoid_ident::{
-    Choice, Fit, InitialState,
+    Choice, Fit, InitialState, MarginEstimates,
     order_search::Criterion,
     validation::{Quality, Validation},
 };
-use hoid_model::{OperatorParameters, Record, margins::Margins, remnant::RemnantDiscretisation, uncertainty::Estimate};
+use hoid_model::{OperatorParameters, Record, remnant::RemnantDiscretisation, uncertainty::Estimate};
 use minijinja::{Value, context};
 
 use crate::{
@@ -159,9 +159,13 @@ fn squared(unit: &str) -> String {
 /// Coefficient, value, standard error, 95 % interval.
 pub fn coefficients(fit: &Fit) -> Vec<Value> {
     let rows = fit.parameters().into_iter().map(|(name, estimate)| {
-        let (letter, index) = name.split_at(1);
         let (value, error) = with_uncertainty(estimate.value, estimate.standard_error);
-        let name = html(format!("<i>{letter}</i><sub>{index}</sub>"));
+        let name = if fit.is_grey_box() {
+            Value::from(name)
+        } else {
+            let (letter, index) = name.split_at(1);
+            html(format!("<i>{letter}</i><sub>{index}</sub>"))
+        };
         context! { name, value, error, interval => interval(estimate.value, estimate.standard_error, Z_95) }
     });
     rows.collect()
@@ -298,7 +302,7 @@ pub fn record_name(record: &Record, index: usize) -> String {
 }
 
 /// Margins of the loop with the controlled element.
-pub fn margins(margins: &Margins) -> Vec<Value> {
+pub fn margins(margins: &MarginEstimates) -> Vec<Value> {
     let rows = [
         (
             "gain crossover",
@@ -326,7 +330,14 @@ pub fn margins(margins: &Margins) -> Vec<Value> {
         ),
     ];
     let rows = rows.into_iter().map(|(label, unit, value, without)| match value {
-        Some(v) if v.is_finite() => context! { label, unit, value => plain(v) },
+        Some(e) if e.value.is_finite() => {
+            let (value, error) = with_uncertainty(e.value, e.standard_error);
+            let value = match e.standard_error {
+                Some(_) => format!("{value} (standard error {error})"),
+                None => plain(e.value),
+            };
+            context! { label, unit, value }
+        }
         _ => context! { label, unit, value => DASH, reason => format!("{without} in the range scanned") },
     });
     rows.collect()
@@ -334,22 +345,13 @@ pub fn margins(margins: &Margins) -> Vec<Value> {
 
 /// Candidates of an order search, best first.
 pub fn candidates(choice: &Choice) -> Value {
-    let name = match choice.criterion {
-        Criterion::Loss => "loss",
-        Criterion::Aic => "AIC",
-        Criterion::Bic => "BIC",
-    };
+    let name = choice.criterion.name();
     let mut fitted = Vec::new();
     let mut failed = Vec::new();
     for candidate in &choice.candidates {
         match &candidate.outcome {
             Ok(f) => {
-                let value = match choice.criterion {
-                    Criterion::Loss => f.loss,
-                    Criterion::Aic => f.aic,
-                    Criterion::Bic => f.bic,
-                };
-                fitted.push((value, candidate.orders, *f));
+                fitted.push((f.value(choice.criterion), candidate.orders, *f));
             }
             Err(reason) => failed.push((candidate.orders, reason.to_string())),
         }
@@ -359,7 +361,7 @@ pub fn candidates(choice: &Choice) -> Value {
     let best = fitted.first().map_or(0.0, |f| f.0);
     let all = fitted.len() + failed.len();
     let decimals = |value: f64| match choice.criterion {
-        Criterion::Loss => plain(value),
+        Criterion::Loss | Criterion::Fpe | Criterion::Mdl => plain(value),
         _ => fixed(value, 1),
     };
     let rows: Vec<Value> = fitted

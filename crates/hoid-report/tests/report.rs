@@ -1,12 +1,12 @@
 //! The page as a whole, from simulated runs.
 #![allow(clippy::unwrap_used)]
 
-use hoid_ident::{Choice, Estimator, Fit, OrderRanges, choose_orders, order_search::Criterion};
+use hoid_ident::{Choice, Estimator, Fit, MarginEstimates, OrderRanges, choose_orders, order_search::Criterion};
 use hoid_model::{
     Channel, OperatorParameters, Orders, Record, SampleTime, Structure,
-    margins::Margins,
     remnant::RemnantDiscretisation,
     scenario::{Condition, Scenario},
+    uncertainty::Estimate,
 };
 use hoid_report::{ModelSection, Report, ReportError, figures};
 use hoid_sim::{Simulator, Stream};
@@ -267,9 +267,9 @@ fn candidates_are_sorted_and_cut() {
     let choice: Choice = choose_orders(&template, &ranges, Criterion::Bic, &records).unwrap();
     let mut model = section("BJ", &choice.fit, &records);
     model.candidates = Some(&choice);
-    model.margins = Some(Margins {
-        crossover_rad_s: Some(1.5635),
-        phase_margin_deg: Some(76.67),
+    model.margins = Some(MarginEstimates {
+        crossover_rad_s: Some(Estimate::with_variance(1.5635, 1e-4)),
+        phase_margin_deg: Some(Estimate::fixed(76.67)),
         phase_crossover_rad_s: None,
         gain_margin_db: None,
     });
@@ -280,7 +280,8 @@ fn candidates_are_sorted_and_cut() {
     assert!(table.contains("33 candidates") && table.contains("3 more candidates are not shown"));
     let first = &table[table.find("<tr><th>nb=2").unwrap()..];
     assert!(first.starts_with(&format!("<tr><th>{}</th>", choice.fit.orders())));
-    assert!(html.contains("<td class=\"n\">1.5635</td>"));
+    assert!(html.contains("<td class=\"n\">76.67</td>"));
+    assert!(html.contains("1.564 (standard error 0.010)"));
     assert!(html.contains("the phase does not cross -180 deg in the range scanned"));
 }
 

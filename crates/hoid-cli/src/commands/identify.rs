@@ -3,14 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use hoid_ident::{
-    Choice, Estimator, Fit, Loss, SearchOptions,
+    Choice, Estimator, Fit, Loss, MarginEstimates, SearchOptions,
     order_search::{Criterion, OrderRanges, choose_orders_with},
+    validation::{nrmse_fit, vaf},
 };
 use hoid_io::{ReadOptions, Repair, make_directory, read_record, write_atomically};
-use hoid_model::{
-    ContinuousTransferFunction, Detrend, Record, Structure,
-    margins::{MANUAL_CONTROL_RANGE_RAD_S, Margins, margins},
-};
+use hoid_model::{ContinuousTransferFunction, Detrend, Record, Structure, margins::MANUAL_CONTROL_RANGE_RAD_S};
 use hoid_report::{ModelSection, Report, numbers};
 
 use crate::{
@@ -44,6 +42,8 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         .controlled_element
         .as_ref()
         .map(|element| loop_margins(&fit, element));
+    let validations = records.iter().map(|r| fit.validate(r)).collect::<Result<Vec<_>, _>>()?;
+    let ahead = args.horizon.map(|k| prediction_ahead(&fit, &records, k)).transpose()?;
     let identified = Identified {
         files: &files,
         records: &records,
@@ -53,6 +53,8 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         operator: &operator,
         remnant: remnant.as_ref(),
         margins: margins.as_ref(),
+        validations: &validations,
+        ahead,
         validation: validation.as_ref().map(|(file, q)| (file.as_str(), *q)),
         settings: &settings,
     };
@@ -157,14 +159,22 @@ fn fit(
     Ok((choice.fit.clone(), Some(choice)))
 }
 
-fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> Margins {
+/// VAF and NRMSE of the prediction k samples ahead, over all records together.
+fn prediction_ahead(fit: &Fit, records: &[Record], k: usize) -> Result<(usize, f64, f64), CliError> {
+    let (mut measured, mut predicted) = (Vec::new(), Vec::new());
+    for record in records {
+        let series = fit.predict_ahead(record, k)?;
+        measured.extend_from_slice(&record.output()[series.first..]);
+        predicted.extend(series.values);
+    }
+    Ok((k, vaf(&measured, &predicted), nrmse_fit(&measured, &predicted)))
+}
+
+fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> MarginEstimates {
     let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
     // The sampled model says nothing above half the sampling frequency.
     let high = high.min(fit.model().sample_time().nyquist_rad_s());
-    margins(
-        |omega| fit.model().response(omega) * element.response(omega),
-        (low, high),
-    )
+    fit.margins(|omega| element.response(omega), (low, high))
 }
 
 /// Every option that shaped the result, defaults included.
@@ -259,6 +269,22 @@ fn page(found: &Identified<'_>) -> String {
         page.push_str(&format!(
             "Open loop with the given controlled element: {}",
             text::margins(m)
+        ));
+    }
+    page.push('\n');
+    page.push_str(&text::roots(fit));
+    for (file, v) in found.files.iter().zip(found.validations) {
+        let tests = text::residual_tests(v);
+        let of = if found.files.len() > 1 {
+            format!("{file}: ")
+        } else {
+            String::new()
+        };
+        page.push_str(&format!("{of}{tests}"));
+    }
+    if let Some((k, vaf, nrmse)) = found.ahead {
+        page.push_str(&format!(
+            "Prediction {k} samples ahead: VAF {vaf:.2} %, NRMSE fit {nrmse:.2} %.\n"
         ));
     }
     if let Some((file, q)) = &found.validation {

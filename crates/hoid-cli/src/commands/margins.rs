@@ -91,7 +91,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
     output::print(&format!(
         "{}, {state_name} state.\n{}\nRemnant gain K_n for P_n = {share}, T_n = {} s, Ts = {} s:\n{table}\n",
         scenario.name,
-        text::margins(&found),
+        text::margins(&found.into()),
         scenario.remnant.time_constant_s,
         scenario.sample_time.s(),
     ));

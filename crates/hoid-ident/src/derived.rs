@@ -1,0 +1,273 @@
+//! Poles, zeros, crossover and margins of a fit, with standard errors by the delta method.
+//!
+//! A simple root z of `p(z) = z^n + p_1 z^{n-1} + ... + p_n` moves with the coefficients as `dz/dp_j = -z^{n-j} / p'(z)`; the
+//! same holds for B with its leading coefficient b_0. At a multiple root the derivative does not exist, and near one it says
+//! little: the standard error grows without bound there, as the root itself is ill determined.
+//!
+//! The open loop is `L(omega, theta) = H(omega, theta) Y_c(omega)` with the controlled element Y_c given. Where `|L| = 1`
+//! stays so while theta moves,
+//!
+//! `d omega_c = -(d ln|L|/d theta) / (d ln|L|/d omega)`,  `d phi_m = d arg L/d theta + (d arg L/d omega) d omega_c`,
+//!
+//! and where `arg L = -180 deg` stays so, with the parts of phase and gain exchanged, for the gain margin.
+
+use hoid_model::{
+    Complex64, margins::Margins, margins::margins, polynomial, polynomial_model::monic, uncertainty::Estimate,
+    uncertainty::variance_along,
+};
+
+use crate::Fit;
+
+/// A pole or a zero in the z plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Root {
+    /// Polynomial that has it: `'a'`, `'b'`, `'c'`, `'d'` or `'f'`.
+    pub polynomial: char,
+    /// Its place.
+    pub value: Complex64,
+    /// Standard errors of the real and the imaginary part; `None` without covariance or at a multiple root.
+    pub standard_error: Option<(f64, f64)>,
+}
+
+impl Root {
+    /// Natural frequency in rad/s and damping ratio of the continuous pole `ln(z)/Ts`; `None` at the origin of z.
+    pub fn frequency_and_damping(&self, sample_time_s: f64) -> Option<(f64, f64)> {
+        let s = self.value.ln() / sample_time_s;
+        let frequency = s.norm();
+        (frequency.is_finite() && frequency > 0.0).then(|| (frequency, -s.re / frequency))
+    }
+}
+
+/// Crossover and margins of an open loop with their uncertainty; `None` where there is no crossover.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MarginEstimates {
+    /// Gain crossover frequency omega_c in rad/s.
+    pub crossover_rad_s: Option<Estimate>,
+    /// Phase margin phi_m in deg.
+    pub phase_margin_deg: Option<Estimate>,
+    /// Phase crossover frequency in rad/s.
+    pub phase_crossover_rad_s: Option<Estimate>,
+    /// Gain margin in dB.
+    pub gain_margin_db: Option<Estimate>,
+}
+
+impl From<Margins> for MarginEstimates {
+    /// Margins that are computed and not estimated: no standard errors.
+    fn from(m: Margins) -> Self {
+        Self {
+            crossover_rad_s: m.crossover_rad_s.map(Estimate::fixed),
+            phase_margin_deg: m.phase_margin_deg.map(Estimate::fixed),
+            phase_crossover_rad_s: m.phase_crossover_rad_s.map(Estimate::fixed),
+            gain_margin_db: m.gain_margin_db.map(Estimate::fixed),
+        }
+    }
+}
+
+impl Fit {
+    /// Roots of A, B, C, D and F with their uncertainty, in this order: poles of the system are those of A and F, its zeros
+    /// those of B (the delay's not counted); poles of the noise filter are those of A and D, its zeros those of C.
+    pub fn roots(&self) -> Vec<Root> {
+        let m = self.model();
+        let o = self.orders();
+        let mut all = Vec::new();
+        let mut at = 0;
+        for (letter, count) in [('a', o.na), ('b', o.nb), ('c', o.nc), ('d', o.nd), ('f', o.nf)] {
+            let part = &m.theta()[at..at + count];
+            let p = if letter == 'b' { part.to_vec() } else { monic(part) };
+            for value in polynomial::roots(&p).unwrap_or_default() {
+                all.push(Root {
+                    polynomial: letter,
+                    value,
+                    standard_error: self.root_error(&p, value, at, letter == 'b'),
+                });
+            }
+            at += count;
+        }
+        all
+    }
+
+    /// Standard errors of a root of `p`, whose coefficients lie in theta from `at` on (all of them, or all but the leading one).
+    fn root_error(&self, p: &[f64], z: Complex64, at: usize, leading: bool) -> Option<(f64, f64)> {
+        let covariance = self.covariance()?;
+        let n = p.len() - 1;
+        let slope = (0..n).fold(Complex64::new(0.0, 0.0), |sum, j| sum * z + p[j] * (n - j) as f64);
+        let (mut by_re, mut by_im) = (
+            vec![0.0; self.model().theta().len()],
+            vec![0.0; self.model().theta().len()],
+        );
+        for j in usize::from(!leading)..=n {
+            let gradient = -z.powu((n - j) as u32) / slope;
+            let place = at + j - usize::from(!leading);
+            (by_re[place], by_im[place]) = (gradient.re, gradient.im);
+        }
+        let error =
+            |gradient: &[f64]| Estimate::with_variance(0.0, variance_along(gradient, covariance)).standard_error;
+        Some((error(&by_re)?, if z.im == 0.0 { 0.0 } else { error(&by_im)? }))
+    }
+
+    /// Crossover frequency and margins of the open loop with a controlled element of the given frequency response.
+    pub fn margins(&self, controlled_element: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> MarginEstimates {
+        let open_loop = |omega: f64| self.model().response(omega) * controlled_element(omega);
+        let found = margins(open_loop, range_rad_s);
+        let mut estimates = MarginEstimates::from(found);
+        let Some(covariance) = self.covariance() else {
+            return estimates;
+        };
+        // d ln L / d omega by a central difference: L is smooth, so that the step costs about 1e-10 of it.
+        let slope = |omega: f64| {
+            let h = 1e-5 * omega;
+            let ratio = open_loop(omega + h) / open_loop(omega - h);
+            ratio.ln() / (2.0 * h)
+        };
+        let relative = |omega: f64| -> Vec<Complex64> {
+            let (response, gradient) = self.model().response_and_gradient(omega);
+            gradient.iter().map(|g| g / response).collect()
+        };
+        let with = |value: Option<f64>, gradient: Vec<f64>| {
+            value.map(|v| Estimate::with_variance(v, variance_along(&gradient, covariance)))
+        };
+        if let Some(omega) = found.crossover_rad_s {
+            let (along, by_theta) = (slope(omega), relative(omega));
+            let moved: Vec<f64> = by_theta.iter().map(|g| -g.re / along.re).collect();
+            let phase = by_theta
+                .iter()
+                .zip(&moved)
+                .map(|(g, d)| (g.im + along.im * d).to_degrees())
+                .collect();
+            estimates.crossover_rad_s = with(found.crossover_rad_s, moved);
+            estimates.phase_margin_deg = with(found.phase_margin_deg, phase);
+        }
+        if let Some(omega) = found.phase_crossover_rad_s {
+            let (along, by_theta) = (slope(omega), relative(omega));
+            let moved: Vec<f64> = by_theta.iter().map(|g| -g.im / along.im).collect();
+            let to_db = 20.0 / std::f64::consts::LN_10;
+            let gain = by_theta
+                .iter()
+                .zip(&moved)
+                .map(|(g, d)| -to_db * (g.re + along.re * d))
+                .collect();
+            estimates.phase_crossover_rad_s = with(found.phase_crossover_rad_s, moved);
+            estimates.gain_margin_db = with(found.gain_margin_db, gain);
+        }
+        estimates
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::{Orders, PolynomialModel, SampleTime, Structure};
+
+    use super::*;
+    use crate::{InitialState, Reason, Termination};
+
+    fn fit(theta: Vec<f64>, covariance: Vec<f64>) -> Fit {
+        let orders = Orders {
+            nb: 3,
+            nc: 1,
+            nd: 1,
+            nf: 2,
+            nk: 20,
+            ..Orders::default()
+        };
+        Fit {
+            held: vec![false; theta.len()],
+            model: PolynomialModel::new(Structure::BoxJenkins, orders, SampleTime::HUNDREDTH, theta).unwrap(),
+            covariance: Some(covariance),
+            loss: 1.0,
+            innovation_variance: 1.0,
+            residuals: 100,
+            states: 0,
+            initial_state: InitialState::Estimate,
+            termination: Termination {
+                reason: Reason::SmallDecrease,
+                iterations: 1,
+            },
+            start: String::new(),
+            output_variance: 1.0,
+            physical: None,
+        }
+    }
+
+    fn theta() -> Vec<f64> {
+        vec![0.0442765923, -0.041, -0.002, 0.4, -0.8465, -1.9121130548, 0.9242709633]
+    }
+
+    fn element(omega: f64) -> Complex64 {
+        let s = Complex64::new(0.0, omega);
+        90.0 / (s * (s + 6.0))
+    }
+
+    /// Covariance with one parameter uncertain: the standard error is then the derivative.
+    fn only(i: usize) -> Vec<f64> {
+        let mut covariance = vec![0.0; 49];
+        covariance[i * 7 + i] = 1.0;
+        covariance
+    }
+
+    #[test]
+    fn standard_errors_are_the_derivatives() {
+        let (h, range) = (1e-7, (1e-3, 300.0));
+        for i in 0..7 {
+            let shifted = |sign: f64| {
+                let mut theta = theta();
+                theta[i] += sign * h;
+                fit(theta, only(i))
+            };
+            let (up, down, here) = (shifted(1.0), shifted(-1.0), fit(theta(), only(i)));
+            for ((a, b), root) in up.roots().iter().zip(down.roots()).zip(here.roots()) {
+                let slope = (a.value - b.value) / (2.0 * h);
+                let (re, im) = root.standard_error.unwrap();
+                // The pair of poles lies close together: second differences of the root are 1e3.
+                assert!((slope.re.abs() - re).abs() < 1e-5 * (1.0 + re), "{i} {root:?} {slope}");
+                assert!((slope.im.abs() - im).abs() < 1e-5 * (1.0 + im), "{i} {root:?} {slope}");
+            }
+            let all = |fit: &Fit| {
+                let m = fit.margins(element, range);
+                [
+                    m.crossover_rad_s,
+                    m.phase_margin_deg,
+                    m.phase_crossover_rad_s,
+                    m.gain_margin_db,
+                ]
+                .map(Option::unwrap)
+            };
+            for ((a, b), e) in all(&up).iter().zip(all(&down)).zip(all(&here)) {
+                let slope = (a.value - b.value) / (2.0 * h);
+                let ours = e.standard_error.unwrap();
+                assert!((slope.abs() - ours).abs() < 1e-4 * (1.0 + ours), "{i}: {slope} {ours}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_double_root_has_no_standard_error_and_a_loop_without_crossover_no_margins() {
+        let mut double = theta();
+        (double[5], double[6]) = (-1.0, 0.25);
+        let roots = fit(double, only(5)).roots();
+        let f: Vec<&Root> = roots.iter().filter(|r| r.polynomial == 'f').collect();
+        assert_eq!(f.len(), 2);
+        assert!(
+            f.iter().all(|r| r.standard_error.is_none_or(|(re, _)| re > 1e4)),
+            "{f:?}"
+        );
+        let none = fit(theta(), only(0)).margins(|omega| 1e-9 * element(omega), (1.0, 300.0));
+        assert!(none.crossover_rad_s.is_none() && none.phase_margin_deg.is_none());
+    }
+
+    #[test]
+    fn a_root_tells_its_frequency_and_damping() {
+        let s = Complex64::new(-0.35, (1.0_f64 - 0.35 * 0.35).sqrt()) * 11.25;
+        let root = Root {
+            polynomial: 'f',
+            value: (s * 0.01).exp(),
+            standard_error: None,
+        };
+        let (frequency, damping) = root.frequency_and_damping(0.01).unwrap();
+        assert!((frequency - 11.25).abs() < 1e-10 && (damping - 0.35).abs() < 1e-10);
+        let origin = Root {
+            value: Complex64::new(0.0, 0.0),
+            ..root
+        };
+        assert!(origin.frequency_and_damping(0.01).is_none());
+    }
+}

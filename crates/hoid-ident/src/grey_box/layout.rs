@@ -1,0 +1,378 @@
+//! Where the physical parameters of each record stand in eta, and what they mean for its polynomials.
+//!
+//! Slots of one record: `[K_e, K_e_dot (or T_L), omega_nm, zeta_nm, tau_e, T_n]`, the last only for m > 0. A parameter that the
+//! records share has one place in eta, one that is individual has as many as there are records. K_e_dot is the coordinate of
+//! the lead unless the user constrains T_L itself: `K_e_dot = K_e T_L` is well determined also where K_e is small.
+
+use std::collections::BTreeMap;
+
+use hoid_model::{
+    ModelError, Orders, SampleTime,
+    delayed_operator::{delayed_operator_jacobian_within, delayed_operator_within, whole_samples},
+    remnant_noise::remnant_noise,
+};
+
+use crate::{Constraint, IdentError};
+
+/// Number of slots with a remnant filter.
+pub(crate) const SLOTS: usize = 6;
+/// Slot of the second coordinate of the gains.
+pub(crate) const LEAD: usize = 1;
+/// Slot of the delay.
+pub(crate) const DELAY: usize = 4;
+/// Slot of the remnant's time constant.
+pub(crate) const TIME_CONSTANT: usize = 5;
+
+/// Names that can be constrained or be individual.
+pub const GREY_BOX_NAMES: [&str; 7] = ["K_e", "K_e_dot", "T_L", "omega_nm", "zeta_nm", "tau_e", "T_n"];
+
+/// Bounds of zeta_nm: beyond them the two poles have nothing to do with each other.
+const ZETA_LIMITS: (f64, f64) = (1e-4, 20.0);
+/// Bounds of T_n in samples: white below, a drift above.
+const TIME_CONSTANT_LIMITS: (f64, f64) = (0.1, 1e4);
+/// Largest omega_nm as a share of pi/Ts.
+const HIGHEST_FREQUENCY: f64 = 0.999;
+
+/// The second coordinate of the gains.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Lead {
+    /// K_e_dot in s.
+    RateGain,
+    /// T_L in s.
+    Time,
+}
+
+/// What is asked of the parameters, checked.
+#[derive(Debug, Clone)]
+pub(crate) struct Layout {
+    /// Order m of the remnant filter.
+    pub order: usize,
+    pub lead: Lead,
+    pub sample_time: SampleTime,
+    /// Place in eta of each slot, for each record.
+    pub positions: Vec<[usize; SLOTS]>,
+    /// Name of each element of eta; with the number of the record where it is individual.
+    pub names: Vec<String>,
+    /// Bounds of each element of eta.
+    pub limits: Vec<(f64, f64)>,
+    /// Slot of each element of eta.
+    pub slots: Vec<usize>,
+}
+
+/// Orders and theta of one record at one eta; the Jacobian has a row for each coefficient and a column for each slot.
+#[derive(Debug, Clone)]
+pub(crate) struct Polynomials {
+    pub orders: Orders,
+    pub theta: Vec<f64>,
+    pub jacobian: Vec<[f64; SLOTS]>,
+}
+
+/// Orders of the Box-Jenkins model that holds the grey box.
+pub(crate) fn orders(order: usize, nk: usize) -> Orders {
+    Orders {
+        na: 0,
+        nb: 3,
+        nc: order.saturating_sub(1),
+        nd: order,
+        nf: 2,
+        nk,
+    }
+}
+
+impl Layout {
+    pub fn new(
+        order: usize,
+        records: usize,
+        delay_range_s: (f64, f64),
+        constraints: &BTreeMap<String, Constraint>,
+        individual: &[String],
+        sample_time: SampleTime,
+    ) -> Result<Self, IdentError> {
+        for name in constraints.keys().chain(individual) {
+            if !GREY_BOX_NAMES.contains(&name.as_str()) {
+                return Err(IdentError::UnknownParameter {
+                    name: name.clone(),
+                    available: GREY_BOX_NAMES.join(", "),
+                });
+            }
+        }
+        let asked = |name: &str| constraints.contains_key(name) || individual.iter().any(|n| n == name);
+        if constraints.contains_key("T_L") && asked("K_e_dot") {
+            return Err(bad(
+                "T_L",
+                "a constraint on K_e_dot = K_e T_L as well",
+                "one of the two".to_owned(),
+            ));
+        }
+        let lead = if asked("T_L") { Lead::Time } else { Lead::RateGain };
+        let mut layout = Self {
+            order,
+            lead,
+            sample_time,
+            positions: vec![[usize::MAX; SLOTS]; records],
+            names: Vec::new(),
+            limits: Vec::new(),
+            slots: Vec::new(),
+        };
+        for (slot, name) in layout.slot_names().into_iter().enumerate() {
+            let limits = layout.slot_limits(slot, name, delay_range_s, constraints)?;
+            let own = individual.iter().any(|n| n == name) && records > 1;
+            let copies = if own { records } else { 1 };
+            for copy in 0..copies {
+                for (record, positions) in layout.positions.iter_mut().enumerate() {
+                    if !own || record == copy {
+                        positions[slot] = layout.names.len();
+                    }
+                }
+                layout.names.push(if own {
+                    format!("{name}[{}]", copy + 1)
+                } else {
+                    name.to_owned()
+                });
+                layout.limits.push(limits);
+                layout.slots.push(slot);
+            }
+        }
+        Ok(layout)
+    }
+
+    fn slot_names(&self) -> Vec<&'static str> {
+        let lead = match self.lead {
+            Lead::RateGain => "K_e_dot",
+            Lead::Time => "T_L",
+        };
+        let mut names = vec!["K_e", lead, "omega_nm", "zeta_nm", "tau_e"];
+        if self.order > 0 {
+            names.push("T_n");
+        }
+        names
+    }
+
+    /// The constraint of a parameter within what has a meaning at all.
+    fn slot_limits(
+        &self,
+        slot: usize,
+        name: &str,
+        delay_range_s: (f64, f64),
+        constraints: &BTreeMap<String, Constraint>,
+    ) -> Result<(f64, f64), IdentError> {
+        let ts = self.sample_time.s();
+        let widest = match slot {
+            2 => (1e-3, HIGHEST_FREQUENCY * self.sample_time.nyquist_rad_s()),
+            3 => ZETA_LIMITS,
+            DELAY => (0.0, f64::INFINITY),
+            TIME_CONSTANT => (TIME_CONSTANT_LIMITS.0 * ts, TIME_CONSTANT_LIMITS.1 * ts),
+            _ => (f64::NEG_INFINITY, f64::INFINITY),
+        };
+        let range = Constraint::Between(delay_range_s.0, delay_range_s.1);
+        let constraint = match constraints.get(name) {
+            Some(constraint) => *constraint,
+            None if slot == DELAY => range,
+            None => Constraint::Between(widest.0, widest.1),
+        };
+        let (low, high) = constraint.limits();
+        let within = (low.max(widest.0), high.min(widest.1));
+        let meaning = within.0 <= within.1 && within.0 < f64::INFINITY && within.1 > f64::NEG_INFINITY;
+        let fixed_elsewhere = low == high && within != (low, high);
+        if !constraint.is_sound() || !meaning || fixed_elsewhere {
+            let expected = format!(
+                "a finite value, or a lower and an upper bound, within {:.6} to {:.6}",
+                widest.0, widest.1
+            );
+            return Err(bad(name, &format!("{constraint:?}"), expected));
+        }
+        if slot == DELAY && !within.1.is_finite() {
+            return Err(bad(
+                name,
+                &format!("{constraint:?}"),
+                "a finite upper bound: the longest delay".to_owned(),
+            ));
+        }
+        Ok(within)
+    }
+
+    /// Number of parameters of one record.
+    pub fn slots_in_use(&self) -> usize {
+        if self.order == 0 { TIME_CONSTANT } else { SLOTS }
+    }
+
+    /// Places of the delays in eta.
+    pub fn delays(&self) -> Vec<usize> {
+        (0..self.slots.len()).filter(|&i| self.slots[i] == DELAY).collect()
+    }
+
+    /// Longest delay that eta can take, in samples of nk.
+    pub fn longest_nk(&self) -> Result<usize, ModelError> {
+        let longest = self.delays().into_iter().map(|i| self.limits[i].1).fold(0.0, f64::max);
+        Ok(whole_samples(longest, self.sample_time)? + 1)
+    }
+
+    /// An eta whose parameters are the same for all records.
+    pub fn spread(&self, slots: &[f64; SLOTS]) -> Vec<f64> {
+        self.slots.iter().map(|&slot| slots[slot]).collect()
+    }
+
+    /// The parameters of one record; T_n is 0 where there is none.
+    pub fn of_record(&self, eta: &[f64], record: usize) -> [f64; SLOTS] {
+        let mut values = [0.0; SLOTS];
+        for (value, &position) in values.iter_mut().zip(&self.positions[record]).take(self.slots_in_use()) {
+            *value = eta[position];
+        }
+        values
+    }
+
+    /// `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` of the slots of one record.
+    pub fn operator(&self, slots: &[f64; SLOTS]) -> [f64; 5] {
+        let [k_e, lead, omega, zeta, tau, _] = *slots;
+        let k_e_dot = match self.lead {
+            Lead::RateGain => lead,
+            Lead::Time => k_e * lead,
+        };
+        [k_e, k_e_dot, omega, zeta, tau]
+    }
+
+    /// The polynomials of one record; `sample` is the sample in which tau_e lies, where the caller has chosen one.
+    pub fn polynomials(&self, eta: &[f64], record: usize, sample: Option<usize>) -> Result<Polynomials, ModelError> {
+        let slots = self.of_record(eta, record);
+        let operator = self.operator(&slots);
+        let sample = match sample {
+            Some(sample) => sample,
+            None => whole_samples(operator[DELAY], self.sample_time)?,
+        };
+        let held = delayed_operator_within(sample, operator, self.sample_time)?;
+        let by_operator = delayed_operator_jacobian_within(sample, operator, self.sample_time)?;
+        let noise = remnant_noise(slots[TIME_CONSTANT], self.order, self.sample_time)?;
+        let mut theta = held.b.to_vec();
+        theta.extend_from_slice(&noise.c);
+        theta.extend_from_slice(&noise.d);
+        theta.extend_from_slice(&held.f);
+        let row_of_operator = |row: [f64; 5]| {
+            let [k_e, k_e_dot, omega, zeta, tau] = row;
+            match self.lead {
+                Lead::RateGain => [k_e, k_e_dot, omega, zeta, tau, 0.0],
+                Lead::Time => [k_e + slots[LEAD] * k_e_dot, slots[0] * k_e_dot, omega, zeta, tau, 0.0],
+            }
+        };
+        let mut jacobian: Vec<[f64; SLOTS]> = by_operator[..3].iter().map(|r| row_of_operator(*r)).collect();
+        jacobian.extend(
+            noise
+                .c_slope
+                .iter()
+                .chain(&noise.d_slope)
+                .map(|s| [0.0, 0.0, 0.0, 0.0, 0.0, *s]),
+        );
+        jacobian.extend(by_operator[3..].iter().map(|r| row_of_operator(*r)));
+        Ok(Polynomials {
+            orders: orders(self.order, held.nk),
+            theta,
+            jacobian,
+        })
+    }
+}
+
+fn bad(name: &str, found: &str, expected: String) -> IdentError {
+    IdentError::BadOption {
+        option: format!("the constraint on {name}"),
+        found: found.to_owned(),
+        expected,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn layout(
+        order: usize,
+        records: usize,
+        constraints: &[(&str, Constraint)],
+        individual: &[&str],
+    ) -> Result<Layout, IdentError> {
+        let constraints = constraints.iter().map(|(n, c)| ((*n).to_owned(), *c)).collect();
+        let individual: Vec<String> = individual.iter().map(|n| (*n).to_owned()).collect();
+        Layout::new(
+            order,
+            records,
+            (0.05, 0.6),
+            &constraints,
+            &individual,
+            SampleTime::HUNDREDTH,
+        )
+    }
+
+    #[test]
+    fn common_and_individual_parameters_have_their_places() {
+        let common = layout(2, 3, &[], &[]).unwrap();
+        assert_eq!(common.names, ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e", "T_n"]);
+        assert!(common.positions.iter().all(|p| *p == [0, 1, 2, 3, 4, 5]));
+        let mixed = layout(0, 2, &[], &["K_e", "tau_e"]).unwrap();
+        assert_eq!(
+            mixed.names,
+            [
+                "K_e[1]", "K_e[2]", "K_e_dot", "omega_nm", "zeta_nm", "tau_e[1]", "tau_e[2]"
+            ]
+        );
+        assert_eq!(mixed.delays(), [5, 6]);
+        let eta = [1.0, 2.0, 3.0, 4.0, 5.0, 0.1, 0.2];
+        assert_eq!(mixed.of_record(&eta, 1), [2.0, 3.0, 4.0, 5.0, 0.2, 0.0]);
+        assert_eq!(mixed.longest_nk().unwrap(), 61);
+        // One record: nothing is individual.
+        assert_eq!(layout(1, 1, &[], &["K_e"]).unwrap().names[0], "K_e");
+    }
+
+    #[test]
+    fn jacobian_agrees_with_finite_differences() {
+        for constraint in ["K_e", "T_L"] {
+            for order in 0..=4 {
+                let open = Constraint::Between(f64::NEG_INFINITY, f64::INFINITY);
+                let layout = layout(order, 1, &[(constraint, open)], &[]).unwrap();
+                let eta = [0.09, 0.4, 11.25, 0.35, 0.2837, 0.06];
+                let eta = &eta[..layout.names.len()];
+                let exact = layout.polynomials(eta, 0, None).unwrap();
+                for j in 0..eta.len() {
+                    let h = 1e-5 * eta[j];
+                    let at = |sign: f64| {
+                        let mut moved = eta.to_vec();
+                        moved[j] += sign * h;
+                        layout.polynomials(&moved, 0, None).unwrap().theta
+                    };
+                    let (up, down) = (at(1.0), at(-1.0));
+                    let scale = exact.jacobian.iter().map(|r| r[j].abs()).fold(0.0, f64::max);
+                    for i in 0..up.len() {
+                        let difference = (up[i] - down[i]) / (2.0 * h);
+                        // Truncation h^2 and rounding eps/h.
+                        assert!(
+                            (exact.jacobian[i][j] - difference).abs() < 1e-7 * scale,
+                            "m {order} {constraint} row {i} column {j}: {} and {difference}",
+                            exact.jacobian[i][j]
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_asked_is_named() {
+        let name = |r: Result<Layout, IdentError>| match r {
+            Err(IdentError::BadOption { option, .. }) => option.replace("the constraint on ", ""),
+            Err(IdentError::UnknownParameter { name, .. }) => name,
+            other => panic!("expected a refusal, found {other:?}"),
+        };
+        assert_eq!(name(layout(1, 1, &[("K_n", Constraint::Fixed(1.0))], &[])), "K_n");
+        assert_eq!(name(layout(1, 1, &[], &["sigma"])), "sigma");
+        let both = [("T_L", Constraint::Fixed(0.4)), ("K_e_dot", Constraint::Fixed(0.03))];
+        assert_eq!(name(layout(1, 1, &both, &[])), "T_L");
+        assert_eq!(name(layout(1, 1, &[("tau_e", Constraint::Fixed(-0.1))], &[])), "tau_e");
+        assert_eq!(
+            name(layout(1, 1, &[("omega_nm", Constraint::Between(400.0, 500.0))], &[])),
+            "omega_nm"
+        );
+        assert_eq!(
+            name(layout(1, 1, &[("tau_e", Constraint::Between(0.1, f64::INFINITY))], &[])),
+            "tau_e"
+        );
+        let fixed = layout(1, 1, &[("zeta_nm", Constraint::Fixed(0.3))], &[]).unwrap();
+        assert_eq!(fixed.limits[3], (0.3, 0.3));
+    }
+}

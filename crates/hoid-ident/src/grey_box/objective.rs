@@ -1,0 +1,353 @@
+//! The prediction-error criterion as a function of the physical parameters.
+//!
+//! For each record the polynomials follow from eta, `theta = theta(eta)` with `J = d theta/d eta`; then `psi_eta = psi J`, so that
+//! `psi_eta' eps = J' psi' eps` and `psi_eta' psi_eta = J' psi' psi J`, both summed over the records. nk moves with tau_e, the
+//! first residual that counts does not: the loss is a function of eta alone.
+
+use crate::{
+    IdentError, InitialState,
+    least_squares::{dot, solve_symmetric},
+    prediction_error::{Criterion, Data, Linearisation, Workspace},
+    search::{Minimum, Objective, Reason, SearchOptions, minimise},
+};
+
+use super::layout::{DELAY, Layout, Polynomials};
+
+/// The criterion over one or several records.
+#[derive(Debug, Clone)]
+pub(crate) struct PhysicalCriterion<'a> {
+    pub layout: Layout,
+    pub data: Vec<Data<'a>>,
+    pub initial: InitialState,
+    pub first: usize,
+    /// Sample in which each delay of [`Layout::delays`] is held; by the delay itself where there is none.
+    pub samples: Option<Vec<usize>>,
+    pub limits: Vec<(f64, f64)>,
+}
+
+impl<'a> PhysicalCriterion<'a> {
+    pub fn new(layout: Layout, data: Vec<Data<'a>>, initial: InitialState, first: usize) -> Self {
+        let limits = layout.limits.clone();
+        Self {
+            layout,
+            data,
+            initial,
+            first,
+            samples: None,
+            limits,
+        }
+    }
+
+    pub fn residuals(&self) -> usize {
+        self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
+    }
+
+    /// Number of initial states over all records.
+    pub fn states(&self) -> usize {
+        let of_record = |record: usize| {
+            self.criterion(super::layout::orders(self.layout.order, 1), record)
+                .states()
+        };
+        (0..self.data.len()).map(of_record).sum()
+    }
+
+    fn criterion(&self, orders: hoid_model::Orders, record: usize) -> Criterion<'a> {
+        Criterion {
+            orders,
+            data: vec![self.data[record]],
+            initial: self.initial,
+            first: self.first,
+            weights: None,
+        }
+    }
+
+    fn polynomials(&self, eta: &[f64], record: usize) -> Option<Polynomials> {
+        let sample = self.samples.as_ref().and_then(|samples| {
+            let place = self.layout.positions[record][DELAY];
+            let index = self.layout.delays().iter().position(|&i| i == place)?;
+            samples.get(index).copied()
+        });
+        self.layout.polynomials(eta, record, sample).ok()
+    }
+
+    /// The gains that are best for the other parameters, and the sum of squares there: the residual is affine in K_e and
+    /// K_e_dot. Only for one set of parameters common to all records, with K_e_dot as coordinate.
+    pub fn best_gains(&self, eta: &mut [f64], workspace: &mut Workspace) -> Option<f64> {
+        eta[..2].fill(0.0);
+        if !self.is_feasible(eta) {
+            return None;
+        }
+        let p = eta.len();
+        let at = self.linearise(eta, workspace);
+        let (a, b, c) = (at.gram[0], at.gram[1], at.gram[p + 1]);
+        let (g, h) = (at.descent[0], at.descent[1]);
+        let determinant = a * c - b * b;
+        if determinant <= 1e-14 * a * c {
+            return None;
+        }
+        eta[0] = (c * g - b * h) / determinant;
+        eta[1] = (a * h - b * g) / determinant;
+        let value = at.sum_of_squares - eta[0] * g - eta[1] * h;
+        (value.is_finite() && eta.iter().all(|v| v.is_finite())).then_some(value)
+    }
+
+    /// Searches from eta. The loss has kinks where a delay is a whole number of samples, and a search may come to rest in
+    /// one; then it is finished inside each of the samples that meet there.
+    pub fn search(
+        &self,
+        eta: Vec<f64>,
+        options: &SearchOptions,
+        rival: Option<f64>,
+        workspace: &mut Workspace,
+    ) -> Option<Minimum> {
+        let found = minimise(self, eta, options, rival, workspace)?;
+        let minimum = self.settled(found);
+        if minimum.termination.converged() {
+            return Some(minimum);
+        }
+        let finished = self.search_by_samples(minimum, options, workspace);
+        Some(self.settled(finished))
+    }
+
+    /// A search that found no descent has converged where only rounding is left to gain.
+    fn settled(&self, mut minimum: Minimum) -> Minimum {
+        if minimum.termination.reason == Reason::NoDescent && self.promised(&minimum) <= ROUNDING {
+            minimum.termination.reason = Reason::SmallDecrease;
+        }
+        minimum
+    }
+
+    /// Relative decrease of the loss that the Gauss-Newton step of the free parameters promises.
+    fn promised(&self, minimum: &Minimum) -> f64 {
+        let p = minimum.theta.len();
+        let free = self.free(&minimum.theta, &minimum.at.descent);
+        let gram: Vec<f64> = free
+            .iter()
+            .flat_map(|&i| free.iter().map(move |&j| minimum.at.gram[i * p + j]))
+            .collect();
+        let descent: Vec<f64> = free.iter().map(|&i| minimum.at.descent[i]).collect();
+        let step = solve_symmetric(&gram, &descent);
+        step.map_or(f64::INFINITY, |step| dot(&step, &descent) / minimum.at.sum_of_squares)
+    }
+
+    /// Moves from sample to sample as long as the loss falls.
+    fn search_by_samples(&self, minimum: Minimum, options: &SearchOptions, workspace: &mut Workspace) -> Minimum {
+        let (delays, ts) = (self.layout.delays(), self.layout.sample_time.s());
+        let mut samples: Vec<usize> = delays
+            .iter()
+            .map(|&i| (minimum.theta[i] / ts).floor().max(0.0) as usize)
+            .collect();
+        let inside = |samples: &[usize], start: &Minimum, workspace: &mut Workspace| {
+            let mut within = Self {
+                samples: Some(samples.to_vec()),
+                ..self.clone()
+            };
+            let mut eta = start.theta.clone();
+            for (&i, &sample) in delays.iter().zip(samples) {
+                let (low, high) = self.limits[i];
+                let border = |n: usize| (n as f64 * ts).clamp(low, high);
+                within.limits[i] = (border(sample), border(sample + 1));
+                eta[i] = eta[i].clamp(within.limits[i].0, within.limits[i].1);
+            }
+            minimise(&within, eta, options, None, workspace)
+        };
+        let mut best = inside(&samples, &minimum, workspace).unwrap_or(minimum);
+        // Each move lowers the loss; the limit only guards against rounding.
+        for _ in 0..100 {
+            let mut moved = false;
+            for (k, &i) in delays.iter().enumerate() {
+                let position = best.theta[i] / ts;
+                let neighbours = [
+                    (position <= samples[k] as f64 + NEAR_BORDER)
+                        .then(|| samples[k].checked_sub(1))
+                        .flatten(),
+                    (position >= (samples[k] + 1) as f64 - NEAR_BORDER).then_some(samples[k] + 1),
+                ];
+                for neighbour in neighbours.into_iter().flatten() {
+                    let mut there = samples.clone();
+                    there[k] = neighbour;
+                    let (low, high) = self.limits[i];
+                    if (neighbour + 1) as f64 * ts <= low || neighbour as f64 * ts >= high {
+                        continue;
+                    }
+                    if let Some(found) = inside(&there, &best, workspace)
+                        && found.at.sum_of_squares < best.at.sum_of_squares * (1.0 - options.tolerance)
+                    {
+                        (best, samples, moved) = (found, there, true);
+                        break;
+                    }
+                }
+            }
+            if !moved {
+                break;
+            }
+        }
+        best
+    }
+
+    /// Elements of eta with a variance: not fixed, and not held at a bound of the user. A kink of the loss is no bound.
+    pub fn free(&self, eta: &[f64], descent: &[f64]) -> Vec<usize> {
+        crate::search::free_parameters(self, eta, descent)
+    }
+
+    /// What the polynomials of a record are at eta.
+    pub fn model_of(&self, eta: &[f64], record: usize) -> Result<Polynomials, IdentError> {
+        Ok(self.layout.polynomials(eta, record, None)?)
+    }
+}
+
+/// Distance to the border of a sample, in samples, below which the next sample is tried.
+const NEAR_BORDER: f64 = 1e-6;
+/// Relative decrease of the loss that rounding may hide: D of fourth order leaves residuals of 1e-5 of the output. In units of
+/// standard errors this is a distance of 1e-3 with 10 000 samples.
+const ROUNDING: f64 = 1e-10;
+
+impl Objective for PhysicalCriterion<'_> {
+    fn is_feasible(&self, eta: &[f64]) -> bool {
+        eta.iter().all(|v| v.is_finite())
+            && (0..self.data.len()).all(|record| {
+                self.polynomials(eta, record)
+                    .is_some_and(|p| self.criterion(p.orders, record).is_feasible(&p.theta))
+            })
+    }
+
+    fn linearise(&self, eta: &[f64], workspace: &mut Workspace) -> Linearisation {
+        let p = eta.len();
+        let mut total = Linearisation {
+            sum_of_squares: 0.0,
+            descent: vec![0.0; p],
+            gram: vec![0.0; p * p],
+        };
+        for record in 0..self.data.len() {
+            let Some(polynomials) = self.polynomials(eta, record) else {
+                // Only for an eta that is not feasible.
+                total.sum_of_squares = f64::NAN;
+                return total;
+            };
+            let of_theta = self
+                .criterion(polynomials.orders, record)
+                .linearise(&polynomials.theta, workspace);
+            total.sum_of_squares += of_theta.sum_of_squares;
+            let positions = &self.layout.positions[record][..self.layout.slots_in_use()];
+            let n = polynomials.theta.len();
+            let column = |slot: usize| -> Vec<f64> { polynomials.jacobian.iter().map(|row| row[slot]).collect() };
+            let columns: Vec<Vec<f64>> = (0..positions.len()).map(column).collect();
+            for (i, &place) in positions.iter().enumerate() {
+                total.descent[place] += dot(&columns[i], &of_theta.descent);
+                let product: Vec<f64> = (0..n)
+                    .map(|k| dot(&of_theta.gram[k * n..(k + 1) * n], &columns[i]))
+                    .collect();
+                for (j, &other) in positions.iter().enumerate() {
+                    total.gram[other * p + place] += dot(&columns[j], &product);
+                }
+            }
+        }
+        total
+    }
+
+    fn output_power(&self) -> f64 {
+        self.data.iter().map(|d| dot(d.u, d.u)).sum()
+    }
+
+    fn limits(&self) -> Option<&[(f64, f64)]> {
+        Some(&self.limits)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use hoid_model::SampleTime;
+
+    use super::*;
+    use crate::{Constraint, prediction_error::first_residual};
+
+    fn signals(n: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
+        let mut state = 7_u64;
+        let mut draw = move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        (0..2)
+            .map(|_| {
+                let (mut slow, mut e, mut u) = (0.0, Vec::new(), Vec::new());
+                for t in 0..n {
+                    slow = 0.9 * slow + draw();
+                    e.push(slow);
+                    u.push(if t >= 30 { e[t - 30] } else { 0.0 } + 0.3 * draw());
+                }
+                (e, u)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn derivatives_agree_with_finite_differences() {
+        let signals = signals(600);
+        let lead_time = [("T_L".to_owned(), Constraint::Between(-9.0, 9.0))];
+        for (order, individual, constraints) in [
+            (1, vec![], BTreeMap::new()),
+            (3, vec!["tau_e".to_owned(), "K_e".to_owned()], BTreeMap::new()),
+            (2, vec!["T_n".to_owned()], BTreeMap::from(lead_time)),
+        ] {
+            for initial in [InitialState::Zero, InitialState::Estimate, InitialState::Backcast] {
+                let layout =
+                    Layout::new(order, 2, (0.05, 0.6), &constraints, &individual, SampleTime::HUNDREDTH).unwrap();
+                let first = first_residual(
+                    &super::super::layout::orders(order, layout.longest_nk().unwrap()),
+                    initial,
+                );
+                let data = signals.iter().map(|(e, u)| Data { e, u }).collect();
+                let criterion = PhysicalCriterion::new(layout, data, initial, first);
+                let mut eta = criterion.layout.spread(&[0.3, 0.05, 12.0, 0.4, 0.2837, 0.05]);
+                // Individual parameters apart from each other.
+                for (i, value) in eta.iter_mut().enumerate() {
+                    *value *= 1.0 + 0.01 * i as f64;
+                }
+                let mut ws = Workspace::default();
+                let at = criterion.linearise(&eta, &mut ws);
+                for i in 0..eta.len() {
+                    let h = 1e-5 * eta[i];
+                    let mut value = |sign: f64| {
+                        let mut moved = eta.clone();
+                        moved[i] += sign * h;
+                        criterion.linearise(&moved, &mut ws).sum_of_squares
+                    };
+                    let difference = -(value(1.0) - value(-1.0)) / (4.0 * h);
+                    let scale = (at.gram[i * eta.len() + i] * at.sum_of_squares).sqrt();
+                    // Truncation h^2 and rounding 1e-16/1e-5, of the scale of the gradient.
+                    assert!(
+                        (at.descent[i] - difference).abs() < 1e-7 * scale,
+                        "m {order} {initial:?} {}: {} and {difference}",
+                        criterion.layout.names[i],
+                        at.descent[i]
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_loss_is_continuous_in_the_delay() {
+        let signals = signals(600);
+        let layout = Layout::new(2, 2, (0.05, 0.6), &BTreeMap::new(), &[], SampleTime::HUNDREDTH).unwrap();
+        let first = first_residual(&super::super::layout::orders(2, 61), InitialState::Estimate);
+        let data = signals.iter().map(|(e, u)| Data { e, u }).collect();
+        let criterion = PhysicalCriterion::new(layout, data, InitialState::Estimate, first);
+        let mut ws = Workspace::default();
+        let mut loss = |tau: f64| {
+            criterion
+                .linearise(&[0.3, 0.05, 12.0, 0.4, tau, 0.05], &mut ws)
+                .sum_of_squares
+        };
+        let (before, there, after) = (loss(0.3 - 1e-9), loss(0.3), loss(0.3 + 1e-9));
+        // 1e-9 s times a relative slope of some 10/s.
+        assert!(
+            (before / there - 1.0).abs() < 1e-7 && (after / there - 1.0).abs() < 1e-7,
+            "{before} {there} {after}"
+        );
+    }
+}

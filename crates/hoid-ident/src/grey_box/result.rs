@@ -1,0 +1,230 @@
+//! What a grey-box fit found.
+
+use hoid_model::{
+    NotConvertible, OperatorParameters,
+    remnant::RemnantDiscretisation,
+    remnant_noise::remnant_noise,
+    uncertainty::{Estimate, OperatorEstimate, RemnantEstimate, variance_along},
+};
+
+use crate::{Fit, IdentError, Termination};
+
+use super::layout::{DELAY, LEAD, Layout, Lead, TIME_CONSTANT};
+
+/// One order m of the remnant filter that was tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OrderCandidate {
+    /// Order m.
+    pub order: usize,
+    /// Its figures, all on the same samples, or why it could not be fitted.
+    pub outcome: Result<OrderFigures, IdentError>,
+}
+
+/// What orders are compared by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OrderFigures {
+    /// Loss V.
+    pub loss: f64,
+    /// Akaike's criterion.
+    pub aic: f64,
+    /// Schwarz's criterion, which decides.
+    pub bic: f64,
+    /// True when the search converged.
+    pub converged: bool,
+}
+
+/// A fit in physical parameters.
+#[derive(Debug, Clone)]
+pub struct GreyBoxFit {
+    pub(crate) layout: Layout,
+    pub(crate) eta: Vec<f64>,
+    /// Covariance of eta by rows; zero for what was fixed or rests at a bound.
+    pub(crate) covariance: Option<Vec<f64>>,
+    /// Elements of eta with a variance of their own.
+    pub(crate) free: Vec<usize>,
+    /// Number of parameters that were not fixed.
+    pub(crate) parameters: usize,
+    pub(crate) fits: Vec<Fit>,
+    pub(crate) loss: f64,
+    pub(crate) innovation_variance: f64,
+    pub(crate) residuals: usize,
+    pub(crate) states: usize,
+    pub(crate) termination: Termination,
+    pub(crate) start: String,
+    pub(crate) candidates: Vec<OrderCandidate>,
+}
+
+impl GreyBoxFit {
+    /// Order m of the remnant filter; 0 is white noise.
+    pub fn order(&self) -> usize {
+        self.layout.order
+    }
+
+    /// All orders that were tried, the one of this fit among them.
+    pub fn candidates(&self) -> &[OrderCandidate] {
+        &self.candidates
+    }
+
+    /// Name, value and standard error of each parameter that was fitted, in the coordinates of the fit: K_e (deg/deg), K_e_dot
+    /// (s) or T_L (s) where that is constrained, omega_nm (rad/s), zeta_nm, tau_e (s), T_n (s). Individual parameters carry the
+    /// number of their record.
+    pub fn parameters(&self) -> Vec<(String, Estimate)> {
+        self.layout
+            .names
+            .iter()
+            .enumerate()
+            .map(|(i, name)| (name.clone(), self.estimate(i)))
+            .collect()
+    }
+
+    /// Covariance of [`GreyBoxFit::parameters`] by rows, zero for what was fixed or rests at a bound; `None` for an exact fit.
+    pub fn covariance(&self) -> Option<&[f64]> {
+        self.covariance.as_deref()
+    }
+
+    fn estimate(&self, i: usize) -> Estimate {
+        let p = self.eta.len();
+        match &self.covariance {
+            Some(c) if self.free.contains(&i) => Estimate::with_variance(self.eta[i], c[i * p + i]),
+            _ => Estimate::fixed(self.eta[i]),
+        }
+    }
+
+    /// An estimate of `value` whose gradient is `by_gain` for K_e and `by_lead` for the second coordinate.
+    fn of_gains(&self, record: usize, value: f64, by_gain: f64, by_lead: f64) -> Estimate {
+        let places = &self.layout.positions[record];
+        let used = |place: usize, by: f64| by != 0.0 && self.free.contains(&place);
+        match &self.covariance {
+            Some(c) if used(places[0], by_gain) || used(places[LEAD], by_lead) => {
+                let mut gradient = vec![0.0; self.eta.len()];
+                gradient[places[0]] += by_gain;
+                gradient[places[LEAD]] += by_lead;
+                Estimate::with_variance(value, variance_along(&gradient, c))
+            }
+            _ => Estimate::fixed(value),
+        }
+    }
+
+    /// The operator of a record, with standard errors. `record` counts the records of the fit from 0, here and below; a number
+    /// beyond them means the last.
+    ///
+    /// # Errors
+    /// [`NotConvertible::ZeroGain`] when K_e is zero, so that there is no T_L.
+    pub fn operator(&self, record: usize) -> Result<OperatorEstimate, NotConvertible> {
+        let record = self.known(record);
+        let slots = self.layout.of_record(&self.eta, record);
+        let [k_e, k_e_dot, ..] = self.layout.operator(&slots);
+        if k_e == 0.0 {
+            return Err(NotConvertible::ZeroGain);
+        }
+        let t_l = k_e_dot / k_e;
+        let places = self.layout.positions[record];
+        let (t_l_s, k_e_dot) = match self.layout.lead {
+            Lead::RateGain => (
+                self.of_gains(record, t_l, -t_l / k_e, 1.0 / k_e),
+                self.estimate(places[LEAD]),
+            ),
+            Lead::Time => (self.estimate(places[LEAD]), self.of_gains(record, k_e_dot, t_l, k_e)),
+        };
+        Ok(OperatorEstimate {
+            k_e: self.estimate(places[0]),
+            t_l_s,
+            k_e_dot,
+            omega_nm_rad_s: self.estimate(places[2]),
+            zeta_nm: self.estimate(places[3]),
+            tau_e_s: self.estimate(places[DELAY]),
+        })
+    }
+
+    /// The operator of a record without uncertainty.
+    ///
+    /// # Errors
+    /// As [`GreyBoxFit::operator`].
+    pub fn operator_parameters(&self, record: usize) -> Result<OperatorParameters, NotConvertible> {
+        Ok(self.operator(record)?.parameters())
+    }
+
+    /// T_n and K_n of a record, the remnant held over each sample; `None` for m = 0, where the remnant is white with the standard
+    /// deviation of the innovation.
+    ///
+    /// `K_n = sigma/g(T_n)`; sigma is known to `sigma^2/(2 n)` and uncorrelated with T_n (Gaussian innovations).
+    pub fn remnant(&self, record: usize) -> Option<RemnantEstimate> {
+        if self.layout.order == 0 {
+            return None;
+        }
+        let place = self.layout.positions[self.known(record)][TIME_CONSTANT];
+        let noise = remnant_noise(self.eta[place], self.layout.order, self.layout.sample_time).ok()?;
+        let sigma = self.innovation_variance.sqrt();
+        let k_n = sigma / noise.gain;
+        let t_n_s = self.estimate(place);
+        let of_time = t_n_s.standard_error.unwrap_or(0.0) * noise.log_gain_slope;
+        let relative = of_time * of_time + 1.0 / (2.0 * self.residuals as f64);
+        let k_n = match self.covariance {
+            Some(_) => Estimate::with_variance(k_n, k_n * k_n * relative),
+            None => Estimate::fixed(k_n),
+        };
+        Some(RemnantEstimate {
+            order: self.layout.order,
+            discretisation: RemnantDiscretisation::ZeroOrderHold,
+            t_n_s,
+            k_n,
+        })
+    }
+
+    /// The same model as polynomials, for prediction, simulation and the frequency response with its bands: Box-Jenkins with
+    /// three coefficients in B. Its covariance is `J P J'` and singular, as theta has more elements than eta; parameters, criteria,
+    /// operator and remnant are those of this fit.
+    pub fn polynomial_fit(&self, record: usize) -> &Fit {
+        &self.fits[self.known(record)]
+    }
+
+    fn known(&self, record: usize) -> usize {
+        record.min(self.fits.len() - 1)
+    }
+
+    /// Loss `V = sum eps^2 / n` over the n residuals that count.
+    pub fn loss(&self) -> f64 {
+        self.loss
+    }
+
+    /// Unbiased innovation variance `sum eps^2 / (n - p - s)` with p parameters and s estimated initial states.
+    pub fn innovation_variance(&self) -> f64 {
+        self.innovation_variance
+    }
+
+    /// Number n of residuals.
+    pub fn residual_count(&self) -> usize {
+        self.residuals
+    }
+
+    /// Number s of initial states that were estimated, over all records.
+    pub fn state_count(&self) -> usize {
+        self.states
+    }
+
+    /// Number p of parameters that were not fixed.
+    pub fn parameter_count(&self) -> usize {
+        self.parameters
+    }
+
+    /// How the search ended.
+    pub fn termination(&self) -> Termination {
+        self.termination
+    }
+
+    /// The start that won.
+    pub fn start(&self) -> &str {
+        &self.start
+    }
+
+    /// Akaike's criterion `n ln V + 2 p`.
+    pub fn aic(&self) -> f64 {
+        self.residuals as f64 * self.loss.ln() + 2.0 * self.parameters as f64
+    }
+
+    /// Schwarz's (Bayesian) criterion `n ln V + p ln n`.
+    pub fn bic(&self) -> f64 {
+        let n = self.residuals as f64;
+        n * self.loss.ln() + self.parameters as f64 * n.ln()
+    }
+}

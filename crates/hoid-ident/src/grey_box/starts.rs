@@ -1,0 +1,185 @@
+//! Where the search in physical parameters starts.
+//!
+//! 1. `grid`: delays every 0.04 s over their range with a usual neuromuscular system, then at the best of them frequencies and
+//!    dampings as people have them. The residual is affine in K_e and K_e_dot, so that both are eliminated at each point; the
+//!    noise model is that of one T_n. The best points by loss are starts.
+//! 2. `box-jenkins`: the operator that a Box-Jenkins fit at the delay of the best point converts to, where it does.
+//! 3. `order m - 1`: the minimum of the order before, when several orders are tried.
+//!
+//! For each order the T_n of a start is the best of a few.
+
+use hoid_model::{Record, Structure};
+
+use crate::{Estimator, prediction_error::Workspace};
+
+use super::{
+    layout::{DELAY, LEAD, Layout, Lead, SLOTS, TIME_CONSTANT},
+    objective::PhysicalCriterion,
+};
+
+/// Spacing of the delays, s: a fraction of the period of the highest frequencies that people respond to.
+const GRID_DELAY_S: f64 = 0.04;
+/// Neuromuscular frequency with which the delays are ranked, rad/s.
+const USUAL_OMEGA: f64 = 11.0;
+/// Damping ratio with which the delays are ranked.
+const USUAL_ZETA: f64 = 0.4;
+/// Delays at which the other frequencies and dampings are tried.
+const BEST_DELAYS: usize = 2;
+/// Neuromuscular frequencies of the grid, rad/s.
+const GRID_OMEGA: [f64; 3] = [6.0, 11.0, 20.0];
+/// Damping ratios of the grid.
+const GRID_ZETA: [f64; 3] = [0.25, 0.7, 1.3];
+/// Time constants of the remnant, s; the first ranks the grid.
+pub(crate) const GRID_TIME_CONSTANT_S: [f64; 5] = [0.1, 0.012, 0.03, 0.06, 0.3];
+/// Fewest delays over a range that is not a point.
+const FEWEST_DELAYS: usize = 3;
+
+/// A start with its name: `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, T_n]`, the same for all records.
+#[derive(Debug, Clone)]
+pub(crate) struct Start {
+    pub label: String,
+    pub slots: [f64; SLOTS],
+}
+
+/// The same data with one set of parameters for all records and K_e_dot as coordinate.
+pub(crate) fn scout<'a>(criterion: &PhysicalCriterion<'a>, order: usize) -> PhysicalCriterion<'a> {
+    let of_slot = |slot: usize| {
+        let bounds = criterion
+            .layout
+            .slots
+            .iter()
+            .zip(&criterion.limits)
+            .filter(|(s, _)| **s == slot);
+        bounds.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, b)| {
+            (low.min(b.0), high.max(b.1))
+        })
+    };
+    let used = if order == 0 { TIME_CONSTANT } else { SLOTS };
+    let limits: Vec<(f64, f64)> = (0..used)
+        .map(|slot| match slot {
+            0 | LEAD => (f64::NEG_INFINITY, f64::INFINITY),
+            _ => of_slot(slot),
+        })
+        .collect();
+    let layout = Layout {
+        order,
+        lead: Lead::RateGain,
+        sample_time: criterion.layout.sample_time,
+        positions: vec![std::array::from_fn(|slot| slot); criterion.data.len()],
+        names: Vec::new(),
+        limits,
+        slots: (0..used).collect(),
+    };
+    PhysicalCriterion::new(layout, criterion.data.clone(), criterion.initial, criterion.first)
+}
+
+/// The best points of the grid, with the gains that are best for them: so many with a lead, and the best without one where it is
+/// better.
+pub(crate) fn grid(criterion: &PhysicalCriterion<'_>, starts: usize, workspace: &mut Workspace) -> Vec<Start> {
+    let scout = scout(criterion, criterion.layout.order.min(1));
+    let bounded = |slot: usize, value: f64| value.clamp(scout.limits[slot].0, scout.limits[slot].1);
+    let (low, high) = scout.limits[DELAY];
+    let intervals = match high - low {
+        width if width > 0.0 => ((width / GRID_DELAY_S).ceil() as usize).max(FEWEST_DELAYS - 1),
+        _ => 0,
+    };
+    let t_n = if scout.layout.order == 0 {
+        0.0
+    } else {
+        bounded(TIME_CONSTANT, GRID_TIME_CONSTANT_S[0])
+    };
+    let delays: Vec<f64> = (0..=intervals)
+        .map(|i| low + (high - low) * i as f64 / intervals.max(1) as f64)
+        .collect();
+    let mut ranked = |tau: f64, omega: f64, zeta: f64| {
+        let (omega, zeta) = (bounded(2, omega), bounded(3, zeta));
+        let mut slots = [0.0, 0.0, omega, zeta, tau, t_n];
+        let value = scout.best_gains(&mut slots[..scout.limits.len()], workspace)?;
+        let label = format!("grid tau_e {tau:.3} s, omega_nm {omega} rad/s, zeta_nm {zeta}");
+        Some((Start { label, slots }, value))
+    };
+    let by_loss = |points: &mut Vec<(Start, f64)>| points.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let mut points: Vec<(Start, f64)> = delays
+        .into_iter()
+        .filter_map(|tau| ranked(tau, USUAL_OMEGA, USUAL_ZETA))
+        .collect();
+    by_loss(&mut points);
+    let best: Vec<f64> = (leading(&points, BEST_DELAYS).iter()).map(|s| s.slots[DELAY]).collect();
+    for tau in best {
+        for omega in GRID_OMEGA {
+            points.extend(GRID_ZETA.iter().filter_map(|&zeta| ranked(tau, omega, zeta)));
+        }
+    }
+    by_loss(&mut points);
+    points.dedup_by(|a, b| a.0.label == b.0.label);
+    leading(&points, starts)
+}
+
+/// The first few with a lead, and the first of all: a lag in the place of the lead, with a shorter delay, imitates the phase of
+/// an operator and makes a local minimum of its own.
+fn leading(points: &[(Start, f64)], n: usize) -> Vec<Start> {
+    let has_lead = |s: &Start| s.slots[0] * s.slots[LEAD] >= 0.0;
+    let mut chosen: Vec<Start> = points
+        .iter()
+        .map(|(s, _)| s)
+        .filter(|s| has_lead(s))
+        .take(n)
+        .cloned()
+        .collect();
+    chosen.extend(points.first().map(|(s, _)| s).filter(|s| !has_lead(s)).cloned());
+    chosen
+}
+
+/// The operator of a Box-Jenkins fit at this delay.
+pub(crate) fn box_jenkins(records: &[Record], nearest: &Start, criterion: &PhysicalCriterion<'_>) -> Option<Start> {
+    let ts = criterion.layout.sample_time.s();
+    let nk = (nearest.slots[DELAY] / ts).round() as usize + 1;
+    let mut estimator = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(nk));
+    estimator.initial_state = Some(criterion.initial);
+    estimator.search.tolerance = 1e-6;
+    estimator.starts = 1;
+    let o = estimator.fit(records).ok()?.operator().ok()?;
+    let slots = [
+        o.k_e.value,
+        o.k_e_dot.value,
+        o.omega_nm_rad_s.value,
+        o.zeta_nm.value,
+        nearest.slots[DELAY],
+        nearest.slots[TIME_CONSTANT],
+    ];
+    (o.zeta_nm.value > 0.0).then(|| Start {
+        label: format!("box-jenkins nk {nk}"),
+        slots,
+    })
+}
+
+/// The start as an eta of this criterion, with the best T_n of a few for its order.
+pub(crate) fn complete(
+    criterion: &PhysicalCriterion<'_>,
+    start: &Start,
+    time_constants_s: &[f64],
+    workspace: &mut Workspace,
+) -> Vec<f64> {
+    let layout = &criterion.layout;
+    let mut slots = start.slots;
+    if layout.order > 0 {
+        let scout = scout(criterion, layout.order);
+        let (low, high) = scout.limits[TIME_CONSTANT];
+        let tried = time_constants_s.iter().map(|&t| {
+            let mut eta = start.slots.to_vec();
+            eta[TIME_CONSTANT] = t.clamp(low, high);
+            let value = scout.best_gains(&mut eta, workspace);
+            (eta, value.unwrap_or(f64::INFINITY))
+        });
+        if let Some((eta, value)) = tried.min_by(|a, b| a.1.total_cmp(&b.1))
+            && value.is_finite()
+        {
+            slots.copy_from_slice(&eta);
+        }
+    }
+    if layout.lead == Lead::Time {
+        // A start without K_e has no lead time; one second is one.
+        slots[LEAD] = if slots[0] == 0.0 { 1.0 } else { slots[LEAD] / slots[0] };
+    }
+    layout.spread(&slots)
+}

@@ -1,0 +1,142 @@
+//! The noise model of the exactly held remnant as a function of T_n alone, with its derivatives.
+//!
+//! `K_n/(T_n s + 1)^m`, driven by one normal deviate of unit variance a sample, has the innovation form `C/D eps` with
+//! `D = (1 - p q^-1)^m`, `p = e^{-Ts/T_n}`, C the monic spectral factor of the numerator of the zero-order hold
+//! ([`crate::remnant`]), and `sigma = K_n g(T_n)`. The derivatives: `dp/dT_n = p Ts/T_n^2`; a zero zeta of the numerator N moves by
+//! `-N_a/N_zeta` with `a = Ts/T_n`, its mirror image `1/conj zeta` accordingly.
+
+use crate::{
+    ModelError, SampleTime,
+    remnant::{Factored, RemnantFilter, denominator},
+};
+
+/// C, D and `g = sigma/K_n` of the innovation form, and their derivatives with respect to T_n.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RemnantNoise {
+    /// `[c1, ..., c_{m-1}]`.
+    pub c: Vec<f64>,
+    /// `[d1, ..., dm]`.
+    pub d: Vec<f64>,
+    /// Standard deviation of the innovation for K_n = 1.
+    pub gain: f64,
+    /// Derivatives of c, 1/s.
+    pub c_slope: Vec<f64>,
+    /// Derivatives of d, 1/s.
+    pub d_slope: Vec<f64>,
+    /// Derivative of `ln g`, 1/s.
+    pub log_gain_slope: f64,
+}
+
+/// The innovation form for the time constant T_n in s and the order m; m = 0 is white noise, with no coefficients and g = 1.
+///
+/// # Errors
+/// [`ModelError::OutOfRange`] when m is above 4, or T_n (which m = 0 does not use) not between 1e-9 and 1e9 samples.
+pub fn remnant_noise(time_constant_s: f64, order: usize, sample_time: SampleTime) -> Result<RemnantNoise, ModelError> {
+    if order == 0 {
+        return Ok(RemnantNoise {
+            c: Vec::new(),
+            d: Vec::new(),
+            gain: 1.0,
+            c_slope: Vec::new(),
+            d_slope: Vec::new(),
+            log_gain_slope: 0.0,
+        });
+    }
+    let a = RemnantFilter {
+        gain: 1.0,
+        time_constant_s,
+        order,
+    }
+    .ratio(sample_time)?;
+    let held = Factored::new(order, a);
+    let a_slope = -a / time_constant_s;
+    let d = denominator(order, (-a).exp());
+    // Zeros that vanish for a fast filter leave C shorter than its order.
+    let padded = |p: &[f64], factor: f64| -> Vec<f64> {
+        (1..order).map(|i| factor * p.get(i).copied().unwrap_or(0.0)).collect()
+    };
+    Ok(RemnantNoise {
+        c: padded(&held.c, 1.0),
+        c_slope: padded(&held.c_derivative, a_slope),
+        // d_i goes with p^i, and p with e^-a.
+        d_slope: (1..=order).map(|i| -(i as f64) * d[i] * a_slope).collect(),
+        d: d[1..].to_vec(),
+        gain: held.innovation_sd,
+        log_gain_slope: held.log_derivative * a_slope,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::remnant::RemnantDiscretisation;
+
+    fn ts() -> SampleTime {
+        SampleTime::new(0.01).unwrap()
+    }
+
+    const CONSTANTS: [f64; 6] = [0.06, 0.003, 0.0004, 0.012, 0.5, 20.0];
+
+    #[test]
+    fn agrees_with_the_noise_model_of_the_filter() {
+        for m in 1..=4 {
+            for t_n in CONSTANTS {
+                let ours = remnant_noise(t_n, m, ts()).unwrap();
+                let filter = RemnantFilter::new(0.3, t_n, m).unwrap();
+                let known = filter.noise_model(ts(), RemnantDiscretisation::ZeroOrderHold).unwrap();
+                assert_eq!((ours.c.len(), ours.d.len()), (m - 1, m));
+                assert_eq!(ours.c[..known.c.len() - 1], known.c[1..]);
+                assert_eq!(ours.d, known.d[1..]);
+                assert!((0.3 * ours.gain / known.innovation_sd - 1.0).abs() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn spectrum_of_second_order_in_closed_form() {
+        // n_1 = 1 - p - a p and n_2 = p (p - 1 + a) of the hold of 1/(T_n s + 1)^2: sigma^2 C C* has to be N N*.
+        let a: f64 = 1.0 / 6.0;
+        let p = (-a).exp();
+        let (n1, n2) = (1.0 - p - a * p, p * (p - 1.0 + a));
+        let ours = remnant_noise(0.06, 2, ts()).unwrap();
+        let g2 = ours.gain * ours.gain;
+        assert!((g2 * (1.0 + ours.c[0] * ours.c[0]) / (n1 * n1 + n2 * n2) - 1.0).abs() < 1e-12);
+        assert!((g2 * ours.c[0] / (n1 * n2) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn slopes_agree_with_finite_differences() {
+        for m in 1..=4 {
+            for t_n in CONSTANTS {
+                let exact = remnant_noise(t_n, m, ts()).unwrap();
+                let h = 1e-5 * t_n;
+                let (up, down) = (
+                    remnant_noise(t_n + h, m, ts()).unwrap(),
+                    remnant_noise(t_n - h, m, ts()).unwrap(),
+                );
+                let pairs = [
+                    (&exact.c_slope, &up.c, &down.c),
+                    (&exact.d_slope, &up.d, &down.d),
+                    (&vec![exact.log_gain_slope], &vec![up.gain.ln()], &vec![down.gain.ln()]),
+                ];
+                for (slope, up, down) in pairs {
+                    for ((s, u), d) in slope.iter().zip(up).zip(down) {
+                        let difference = (u - d) / (2.0 * h);
+                        // Rounding: coefficients up to 6 with 1e-16 (zeros of m = 4 with 1e-14) over h; truncation (h/T_n)^2.
+                        let bound = 2e-8 * difference.abs() + 5e-14 / h;
+                        assert!((s - difference).abs() < bound, "m {m} T_n {t_n}: {s} and {difference}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn white_noise_and_what_is_no_filter() {
+        let white = remnant_noise(f64::NAN, 0, ts()).unwrap();
+        assert!(white.c.is_empty() && white.d.is_empty() && white.gain == 1.0);
+        for (t_n, m) in [(0.06, 5), (0.0, 1), (-0.1, 2), (f64::NAN, 1), (1e-100, 3), (1e100, 3)] {
+            assert!(remnant_noise(t_n, m, ts()).is_err(), "{t_n} {m}");
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! The numbers of the page "Evidence" of the book that take too long for a test.
+//!
+//! `cargo run --release -p hoid --example evidence -- coverage|efficiency|starts|delay [RUNS]`
+#![allow(clippy::unwrap_used)]
+
+#[path = "../tests/common/textbook.rs"]
+mod textbook;
+
+use hoid::{
+    ident::{GreyBox, OrderRanges, choose_orders, order_search::Criterion},
+    model::{
+        remnant::RemnantDiscretisation,
+        remnant_gain::NoiseDefinition,
+        scenario::{OperatingState, RemnantStrength},
+    },
+    prelude::*,
+};
+use textbook::Truth;
+
+const NK: usize = 29;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let runs = arguments.get(1).map(|n| n.parse().unwrap());
+    match arguments.first().map(String::as_str) {
+        Some("coverage") => {
+            textbook_coverage(runs.unwrap_or(2000));
+            closed_loop(runs.unwrap_or(2000));
+        }
+        Some("efficiency") => closed_loop(runs.unwrap_or(2000)),
+        Some("starts") => starts(runs.unwrap_or(100)),
+        Some("delay") => delay(runs.unwrap_or(100)),
+        _ => println!("coverage, efficiency, starts or delay, and a number of runs"),
+    }
+}
+
+fn simulator(condition: Condition, remnant_order: usize, noise_level: f64) -> Simulator {
+    let mut scenario = Scenario::condition(condition);
+    scenario.remnant.order = remnant_order;
+    scenario.remnant.strength = RemnantStrength::Level {
+        level: noise_level,
+        definition: NoiseDefinition::Response,
+    };
+    Simulator::new(&scenario).unwrap()
+}
+
+fn run(simulator: &Simulator, cell: u64, replication: u64) -> Record {
+    let stream = Stream {
+        seed: 2000,
+        cell,
+        replication,
+    };
+    simulator.run(stream, false).unwrap()
+}
+
+/// Estimates of one quantity over the runs.
+#[derive(Default)]
+struct Tally {
+    name: String,
+    truth: f64,
+    values: Vec<f64>,
+    bounds: Vec<f64>,
+    inside: usize,
+    without: usize,
+}
+
+#[derive(Default)]
+struct Tallies(Vec<Tally>);
+
+impl Tallies {
+    /// Adds an estimate, and the variance that the Cramer-Rao bound allows it (not a number where that is not asked).
+    fn add(&mut self, name: &str, estimate: Estimate, truth: f64, bound: f64) {
+        let at = match self.0.iter().position(|t| t.name == name) {
+            Some(at) => at,
+            None => {
+                self.0.push(Tally {
+                    name: name.to_owned(),
+                    truth,
+                    ..Tally::default()
+                });
+                self.0.len() - 1
+            }
+        };
+        let tally = &mut self.0[at];
+        let Some(error) = estimate.standard_error else {
+            tally.without += 1;
+            return;
+        };
+        tally.values.push(estimate.value - truth);
+        tally.bounds.push(bound);
+        tally.inside += usize::from((estimate.value - truth).abs() < 1.959_964 * error);
+    }
+
+    fn print(&mut self) {
+        println!("  quantity     median bias   spread       coverage   variance / CRB");
+        for tally in &mut self.0 {
+            let n = tally.values.len() as f64;
+            let mean = tally.values.iter().sum::<f64>() / n;
+            let variance = tally.values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+            let bound = tally.bounds.iter().sum::<f64>() / n;
+            tally.values.sort_by(f64::total_cmp);
+            let percent = |x: f64| 100.0 * x / tally.truth.abs();
+            println!(
+                "  {:10} {:+10.2} % {:10.2} %   {:8.3}   {:8.3}   {}",
+                tally.name,
+                percent(tally.values[tally.values.len() / 2]),
+                percent(variance.sqrt()),
+                tally.inside as f64 / n,
+                variance / bound,
+                if tally.without > 0 {
+                    format!("({} without a standard error)", tally.without)
+                } else {
+                    String::new()
+                }
+            );
+        }
+    }
+}
+
+fn textbook_coverage(runs: u64) {
+    for structure in Structure::ALL {
+        let truth = Truth::of(structure);
+        let mut tallies = Tallies::default();
+        for seed in 0..runs {
+            let record = truth.record(400, 0.5, 10_000 + seed);
+            let fit = Estimator::new(structure, truth.orders()).fit(&[record]).unwrap();
+            for ((name, estimate), value) in fit.parameters().into_iter().zip(truth.theta()) {
+                tallies.add(&name, estimate, value, f64::NAN);
+            }
+        }
+        println!("{structure}, open loop, 400 samples, {runs} runs");
+        tallies.print();
+    }
+}
+
+fn closed_loop(runs: u64) {
+    for (condition, state) in [
+        (Condition::C1, OperatingState::s1()),
+        (Condition::C2, OperatingState::s2()),
+    ] {
+        let simulator = simulator(condition, 1, 0.1);
+        let held = state.operator.discretise(SampleTime::HUNDREDTH).unwrap().held;
+        let theta = [held.b0, held.b1, -(-0.01_f64 / 0.06).exp(), held.f1, held.f2];
+        let o = state.operator;
+        let bj = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(NK));
+        // No step from the truth: the covariance is the Cramer-Rao bound of this record.
+        let mut at_truth = bj.clone();
+        at_truth.start = Some(theta.to_vec());
+        at_truth.search.max_iterations = 0;
+        let (mut box_jenkins, mut grey) = (Tallies::default(), Tallies::default());
+        let (mut grey_failed, mut bj_failed) = (0, 0);
+        for replication in 0..runs {
+            let record = [run(&simulator, condition as u64, replication)];
+            let k_n = record[0].channel("K_n").unwrap()[0];
+            let fit = bj.fit(&record).unwrap();
+            let bound = at_truth.fit(&record).unwrap();
+            for (i, (name, estimate)) in fit.parameters().into_iter().enumerate() {
+                box_jenkins.add(&name, estimate, theta[i], bound.covariance().unwrap()[i * 6]);
+            }
+            let variance = |e: &Estimate| e.standard_error.map_or(f64::NAN, |s| s * s);
+            match (fit.operator(), bound.operator()) {
+                (Ok(found), Ok(bound)) => {
+                    let truths = [o.k_e, o.t_l_s, o.k_e_dot(), o.omega_nm_rad_s, o.zeta_nm];
+                    for (((name, _, e), (_, _, b)), truth) in found.rows().iter().zip(bound.rows()).zip(truths) {
+                        box_jenkins.add(name, *e, truth, variance(&b));
+                    }
+                }
+                _ => bj_failed += 1,
+            }
+            if let (Ok(found), Ok(bound)) = (
+                fit.remnant(RemnantDiscretisation::ZeroOrderHold),
+                bound.remnant(RemnantDiscretisation::ZeroOrderHold),
+            ) {
+                box_jenkins.add("T_n", found.t_n_s, 0.06, variance(&bound.t_n_s));
+                box_jenkins.add("K_n", found.k_n, k_n, variance(&bound.k_n));
+            }
+            match GreyBox::new(1..=1).fit(&record) {
+                Ok(fit) => {
+                    if let Ok(found) = fit.operator(0) {
+                        let truths = [o.k_e, o.t_l_s, o.k_e_dot(), o.omega_nm_rad_s, o.zeta_nm, o.tau_e_s];
+                        for ((name, _, e), truth) in found.rows().iter().zip(truths) {
+                            grey.add(name, *e, truth, variance(e));
+                        }
+                    }
+                    if let Some(r) = fit.remnant(0) {
+                        grey.add("T_n", r.t_n_s, 0.06, variance(&r.t_n_s));
+                        grey.add("K_n", r.k_n, k_n, variance(&r.k_n));
+                    }
+                }
+                Err(_) => grey_failed += 1,
+            }
+        }
+        println!(
+            "{condition:?}, m0 = 1, P_n = .1, BJ(m* = 1), {runs} runs; bound at the truth; {bj_failed} not convertible"
+        );
+        box_jenkins.print();
+        println!("{condition:?}, grey box; bound at the estimates; {grey_failed} failed");
+        grey.print();
+    }
+}
+
+/// Table 6.1: the same minimum from each initial condition.
+fn starts(runs: u64) {
+    let gains = [0.075, 0.05, 0.1];
+    let poles = [[-1.912, 0.924], [-1.812, 0.824], [-1.962, 0.974]];
+    for m0 in 1..=4 {
+        let simulator = simulator(Condition::C1, m0, 0.1);
+        let orders = Orders {
+            nd: m0,
+            ..Structure::BoxJenkins.operator_orders(NK)
+        };
+        let mut missed = [0; 10];
+        for replication in 0..runs {
+            let record = [run(&simulator, 60 + m0 as u64, replication)];
+            let fit = |start: Option<Vec<f64>>| {
+                let estimator = Estimator {
+                    start,
+                    ..Estimator::new(Structure::BoxJenkins, orders)
+                };
+                estimator.fit(&record).map_or(f64::INFINITY, |f| f.loss())
+            };
+            let mut losses = vec![fit(None)];
+            for gain in gains {
+                for [f1, f2] in poles {
+                    let mut theta = vec![gain, -gain];
+                    theta.extend(vec![0.0; m0]);
+                    theta.extend([f1, f2]);
+                    losses.push(fit(Some(theta)));
+                }
+            }
+            let best = losses.iter().copied().fold(f64::INFINITY, f64::min);
+            for (count, loss) in missed.iter_mut().zip(&losses) {
+                *count += u32::from(*loss > best * (1.0 + 1e-6));
+            }
+        }
+        println!("m0 = {m0}, {runs} runs: other minima from own start, base, IC2.., by gains then poles: {missed:?}");
+    }
+}
+
+/// Share of runs in which the loss is smallest at the true delay.
+fn delay(runs: u64) {
+    for m0 in 1..=4 {
+        for noise_level in [0.01, 0.1, 0.3] {
+            let simulator = simulator(Condition::C1, m0, noise_level);
+            let mut found = [0; 2];
+            let mut near = [0; 2];
+            for replication in 0..runs {
+                let record = [run(&simulator, 100 + m0 as u64, replication)];
+                for (i, structure) in [Structure::Arx, Structure::BoxJenkins].into_iter().enumerate() {
+                    let mut ranges = OrderRanges::from(structure.operator_orders(NK));
+                    ranges.nk = 20..=40;
+                    if structure == Structure::BoxJenkins {
+                        ranges.nd = m0..=m0;
+                    }
+                    let template = Estimator::new(structure, structure.operator_orders(NK));
+                    let choice = choose_orders(&template, &ranges, Criterion::Loss, &record).unwrap();
+                    let nk = choice.fit.orders().nk;
+                    found[i] += u32::from(nk == NK);
+                    near[i] += u32::from(nk.abs_diff(NK) <= 1);
+                }
+            }
+            let share = |n: u32| 100.0 * f64::from(n) / runs as f64;
+            println!(
+                "m0 = {m0}, P_n = {noise_level}: nk = 29 found by ARX {:.0} %, BJ {:.0} %; within one sample ARX {:.0} %, BJ {:.0} %",
+                share(found[0]),
+                share(found[1]),
+                share(near[0]),
+                share(near[1])
+            );
+        }
+    }
+}
