@@ -24,6 +24,7 @@ use crate::{
     search::{Minimum, minimise},
 };
 
+mod assemble;
 mod interval;
 mod layout;
 mod noise_level;
@@ -108,7 +109,7 @@ impl TimeVarying {
         let mut lower = 0;
         loop {
             let constant = self.without_change(&criterion, &minimum.theta)?;
-            fit = result::assemble(&criterion, &minimum, start.clone(), &constant, levels)?;
+            fit = assemble::assemble(&criterion, &minimum, start.clone(), &constant, levels)?;
             if !self.likelihood_intervals {
                 break;
             }
