@@ -85,7 +85,7 @@ pub(crate) fn likelihood_interval(
     } else {
         0.05
     };
-    let first_step = FIRST_STEP * standard_error.unwrap_or(finest).clamp(finest, 0.1 * (high - low));
+    let first_step = FIRST_STEP * standard_error.unwrap_or(finest).max(finest).min(0.1 * (high - low));
     let mut ends = [low, high];
     for (end, sign) in ends.iter_mut().zip([-1.0, 1.0]) {
         let bound = *end;

@@ -89,7 +89,7 @@ pub(crate) fn limits(
         let (widest, usual) = match i {
             MIDPOINT => ((from, to), (from + ENDS * span, to - ENDS * span)),
             LOG_RATE => {
-                let slowest = SLOWEST / span;
+                let slowest = (SLOWEST / span).min(FASTEST / frame.ts_s);
                 ((slowest, FASTEST_GIVEN / frame.ts_s), (slowest, FASTEST / frame.ts_s))
             }
             OMEGA => {

@@ -24,6 +24,7 @@ use crate::{
     search::{Minimum, minimise},
 };
 
+mod assemble;
 mod interval;
 mod layout;
 mod noise_level;
@@ -68,7 +69,8 @@ pub struct TimeVarying {
 }
 
 impl Default for TimeVarying {
-    /// First-order noise, delay between 0.05 and 0.6 s, noise level that changes, own starts.
+    /// First-order noise, delay between 0.05 and 0.6 s, noise level that changes, own starts; searches of up to 200 steps
+    /// to a relative decrease of 1e-10 (a thousandth of a standard error): a small change fills its loss with ripples in t_M.
     fn default() -> Self {
         Self {
             nd: 1,
@@ -76,7 +78,11 @@ impl Default for TimeVarying {
             constraints: BTreeMap::new(),
             noise_level: NoiseLevel::default(),
             start: None,
-            search: SearchOptions::default(),
+            search: SearchOptions {
+                max_iterations: 200,
+                tolerance: 1e-10,
+                ..SearchOptions::default()
+            },
             likelihood_intervals: true,
         }
     }
@@ -102,19 +108,22 @@ impl TimeVarying {
     pub fn fit(&self, records: &[Record]) -> Result<TimeVaryingFit, IdentError> {
         let sample_time = checks::common_sample_time(records)?;
         let mut criterion = self.criterion(records, sample_time)?;
-        let (start, minimum) = self.best_minimum(&criterion, records)?;
+        let (mut start, minimum) = self.best_minimum(&criterion, records)?;
         let (mut minimum, mut levels) = self.with_levels(&mut criterion, minimum)?;
         let mut fit;
         let mut lower = 0;
         loop {
             let constant = self.without_change(&criterion, &minimum.theta)?;
-            fit = result::assemble(&criterion, &minimum, start.clone(), &constant, levels)?;
+            fit = assemble::assemble(&criterion, &minimum, start.clone(), &constant, levels)?;
             if !self.likelihood_intervals {
                 break;
             }
             match fit.add_intervals(&criterion, &minimum) {
                 Some(theta) if lower < MOST_LOWER => {
                     lower += 1;
+                    if lower == 1 {
+                        start += "; then a lower minimum along t_M or G";
+                    }
                     let iterations = minimum.termination.iterations;
                     let found = search(&criterion, theta, &self.search, None).ok_or(IdentError::NoFiniteLoss)?;
                     (minimum, levels) = self.with_levels(&mut criterion, found)?;
