@@ -42,7 +42,6 @@ use crate::{
 };
 use equation::{Problem, Source};
 
-#[allow(unused_imports)] // As in its own file.
 pub(crate) use chain::instrument_chain;
 
 /// Residuals below this share of the output, in amplitude, are rounding.
