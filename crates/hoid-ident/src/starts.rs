@@ -24,6 +24,7 @@ use crate::{
     least_squares::{dot, solve_symmetric},
     prediction_error::{Criterion, Data, InitialState, Workspace, first_residual},
     search::Objective,
+    shared_poles,
 };
 
 /// Steps of Steiglitz and McBride.
@@ -48,9 +49,18 @@ const COMPLETED: usize = 4;
 
 /// The best starts, best first.
 pub(crate) fn propose(criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> Vec<Start> {
+    let starts = from_poles(criterion, sample_time, workspace);
+    if shared_poles::concerns(&criterion.orders) {
+        return ranked(shared_poles::propose(criterion, starts, workspace));
+    }
+    ranked(starts)
+}
+
+/// Starts from proposals for F.
+fn from_poles(criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> Vec<(Start, f64)> {
     if criterion.orders.nf == 0 {
         let linear = vec![("linear".to_owned(), Vec::new())];
-        return ranked(completed(criterion, linear, workspace));
+        return completed(criterion, linear, workspace);
     }
     let slow = continuation::propose(criterion, sample_time, workspace);
     let mut proposals: Vec<(String, Vec<f64>)> = slow
@@ -79,7 +89,7 @@ pub(crate) fn propose(criterion: &Criterion<'_>, sample_time: SampleTime, worksp
         let label = "instruments".to_owned();
         starts.push((Start { label, theta }, value));
     }
-    ranked(starts)
+    starts
 }
 
 /// The best starts of the pole grid alone.
@@ -108,6 +118,7 @@ fn completed(
         .collect()
 }
 
+/// Best first.
 fn ranked(mut starts: Vec<(Start, f64)>) -> Vec<Start> {
     starts.sort_by(|a, b| a.1.total_cmp(&b.1));
     starts.into_iter().map(|(start, _)| start).collect()
@@ -159,7 +170,7 @@ fn grid_poles(nf: usize, omega: f64, zeta: f64, ts: f64) -> Vec<Complex64> {
 }
 
 /// A of an ARX fit with as many poles as F has, unstable ones reflected into the circle.
-fn arx_poles(criterion: &Criterion<'_>, data: &[Data<'_>], workspace: &mut Workspace) -> Option<Vec<f64>> {
+pub(crate) fn arx_poles(criterion: &Criterion<'_>, data: &[Data<'_>], workspace: &mut Workspace) -> Option<Vec<f64>> {
     let orders = Orders {
         na: criterion.orders.nf,
         nb: criterion.orders.nb,
