@@ -198,6 +198,25 @@ impl Estimator {
                 best = Some((label, minimum));
             }
         }
+        if self.start.is_none()
+            && let Some((_, minimum)) = &best
+            && matches!(minimum.termination.reason, Reason::Border | Reason::NoDescent)
+        {
+            // The loss often has a minimum on the border besides a lower one inside.
+            let o = criterion.orders;
+            let inside = starts::with_c_drawn_inside(&o, &minimum.theta);
+            let known = minimum.at.sum_of_squares;
+            let others = inside
+                .into_iter()
+                .filter_map(|theta| minimise(&informed, theta, &self.search, Some(known), &mut workspace));
+            if let Some(lower) = others.min_by(|a, b| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares))
+                && lower.at.sum_of_squares < known
+                && let Some((label, best)) = &mut best
+            {
+                label.push_str(", C drawn inside");
+                *best = lower;
+            }
+        }
         let (start, minimum) = best.ok_or(IdentError::NoFiniteLoss)?;
         let exact = minimum.termination.reason == Reason::ExactFit;
         if let (Loss::Huber { threshold }, false) = (self.loss, exact) {

@@ -6,7 +6,7 @@
 //! | `prediction_error` | the criterion of the general model and its gradients |
 //! | `initial_states` | what a record does not say about its past, eliminated exactly |
 //! | `stationary_past` | the noise before the record, when it was stationary |
-//! | `search` | damped Gauss-Newton |
+//! | `search`, `stable_coordinates` | damped Gauss-Newton, also along the border of stability |
 //! | `objective`, `robust`, `simulation_focus` | bounds and priors, a loss against outliers, models that are to simulate |
 //! | `starts`, `continuation`, `shared_poles` | where the search begins when nobody says |
 //! | `arx`, `least_squares` | linear regression by QR with column pivoting |
@@ -38,6 +38,7 @@ mod robust;
 mod search;
 mod shared_poles;
 mod simulation_focus;
+mod stable_coordinates;
 mod starts;
 mod stationary_past;
 mod time_varying;

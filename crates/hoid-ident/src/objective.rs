@@ -3,6 +3,8 @@
 //! `N V(theta) = sum eps^2 + N sum_i w_i (theta_i - theta*_i)^2` (the regularised criterion of L. Ljung, *System
 //! Identification*, 1999, eq. 7.107), with bounds on each parameter, and on request only models that are stable from e to u.
 
+use std::ops::Range;
+
 use hoid_core::stability::roots_inside;
 
 use crate::{
@@ -52,6 +54,19 @@ impl Objective for Informed<'_, '_> {
 
     fn output_power(&self) -> f64 {
         self.criterion.output_power()
+    }
+
+    fn stable_blocks(&self) -> Vec<Range<usize>> {
+        let mut blocks = self.criterion.stable_blocks();
+        let of_a = 0..self.criterion.orders.na;
+        if self.stable && !of_a.is_empty() && !blocks.contains(&of_a) {
+            blocks.push(of_a);
+        }
+        if let Some(limits) = &self.limits {
+            let unlimited = |i: usize| limits[i] == (f64::NEG_INFINITY, f64::INFINITY);
+            blocks.retain(|block| block.clone().all(unlimited));
+        }
+        blocks
     }
 
     fn limits(&self) -> Option<&[(f64, f64)]> {

@@ -31,7 +31,7 @@
 //!
 //! **Weights** multiply the squared residuals; they serve the robust loss.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, ops::Range};
 
 use hoid_core::{filter::divide_in_place, stability::roots_inside};
 use hoid_model::Orders;
@@ -511,6 +511,18 @@ impl Objective for Criterion<'_> {
             self.add_penalty(&passed, &mut total);
         }
         total
+    }
+
+    fn stable_blocks(&self) -> Vec<Range<usize>> {
+        let o = &self.orders;
+        let (c, d) = (o.na + o.nb, o.na + o.nb + o.nc);
+        let noise_poles = match self.initial {
+            InitialState::Backcast if o.nb == 0 && o.nd == 0 => 0..o.na,
+            InitialState::Backcast => d..d + o.nd,
+            _ => 0..0,
+        };
+        let blocks = [c..d, d + o.nd..o.parameters(), noise_poles];
+        blocks.into_iter().filter(|block| !block.is_empty()).collect()
     }
 
     fn output_power(&self) -> f64 {

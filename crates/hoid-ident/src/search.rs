@@ -7,7 +7,7 @@
 //! | Levenberg-Marquardt | `(H + mu diag H)^-1 g`, mu by the ratio of gained to promised decrease (H. B. Nielsen, *Damping parameter in Marquardt's method*, IMM-REP-1999-05, DTU) |
 //! | Gauss-Newton | `H^-1 g`, halved until the loss falls |
 //! | steepest descent | `alpha (diag H)^-1 g`, alpha best for the quadratic model, halved until the loss falls |
-//! | automatic | Levenberg-Marquardt; where it finds no lower loss although the gradient is not zero, a run of steepest descent and Levenberg-Marquardt once more |
+//! | automatic | Levenberg-Marquardt; where it finds no lower loss although the gradient is not zero, it goes on in coordinates in which the border of stability is a bound ([`crate::stable_coordinates`]) |
 //!
 //! A step that makes the predictor unstable counts as one that does not lower the loss.
 //!
@@ -20,11 +20,12 @@
 //! `sqrt(tolerance N)`, 1e-4 for the default and 8192 samples; that last step is still taken. Where no step lowers the loss any
 //! more and the promise is as small as the rounding of the loss, it has converged as well.
 
-use std::fmt;
+use std::{fmt, ops::Range};
 
 use crate::{
     least_squares::{dot, solve_symmetric},
     prediction_error::{Linearisation, Workspace},
+    stable_coordinates::StableCoordinates,
 };
 
 /// A sum of squares over theta with its derivatives: what the search needs to know of a model.
@@ -39,12 +40,16 @@ pub(crate) trait Objective {
     fn limits(&self) -> Option<&[(f64, f64)]> {
         None
     }
+    /// Places of the polynomials in theta that must be stable and have no limits of their own.
+    fn stable_blocks(&self) -> Vec<Range<usize>> {
+        Vec::new()
+    }
 }
 
 /// How a step is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SearchMethod {
-    /// Levenberg-Marquardt, helped by steepest descent where it cannot go on.
+    /// Levenberg-Marquardt, along the border of stability where that is in the way.
     #[default]
     Automatic,
     /// Gauss-Newton with halved steps.
@@ -84,6 +89,8 @@ pub enum Reason {
     Direct,
     /// The next step promises no decrease that matters.
     SmallDecrease,
+    /// The loss is smallest on the border of stability: a root of C or F lies on the unit circle.
+    Border,
     /// The residuals are zero up to rounding.
     ExactFit,
     /// The limit of iterations was reached first.
@@ -101,6 +108,9 @@ impl fmt::Display for Reason {
         f.write_str(match self {
             Self::Direct => "solved directly (linear least squares)",
             Self::SmallDecrease => "converged: the next step promises no decrease of the loss",
+            Self::Border => {
+                "converged at the border of stability: a root of C or F lies on the unit circle, and standard errors mean little"
+            }
             Self::ExactFit => "converged: the residuals are zero up to rounding",
             Self::IterationLimit => "not converged: iteration limit reached",
             Self::NoDescent => "not converged: no step inside the region of stable C and F lowers the loss",
@@ -126,7 +136,7 @@ impl Termination {
     pub fn converged(&self) -> bool {
         matches!(
             self.reason,
-            Reason::Direct | Reason::SmallDecrease | Reason::ExactFit | Reason::Settled
+            Reason::Direct | Reason::SmallDecrease | Reason::Border | Reason::ExactFit | Reason::Settled
         )
     }
 }
@@ -168,16 +178,12 @@ pub(crate) fn minimise(
     };
     let reason = match options.method {
         SearchMethod::Automatic => {
-            let mut reason = search.descend(SearchMethod::LevenbergMarquardt, options.max_iterations)?;
+            let reason = search.descend(SearchMethod::LevenbergMarquardt, options.max_iterations)?;
             if reason == Reason::NoDescent {
-                let before = search.at.sum_of_squares;
-                let help = (search.iterations + STEEPEST_HELP).min(options.max_iterations);
-                search.descend(SearchMethod::SteepestDescent, help)?;
-                if search.at.sum_of_squares < before * (1.0 - options.tolerance) {
-                    reason = search.descend(SearchMethod::LevenbergMarquardt, options.max_iterations)?;
-                }
+                search.follow_the_border()?
+            } else {
+                reason
             }
-            reason
         }
         method => search.descend(method, options.max_iterations)?,
     };
@@ -218,9 +224,6 @@ const BASIN: f64 = 0.05;
 /// digits.
 const ROUNDING: f64 = 1e-10;
 
-/// Steps of steepest descent that help a search that cannot go on.
-const STEEPEST_HELP: usize = 10;
-
 struct Search<'s, O> {
     objective: &'s O,
     workspace: &'s mut Workspace,
@@ -232,6 +235,38 @@ struct Search<'s, O> {
 }
 
 impl<O: Objective> Search<'_, O> {
+    /// Goes on in coordinates in which the border of stability is a bound. `None` as in [`Search::descend`].
+    fn follow_the_border(&mut self) -> Option<Reason> {
+        let Some((coordinates, kappa)) = StableCoordinates::of(self.objective, &self.theta) else {
+            return Some(Reason::NoDescent);
+        };
+        if !coordinates.is_feasible(&kappa) {
+            return Some(Reason::NoDescent);
+        }
+        let at = coordinates.linearise(&kappa, self.workspace);
+        let mut along = Search {
+            objective: &coordinates,
+            workspace: self.workspace,
+            options: self.options,
+            rival: self.rival,
+            theta: kappa,
+            at,
+            iterations: self.iterations,
+        };
+        let reason = along.descend(SearchMethod::LevenbergMarquardt, self.options.max_iterations)?;
+        let (kappa, iterations) = (along.theta, along.iterations);
+        let theta = coordinates.theta(&kappa);
+        let there = self.objective.linearise(&theta, self.workspace);
+        self.iterations = iterations;
+        if there.sum_of_squares <= self.at.sum_of_squares {
+            (self.theta, self.at) = (theta, there);
+        }
+        Some(match reason {
+            Reason::SmallDecrease if coordinates.is_on_border(&kappa) => Reason::Border,
+            reason => reason,
+        })
+    }
+
     /// Steps of one method until it ends. `None` when the loss is not finite or the rival will not be beaten.
     fn descend(&mut self, method: SearchMethod, max_iterations: usize) -> Option<Reason> {
         let power = self.objective.output_power();

@@ -58,6 +58,9 @@ pub(crate) fn propose(criterion: &Criterion<'_>, sample_time: SampleTime, worksp
 
 /// Starts from proposals for F.
 fn from_poles(criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> Vec<(Start, f64)> {
+    if criterion.orders.nb == 0 {
+        return time_series(criterion, workspace);
+    }
     if criterion.orders.nf == 0 {
         let linear = vec![("linear".to_owned(), Vec::new())];
         return completed(criterion, linear, workspace);
@@ -206,6 +209,36 @@ fn steiglitz_mcbride(criterion: &Criterion<'_>, mut f: Vec<f64>, workspace: &mut
     Some(f)
 }
 
+/// Theta with the roots of C drawn towards the origin, `c_i rho^i`, and with pairs of them turned off the real axis: starts for a
+/// search that ended on the unit circle.
+pub(crate) fn with_c_drawn_inside(o: &Orders, theta: &[f64]) -> Vec<Vec<f64>> {
+    let block = o.na + o.nb..o.na + o.nb + o.nc;
+    let c = &theta[block.clone()];
+    let mut all = Vec::new();
+    if c.is_empty() {
+        return all;
+    }
+    let mut push = |c: &[f64]| {
+        let mut start = theta.to_vec();
+        start[block.clone()].copy_from_slice(c);
+        all.push(start);
+    };
+    for rho in DRAWN {
+        let drawn: Vec<f64> = c.iter().zip(1..).map(|(ci, i)| ci * f64::powi(rho, i)).collect();
+        push(&drawn);
+    }
+    // (1 + x q^-1)^n with the same sum of roots.
+    let x = (c[0] / c.len() as f64).clamp(-0.95, 0.95);
+    let multiple = polynomial::from_roots(&vec![Complex64::new(-x, 0.0); c.len()]);
+    if multiple.len() == c.len() + 1 {
+        push(&multiple[1..]);
+    }
+    all
+}
+
+/// Factors by which roots on the circle are drawn inside.
+const DRAWN: [f64; 2] = [0.95, 0.8];
+
 /// The same polynomial with each root outside the circle replaced by the inverse of its conjugate.
 pub(crate) fn reflected_inside(coefficients: &[f64]) -> Option<Vec<f64>> {
     if roots_inside(coefficients, 1.0) {
@@ -230,9 +263,6 @@ pub(crate) fn reflected_inside(coefficients: &[f64]) -> Option<Vec<f64>> {
 /// (generalised least squares; D. W. Clarke, *IFAC Symposium on Identification*, Prague 1967).
 fn complete(criterion: &Criterion<'_>, f: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, f64)> {
     let o = criterion.orders;
-    if o.nb == 0 {
-        return time_series(criterion, workspace);
-    }
     let linear = o.na + o.nb;
     let white = Criterion {
         orders: Orders { nc: 0, nd: 0, ..o },
@@ -266,20 +296,27 @@ fn complete(criterion: &Criterion<'_>, f: &[f64], workspace: &mut Workspace) -> 
     Some((theta, value))
 }
 
-/// Start of a model of the output alone, `u = C/(A D) eps`, by Hannan and Rissanen: A takes the autoregression where it is
-/// there, D starts at one.
-fn time_series(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Option<(Vec<f64>, f64)> {
+/// Starts of a model of the output alone, `u = (C/A) eps`: A and C by Hannan and Rissanen, which cancel each other in part where
+/// the roots of C are near the unit circle and the long autoregression is too short; and A by its own autoregression, with the
+/// same C and with C = 1.
+fn time_series(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<(Start, f64)> {
     let o = criterion.orders;
     let outputs: Vec<Vec<f64>> = criterion.data.iter().map(|d| d.u.to_vec()).collect();
-    let (c, mut a) = noise_model(&outputs, o.nc, o.na);
-    if o.na > 0 {
-        a = reflected_inside(&a)?;
+    let (c, a) = noise_model(&outputs, o.nc, o.na);
+    let mut proposals = vec![("hannan-rissanen", a, c.clone())];
+    if o.na > 0 && o.nc > 0 {
+        let (_, alone) = noise_model(&outputs, 0, o.na);
+        proposals.push(("autoregression", alone.clone(), c));
+        proposals.push(("autoregression, C = 1", alone, vec![0.0; o.nc]));
     }
-    let mut theta = a;
-    theta.extend(c);
-    theta.resize(o.parameters(), 0.0);
-    let value = criterion.linearise(&theta, workspace).sum_of_squares;
-    value.is_finite().then_some((theta, value))
+    let start = |(label, a, c): (&str, Vec<f64>, Vec<f64>)| {
+        let mut theta = if o.na > 0 { reflected_inside(&a)? } else { a };
+        theta.extend(c);
+        let label = label.to_owned();
+        let value = criterion.linearise(&theta, workspace).sum_of_squares;
+        value.is_finite().then_some((Start { label, theta }, value))
+    };
+    proposals.into_iter().filter_map(start).collect()
 }
 
 /// C and D of `v = (C/D) eps` by Hannan and Rissanen (*Biometrika* 69 (1982) 81-94): with nc = 0 one autoregression, else a long
