@@ -3,7 +3,7 @@
 use std::{ops::RangeInclusive, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use hoid_ident::{Focus, InitialState, SearchMethod, order_search::Criterion};
+use hoid_ident::{Focus, InitialState, IvMethod, SearchMethod, order_search::Criterion};
 use hoid_model::{
     ContinuousTransferFunction, Detrend, Structure, discretise,
     remnant::RemnantDiscretisation,
@@ -134,9 +134,29 @@ pub struct IdentifyArgs {
     pub records: Vec<PathBuf>,
     #[command(flatten)]
     pub read: ReadArgs,
-    /// Model structure
-    #[arg(long, value_name = "NAME", default_value = "bj")]
-    pub structure: StructureName,
+    /// What is fitted: a polynomial structure, grey-box (operator and remnant in physical parameters, with a real delay), or
+    /// time-varying (the operator's gains change once, by a sigmoid) [default: bj, or that of --method]
+    #[arg(long, value_name = "NAME")]
+    pub structure: Option<StructureName>,
+    /// How: pem the prediction error method; iv4 (for arx), sriv (for oe), rivbj (for bj) instrumental variables
+    #[arg(long, value_name = "NAME", default_value = "pem")]
+    pub method: FitMethodName,
+    /// Instruments of iv4, sriv and rivbj: a channel that the noise does not reach, or `simulated` from the input, for an open
+    /// loop [default: f_t where all records have it, else simulated]
+    #[arg(long, value_name = "CHANNEL|simulated")]
+    pub instruments: Option<String>,
+    /// Order m of the remnant, a number or a range to search, for grey-box [default: 1..4]
+    #[arg(long, value_name = "M|LO..HI", value_parser = parse_range)]
+    pub remnant_order: Option<RangeInclusive<usize>>,
+    /// Shortest and longest delay tau_e in s, for grey-box and time-varying [default: 0.05..0.6]
+    #[arg(long, value_name = "LO..HI", value_parser = parse_span)]
+    pub delay: Option<(f64, f64)>,
+    /// Parameters that each record has for itself, as K_e,T_L, for grey-box
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub individual: Vec<String>,
+    /// Write K_e, T_L and K_e_dot over time into this file (CSV), for time-varying
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
     /// Orders, each a number or a range to search, as nb=2,nc=0,nd=1..4,nf=2; nb counts b0, b1, ...
     /// [default: the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2]
     #[arg(long, value_name = "LIST")]
@@ -265,6 +285,29 @@ pub struct MarginsArgs {
     pub json: bool,
 }
 
+/// What `identify` fits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A polynomial structure.
+    Polynomial(Structure),
+    /// The operator and its remnant in physical parameters.
+    GreyBox,
+    /// The operator with gains that change once.
+    TimeVarying,
+}
+
+/// `LO..HI`, finite and in order.
+fn parse_span(text: &str) -> Result<(f64, f64), String> {
+    let number = |part: &str| part.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+    let ends = text
+        .split_once("..")
+        .and_then(|(low, high)| Some((number(low)?, number(high)?)));
+    match ends {
+        Some((low, high)) if low <= high => Ok((low, high)),
+        _ => Err(format!("{text:?} is no span; write LO..HI with LO <= HI, as 0.05..0.6")),
+    }
+}
+
 /// A name on the command line for each value of a type of the library.
 macro_rules! names {
     ($name:ident for $target:ty { $($variant:ident = $value:expr),+ $(,)? }) => {
@@ -278,18 +321,26 @@ macro_rules! names {
     };
 }
 
-names!(StructureName for Structure {
-    Arx = Structure::Arx,
-    Armax = Structure::Armax,
-    Oe = Structure::OutputError,
-    Bj = Structure::BoxJenkins,
-    Fir = Structure::Fir,
-    Ar = Structure::Ar,
-    Ma = Structure::Ma,
-    Arma = Structure::Arma,
-    Ararx = Structure::Ararx,
-    Ararmax = Structure::Ararmax,
-    General = Structure::General,
+names!(FitMethodName for Option<IvMethod> {
+    Pem = None,
+    Iv4 = Some(IvMethod::Iv4),
+    Sriv = Some(IvMethod::Sriv),
+    Rivbj = Some(IvMethod::RivBj),
+});
+names!(StructureName for Kind {
+    Arx = Kind::Polynomial(Structure::Arx),
+    Armax = Kind::Polynomial(Structure::Armax),
+    Oe = Kind::Polynomial(Structure::OutputError),
+    Bj = Kind::Polynomial(Structure::BoxJenkins),
+    Fir = Kind::Polynomial(Structure::Fir),
+    Ar = Kind::Polynomial(Structure::Ar),
+    Ma = Kind::Polynomial(Structure::Ma),
+    Arma = Kind::Polynomial(Structure::Arma),
+    Ararx = Kind::Polynomial(Structure::Ararx),
+    Ararmax = Kind::Polynomial(Structure::Ararmax),
+    General = Kind::Polynomial(Structure::General),
+    GreyBox = Kind::GreyBox,
+    TimeVarying = Kind::TimeVarying,
 });
 names!(FocusName for Focus { Prediction = Focus::Prediction, Simulation = Focus::Simulation });
 names!(SearchMethodName for SearchMethod {

@@ -1,7 +1,8 @@
 //! Results as JSON objects, the contract with other programs.
 
 use hoid_ident::{
-    Choice, Fit, IdentError, MarginEstimates, Root,
+    Choice, Fit, GreyBoxFit, IdentError, MarginEstimates, Root,
+    grey_box::OrderCandidate,
     validation::{Quality, Validation},
 };
 use hoid_model::{
@@ -18,7 +19,7 @@ pub fn number(value: f64) -> Value {
     serde_json::Number::from_f64(value).map_or(Value::Null, Value::Number)
 }
 
-fn optional(value: Option<f64>) -> Value {
+pub fn optional(value: Option<f64>) -> Value {
     value.map_or(Value::Null, number)
 }
 
@@ -128,6 +129,7 @@ pub struct Identified<'a> {
     pub records: &'a [Record],
     pub fit: &'a Fit,
     pub choice: Option<&'a Choice>,
+    pub grey_box: Option<&'a GreyBoxFit>,
     pub quality: Quality,
     pub operator: &'a Result<OperatorEstimate, NotConvertible>,
     pub remnant: Option<&'a Result<RemnantEstimate, NotConvertible>>,
@@ -143,12 +145,6 @@ pub struct Identified<'a> {
 impl Identified<'_> {
     pub fn to_json(&self) -> Value {
         let fit = self.fit;
-        let records: Vec<Value> = self
-            .files
-            .iter()
-            .zip(self.records)
-            .map(|(file, r)| json!({"file": file, "samples": r.len(), "sample_time": number(r.sample_time().s())}))
-            .collect();
         let parameters: Vec<Value> = fit
             .parameters()
             .iter()
@@ -160,8 +156,12 @@ impl Identified<'_> {
         let mut map = Map::new();
         let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
         set("hoid", json!(env!("CARGO_PKG_VERSION")));
-        set("records", Value::Array(records));
-        set("structure", json!(fit.model().structure().name()));
+        set("records", records(self.files, self.records));
+        let structure = fit.model().structure().name();
+        set(
+            "structure",
+            json!(if fit.is_grey_box() { "grey-box" } else { structure }),
+        );
         set("orders", orders(&fit.orders()));
         set("parameters", Value::Array(parameters));
         set("loss", number(fit.loss()));
@@ -210,11 +210,43 @@ impl Identified<'_> {
             "delay_interval",
             interval.map_or(Value::Null, |(low, high)| json!([low, high])),
         );
-        set("candidates", self.choice.map_or(json!([]), candidates));
+        set(
+            "candidates",
+            match (self.choice, self.grey_box) {
+                (Some(choice), _) => candidates(choice),
+                (None, Some(grey_box)) => remnant_orders(grey_box),
+                (None, None) => json!([]),
+            },
+        );
+        if let Some(grey_box) = self.grey_box {
+            let each = (0..self.records.len()).map(|k| operator(&grey_box.operator(k)));
+            set("operators", each.collect());
+        }
         let settings: Map<String, Value> = self.settings.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
         set("settings", Value::Object(settings));
         Value::Object(map)
     }
+}
+
+/// Files and sampling of the records.
+pub fn records(files: &[String], records: &[Record]) -> Value {
+    let record = |(file, r): (&String, &Record)| json!({"file": file, "samples": r.len(), "sample_time": number(r.sample_time().s())});
+    files.iter().zip(records).map(record).collect()
+}
+
+/// Orders m of the remnant that a grey box tried.
+fn remnant_orders(grey_box: &GreyBoxFit) -> Value {
+    let row = |c: &OrderCandidate| match &c.outcome {
+        Ok(f) => json!({
+            "remnant_order": c.order,
+            "loss": number(f.loss),
+            "aic": number(f.aic),
+            "bic": number(f.bic),
+            "converged": f.converged,
+        }),
+        Err(reason) => json!({"remnant_order": c.order, "error": reason.to_string()}),
+    };
+    grey_box.candidates().iter().map(row).collect()
 }
 
 fn candidates(choice: &Choice) -> Value {

@@ -2,12 +2,12 @@
 
 use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 use hoid_ident::{
-    Choice, Fit, MarginEstimates,
+    Choice, Fit, GreyBoxFit, MarginEstimates,
     order_search::Criterion,
     validation::{Quality, Validation},
 };
 use hoid_model::{
-    NotConvertible,
+    NotConvertible, Record,
     remnant::RemnantDiscretisation,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
@@ -49,18 +49,72 @@ pub fn remnant_discretisation(how: RemnantDiscretisation) -> &'static str {
     }
 }
 
+/// The records in use.
+pub fn records(files: &[String], records: &[Record]) -> String {
+    let line = |(file, record): (&String, &Record)| {
+        format!(
+            "{file}: {} samples of {} s from t = {:.4} s\n",
+            record.len(),
+            numbers::plain(record.sample_time().s()),
+            record.time_s(0)
+        )
+    };
+    files.iter().zip(records).map(line).collect()
+}
+
+/// Every option that shaped the result.
+pub fn settings(settings: &[(String, String)]) -> String {
+    let list: Vec<String> = settings.iter().map(|(k, v)| format!("{k}: {v}")).collect();
+    format!("\nSettings: {}.\n", list.join("; "))
+}
+
+/// Orders m of the remnant that a grey box tried; nothing when it was one.
+pub fn remnant_orders(grey_box: &GreyBoxFit) -> String {
+    if grey_box.candidates().len() < 2 {
+        return String::new();
+    }
+    let mut rows = table(&["remnant order m", "loss", "AIC", "BIC", ""]);
+    for candidate in grey_box.candidates() {
+        let m = candidate.order.to_string();
+        match &candidate.outcome {
+            Ok(f) => rows.add_row([
+                m,
+                numbers::plain(f.loss),
+                format!("{:.1}", f.aic),
+                format!("{:.1}", f.bic),
+                if f.converged { "" } else { "not converged" }.to_owned(),
+            ]),
+            Err(reason) => rows.add_row([m, String::new(), String::new(), String::new(), reason.to_string()]),
+        };
+    }
+    format!("{rows}\n\n")
+}
+
+/// The operators of the records behind the first, where a grey box has parameters for each.
+pub fn other_records(grey_box: &GreyBoxFit, files: &[String]) -> String {
+    let differs = |k: &usize| grey_box.operator_parameters(*k) != grey_box.operator_parameters(0);
+    let mut text = String::new();
+    for k in (1..files.len()).filter(differs) {
+        text.push_str(&format!("{}:\n{}", files[k], operator(&grey_box.operator(k))));
+    }
+    text
+}
+
 /// The model in a line, and its coefficients.
 pub fn model(fit: &Fit) -> String {
-    let mut coefficients = table(&["coefficient", "value", "standard error"]);
+    let mut coefficients = table(&[
+        if fit.is_grey_box() { "parameter" } else { "coefficient" },
+        "value",
+        "standard error",
+    ]);
     for (name, e) in fit.parameters() {
         let (value, error) = with_uncertainty(&e);
         coefficients.add_row([name, value, error]);
     }
     let t = fit.termination();
     let mut text = format!(
-        "{}({})\n{coefficients}\nSearch: {}, {} steps, start: {}.\n",
-        fit.model().structure(),
-        fit.orders(),
+        "{}\n{coefficients}\nSearch: {}, {} steps, start: {}.\n",
+        fit.title(),
         t.reason,
         t.iterations,
         fit.start(),

@@ -151,6 +151,162 @@ fn a_range_is_searched_and_its_table_is_part_of_the_result() {
 }
 
 #[test]
+fn options_of_the_search_reach_the_fit() {
+    let directory = simulated();
+    let d = directory.path();
+    let run = |more: &[&str]| {
+        let mut all = vec!["identify", "c1.csv", "--nk", "29", "--orders", "nd=1", "--json"];
+        all.extend(more);
+        json(d, &all)
+    };
+    let plain = run(&[]);
+    let value = |found: &Value, name: &str| {
+        let all = found["parameters"].as_array().unwrap();
+        let p = all.iter().find(|p| p["name"] == name).unwrap().clone();
+        (p["value"].as_f64().unwrap(), p["standard_error"].as_f64())
+    };
+    let fixed = run(&["--fix", "d1=-0.8", "--bound", "f2=..0.92"]);
+    assert_eq!(value(&fixed, "d1"), (-0.8, None));
+    assert_eq!(value(&fixed, "f2"), (0.92, None));
+    for same in [
+        &["--search-method", "gn"][..],
+        &["--search-method", "lm", "--tolerance", "1e-13"],
+        &["--bound", "f2=0.."],
+        &["--stable"],
+        &["--initial-state", "estimate"],
+    ] {
+        let found = run(same);
+        let ratio = found["loss"].as_f64().unwrap() / plain["loss"].as_f64().unwrap();
+        assert!((ratio - 1.0).abs() < 1e-9, "{same:?}: {ratio}");
+    }
+    for other in [
+        &["--initial-state", "zero"][..],
+        &["--initial-state", "backcast"],
+        &["--robust"],
+        &["--robust", "2"],
+        &["--prior", "f2=0.9:1"],
+        &["--focus", "simulation"],
+    ] {
+        let found = run(other);
+        assert!(found["termination"]["converged"].as_bool().unwrap(), "{other:?}");
+        assert_ne!(value(&found, "f1").0, value(&plain, "f1").0, "{other:?}");
+        assert!((value(&found, "f1").0 + 1.912).abs() < 0.05, "{other:?}");
+    }
+    let (code, message) = bad(
+        d,
+        &["identify", "c1.csv", "--nk", "29", "--orders", "nd=1", "--fix", "x1=0"],
+    );
+    assert!(code == 1 && message.contains("b0, b1, d1, f1, f2"), "{message}");
+    let steps = run(&["--horizon", "1"]);
+    let ahead = steps["prediction_ahead"]["vaf"].as_f64().unwrap();
+    assert!((ahead - steps["fit"]["vaf_prediction"].as_f64().unwrap()).abs() < 1e-9);
+}
+
+#[test]
+fn every_structure_and_method_runs_from_the_command_line() {
+    let directory = simulated();
+    let d = directory.path();
+    for name in ["arx", "armax", "oe", "bj", "fir", "ararx", "ararmax", "general"] {
+        let orders = if name == "bj" { "nd=1" } else { "nb=2" };
+        let found = json(
+            d,
+            &[
+                "identify",
+                "c1.csv",
+                "--structure",
+                name,
+                "--nk",
+                "29",
+                "--orders",
+                orders,
+                "--json",
+            ],
+        );
+        assert_eq!(found["structure"], name);
+        assert!(found["fit"]["vaf_prediction"].as_f64().unwrap() > 50.0, "{name}");
+    }
+    // An output alone needs no column e.
+    let text = fs::read_to_string(d.join("c1.csv")).unwrap();
+    fs::write(d.join("alone.csv"), text.replace(",e,", ",was_e,")).unwrap();
+    for name in ["ar", "ma", "arma"] {
+        let found = json(d, &["identify", "alone.csv", "--structure", name, "--json"]);
+        assert_eq!(found["structure"], name);
+        assert!(found["operator"].is_null());
+    }
+    let (code, message) = bad(d, &["identify", "alone.csv", "--structure", "arx"]);
+    assert!(code == 1 && message.contains('e'), "{message}");
+    for (method, structure) in [("iv4", "arx"), ("sriv", "oe"), ("rivbj", "bj")] {
+        let orders = if method == "rivbj" { "nd=1" } else { "nb=2" };
+        let found = json(
+            d,
+            &[
+                "identify", "c1.csv", "--method", method, "--nk", "29", "--orders", orders, "--json",
+            ],
+        );
+        assert_eq!(found["structure"], structure);
+        assert!(found["start"].as_str().unwrap().contains("f_t"));
+        let k_e = found["operator"]["K_e"]["value"].as_f64().unwrap();
+        assert!((k_e - 0.09).abs() < 0.02, "{method}: {k_e}");
+    }
+}
+
+#[test]
+fn a_grey_box_gives_the_delay_an_error_bar_and_reports() {
+    let directory = simulated();
+    let d = directory.path();
+    let found = json(
+        d,
+        &[
+            "identify",
+            "c1.csv",
+            "--structure",
+            "grey-box",
+            "--remnant-order",
+            "1..2",
+            "--delay",
+            "0.2..0.4",
+            "--report",
+            "out",
+            "--json",
+        ],
+    );
+    assert_eq!(found["structure"], "grey-box");
+    assert_eq!(found["candidates"].as_array().unwrap().len(), 2);
+    let delay = &found["operator"]["tau_e"];
+    let off = delay["value"].as_f64().unwrap() - 0.28;
+    // Four standard errors.
+    assert!(off.abs() < 4.0 * delay["standard_error"].as_f64().unwrap(), "{delay}");
+    assert!(found["remnant"]["T_n"]["standard_error"].is_number());
+    let page = fs::read_to_string(d.join("out/report.html")).unwrap();
+    assert!(page.contains("Grey box with a remnant of order m = 1"));
+}
+
+#[test]
+fn a_change_is_found_and_its_gains_are_written() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    good(d, &["simulate", "--condition", "C4", "--seed", "3", "--out", "c4.csv"]);
+    let arguments = [
+        "identify",
+        "c4.csv",
+        "--structure",
+        "time-varying",
+        "--trace",
+        "trace.csv",
+        "--json",
+    ];
+    let found = json(d, &arguments);
+    assert_eq!(found["change"]["found"], true);
+    let all = found["parameters"].as_array().unwrap();
+    let midpoint = all.iter().find(|p| p["name"] == "t_M").unwrap();
+    assert!((midpoint["value"].as_f64().unwrap() - 40.96).abs() < 3.0, "{midpoint}");
+    let trace = fs::read_to_string(d.join("trace.csv")).unwrap();
+    assert!(trace.contains("t,K_e,K_e_se,T_L,T_L_se,K_e_dot,K_e_dot_se"));
+    // 8192 rows behind two comments and the header.
+    assert_eq!(trace.lines().count(), 8195);
+}
+
+#[test]
 fn several_records_start_validation_report_and_margins() {
     let directory = simulated();
     let d = directory.path();
@@ -437,6 +593,20 @@ fn wrong_usage_ends_with_two() {
         &["identify", "c1.csv", "--orders", "nk=3", "--nk", "4"],
         &["identify", "c1.csv", "--structure", "narmax"],
         &["identify", "c1.csv", "--start", "b0=1"],
+        &["identify", "c1.csv", "--method", "iv4", "--structure", "bj"],
+        &["identify", "c1.csv", "--instruments", "f_t"],
+        &["identify", "c1.csv", "--structure", "grey-box", "--nk", "29"],
+        &["identify", "c1.csv", "--structure", "grey-box", "--orders", "nd=2"],
+        &["identify", "c1.csv", "--remnant-order", "1"],
+        &["identify", "c1.csv", "--delay", "0.1..0.3"],
+        &["identify", "c1.csv", "--trace", "x.csv"],
+        &["identify", "c1.csv", "--structure", "time-varying", "--report", "out"],
+        &["identify", "c1.csv", "--structure", "time-varying", "--orders", "nb=2"],
+        &["identify", "c1.csv", "--nk", "29", "--fix", "d1"],
+        &["identify", "c1.csv", "--nk", "29", "--bound", "d1=2..1"],
+        &[
+            "identify", "c1.csv", "--nk", "29", "--fix", "d1=0", "--bound", "d1=0..1",
+        ],
         &["simulate", "--out", "x.csv"],
         &["simulate", "--condition", "C9", "--out", "x.csv"],
         &["convert", "--f", "1,2"],

@@ -8,7 +8,7 @@
 //! | `stationary_past` | the noise before the record, when it was stationary |
 //! | `search` | damped Gauss-Newton |
 //! | `objective`, `robust`, `simulation_focus` | bounds and priors, a loss against outliers, models that are to simulate |
-//! | `starts`, `continuation` | where the search begins when nobody says |
+//! | `starts`, `continuation`, `shared_poles` | where the search begins when nobody says |
 //! | `arx`, `least_squares` | linear regression by QR with column pivoting |
 //! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
 //! | [`instrumental`] | instrumental variables, in open and closed loop |
@@ -36,6 +36,7 @@ pub mod order_search;
 mod prediction_error;
 mod robust;
 mod search;
+mod shared_poles;
 mod simulation_focus;
 mod starts;
 mod stationary_past;

@@ -9,8 +9,10 @@
 //! 3. `steiglitz-mcbride`: ARX, and again on input and output filtered by 1/F of the step before, a few times (K. Steiglitz and
 //!    L. E. McBride, *IEEE Trans. Automatic Control* 10 (1965) 461-464). The `arx` poles themselves, badly biased where the
 //!    noise poles are not those of the system (m0 = 1: a2 near 0), only where that fails.
+//! 4. `instruments`: ARX, instrumental variables twice, the residual, C and D from it ([`crate::instrumental`]).
 //!
-//! The proposals are ranked by their loss with the initial states eliminated; the search runs from the best of them, and the
+//! The last two only where the poles of the first are not all slow beside its average: there it says nearly all that the record
+//! does. The proposals are ranked by their loss with the initial states eliminated; the search runs from the best of them, and the
 //! best minimum wins.
 
 use hoid_core::stability::roots_inside;
@@ -18,9 +20,11 @@ use hoid_model::{Complex64, Orders, SampleTime, polynomial, polynomial_model::mo
 
 use crate::{
     continuation,
+    instrumental::instrument_chain,
     least_squares::{dot, solve_symmetric},
     prediction_error::{Criterion, Data, InitialState, Workspace, first_residual},
     search::Objective,
+    shared_poles,
 };
 
 /// Steps of Steiglitz and McBride.
@@ -45,8 +49,18 @@ const COMPLETED: usize = 4;
 
 /// The best starts, best first.
 pub(crate) fn propose(criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> Vec<Start> {
+    let starts = from_poles(criterion, sample_time, workspace);
+    if shared_poles::concerns(&criterion.orders) {
+        return ranked(shared_poles::propose(criterion, starts, workspace));
+    }
+    ranked(starts)
+}
+
+/// Starts from proposals for F.
+fn from_poles(criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> Vec<(Start, f64)> {
     if criterion.orders.nf == 0 {
-        return completed(criterion, vec![("linear".to_owned(), Vec::new())], workspace);
+        let linear = vec![("linear".to_owned(), Vec::new())];
+        return completed(criterion, linear, workspace);
     }
     let slow = continuation::propose(criterion, sample_time, workspace);
     let mut proposals: Vec<(String, Vec<f64>)> = slow
@@ -65,7 +79,17 @@ pub(crate) fn propose(criterion: &Criterion<'_>, sample_time: SampleTime, worksp
             None => proposals.push(("arx".to_owned(), f)),
         }
     }
-    completed(criterion, proposals, workspace)
+    let mut starts = completed(criterion, proposals, workspace);
+    if !slow.complete
+        && let Some(theta) = instrument_chain(criterion).filter(|theta| criterion.is_feasible(theta))
+        && let Some((linear, value)) = criterion.best_linear_part(&theta, workspace)
+    {
+        let mut theta = theta;
+        theta[..linear.len()].copy_from_slice(&linear);
+        let label = "instruments".to_owned();
+        starts.push((Start { label, theta }, value));
+    }
+    starts
 }
 
 /// The best starts of the pole grid alone.
@@ -76,18 +100,26 @@ pub(crate) fn from_grid(
     workspace: &mut Workspace,
 ) -> Vec<Start> {
     let proposals = ranked_grid(criterion, sample_time, count, workspace);
-    completed(criterion, proposals, workspace)
+    ranked(completed(criterion, proposals, workspace))
 }
 
-/// Proposals with A, B and a noise model of their own, best first.
-fn completed(criterion: &Criterion<'_>, proposals: Vec<(String, Vec<f64>)>, workspace: &mut Workspace) -> Vec<Start> {
-    let mut starts: Vec<(Start, f64)> = proposals
+/// Proposals with A, B and a noise model of their own, and their sums of squares.
+fn completed(
+    criterion: &Criterion<'_>,
+    proposals: Vec<(String, Vec<f64>)>,
+    workspace: &mut Workspace,
+) -> Vec<(Start, f64)> {
+    proposals
         .into_iter()
         .filter_map(|(label, f)| {
             let (theta, value) = complete(criterion, &f, workspace)?;
             Some((Start { label, theta }, value))
         })
-        .collect();
+        .collect()
+}
+
+/// Best first.
+fn ranked(mut starts: Vec<(Start, f64)>) -> Vec<Start> {
     starts.sort_by(|a, b| a.1.total_cmp(&b.1));
     starts.into_iter().map(|(start, _)| start).collect()
 }
@@ -138,7 +170,7 @@ fn grid_poles(nf: usize, omega: f64, zeta: f64, ts: f64) -> Vec<Complex64> {
 }
 
 /// A of an ARX fit with as many poles as F has, unstable ones reflected into the circle.
-fn arx_poles(criterion: &Criterion<'_>, data: &[Data<'_>], workspace: &mut Workspace) -> Option<Vec<f64>> {
+pub(crate) fn arx_poles(criterion: &Criterion<'_>, data: &[Data<'_>], workspace: &mut Workspace) -> Option<Vec<f64>> {
     let orders = Orders {
         na: criterion.orders.nf,
         nb: criterion.orders.nb,

@@ -246,12 +246,16 @@ impl fmt::Display for Orders {
             ("nd", self.nd),
             ("nf", self.nf),
         ];
-        for (name, n) in all {
-            if n > 0 {
-                write!(f, "{name}={n}, ")?;
-            }
+        let mut parts: Vec<String> = all
+            .iter()
+            .filter(|(_, n)| *n > 0)
+            .map(|(name, n)| format!("{name}={n}"))
+            .collect();
+        // Without an input there is no delay.
+        if self.nb > 0 || parts.is_empty() {
+            parts.push(format!("nk={}", self.nk));
         }
-        write!(f, "nk={}", self.nk)
+        f.write_str(&parts.join(", "))
     }
 }
 
@@ -263,12 +267,50 @@ mod tests {
     fn operator_orders_are_those_of_the_reference() {
         let bj = Structure::BoxJenkins.operator_orders(29);
         assert_eq!(bj.to_string(), "nb=2, nd=1, nf=2, nk=29");
+        assert_eq!(
+            Structure::Arma.operator_orders(29).to_string(),
+            "na=2, nc=1",
+            "no input, no delay"
+        );
         assert_eq!(bj.parameter_names(), ["b0", "b1", "d1", "f1", "f2"]);
         assert_eq!(bj.parameters(), 5);
         let arx = Structure::Arx.operator_orders(29);
         assert_eq!(arx.parameter_names(), ["a1", "a2", "b0", "b1"]);
         // i0 of eq. 5.33, counted from 0.
         assert_eq!(arx.first_regressed_sample(), 30);
+    }
+
+    #[test]
+    fn every_structure_takes_its_own_orders_and_no_others() {
+        for structure in Structure::ALL {
+            let orders = structure.operator_orders(if structure.has_input() { 5 } else { 0 });
+            assert!(orders.check(structure).is_ok(), "{structure}");
+            for other in Structure::ALL {
+                let fits = other
+                    .polynomials()
+                    .chars()
+                    .all(|letter| structure.polynomials().contains(letter));
+                if !fits && other != Structure::General {
+                    assert!(
+                        other.operator_orders(0).check(structure).is_err(),
+                        "{other} as {structure}"
+                    );
+                }
+            }
+        }
+        let delayed = Orders {
+            na: 2,
+            nk: 3,
+            ..Orders::default()
+        };
+        assert!(
+            delayed
+                .check(Structure::Ar)
+                .unwrap_err()
+                .to_string()
+                .contains("no input")
+        );
+        assert!(Orders::default().check(Structure::Ma).is_err());
     }
 
     #[test]

@@ -268,7 +268,7 @@ fn candidates_are_sorted_and_cut() {
     let mut model = section("BJ", &choice.fit, &records);
     model.candidates = Some(&choice);
     model.margins = Some(MarginEstimates {
-        crossover_rad_s: Some(Estimate::with_variance(1.5635, 1e-4)),
+        crossover_rad_s: Some(Estimate::with_variance(1.5637, 1e-4)),
         phase_margin_deg: Some(Estimate::fixed(76.67)),
         phase_crossover_rad_s: None,
         gain_margin_db: None,

@@ -1,24 +1,201 @@
-//! Instrumental variables on simulated records.
-#![allow(clippy::unwrap_used)]
+//! Instrumental variables: open loop against the truth and the prediction error method, the closed loops of the reference task and a
+//! faster one in which the input is strongly correlated with the noise, and what is refused.
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid::{
-    ident::{InstrumentalVariable, Instruments, IvMethod},
+    ident::{IdentError, InstrumentalVariable, Instruments, IvMethod, Reason},
     model::{remnant_gain::NoiseDefinition, scenario::RemnantStrength},
     prelude::*,
 };
 
-fn nk() -> usize {
-    if std::env::var("HARD").is_ok() { 6 } else { 29 }
+fn iv(method: IvMethod, instruments: Instruments, orders: Orders) -> InstrumentalVariable {
+    InstrumentalVariable {
+        instruments,
+        ..InstrumentalVariable::new(method, orders)
+    }
 }
 
-fn runs(m0: usize, level: f64, n: u64) -> Vec<Record> {
-    let mut scenario = Scenario::condition(Condition::C1);
-    scenario.remnant.order = m0;
-    if std::env::var("HARD").is_ok() {
-        scenario.initial.operator.tau_e_s = 0.05;
-        scenario.last = scenario.initial;
-        scenario.remnant.time_constant_s = 0.3;
+fn operator_iv(method: IvMethod, instruments: Instruments, nk: usize) -> InstrumentalVariable {
+    iv(method, instruments, method.structure().operator_orders(nk))
+}
+
+fn external() -> Instruments {
+    Instruments::External("f_t".to_owned())
+}
+
+fn one(record: &Record) -> &[Record] {
+    std::slice::from_ref(record)
+}
+
+/// Values and standard errors of some numbers over many runs.
+struct Sample {
+    values: Vec<f64>,
+    errors: Vec<f64>,
+}
+
+impl Sample {
+    fn new() -> Self {
+        Self {
+            values: Vec::new(),
+            errors: Vec::new(),
+        }
     }
+
+    fn add(&mut self, e: Estimate) {
+        self.values.push(e.value);
+        self.errors.push(e.standard_error.unwrap());
+    }
+
+    fn mean(&self) -> f64 {
+        self.values.iter().sum::<f64>() / self.values.len() as f64
+    }
+
+    fn spread(&self) -> f64 {
+        let mean = self.mean();
+        let squares: f64 = self.values.iter().map(|v| (v - mean).powi(2)).sum();
+        (squares / (self.values.len() - 1) as f64).sqrt()
+    }
+
+    /// Distance of the mean from the truth in standard errors of the mean.
+    fn bias(&self, truth: f64) -> f64 {
+        (self.mean() - truth) / (self.spread() / (self.values.len() as f64).sqrt())
+    }
+
+    fn median_error(&self) -> f64 {
+        let mut sorted = self.errors.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted[sorted.len() / 2]
+    }
+}
+
+const B: [f64; 2] = [1.0, 0.5];
+const F: [f64; 2] = [-1.5, 0.7];
+const D: [f64; 1] = [-0.8];
+
+fn noise(cell: u32, replication: u64, n: usize) -> Vec<f64> {
+    Stream {
+        seed: 31,
+        cell: u64::from(cell),
+        replication,
+    }
+    .white_noise(n)
+}
+
+/// `u = (B/F) q^-2 e + gain (C/D) eps` with white e and eps, after a run-in.
+fn open_loop(c: &[f64], gain: f64, n: usize, replication: u64) -> Record {
+    let run_in = 200;
+    let (e, eps) = (noise(0, replication, n + run_in), noise(1, replication, n + run_in));
+    let mut w = vec![0.0; n + run_in];
+    hoid::core::filter::moving_sum(&B, 2, &e, &mut w);
+    hoid::core::filter::divide_in_place(&F, &mut w);
+    let mut v = vec![0.0; n + run_in];
+    hoid::core::filter::multiply(c, &eps, &mut v);
+    hoid::core::filter::divide_in_place(&D, &mut v);
+    let u = w.iter().zip(&v).map(|(w, v)| w + gain * v).skip(run_in).collect();
+    let e = e[run_in..].to_vec();
+    Record::new(
+        SampleTime::new(0.05).unwrap(),
+        Channel::new("e", "", e),
+        Channel::new("u", "", u),
+    )
+    .unwrap()
+}
+
+fn textbook_orders(method: IvMethod) -> Orders {
+    let orders = Orders {
+        nb: 2,
+        nk: 2,
+        ..Orders::default()
+    };
+    match method {
+        IvMethod::Iv4 => Orders { na: 2, ..orders },
+        IvMethod::Sriv => Orders { nf: 2, ..orders },
+        _ => Orders { nf: 2, nd: 1, ..orders },
+    }
+}
+
+#[test]
+fn open_loop_is_unbiased_and_knows_its_errors() {
+    let runs = 100;
+    let names = ["b0", "b1", "f1", "f2"];
+    let truth = [B[0], B[1], F[0], F[1]];
+    let mut of_methods: Vec<Vec<Sample>> = (0..4).map(|_| (0..4).map(|_| Sample::new()).collect()).collect();
+    for replication in 0..runs {
+        let record = open_loop(&[], 1.0, 1000, replication);
+        let orders = textbook_orders(IvMethod::RivBj);
+        let pem = Estimator::new(Structure::BoxJenkins, orders).fit(one(&record)).unwrap();
+        let others = IvMethod::ALL.map(|method| {
+            iv(method, Instruments::Simulated, textbook_orders(method))
+                .fit(one(&record))
+                .unwrap()
+        });
+        for (fit, samples) in [pem].iter().chain(&others).zip(&mut of_methods) {
+            assert!(fit.termination().converged(), "{:?}", fit.termination());
+            for (name, e) in fit.parameters() {
+                let name = name.replace('a', "f");
+                if let Some(i) = names.iter().position(|n| *n == name) {
+                    samples[i].add(e);
+                }
+            }
+        }
+    }
+    for (method, samples) in ["pem", "iv4", "sriv", "rivbj"].iter().zip(&of_methods) {
+        for (i, sample) in samples.iter().enumerate() {
+            let ratio = sample.median_error() / sample.spread();
+            println!(
+                "{method:6} {}: bias {:+.2} standard errors, spread {:.5}, standard error / spread {ratio:.2}, spread / PEM {:.2}",
+                names[i],
+                sample.bias(truth[i]),
+                sample.spread(),
+                sample.spread() / of_methods[0][i].spread()
+            );
+            // 16 numbers: the largest of as many normal ones exceeds 3.3 in 1.5 % of all seeds.
+            assert!(sample.bias(truth[i]).abs() < 3.3, "{method} {}", names[i]);
+            // A spread over 100 runs is good to 7 %; four of that.
+            assert!((0.75..1.35).contains(&ratio), "{method} {}: {ratio}", names[i]);
+        }
+    }
+    for i in 0..4 {
+        // Both are efficient here, and from the same runs.
+        let ratio = of_methods[3][i].spread() / of_methods[0][i].spread();
+        assert!((0.95..1.05).contains(&ratio), "{}: {ratio}", names[i]);
+    }
+}
+
+#[test]
+fn refined_method_agrees_with_the_prediction_error_method_for_c_and_d_too() {
+    let orders = Orders {
+        nc: 1,
+        ..textbook_orders(IvMethod::RivBj)
+    };
+    let records: Vec<Record> = (0..3)
+        .map(|k| open_loop(&[0.5], 1.0, 3000 + 500 * k, k as u64))
+        .collect();
+    let pem = Estimator::new(Structure::BoxJenkins, orders).fit(&records).unwrap();
+    let riv = iv(IvMethod::RivBj, Instruments::Simulated, orders)
+        .fit(&records)
+        .unwrap();
+    assert_eq!(riv.termination().reason, Reason::Settled);
+    assert_eq!(
+        (riv.residual_count(), riv.state_count()),
+        (pem.residual_count(), pem.state_count())
+    );
+    for ((name, a), (_, b)) in riv.parameters().into_iter().zip(pem.parameters()) {
+        let (sa, sb) = (a.standard_error.unwrap(), b.standard_error.unwrap());
+        println!("{name}: {:.5} +- {sa:.5}, PEM {:.5} +- {sb:.5}", a.value, b.value);
+        // The same information: estimates differ by a small part of their errors, and the errors agree.
+        assert!((a.value - b.value).abs() < 0.3 * sb, "{name}");
+        assert!((sa / sb - 1.0).abs() < 0.1, "{name}");
+    }
+}
+
+/// Runs of the operator of C1 with this delay, remnant and noise level.
+fn runs(delay_s: f64, time_constant_s: f64, m0: usize, level: f64, n: u64) -> Vec<Record> {
+    let mut scenario = Scenario::condition(Condition::C1);
+    scenario.initial.operator.tau_e_s = delay_s;
+    scenario.last = scenario.initial;
+    scenario.remnant.time_constant_s = time_constant_s;
+    scenario.remnant.order = m0;
     scenario.remnant.strength = RemnantStrength::Level {
         level,
         definition: NoiseDefinition::Response,
@@ -37,113 +214,292 @@ fn runs(m0: usize, level: f64, n: u64) -> Vec<Record> {
         .collect()
 }
 
-fn external() -> Instruments {
-    Instruments::External("f_t".to_owned())
+const NAMES: [&str; 6] = ["b0", "f1", "K_e", "T_L", "omega_nm", "zeta_nm"];
+
+fn truth() -> [f64; 6] {
+    let operator = Scenario::condition(Condition::C1).initial.operator;
+    let held = operator.discretise(SampleTime::HUNDREDTH).unwrap().held;
+    [held.b0, held.f1, 0.09, 0.4, 11.25, 0.35]
 }
 
-fn iv(method: IvMethod, instruments: Instruments, nd: usize) -> InstrumentalVariable {
-    let orders = method.structure().operator_orders(nk());
-    let orders = Orders {
-        nd: if method == IvMethod::RivBj { nd } else { 0 },
-        ..orders
-    };
-    InstrumentalVariable {
-        instruments,
-        ..InstrumentalVariable::new(method, orders)
+/// Fits all runs, prints bias, spread and median standard error in % of the truth.
+fn fit_all(label: &str, records: &[Record], fit: impl Fn(&Record) -> Result<Fit, IdentError>) -> Vec<Sample> {
+    let mut samples: Vec<Sample> = NAMES.iter().map(|_| Sample::new()).collect();
+    let mut left_out = 0;
+    for record in records {
+        let fit = fit(record).unwrap();
+        let (Ok(o), true) = (fit.operator(), fit.termination().converged()) else {
+            left_out += 1;
+            continue;
+        };
+        let m = fit.model();
+        let poles = if m.f().is_empty() { "a1" } else { "f1" };
+        let parameter = |name: &str| fit.parameters().into_iter().find(|(n, _)| n == name).unwrap().1;
+        let estimates = [
+            parameter("b0"),
+            parameter(poles),
+            o.k_e,
+            o.t_l_s,
+            o.omega_nm_rad_s,
+            o.zeta_nm,
+        ];
+        for (sample, e) in samples.iter_mut().zip(estimates) {
+            sample.add(e);
+        }
+    }
+    print!("{label:24}");
+    for (sample, truth) in samples.iter().zip(truth()) {
+        let percent = 100.0 / truth.abs();
+        print!(
+            " {:+6.2} ±{:6.2} ({:5.2})",
+            percent * (sample.mean() - truth),
+            percent * sample.spread(),
+            percent * sample.median_error()
+        );
+    }
+    println!("  left out {left_out}");
+    samples
+}
+
+fn pem(nk: usize) -> impl Fn(&Record) -> Result<Fit, IdentError> {
+    move |record| Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(nk)).fit(one(record))
+}
+
+/// The mean within so many of its standard errors and a share of the truth.
+fn assert_unbiased(label: &str, samples: &[Sample], errors: f64, share: f64) {
+    for ((sample, truth), name) in samples.iter().zip(truth()).zip(NAMES) {
+        let distance = (sample.mean() - truth).abs();
+        let allowed = errors * sample.spread() / (sample.values.len() as f64).sqrt() + share * truth.abs();
+        assert!(distance < allowed, "{label} {name}: {distance} {allowed}");
+    }
+}
+
+/// Delay 0.05 s and a remnant of time constant 0.3 s: what the operator sees still holds the noise that acts now.
+#[test]
+fn fast_loop_biases_simulated_instruments_but_not_external_ones() {
+    let nk = 6;
+    let records = runs(0.05, 0.3, 1, 0.3, 40);
+    println!("bias ± spread (median standard error) in % of {NAMES:?}");
+    let by_pem = fit_all("pem", &records, pem(nk));
+    for method in [IvMethod::Iv4, IvMethod::Sriv] {
+        let from_e = fit_all(&format!("{method} simulated"), &records, |r| {
+            operator_iv(method, Instruments::Simulated, nk).fit(one(r))
+        });
+        // b0 falls short by about 30 %, at an error of the mean of 2 %.
+        assert!(from_e[0].bias(truth()[0]) < -8.0, "{method}");
+    }
+    for method in IvMethod::ALL {
+        let label = format!("{method} from f_t");
+        let samples = fit_all(&label, &records, |r| operator_iv(method, external(), nk).fit(one(r)));
+        // The estimate is not linear in the data: a second-order bias of some per cent, where a spread is 13 %, is no surprise.
+        assert_unbiased(&label, &samples, 3.5, 0.02);
+        for (i, (ours, theirs)) in samples.iter().zip(&by_pem).enumerate() {
+            let ratio = (ours.spread() / theirs.spread()).powi(2);
+            println!("    {}: variance / PEM {ratio:.2}", NAMES[i]);
+            // PEM also uses what the noise excites. Spreads over 40 runs are good to 11 %.
+            assert!((0.6..5.0).contains(&ratio), "{label} {}: {ratio}", NAMES[i]);
+            let known = ours.median_error() / ours.spread();
+            assert!((0.6..1.5).contains(&known), "{label} {}: {known}", NAMES[i]);
+        }
     }
 }
 
 #[test]
-fn explore() {
-    let n: u64 = std::env::var("RUNS").map_or(20, |v| v.parse().unwrap());
-    let held = Scenario::condition(Condition::C1)
-        .initial
-        .operator
-        .discretise(SampleTime::HUNDREDTH)
-        .unwrap()
-        .held;
-    let truth = [held.b0, held.f1, 0.09, 0.4, 11.25, 0.35];
+fn refined_method_with_the_right_noise_model_is_the_prediction_error_method() {
+    let records = runs(0.28, 0.06, 1, 0.3, 12);
+    for record in &records {
+        let a = operator_iv(IvMethod::RivBj, Instruments::Simulated, 29)
+            .fit(one(record))
+            .unwrap();
+        let b = pem(29)(record).unwrap();
+        assert!(a.termination().converged());
+        for ((name, a), (_, b)) in a.parameters().into_iter().zip(b.parameters()) {
+            assert!(
+                (a.value - b.value).abs() < 0.6 * b.standard_error.unwrap(),
+                "{name}: {a:?} {b:?}"
+            );
+        }
+    }
+}
+
+fn reference_cell(m0: usize, level: f64, n: u64) {
+    let records = runs(0.28, 0.06, m0, level, n);
+    println!("m0 = {m0}, P_n = {level}, {n} runs");
+    let by_pem = fit_all("pem", &records, pem(29));
+    for instruments in [Instruments::Simulated, external()] {
+        for method in IvMethod::ALL {
+            let label = format!("{method} {instruments}");
+            let samples = fit_all(&label, &records, |r| {
+                operator_iv(method, instruments.clone(), 29).fit(one(r))
+            });
+            if instruments == Instruments::Simulated {
+                continue;
+            }
+            let kept = samples[0].values.len() as f64;
+            assert!(kept >= 0.95 * n as f64, "{label}: {kept}");
+            // Second-order bias: estimates are not linear in the data.
+            assert_unbiased(&label, &samples, 4.0, 0.03);
+            let ratios: Vec<String> = samples
+                .iter()
+                .zip(&by_pem)
+                .map(|(a, b)| format!("{:.2}", (a.spread() / b.spread()).powi(2)))
+                .collect();
+            println!("    variance / PEM: {}", ratios.join("  "));
+        }
+    }
+}
+
+#[test]
+fn reference_loop_is_unbiased_from_f_t() {
+    reference_cell(1, 0.1, 16);
+    reference_cell(4, 0.1, 16);
+}
+
+#[test]
+#[ignore = "prints the table of the book; minutes"]
+fn reference_loop_table() {
     for m0 in 1..=4 {
         for level in [0.1, 0.3] {
-            let records = runs(m0, level, n);
-            let mut show = |name: &str, fit: &dyn Fn(&Record) -> Result<Fit, hoid::ident::IdentError>| {
-                let begin = std::time::Instant::now();
-                let mut values: Vec<Vec<f64>> = vec![vec![]; 6];
-                let mut ses: Vec<Vec<f64>> = vec![vec![]; 6];
-                let (mut bad, mut nc, mut its, mut failed) = (0, 0, 0, 0);
-                for r in &records {
-                    let f = match fit(r) {
-                        Ok(f) => f,
-                        Err(e) => {
-                            failed += 1;
-                            println!("{e}");
-                            continue;
-                        }
-                    };
-                    bad += usize::from(!f.termination().converged());
-                    its += f.termination().iterations;
-                    let m = f.model();
-                    let poles = if m.f().is_empty() { m.a() } else { m.f() };
-                    let p = f.parameters();
-                    let se = |n: &str| {
-                        p.iter()
-                            .find(|(x, _)| x == n)
-                            .unwrap()
-                            .1
-                            .standard_error
-                            .unwrap_or(f64::NAN)
-                    };
-                    match f.operator() {
-                        Ok(o) => {
-                            let e = [o.k_e, o.t_l_s, o.omega_nm_rad_s, o.zeta_nm];
-                            values[0].push(m.b()[0]);
-                            values[1].push(poles[0]);
-                            ses[0].push(se("b0"));
-                            ses[1].push(se(if m.f().is_empty() { "a1" } else { "f1" }));
-                            for i in 0..4 {
-                                values[2 + i].push(e[i].value);
-                                ses[2 + i].push(e[i].standard_error.unwrap_or(f64::NAN));
-                            }
-                        }
-                        Err(_) => nc += 1,
+            reference_cell(m0, level, 60);
+        }
+    }
+}
+
+#[test]
+fn a_missing_or_useless_channel_is_told() {
+    let record = runs(0.28, 0.06, 1, 0.1, 1).remove(0);
+    let fit = |channel: &str, record: &Record| {
+        let instruments = Instruments::External(channel.to_owned());
+        operator_iv(IvMethod::Sriv, instruments, 29).fit(one(record))
+    };
+    match fit("forcing", &record) {
+        Err(error @ IdentError::NoChannel { .. }) => {
+            let text = error.to_string();
+            assert!(text.contains("forcing") && text.contains("e, u, f_t"), "{text}");
+        }
+        other => panic!("expected a missing channel, found {other:?}"),
+    }
+    let still = record
+        .clone()
+        .with_channel(Channel::new("still", "", vec![0.0; record.len()]))
+        .unwrap();
+    assert!(matches!(
+        fit("still", &still),
+        Err(IdentError::NoExcitation { value: 0.0, .. })
+    ));
+    for inside in ["e", "u"] {
+        assert!(matches!(fit(inside, &record), Err(IdentError::BadOption { .. })));
+    }
+}
+
+#[test]
+fn instruments_that_vanish_where_they_count_are_told() {
+    let record = open_loop(&[], 1.0, 2000, 0);
+    // Zero but for one sample near the end: no instrument is left in the rows that count.
+    let mut late = vec![0.0; 2000];
+    late[1999] = 1.0;
+    let record = record.with_channel(Channel::new("late", "", late)).unwrap();
+    for method in IvMethod::ALL {
+        let instruments = Instruments::External("late".to_owned());
+        match iv(method, instruments, textbook_orders(method)).fit(one(&record)) {
+            Err(IdentError::SingularInstruments { dependence }) => {
+                assert!(dependence.contains("is zero"), "{dependence}")
+            }
+            other => panic!("expected singular instruments, found {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn a_record_without_noise_gives_the_truth() {
+    let record = open_loop(&[], 0.0, 400, 3);
+    for method in IvMethod::ALL {
+        let fit = iv(method, Instruments::Simulated, textbook_orders(method))
+            .fit(one(&record))
+            .unwrap();
+        assert_eq!(fit.termination().reason, Reason::ExactFit, "{method}");
+        assert!(fit.covariance().is_none());
+        let m = fit.model();
+        let poles = if m.f().is_empty() { m.a() } else { m.f() };
+        for (a, b) in m.b().iter().chain(poles).zip(B.iter().chain(&F)) {
+            assert!((a - b).abs() < 1e-9, "{method}: {a} {b}");
+        }
+    }
+}
+
+#[test]
+fn one_sample_too_few_is_told_and_no_length_panics() {
+    let whole = runs(0.28, 0.06, 1, 0.1, 1).remove(0);
+    let mut fitted = 0;
+    for samples in [1, 2, 29, 30, 31, 33, 35, 36, 37, 38, 39, 40, 45, 60, 90, 150, 400] {
+        let record = [whole.span(0.0, 0.01 * f64::from(samples)).unwrap()];
+        for method in IvMethod::ALL {
+            for instruments in [Instruments::Simulated, external()] {
+                match operator_iv(method, instruments, 29).fit(&record) {
+                    Ok(fit) => {
+                        // 30 samples before the first row, 4 parameters.
+                        assert!(samples > 34);
+                        assert!(fit.loss().is_finite() && fit.model().theta().iter().all(|t| t.is_finite()));
+                        fitted += 1;
                     }
-                }
-                let time = begin.elapsed().as_secs_f64() * 1e3 / n as f64;
-                print!("m0={m0} Pn={level} {name:16}");
-                for i in 0..6 {
-                    let k = values[i].len() as f64;
-                    let mean = values[i].iter().sum::<f64>() / k;
-                    let sd = (values[i].iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (k - 1.0)).sqrt();
-                    let mut s = ses[i].clone();
-                    s.sort_by(f64::total_cmp);
-                    let med = s.get(s.len() / 2).copied().unwrap_or(f64::NAN);
-                    let t = truth[i].abs();
-                    print!(
-                        " {:+6.2}±{:5.2}({:5.2})",
-                        100.0 * (mean - truth[i]) / t,
-                        100.0 * sd / t,
-                        100.0 * med / t
-                    );
-                }
-                println!(
-                    "  unconv {bad} notconv {nc} err {failed} it {:.1} {time:.1} ms",
-                    its as f64 / n as f64
-                );
-            };
-            show("pem bj(1)", &|r| {
-                Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(nk()))
-                    .fit(std::slice::from_ref(r))
-            });
-            for (how, name) in [(Instruments::Simulated, "sim"), (external(), "f_t")] {
-                for method in IvMethod::ALL {
-                    if std::env::var("ONLY4").is_ok() && method != IvMethod::Iv4 {
-                        continue;
+                    Err(error) => {
+                        // One sample is a constant signal.
+                        let told = matches!(
+                            error,
+                            IdentError::TooFewSamples { .. }
+                                | IdentError::DelayTooLong { .. }
+                                | IdentError::NoExcitation { .. }
+                        );
+                        assert!(samples > 34 || told, "{samples} {error}");
                     }
-                    show(&format!("{method} {name}"), &|r| {
-                        iv(method, how.clone(), 1).fit(std::slice::from_ref(r))
-                    });
                 }
             }
+        }
+    }
+    assert!(fitted > 30, "{fitted}");
+}
+
+#[test]
+fn options_and_orders_are_checked_and_a_limit_is_told() {
+    let record = open_loop(&[], 1.0, 1000, 0);
+    let method = IvMethod::Sriv;
+    let sound = iv(method, Instruments::Simulated, textbook_orders(method));
+    for wrong in [
+        InstrumentalVariable {
+            max_iterations: 0,
+            ..sound.clone()
+        },
+        InstrumentalVariable {
+            tolerance: f64::NAN,
+            ..sound.clone()
+        },
+    ] {
+        assert!(matches!(wrong.fit(one(&record)), Err(IdentError::BadOption { .. })));
+    }
+    let other = iv(IvMethod::Iv4, Instruments::Simulated, textbook_orders(method));
+    assert!(matches!(other.fit(one(&record)), Err(IdentError::Model(_))));
+    assert!(matches!(sound.fit(&[]), Err(IdentError::NoRecords)));
+    let cut = InstrumentalVariable {
+        max_iterations: 1,
+        ..sound.clone()
+    }
+    .fit(one(&record))
+    .unwrap();
+    assert_eq!(cut.termination().reason, Reason::IterationLimit);
+    assert!(!cut.termination().converged());
+    assert_eq!(sound.fit(one(&record)).unwrap().start(), "sriv, simulated instruments");
+}
+
+#[test]
+fn several_records_sharpen_the_estimate() {
+    let records = runs(0.28, 0.06, 1, 0.1, 4);
+    for method in IvMethod::ALL {
+        let estimator = operator_iv(method, external(), 29);
+        let (one, four) = (estimator.fit(&records[..1]).unwrap(), estimator.fit(&records).unwrap());
+        for ((name, a), (_, b)) in one.parameters().into_iter().zip(four.parameters()) {
+            let ratio = a.standard_error.unwrap() / b.standard_error.unwrap();
+            // Four times the data halve the error; the error itself scatters by ten per cent or so.
+            assert!((1.5..2.8).contains(&ratio), "{method} {name}: {ratio}");
         }
     }
 }

@@ -6,9 +6,9 @@
 
 use crate::{
     IdentError, InitialState,
-    least_squares::{dot, solve_symmetric},
+    least_squares::dot,
     prediction_error::{Criterion, Data, Linearisation, Workspace},
-    search::{Minimum, Objective, Reason, SearchOptions, minimise},
+    search::{Minimum, Objective, SearchOptions, minimise},
 };
 
 use super::layout::{DELAY, Layout, Polynomials};
@@ -100,34 +100,11 @@ impl<'a> PhysicalCriterion<'a> {
         rival: Option<f64>,
         workspace: &mut Workspace,
     ) -> Option<Minimum> {
-        let found = minimise(self, eta, options, rival, workspace)?;
-        let minimum = self.settled(found);
+        let minimum = minimise(self, eta, options, rival, workspace)?;
         if minimum.termination.converged() {
             return Some(minimum);
         }
-        let finished = self.search_by_samples(minimum, options, workspace);
-        Some(self.settled(finished))
-    }
-
-    /// A search that found no descent has converged where only rounding is left to gain.
-    fn settled(&self, mut minimum: Minimum) -> Minimum {
-        if minimum.termination.reason == Reason::NoDescent && self.promised(&minimum) <= ROUNDING {
-            minimum.termination.reason = Reason::SmallDecrease;
-        }
-        minimum
-    }
-
-    /// Relative decrease of the loss that the Gauss-Newton step of the free parameters promises.
-    fn promised(&self, minimum: &Minimum) -> f64 {
-        let p = minimum.theta.len();
-        let free = self.free(&minimum.theta, &minimum.at.descent);
-        let gram: Vec<f64> = free
-            .iter()
-            .flat_map(|&i| free.iter().map(move |&j| minimum.at.gram[i * p + j]))
-            .collect();
-        let descent: Vec<f64> = free.iter().map(|&i| minimum.at.descent[i]).collect();
-        let step = solve_symmetric(&gram, &descent);
-        step.map_or(f64::INFINITY, |step| dot(&step, &descent) / minimum.at.sum_of_squares)
+        Some(self.search_by_samples(minimum, options, workspace))
     }
 
     /// Moves from sample to sample as long as the loss falls.
@@ -198,9 +175,6 @@ impl<'a> PhysicalCriterion<'a> {
 
 /// Distance to the border of a sample, in samples, below which the next sample is tried.
 const NEAR_BORDER: f64 = 1e-6;
-/// Relative decrease of the loss that rounding may hide: D of fourth order leaves residuals of 1e-5 of the output. In units of
-/// standard errors this is a distance of 1e-3 with 10 000 samples.
-const ROUNDING: f64 = 1e-10;
 
 impl Objective for PhysicalCriterion<'_> {
     fn is_feasible(&self, eta: &[f64]) -> bool {

@@ -42,8 +42,6 @@ use crate::{
 };
 use equation::{Problem, Source};
 
-// The search for starts takes it up.
-#[allow(unused_imports)]
 pub(crate) use chain::instrument_chain;
 
 /// Residuals below this share of the output, in amplitude, are rounding.

@@ -1,41 +1,51 @@
 //! `hoid identify`: records to a model and the operator's parameters.
 
+mod change;
+mod estimate;
+
 use std::path::{Path, PathBuf};
 
 use hoid_ident::{
-    Choice, Estimator, Fit, Loss, MarginEstimates, SearchOptions,
-    order_search::{Criterion, OrderRanges, choose_orders_with},
+    Fit, MarginEstimates,
     validation::{nrmse_fit, vaf},
 };
 use hoid_io::{ReadOptions, Repair, make_directory, read_record, write_atomically};
-use hoid_model::{ContinuousTransferFunction, Detrend, Record, Structure, margins::MANUAL_CONTROL_RANGE_RAD_S};
-use hoid_report::{ModelSection, Report, numbers};
+use hoid_model::{ContinuousTransferFunction, Detrend, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
+use hoid_report::{ModelSection, Report};
 
 use crate::{
-    args::{IdentifyArgs, ReadArgs},
+    args::{IdentifyArgs, Kind, ReadArgs},
     error::CliError,
     json::{self, Identified},
-    orders, output, text,
+    output, text,
 };
+use estimate::Estimated;
 
 pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
-    let structure = Structure::from(args.structure);
-    let read = |path: &PathBuf| read(path, &args.read, structure.has_input());
+    let kind = estimate::kind(args)?;
+    let with_input = match kind {
+        Kind::Polynomial(structure) => structure.has_input(),
+        Kind::GreyBox | Kind::TimeVarying => true,
+    };
+    let read = |path: &PathBuf| read(path, &args.read, with_input);
     let records = args.records.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-    let ranges = orders::ranges(
-        structure,
-        args.orders.as_deref(),
-        args.nk.as_ref(),
-        records[0].sample_time(),
-    )?;
-    let (fit, choice) = fit(args, structure, &ranges, &records)?;
+    if kind == Kind::TimeVarying {
+        return change::run(args, &records);
+    }
+    let Estimated {
+        fit,
+        choice,
+        grey_box,
+        settings: chosen,
+    } = estimate::fit(args, kind, &records)?;
     // Read before anything is written: a bad validation file leaves nothing behind.
     let validation = match &args.validate {
         Some(path) => Some((path.display().to_string(), fit.quality(&[read(path)?])?)),
         None => None,
     };
     let files: Vec<String> = args.records.iter().map(|p| p.display().to_string()).collect();
-    let settings = settings(args, structure, &ranges);
+    let mut settings = chosen;
+    settings.extend(common_settings(args));
     let operator = fit.operator();
     let remnant = (fit.orders().nd > 0).then(|| fit.remnant(args.remnant_discretisation.into()));
     let margins = args
@@ -50,6 +60,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         quality: fit.quality(&records)?,
         fit: &fit,
         choice: choice.as_ref(),
+        grey_box: grey_box.as_ref(),
         operator: &operator,
         remnant: remnant.as_ref(),
         margins: margins.as_ref(),
@@ -72,11 +83,11 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
             title,
             settings: facts,
             models: vec![ModelSection {
-                name: format!("{}({})", fit.model().structure(), fit.orders()),
+                name: fit.title(),
                 fit: &fit,
                 records: &records,
                 candidates: choice.as_ref(),
-                truth: super::known_operator(&records),
+                truth: crate::commands::known_operator(&records),
                 margins,
             }],
             notes: Vec::new(),
@@ -112,53 +123,6 @@ fn read(path: &Path, args: &ReadArgs, with_input: bool) -> Result<Record, CliErr
     Ok(read.record.detrended(Detrend::from(args.detrend)))
 }
 
-fn fit(
-    args: &IdentifyArgs,
-    structure: Structure,
-    ranges: &OrderRanges,
-    records: &[Record],
-) -> Result<(Fit, Option<Choice>), CliError> {
-    let combinations = ranges.combinations()?;
-    let mut estimator = Estimator {
-        initial_state: args.initial_state.into(),
-        search: SearchOptions {
-            method: args.search_method.into(),
-            max_iterations: args.max_iterations,
-            tolerance: args.tolerance,
-        },
-        constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
-        priors: orders::priors(args.prior.as_deref())?,
-        loss: args
-            .robust
-            .map_or(Loss::Quadratic, |threshold| Loss::Huber { threshold }),
-        focus: args.focus.into(),
-        stable: args.stable,
-        ..Estimator::new(structure, combinations[0])
-    };
-    if let [orders] = combinations.as_slice() {
-        estimator.start = args
-            .start
-            .as_deref()
-            .map(|text| orders::theta(orders, text))
-            .transpose()?;
-        return Ok((estimator.fit(records)?, None));
-    }
-    if args.start.is_some() {
-        return Err(CliError::Usage(
-            "--start belongs to one model, but a range of orders or delays is searched; give --nk and --orders as single \
-             numbers"
-                .to_owned(),
-        ));
-    }
-    let bar = output::progress(combinations.len());
-    let choice = choose_orders_with(&estimator, ranges, Criterion::from(args.criterion), records, &|| {
-        bar.inc(1)
-    });
-    bar.finish_and_clear();
-    let choice = choice?;
-    Ok((choice.fit.clone(), Some(choice)))
-}
-
 /// VAF and NRMSE of the prediction k samples ahead, over all records together.
 fn prediction_ahead(fit: &Fit, records: &[Record], k: usize) -> Result<(usize, f64, f64), CliError> {
     let (mut measured, mut predicted) = (Vec::new(), Vec::new());
@@ -177,14 +141,11 @@ fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> MarginEstima
     fit.margins(|omega| element.response(omega), (low, high))
 }
 
-/// Every option that shaped the result, defaults included.
-fn settings(args: &IdentifyArgs, structure: Structure, ranges: &OrderRanges) -> Vec<(String, String)> {
+/// The options that every kind of fit shares, defaults included.
+fn common_settings(args: &IdentifyArgs) -> Vec<(String, String)> {
     let read = &args.read;
     let or_all = |bound: Option<f64>, all: &str| bound.map_or(all.to_owned(), |v| v.to_string());
     let mut list = vec![
-        ("structure".to_owned(), structure.name().to_owned()),
-        ("orders".to_owned(), ranges.to_string()),
-        ("criterion".to_owned(), format!("{:?}", args.criterion).to_lowercase()),
         (
             "initial state".to_owned(),
             format!("{:?}", args.initial_state).to_lowercase(),
@@ -200,32 +161,20 @@ fn settings(args: &IdentifyArgs, structure: Structure, ranges: &OrderRanges) -> 
             format!("{} to {}", or_all(read.from, "start"), or_all(read.to, "end")),
         ),
         ("detrend".to_owned(), format!("{:?}", read.detrend).to_lowercase()),
-        ("focus".to_owned(), format!("{:?}", args.focus).to_lowercase()),
-        ("start".to_owned(), args.start.clone().unwrap_or("own".to_owned())),
         (
             "search".to_owned(),
             format!(
-                "{}, relative tolerance {}",
+                "{}, relative tolerance {:e}",
                 format!("{:?}", args.search_method).to_lowercase(),
                 args.tolerance
             ),
         ),
         ("largest number of steps".to_owned(), args.max_iterations.to_string()),
     ];
-    let given = [("fixed", &args.fix), ("bounds", &args.bound), ("prior", &args.prior)];
-    for (name, text) in given {
+    for (name, text) in [("fixed", &args.fix), ("bounds", &args.bound)] {
         if let Some(text) = text {
             list.push((name.to_owned(), text.clone()));
         }
-    }
-    if let Some(threshold) = args.robust {
-        list.push((
-            "robust loss".to_owned(),
-            format!("Huber, {threshold} standard deviations"),
-        ));
-    }
-    if args.stable {
-        list.push(("stable models only".to_owned(), "yes".to_owned()));
     }
     if read.resample || read.fill {
         list.push((
@@ -244,24 +193,24 @@ fn settings(args: &IdentifyArgs, structure: Structure, ranges: &OrderRanges) -> 
 
 fn page(found: &Identified<'_>) -> String {
     let fit = found.fit;
-    let mut page = String::new();
-    for (file, record) in found.files.iter().zip(found.records) {
-        page.push_str(&format!(
-            "{file}: {} samples of {} s from t = {:.4} s\n",
-            record.len(),
-            numbers::plain(record.sample_time().s()),
-            record.time_s(0)
-        ));
-    }
+    let mut page = text::records(found.files, found.records);
     page.push('\n');
     if let Some(choice) = found.choice {
         page.push_str(&text::candidates(choice));
         page.push('\n');
     }
+    if let Some(grey_box) = found.grey_box {
+        page.push_str(&text::remnant_orders(grey_box));
+    }
     page.push_str(&text::model(fit));
     page.push_str(&text::quality(fit, &found.quality));
     page.push('\n');
-    page.push_str(&text::operator(found.operator));
+    if fit.model().structure().has_input() {
+        page.push_str(&text::operator(found.operator));
+    }
+    if let Some(grey_box) = found.grey_box {
+        page.push_str(&text::other_records(grey_box, found.files));
+    }
     if let Some(remnant) = found.remnant {
         page.push_str(&text::remnant(remnant));
     }
@@ -293,8 +242,7 @@ fn page(found: &Identified<'_>) -> String {
             q.vaf_simulation, q.vaf_prediction, q.nrmse_simulation, q.nrmse_prediction
         ));
     }
-    let defaults: Vec<String> = found.settings.iter().map(|(k, v)| format!("{k}: {v}")).collect();
-    page.push_str(&format!("\nSettings: {}.\n", defaults.join("; ")));
+    page.push_str(&text::settings(found.settings));
     page
 }
 

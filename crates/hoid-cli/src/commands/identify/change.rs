@@ -1,0 +1,175 @@
+//! `hoid identify --structure time-varying`: the operator whose gains change once.
+
+use hoid_ident::{GainsAt, InitialState, TimeVarying, TimeVaryingFit};
+use hoid_io::write_record;
+use hoid_model::{Channel, Record, uncertainty::Estimate};
+use hoid_report::numbers;
+use serde_json::{Map, Value, json};
+
+use crate::{
+    args::IdentifyArgs,
+    error::CliError,
+    json::{self, number},
+    orders, output, text,
+};
+
+pub fn run(args: &IdentifyArgs, records: &[Record]) -> Result<(), CliError> {
+    if Option::<InitialState>::from(args.initial_state).is_some_and(|rule| rule != InitialState::Estimate) {
+        return Err(CliError::Usage(
+            "--initial-state: the time-varying fit estimates the initial states; give auto or estimate".to_owned(),
+        ));
+    }
+    let mut estimator = TimeVarying {
+        nd: noise_order(args)?,
+        constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
+        search: super::estimate::search(args),
+        ..TimeVarying::default()
+    };
+    if let Some(delay) = args.delay {
+        estimator.delay_range_s = delay;
+    }
+    let fit = estimator.fit(records)?;
+    let (low, high) = estimator.delay_range_s;
+    let mut settings = vec![
+        ("structure".to_owned(), "time-varying".to_owned()),
+        ("orders".to_owned(), format!("nd={}", estimator.nd)),
+        ("delay in s".to_owned(), format!("{low}..{high}")),
+    ];
+    settings.extend(super::common_settings(args));
+    if let Some(path) = &args.trace {
+        write_record(path, &trace(&fit, &records[0])?)?;
+        output::complain(&format!("trace: {}", path.display()));
+    }
+    let files: Vec<String> = args.records.iter().map(|p| p.display().to_string()).collect();
+    if args.json {
+        json::print(&to_json(&fit, &files, records, &settings));
+    } else {
+        output::print(&page(&fit, &files, records, &settings));
+    }
+    Ok(())
+}
+
+/// nd from `--orders nd=N`; the other orders are those of the operator.
+fn noise_order(args: &IdentifyArgs) -> Result<usize, CliError> {
+    let wrong = || CliError::Usage("--orders: the time-varying fit takes nd=N alone, as --orders nd=2".to_owned());
+    match args.orders.as_deref() {
+        None => Ok(TimeVarying::default().nd),
+        Some(text) => match orders::parse_pairs(text).map_err(CliError::Usage)?.as_slice() {
+            [(name, value)] if name == "nd" => value.parse().map_err(|_| wrong()),
+            _ => Err(wrong()),
+        },
+    }
+}
+
+/// The gains over the time of a record, with their standard errors where they have them.
+fn trace(fit: &TimeVaryingFit, record: &Record) -> Result<Record, CliError> {
+    type Gain = fn(&GainsAt) -> Estimate;
+    let gains = fit.trace(record);
+    let columns: [(&str, &str, Gain); 3] = [
+        ("K_e", "deg/deg", |g| g.k_e),
+        ("T_L", "s", |g| g.t_l_s),
+        ("K_e_dot", "s", |g| g.k_e_dot),
+    ];
+    let mut trace: Option<Record> = None;
+    for (name, unit, of) in columns {
+        let values = gains.iter().map(|g| of(g).value).collect();
+        let errors: Option<Vec<f64>> = gains.iter().map(|g| of(g).standard_error).collect();
+        let value = Channel::new(name, unit, values);
+        let error = errors.map(|errors| Channel::new(format!("{name}_se"), unit, errors));
+        for channel in [Some(value), error].into_iter().flatten() {
+            trace = Some(match trace {
+                None => Record::of_output(record.sample_time(), channel)?.starting_at(record.time_s(0)),
+                Some(trace) => trace.with_channel(channel)?,
+            });
+        }
+    }
+    // K_e is always there.
+    Ok(trace.unwrap_or_else(|| record.clone()))
+}
+
+fn page(fit: &TimeVaryingFit, files: &[String], records: &[Record], settings: &[(String, String)]) -> String {
+    let mut page = text::records(files, records);
+    let mut rows = text::table(&["parameter", "value", "standard error", "unit", ""]);
+    for p in fit.parameters() {
+        let (value, error) = text::with_uncertainty(&p.estimate);
+        let remark = p.remark.map(|r| r.to_string()).unwrap_or_default();
+        rows.add_row([p.name, value, error, p.unit.to_owned(), remark]);
+    }
+    page.push_str(&format!("\nOperator whose gains change once (sigmoid)\n{rows}\n"));
+    let interval = |name: &str, unit: &str, interval: Option<(f64, f64)>| {
+        interval.map_or(String::new(), |(low, high)| {
+            format!("{name}: 95 % likelihood interval {low:.4} to {high:.4} {unit}.\n")
+        })
+    };
+    page.push_str(&interval("t_M", "s", fit.midpoint_interval()));
+    page.push_str(&interval("G", "1/s", fit.rate_interval()));
+    let c = fit.comparison();
+    page.push_str(&format!(
+        "Against the operator that does not change: 2 ln of the likelihood ratio {:.1} for {} parameters more, BIC {} by {:.1}.\n",
+        c.likelihood_ratio,
+        c.extra_parameters,
+        if c.bic_difference > 0.0 { "lower" } else { "higher" },
+        c.bic_difference.abs()
+    ));
+    if !fit.change_found() {
+        page.push_str("The records show no change.\n");
+    }
+    let t = fit.termination();
+    page.push_str(&format!(
+        "Search: {}, {} steps, start: {}.\n",
+        t.reason,
+        t.iterations,
+        fit.start()
+    ));
+    page.push_str(&format!(
+        "Loss {} over {} residuals; innovation variance {}.\n",
+        numbers::plain(fit.loss()),
+        fit.residual_count(),
+        numbers::plain(fit.innovation_variance())
+    ));
+    page.push_str(&text::settings(settings));
+    page
+}
+
+fn to_json(fit: &TimeVaryingFit, files: &[String], records: &[Record], settings: &[(String, String)]) -> Value {
+    let parameters: Vec<Value> = fit
+        .parameters()
+        .iter()
+        .map(|p| {
+            json!({
+                "name": p.name,
+                "value": number(p.estimate.value),
+                "standard_error": json::optional(p.estimate.standard_error),
+                "unit": p.unit,
+                "remark": p.remark.map(|r| r.to_string()),
+            })
+        })
+        .collect();
+    let t = fit.termination();
+    let c = fit.comparison();
+    let interval = |interval: Option<(f64, f64)>| interval.map_or(Value::Null, |(low, high)| json!([low, high]));
+    let settings: Map<String, Value> = settings.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
+    json!({
+        "hoid": env!("CARGO_PKG_VERSION"),
+        "records": json::records(files, records),
+        "structure": "time-varying",
+        "parameters": parameters,
+        "loss": number(fit.loss()),
+        "innovation_variance": number(fit.innovation_variance()),
+        "termination": {"reason": t.reason.to_string(), "converged": t.converged(), "iterations": t.iterations},
+        "start": fit.start(),
+        "residuals": fit.residual_count(),
+        "initial_states": fit.state_count(),
+        "change": {
+            "found": fit.change_found(),
+            "likelihood_ratio": number(c.likelihood_ratio),
+            "extra_parameters": c.extra_parameters,
+            "bic_difference": number(c.bic_difference),
+            "t_M_interval": interval(fit.midpoint_interval()),
+            "G_interval": interval(fit.rate_interval()),
+        },
+        "initial": json::operator(&Ok(fit.initial_operator())),
+        "last": json::operator(&Ok(fit.last_operator())),
+        "settings": settings,
+    })
+}

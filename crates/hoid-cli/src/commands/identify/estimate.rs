@@ -1,0 +1,258 @@
+//! From the options of `hoid identify` to a fit.
+
+use hoid_ident::{
+    Choice, Estimator, Fit, GreyBox, GreyBoxFit, InitialState, InstrumentalVariable, Instruments, IvMethod, Loss,
+    SearchOptions,
+    order_search::{Criterion, OrderRanges, choose_orders_with},
+};
+use hoid_model::{Record, Structure};
+
+use crate::{
+    args::{FocusName, IdentifyArgs, Kind},
+    error::CliError,
+    orders, output,
+};
+
+/// A fit, how it was chosen, and the options that were special to it.
+pub struct Estimated {
+    pub fit: Fit,
+    pub choice: Option<Choice>,
+    pub grey_box: Option<GreyBoxFit>,
+    pub settings: Vec<(String, String)>,
+}
+
+/// What is to be fitted, the options checked against each other.
+pub fn kind(args: &IdentifyArgs) -> Result<Kind, CliError> {
+    let method: Option<IvMethod> = args.method.into();
+    let typed = args.structure.map(Kind::from);
+    let kind = match (typed, method) {
+        (Some(kind), None) => kind,
+        (None, None) => Kind::Polynomial(Structure::BoxJenkins),
+        (typed, Some(method)) => {
+            let own = Kind::Polynomial(method.structure());
+            if typed.is_some_and(|kind| kind != own) {
+                return Err(CliError::Usage(format!(
+                    "--method {method} fits the structure {}; drop --structure, or take --method pem",
+                    method.structure().name()
+                )));
+            }
+            own
+        }
+    };
+    match misplaced(args, kind, method.is_some()) {
+        Some((option, with)) => Err(CliError::Usage(format!("{option} belongs to {with}"))),
+        None => Ok(kind),
+    }
+}
+
+/// The first option that has no meaning for this kind of fit, and what it belongs to.
+fn misplaced(args: &IdentifyArgs, kind: Kind, by_instruments: bool) -> Option<(&'static str, &'static str)> {
+    let polynomial = matches!(kind, Kind::Polynomial(_));
+    let by_search = polynomial && !by_instruments;
+    let (grey_box, changing) = (kind == Kind::GreyBox, kind == Kind::TimeVarying);
+    let search = "--method pem and a polynomial structure";
+    let steady = "a model that does not change";
+    let options = [
+        (
+            args.instruments.is_some() && !by_instruments,
+            "--instruments",
+            "--method iv4, sriv or rivbj",
+        ),
+        (
+            args.remnant_order.is_some() && !grey_box,
+            "--remnant-order",
+            "--structure grey-box",
+        ),
+        (
+            !args.individual.is_empty() && !grey_box,
+            "--individual",
+            "--structure grey-box",
+        ),
+        (
+            args.delay.is_some() && polynomial,
+            "--delay",
+            "--structure grey-box or time-varying; else give --nk",
+        ),
+        (
+            args.nk.is_some() && !polynomial,
+            "--nk",
+            "a polynomial structure; else give --delay in s",
+        ),
+        (
+            args.orders.is_some() && grey_box,
+            "--orders",
+            "a polynomial structure; a grey box has --remnant-order",
+        ),
+        (args.trace.is_some() && !changing, "--trace", "--structure time-varying"),
+        (args.start.is_some() && !by_search, "--start", search),
+        (args.prior.is_some() && !by_search, "--prior", search),
+        (args.robust.is_some() && !by_search, "--robust", search),
+        (args.stable && !by_search, "--stable", search),
+        (args.focus != FocusName::Prediction && !by_search, "--focus", search),
+        (args.fix.is_some() && by_instruments, "--fix", "--method pem"),
+        (args.bound.is_some() && by_instruments, "--bound", "--method pem"),
+        (args.validate.is_some() && changing, "--validate", steady),
+        (args.horizon.is_some() && changing, "--horizon", steady),
+        (
+            args.controlled_element.is_some() && changing,
+            "--controlled-element",
+            steady,
+        ),
+        (
+            args.report.is_some() && changing,
+            "--report",
+            "a model that does not change; --trace writes the gains",
+        ),
+    ];
+    options
+        .into_iter()
+        .find_map(|(wrong, option, with)| wrong.then_some((option, with)))
+}
+
+/// Fits what was asked for.
+pub fn fit(args: &IdentifyArgs, kind: Kind, records: &[Record]) -> Result<Estimated, CliError> {
+    match kind {
+        Kind::Polynomial(structure) => polynomial(args, structure, records),
+        Kind::GreyBox | Kind::TimeVarying => grey_box(args, records),
+    }
+}
+
+/// Method and limits of the search as typed.
+pub fn search(args: &IdentifyArgs) -> SearchOptions {
+    SearchOptions {
+        method: args.search_method.into(),
+        max_iterations: args.max_iterations,
+        tolerance: args.tolerance,
+    }
+}
+
+fn polynomial(args: &IdentifyArgs, structure: Structure, records: &[Record]) -> Result<Estimated, CliError> {
+    let ranges = orders::ranges(
+        structure,
+        args.orders.as_deref(),
+        args.nk.as_ref(),
+        records[0].sample_time(),
+    )?;
+    let mut settings = vec![
+        ("structure".to_owned(), structure.name().to_owned()),
+        ("orders".to_owned(), ranges.to_string()),
+        ("criterion".to_owned(), format!("{:?}", args.criterion).to_lowercase()),
+        ("focus".to_owned(), format!("{:?}", args.focus).to_lowercase()),
+        ("start".to_owned(), args.start.clone().unwrap_or("own".to_owned())),
+    ];
+    if let Some(prior) = &args.prior {
+        settings.push(("prior".to_owned(), prior.clone()));
+    }
+    if let Some(threshold) = args.robust {
+        let text = format!("Huber, {threshold} standard deviations");
+        settings.push(("robust loss".to_owned(), text));
+    }
+    if args.stable {
+        settings.push(("stable models only".to_owned(), "yes".to_owned()));
+    }
+    let (mut fit, choice) = prediction_error(args, structure, &ranges, records)?;
+    if let Some(method) = Option::<IvMethod>::from(args.method) {
+        let instruments = instruments(args, records);
+        settings.push(("method".to_owned(), format!("{method}, {instruments}")));
+        if choice.is_some() {
+            settings.push(("orders chosen by".to_owned(), "the prediction error method".to_owned()));
+        }
+        let estimator = InstrumentalVariable {
+            instruments,
+            ..InstrumentalVariable::new(method, fit.orders())
+        };
+        fit = estimator.fit(records)?;
+    }
+    Ok(Estimated {
+        fit,
+        choice,
+        grey_box: None,
+        settings,
+    })
+}
+
+/// The forcing function where all records have it: in a closed loop it is the signal that the noise does not reach.
+fn instruments(args: &IdentifyArgs, records: &[Record]) -> Instruments {
+    match args.instruments.as_deref() {
+        Some("simulated") => Instruments::Simulated,
+        Some(channel) => Instruments::External(channel.to_owned()),
+        None if records.iter().all(|r| r.channel("f_t").is_some()) => Instruments::External("f_t".to_owned()),
+        None => Instruments::Simulated,
+    }
+}
+
+fn prediction_error(
+    args: &IdentifyArgs,
+    structure: Structure,
+    ranges: &OrderRanges,
+    records: &[Record],
+) -> Result<(Fit, Option<Choice>), CliError> {
+    let combinations = ranges.combinations()?;
+    let mut estimator = Estimator {
+        initial_state: args.initial_state.into(),
+        search: search(args),
+        constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
+        priors: orders::priors(args.prior.as_deref())?,
+        loss: args
+            .robust
+            .map_or(Loss::Quadratic, |threshold| Loss::Huber { threshold }),
+        focus: args.focus.into(),
+        stable: args.stable,
+        ..Estimator::new(structure, combinations[0])
+    };
+    if let [orders] = combinations.as_slice() {
+        estimator.start = args
+            .start
+            .as_deref()
+            .map(|text| orders::theta(orders, text))
+            .transpose()?;
+        return Ok((estimator.fit(records)?, None));
+    }
+    if args.start.is_some() {
+        return Err(CliError::Usage(
+            "--start belongs to one model, but a range of orders or delays is searched; give --nk and --orders as single \
+             numbers"
+                .to_owned(),
+        ));
+    }
+    let bar = output::progress(combinations.len());
+    let choice = choose_orders_with(&estimator, ranges, Criterion::from(args.criterion), records, &|| {
+        bar.inc(1)
+    });
+    bar.finish_and_clear();
+    let choice = choice?;
+    Ok((choice.fit.clone(), Some(choice)))
+}
+
+fn grey_box(args: &IdentifyArgs, records: &[Record]) -> Result<Estimated, CliError> {
+    let m = args.remnant_order.clone().unwrap_or(1..=4);
+    let mut estimator = GreyBox {
+        constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
+        individual: args.individual.clone(),
+        initial_state: Option::<InitialState>::from(args.initial_state).unwrap_or_default(),
+        search: search(args),
+        ..GreyBox::new(m.clone())
+    };
+    if let Some(delay) = args.delay {
+        estimator.delay_range_s = delay;
+    }
+    let (low, high) = estimator.delay_range_s;
+    let mut settings = vec![
+        ("structure".to_owned(), "grey-box".to_owned()),
+        (
+            "remnant order m".to_owned(),
+            format!("{}..{}, by BIC", m.start(), m.end()),
+        ),
+        ("delay in s".to_owned(), format!("{low}..{high}")),
+    ];
+    if !args.individual.is_empty() {
+        settings.push(("individual".to_owned(), args.individual.join(", ")));
+    }
+    let found = estimator.fit(records)?;
+    Ok(Estimated {
+        fit: found.polynomial_fit(0).clone(),
+        choice: None,
+        grey_box: Some(found),
+        settings,
+    })
+}
