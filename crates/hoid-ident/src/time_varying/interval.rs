@@ -50,13 +50,15 @@ pub(crate) fn is_change_point(theta: &[f64], standard_error: f64) -> bool {
     2.0 * standard_error >= (-theta[LOG_RATE]).exp()
 }
 
-/// 95 % interval of t_M or ln G around a minimum, `standard_error` its own where it has one.
+/// 95 % interval of t_M or ln G around a minimum, `standard_error` its own where it has one; with `stay` a lower loss on the
+/// way only counts as inside.
 pub(crate) fn likelihood_interval(
     criterion: &ChangeCriterion<'_>,
     minimum: &Minimum,
     place: usize,
     standard_error: Option<f64>,
     change_point: bool,
+    stay: bool,
 ) -> Walk {
     let quantile = if change_point && place == MIDPOINT {
         CHANGE_POINT
@@ -87,6 +89,7 @@ pub(crate) fn likelihood_interval(
     };
     let first_step = FIRST_STEP * standard_error.unwrap_or(finest).max(finest).min(0.1 * (high - low));
     let mut ends = [low, high];
+    let (mut lowest, mut lower) = (-0.1 * quantile, None);
     for (end, sign) in ends.iter_mut().zip([-1.0, 1.0]) {
         let bound = *end;
         let (mut inside, mut outside) = (minimum.theta.clone(), None);
@@ -96,9 +99,10 @@ pub(crate) fn likelihood_interval(
             let value = (from[place] + sign * step).clamp(low, high);
             step *= GROWTH;
             let Some((loss, theta)) = at(value, &from) else { break };
-            // A lower minimum than the one that was found: by a tenth of what matters.
-            if loss < -0.1 * quantile {
-                return Walk::Lower(theta);
+            // A lower minimum than the one that was found, by a tenth of what matters: the walk goes on to the lowest.
+            if loss < lowest && !stay {
+                lowest = loss;
+                lower = Some(theta.clone());
             }
             if loss <= quantile {
                 (inside, outside) = (theta.clone(), None);
@@ -110,6 +114,9 @@ pub(crate) fn likelihood_interval(
             }
             from = theta;
         }
+        if lower.is_some() {
+            continue;
+        }
         let Some(mut beyond) = outside else { continue };
         for _ in 0..HALVINGS {
             let middle = 0.5 * (inside[place] + beyond);
@@ -119,6 +126,9 @@ pub(crate) fn likelihood_interval(
             }
         }
         *end = 0.5 * (inside[place] + beyond);
+    }
+    if let Some(theta) = lower {
+        return Walk::Lower(theta);
     }
     let [low_end, high_end] = ends;
     Walk::Found(if place == LOG_RATE {

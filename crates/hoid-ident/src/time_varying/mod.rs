@@ -94,8 +94,10 @@ const LOOK: usize = 30;
 const ROUNDS: usize = 20;
 /// Rounds end when the ratio of the levels moves by less than this share; its own standard error is `1/sqrt n`, about 1 %.
 const SETTLED: f64 = 1e-6;
+/// Relative change of the loss that does not matter: of the log-likelihood of 10000 residuals, a two-hundredth.
+const NO_MATTER: f64 = 1e-6;
 /// Lower minima that the walks along t_M and G may come upon before the fit is left at the last one.
-const MOST_LOWER: usize = 3;
+const MOST_LOWER: usize = 10;
 /// Distance to the border of a sample, in samples, below which the next sample is tried.
 const NEAR_BORDER: f64 = 1e-6;
 
@@ -110,29 +112,32 @@ impl TimeVarying {
         let mut criterion = self.criterion(records, sample_time)?;
         let (mut start, minimum) = self.best_minimum(&criterion, records)?;
         let (mut minimum, mut levels) = self.with_levels(&mut criterion, minimum)?;
-        let mut fit;
-        let mut lower = 0;
+        let (mut lower, mut stay) = (0, false);
         loop {
             let constant = self.without_change(&criterion, &minimum.theta)?;
-            fit = assemble::assemble(&criterion, &minimum, start.clone(), &constant, levels)?;
-            if !self.likelihood_intervals {
-                break;
-            }
-            match fit.add_intervals(&criterion, &minimum) {
-                Some(theta) if lower < MOST_LOWER => {
-                    lower += 1;
-                    if lower == 1 {
-                        start += "; then a lower minimum along t_M or G";
-                    }
-                    let iterations = minimum.termination.iterations;
-                    let found = search(&criterion, theta, &self.search, None).ok_or(IdentError::NoFiniteLoss)?;
-                    (minimum, levels) = self.with_levels(&mut criterion, found)?;
-                    minimum.termination.iterations += iterations;
+            let mut found = assemble::assemble(&criterion, &minimum, start.clone(), &constant, levels)?;
+            let walk = self
+                .likelihood_intervals
+                .then(|| found.add_intervals(&criterion, &minimum, stay));
+            let Some(theta) = walk.flatten() else {
+                return Ok(found);
+            };
+            // With the weights of the other minimum this one may be the lower: the likelihood decides, weights and all.
+            let weights = criterion.weights.clone();
+            let other = search(&criterion, theta, &self.search, None).ok_or(IdentError::NoFiniteLoss)?;
+            let (mut other, other_levels) = self.with_levels(&mut criterion, other)?;
+            lower += 1;
+            if other.at.sum_of_squares < minimum.at.sum_of_squares && lower <= MOST_LOWER {
+                other.termination.iterations += minimum.termination.iterations;
+                (minimum, levels) = (other, other_levels);
+                if lower == 1 {
+                    start += "; then a lower minimum along t_M or G";
                 }
-                _ => break,
+            } else {
+                criterion.weights = weights;
+                stay = true;
             }
         }
-        Ok(fit)
     }
 
     /// The minimum with the noise levels found in turn with the fit.
@@ -155,15 +160,22 @@ impl TimeVarying {
             if before.is_some_and(|b: [f64; 2]| (ratio(found) / ratio(b) - 1.0).abs() < SETTLED) {
                 break;
             }
-            criterion.weights = Some(noise_level::weights(found, &shares(criterion, &minimum.theta)));
-            let next = search(criterion, minimum.theta, &self.search, None).ok_or(IdentError::NoFiniteLoss)?;
+            let weights = noise_level::weights(found, &shares(criterion, &minimum.theta));
+            let kept = criterion.weights.replace(weights);
+            let next = search(criterion, minimum.theta.clone(), &self.search, None).ok_or(IdentError::NoFiniteLoss)?;
             iterations += next.termination.iterations;
+            let change = next.at.sum_of_squares / minimum.at.sum_of_squares - 1.0;
+            if round > 0 && change > NO_MATTER {
+                // Two changes that each look worse with the noise levels of the other: the likelier one stays.
+                (criterion.weights, levels) = (kept, before);
+                break;
+            }
             minimum = next;
-            minimum.termination.iterations = iterations;
-            if round + 1 == ROUNDS && minimum.termination.reason == Reason::SmallDecrease {
+            if round + 1 == ROUNDS && change < -NO_MATTER && minimum.termination.converged() {
                 minimum.termination.reason = Reason::IterationLimit;
             }
         }
+        minimum.termination.iterations = iterations;
         Ok((minimum, levels))
     }
 

@@ -149,8 +149,13 @@ impl TimeVaryingFit {
     }
 
     /// Likelihood intervals of t_M and G, if there was a change and noise. Returns theta where the loss is lower than at
-    /// the minimum, if the walk along t_M or G comes upon such a place.
-    pub(super) fn add_intervals(&mut self, criterion: &ChangeCriterion<'_>, minimum: &Minimum) -> Option<Vec<f64>> {
+    /// the minimum, if the walk along t_M or G comes upon such a place and is not to stay.
+    pub(super) fn add_intervals(
+        &mut self,
+        criterion: &ChangeCriterion<'_>,
+        minimum: &Minimum,
+        stay: bool,
+    ) -> Option<Vec<f64>> {
         let p = self.theta.len();
         if !self.change_found() {
             return None;
@@ -162,7 +167,7 @@ impl TimeVaryingFit {
             if self.remarks[place] == Some(Remark::Fixed) {
                 continue;
             }
-            match likelihood_interval(criterion, minimum, place, standard_error, self.change_point) {
+            match likelihood_interval(criterion, minimum, place, standard_error, self.change_point, stay) {
                 Walk::Lower(theta) => return Some(theta),
                 Walk::Found(interval) if place == MIDPOINT => self.midpoint_interval = Some(interval),
                 Walk::Found(interval) => self.rate_interval = Some(interval),
