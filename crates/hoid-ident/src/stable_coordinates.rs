@@ -188,7 +188,7 @@ mod tests {
             vec![-0.9],
             vec![-1.912, 0.924],
             vec![-2.3, 1.85, -0.511],
-            vec![0.1, -0.2, 0.3, -0.4],
+            vec![0.1, -0.2, 0.3, -0.2],
         ] {
             let k = reflection_coefficients(&p).unwrap();
             for (a, b) in polynomial(&k).iter().zip(&p) {

@@ -1,6 +1,9 @@
 //! The numbers of the page "Evidence" of the book that take too long for a test.
 //!
 //! `cargo run --release -p hoid --example evidence -- coverage|efficiency|starts|delay [RUNS]`
+//!
+//! `cargo run --release -p hoid --example evidence -- speed [RUNS] [PYTHON]` times the Box-Jenkins fit beside SciPy; PYTHON is an
+//! interpreter that has numpy and scipy, `python3` by default.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../tests/common/textbook.rs"]
@@ -30,7 +33,8 @@ fn main() {
         Some("efficiency") => closed_loop(runs.unwrap_or(2000)),
         Some("starts") => starts(runs.unwrap_or(100)),
         Some("delay") => delay(runs.unwrap_or(100)),
-        _ => println!("coverage, efficiency, starts or delay, and a number of runs"),
+        Some("speed") => speed(runs.unwrap_or(50), arguments.get(2).map_or("python3", String::as_str)),
+        _ => println!("coverage, efficiency, starts, delay or speed, and a number of runs"),
     }
 }
 
@@ -269,4 +273,56 @@ fn delay(runs: u64) {
             );
         }
     }
+}
+
+/// The Box-Jenkins fit from no start beside the same in SciPy, in one sitting on one thread; the smallest of the times of each.
+fn speed(runs: u64, python: &str) {
+    let record = [run(&simulator(Condition::C1, 1, 0.1), 0, 0)];
+    let estimator = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(NK));
+    let fastest = |estimator: &Estimator| {
+        let time = |_| {
+            let begin = std::time::Instant::now();
+            let fit = estimator.fit(&record).unwrap();
+            (begin.elapsed().as_secs_f64(), fit.loss())
+        };
+        (0..runs).map(time).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap()
+    };
+    let (ours, loss) = fastest(&estimator);
+    let mut zero = estimator.clone();
+    zero.initial_state = Some(InitialState::Zero);
+    let (ours_zero, loss_zero) = fastest(&zero);
+    println!("hoid, initial states estimated: {:.3} ms, loss {loss:.6e}", 1e3 * ours);
+    println!(
+        "hoid, zeros before the record:  {:.3} ms, loss {loss_zero:.6e}",
+        1e3 * ours_zero
+    );
+    let file = std::env::temp_dir().join("hoid-evidence-speed.csv");
+    let rows = record[0].input().iter().zip(record[0].output());
+    let text: String = rows.map(|(e, u)| format!("{e},{u}\n")).collect();
+    std::fs::write(&file, text).unwrap();
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/peers/scipy_bj.py");
+    let found = std::process::Command::new(python)
+        .args([script, file.to_str().unwrap(), &runs.to_string()])
+        .envs([("OMP_NUM_THREADS", "1"), ("OPENBLAS_NUM_THREADS", "1")])
+        .output();
+    let printed = found
+        .map(|o| String::from_utf8_lossy(&o.stdout).into_owned())
+        .unwrap_or_default();
+    let parts: Vec<&str> = printed.split_whitespace().collect();
+    let Some(theirs) = parts.first().and_then(|t| t.parse::<f64>().ok()) else {
+        println!("{python} with numpy and scipy is not there: no comparison");
+        return;
+    };
+    println!(
+        "SciPy, zeros before the record: {:.3} ms, loss {} (scipy {}, numpy {})",
+        1e3 * theirs,
+        parts[1],
+        parts[2],
+        parts[3]
+    );
+    println!(
+        "SciPy / hoid: {:.1} (states estimated), {:.1} (zeros as SciPy)",
+        theirs / ours,
+        theirs / ours_zero
+    );
 }
