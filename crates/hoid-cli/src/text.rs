@@ -243,26 +243,51 @@ pub fn roots(fit: &Fit) -> String {
     format!("{rows}\n")
 }
 
-/// What the residuals say.
-pub fn residual_tests(v: &Validation) -> String {
-    let mut text = match v.ljung_box {
-        Some(t) => format!(
-            "Residuals: Ljung-Box Q = {:.1} with {} degrees of freedom, p = {:.3}.\n",
-            t.statistic, t.degrees_of_freedom, t.p_value
+/// What the residuals say, record by record.
+pub fn residual_tests(files: &[String], validations: &[Validation]) -> String {
+    let mut rows = table(&["residuals of", "Ljung-Box Q", "degrees", "p", "signs"]);
+    let (mut coloured, mut missed, mut feedback) = (false, false, false);
+    for (file, v) in files.iter().zip(validations) {
+        let signs = v.signs();
+        let mut words = Vec::new();
+        for (there, seen, word) in [
+            (signs.coloured_residuals, &mut coloured, "not white"),
+            (signs.under_modelled, &mut missed, "follow the input"),
+            (signs.feedback, &mut feedback, "feedback"),
+        ] {
+            *seen |= there;
+            if there {
+                words.push(word);
+            }
+        }
+        let (q, degrees, p) = match v.ljung_box {
+            Some(t) => (
+                format!("{:.1}", t.statistic),
+                t.degrees_of_freedom.to_string(),
+                format!("{:.3}", t.p_value),
+            ),
+            None => ("-".to_owned(), "-".to_owned(), "-".to_owned()),
+        };
+        rows.add_row([file.clone(), q, degrees, p, words.join(", ")]);
+    }
+    let mut text = format!("{rows}\n");
+    for (seen, sentence) in [
+        (
+            coloured,
+            "Not white: a richer noise model (nd, nc) would serve, and in a closed loop bias less.\n",
         ),
-        None => String::new(),
-    };
-    let signs = v.signs();
-    if signs.coloured_residuals {
-        text.push_str(
-            "They are not white: a richer noise model (nd, nc) would serve, and in a closed loop bias less.\n",
-        );
-    }
-    if signs.under_modelled {
-        text.push_str("They follow the input at positive lags: the model misses dynamics, or has the wrong delay.\n");
-    }
-    if signs.feedback {
-        text.push_str("The input follows them (negative lags): there is feedback, as in every closed loop.\n");
+        (
+            missed,
+            "They follow the input at positive lags: the model misses dynamics, or has the wrong delay.\n",
+        ),
+        (
+            feedback,
+            "The input follows them (negative lags): there is feedback, as in every closed loop.\n",
+        ),
+    ] {
+        if seen {
+            text.push_str(sentence);
+        }
     }
     text
 }

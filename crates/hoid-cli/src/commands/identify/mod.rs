@@ -222,15 +222,7 @@ fn page(found: &Identified<'_>) -> String {
     }
     page.push('\n');
     page.push_str(&text::roots(fit));
-    for (file, v) in found.files.iter().zip(found.validations) {
-        let tests = text::residual_tests(v);
-        let of = if found.files.len() > 1 {
-            format!("{file}: ")
-        } else {
-            String::new()
-        };
-        page.push_str(&format!("{of}{tests}"));
-    }
+    page.push_str(&text::residual_tests(found.files, found.validations));
     if let Some((k, vaf, nrmse)) = found.ahead {
         page.push_str(&format!(
             "Prediction {k} samples ahead: VAF {vaf:.2} %, NRMSE fit {nrmse:.2} %.\n"
