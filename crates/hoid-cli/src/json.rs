@@ -3,7 +3,7 @@
 use hoid_ident::{
     Choice, Fit, GreyBoxFit, IdentError, MarginEstimates, Root,
     grey_box::OrderCandidate,
-    validation::{Quality, Validation},
+    validation::{LjungBox, Quality, Validation},
 };
 use hoid_model::{
     NotConvertible, Orders, Record,
@@ -44,7 +44,7 @@ pub fn operator(found: &Result<OperatorEstimate, NotConvertible>) -> Value {
             Value::Object(map)
         }
         // Another order has no meaning as an operator at all.
-        Err(NotConvertible::OtherOrders { .. }) => Value::Null,
+        Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. }) => Value::Null,
         Err(reason) => json!({"convertible": false, "reason": reason.to_string()}),
     }
 }
@@ -94,14 +94,20 @@ fn root(r: &Root, sample_time_s: f64) -> Value {
     })
 }
 
-fn residual_tests(v: &Validation) -> Value {
-    let signs = v.signs();
-    json!({
-        "ljung_box": v.ljung_box.map_or(Value::Null, |t| json!({
+pub fn ljung_box(test: Option<&LjungBox>) -> Value {
+    test.map_or(Value::Null, |t| {
+        json!({
             "statistic": number(t.statistic),
             "degrees_of_freedom": t.degrees_of_freedom,
             "p_value": number(t.p_value),
-        })),
+        })
+    })
+}
+
+fn residual_tests(v: &Validation) -> Value {
+    let signs = v.signs();
+    json!({
+        "ljung_box": ljung_box(v.ljung_box.as_ref()),
         "coloured_residuals": signs.coloured_residuals,
         "under_modelled": signs.under_modelled,
         "feedback": signs.feedback,
@@ -186,7 +192,13 @@ impl Identified<'_> {
         }
         let ts = fit.model().sample_time().s();
         set("roots", fit.roots().iter().map(|r| root(r, ts)).collect());
-        set("residual_tests", self.validations.iter().map(residual_tests).collect());
+        // Residuals that are rounding say nothing.
+        let tested = if fit.covariance().is_some() {
+            self.validations
+        } else {
+            &[]
+        };
+        set("residual_tests", tested.iter().map(residual_tests).collect());
         if let Some((k, vaf, nrmse)) = self.ahead {
             set(
                 "prediction_ahead",

@@ -113,10 +113,10 @@ pub fn model(fit: &Fit) -> String {
     }
     let t = fit.termination();
     let mut text = format!(
-        "{}\n{coefficients}\nSearch: {}, {} steps, start: {}.\n",
+        "{}\n{coefficients}\nSearch: {}, {}, start: {}.\n",
         fit.title(),
         t.reason,
-        t.iterations,
+        steps(t.iterations),
         fit.start(),
     );
     if !fit.model().is_stable() {
@@ -125,21 +125,41 @@ pub fn model(fit: &Fit) -> String {
     text
 }
 
+/// A number of steps in words.
+pub fn steps(n: usize) -> String {
+    if n == 1 {
+        "1 step".to_owned()
+    } else {
+        format!("{n} steps")
+    }
+}
+
 /// Loss and fit percentages.
 pub fn quality(fit: &Fit, q: &Quality) -> String {
-    format!(
-        "Loss {} over {} residuals; innovation variance {} (divisor: residuals - parameters - {} initial states).\n\
-         VAF (no mean removed): simulation {:.2} %, prediction {:.2} %.  NRMSE fit (mean removed): simulation {:.2} %, \
-         prediction {:.2} %.\n",
+    let variance = if fit.is_robust() {
+        "square of the robust scale (median absolute residual / 0.6745)".to_owned()
+    } else {
+        format!("divisor: residuals - parameters - {} initial states", fit.state_count())
+    };
+    let mut text = format!(
+        "Loss {} over {} residuals; innovation variance {} ({variance}).\n",
         numbers::plain(fit.loss()),
         fit.residual_count(),
         numbers::plain(fit.innovation_variance()),
-        fit.state_count(),
-        q.vaf_simulation,
-        q.vaf_prediction,
-        q.nrmse_simulation,
-        q.nrmse_prediction,
-    )
+    );
+    text.push_str(&if fit.model().structure().has_input() {
+        format!(
+            "VAF (no mean removed): simulation {:.2} %, prediction {:.2} %.  NRMSE fit (mean removed): simulation {:.2} %, \
+             prediction {:.2} %.\n",
+            q.vaf_simulation, q.vaf_prediction, q.nrmse_simulation, q.nrmse_prediction,
+        )
+    } else {
+        format!(
+            "Prediction: VAF (no mean removed) {:.2} %, NRMSE fit (mean removed) {:.2} %.\n",
+            q.vaf_prediction, q.nrmse_prediction
+        )
+    });
+    text
 }
 
 /// The operator's parameters, or why there are none.
@@ -224,7 +244,13 @@ pub fn roots(fit: &Fit) -> String {
             _ => "zero (B)",
         };
         let errors = match root.standard_error {
-            Some((re, im)) if re.is_finite() && im.is_finite() => format!("{re:.1e}, {im:.1e}"),
+            Some((re, im)) if re.is_finite() && im.is_finite() => {
+                if root.value.im == 0.0 {
+                    format!("{re:.1e}")
+                } else {
+                    format!("{re:.1e}, {im:.1e}")
+                }
+            }
             _ => "-".to_owned(),
         };
         let (frequency, damping) = match root.frequency_and_damping(ts) {
@@ -331,8 +357,7 @@ pub fn candidates(choice: &Choice) -> String {
     );
     if let Some((low, high)) = choice.delay_interval() {
         text.push_str(&format!(
-            "Delay: nk = {low} to {high} lie within the 95 % likelihood interval of nk = {}.\n",
-            choice.fit.orders().nk
+            "Delay: nk = {low} to {high} lie within the 95 % likelihood interval around the smallest loss.\n"
         ));
     }
     if failed > 0 {

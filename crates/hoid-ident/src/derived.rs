@@ -30,8 +30,12 @@ pub struct Root {
 }
 
 impl Root {
-    /// Natural frequency in rad/s and damping ratio of the continuous pole `ln(z)/Ts`; `None` at the origin of z.
+    /// Natural frequency in rad/s and damping ratio of the continuous pole `ln(z)/Ts`; `None` on the closed negative real axis of
+    /// z, where there is none.
     pub fn frequency_and_damping(&self, sample_time_s: f64) -> Option<(f64, f64)> {
+        if self.value.im == 0.0 && self.value.re <= 0.0 {
+            return None;
+        }
         let s = self.value.ln() / sample_time_s;
         let frequency = s.norm();
         (frequency.is_finite() && frequency > 0.0).then(|| (frequency, -s.re / frequency))
@@ -102,7 +106,9 @@ impl Fit {
         }
         let error =
             |gradient: &[f64]| Estimate::with_variance(0.0, variance_along(gradient, covariance)).standard_error;
-        Some((error(&by_re)?, if z.im == 0.0 { 0.0 } else { error(&by_im)? }))
+        let (re, im) = (error(&by_re)?, if z.im == 0.0 { 0.0 } else { error(&by_im)? });
+        // Coefficients without a variance: fixed ones.
+        (re > 0.0 || im > 0.0).then_some((re, im))
     }
 
     /// Crossover frequency and margins of the open loop with a controlled element of the given frequency response.
@@ -184,6 +190,7 @@ mod tests {
             },
             start: String::new(),
             output_variance: 1.0,
+            robust: false,
             physical: None,
         }
     }
@@ -216,7 +223,8 @@ mod tests {
             let (up, down, here) = (shifted(1.0), shifted(-1.0), fit(theta(), only(i)));
             for ((a, b), root) in up.roots().iter().zip(down.roots()).zip(here.roots()) {
                 let slope = (a.value - b.value) / (2.0 * h);
-                let (re, im) = root.standard_error.unwrap();
+                // A root that does not depend on this parameter has no error.
+                let (re, im) = root.standard_error.unwrap_or((0.0, 0.0));
                 // The pair of poles lies close together: second differences of the root are 1e3.
                 assert!((slope.re.abs() - re).abs() < 1e-5 * (1.0 + re), "{i} {root:?} {slope}");
                 assert!((slope.im.abs() - im).abs() < 1e-5 * (1.0 + im), "{i} {root:?} {slope}");
@@ -264,10 +272,12 @@ mod tests {
         };
         let (frequency, damping) = root.frequency_and_damping(0.01).unwrap();
         assert!((frequency - 11.25).abs() < 1e-10 && (damping - 0.35).abs() < 1e-10);
-        let origin = Root {
-            value: Complex64::new(0.0, 0.0),
-            ..root
-        };
-        assert!(origin.frequency_and_damping(0.01).is_none());
+        for without in [0.0, -0.3] {
+            let root = Root {
+                value: Complex64::new(without, 0.0),
+                ..root
+            };
+            assert!(root.frequency_and_damping(0.01).is_none());
+        }
     }
 }

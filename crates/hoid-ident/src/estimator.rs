@@ -301,6 +301,7 @@ impl Estimator {
         Ok(Fit {
             covariance: Some(inverse.iter().map(|g| variance * g).collect()),
             innovation_variance: rounds.scale * rounds.scale,
+            robust: true,
             ..fit
         })
     }
@@ -352,6 +353,7 @@ impl Estimator {
             termination,
             start: String::new(),
             output_variance: output_variance(&criterion.data, criterion.first),
+            robust: false,
             physical: None,
         })
     }

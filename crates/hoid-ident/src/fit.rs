@@ -29,6 +29,8 @@ pub struct Fit {
     pub(crate) held: Vec<bool>,
     /// Variance of the output over the residuals that count.
     pub(crate) output_variance: f64,
+    /// True where the innovation variance is the square of a robust scale.
+    pub(crate) robust: bool,
     /// The physical parameters that theta was computed from, for a grey box.
     pub(crate) physical: Option<Box<Physical>>,
 }
@@ -108,7 +110,8 @@ impl Fit {
         self.loss
     }
 
-    /// Unbiased innovation variance `sum eps^2 / (n - p - s)` with p parameters and s estimated initial states.
+    /// Unbiased innovation variance `sum eps^2 / (n - p - s)` with p parameters and s estimated initial states; with a robust
+    /// loss the square of the robust scale ([`Fit::is_robust`]).
     pub fn innovation_variance(&self) -> f64 {
         self.innovation_variance
     }
@@ -219,6 +222,11 @@ impl Fit {
             Some(covariance) => operator_estimate(&self.model, covariance),
             None => operator_estimate(&self.model, &vec![f64::NAN; p * p]),
         }
+    }
+
+    /// True for a fit by a robust loss.
+    pub fn is_robust(&self) -> bool {
+        self.robust
     }
 
     /// True for a grey box, whose theta is a function of physical parameters.

@@ -47,7 +47,7 @@ impl fmt::Display for OrderRanges {
         let mut separator = "";
         for (name, range) in self.named() {
             match (*range.start(), *range.end()) {
-                (0, 0) if name != "nk" => continue,
+                (0, 0) if name != "nk" || *self.nb.end() == 0 => continue,
                 (low, high) if low == high => write!(f, "{separator}{name}={low}")?,
                 (low, high) => write!(f, "{separator}{name}={low}..{high}")?,
             }

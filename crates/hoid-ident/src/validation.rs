@@ -281,6 +281,11 @@ fn autocorrelation(residuals: &[f64], largest: usize) -> Correlation {
     }
 }
 
+/// Test of Ljung and Box on residuals whose noise model has `free` coefficients; `None` when there are fewer lags than those.
+pub fn whiteness(residuals: &[f64], free: usize) -> Option<LjungBox> {
+    ljung_box(&autocorrelation(residuals, LARGEST_LAG), residuals.len(), free)
+}
+
 fn ljung_box(correlation: &Correlation, n: usize, free: usize) -> Option<LjungBox> {
     let lags = correlation.lags.len();
     let degrees_of_freedom = lags.checked_sub(free).filter(|d| *d > 0)?;

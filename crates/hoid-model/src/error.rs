@@ -153,6 +153,14 @@ pub enum NotConvertible {
         /// Poles of B/F (or B/A).
         poles: usize,
     },
+    /// Poles of the system in A and in F.
+    #[error("the operator model has its two poles in A or in F, found na = {na} and nf = {nf}")]
+    PolesInBoth {
+        /// Coefficients of A.
+        na: usize,
+        /// Coefficients of F.
+        nf: usize,
+    },
     /// A zero-order hold makes at least one sample of delay.
     #[error("nk = 0: a zero-order hold delays by at least one sample, so that tau_e = (nk - 1) Ts would be negative")]
     NoDelay,

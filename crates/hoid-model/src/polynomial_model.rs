@@ -161,8 +161,12 @@ impl PolynomialModel {
     /// The model as a discrete operator, when it has two coefficients in B and two poles.
     ///
     /// # Errors
-    /// [`NotConvertible::OtherOrders`].
+    /// [`NotConvertible::OtherOrders`], [`NotConvertible::PolesInBoth`].
     pub fn discrete_operator(&self) -> Result<DiscreteOperator, NotConvertible> {
+        let (na, nf) = (self.orders.na, self.orders.nf);
+        if na > 0 && nf > 0 {
+            return Err(NotConvertible::PolesInBoth { na, nf });
+        }
         let (b, poles) = (self.b(), self.operator_poles());
         match (b, poles) {
             (&[b0, b1], &[f1, f2]) => Ok(DiscreteOperator {
@@ -177,14 +181,9 @@ impl PolynomialModel {
         }
     }
 
-    /// The polynomial that holds the operator's poles: A where there is no F (ARX and its kin), else F. Empty when the poles
-    /// are spread over both.
+    /// The polynomial that holds the operator's poles: A where there is no F (ARX and its kin), else F.
     fn operator_poles(&self) -> &[f64] {
-        match (self.orders.na, self.orders.nf) {
-            (_, 0) => self.a(),
-            (0, _) => self.f(),
-            _ => &[],
-        }
+        if self.orders.nf == 0 { self.a() } else { self.f() }
     }
 
     /// Positions of `[b0, b1, f1, f2]` (or a1, a2) in theta, for models that [`PolynomialModel::discrete_operator`] takes.

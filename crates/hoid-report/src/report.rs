@@ -159,6 +159,7 @@ fn section(index: usize, model: &ModelSection<'_>, validations: &[Result<Validat
         converged => fit.termination().converged(),
         stable => fit.model().is_stable(),
         exact => fit.covariance().is_none(),
+        grey_box => fit.is_grey_box(),
         coefficients => tables::coefficients(fit),
         operator => tables::operator(fit, model.truth.as_ref()),
         remnant => tables::remnant(fit),

@@ -205,7 +205,9 @@ pub fn remnant(fit: &Fit) -> Vec<Value> {
         ),
         (RemnantDiscretisation::BackwardEuler, "backward Euler"),
     ];
-    let rows = ways.into_iter().map(|(how, name)| match fit.remnant(how) {
+    // A grey box has fitted the remnant as it is held.
+    let count = if fit.is_grey_box() { 1 } else { ways.len() };
+    let rows = ways.into_iter().take(count).map(|(how, name)| match fit.remnant(how) {
         Ok(r) => context! { how => name, order => r.order, t_n => cell(r.t_n_s), k_n => cell(r.k_n) },
         Err(reason) => context! { how => name, reason => reason.to_string() },
     });

@@ -288,6 +288,7 @@ impl GreyBox {
                 start: start.clone(),
                 held: vec![false; polynomials.jacobian.len()],
                 output_variance: output_variance(&criterion.data, criterion.first),
+                robust: false,
                 physical: None,
             });
         }

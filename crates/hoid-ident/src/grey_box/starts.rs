@@ -30,7 +30,8 @@ const GRID_OMEGA: [f64; 3] = [6.0, 11.0, 20.0];
 /// Damping ratios of the grid.
 const GRID_ZETA: [f64; 3] = [0.25, 0.7, 1.3];
 /// Time constants of the remnant, s; the first ranks the grid.
-pub(crate) const GRID_TIME_CONSTANT_S: [f64; 5] = [0.1, 0.012, 0.03, 0.06, 0.3];
+/// Below half a sample a filter of third order has another minimum.
+pub(crate) const GRID_TIME_CONSTANT_S: [f64; 6] = [0.1, 0.004, 0.012, 0.03, 0.06, 0.3];
 /// Fewest delays over a range that is not a point.
 const FEWEST_DELAYS: usize = 3;
 

@@ -221,6 +221,7 @@ impl InstrumentalVariable {
             start: format!("{}, {}", self.method, self.instruments),
             held: vec![false; p],
             output_variance: output_variance(&criterion.data, criterion.first),
+            robust: false,
             physical: None,
         })
     }

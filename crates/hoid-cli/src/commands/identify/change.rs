@@ -1,6 +1,9 @@
 //! `hoid identify --structure time-varying`: the operator whose gains change once.
 
-use hoid_ident::{GainsAt, InitialState, TimeVarying, TimeVaryingFit};
+use hoid_ident::{
+    GainsAt, InitialState, TimeVarying, TimeVaryingFit,
+    validation::{LjungBox, whiteness},
+};
 use hoid_io::write_record;
 use hoid_model::{Channel, Record, uncertainty::Estimate};
 use hoid_report::numbers;
@@ -35,16 +38,28 @@ pub fn run(args: &IdentifyArgs, records: &[Record]) -> Result<(), CliError> {
         ("orders".to_owned(), format!("nd={}", estimator.nd)),
         ("delay in s".to_owned(), format!("{low}..{high}")),
     ];
-    settings.extend(super::common_settings(args));
+    settings.extend(super::common_settings(args, true));
     if let Some(path) = &args.trace {
         write_record(path, &trace(&fit, &records[0])?)?;
-        output::complain(&format!("trace: {}", path.display()));
+        output::complain(&format!("trace of {}: {}", args.records[0].display(), path.display()));
     }
     let files: Vec<String> = args.records.iter().map(|p| p.display().to_string()).collect();
+    let test = |record: &Record| Ok(whiteness(&fit.residuals(record)?.values, estimator.nd));
+    let tests = records
+        .iter()
+        .map(test)
+        .collect::<Result<Vec<Option<LjungBox>>, CliError>>()?;
+    let found = Found {
+        fit: &fit,
+        files: &files,
+        records,
+        tests: &tests,
+        settings: &settings,
+    };
     if args.json {
-        json::print(&to_json(&fit, &files, records, &settings));
+        json::print(&found.to_json());
     } else {
-        output::print(&page(&fit, &files, records, &settings));
+        output::print(&found.page());
     }
     Ok(())
 }
@@ -87,89 +102,133 @@ fn trace(fit: &TimeVaryingFit, record: &Record) -> Result<Record, CliError> {
     Ok(trace.unwrap_or_else(|| record.clone()))
 }
 
-fn page(fit: &TimeVaryingFit, files: &[String], records: &[Record], settings: &[(String, String)]) -> String {
-    let mut page = text::records(files, records);
-    let mut rows = text::table(&["parameter", "value", "standard error", "unit", ""]);
-    for p in fit.parameters() {
-        let (value, error) = text::with_uncertainty(&p.estimate);
-        let remark = p.remark.map(|r| r.to_string()).unwrap_or_default();
-        rows.add_row([p.name, value, error, p.unit.to_owned(), remark]);
-    }
-    page.push_str(&format!("\nOperator whose gains change once (sigmoid)\n{rows}\n"));
-    let interval = |name: &str, unit: &str, interval: Option<(f64, f64)>| {
-        interval.map_or(String::new(), |(low, high)| {
-            format!("{name}: 95 % likelihood interval {low:.4} to {high:.4} {unit}.\n")
-        })
-    };
-    page.push_str(&interval("t_M", "s", fit.midpoint_interval()));
-    page.push_str(&interval("G", "1/s", fit.rate_interval()));
-    let c = fit.comparison();
-    page.push_str(&format!(
+/// Everything that was found.
+struct Found<'a> {
+    fit: &'a TimeVaryingFit,
+    files: &'a [String],
+    records: &'a [Record],
+    /// Whiteness of the residuals of each record.
+    tests: &'a [Option<LjungBox>],
+    settings: &'a [(String, String)],
+}
+
+impl Found<'_> {
+    fn page(&self) -> String {
+        let Self {
+            fit,
+            files,
+            records,
+            tests,
+            settings,
+        } = *self;
+        let mut page = text::records(files, records);
+        let mut rows = text::table(&["parameter", "value", "standard error", "unit", ""]);
+        for p in fit.parameters() {
+            let (value, error) = text::with_uncertainty(&p.estimate);
+            let remark = p.remark.map(|r| r.to_string()).unwrap_or_default();
+            rows.add_row([p.name, value, error, p.unit.to_owned(), remark]);
+        }
+        page.push_str(&format!("\nOperator whose gains change once (sigmoid)\n{rows}\n"));
+        let interval = |name: &str, unit: &str, interval: Option<(f64, f64)>| {
+            interval.map_or(String::new(), |(low, high)| {
+                format!("{name}: 95 % likelihood interval {low:.4} to {high:.4} {unit}.\n")
+            })
+        };
+        page.push_str(&interval("t_M", "s", fit.midpoint_interval()));
+        page.push_str(&interval("G", "1/s", fit.rate_interval()));
+        let c = fit.comparison();
+        page.push_str(&format!(
         "Against the operator that does not change: 2 ln of the likelihood ratio {:.1} for {} parameters more, BIC {} by {:.1}.\n",
         c.likelihood_ratio,
         c.extra_parameters,
         if c.bic_difference > 0.0 { "lower" } else { "higher" },
         c.bic_difference.abs()
     ));
-    if !fit.change_found() {
-        page.push_str("The records show no change.\n");
+        if !fit.change_found() {
+            page.push_str("The records show no change.\n");
+        }
+        let t = fit.termination();
+        page.push_str(&format!(
+            "Search: {}, {}, start: {}.\n",
+            t.reason,
+            text::steps(t.iterations),
+            fit.start()
+        ));
+        page.push_str(&format!(
+            "Loss {} over {} residuals; innovation variance {}.\n",
+            numbers::plain(fit.loss()),
+            fit.residual_count(),
+            numbers::plain(fit.innovation_variance())
+        ));
+        // Residuals that are rounding say nothing.
+        if fit.covariance().is_some() {
+            let mut coloured = false;
+            for (file, test) in files.iter().zip(tests) {
+                let Some(t) = test else { continue };
+                coloured |= t.p_value < 0.01;
+                page.push_str(&format!(
+                    "Residuals of {file}: Ljung-Box Q = {:.1} with {} degrees of freedom, p = {:.3}.\n",
+                    t.statistic, t.degrees_of_freedom, t.p_value
+                ));
+            }
+            if coloured {
+                page.push_str(
+                "They are not white: a noise model that is too small can pass for a change; try --orders nd=2 or more.\n",
+            );
+            }
+        }
+        page.push_str(&text::settings(settings));
+        page
     }
-    let t = fit.termination();
-    page.push_str(&format!(
-        "Search: {}, {} steps, start: {}.\n",
-        t.reason,
-        t.iterations,
-        fit.start()
-    ));
-    page.push_str(&format!(
-        "Loss {} over {} residuals; innovation variance {}.\n",
-        numbers::plain(fit.loss()),
-        fit.residual_count(),
-        numbers::plain(fit.innovation_variance())
-    ));
-    page.push_str(&text::settings(settings));
-    page
-}
 
-fn to_json(fit: &TimeVaryingFit, files: &[String], records: &[Record], settings: &[(String, String)]) -> Value {
-    let parameters: Vec<Value> = fit
-        .parameters()
-        .iter()
-        .map(|p| {
-            json!({
-                "name": p.name,
-                "value": number(p.estimate.value),
-                "standard_error": json::optional(p.estimate.standard_error),
-                "unit": p.unit,
-                "remark": p.remark.map(|r| r.to_string()),
+    fn to_json(&self) -> Value {
+        let Self {
+            fit,
+            files,
+            records,
+            tests,
+            settings,
+        } = *self;
+        let parameters: Vec<Value> = fit
+            .parameters()
+            .iter()
+            .map(|p| {
+                json!({
+                    "name": p.name,
+                    "value": number(p.estimate.value),
+                    "standard_error": json::optional(p.estimate.standard_error),
+                    "unit": p.unit,
+                    "remark": p.remark.map(|r| r.to_string()),
+                })
             })
+            .collect();
+        let t = fit.termination();
+        let c = fit.comparison();
+        let interval = |interval: Option<(f64, f64)>| interval.map_or(Value::Null, |(low, high)| json!([low, high]));
+        let settings: Map<String, Value> = settings.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
+        json!({
+            "hoid": env!("CARGO_PKG_VERSION"),
+            "records": json::records(files, records),
+            "structure": "time-varying",
+            "parameters": parameters,
+            "loss": number(fit.loss()),
+            "innovation_variance": number(fit.innovation_variance()),
+            "termination": {"reason": t.reason.to_string(), "converged": t.converged(), "iterations": t.iterations},
+            "start": fit.start(),
+            "residuals": fit.residual_count(),
+            "initial_states": fit.state_count(),
+            "change": {
+                "found": fit.change_found(),
+                "likelihood_ratio": number(c.likelihood_ratio),
+                "extra_parameters": c.extra_parameters,
+                "bic_difference": number(c.bic_difference),
+                "t_M_interval": interval(fit.midpoint_interval()),
+                "G_interval": interval(fit.rate_interval()),
+            },
+            "residual_tests": tests.iter().map(|t| json!({"ljung_box": json::ljung_box(t.as_ref())})).collect::<Vec<_>>(),
+            "initial": json::operator(&Ok(fit.initial_operator())),
+            "last": json::operator(&Ok(fit.last_operator())),
+            "settings": settings,
         })
-        .collect();
-    let t = fit.termination();
-    let c = fit.comparison();
-    let interval = |interval: Option<(f64, f64)>| interval.map_or(Value::Null, |(low, high)| json!([low, high]));
-    let settings: Map<String, Value> = settings.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
-    json!({
-        "hoid": env!("CARGO_PKG_VERSION"),
-        "records": json::records(files, records),
-        "structure": "time-varying",
-        "parameters": parameters,
-        "loss": number(fit.loss()),
-        "innovation_variance": number(fit.innovation_variance()),
-        "termination": {"reason": t.reason.to_string(), "converged": t.converged(), "iterations": t.iterations},
-        "start": fit.start(),
-        "residuals": fit.residual_count(),
-        "initial_states": fit.state_count(),
-        "change": {
-            "found": fit.change_found(),
-            "likelihood_ratio": number(c.likelihood_ratio),
-            "extra_parameters": c.extra_parameters,
-            "bic_difference": number(c.bic_difference),
-            "t_M_interval": interval(fit.midpoint_interval()),
-            "G_interval": interval(fit.rate_interval()),
-        },
-        "initial": json::operator(&Ok(fit.initial_operator())),
-        "last": json::operator(&Ok(fit.last_operator())),
-        "settings": settings,
-    })
+    }
 }

@@ -8,7 +8,7 @@ use hoid_ident::{
 use hoid_model::{Record, Structure};
 
 use crate::{
-    args::{FocusName, IdentifyArgs, Kind},
+    args::{FocusName, IdentifyArgs, InitialStateName, Kind, SearchMethodName},
     error::CliError,
     orders, output,
 };
@@ -52,7 +52,23 @@ fn misplaced(args: &IdentifyArgs, kind: Kind, by_instruments: bool) -> Option<(&
     let (grey_box, changing) = (kind == Kind::GreyBox, kind == Kind::TimeVarying);
     let search = "--method pem and a polynomial structure";
     let steady = "a model that does not change";
+    let input = !matches!(kind, Kind::Polynomial(structure) if !structure.has_input());
     let options = [
+        (
+            args.controlled_element.is_some() && !input,
+            "--controlled-element",
+            "a structure with an input",
+        ),
+        (
+            args.initial_state != InitialStateName::Auto && by_instruments,
+            "--initial-state",
+            "--method pem",
+        ),
+        (
+            args.search_method != SearchMethodName::Auto && by_instruments,
+            "--search-method",
+            "--method pem",
+        ),
         (
             args.instruments.is_some() && !by_instruments,
             "--instruments",
@@ -159,6 +175,7 @@ fn polynomial(args: &IdentifyArgs, structure: Structure, records: &[Record]) -> 
         }
         let estimator = InstrumentalVariable {
             instruments,
+            max_iterations: args.max_iterations,
             ..InstrumentalVariable::new(method, fit.orders())
         };
         fit = estimator.fit(records)?;
@@ -241,7 +258,11 @@ fn grey_box(args: &IdentifyArgs, records: &[Record]) -> Result<Estimated, CliErr
         ("structure".to_owned(), "grey-box".to_owned()),
         (
             "remnant order m".to_owned(),
-            format!("{}..{}, by BIC", m.start(), m.end()),
+            if m.start() == m.end() {
+                m.start().to_string()
+            } else {
+                format!("{}..{}, by BIC", m.start(), m.end())
+            },
         ),
         ("delay in s".to_owned(), format!("{low}..{high}")),
     ];

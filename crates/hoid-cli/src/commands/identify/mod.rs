@@ -45,7 +45,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     };
     let files: Vec<String> = args.records.iter().map(|p| p.display().to_string()).collect();
     let mut settings = chosen;
-    settings.extend(common_settings(args));
+    settings.extend(common_settings(args, with_input));
     let operator = fit.operator();
     let remnant = (fit.orders().nd > 0).then(|| fit.remnant(args.remnant_discretisation.into()));
     let margins = args
@@ -142,7 +142,7 @@ fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> MarginEstima
 }
 
 /// The options that every kind of fit shares, defaults included.
-fn common_settings(args: &IdentifyArgs) -> Vec<(String, String)> {
+fn common_settings(args: &IdentifyArgs, with_input: bool) -> Vec<(String, String)> {
     let read = &args.read;
     let or_all = |bound: Option<f64>, all: &str| bound.map_or(all.to_owned(), |v| v.to_string());
     let mut list = vec![
@@ -150,7 +150,6 @@ fn common_settings(args: &IdentifyArgs) -> Vec<(String, String)> {
             "initial state".to_owned(),
             format!("{:?}", args.initial_state).to_lowercase(),
         ),
-        ("input".to_owned(), read.input.clone()),
         ("output".to_owned(), read.output.clone()),
         (
             "sampling".to_owned(),
@@ -171,6 +170,9 @@ fn common_settings(args: &IdentifyArgs) -> Vec<(String, String)> {
         ),
         ("largest number of steps".to_owned(), args.max_iterations.to_string()),
     ];
+    if with_input {
+        list.insert(1, ("input".to_owned(), read.input.clone()));
+    }
     for (name, text) in [("fixed", &args.fix), ("bounds", &args.bound)] {
         if let Some(text) = text {
             list.push((name.to_owned(), text.clone()));
@@ -204,8 +206,8 @@ fn page(found: &Identified<'_>) -> String {
     }
     page.push_str(&text::model(fit));
     page.push_str(&text::quality(fit, &found.quality));
-    page.push('\n');
     if fit.model().structure().has_input() {
+        page.push('\n');
         page.push_str(&text::operator(found.operator));
     }
     if let Some(grey_box) = found.grey_box {
@@ -215,14 +217,21 @@ fn page(found: &Identified<'_>) -> String {
         page.push_str(&text::remnant(remnant));
     }
     if let Some(m) = found.margins {
+        let whose = match found.grey_box {
+            Some(_) if found.files.len() > 1 => format!(" (operator of {})", found.files[0]),
+            _ => String::new(),
+        };
         page.push_str(&format!(
-            "Open loop with the given controlled element: {}",
+            "Open loop with the given controlled element{whose}: {}",
             text::margins(m)
         ));
     }
     page.push('\n');
     page.push_str(&text::roots(fit));
-    page.push_str(&text::residual_tests(found.files, found.validations));
+    // Residuals that are rounding say nothing.
+    if fit.covariance().is_some() {
+        page.push_str(&text::residual_tests(found.files, found.validations));
+    }
     if let Some((k, vaf, nrmse)) = found.ahead {
         page.push_str(&format!(
             "Prediction {k} samples ahead: VAF {vaf:.2} %, NRMSE fit {nrmse:.2} %.\n"
