@@ -120,13 +120,7 @@ impl Estimator {
         }
         let criterion = Criterion {
             orders: self.orders,
-            data: records
-                .iter()
-                .map(|r| Data {
-                    e: r.input(),
-                    u: r.output(),
-                })
-                .collect(),
+            data: Data::of(records),
             initial,
             first,
             weights: None,

@@ -123,13 +123,7 @@ fn covariance(simulated: &Fit, fit: &Fit, records: &[Record], first: usize) -> R
     let orders = simulated.orders();
     let criterion = Criterion {
         orders,
-        data: records
-            .iter()
-            .map(|r| Data {
-                e: r.input(),
-                u: r.output(),
-            })
-            .collect(),
+        data: Data::of(records),
         initial: simulated.initial_state(),
         first: first.max(first_residual(&orders, simulated.initial_state())),
         weights: None,

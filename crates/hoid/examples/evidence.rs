@@ -4,7 +4,7 @@
 //!
 //! `cargo run --release -p hoid --example evidence -- speed [RUNS] [PYTHON]` times the Box-Jenkins fit beside SciPy; PYTHON is an
 //! interpreter that has numpy and scipy, `python3` by default.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../tests/common/textbook.rs"]
 mod textbook;

@@ -92,13 +92,7 @@ impl GreyBox {
                 checks::record(Structure::BoxJenkins, &orders, record, first)?;
             }
         }
-        let data: Vec<Data<'_>> = records
-            .iter()
-            .map(|r| Data {
-                e: r.input(),
-                u: r.output(),
-            })
-            .collect();
+        let data: Vec<Data<'_>> = Data::of(records);
         let criteria: Vec<PhysicalCriterion<'_>> = layouts
             .into_iter()
             .map(|layout| PhysicalCriterion::new(layout, data.clone(), self.initial_state, first))
@@ -144,7 +138,7 @@ impl GreyBox {
         };
         let polished = criteria[i].search(rough.eta.clone(), &self.search, None, &mut workspace);
         let fit = match polished {
-            Some(minimum) => self.result(&criteria[i], minimum, rough.start)?,
+            Some(minimum) => self.result(&criteria[i], minimum, rough.start().to_owned())?,
             None => rough,
         };
         candidates[i] = candidate(&criteria[i], Ok(&fit));
@@ -299,12 +293,6 @@ impl GreyBox {
             free,
             parameters: not_fixed,
             fits,
-            loss: sum_of_squares / n as f64,
-            innovation_variance,
-            residuals: n,
-            states,
-            termination: minimum.termination,
-            start,
             candidates: Vec::new(),
         };
         for record in 0..fit.fits.len() {

@@ -45,12 +45,6 @@ pub struct GreyBoxFit {
     /// Number of parameters that were not fixed.
     pub(crate) parameters: usize,
     pub(crate) fits: Vec<Fit>,
-    pub(crate) loss: f64,
-    pub(crate) innovation_variance: f64,
-    pub(crate) residuals: usize,
-    pub(crate) states: usize,
-    pub(crate) termination: Termination,
-    pub(crate) start: String,
     pub(crate) candidates: Vec<OrderCandidate>,
 }
 
@@ -154,11 +148,11 @@ impl GreyBoxFit {
         }
         let place = self.layout.positions[self.known(record)][TIME_CONSTANT];
         let noise = remnant_noise(self.eta[place], self.layout.order, self.layout.sample_time).ok()?;
-        let sigma = self.innovation_variance.sqrt();
+        let sigma = self.innovation_variance().sqrt();
         let k_n = sigma / noise.gain;
         let t_n_s = self.estimate(place);
         let of_time = t_n_s.standard_error.unwrap_or(0.0) * noise.log_gain_slope;
-        let relative = of_time * of_time + 1.0 / (2.0 * self.residuals as f64);
+        let relative = of_time * of_time + 1.0 / (2.0 * self.residual_count() as f64);
         let k_n = match self.covariance {
             Some(_) => Estimate::with_variance(k_n, k_n * k_n * relative),
             None => Estimate::fixed(k_n),
@@ -182,24 +176,29 @@ impl GreyBoxFit {
         record.min(self.fits.len() - 1)
     }
 
+    /// The figures that all records share.
+    fn whole(&self) -> &Fit {
+        &self.fits[0]
+    }
+
     /// Loss `V = sum eps^2 / n` over the n residuals that count.
     pub fn loss(&self) -> f64 {
-        self.loss
+        self.whole().loss()
     }
 
     /// Unbiased innovation variance `sum eps^2 / (n - p - s)` with p parameters and s estimated initial states.
     pub fn innovation_variance(&self) -> f64 {
-        self.innovation_variance
+        self.whole().innovation_variance()
     }
 
     /// Number n of residuals.
     pub fn residual_count(&self) -> usize {
-        self.residuals
+        self.whole().residual_count()
     }
 
     /// Number s of initial states that were estimated, over all records.
     pub fn state_count(&self) -> usize {
-        self.states
+        self.whole().state_count()
     }
 
     /// Number p of parameters that were not fixed.
@@ -209,22 +208,21 @@ impl GreyBoxFit {
 
     /// How the search ended.
     pub fn termination(&self) -> Termination {
-        self.termination
+        self.whole().termination()
     }
 
     /// The start that won.
     pub fn start(&self) -> &str {
-        &self.start
+        self.whole().start()
     }
 
     /// Akaike's criterion `n ln V + 2 p`.
     pub fn aic(&self) -> f64 {
-        self.residuals as f64 * self.loss.ln() + 2.0 * self.parameters as f64
+        self.whole().aic()
     }
 
     /// Schwarz's (Bayesian) criterion `n ln V + p ln n`.
     pub fn bic(&self) -> f64 {
-        let n = self.residuals as f64;
-        n * self.loss.ln() + self.parameters as f64 * n.ln()
+        self.whole().bic()
     }
 }

@@ -159,13 +159,7 @@ impl InstrumentalVariable {
         }
         let criterion = Criterion {
             orders: self.orders,
-            data: records
-                .iter()
-                .map(|r| Data {
-                    e: r.input(),
-                    u: r.output(),
-                })
-                .collect(),
+            data: Data::of(records),
             initial: InitialState::Estimate,
             first,
             weights: None,

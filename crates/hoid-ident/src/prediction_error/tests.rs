@@ -1,0 +1,303 @@
+use super::*;
+
+/// A closed-loop-like record with coloured noise and a start away from rest.
+fn record(n: usize) -> (Vec<f64>, Vec<f64>) {
+    let mut state = 12345_u64;
+    let mut noise = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let e: Vec<f64> = (0..n)
+        .map(|t| (0.05 * t as f64 + 1.0).sin() + 0.4 * (0.31 * t as f64).cos() + 0.3 * noise())
+        .collect();
+    let mut u = vec![0.3, 0.2, -0.1];
+    let mut colour = 0.0;
+    for t in 3..n {
+        colour = 0.8 * colour + 0.05 * noise();
+        let w = 1.6 * u[t - 1] - 0.7 * u[t - 2] + 0.2 * e[t - 3];
+        u.push(w + colour - 0.8 * 0.05 * noise());
+    }
+    (e, u)
+}
+
+fn cases() -> Vec<(Orders, Vec<f64>)> {
+    let base = Orders {
+        nb: 2,
+        nk: 3,
+        ..Orders::default()
+    };
+    vec![
+        (Orders { nd: 1, nf: 2, ..base }, vec![0.2, -0.1, -0.5, -1.5, 0.62]),
+        (
+            Orders { nd: 4, nf: 2, ..base },
+            vec![0.2, -0.1, -0.5, 0.2, -0.1, 0.05, -1.5, 0.62],
+        ),
+        (
+            Orders {
+                nc: 2,
+                nd: 1,
+                nf: 2,
+                ..base
+            },
+            vec![0.2, -0.1, 0.3, 0.1, -0.5, -1.5, 0.62],
+        ),
+        (
+            Orders { nc: 1, nf: 3, ..base },
+            vec![0.2, -0.1, -0.6, -1.5, 0.62, -0.05],
+        ),
+        (Orders { na: 2, ..base }, vec![-1.5, 0.6, 0.2, -0.1]),
+        (
+            Orders {
+                na: 1,
+                nc: 1,
+                nd: 1,
+                nf: 1,
+                ..base
+            },
+            vec![-0.6, 0.2, -0.1, 0.4, -0.3, -0.8],
+        ),
+        (
+            Orders {
+                nb: 1,
+                nk: 0,
+                nf: 1,
+                nd: 2,
+                ..Orders::default()
+            },
+            vec![0.3, -0.4, 0.1, -0.9],
+        ),
+        (
+            Orders {
+                na: 2,
+                nc: 1,
+                ..Orders::default()
+            },
+            vec![-1.5, 0.6, 0.4],
+        ),
+        (
+            Orders {
+                nc: 2,
+                ..Orders::default()
+            },
+            vec![0.5, 0.2],
+        ),
+    ]
+}
+
+fn criterion<'a>(orders: Orders, data: Vec<Data<'a>>, initial: InitialState) -> Criterion<'a> {
+    Criterion {
+        first: first_residual(&orders, initial),
+        orders,
+        data,
+        initial,
+        weights: None,
+    }
+}
+
+#[test]
+fn gradient_agrees_with_finite_differences_in_both_modes() {
+    let (e, u) = record(300);
+    for initial in [InitialState::Zero, InitialState::Estimate, InitialState::Backcast] {
+        for (orders, theta) in cases() {
+            let data = vec![
+                Data { e: &e, u: &u },
+                Data {
+                    e: &e[40..170],
+                    u: &u[40..170],
+                },
+            ];
+            let c = criterion(orders, data, initial);
+            let mut ws = Workspace::default();
+            let exact = c.linearise(&theta, &mut ws);
+            assert!((exact.sum_of_squares - c.sum_of_squares(&theta, &mut ws)).abs() < 1e-10);
+            for i in 0..theta.len() {
+                let h = 1e-5;
+                let mut at = |delta: f64| {
+                    let mut shifted = theta.clone();
+                    shifted[i] += delta;
+                    c.sum_of_squares(&shifted, &mut ws)
+                };
+                // Fourth order: truncation h^4, rounding eps V/h = 1e-9 V.
+                let slope = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
+                let ours = -2.0 * exact.descent[i];
+                let scale = exact.gram[i * theta.len() + i].sqrt() * exact.sum_of_squares.sqrt();
+                assert!(
+                    (slope - ours).abs() < 1e-7 * scale,
+                    "{initial:?} {orders} {}: {ours} and {slope}",
+                    orders.parameter_names()[i]
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn residuals_obey_the_model_equation() {
+    let (e, u) = record(120);
+    let theta = vec![0.2, -0.1, 0.3, -0.5, -1.5, 0.62];
+    let orders = Orders {
+        nb: 2,
+        nc: 1,
+        nd: 1,
+        nf: 2,
+        nk: 3,
+        ..Orders::default()
+    };
+    let c = criterion(orders, vec![Data { e: &e, u: &u }], InitialState::Zero);
+    let eps = c.residuals_of(&theta, 0, &mut Workspace::default());
+    // Written out sample by sample with zeros before the record.
+    let get = |x: &[f64], t: usize, lag: usize| if t >= lag { x[t - lag] } else { 0.0 };
+    let (mut w, mut v, mut r) = (vec![], vec![], vec![]);
+    for t in 0..u.len() {
+        let wt = 0.2 * get(&e, t, 3) - 0.1 * get(&e, t, 4) + 1.5 * get(&w, t, 1) - 0.62 * get(&w, t, 2);
+        w.push(wt);
+        v.push(u[t] - wt);
+        r.push(v[t] - 0.5 * get(&v, t, 1) - 0.3 * get(&r, t, 1));
+        assert!((r[t] - eps[t]).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn estimated_states_leave_nothing_to_gain() {
+    // Shifting w by any free response must not lower the loss: the residual is orthogonal to the basis.
+    let (e, u) = record(300);
+    for (orders, theta) in cases() {
+        let c = criterion(orders, vec![Data { e: &e, u: &u }], InitialState::Estimate);
+        let eps = c.residuals_of(&theta, 0, &mut Workspace::default());
+        let parts = Parts::split(&orders, &theta);
+        let past = Past {
+            c: parts.c,
+            d: parts.d,
+            f: parts.f,
+            lead: orders.nd,
+            noise: None,
+            weights: None,
+        };
+        let free = FreeResponses::of(&past, eps.len());
+        assert_eq!(free.basis().count(), orders.nf + orders.nc, "{orders}");
+        for q in free.basis() {
+            assert!(dot(q, &eps[..q.len()]).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn estimated_states_of_a_noise_free_record_are_exact() {
+    // The record is cut out of a longer one: its past is unknown, and the residuals are still zero.
+    let (e, _) = record(400);
+    let mut u = vec![0.5, -0.3, 0.1, 0.2];
+    for t in 4..400 {
+        u.push(1.6 * u[t - 1] - 0.7 * u[t - 2] + 0.2 * e[t - 3] - 0.12 * e[t - 4]);
+    }
+    let theta = vec![0.2, -0.12, -0.4, -1.6, 0.7];
+    let orders = Orders {
+        nb: 2,
+        nd: 1,
+        nf: 2,
+        nk: 3,
+        ..Orders::default()
+    };
+    let data = Data {
+        e: &e[100..],
+        u: &u[100..],
+    };
+    let c = criterion(orders, vec![data], InitialState::Estimate);
+    assert!(
+        c.residuals_of(&theta, 0, &mut Workspace::default())
+            .iter()
+            .all(|v| v.abs() < 1e-13)
+    );
+    let zero = criterion(orders, vec![data], InitialState::Zero);
+    assert!(
+        zero.residuals_of(&theta, 0, &mut Workspace::default())
+            .iter()
+            .any(|v| v.abs() > 1e-2)
+    );
+}
+
+#[test]
+fn the_unconditional_sum_of_squares_is_that_of_the_covariance_matrix() {
+    let (_, u) = record(60);
+    let orders = Orders {
+        na: 2,
+        nc: 1,
+        ..Orders::default()
+    };
+    let theta = vec![-1.5, 0.7, 0.4];
+    let c = criterion(orders, vec![Data { e: &[], u: &u }], InitialState::Backcast);
+    let ours = c.linearise(&theta, &mut Workspace::default()).sum_of_squares;
+    // Autocovariance of C/A eps from its impulse response; the poles have the modulus 0.84, 0.84^400 = 1e-30.
+    let mut h = vec![1.0, 0.4 + 1.5];
+    for t in 2..800 {
+        h.push(1.5 * h[t - 1] - 0.7 * h[t - 2]);
+    }
+    let r: Vec<f64> = (0..60).map(|k| dot(&h[k..], &h[..800 - k])).collect();
+    let sigma = nalgebra::DMatrix::from_fn(60, 60, |i, j| r[i.abs_diff(j)]);
+    let v = nalgebra::DVector::from_column_slice(&u);
+    let exact = v.dot(&sigma.cholesky().unwrap().solve(&v));
+    assert!((ours - exact).abs() < 1e-11 * exact, "{ours} {exact}");
+}
+
+#[test]
+fn weights_act_as_a_diagonal_matrix_and_keep_the_gradient_exact() {
+    let (e, u) = record(200);
+    for initial in [InitialState::Zero, InitialState::Estimate, InitialState::Backcast] {
+        for (orders, theta) in cases().into_iter().take(4) {
+            let plain = criterion(orders, vec![Data { e: &e, u: &u }], initial);
+            let weights = vec![
+                (plain.first..200)
+                    .map(|t| if t % 7 == 0 { 0.3 } else { 1.0 })
+                    .collect::<Vec<f64>>(),
+            ];
+            let weighted = Criterion {
+                weights: Some(&weights),
+                ..plain.clone()
+            };
+            let mut ws = Workspace::default();
+            let exact = weighted.linearise(&theta, &mut ws);
+            let eps = weighted.residuals_of(&theta, 0, &mut ws);
+            let by_hand: f64 = eps.iter().zip(&weights[0]).map(|(e, w)| (e * w) * (e * w)).sum();
+            if initial != InitialState::Backcast {
+                assert!((by_hand - exact.sum_of_squares).abs() < 1e-12 * by_hand);
+            }
+            for i in 0..theta.len() {
+                let h = 1e-5;
+                let mut at = |delta: f64| {
+                    let mut shifted = theta.clone();
+                    shifted[i] += delta;
+                    weighted.sum_of_squares(&shifted, &mut ws)
+                };
+                let slope = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
+                let scale = exact.gram[i * theta.len() + i].sqrt() * exact.sum_of_squares.sqrt();
+                assert!(
+                    (slope + 2.0 * exact.descent[i]).abs() < 1e-7 * scale,
+                    "{initial:?} {orders}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_later_first_residual_leaves_the_gradient_exact() {
+    let (e, u) = record(300);
+    let (orders, theta) = cases().remove(1);
+    let data = vec![Data { e: &e, u: &u }];
+    let late = Criterion {
+        first: 40,
+        ..criterion(orders, data, InitialState::Estimate)
+    };
+    assert_eq!(late.residuals(), 260);
+    let mut ws = Workspace::default();
+    let exact = late.linearise(&theta, &mut ws);
+    let h = 1e-5;
+    let mut at = |delta: f64| {
+        let mut shifted = theta.clone();
+        shifted[7] += delta;
+        late.sum_of_squares(&shifted, &mut ws)
+    };
+    let slope = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
+    assert!((slope + 2.0 * exact.descent[7]).abs() < 1e-6 * slope.abs());
+}
