@@ -1,28 +1,29 @@
 //! A delay line: `y(t) = x(t - n)`, zero before the first sample.
 
-/// A delay of as many samples as the buffer is long. An empty buffer passes its input through.
-#[derive(Debug)]
-pub struct DelayLine<'a> {
-    buffer: &'a mut [f64],
+/// A delay of as many samples as its memory is long: a slice, an array or a vector. An empty memory passes its input through.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DelayLine<M> {
+    memory: M,
     oldest: usize,
 }
 
-impl<'a> DelayLine<'a> {
+impl<M: AsMut<[f64]>> DelayLine<M> {
     /// Takes the memory of the line and fills it with zeros (the state of rest).
-    pub fn new(buffer: &'a mut [f64]) -> Self {
-        buffer.fill(0.0);
-        Self { buffer, oldest: 0 }
+    pub fn new(mut memory: M) -> Self {
+        memory.as_mut().fill(0.0);
+        Self { memory, oldest: 0 }
     }
 
-    /// Takes `x(t)` and returns `x(t - n)`, with `n` the length of the buffer.
+    /// Takes `x(t)` and returns `x(t - n)`, with `n` the length of the memory.
     #[inline]
     pub fn step(&mut self, x: f64) -> f64 {
-        if self.buffer.is_empty() {
+        let memory = self.memory.as_mut();
+        if memory.is_empty() {
             return x;
         }
-        let y = core::mem::replace(&mut self.buffer[self.oldest], x);
+        let y = core::mem::replace(&mut memory[self.oldest], x);
         self.oldest += 1;
-        if self.oldest == self.buffer.len() {
+        if self.oldest == memory.len() {
             self.oldest = 0;
         }
         y
@@ -35,7 +36,7 @@ mod tests {
     use std::vec::Vec;
 
     #[test]
-    fn delays_by_the_length_of_its_buffer() {
+    fn delays_by_the_length_of_its_memory() {
         for n in 0..4 {
             let mut memory = [7.0; 4];
             let mut line = DelayLine::new(&mut memory[..n]);

@@ -13,6 +13,13 @@ pub const MAX_ORDER: usize = 64;
 /// Coefficients that are not finite give `false`, and so does an order above [`MAX_ORDER`]: no claim of stability without proof.
 pub fn roots_inside(d: &[f64], radius: f64) -> bool {
     let order = d.len();
+    // Most polynomials of an operator are short, and a recursion tests them at every sample.
+    match *d {
+        [] if radius > 0.0 => return true,
+        [d1] if radius > 0.0 => return d1.abs() < radius,
+        [d1, d2] if radius == 1.0 => return d2.abs() < 1.0 && d1.abs() < 1.0 + d2,
+        _ => {}
+    }
     if order > MAX_ORDER || radius.is_nan() || radius <= 0.0 {
         return false;
     }

@@ -1,30 +1,15 @@
 //! Exact zero-order hold of the operator with a real delay: any fraction of a sample.
 //!
-//! `H(s) = (K_e + K_e_dot s) omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}` with `tau = l Ts + delta`, `0 <= delta < Ts`.
-//! An error that is held over each sample reaches the states in two parts,
-//!
-//! `x_{k+1} = Phi(Ts) x_k + Phi(Ts - delta) Gamma(delta) e_{k-l-1} + Gamma(Ts - delta) e_{k-l}`,
-//!
-//! so that the discrete model is `q^-nk (b0 + b1 q^-1 + b2 q^-2)/(1 + f1 q^-1 + f2 q^-2)` with `nk = l + 1` (K. J. Åström and
-//! B. Wittenmark, *Computer-Controlled Systems*, 1997, section 2.3; E. I. Jury, *Theory and Application of the z-Transform
-//! Method*, 1964: the modified z-transform). With the step response `s(t)` of the operator without its delay, continued
-//! analytically to negative t, where it obeys the same difference equation,
-//!
-//! - `b0 = s(Ts - delta)`;
-//! - `b2 = f2 s(-delta)`;
-//! - `b0 + b1 + b2 = K_e (1 + f1 + f2)`, the gain at zero frequency.
-//!
-//! `s(t) = omega^2 (K_e_dot t phi1 + K_e t^2 phi2)` with the divided differences of [`crate::second_order`] at the poles times
-//! t: one formula for complex, double and real poles. delta = 0 gives b2 = 0 and the hold of [`crate::operator`].
+//! `H(s) = (K_e + K_e_dot s) omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}` with `tau = l Ts + delta`, `0 <= delta < Ts`, is
+//! `q^-nk (b0 + b1 q^-1 + b2 q^-2)/(1 + f1 q^-1 + f2 q^-2)` with `nk = l + 1` behind a zero-order hold, by the formulas of
+//! [`hoid_core::held_operator`]. delta = 0 gives b2 = 0 and the hold of [`crate::operator`].
 //!
 //! The model is linear in K_e and K_e_dot. Its response is continuous in tau and has a kink where tau is a whole number of
 //! samples: the step response starts with the slope `omega^2 K_e_dot`. Derivatives there are those for growing tau.
 
-use crate::{
-    ModelError, OperatorParameters, SampleTime,
-    operator::scaled_hyperbolics,
-    second_order::{PolePair, SecondOrder},
-};
+use hoid_core::held_operator::held_operator_delayed;
+
+use crate::{ModelError, OperatorParameters, SampleTime};
 
 /// `q^-nk (b0 + b1 q^-1 + b2 q^-2) / (1 + f1 q^-1 + f2 q^-2)`: the operator with any delay behind a zero-order hold.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,34 +59,7 @@ pub fn delayed_operator_within(
     parameters: [f64; 5],
     sample_time: SampleTime,
 ) -> Result<DelayedOperator, ModelError> {
-    let delta = fraction(whole_samples, parameters, sample_time)?;
-    let nk = whole_samples + 1;
-    let [k_e, k_e_dot, omega, zeta, _] = parameters;
-    let ts = sample_time.s();
-    let w2 = omega * omega;
-    let whole = SecondOrder {
-        b0: w2 * k_e_dot,
-        b1: w2 * k_e,
-        a1: 2.0 * zeta * omega,
-        a2: w2,
-    }
-    .hold(sample_time)?;
-    let (early, late) = (Gains::at(ts - delta, omega, zeta), Gains::at(-delta, omega, zeta));
-    let b0 = early.step_response(k_e, k_e_dot);
-    let b2 = whole.f2 * late.step_response(k_e, k_e_dot);
-    let operator = DelayedOperator {
-        nk,
-        b: [b0, whole.b0 + whole.b1 - b0 - b2, b2],
-        f: [whole.f1, whole.f2],
-    };
-    match operator.b.iter().find(|b| !b.is_finite()) {
-        None => Ok(operator),
-        Some(&found) => Err(ModelError::OutOfRange {
-            quantity: "a coefficient of B",
-            found,
-            expected: "a finite number; check the poles against the sample time",
-        }),
-    }
+    Ok(delayed_operator_and_jacobian_within(whole_samples, parameters, sample_time)?.0)
 }
 
 /// Jacobian of `[b0, b1, b2, f1, f2]` (rows) with respect to `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` (columns), nk held.
@@ -122,31 +80,38 @@ pub fn delayed_operator_jacobian_within(
     parameters: [f64; 5],
     sample_time: SampleTime,
 ) -> Result<[[f64; 5]; 5], ModelError> {
-    let delta = fraction(whole_samples, parameters, sample_time)?;
-    let f2 = delayed_operator_within(whole_samples, parameters, sample_time)?.f[1];
-    let [k_e, k_e_dot, omega, zeta, _] = parameters;
-    let ts = sample_time.s();
-    let whole = Slopes::at(ts, omega, zeta);
-    let (early, late) = (Slopes::at(ts - delta, omega, zeta), Slopes::at(-delta, omega, zeta));
-    let late_response = late.gains.step_response(k_e, k_e_dot);
-    // f2 = e^{-2 zeta omega Ts}.
-    let (f2_omega, f2_zeta) = (-2.0 * zeta * ts * f2, -2.0 * omega * ts * f2);
-    // f1 = -2 E C, and the sum of B is K_e (1 + f1 + f2).
-    let (f1_omega, f1_zeta) = (-2.0 * whole.cosine_omega, -2.0 * whole.cosine_zeta);
-    let sum = 1.0 - 2.0 * whole.cosine + f2;
+    Ok(delayed_operator_and_jacobian_within(whole_samples, parameters, sample_time)?.1)
+}
 
-    let b0 = early.row(k_e, k_e_dot);
-    let mut b2 = late.row(k_e, k_e_dot).map(|d| f2 * d);
-    b2[2] += f2_omega * late_response;
-    b2[3] += f2_zeta * late_response;
-    let total = [sum, 0.0, k_e * (f1_omega + f2_omega), k_e * (f1_zeta + f2_zeta), 0.0];
-    Ok([
-        b0,
-        std::array::from_fn(|j| total[j] - b0[j] - b2[j]),
-        b2,
-        [0.0, 0.0, f1_omega, f1_zeta, 0.0],
-        [0.0, 0.0, f2_omega, f2_zeta, 0.0],
-    ])
+/// [`delayed_operator_within`] and [`delayed_operator_jacobian_within`] in one evaluation.
+///
+/// # Errors
+/// As [`delayed_operator_within`].
+pub fn delayed_operator_and_jacobian_within(
+    whole_samples: usize,
+    parameters: [f64; 5],
+    sample_time: SampleTime,
+) -> Result<(DelayedOperator, [[f64; 5]; 5]), ModelError> {
+    let delta = fraction(whole_samples, parameters, sample_time)?;
+    let [k_e, k_e_dot, omega, zeta, _] = parameters;
+    let (coefficients, jacobian) = held_operator_delayed([k_e, k_e_dot, omega, zeta], delta, sample_time.s());
+    let quantities = ["b0", "b1", "b2", "f1", "f2"];
+    for (quantity, found) in quantities.into_iter().zip(coefficients) {
+        if !found.is_finite() {
+            return Err(ModelError::OutOfRange {
+                quantity,
+                found,
+                expected: "a finite number; check the poles against the sample time",
+            });
+        }
+    }
+    let [b0, b1, b2, f1, f2] = coefficients;
+    let operator = DelayedOperator {
+        nk: whole_samples + 1,
+        b: [b0, b1, b2],
+        f: [f1, f2],
+    };
+    Ok((operator, jacobian))
 }
 
 /// Whole samples l of a delay: the largest number with `l Ts <= tau`, up to rounding.
@@ -202,93 +167,6 @@ fn fraction(whole_samples: usize, parameters: [f64; 5], sample_time: SampleTime)
         d if d >= ts - rounding => ts,
         d => d,
     })
-}
-
-/// What K_e and K_e_dot contribute to the step response at one time.
-#[derive(Debug, Clone, Copy)]
-struct Gains {
-    /// `omega^2 t^2 phi2`.
-    step: f64,
-    /// `omega^2 t phi1`.
-    rate: f64,
-}
-
-impl Gains {
-    fn at(t: f64, omega: f64, zeta: f64) -> Self {
-        let q = omega * omega * t * t;
-        let poles = PolePair::from_sum_and_product(-2.0 * zeta * omega * t, q);
-        Self {
-            step: q * poles.phi2(),
-            rate: omega * omega * t * poles.phi1(),
-        }
-    }
-
-    fn step_response(self, k_e: f64, k_e_dot: f64) -> f64 {
-        k_e * self.step + k_e_dot * self.rate
-    }
-}
-
-/// The gains with their derivatives, and `E C` with its own (for f1).
-///
-/// With `s = -2 zeta omega t`, `q = omega^2 t^2`, `E = e^{s/2}` and C, S, G of `x = s^2/4 - q` as in [`crate::operator`]: `phi1 = E S`,
-/// `q phi2 = 1 - E C + (s/2) E S`; `x_s = s/2`, `x_q = -1`, `dC/dx = S/2`, `dS/dx = G`.
-#[derive(Debug, Clone, Copy)]
-struct Slopes {
-    gains: Gains,
-    step_omega: f64,
-    step_zeta: f64,
-    step_t: f64,
-    rate_omega: f64,
-    rate_zeta: f64,
-    rate_t: f64,
-    cosine: f64,
-    cosine_omega: f64,
-    cosine_zeta: f64,
-}
-
-impl Slopes {
-    fn at(t: f64, omega: f64, zeta: f64) -> Self {
-        let s = -2.0 * zeta * omega * t;
-        let w2 = omega * omega;
-        let q = w2 * t * t;
-        let (ec, es, eg) = scaled_hyperbolics(s / 2.0, s * s / 4.0 - q);
-        let (ec_s, ec_q) = (ec / 2.0 + es * s / 4.0, -es / 2.0);
-        let (es_s, es_q) = (es / 2.0 + eg * s / 2.0, -eg);
-        let (step_s, step_q) = (-ec_s + es / 2.0 + s / 2.0 * es_s, -ec_q + s / 2.0 * es_q);
-        let along = |by_s: f64, by_q: f64| {
-            (
-                by_s * (-2.0 * zeta * t) + by_q * (2.0 * omega * t * t),
-                by_s * (-2.0 * omega * t),
-            )
-        };
-        let (cosine_omega, cosine_zeta) = along(ec_s, ec_q);
-        let (step_omega, step_zeta) = along(step_s, step_q);
-        let (es_omega, es_zeta) = along(es_s, es_q);
-        Self {
-            gains: Gains::at(t, omega, zeta),
-            step_omega,
-            step_zeta,
-            // The impulse response, and its own slope.
-            step_t: w2 * t * es,
-            rate_omega: 2.0 * omega * t * es + w2 * t * es_omega,
-            rate_zeta: w2 * t * es_zeta,
-            rate_t: w2 * (ec + s / 2.0 * es),
-            cosine: ec,
-            cosine_omega,
-            cosine_zeta,
-        }
-    }
-
-    /// Derivatives of the step response with respect to the parameters; t falls as tau grows.
-    fn row(&self, k_e: f64, k_e_dot: f64) -> [f64; 5] {
-        [
-            self.gains.step,
-            self.gains.rate,
-            k_e * self.step_omega + k_e_dot * self.rate_omega,
-            k_e * self.step_zeta + k_e_dot * self.rate_zeta,
-            -(k_e * self.step_t + k_e_dot * self.rate_t),
-        ]
-    }
 }
 
 #[cfg(test)]

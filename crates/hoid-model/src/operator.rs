@@ -3,20 +3,13 @@
 //! `H(s) = K_e (T_L s + 1) e^{-s tau_e} omega_nm^2 / (s^2 + 2 zeta_nm omega_nm s + omega_nm^2)`   (eq. 2)
 //!
 //! Behind a zero-order hold this is exactly `(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)` with `nk = tau_e/Ts + 1`
-//! (eq. 11). With `s = -2 zeta omega Ts`, `x = s^2/4 - omega^2 Ts^2`, `E = e^{s/2}`, `C = cosh sqrt x`, `S = sinh sqrt x / sqrt x`:
-//!
-//! - `f1 = -2 E C`, `f2 = E^2`;
-//! - `b0 = K_e_dot (omega^2 Ts) E S + K_e (1 - E C + (s/2) E S)`;
-//! - `b0 + b1 = K_e (1 + f1 + f2)`.
-//!
-//! C and S are entire in x, so that over- and underdamped operators are one formula; `dC/dx = S/2` and
-//! `G = dS/dx = (C - S)/(2x)` give the Jacobian in closed form.
+//! (eq. 11), by the formulas of [`hoid_core::held_operator`].
 
+use hoid_core::held_operator::held_operator;
 use nalgebra::{Matrix4, Vector4};
 
 use crate::{
-    ModelError, NotConvertible, SampleTime,
-    second_order::{HeldSecondOrder, SecondOrder},
+    ModelError, NotConvertible, SampleTime, second_order::HeldSecondOrder,
     transfer_function::ContinuousTransferFunction,
 };
 
@@ -56,6 +49,11 @@ impl OperatorParameters {
     /// Error-rate gain `K_e_dot = K_e T_L`, s.
     pub fn k_e_dot(&self) -> f64 {
         self.k_e * self.t_l_s
+    }
+
+    /// In the order of [`PHYSICAL_NAMES`].
+    fn without_delay(&self) -> [f64; 4] {
+        [self.k_e, self.k_e_dot(), self.omega_nm_rad_s, self.zeta_nm]
     }
 
     /// True when the neuromuscular poles lie in the open left half plane.
@@ -108,15 +106,9 @@ impl OperatorParameters {
                 expected: "zero or more, and a whole number of samples: round it or change the sample time",
             });
         };
-        let w2 = self.omega_nm_rad_s * self.omega_nm_rad_s;
-        let continuous = SecondOrder {
-            b0: w2 * self.k_e_dot(),
-            b1: w2 * self.k_e,
-            a1: 2.0 * self.zeta_nm * self.omega_nm_rad_s,
-            a2: w2,
-        };
+        let ([b0, b1, f1, f2], _) = held_operator(self.without_delay(), sample_time.s());
         Ok(DiscreteOperator {
-            held: continuous.hold(sample_time)?,
+            held: HeldSecondOrder { b0, b1, f1, f2 }.finite()?,
             nk: delay + 1,
             sample_time,
         })
@@ -155,40 +147,7 @@ impl DiscreteOperator {
 
 /// Jacobian of `[b0, b1, f1, f2]` (rows) with respect to `[K_e, K_e_dot, omega_nm, zeta_nm]` (columns).
 pub fn discretisation_jacobian(operator: &OperatorParameters, sample_time: SampleTime) -> [[f64; 4]; 4] {
-    let ts = sample_time.s();
-    let (k_e, k_e_dot) = (operator.k_e, operator.k_e_dot());
-    let (omega, zeta) = (operator.omega_nm_rad_s, operator.zeta_nm);
-    let q = omega * omega * ts * ts;
-    let s = -2.0 * zeta * omega * ts;
-    let x = s * s / 4.0 - q;
-    let (ec, es, eg) = scaled_hyperbolics(s / 2.0, x);
-    let f2 = s.exp();
-    // Gains of b0 for K_e_dot and K_e, and 1 + f1 + f2.
-    let (rate, step, sum) = (q / ts * es, 1.0 - ec + s / 2.0 * es, 1.0 - 2.0 * ec + f2);
-
-    // Derivatives with respect to s and q; x_s = s/2, x_q = -1, E_s = E/2.
-    let (ec_s, ec_q) = (ec / 2.0 + es * s / 4.0, -es / 2.0);
-    let (es_s, es_q) = (es / 2.0 + eg * s / 2.0, -eg);
-    let (rate_s, rate_q) = (q / ts * es_s, es / ts + q / ts * es_q);
-    let (step_s, step_q) = (-ec_s + es / 2.0 + s / 2.0 * es_s, -ec_q + s / 2.0 * es_q);
-    let (f1_s, f1_q) = (-2.0 * ec_s, -2.0 * ec_q);
-    let (sum_s, sum_q) = (f1_s + f2, f1_q);
-
-    let along = |by_s: f64, by_q: f64| {
-        let by_omega = by_s * (-2.0 * zeta * ts) + by_q * (2.0 * omega * ts * ts);
-        let by_zeta = by_s * (-2.0 * omega * ts);
-        (by_omega, by_zeta)
-    };
-    let (b0_omega, b0_zeta) = along(k_e_dot * rate_s + k_e * step_s, k_e_dot * rate_q + k_e * step_q);
-    let (total_omega, total_zeta) = along(k_e * sum_s, k_e * sum_q);
-    let (f1_omega, f1_zeta) = along(f1_s, f1_q);
-    let (f2_omega, f2_zeta) = along(f2, 0.0);
-    [
-        [step, rate, b0_omega, b0_zeta],
-        [sum - step, -rate, total_omega - b0_omega, total_zeta - b0_zeta],
-        [0.0, 0.0, f1_omega, f1_zeta],
-        [0.0, 0.0, f2_omega, f2_zeta],
-    ]
+    held_operator(operator.without_delay(), sample_time.s()).1
 }
 
 /// Jacobian of `[K_e, K_e_dot, omega_nm, zeta_nm]` (rows) with respect to `[b0, b1, f1, f2]` (columns): the inverse of
@@ -206,34 +165,6 @@ pub fn retrieval_jacobian(operator: &OperatorParameters, sample_time: SampleTime
     let result = std::array::from_fn(|i| std::array::from_fn(|j| inverse[(i, j)] / scale[i]));
     let finite = |rows: &[[f64; 4]; 4]| rows.iter().flatten().all(|v| v.is_finite());
     finite(&result).then_some(result)
-}
-
-/// `e^h C(x)`, `e^h S(x)`, `e^h G(x)` with `C = cosh sqrt x`, `S = sinh sqrt x / sqrt x`, `G = dS/dx`.
-pub(crate) fn scaled_hyperbolics(h: f64, x: f64) -> (f64, f64, f64) {
-    let e = h.exp();
-    if x.abs() < 0.25 {
-        // Power series: C = sum x^k/(2k)!, S = sum x^k/(2k+1)!, G = sum (k+1) x^k/(2k+3)!.
-        let (mut c, mut s, mut g) = (0.0, 0.0, 0.0);
-        let mut term = 1.0; // x^k/(2k)!
-        for k in 0..10 {
-            let k = f64::from(k);
-            let odd = term / (2.0 * k + 1.0);
-            c += term;
-            s += odd;
-            g += (k + 1.0) * odd / ((2.0 * k + 2.0) * (2.0 * k + 3.0));
-            term *= x / ((2.0 * k + 1.0) * (2.0 * k + 2.0));
-        }
-        return (e * c, e * s, e * g);
-    }
-    let r = x.abs().sqrt();
-    let (ec, es) = if x < 0.0 {
-        (e * r.cos(), e * r.sin() / r)
-    } else {
-        // e^h inside the exponentials: cosh alone would overflow for a fast overdamped system.
-        let (up, down) = ((h + r).exp(), (h - r).exp());
-        ((up + down) / 2.0, (up - down) / (2.0 * r))
-    };
-    (ec, es, (ec - es) / (2.0 * x))
 }
 
 #[cfg(test)]

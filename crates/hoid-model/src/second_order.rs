@@ -11,12 +11,12 @@
 //!   `b0_d + b1_d = b1 Ts^2 chi`, `chi = (1 + f1 + f2) / q = exp[0, z1] exp[0, z2]`.
 //!
 //! All of these are symmetric in the poles and entire in (s, q): complex, real, double poles and poles at the origin of s are
-//! the same formulas, only evaluated in different ways so that nothing cancels. This replaces the matrix exponential and
+//! the same formulas ([`hoid_core::divided_differences`]). This replaces the matrix exponential and
 //! logarithm of the extended matrix (eq. B.7); it gives the same numbers.
 //! The inverse exists when no pole in z lies on the closed negative real axis (then the logarithm is the principal one).
 //! Source: N. J. Higham, *Functions of Matrices*, 2008, sections 2.4 and B.16 (divided differences); eq. B.3-B.10 of the reference text.
 
-use num_complex::Complex64;
+use hoid_core::divided_differences::DividedDifferences;
 
 use crate::{ModelError, NotConvertible, SampleTime};
 
@@ -54,15 +54,22 @@ impl SecondOrder {
     /// a coefficient that is not a finite number).
     pub fn hold(self, sample_time: SampleTime) -> Result<HeldSecondOrder, ModelError> {
         let ts = sample_time.s();
-        let poles = PolePair::from_sum_and_product(-self.a1 * ts, self.a2 * ts * ts);
-        let b0 = self.b0 * ts * poles.phi1() + self.b1 * ts * ts * poles.phi2();
-        let held = HeldSecondOrder {
+        let poles = DividedDifferences::at(-self.a1 * ts, self.a2 * ts * ts);
+        let b0 = self.b0 * ts * poles.phi1 + self.b1 * ts * ts * poles.phi2;
+        HeldSecondOrder {
             b0,
             b1: self.b1 * ts * ts * poles.chi() - b0,
-            f1: -poles.sum_of_exponentials(),
+            f1: -2.0 * poles.mean,
             f2: poles.sum.exp(),
-        };
-        for (quantity, found) in [("b0", held.b0), ("b1", held.b1), ("f1", held.f1), ("f2", held.f2)] {
+        }
+        .finite()
+    }
+}
+
+impl HeldSecondOrder {
+    /// Itself, when an exponential has not overflowed.
+    pub(crate) fn finite(self) -> Result<Self, ModelError> {
+        for (quantity, found) in [("b0", self.b0), ("b1", self.b1), ("f1", self.f1), ("f2", self.f2)] {
             if !found.is_finite() {
                 return Err(ModelError::OutOfRange {
                     quantity,
@@ -71,11 +78,9 @@ impl SecondOrder {
                 });
             }
         }
-        Ok(held)
+        Ok(self)
     }
-}
 
-impl HeldSecondOrder {
     /// The continuous system that has this exact discrete model.
     ///
     /// # Errors
@@ -90,14 +95,15 @@ impl HeldSecondOrder {
             }
         }
         let ts = sample_time.s();
-        let poles = PolePair::from_discrete(self.f1, self.f2)?;
+        let (sum, product) = continuous_poles(self.f1, self.f2)?;
+        let poles = DividedDifferences::at(sum, product);
         let b1 = (self.b0 + self.b1) / (ts * ts * poles.chi());
-        let b0 = (self.b0 - b1 * ts * ts * poles.phi2()) / (ts * poles.phi1());
+        let b0 = (self.b0 - b1 * ts * ts * poles.phi2) / (ts * poles.phi1);
         Ok(SecondOrder {
             b0,
             b1,
-            a1: -poles.sum / ts,
-            a2: poles.product / (ts * ts),
+            a1: -sum / ts,
+            a2: product / (ts * ts),
         })
     }
 }
@@ -116,8 +122,8 @@ impl HeldStates {
     /// With `h = Ts phi1` and `g = Ts^2 phi2`: transition `[[1 - a2 g, h], [-a2 h, 1 - a2 g - a1 h]]`, input `[g, h]`.
     pub fn new(a1: f64, a2: f64, sample_time: SampleTime) -> Self {
         let ts = sample_time.s();
-        let poles = PolePair::from_sum_and_product(-a1 * ts, a2 * ts * ts);
-        let (h, g) = (ts * poles.phi1(), ts * ts * poles.phi2());
+        let poles = DividedDifferences::at(-a1 * ts, a2 * ts * ts);
+        let (h, g) = (ts * poles.phi1, ts * ts * poles.phi2);
         let kept = 1.0 - a2 * g;
         Self {
             transition: [[kept, h], [-a2 * h, kept - a1 * h]],
@@ -189,158 +195,41 @@ pub fn unhold_biproper(
     ))
 }
 
-/// Two poles times Ts: their sum, product, and the values themselves.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct PolePair {
-    sum: f64,
-    product: f64,
-    poles: Poles,
-}
-
-#[derive(Debug, Clone, Copy)]
-enum Poles {
-    /// The one nearer to zero first.
-    Real(f64, f64),
-    /// Real and (positive) imaginary part.
-    Complex(f64, f64),
-}
-
-impl PolePair {
-    pub(crate) fn from_sum_and_product(sum: f64, product: f64) -> Self {
-        let half = sum / 2.0;
-        let x = half * half - product;
-        let poles = if x < 0.0 {
-            Poles::Complex(half, (-x).sqrt())
-        } else {
-            let far = half + x.sqrt().copysign(half);
-            // The near pole from the product: the difference of half and root would cancel.
-            let near = if far == 0.0 { 0.0 } else { product / far };
-            Poles::Real(near, far)
-        };
-        Self { sum, product, poles }
+/// Sum and product of the poles times Ts that `1 + f1 q^-1 + f2 q^-2` has in s, by the principal logarithm.
+fn continuous_poles(f1: f64, f2: f64) -> Result<(f64, f64), NotConvertible> {
+    let half = -f1 / 2.0;
+    let x = half * half - f2;
+    if x < 0.0 {
+        let beta = (-x).sqrt().atan2(half);
+        let alpha = f2.ln() / 2.0;
+        return Ok((2.0 * alpha, alpha * alpha + beta * beta));
     }
-
-    /// Poles of `1 + f1 q^-1 + f2 q^-2`, taken back through the principal logarithm.
-    fn from_discrete(f1: f64, f2: f64) -> Result<Self, NotConvertible> {
-        let half = -f1 / 2.0;
-        let x = half * half - f2;
-        if x < 0.0 {
-            let beta = (-x).sqrt().atan2(half);
-            let alpha = f2.ln() / 2.0;
-            return Ok(Self {
-                sum: 2.0 * alpha,
-                product: alpha * alpha + beta * beta,
-                poles: Poles::Complex(alpha, beta),
-            });
-        }
-        let outer = half + x.sqrt().copysign(half);
-        let inner = if outer == 0.0 { 0.0 } else { f2 / outer };
-        let lowest = outer.min(inner);
-        if lowest <= 0.0 {
-            return Err(NotConvertible::NegativeRealPole { pole: lowest });
-        }
-        // A pole near z = 1 is a pole near the origin of s: its distance from 1 follows from the value of the polynomial at
-        // 1, which the coefficients give more accurately than the difference of the roots.
-        let at_one = 1.0 + f1 + f2;
-        let (far_z, near_z) = if (outer - 1.0).abs() > (inner - 1.0).abs() {
-            (outer, inner)
-        } else {
-            (inner, outer)
-        };
-        let near = if far_z == 1.0 || (near_z - 1.0).abs() > 0.1 {
-            near_z.ln()
-        } else {
-            (-at_one / (1.0 - far_z)).ln_1p()
-        };
-        let far = far_z.ln();
-        let pair = Self {
-            sum: f2.ln(),
-            product: near * far,
-            poles: Poles::Real(near, far),
-        };
-        Ok(pair)
+    let outer = half + x.sqrt().copysign(half);
+    let inner = if outer == 0.0 { 0.0 } else { f2 / outer };
+    let lowest = outer.min(inner);
+    if lowest <= 0.0 {
+        return Err(NotConvertible::NegativeRealPole { pole: lowest });
     }
-
-    fn sum_of_exponentials(self) -> f64 {
-        match self.poles {
-            Poles::Real(a, b) => a.exp() + b.exp(),
-            Poles::Complex(alpha, beta) => 2.0 * alpha.exp() * beta.cos(),
-        }
-    }
-
-    /// `exp[z1, z2]`.
-    pub(crate) fn phi1(self) -> f64 {
-        match self.poles {
-            Poles::Real(a, b) => a.min(b).exp() * expm1_ratio((a - b).abs()),
-            Poles::Complex(alpha, beta) => alpha.exp() * sin_ratio(beta),
-        }
-    }
-
-    /// `exp[0, z1] exp[0, z2]`.
-    fn chi(self) -> f64 {
-        match self.poles {
-            Poles::Real(a, b) => expm1_ratio(a) * expm1_ratio(b),
-            Poles::Complex(alpha, beta) => expm1_ratio_complex(Complex64::new(alpha, beta)).norm_sqr(),
-        }
-    }
-
-    /// `exp[0, z1, z2]`.
-    pub(crate) fn phi2(self) -> f64 {
-        let largest = match self.poles {
-            Poles::Real(a, b) => a.abs().max(b.abs()),
-            Poles::Complex(..) => self.product.sqrt(),
-        };
-        if largest <= 1.0 {
-            return self.phi2_by_series();
-        }
-        match self.poles {
-            Poles::Real(a, b) if (a - b).abs() > 0.5 => (expm1_ratio(b) - expm1_ratio(a)) / (b - a),
-            // Here |q| >= 1/4: the step response in closed form does not cancel.
-            Poles::Real(a, b) => {
-                let half = self.sum / 2.0;
-                let mean = 0.5 * (a.exp() + b.exp());
-                (1.0 - mean + half * self.phi1()) / self.product
-            }
-            Poles::Complex(alpha, beta) => (1.0 - alpha.exp() * (beta.cos() - alpha * sin_ratio(beta))) / self.product,
-        }
-    }
-
-    /// `sum over k of h_k / (k+2)!` with the complete symmetric polynomials `h_k = s h_{k-1} - q h_{k-2}`; for |z| <= 1 the
-    /// terms fall faster than `(k+1)/(k+2)!`.
-    fn phi2_by_series(self) -> f64 {
-        let (mut h, mut h_before, mut factorial, mut total) = (1.0, 0.0, 2.0, 0.0);
-        for k in 0..24 {
-            total += h / factorial;
-            (h, h_before) = (self.sum * h - self.product * h_before, h);
-            factorial *= f64::from(k + 3);
-        }
-        total
-    }
-}
-
-/// `(e^x - 1)/x`.
-fn expm1_ratio(x: f64) -> f64 {
-    if x.abs() < 1e-8 { 1.0 + x / 2.0 } else { x.exp_m1() / x }
-}
-
-/// `sin(x)/x`.
-fn sin_ratio(x: f64) -> f64 {
-    if x.abs() < 1e-4 { 1.0 - x * x / 6.0 } else { x.sin() / x }
-}
-
-/// `(e^z - 1)/z` for complex z.
-fn expm1_ratio_complex(z: Complex64) -> Complex64 {
-    if z.norm() < 1e-8 {
-        return 1.0 + z / 2.0;
-    }
-    let half_sine = (z.im / 2.0).sin();
-    let re = z.re.exp_m1() * z.im.cos() - 2.0 * half_sine * half_sine;
-    Complex64::new(re, z.re.exp() * z.im.sin()) / z
+    // A pole near z = 1 is a pole near the origin of s: its distance from 1 follows from the value of the polynomial at 1, which
+    // the coefficients give more accurately than the difference of the roots.
+    let at_one = 1.0 + f1 + f2;
+    let (far_z, near_z) = if (outer - 1.0).abs() > (inner - 1.0).abs() {
+        (outer, inner)
+    } else {
+        (inner, outer)
+    };
+    let near = if far_z == 1.0 || (near_z - 1.0).abs() > 0.1 {
+        near_z.ln()
+    } else {
+        (-at_one / (1.0 - far_z)).ln_1p()
+    };
+    Ok((f2.ln(), near * far_z.ln()))
 }
 
 #[cfg(test)]
 mod tests {
     use nalgebra::DMatrix;
+    use num_complex::Complex64;
 
     use super::*;
     use crate::{

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use hoid_model::{
     ModelError, Orders, SampleTime,
-    delayed_operator::{delayed_operator_jacobian_within, delayed_operator_within, whole_samples},
+    delayed_operator::{delayed_operator_and_jacobian_within, whole_samples},
     remnant_noise::remnant_noise,
 };
 
@@ -239,8 +239,7 @@ impl Layout {
             Some(sample) => sample,
             None => whole_samples(operator[DELAY], self.sample_time)?,
         };
-        let held = delayed_operator_within(sample, operator, self.sample_time)?;
-        let by_operator = delayed_operator_jacobian_within(sample, operator, self.sample_time)?;
+        let (held, by_operator) = delayed_operator_and_jacobian_within(sample, operator, self.sample_time)?;
         let noise = remnant_noise(slots[TIME_CONSTANT], self.order, self.sample_time)?;
         let mut theta = held.b.to_vec();
         theta.extend_from_slice(&noise.c);

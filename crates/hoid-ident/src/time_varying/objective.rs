@@ -17,7 +17,7 @@
 use hoid_core::filter::{divide_in_place, moving_sum};
 use hoid_model::{
     SampleTime,
-    delayed_operator::{delayed_operator_jacobian_within, delayed_operator_within, whole_samples},
+    delayed_operator::{delayed_operator_and_jacobian_within, whole_samples},
 };
 
 use super::layout::{DELAY, Instant, K_E, LOG_RATE, MIDPOINT, NOISE, OMEGA, T_L, ZETA};
@@ -90,12 +90,9 @@ impl UnitOperator {
             Some(sample) => sample,
             None => whole_samples(theta[DELAY], ts).ok()?,
         };
-        let sides = [at([1.0, 0.0]), at([0.0, 1.0])];
-        let held = delayed_operator_within(sample, sides[0], ts).ok()?;
-        let jacobians = [
-            delayed_operator_jacobian_within(sample, sides[0], ts).ok()?,
-            delayed_operator_jacobian_within(sample, sides[1], ts).ok()?,
-        ];
+        let (held, by_gain) = delayed_operator_and_jacobian_within(sample, at([1.0, 0.0]), ts).ok()?;
+        let (_, by_rate) = delayed_operator_and_jacobian_within(sample, at([0.0, 1.0]), ts).ok()?;
+        let jacobians = [by_gain, by_rate];
         let column = |side: usize, j: usize| std::array::from_fn(|i| jacobians[side][i][j]);
         Some(Self {
             nk: held.nk,

@@ -1,0 +1,219 @@
+//! Cost of a step of each recursion with its history kept: 8192 samples, divide by 8192 for a sample.
+//! Run with `cargo bench -p hoid-core`.
+
+#![allow(missing_docs, clippy::unwrap_used)]
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use hoid_core::{
+    adaptation::{Covariance, Forgetting},
+    error_bars::{ErrorBars, Level},
+    factored::Factored,
+    physical::{Physical, PhysicalModel},
+    predictor::{AnyShape, FixedShape, Regressor, Shape},
+    recursion::Stable,
+    rls::Rls,
+    rpem::Rpem,
+};
+
+const SAMPLES: usize = 8192;
+
+/// Input and output of a Box-Jenkins model with the poles of the operator, and noise of a fixed generator.
+fn data() -> Vec<(f64, f64)> {
+    let mut state = 1u64;
+    let mut noise = move || {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    };
+    let (mut w, mut n, mut x1) = ([0.0; 2], 0.0, 0.0);
+    (0..SAMPLES)
+        .map(|t| {
+            let t = t as f64;
+            let x = (0.005 * t).sin() + (0.023 * t).sin() + 0.3 * (0.11 * t).sin();
+            let response = 0.0443 * x - 0.0432 * x1 + 1.9121 * w[0] - 0.9243 * w[1];
+            x1 = x;
+            w = [response, w[0]];
+            n = 0.85 * n + 0.02 * noise();
+            (x, response + n)
+        })
+        .collect()
+}
+
+fn covariance<const N: usize>(forgetting: Forgetting<N>) -> Covariance<N> {
+    Covariance::new(Factored::diagonal([0.1; N]), forgetting, [1e3; N])
+}
+
+fn bars<const N: usize, const K: usize>() -> ErrorBars<N, K> {
+    let start: [[f64; N]; N] = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 0.1 } else { 0.0 }));
+    ErrorBars::new(&start, Level::new(1e-4, 100.0, 0.999), 5.0)
+}
+
+fn scalar<const N: usize>() -> Forgetting<N> {
+    Forgetting::Exponential {
+        lambda: [1.0 - 1.0 / 256.0; N],
+    }
+}
+
+fn matrix<const N: usize>() -> Forgetting<N> {
+    let mut lambda = [1.0 - 1.0 / 256.0; N];
+    lambda[N - 1] = 1.0;
+    Forgetting::Exponential { lambda }
+}
+
+fn rls<S: Shape, const N: usize>(
+    shape: S,
+    forgetting: Forgetting<N>,
+    data: &[(f64, f64)],
+    history: &mut Vec<[f64; N]>,
+) {
+    history.clear();
+    let mut recursion = Rls::new(shape, [0.0; N], covariance(forgetting), bars::<N, 0>()).unwrap();
+    for &(x, u) in data {
+        recursion.step(x, u);
+        history.push(*recursion.theta());
+    }
+}
+
+fn rpem<S: Shape, const N: usize, const K: usize>(
+    shape: S,
+    forgetting: Forgetting<N>,
+    data: &[(f64, f64)],
+    history: &mut Vec<[f64; N]>,
+) {
+    history.clear();
+    let mut theta = [0.0; N];
+    let nd = shape.nd();
+    theta[..2].copy_from_slice(&[0.04, -0.04]);
+    theta[2] = -0.8;
+    theta[2 + nd..4 + nd].copy_from_slice(&[-1.9, 0.92]);
+    let mut recursion = Rpem::new(
+        shape,
+        Regressor::Gradient,
+        Stable::Predictor,
+        theta,
+        covariance(forgetting),
+        bars::<N, K>(),
+    )
+    .unwrap();
+    for &(x, u) in data {
+        recursion.step(x, u);
+        history.push(*recursion.theta());
+    }
+}
+
+fn physical<S: Shape, const N: usize, const K: usize, const L: usize>(
+    shape: S,
+    tracked_from: Option<usize>,
+    data: &[(f64, f64)],
+    history: &mut Vec<[f64; N]>,
+) {
+    history.clear();
+    let mut bounds = [[f64::NEG_INFINITY, f64::INFINITY]; N];
+    bounds[2] = [0.5, 100.0];
+    bounds[3] = [0.02, 5.0];
+    let mut eta = [0.0; N];
+    eta[..4].copy_from_slice(&[0.09, 0.036, 11.25, 0.35]);
+    if tracked_from.is_some() {
+        bounds[4] = [0.0, 0.5];
+        eta[4] = 0.02;
+    }
+    let model = PhysicalModel {
+        shape,
+        tracked_from,
+        sample_time: 0.01,
+        bounds,
+        stable: Stable::Predictor,
+    };
+    let mut recursion = Physical::<S, N, K, L, _>::new(model, eta, covariance(matrix()), bars::<N, K>()).unwrap();
+    for &(x, u) in data {
+        recursion.step(x, u);
+        history.push(*recursion.eta());
+    }
+}
+
+/// The yardstick: recursive least squares with one triangle of a plain covariance and nothing else, no guard, no error bars.
+fn plain(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
+    history.clear();
+    let (mut theta, mut psi) = ([0.0; 4], [0.0; 4]);
+    let mut p = [[0.0; 4]; 4];
+    (0..4).for_each(|i| p[i][i] = 0.1);
+    let inverse = 1.0 / (1.0 - 1.0 / 256.0);
+    let lambda = 1.0 - 1.0 / 256.0;
+    for &(x, u) in data {
+        psi = [psi[0], psi[1], x, psi[2]];
+        let mut product = [0.0; 4];
+        for i in 0..4 {
+            for j in 0..4 {
+                product[i] += if j <= i { p[i][j] } else { p[j][i] } * psi[j];
+            }
+        }
+        let power: f64 = (0..4).map(|i| psi[i] * product[i]).sum();
+        let eps = u - (0..4).map(|i| psi[i] * theta[i]).sum::<f64>();
+        let scale = 1.0 / (lambda + power);
+        for i in 0..4 {
+            theta[i] += product[i] * scale * eps;
+            for j in 0..=i {
+                p[i][j] = (p[i][j] - product[i] * product[j] * scale) * inverse;
+            }
+        }
+        psi = [-u, psi[0], psi[2], psi[3]];
+        history.push(theta);
+    }
+}
+
+fn bench(c: &mut Criterion) {
+    let data = data();
+    let data = black_box(data.as_slice());
+    let mut group = c.benchmark_group("recursion");
+    group.throughput(Throughput::Elements(SAMPLES as u64));
+    let any = |na, nb, nd, nf| AnyShape { na, nb, nc: 0, nd, nf };
+    let mut h4: Vec<[f64; 4]> = Vec::with_capacity(SAMPLES);
+    group.bench_function("rls 4, plain yardstick", |b| b.iter(|| plain(data, &mut h4)));
+    let arx = FixedShape::<2, 2, 0, 0, 0>;
+    group.bench_function("rls 4", |b| b.iter(|| rls(arx, scalar(), data, &mut h4)));
+    group.bench_function("rls 4, matrix", |b| b.iter(|| rls(arx, matrix(), data, &mut h4)));
+    group.bench_function("rls 4, any shape", |b| {
+        b.iter(|| rls(any(2, 2, 0, 0), scalar(), data, &mut h4))
+    });
+    let mut h5: Vec<[f64; 5]> = Vec::with_capacity(SAMPLES);
+    let bj = FixedShape::<0, 2, 0, 1, 2>;
+    group.bench_function("rpem 5", |b| b.iter(|| rpem::<_, 5, 2>(bj, scalar(), data, &mut h5)));
+    group.bench_function("rpem 5, usual error bars", |b| {
+        b.iter(|| rpem::<_, 5, 0>(bj, scalar(), data, &mut h5))
+    });
+    group.bench_function("rpem 5, matrix", |b| {
+        b.iter(|| rpem::<_, 5, 2>(bj, matrix(), data, &mut h5))
+    });
+    group.bench_function("rpem 5, any shape", |b| {
+        b.iter(|| rpem::<_, 5, 2>(any(0, 2, 1, 2), scalar(), data, &mut h5))
+    });
+    group.bench_function("physical 5", |b| {
+        b.iter(|| physical::<_, 5, 2, 5>(bj, None, data, &mut h5))
+    });
+    group.bench_function("physical 5, usual error bars", |b| {
+        b.iter(|| physical::<_, 5, 0, 5>(bj, None, data, &mut h5));
+    });
+    let mut h6: Vec<[f64; 6]> = Vec::with_capacity(SAMPLES);
+    let delayed = FixedShape::<0, 3, 0, 1, 2>;
+    group.bench_function("physical 6, tau_e", |b| {
+        b.iter(|| physical::<_, 6, 2, 64>(delayed, Some(1), data, &mut h6))
+    });
+    let mut h8: Vec<[f64; 8]> = Vec::with_capacity(SAMPLES);
+    group.bench_function("rpem 8", |b| {
+        b.iter(|| rpem::<_, 8, 4>(any(0, 2, 4, 2), scalar(), data, &mut h8))
+    });
+    group.bench_function("rls 8", |b| b.iter(|| rls(any(4, 4, 0, 0), scalar(), data, &mut h8)));
+    let mut h16: Vec<[f64; 16]> = Vec::with_capacity(SAMPLES);
+    group.bench_function("rls 16", |b| b.iter(|| rls(any(8, 8, 0, 0), scalar(), data, &mut h16)));
+    let mut h32: Vec<[f64; 32]> = Vec::with_capacity(SAMPLES);
+    group.bench_function("rls 32", |b| {
+        b.iter(|| rls(any(16, 16, 0, 0), scalar(), data, &mut h32))
+    });
+    group.finish();
+}
+
+criterion_group!(benches, bench);
+criterion_main!(benches);

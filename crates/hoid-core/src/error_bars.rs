@@ -1,0 +1,425 @@
+//! The covariance of a recursive estimate, whatever the gain.
+//!
+//! Let `theta~ = theta - theta^` be the error of the estimate of a constant theta. To first order the a-priori innovation is
+//! `eps^ = eps + h' X`, where X holds theta~ and the errors that past estimates have left in the filters of the predictor,
+//!
+//! - `dw = w - w^ = b~' x - f~' w^ - (F^ - 1) dw`,
+//! - `dv = v^ - v = dw - a~' u`,
+//! - `de = eps^ - eps = D^ dv - d~' v^ + c~' eps^ - (C^ - 1) de`,
+//!
+//! (signals that stand with a `~` are past ones, x includes the present one; all follow from eq. 5.4 by subtraction). So `h` is the
+//! pseudo-linear regressor for theta~, `D^ - F^` for the past dw, `-(C^ - 1)` for the past de; and with the step `theta^ <- theta^ + g eps^`
+//!
+//! `theta~ <- theta~ - g (eps + h' X)`,  `Sigma <- (I - g h') Sigma (I - g h')' + g g'`
+//!
+//! (the Joseph form, in units of sigma^2), after which the new dw, dv and de take their places in X. With `z = Sigma h` and
+//! `k = z - (1 + h' z)/2 g` the update is `Sigma - g k' - k g'`, and for the row a of a new error, which differs from h in few places,
+//! `Sigma a = z - Sigma (h - a)`: two thirds of the products are shared. No assumption is made about g: the
+//! error bars hold for a scalar factor, where they tend to `P/(1 + lambda)` for ARX (L. Ljung and T. Söderström, *Theory and Practice of
+//! Recursive Identification*, 1983, eq. 4.136), for a forgetting matrix, a shortened step, or a gradient. Without forgetting `Sigma`
+//! becomes P. The usual `h = psi` is the same for an estimate that does not move within the memory of the filters; where the memory of
+//! the estimate is not much longer than that of 1/F, it promises up to a third too little, at half the cost of a step; room for no
+//! errors of filters (K = 0) takes it.
+//!
+//! **Outliers.** An innovation beyond a few sigma moves the estimate as if it were at that limit (P. J. Huber, *Robust Statistics*, 1981,
+//! section 7.3; the gain in the equations above is then the smaller one that was used). The variance takes it as it is, so that what
+//! lasts is believed.
+//!
+//! The innovation variance sigma^2 is the mean of `eps^2/(1 + h' Sigma h)`, each term of which has the expectation sigma^2.
+
+use crate::predictor::Shape;
+
+/// Mean of the squared innovations, each over what it is expected to be, with an exponential memory.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Level {
+    sum: f64,
+    weight: f64,
+    lambda: f64,
+}
+
+impl Level {
+    /// Starts from a variance that `weight` residuals gave; weight 0 starts from nothing.
+    pub fn new(variance: f64, weight: f64, lambda: f64) -> Self {
+        Self {
+            sum: variance * weight,
+            weight,
+            lambda,
+        }
+    }
+
+    /// Takes the square of an innovation over its expected size.
+    #[inline(always)]
+    pub fn take(&mut self, squared: f64) {
+        self.sum = self.lambda * self.sum + squared;
+        self.weight = self.lambda * self.weight + 1.0;
+    }
+
+    /// The variance; zero before anything is known.
+    #[inline(always)]
+    pub fn variance(&self) -> f64 {
+        if self.weight > 0.0 { self.sum / self.weight } else { 0.0 }
+    }
+}
+
+/// Places in X: which parameters belong to A, which to C and D, and how many past errors of the filters are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Places {
+    /// Number of coefficients of A, which come first.
+    pub na: usize,
+    /// First coefficient of C and D and their number.
+    pub noise: (usize, usize),
+    /// First dw and their number, among the errors of the filters.
+    pub w: (usize, usize),
+    /// First dv and their number; none without A, where dv is dw.
+    pub v: (usize, usize),
+    /// First de and their number.
+    pub e: (usize, usize),
+}
+
+impl Places {
+    /// The places for a shape, in the order of theta.
+    #[inline(always)]
+    pub fn of<S: Shape>(shape: &S) -> Self {
+        let w = if shape.na() == 0 {
+            shape.nf().max(shape.nd())
+        } else {
+            shape.nf()
+        };
+        let v = if shape.na() == 0 { 0 } else { shape.nd() };
+        Self {
+            na: shape.na(),
+            noise: (shape.na() + shape.nb(), shape.nc() + shape.nd()),
+            w: (0, w),
+            v: (w, v),
+            e: (w + v, shape.nc()),
+        }
+    }
+
+    /// No errors of filters: the usual error bars, with `h = psi`.
+    pub const NONE: Self = Self {
+        na: 0,
+        noise: (0, 0),
+        w: (0, 0),
+        v: (0, 0),
+        e: (0, 0),
+    };
+
+    /// The places where there is room for K errors of filters, none for K = 0.
+    #[inline(always)]
+    pub fn within<S: Shape, const K: usize>(shape: &S) -> Self {
+        if K == 0 { Self::NONE } else { Self::of(shape) }
+    }
+
+    /// Number of past errors of the filters.
+    #[inline(always)]
+    pub fn filters(&self) -> usize {
+        self.e.0 + self.e.1
+    }
+}
+
+/// A linear function of X: its coefficients for the parameters and for the errors of the filters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row<const N: usize, const K: usize> {
+    /// For theta~.
+    pub theta: [f64; N],
+    /// For the past dw, dv and de.
+    pub filters: [f64; K],
+}
+
+/// How the new dw, dv and de follow from X; the last is the sensitivity h of the innovation too.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sensitivities<const N: usize, const K: usize> {
+    /// Of dw.
+    pub w: Row<N, K>,
+    /// Of dv.
+    pub v: Row<N, K>,
+    /// Of de.
+    pub e: Row<N, K>,
+}
+
+impl<const N: usize, const K: usize> Sensitivities<N, K> {
+    /// Those of an estimate that does not move within the memory of its filters: `h = psi`, and no errors in the filters.
+    #[inline(always)]
+    pub fn of_gradient(psi: &[f64; N]) -> Self {
+        let row = Row {
+            theta: *psi,
+            filters: [0.0; K],
+        };
+        Self { w: row, v: row, e: row }
+    }
+}
+
+/// Sigma over sigma^2, and sigma^2. N is the room for parameters, K that for the errors of the filters ([`Places::filters`]).
+#[derive(Debug, Clone, PartialEq)]
+pub struct ErrorBars<const N: usize, const K: usize> {
+    /// Covariance of theta.
+    theta: [[f64; N]; N],
+    /// Covariance of each error of a filter with theta.
+    cross: [[f64; N]; K],
+    /// Covariance of the errors of the filters.
+    filters: [[f64; K]; K],
+    /// Variances of theta at the start.
+    start: [f64; N],
+    level: Level,
+    limit: f64,
+    wait: u32,
+}
+
+/// Variances of theta beyond this multiple of those at the start say that nothing is known.
+pub const NOTHING_KNOWN: f64 = 1e6;
+/// Samples between two looks whether that is so.
+const LOOK: u32 = 64;
+
+impl<const N: usize, const K: usize> ErrorBars<N, K> {
+    /// From the covariance of theta at the start over the innovation variance, with filters whose past is right. Innovations move the
+    /// estimate as if they were no larger than `limit` times sigma; infinite for no limit.
+    pub fn new(start: &[[f64; N]; N], level: Level, limit: f64) -> Self {
+        Self {
+            theta: *start,
+            cross: [[0.0; N]; K],
+            filters: [[0.0; K]; K],
+            start: core::array::from_fn(|i| start[i][i]),
+            level,
+            limit,
+            wait: LOOK,
+        }
+    }
+
+    /// The innovation as far as it may move the estimate.
+    #[inline(always)]
+    pub fn limited(&self, eps: f64) -> f64 {
+        let limit = self.limit * libm::sqrt(self.level.variance());
+        // Before anything is known of sigma there is no limit.
+        if limit > 0.0 && eps.abs() > limit {
+            libm::copysign(limit, eps)
+        } else {
+            eps
+        }
+    }
+
+    /// Takes the innovation of a sample with the gain that was used, and the errors that the sample leaves in the filters.
+    #[inline(always)]
+    pub fn take(&mut self, places: &Places, rows: &Sensitivities<N, K>, gain: &[f64; N], eps: f64) {
+        let count = places.filters();
+        let (mut z, z_filters) = self.times(count, &rows.e);
+        let mut along = 0.0;
+        for i in 0..N {
+            along += rows.e.theta[i] * z[i];
+        }
+        for i in 0..count {
+            along += rows.e.filters[i] * z_filters[i];
+        }
+        self.level.take(eps * eps / (1.0 + along.max(0.0)));
+        let half = 0.5 * (1.0 + along);
+        let mut k = z;
+        for i in 0..N {
+            k[i] -= half * gain[i];
+        }
+        // Exactly symmetric: the two products are exchanged with i and j.
+        for i in 0..N {
+            for j in 0..N {
+                self.theta[i][j] -= gain[i] * k[j] + k[i] * gain[j];
+            }
+        }
+        for c in 0..count {
+            for i in 0..N {
+                self.cross[c][i] -= gain[i] * z_filters[c];
+            }
+        }
+        if count > 0 {
+            // Sigma h after the update: z - g (k' h) - k (g' h).
+            let (mut k_h, mut g_h) = (0.0, 0.0);
+            for i in 0..N {
+                k_h += k[i] * rows.e.theta[i];
+                g_h += gain[i] * rows.e.theta[i];
+            }
+            for i in 0..count {
+                k_h += z_filters[i] * rows.e.filters[i];
+            }
+            for i in 0..N {
+                z[i] -= gain[i] * k_h + k[i] * g_h;
+            }
+            let z_filters = core::array::from_fn(|c| z_filters[c] * (1.0 - g_h));
+            self.insert(places, rows, z, z_filters);
+        }
+        self.wait -= 1;
+        if self.wait == 0 {
+            self.wait = LOOK;
+            self.confine();
+        }
+    }
+
+    /// The errors that a sample leaves in the filters, without a step of the estimate.
+    #[inline]
+    pub fn follow(&mut self, places: &Places, rows: &Sensitivities<N, K>) {
+        let count = places.filters();
+        if count > 0 {
+            let (z, z_filters) = self.times(count, &rows.e);
+            self.insert(places, rows, z, z_filters);
+        }
+    }
+
+    /// `Sigma a`.
+    #[inline(always)]
+    fn times(&self, count: usize, a: &Row<N, K>) -> ([f64; N], [f64; K]) {
+        let (mut theta, mut filters) = ([0.0; N], [0.0; K]);
+        for j in 0..N {
+            for i in 0..N {
+                theta[i] += self.theta[j][i] * a.theta[j];
+            }
+        }
+        for c in 0..count {
+            for i in 0..N {
+                theta[i] += self.cross[c][i] * a.filters[c];
+            }
+            let mut sum = 0.0;
+            for i in 0..N {
+                sum += self.cross[c][i] * a.theta[i];
+            }
+            for d in 0..count {
+                sum += self.filters[c][d] * a.filters[d];
+            }
+            filters[c] = sum;
+        }
+        (theta, filters)
+    }
+
+    /// Puts the new dw, dv and de in front of those of their kind, from `Sigma h`.
+    #[inline(always)]
+    fn insert(&mut self, places: &Places, rows: &Sensitivities<N, K>, z: [f64; N], z_filters: [f64; K]) {
+        let count = places.filters();
+        let kinds = [places.w, places.v, places.e];
+        let new = [&rows.w, &rows.v, &rows.e];
+        let mut with_theta = [z; 3];
+        let mut with_filters = [z_filters; 3];
+        for kind in 0..2 {
+            if kinds[kind].1 == 0 {
+                continue;
+            }
+            // h and the row differ in A (for dw), in C and D, and in the filters.
+            let of_a = if kind == 0 { places.na } else { 0 };
+            let (first, noise) = places.noise;
+            for j in (0..of_a).chain(first..first + noise) {
+                let difference = rows.e.theta[j] - new[kind].theta[j];
+                for i in 0..N {
+                    with_theta[kind][i] -= self.theta[j][i] * difference;
+                }
+                for c in 0..count {
+                    with_filters[kind][c] -= self.cross[c][j] * difference;
+                }
+            }
+            for d in 0..count {
+                let difference = rows.e.filters[d] - new[kind].filters[d];
+                for i in 0..N {
+                    with_theta[kind][i] -= self.cross[d][i] * difference;
+                }
+                for c in 0..count {
+                    with_filters[kind][c] -= self.filters[c][d] * difference;
+                }
+            }
+        }
+        let mut among = [[0.0; 3]; 3];
+        for i in 0..3 {
+            for j in 0..=i {
+                if kinds[i].1 > 0 && kinds[j].1 > 0 {
+                    let mut sum = 0.0;
+                    for k in 0..N {
+                        sum += new[j].theta[k] * with_theta[i][k];
+                    }
+                    for k in 0..count {
+                        sum += new[j].filters[k] * with_filters[i][k];
+                    }
+                    among[i][j] = sum;
+                    among[j][i] = sum;
+                }
+            }
+        }
+        for (first, n) in kinds {
+            for at in (first + 1..first + n).rev() {
+                self.cross[at] = self.cross[at - 1];
+                self.filters[at] = self.filters[at - 1];
+            }
+        }
+        for (first, n) in kinds {
+            for row in &mut self.filters[..count] {
+                for at in (first + 1..first + n).rev() {
+                    row[at] = row[at - 1];
+                }
+            }
+        }
+        for i in 0..3 {
+            let (at, n) = kinds[i];
+            if n == 0 {
+                continue;
+            }
+            self.cross[at] = with_theta[i];
+            let mut row = with_filters[i];
+            for (j, (first, n)) in kinds.into_iter().enumerate() {
+                for at in (first + 1..first + n).rev() {
+                    row[at] = row[at - 1];
+                }
+                if n > 0 {
+                    row[first] = among[i][j];
+                }
+            }
+            self.filters[at] = row;
+            for c in 0..count {
+                self.filters[c][at] = row[c];
+            }
+        }
+    }
+
+    /// To first order a recursion with large gains can be unstable where it is not: then the variances grow to what says that nothing
+    /// is known, and no further. What is not finite starts again from there.
+    #[cold]
+    fn confine(&mut self) {
+        if !self.is_sound() {
+            self.cross = [[0.0; N]; K];
+            self.filters = [[0.0; K]; K];
+            self.theta = [[0.0; N]; N];
+            for i in 0..N {
+                self.theta[i][i] = NOTHING_KNOWN * self.start[i];
+            }
+        }
+        for i in 0..N {
+            let limit = NOTHING_KNOWN * self.start[i];
+            if self.start[i] > 0.0 && self.theta[i][i] > limit {
+                let share = libm::sqrt(limit / self.theta[i][i]);
+                for j in 0..N {
+                    self.theta[i][j] *= share;
+                    self.theta[j][i] *= share;
+                }
+                for cross in &mut self.cross {
+                    cross[i] *= share;
+                }
+            }
+        }
+    }
+
+    /// Adds the variance by which parameter i drifts in a sample, until `bound`.
+    #[inline]
+    pub fn drift(&mut self, i: usize, variance: f64, bound: f64) {
+        // Beyond the bound nothing is known that could be forgotten.
+        if self.theta[i][i] < bound {
+            self.theta[i][i] += variance;
+        }
+    }
+
+    /// Covariance of theta over sigma^2.
+    pub fn spread(&self) -> [[f64; N]; N] {
+        self.theta
+    }
+
+    /// Innovation variance sigma^2.
+    #[inline(always)]
+    pub fn variance(&self) -> f64 {
+        self.level.variance()
+    }
+
+    /// True when every number inside is finite.
+    pub fn is_sound(&self) -> bool {
+        let all = self.theta.iter().chain(&self.cross).flatten();
+        let mut all = all.chain(self.filters.iter().flatten());
+        all.all(|s| s.is_finite()) && self.level.variance().is_finite()
+    }
+}

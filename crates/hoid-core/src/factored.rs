@@ -1,0 +1,187 @@
+//! A covariance matrix in factors: `P = U D U'`, U unit upper triangular, D diagonal.
+//!
+//! P stays symmetric and positive whatever rounding does, as long as D does. Three operations are all that the ways of
+//! forgetting need:
+//!
+//! - **measurement** with the regressor psi and the variance R: `g = P psi/(R + psi' P psi)`, `P <- P - g psi' P`. With
+//!   `f = U' psi`, `v = D f` and the partial sums `alpha_j = R + sum_{i<=j} f_i v_i`: `d_j <- d_j alpha_{j-1}/alpha_j`, and the columns of
+//!   U follow (G. J. Bierman, *Factorization Methods for Discrete Sequential Estimation*, 1977, section V.3). A negative R, with all
+//!   alpha negative, gives P back what a measurement took: the same lines hold.
+//! - **scaling** `P <- S P S` with a diagonal S: `U_ij <- U_ij s_i/s_j`, `d_j <- d_j s_j^2`. Exact; this is the forgetting matrix.
+//! - **rank one** `P <- P + c a a'` with `c >= 0` (W. S. Agee and R. H. Turner, 1972; Bierman, section III.4).
+//!
+//! N is the room for parameters. Where there are fewer, their d is zero and nothing happens to them.
+
+/// `U D U'` of an N x N matrix.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Factored<const N: usize> {
+    /// Column j holds `U_ij`, i < j; the rest is not used.
+    u: [[f64; N]; N],
+    d: [f64; N],
+}
+
+impl<const N: usize> Factored<N> {
+    /// A diagonal matrix.
+    pub fn diagonal(d: [f64; N]) -> Self {
+        Self { u: [[0.0; N]; N], d }
+    }
+
+    /// The factors of a symmetric matrix; `None` unless it is positive semidefinite up to rounding. Rows and columns of zeros
+    /// are parameters that do not move.
+    pub fn of(p: &[[f64; N]; N]) -> Option<Self> {
+        let mut rest = *p;
+        let mut factored = Self::diagonal([0.0; N]);
+        for j in (0..N).rev() {
+            let d = rest[j][j];
+            if !(d >= 0.0 && d.is_finite()) {
+                return None;
+            }
+            factored.d[j] = d;
+            if d == 0.0 {
+                // Nothing can be correlated with what does not vary.
+                if (0..j).any(|i| rest[i][j] != 0.0) {
+                    return None;
+                }
+                continue;
+            }
+            for i in 0..j {
+                factored.u[j][i] = rest[i][j] / d;
+            }
+            for i in 0..j {
+                for k in 0..=i {
+                    rest[k][i] -= factored.u[j][i] * factored.u[j][k] * d;
+                    rest[i][k] = rest[k][i];
+                }
+            }
+        }
+        Some(factored)
+    }
+
+    /// The measurement of the module: the gain g; P moves on.
+    #[inline]
+    pub fn measure(&mut self, psi: &[f64; N], variance: f64) -> [f64; N] {
+        self.grow_and_measure(1.0, psi, variance)
+    }
+
+    /// `P <- growth P`, then the measurement, in one pass.
+    #[inline(always)]
+    pub fn grow_and_measure(&mut self, growth: f64, psi: &[f64; N], variance: f64) -> [f64; N] {
+        let (mut f, mut v, mut grown) = ([0.0; N], [0.0; N], [0.0; N]);
+        for j in 0..N {
+            let mut sum = psi[j];
+            for i in 0..j {
+                sum += self.u[j][i] * psi[i];
+            }
+            grown[j] = self.d[j] * growth;
+            f[j] = sum;
+            v[j] = grown[j] * sum;
+        }
+        let mut gain = [0.0; N];
+        let (mut before, mut inverse_before) = (variance, 1.0 / variance);
+        for j in 0..N {
+            let alpha = before + f[j] * v[j];
+            let inverse = 1.0 / alpha;
+            self.d[j] = grown[j] * (before * inverse);
+            let along = -f[j] * inverse_before;
+            let column = &mut self.u[j];
+            for i in 0..j {
+                let old = column[i];
+                column[i] = old + gain[i] * along;
+                gain[i] += old * v[j];
+            }
+            gain[j] = v[j];
+            (before, inverse_before) = (alpha, inverse);
+        }
+        gain.map(|g| g * inverse_before)
+    }
+
+    /// `psi' P psi`.
+    #[inline]
+    pub fn along(&self, psi: &[f64; N]) -> f64 {
+        let (f, v) = self.projections(psi);
+        f.iter().zip(&v).map(|(f, v)| f * v).sum()
+    }
+
+    /// `f = U' psi` and `v = D f`.
+    #[inline]
+    fn projections(&self, psi: &[f64; N]) -> ([f64; N], [f64; N]) {
+        let (mut f, mut v) = ([0.0; N], [0.0; N]);
+        for j in 0..N {
+            let mut sum = psi[j];
+            for i in 0..j {
+                sum += self.u[j][i] * psi[i];
+            }
+            f[j] = sum;
+            v[j] = self.d[j] * sum;
+        }
+        (f, v)
+    }
+
+    /// `P psi`.
+    #[inline]
+    pub fn times(&self, psi: &[f64; N]) -> [f64; N] {
+        let (_, v) = self.projections(psi);
+        let mut product = v;
+        for j in 0..N {
+            for i in 0..j {
+                product[i] += self.u[j][i] * v[j];
+            }
+        }
+        product
+    }
+
+    /// `P <- s^2 P`.
+    #[inline]
+    pub fn scale_all(&mut self, squared: f64) {
+        for d in &mut self.d {
+            *d *= squared;
+        }
+    }
+
+    /// `P <- S P S` with `S = diag(s)`; `inverse` holds `1/s_j`.
+    #[inline]
+    pub fn scale(&mut self, s: &[f64; N], inverse: &[f64; N]) {
+        for j in 0..N {
+            self.d[j] *= s[j] * s[j];
+            for i in 0..j {
+                self.u[j][i] *= s[i] * inverse[j];
+            }
+        }
+    }
+
+    /// `P <- P + c a a'`, c not negative.
+    #[inline]
+    pub fn add(&mut self, mut c: f64, mut a: [f64; N]) {
+        for j in (0..N).rev() {
+            let s = a[j];
+            let d = self.d[j] + c * s * s;
+            // Zero only where both terms are: the direction is not there yet, and nothing is added to it.
+            if d > 0.0 {
+                let share = c / d;
+                c = share * self.d[j];
+                self.d[j] = d;
+                let along = s * share;
+                for i in 0..j {
+                    a[i] -= s * self.u[j][i];
+                    self.u[j][i] += along * a[i];
+                }
+            }
+        }
+    }
+
+    /// Element (i, j) of P.
+    pub fn element(&self, i: usize, j: usize) -> f64 {
+        let of = |row: usize, column: usize| if row == column { 1.0 } else { self.u[column][row] };
+        (i.max(j)..N).map(|k| of(i, k) * self.d[k] * of(j, k)).sum()
+    }
+
+    /// P itself.
+    pub fn matrix(&self) -> [[f64; N]; N] {
+        core::array::from_fn(|i| core::array::from_fn(|j| self.element(i, j)))
+    }
+
+    /// True when every number is finite and no variance negative.
+    pub fn is_sound(&self) -> bool {
+        self.d.iter().all(|d| *d >= 0.0 && d.is_finite()) && self.u.iter().flatten().all(|u| u.is_finite())
+    }
+}

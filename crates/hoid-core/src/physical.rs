@@ -1,0 +1,323 @@
+//! The recursive prediction-error method in physical parameters.
+//!
+//! `eta = [K_e, K_e_dot, omega_nm, zeta_nm, c.., d..]`, or with the delay `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, c.., d..]`. The
+//! predictor is that of Box-Jenkins with the polynomials `theta(eta)` of the exact zero-order hold ([`crate::held_operator`]); its gradient is
+//! `psi_eta = (d theta/d eta)' psi_theta`. The step is that of [`crate::rpem`], but what is remembered long and what is soon
+//! forgotten are now the quantities of which the user knows how fast they change: a person adapts the gains, hardly the neuromuscular system.
+//!
+//! Each parameter stays within its bounds: a step is cut where it meets one. C (and D, if asked for) is kept stable by halving the step.
+//!
+//! With the delay as a parameter `tau_e = l Ts + delta`, B has three coefficients behind `nk = l + 1` samples; as tau_e grows over a
+//! whole sample, B moves on along the input that the predictor keeps, and no filter notices. The model is continuous there, its derivative
+//! has a kink (see [`crate::held_operator`]).
+
+use crate::{
+    adaptation::Adaptation,
+    error_bars::{ErrorBars, Places, Row, Sensitivities},
+    held_operator::{held_operator, held_operator_delayed},
+    predictor::{Predictor, Regressor, Shape},
+    recursion::{Stable, Step, allowed_share, share},
+};
+
+/// Place of omega_nm in eta.
+const OMEGA: usize = 2;
+/// Place of zeta_nm in eta.
+const ZETA: usize = 3;
+/// Place of tau_e in eta, where it is a parameter.
+const TAU: usize = 4;
+
+/// What the recursion estimates, and within which bounds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PhysicalModel<S, const N: usize> {
+    /// Orders: nc and nd are free, na = 0, nf = 2 and nb = 2, or 3 when tau_e is a parameter.
+    pub shape: S,
+    /// Smallest delay nk in samples, of which the recursion is given the input `x(t) = e(t - nk)`, when tau_e is a parameter.
+    pub tracked_from: Option<usize>,
+    /// Sample time in s.
+    pub sample_time: f64,
+    /// Least and largest value of each parameter.
+    pub bounds: [[f64; 2]; N],
+    /// Which noise polynomials are kept stable.
+    pub stable: Stable,
+}
+
+/// The recursion. N is the room for parameters, K that for the errors of its filters ([`Places::filters`])
+/// (0 for the usual error bars), L that for the input: 2 without tau_e, 3 and the range of the delay with it; at least nc.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Physical<S, const N: usize, const K: usize, const L: usize, A> {
+    model: PhysicalModel<S, N>,
+    predictor: Predictor<S, N, L>,
+    eta: [f64; N],
+    /// Polynomials of eta, their Jacobian with respect to the first parameters, and the whole samples of the delay.
+    polynomials: Polynomials<N>,
+    psi: [f64; N],
+    adaptation: A,
+    bars: ErrorBars<N, K>,
+    restarts: u64,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Polynomials<const N: usize> {
+    theta: [f64; N],
+    /// Rows b.., f1, f2; columns the operator's parameters.
+    jacobian: [[f64; 5]; 5],
+    whole_samples: usize,
+}
+
+impl<S: Shape, const N: usize> PhysicalModel<S, N> {
+    /// Number of operator parameters in front of c and d.
+    fn operator(&self) -> usize {
+        self.shape.nb() + 2
+    }
+
+    fn polynomials(&self, eta: &[f64; N]) -> Polynomials<N> {
+        let gains = [eta[0], eta[1], eta[2], eta[3]];
+        let noise = self.shape.nc() + self.shape.nd();
+        let mut theta = [0.0; N];
+        let mut jacobian = [[0.0; 5]; 5];
+        let (operator, mut whole_samples) = (self.operator(), 0);
+        if self.tracked_from.is_some() {
+            let samples = eta[TAU] / self.sample_time;
+            // Up to rounding: 0.29/0.01 is 28.999999999999996.
+            let whole = libm::floor(samples * (1.0 + 1e-12) + 1e-12).max(0.0);
+            whole_samples = whole as usize;
+            let delta = (eta[TAU] - whole * self.sample_time).clamp(0.0, self.sample_time);
+            let (values, by) = held_operator_delayed(gains, delta, self.sample_time);
+            jacobian = by;
+            theta[..3].copy_from_slice(&values[..3]);
+            theta[3 + noise..5 + noise].copy_from_slice(&values[3..]);
+        } else {
+            let (values, by) = held_operator(gains, self.sample_time);
+            for (row, by) in jacobian.iter_mut().zip(by) {
+                row[..4].copy_from_slice(&by);
+            }
+            theta[..2].copy_from_slice(&values[..2]);
+            theta[2 + noise..4 + noise].copy_from_slice(&values[2..]);
+        }
+        let nb = operator - 2;
+        theta[nb..nb + noise].copy_from_slice(&eta[operator..operator + noise]);
+        Polynomials {
+            theta,
+            jacobian,
+            whole_samples,
+        }
+    }
+
+    fn inside(&self, eta: &[f64; N]) -> bool {
+        eta.iter()
+            .zip(&self.bounds)
+            .all(|(e, [low, high])| low <= e && e <= high)
+    }
+}
+
+impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>> Physical<S, N, K, L, A> {
+    /// Starts from eta with filters at rest. `None` when the orders are others, N or L is too small, eta lies outside the bounds, the bounds let omega_nm or
+    /// zeta_nm become zero, or the noise model is not stable.
+    pub fn new(model: PhysicalModel<S, N>, eta: [f64; N], adaptation: A, bars: ErrorBars<N, K>) -> Option<Self> {
+        let shape = model.shape;
+        let predictor = Predictor::new(shape, Regressor::Gradient)?;
+        let nb = if model.tracked_from.is_some() { 3 } else { 2 };
+        let orders = (shape.na(), shape.nb(), shape.nf()) == (0, nb, 2);
+        let sound = orders
+            && model.sample_time > 0.0
+            && model.bounds[OMEGA][0] > 0.0
+            && model.bounds[ZETA][0] > 0.0
+            && model.inside(&eta);
+        if !sound || Places::within::<S, K>(&shape).filters() > K {
+            return None;
+        }
+        let polynomials = model.polynomials(&eta);
+        if !model.stable.holds(&shape, &polynomials.theta) {
+            return None;
+        }
+        let mut recursion = Self {
+            model,
+            predictor,
+            eta,
+            polynomials,
+            psi: [0.0; N],
+            adaptation,
+            bars,
+            restarts: 0,
+        };
+        recursion.place();
+        Some(recursion)
+    }
+
+    /// Lets B begin where the delay says.
+    fn place(&mut self) {
+        if let Some(first) = self.model.tracked_from {
+            let nk = self.polynomials.whole_samples + 1;
+            self.predictor.set_offset(nk.saturating_sub(first));
+        }
+    }
+
+    #[inline(always)]
+    fn predict(&mut self, x: f64, u: f64) -> f64 {
+        let mut of_theta = [0.0; N];
+        let innovation = self.predictor.predict(&self.polynomials.theta, x, u, &mut of_theta);
+        self.psi = self.by_eta(of_theta);
+        innovation
+    }
+
+    /// A row that stands for theta as one that stands for eta: `J' psi_theta`.
+    #[inline(always)]
+    fn by_eta(&self, of_theta: [f64; N]) -> [f64; N] {
+        let shape = self.model.shape;
+        let (operator, noise) = (self.model.operator(), shape.nc() + shape.nd());
+        let nb = operator - 2;
+        let jacobian = &self.polynomials.jacobian;
+        let mut row = of_theta;
+        for j in 0..operator {
+            let mut sum = 0.0;
+            for i in 0..nb {
+                sum += of_theta[i] * jacobian[i][j];
+            }
+            for i in 0..2 {
+                sum += of_theta[nb + noise + i] * jacobian[nb + i][j];
+            }
+            row[j] = sum;
+        }
+        row[operator..operator + noise].copy_from_slice(&of_theta[nb..nb + noise]);
+        row
+    }
+
+    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`; with the delay as a parameter nk is the smallest one. Both must be finite.
+    #[inline]
+    pub fn step(&mut self, x: f64, u: f64) -> Step {
+        let innovation = self.predict(x, u);
+        let (places, rows) = self.sensitivities();
+        let limited = self.bars.limited(innovation);
+        let used = share(limited, innovation);
+        let moved = self
+            .adaptation
+            .advance(&self.psi, limited, &self.eta, self.bars.variance());
+        let (operator, noise) = (self.model.operator(), self.model.shape.nc() + self.model.shape.nd());
+        let (shape, stable) = (self.model.shape, self.model.stable);
+        // The operator's part of theta is stable by its bounds; only the noise model has to be tested.
+        let (allowed, mut eta) = allowed_share(&self.eta, &moved.step, |eta| {
+            let mut theta = [0.0; N];
+            theta[operator - 2..operator - 2 + noise].copy_from_slice(&eta[operator..operator + noise]);
+            stable.holds(&shape, &theta)
+        });
+        let (mut gain, mut cut) = (moved.gain, false);
+        for i in 0..N {
+            let [low, high] = self.model.bounds[i];
+            let within = eta[i].clamp(low, high);
+            let mut part = allowed;
+            if within != eta[i] {
+                cut = true;
+                part = if moved.step[i] == 0.0 {
+                    0.0
+                } else {
+                    (within - self.eta[i]) / moved.step[i]
+                };
+                eta[i] = within;
+            }
+            gain[i] *= part * used;
+        }
+        self.eta = eta;
+        self.bars.take(&places, &rows, &gain, innovation);
+        self.adaptation.drift_into(&mut self.bars);
+        self.polynomials = self.model.polynomials(&eta);
+        self.place();
+        self.correct();
+        Step {
+            innovation,
+            shortened: allowed < 1.0 || cut,
+        }
+    }
+
+    /// Takes a sample into the filters alone; the estimate stays.
+    pub fn follow(&mut self, x: f64, u: f64) -> Step {
+        let innovation = self.predict(x, u);
+        let (places, rows) = self.sensitivities();
+        self.bars.follow(&places, &rows);
+        self.correct();
+        Step {
+            innovation,
+            shortened: false,
+        }
+    }
+
+    /// As [`Physical::follow`] where the output is missing: the one-step prediction takes its place.
+    pub fn bridge(&mut self, x: f64) {
+        self.predict(x, 0.0);
+        self.predictor.bridge(&self.polynomials.theta);
+        let (places, rows) = self.sensitivities();
+        self.bars.follow(&places, &rows);
+        self.correct();
+    }
+
+    /// Sensitivities with respect to eta, whose noise parameters stand behind the operator's.
+    #[inline(always)]
+    fn sensitivities(&self) -> (Places, Sensitivities<N, K>) {
+        if K == 0 {
+            return (Places::NONE, Sensitivities::of_gradient(&self.psi));
+        }
+        let places = Places::of(&self.model.shape);
+        let rows = self.predictor.sensitivities(&self.polynomials.theta, &places);
+        let in_eta = |row: Row<N, K>| Row {
+            theta: self.by_eta(row.theta),
+            filters: row.filters,
+        };
+        let places = Places {
+            noise: (self.model.operator(), places.noise.1),
+            ..places
+        };
+        let rows = Sensitivities {
+            w: in_eta(rows.w),
+            v: in_eta(rows.v),
+            e: in_eta(rows.e),
+        };
+        (places, rows)
+    }
+
+    #[inline(always)]
+    fn correct(&mut self) {
+        if !self.predictor.correct(&self.polynomials.theta).is_finite() {
+            self.predictor.rest();
+            self.restarts += 1;
+        }
+    }
+
+    /// eta.
+    pub fn eta(&self) -> &[f64; N] {
+        &self.eta
+    }
+
+    /// The polynomials of eta, `[b.. c.. d.. f..]`.
+    pub fn theta(&self) -> &[f64; N] {
+        &self.polynomials.theta
+    }
+
+    /// Jacobian of `[b.., f1, f2]` with respect to the operator's parameters.
+    pub fn jacobian(&self) -> &[[f64; 5]; 5] {
+        &self.polynomials.jacobian
+    }
+
+    /// psi of the last sample.
+    pub fn psi(&self) -> &[f64; N] {
+        &self.psi
+    }
+
+    /// The adaptation with its covariance.
+    pub fn adaptation(&self) -> &A {
+        &self.adaptation
+    }
+
+    /// Covariance of eta over sigma^2.
+    pub fn spread(&self) -> [[f64; N]; N] {
+        self.adaptation.spread_or(&self.bars)
+    }
+
+    /// Innovation variance sigma^2.
+    pub fn innovation_variance(&self) -> f64 {
+        self.bars.variance()
+    }
+
+    /// How often a signal overflowed and the filters were brought to rest.
+    pub fn restarts(&self) -> u64 {
+        self.restarts
+    }
+}

@@ -1,0 +1,376 @@
+//! The one-step predictor of the general model, sample by sample, and its gradient.
+//!
+//! For `A u = (B/F) q^-nk e + (C/D) eps` (eq. 5.1) with the input `x(t) = e(t - nk)`,
+//!
+//! `w = B x - (F - 1) w`,  `v = A u - w`,  `eps = D v - (C - 1) eps`,
+//!
+//! and the negative gradient `psi = -d eps/d theta`
+//!
+//! | parameter | psi(t) |
+//! |---|---|
+//! | `a_j` | `-(D/C) u(t-j)` |
+//! | `b_j` | `(D/(C F)) x(t-j)` |
+//! | `c_j` | `(1/C) eps(t-j)` |
+//! | `d_j` | `-(1/C) v(t-j)` |
+//! | `f_j` | `-(D/(C F)) w(t-j)` |
+//!
+//! Each filter works with the coefficients of its time; for a theta that stays, eps and psi are those of the batch criterion started at
+//! rest. After the estimate has moved, w, v and eps of the sample are computed again with it ([`Predictor::correct`]): the
+//! a-posteriori residuals, with which the recursion converges faster (L. Ljung and T. Söderström, *Theory and Practice of Recursive
+//! Identification*, 1983, section 3.7.3 and eq. 3.151).
+//!
+//! The input is kept over L samples, so that B may begin at any `offset` within them: a delay can be changed without a transient.
+//! N is the room for parameters; every order fits in it.
+
+use crate::error_bars::{Places, Row, Sensitivities};
+
+/// Numbers of coefficients of A, B, C, D and F.
+///
+/// [`AnyShape`] holds them as numbers. [`FixedShape`] has them in its type, so that the compiler writes out every loop over
+/// coefficients: the same operations in the same order, at half the time.
+pub trait Shape: Copy {
+    /// Coefficients `a_1 ...`.
+    fn na(&self) -> usize;
+    /// Coefficients `b_0 ...`.
+    fn nb(&self) -> usize;
+    /// Coefficients `c_1 ...`.
+    fn nc(&self) -> usize;
+    /// Coefficients `d_1 ...`.
+    fn nd(&self) -> usize;
+    /// Coefficients `f_1 ...`.
+    fn nf(&self) -> usize;
+
+    /// Length of `theta = [a.. b.. c.. d.. f..]`.
+    #[inline]
+    fn parameters(&self) -> usize {
+        self.na() + self.nb() + self.nc() + self.nd() + self.nf()
+    }
+
+    /// `[a, b, c, d, f]` of theta.
+    #[inline]
+    fn split<'t>(&self, theta: &'t [f64]) -> [&'t [f64]; 5] {
+        let (a, rest) = theta.split_at(self.na());
+        let (b, rest) = rest.split_at(self.nb());
+        let (c, rest) = rest.split_at(self.nc());
+        let (d, rest) = rest.split_at(self.nd());
+        [a, b, c, d, &rest[..self.nf()]]
+    }
+}
+
+/// Orders as numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct AnyShape {
+    /// Coefficients `a_1 ...`.
+    pub na: usize,
+    /// Coefficients `b_0 ...`.
+    pub nb: usize,
+    /// Coefficients `c_1 ...`.
+    pub nc: usize,
+    /// Coefficients `d_1 ...`.
+    pub nd: usize,
+    /// Coefficients `f_1 ...`.
+    pub nf: usize,
+}
+
+impl Shape for AnyShape {
+    #[inline]
+    fn na(&self) -> usize {
+        self.na
+    }
+
+    #[inline]
+    fn nb(&self) -> usize {
+        self.nb
+    }
+
+    #[inline]
+    fn nc(&self) -> usize {
+        self.nc
+    }
+
+    #[inline]
+    fn nd(&self) -> usize {
+        self.nd
+    }
+
+    #[inline]
+    fn nf(&self) -> usize {
+        self.nf
+    }
+}
+
+/// Orders in the type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct FixedShape<const NA: usize, const NB: usize, const NC: usize, const ND: usize, const NF: usize>;
+
+impl<const NA: usize, const NB: usize, const NC: usize, const ND: usize, const NF: usize> Shape
+    for FixedShape<NA, NB, NC, ND, NF>
+{
+    #[inline]
+    fn na(&self) -> usize {
+        NA
+    }
+
+    #[inline]
+    fn nb(&self) -> usize {
+        NB
+    }
+
+    #[inline]
+    fn nc(&self) -> usize {
+        NC
+    }
+
+    #[inline]
+    fn nd(&self) -> usize {
+        ND
+    }
+
+    #[inline]
+    fn nf(&self) -> usize {
+        NF
+    }
+}
+
+/// What psi is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Regressor {
+    /// The gradient: prediction-error method.
+    #[default]
+    Gradient,
+    /// The signals without their filters: pseudo-linear regression, also called extended least squares (Ljung and Söderström,
+    /// section 3.7.4). Fewer operations; it converges where 1/C (1/F ...) is positive real.
+    PseudoLinear,
+}
+
+/// State of the filters. Histories hold the newest value first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Predictor<S, const N: usize, const L: usize> {
+    shape: S,
+    regressor: Regressor,
+    offset: usize,
+    x: [f64; L],
+    /// `(D/(C F)) x`.
+    filtered_x: [f64; L],
+    /// `x/F`.
+    x_over_f: [f64; N],
+    u: [f64; N],
+    w: [f64; N],
+    v: [f64; N],
+    eps: [f64; N],
+    /// `(D/C) u`, `eps/C`, `v/C`, `w/F` and `(D/(C F)) w`.
+    filtered_u: [f64; N],
+    filtered_eps: [f64; N],
+    filtered_v: [f64; N],
+    w_over_f: [f64; N],
+    filtered_w: [f64; N],
+    /// The output and `x/F` of the sample that was predicted and not yet corrected.
+    pending: [f64; 2],
+}
+
+/// `sum_j c_j h_j` over the coefficients.
+#[inline(always)]
+fn dot(coefficients: &[f64], history: &[f64]) -> f64 {
+    let mut sum = 0.0;
+    for (c, h) in coefficients.iter().zip(history) {
+        sum += c * h;
+    }
+    sum
+}
+
+/// Puts a value in front of the n newest ones.
+#[inline(always)]
+fn push(history: &mut [f64], n: usize, value: f64) {
+    if n > 0 {
+        history.copy_within(0..n - 1, 1);
+        history[0] = value;
+    }
+}
+
+impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
+    /// All filters at rest. `None` when the shape does not fit in N and L, or has no parameter.
+    pub fn new(shape: S, regressor: Regressor) -> Option<Self> {
+        let fits = (1..=N).contains(&shape.parameters()) && shape.nb().max(shape.nc()) <= L;
+        fits.then_some(Self {
+            shape,
+            regressor,
+            offset: 0,
+            x: [0.0; L],
+            filtered_x: [0.0; L],
+            x_over_f: [0.0; N],
+            u: [0.0; N],
+            w: [0.0; N],
+            v: [0.0; N],
+            eps: [0.0; N],
+            filtered_u: [0.0; N],
+            filtered_eps: [0.0; N],
+            filtered_v: [0.0; N],
+            w_over_f: [0.0; N],
+            filtered_w: [0.0; N],
+            pending: [0.0; 2],
+        })
+    }
+
+    /// Orders.
+    pub fn shape(&self) -> S {
+        self.shape
+    }
+
+    /// Lets B begin `offset` samples after x(t), as far as the kept input reaches.
+    pub fn set_offset(&mut self, offset: usize) {
+        self.offset = offset.min(L - self.shape.nb().min(L));
+    }
+
+    /// Brings all filters to rest.
+    pub fn rest(&mut self) {
+        let offset = self.offset;
+        if let Some(rested) = Self::new(self.shape, self.regressor) {
+            *self = rested;
+            self.offset = offset;
+        }
+    }
+
+    /// The a-priori innovation of the sample `x(t) = e(t - nk)`, `u(t)`, and psi.
+    #[inline(always)]
+    pub fn predict(&mut self, theta: &[f64; N], x: f64, u: f64, psi: &mut [f64; N]) -> f64 {
+        let shape = self.shape;
+        let [_, _, c, d, f] = shape.split(theta);
+        let offset = self.offset;
+        // Without a room for shifts of B, its own coefficients are all that is kept.
+        let input = if L > N { L } else { shape.nb() };
+        push(&mut self.x, input, x);
+        self.pending[0] = u;
+        let gradient = self.regressor == Regressor::Gradient;
+        if gradient && shape.nb() > 0 {
+            let over_f = x - dot(f, &self.x_over_f);
+            let filtered = over_f + dot(d, &self.x_over_f) - dot(c, &self.filtered_x);
+            self.pending[1] = over_f;
+            push(&mut self.filtered_x, input.max(shape.nc()), filtered);
+        }
+        let (of_u, of_x, of_eps, of_v, of_w) = if gradient {
+            (
+                &self.filtered_u,
+                &self.filtered_x,
+                &self.filtered_eps,
+                &self.filtered_v,
+                &self.filtered_w,
+            )
+        } else {
+            (&self.u, &self.x, &self.eps, &self.v, &self.w)
+        };
+        let (psi_a, rest) = psi.split_at_mut(shape.na());
+        let (psi_b, rest) = rest.split_at_mut(shape.nb());
+        let (psi_c, rest) = rest.split_at_mut(shape.nc());
+        let (psi_d, rest) = rest.split_at_mut(shape.nd());
+        let (psi_f, rest) = rest.split_at_mut(shape.nf());
+        // Lengths that stand in the type make these a few moves, where an iterator becomes a call to copy memory.
+        for j in 0..shape.na() {
+            psi_a[j] = -of_u[j];
+        }
+        psi_b.copy_from_slice(&of_x[offset..offset + shape.nb()]);
+        psi_c.copy_from_slice(&of_eps[..shape.nc()]);
+        for j in 0..shape.nd() {
+            psi_d[j] = -of_v[j];
+        }
+        for j in 0..shape.nf() {
+            psi_f[j] = -of_w[j];
+        }
+        rest.fill(0.0);
+        self.residual(theta)[2]
+    }
+
+    /// How dw, dv and de of the pending sample follow from the errors X of [`crate::error_bars`].
+    #[inline(always)]
+    pub fn sensitivities<const K: usize>(&self, theta: &[f64; N], places: &Places) -> Sensitivities<N, K> {
+        let shape = self.shape;
+        let (na, nb, nc, nd, nf) = (shape.na(), shape.nb(), shape.nc(), shape.nd(), shape.nf());
+        let [_, _, c, d, f] = shape.split(theta);
+        let mut w = Row {
+            theta: [0.0; N],
+            filters: [0.0; K],
+        };
+        for j in 0..nb {
+            w.theta[na + j] = self.x[self.offset + j];
+        }
+        for j in 0..nf {
+            w.theta[na + nb + nc + nd + j] = -self.w[j];
+            w.filters[places.w.0 + j] = -f[j];
+        }
+        let mut v = w;
+        for j in 0..na {
+            v.theta[j] = -self.u[j];
+        }
+        let mut e = v;
+        let of_v = if na == 0 { places.w.0 } else { places.v.0 };
+        for j in 0..nd {
+            e.theta[na + nb + nc + j] = -self.v[j];
+            e.filters[of_v + j] += d[j];
+        }
+        for j in 0..nc {
+            e.theta[na + nb + j] = self.eps[j];
+            e.filters[places.e.0 + j] = -c[j];
+        }
+        Sensitivities { w, v, e }
+    }
+
+    /// Puts the one-step prediction in the place of the pending output, which is missing.
+    pub fn bridge(&mut self, theta: &[f64; N]) {
+        self.pending[0] = 0.0;
+        // eps is the output less its prediction.
+        self.pending[0] = -self.residual(theta)[2];
+    }
+
+    /// `[w, v, eps]` of the pending sample at theta.
+    #[inline(always)]
+    fn residual(&self, theta: &[f64; N]) -> [f64; 3] {
+        let [a, b, c, d, f] = self.shape.split(theta);
+        let w = dot(b, &self.x[self.offset..]) - dot(f, &self.w);
+        let v = self.pending[0] + dot(a, &self.u) - w;
+        [w, v, v + dot(d, &self.v) - dot(c, &self.eps)]
+    }
+
+    /// Takes the predicted sample into the filters, with the estimate after it. Returns the a-posteriori residual.
+    #[inline(always)]
+    pub fn correct(&mut self, theta: &[f64; N]) -> f64 {
+        let shape = self.shape;
+        let [w, v, eps] = self.residual(theta);
+        let u = self.pending[0];
+        let [_, _, c, d, f] = shape.split(theta);
+        if self.regressor == Regressor::Gradient {
+            if shape.na() > 0 {
+                let filtered = u + dot(d, &self.u) - dot(c, &self.filtered_u);
+                push(&mut self.filtered_u, shape.na().max(shape.nc()), filtered);
+            }
+            if shape.nb() > 0 {
+                push(&mut self.x_over_f, shape.nf().max(shape.nd()), self.pending[1]);
+            }
+            if shape.nc() > 0 {
+                let filtered = eps - dot(c, &self.filtered_eps);
+                push(&mut self.filtered_eps, shape.nc(), filtered);
+            }
+            if shape.nd() > 0 {
+                let filtered = v - dot(c, &self.filtered_v);
+                push(&mut self.filtered_v, shape.nd().max(shape.nc()), filtered);
+            }
+            if shape.nf() > 0 {
+                let over_f = w - dot(f, &self.w_over_f);
+                let filtered = over_f + dot(d, &self.w_over_f) - dot(c, &self.filtered_w);
+                push(&mut self.w_over_f, shape.nf().max(shape.nd()), over_f);
+                push(&mut self.filtered_w, shape.nf().max(shape.nc()), filtered);
+            }
+        }
+        if shape.na() > 0 {
+            push(&mut self.u, shape.na().max(shape.nd()), u);
+        }
+        if shape.nf() > 0 {
+            push(&mut self.w, shape.nf(), w);
+        }
+        if shape.nd() > 0 {
+            push(&mut self.v, shape.nd(), v);
+        }
+        if shape.nc() > 0 {
+            push(&mut self.eps, shape.nc(), eps);
+        }
+        eps
+    }
+}

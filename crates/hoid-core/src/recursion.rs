@@ -1,0 +1,58 @@
+//! What all recursions share: the outcome of a step, and the step that keeps the predictor stable.
+
+use crate::{predictor::Shape, stability::roots_inside};
+
+/// What a recursion says of a sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// A-priori innovation eps.
+    pub innovation: f64,
+    /// True when stability or a bound made the step of the estimate shorter.
+    pub shortened: bool,
+}
+
+/// Polynomials whose roots a recursion keeps inside the unit circle. Without C and F there the predictor and its gradient diverge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Stable {
+    /// C and F.
+    #[default]
+    Predictor,
+    /// C, D and F: a noise model that is stationary too, as the reference text has it.
+    PredictorAndNoise,
+}
+
+/// A step is halved so often at most; then it is left out.
+const HALVINGS: u32 = 12;
+
+impl Stable {
+    /// True for a theta that may be used.
+    #[inline]
+    pub fn holds<S: Shape>(self, shape: &S, theta: &[f64]) -> bool {
+        let [_, _, c, d, f] = shape.split(theta);
+        roots_inside(c, 1.0) && roots_inside(f, 1.0) && (self == Self::Predictor || roots_inside(d, 1.0))
+    }
+}
+
+/// `part/whole`, 1 where both are zero.
+#[inline(always)]
+pub fn share(part: f64, whole: f64) -> f64 {
+    if part == whole { 1.0 } else { part / whole }
+}
+
+/// The largest of the shares 1, 1/2, 1/4 ... of a step that is allowed; 0 when none is.
+#[inline]
+pub fn allowed_share<const N: usize>(
+    theta: &[f64; N],
+    step: &[f64; N],
+    allowed: impl Fn(&[f64; N]) -> bool,
+) -> (f64, [f64; N]) {
+    let mut share = 1.0;
+    for _ in 0..=HALVINGS {
+        let moved: [f64; N] = core::array::from_fn(|i| theta[i] + share * step[i]);
+        if moved.iter().all(|t| t.is_finite()) && allowed(&moved) {
+            return (share, moved);
+        }
+        share *= 0.5;
+    }
+    (0.0, *theta)
+}

@@ -1,0 +1,204 @@
+//! A rectangular window: the last W samples count, all the same.
+//!
+//! Each sample gives a linear equation for theta, `y = psi' theta + eps` with `y = eps(t) + psi(t)' theta(t-1)`; for ARX and FIR y is the
+//! output and psi the regressor, whatever theta was. The estimate is that of least squares over the window,
+//! `theta = R^{-1} sum psi y`, `R = sum psi psi'`, which for ARX and FIR is exact and for the others the recursive prediction-error method
+//! with that memory.
+//!
+//! Sums from which the oldest term is subtracted would keep the rounding of all the past. Here the window is held as two sums: one
+//! grows from a boundary on, the other, a sum that grew until that boundary, loses its terms; when it has lost all of them the first takes its
+//! place. No rounding lives longer than two windows.
+//!
+//! The covariance of theta over sigma^2 is `R^{-1}`. Where the window does not determine theta (fewer samples than parameters, no
+//! excitation), theta stays and there is no covariance. Memory: `W (N + 1)` numbers, which the caller owns.
+
+use crate::adaptation::{Adaptation, Move};
+
+/// Smallest pivot of R scaled to a unit diagonal that counts as information.
+const SINGULAR: f64 = 1e-13;
+
+/// Power of a gradient below which a window is silent, as a share of the largest so far.
+const SILENCE: f64 = 1e-20;
+
+/// Sums over samples.
+#[derive(Debug, Clone, PartialEq)]
+struct Sums<const N: usize> {
+    gram: [[f64; N]; N],
+    right: [f64; N],
+}
+
+/// The adaptation of the module, with its memory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Window<const N: usize, M> {
+    memory: M,
+    /// Parameters in use, at most N.
+    parameters: usize,
+    length: usize,
+    filled: usize,
+    next: usize,
+    growing: Sums<N>,
+    fading: Sums<N>,
+    /// Largest power of each parameter's gradient over a window so far.
+    largest: [f64; N],
+    /// Samples whose window did not determine theta.
+    held: u64,
+}
+
+impl<const N: usize> Sums<N> {
+    const ZERO: Self = Self {
+        gram: [[0.0; N]; N],
+        right: [0.0; N],
+    };
+
+    #[inline]
+    fn add(&mut self, sign: f64, psi: &[f64], y: f64) {
+        for i in 0..psi.len() {
+            let p = sign * psi[i];
+            self.right[i] += p * y;
+            for j in 0..=i {
+                self.gram[i][j] += p * psi[j];
+            }
+        }
+    }
+}
+
+impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
+    /// Numbers of memory for a window of this many samples.
+    pub const fn numbers(samples: usize) -> usize {
+        samples * (N + 1)
+    }
+
+    /// A window as long as the memory allows, for the first `parameters` of N. `None` when the memory is shorter than one sample or
+    /// there is no parameter.
+    pub fn new(memory: M, parameters: usize) -> Option<Self> {
+        let length = memory.as_ref().len() / (N + 1);
+        (length > 0 && (1..=N).contains(&parameters)).then_some(Self {
+            memory,
+            parameters,
+            length,
+            filled: 0,
+            next: 0,
+            growing: Sums::ZERO,
+            fading: Sums::ZERO,
+            largest: [0.0; N],
+            held: 0,
+        })
+    }
+
+    /// Samples whose window did not determine theta, so that it stayed.
+    pub fn held(&self) -> u64 {
+        self.held
+    }
+
+    /// Cholesky factor of R scaled to a unit diagonal, and the scale; `None` when it is singular.
+    fn factor(&self) -> Option<([[f64; N]; N], [f64; N])> {
+        let p = self.parameters;
+        let (mut l, mut scale) = ([[0.0; N]; N], [0.0; N]);
+        for i in 0..p {
+            let power = self.growing.gram[i][i] + self.fading.gram[i][i];
+            if power.is_nan() || power <= SILENCE * self.largest[i] {
+                return None;
+            }
+            scale[i] = 1.0 / libm::sqrt(power);
+        }
+        for i in 0..p {
+            for j in 0..=i {
+                let mut sum = (self.growing.gram[i][j] + self.fading.gram[i][j]) * scale[i] * scale[j];
+                for k in 0..j {
+                    sum -= l[i][k] * l[j][k];
+                }
+                if i > j {
+                    l[i][j] = sum / l[j][j];
+                } else if sum > SINGULAR {
+                    l[i][i] = libm::sqrt(sum);
+                } else {
+                    return None;
+                }
+            }
+        }
+        Some((l, scale))
+    }
+
+    fn solve(&self, factor: &([[f64; N]; N], [f64; N]), right: &[f64; N]) -> [f64; N] {
+        let (l, scale) = factor;
+        let p = self.parameters;
+        let mut x = [0.0; N];
+        for i in 0..p {
+            let known: f64 = (0..i).map(|k| l[i][k] * x[k]).sum();
+            x[i] = (right[i] * scale[i] - known) / l[i][i];
+        }
+        for i in (0..p).rev() {
+            let known: f64 = (i + 1..p).map(|k| l[k][i] * x[k]).sum();
+            x[i] = (x[i] - known) / l[i][i];
+        }
+        for i in 0..p {
+            x[i] *= scale[i];
+        }
+        x
+    }
+}
+
+impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Adaptation<N> for Window<N, M> {
+    fn advance(&mut self, psi: &[f64; N], eps: f64, theta: &[f64; N], _variance: f64) -> Move<N> {
+        let p = self.parameters;
+        let y = eps + (0..p).map(|i| psi[i] * theta[i]).sum::<f64>();
+        let place = self.next * (N + 1);
+        let slot = &mut self.memory.as_mut()[place..place + N + 1];
+        if self.filled == self.length {
+            self.fading.add(-1.0, &slot[..p], slot[N]);
+        } else {
+            self.filled += 1;
+        }
+        slot[..N].copy_from_slice(psi);
+        slot[N] = y;
+        self.growing.add(1.0, &psi[..p], y);
+        self.next += 1;
+        if self.next == self.length {
+            self.next = 0;
+            self.fading = core::mem::replace(&mut self.growing, Sums::ZERO);
+        }
+        let stay = Move {
+            step: [0.0; N],
+            gain: [0.0; N],
+        };
+        for i in 0..p {
+            self.largest[i] = self.largest[i].max(self.growing.gram[i][i] + self.fading.gram[i][i]);
+        }
+        // With as many samples as parameters the residuals are zero and say nothing.
+        let factor = if self.filled > p { self.factor() } else { None };
+        let Some(factor) = factor else {
+            self.held += 1;
+            return stay;
+        };
+        let right: [f64; N] = core::array::from_fn(|i| self.growing.right[i] + self.fading.right[i]);
+        let best = self.solve(&factor, &right);
+        let gain = self.solve(&factor, psi);
+        if best.iter().all(|v| v.is_finite()) && gain.iter().all(|v| v.is_finite()) {
+            Move {
+                step: core::array::from_fn(|i| best[i] - theta[i]),
+                gain,
+            }
+        } else {
+            self.held += 1;
+            stay
+        }
+    }
+
+    fn spread(&self) -> Option<[[f64; N]; N]> {
+        let factor = self.factor()?;
+        let mut spread = [[0.0; N]; N];
+        for j in 0..self.parameters {
+            let mut unit = [0.0; N];
+            unit[j] = 1.0;
+            for (row, value) in spread.iter_mut().zip(self.solve(&factor, &unit)) {
+                row[j] = value;
+            }
+        }
+        Some(spread)
+    }
+
+    fn is_sound(&self) -> bool {
+        let sound = |s: &Sums<N>| s.gram.iter().flatten().chain(&s.right).all(|v| v.is_finite());
+        sound(&self.growing) && sound(&self.fading)
+    }
+}

@@ -1,0 +1,129 @@
+//! Data and the plain form of the covariance that tests share.
+#![allow(dead_code)]
+
+use hoid_core::adaptation::Forgetting;
+
+/// Pseudo-random numbers, uniform with unit variance.
+pub struct Noise(pub u64);
+
+impl Noise {
+    pub fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64 / (1u64 << 53) as f64 - 0.5) * 12f64.sqrt()
+    }
+}
+
+/// Input and output of `u = (B/F) x + (C/D) eps` with two poles of an operator at 100 Hz; x in the units of a tracking error.
+pub fn box_jenkins(samples: usize, seed: u64, level: f64) -> Vec<(f64, f64)> {
+    let mut noise = Noise(seed);
+    let (mut w, mut x1, mut n, mut eps1, mut slow) = ([0.0; 2], 0.0, 0.0, 0.0, 0.0);
+    (0..samples)
+        .map(|_| {
+            slow = 0.97 * slow + 0.3 * noise.next();
+            let x = slow;
+            let response = 0.0443 * x - 0.0432 * x1 + 1.9121 * w[0] - 0.9243 * w[1];
+            x1 = x;
+            w = [response, w[0]];
+            let eps = level * noise.next();
+            n = 0.85 * n + eps + 0.3 * eps1;
+            eps1 = eps;
+            (x, response + n)
+        })
+        .collect()
+}
+
+/// P by rows, updated as the text prints it, made symmetric at each sample: the oracle of the factors.
+pub struct Plain<const N: usize> {
+    pub p: [[f64; N]; N],
+    pub power: f64,
+    pub largest: f64,
+}
+
+impl<const N: usize> Plain<N> {
+    pub fn times(&self, psi: &[f64; N]) -> [f64; N] {
+        std::array::from_fn(|i| (0..N).map(|j| self.p[i][j] * psi[j]).sum())
+    }
+
+    pub fn measure(&mut self, psi: &[f64; N], variance: f64) -> [f64; N] {
+        let product = self.times(psi);
+        let denominator = variance + (0..N).map(|i| psi[i] * product[i]).sum::<f64>();
+        for i in 0..N {
+            for j in 0..N {
+                self.p[i][j] -= product[i] * product[j] / denominator;
+            }
+        }
+        product.map(|v| v / denominator)
+    }
+
+    pub fn scale(&mut self, s: &[f64; N]) {
+        for i in 0..N {
+            for j in 0..N {
+                self.p[i][j] *= s[i] * s[j];
+            }
+        }
+    }
+
+    /// One sample, without the guard against windup; `variance` is the innovation variance that variable forgetting expects.
+    pub fn advance(&mut self, forgetting: &Forgetting<N>, psi: &[f64; N], eps: f64, variance: f64) -> [f64; N] {
+        match forgetting {
+            Forgetting::Exponential { lambda } => {
+                self.scale(&lambda.map(|l| l.powf(-0.5)));
+                self.measure(psi, 1.0)
+            }
+            Forgetting::RandomWalk { drift } => {
+                for i in 0..N {
+                    self.p[i][i] += drift[i];
+                }
+                self.measure(psi, 1.0)
+            }
+            Forgetting::Variable { memory, smallest } => {
+                let along: f64 = self.times(psi).iter().zip(psi).map(|(a, b)| a * b).sum();
+                let gain = self.measure(psi, 1.0);
+                let expected = (1.0 + along) * memory * variance;
+                let lambda = if expected > 0.0 {
+                    (1.0 - eps * eps / expected).clamp(*smallest, 1.0)
+                } else {
+                    1.0
+                };
+                self.scale(&[lambda.powf(-0.5); N]);
+                gain
+            }
+            Forgetting::Directional { lambda } => {
+                let product = self.times(psi);
+                let along: f64 = product.iter().zip(psi).map(|(a, b)| a * b).sum();
+                if along > 0.0 {
+                    let beta = lambda - (1.0 - lambda) / along;
+                    for i in 0..N {
+                        for j in 0..N {
+                            self.p[i][j] -= product[i] * product[j] / (1.0 / beta + along);
+                        }
+                    }
+                }
+                product.map(|v| v / (1.0 + along))
+            }
+            Forgetting::Gradient { rate } => {
+                let power: f64 = psi.iter().map(|p| p * p).sum();
+                self.power += (power - self.power) * 0.01;
+                self.largest = self.largest.max(self.power);
+                psi.map(|p| rate * p / (0.01 * self.largest + power))
+            }
+        }
+    }
+}
+
+/// Largest difference of two matrices in units of the square roots of the diagonal.
+pub fn relative_difference<const N: usize>(a: &[[f64; N]; N], b: &[[f64; N]; N]) -> f64 {
+    let mut largest = 0.0_f64;
+    for i in 0..N {
+        for j in 0..N {
+            let scale = (a[i][i] * a[j][j]).sqrt();
+            if scale > 0.0 {
+                largest = largest.max((a[i][j] - b[i][j]).abs() / scale);
+            }
+        }
+    }
+    largest
+}

@@ -1,0 +1,581 @@
+//! Each recursion against its twin.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{Noise, Plain, box_jenkins, relative_difference};
+use hoid_core::{
+    adaptation::{Adaptation, Covariance, Forgetting},
+    error_bars::{ErrorBars, Level, Places, Sensitivities},
+    factored::Factored,
+    physical::{Physical, PhysicalModel},
+    predictor::{AnyShape, FixedShape, Predictor, Regressor, Shape},
+    recursion::Stable,
+    rls::Rls,
+    rpem::Rpem,
+    window::Window,
+};
+
+const LAMBDA: f64 = 1.0 - 1.0 / 256.0;
+
+fn diagonal<const N: usize>(value: f64) -> [[f64; N]; N] {
+    std::array::from_fn(|i| std::array::from_fn(|j| if i == j { value } else { 0.0 }))
+}
+
+fn covariance<const N: usize>(p0: f64, forgetting: Forgetting<N>) -> Covariance<N> {
+    Covariance::new(Factored::diagonal([p0; N]), forgetting, [f64::INFINITY; N])
+}
+
+fn bars<const N: usize, const K: usize>(p0: f64) -> ErrorBars<N, K> {
+    ErrorBars::new(&diagonal::<N>(p0), Level::new(0.0, 0.0, 1.0), 5.0)
+}
+
+fn ways<const N: usize>() -> Vec<Forgetting<N>> {
+    vec![
+        Forgetting::Exponential { lambda: [1.0; N] },
+        Forgetting::Exponential { lambda: [LAMBDA; N] },
+        Forgetting::Exponential {
+            lambda: std::array::from_fn(|i| if i % 2 == 0 { LAMBDA } else { 1.0 }),
+        },
+        Forgetting::RandomWalk {
+            drift: std::array::from_fn(|i| 1e-4 * i as f64),
+        },
+        Forgetting::Variable {
+            memory: 256.0,
+            smallest: 0.9,
+        },
+        Forgetting::Directional { lambda: LAMBDA },
+        Forgetting::Gradient { rate: 0.5 },
+    ]
+}
+
+fn start<const N: usize>(shape: &AnyShape) -> [f64; N] {
+    let mut theta = [0.0; N];
+    let mut at = 0;
+    for (n, values) in [
+        (shape.na, [-1.2, 0.4]),
+        (shape.nb, [0.05, -0.03]),
+        (shape.nc, [0.2, -0.1]),
+        (shape.nd, [-0.7, 0.1]),
+        (shape.nf, [-1.8, 0.82]),
+    ] {
+        theta[at..at + n].copy_from_slice(&values[..n]);
+        at += n;
+    }
+    theta
+}
+
+/// ARX, ARMAX, OE, ARARX, Box-Jenkins, the general form.
+fn shapes() -> [AnyShape; 6] {
+    let s = |na, nb, nc, nd, nf| AnyShape { na, nb, nc, nd, nf };
+    [
+        s(2, 2, 0, 0, 0),
+        s(2, 2, 1, 0, 0),
+        s(0, 2, 0, 0, 2),
+        s(1, 2, 0, 2, 0),
+        s(0, 2, 0, 1, 2),
+        s(1, 2, 2, 1, 2),
+    ]
+}
+
+#[test]
+fn factors_are_the_plain_covariance_for_every_way_of_forgetting() {
+    let data = box_jenkins(20_000, 1, 0.02);
+    let shape = shapes()[4];
+    for forgetting in ways::<5>() {
+        let mut recursion = Rpem::new(
+            shape,
+            Regressor::Gradient,
+            Stable::Predictor,
+            start(&shape),
+            covariance::<5>(1.0, forgetting.clone()),
+            bars::<5, 2>(1.0),
+        )
+        .unwrap();
+        let mut plain = Plain {
+            p: diagonal(1.0),
+            power: 0.0,
+            largest: 0.0,
+        };
+        let (mut worst, mut worst_gain) = (0.0_f64, 0.0_f64);
+        for &(x, u) in &data {
+            let before = *recursion.theta();
+            let variance = recursion.innovation_variance();
+            let step = recursion.step(x, u);
+            let limit = 5.0 * variance.sqrt();
+            let limited = if limit > 0.0 {
+                step.innovation.clamp(-limit, limit)
+            } else {
+                step.innovation
+            };
+            let gain = plain.advance(&forgetting, recursion.psi(), limited, variance);
+            if !step.shortened {
+                for i in 0..5 {
+                    // In units of the standard error, so that a parameter of any size counts the same.
+                    let difference = recursion.theta()[i] - before[i] - gain[i] * limited;
+                    worst_gain = worst_gain.max(difference.abs() / plain.p[i][i].sqrt());
+                }
+            }
+            worst = worst.max(relative_difference(&plain.p, &recursion.adaptation().matrix()));
+        }
+        // Rounding of the plain form: 20 000 samples of a matrix with a condition number of 1e6.
+        assert!(worst < 1e-9, "{forgetting:?}: {worst:e}");
+        assert!(worst_gain < 1e-9, "{forgetting:?}: {worst_gain:e}");
+    }
+}
+
+#[test]
+fn without_c_d_and_f_the_prediction_error_method_is_least_squares_to_the_last_bit() {
+    let data = box_jenkins(3000, 2, 0.02);
+    let shape = shapes()[0];
+    for forgetting in ways::<4>() {
+        let adaptation = covariance::<4>(0.1, forgetting);
+        let mut rls = Rls::new(shapes()[0], start(&shape), adaptation.clone(), bars::<4, 0>(0.1)).unwrap();
+        let mut rpem = Rpem::new(
+            shape,
+            Regressor::Gradient,
+            Stable::Predictor,
+            start(&shape),
+            adaptation,
+            bars::<4, 0>(0.1),
+        )
+        .unwrap();
+        for &(x, u) in &data {
+            assert_eq!(rls.step(x, u), rpem.step(x, u));
+            assert_eq!(rls.theta(), rpem.theta());
+        }
+        assert_eq!(rls.adaptation(), rpem.adaptation());
+        assert_eq!(rls.spread(), rpem.spread());
+        assert_eq!(rls.innovation_variance(), rpem.innovation_variance());
+    }
+    let window = || Window::<4, Vec<f64>>::new(vec![0.0; Window::<4, Vec<f64>>::numbers(100)], 4).unwrap();
+    let mut rls = Rls::new(shapes()[0], start(&shape), window(), bars::<4, 0>(0.1)).unwrap();
+    let mut rpem = Rpem::new(
+        shape,
+        Regressor::Gradient,
+        Stable::Predictor,
+        start(&shape),
+        window(),
+        bars::<4, 0>(0.1),
+    )
+    .unwrap();
+    for &(x, u) in &data {
+        rls.step(x, u);
+        rpem.step(x, u);
+        assert_eq!(rls.theta(), rpem.theta());
+    }
+}
+
+#[test]
+fn orders_in_the_type_are_the_same_recursion_to_the_last_bit() {
+    let data = box_jenkins(3000, 13, 0.02);
+    let shape = shapes()[4];
+    let adaptation = covariance::<5>(0.1, Forgetting::Exponential { lambda: [LAMBDA; 5] });
+    let fixed = FixedShape::<0, 2, 0, 1, 2>;
+    let mut any = Rpem::new(
+        shape,
+        Regressor::Gradient,
+        Stable::Predictor,
+        start(&shape),
+        adaptation.clone(),
+        bars::<5, 2>(0.1),
+    )
+    .unwrap();
+    let mut typed = Rpem::new(
+        fixed,
+        Regressor::Gradient,
+        Stable::Predictor,
+        start(&shape),
+        adaptation,
+        bars::<5, 2>(0.1),
+    )
+    .unwrap();
+    for &(x, u) in &data {
+        assert_eq!(any.step(x, u), typed.step(x, u));
+        assert_eq!(any.theta(), typed.theta());
+        assert_eq!(any.spread(), typed.spread());
+    }
+}
+
+#[test]
+fn a_forgetting_matrix_with_equal_entries_is_the_scalar_factor() {
+    let data = box_jenkins(8192, 3, 0.02);
+    let shape = shapes()[4];
+    let make = |lambda: [f64; 5]| {
+        let adaptation = covariance::<5>(0.1, Forgetting::Exponential { lambda });
+        Rpem::new(
+            shape,
+            Regressor::Gradient,
+            Stable::Predictor,
+            start(&shape),
+            adaptation,
+            bars::<5, 2>(0.1),
+        )
+        .unwrap()
+    };
+    let mut scalar = make([LAMBDA; 5]);
+    // One entry is another number in its last bit, so that the path of the matrix is taken.
+    let mut matrix = make([LAMBDA, LAMBDA, LAMBDA, LAMBDA, LAMBDA.next_up()]);
+    for &(x, u) in &data {
+        scalar.step(x, u);
+        matrix.step(x, u);
+    }
+    let difference = relative_difference(&scalar.adaptation().matrix(), &matrix.adaptation().matrix());
+    assert!(difference < 1e-9, "{difference:e}");
+    for i in 0..5 {
+        assert!((scalar.theta()[i] - matrix.theta()[i]).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_window_is_least_squares_over_its_samples() {
+    const W: usize = 300;
+    // Large samples first: what they leave behind by rounding must be gone after two windows.
+    let mut data = box_jenkins(2000, 4, 0.02);
+    for (x, u) in &mut data[..700] {
+        *x *= 1e6;
+        *u *= 1e6;
+    }
+    let memory = vec![0.0; Window::<4, Vec<f64>>::numbers(W)];
+    let window = Window::<4, Vec<f64>>::new(memory, 4).unwrap();
+    let unlimited = ErrorBars::new(&diagonal::<4>(1.0), Level::new(0.0, 0.0, 1.0), f64::INFINITY);
+    let mut rls = Rls::new(shapes()[0], [0.0; 4], window, unlimited).unwrap();
+    let regressor = |t: usize| {
+        let at = |lag: usize| if t >= lag { data[t - lag] } else { (0.0, 0.0) };
+        [-at(1).1, -at(2).1, at(0).0, at(1).0]
+    };
+    for t in 0..data.len() {
+        rls.step(data[t].0, data[t].1);
+        if t % 37 != 0 || t < 20 || (640..1210).contains(&t) {
+            continue;
+        }
+        // Householder-free twin: modified Gram-Schmidt on the window.
+        let rows: Vec<([f64; 4], f64)> = ((t + 1).saturating_sub(W)..=t)
+            .map(|s| (regressor(s), data[s].1))
+            .collect();
+        let theta = gram_schmidt(&rows);
+        for i in 0..4 {
+            let difference = (rls.theta()[i] - theta[i]).abs();
+            // Normal equations: the condition number of the regressors squared (1e4 squared) times rounding.
+            assert!(
+                difference < 1e-8 * (1.0 + theta[i].abs()),
+                "{t}: {} and {}",
+                rls.theta()[i],
+                theta[i]
+            );
+        }
+    }
+}
+
+/// Least squares by modified Gram-Schmidt.
+fn gram_schmidt(rows: &[([f64; 4], f64)]) -> [f64; 4] {
+    let mut columns: Vec<Vec<f64>> = (0..4).map(|j| rows.iter().map(|r| r.0[j]).collect()).collect();
+    let mut y: Vec<f64> = rows.iter().map(|r| r.1).collect();
+    let mut r = [[0.0; 4]; 4];
+    let mut q_y = [0.0; 4];
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+    for j in 0..4 {
+        r[j][j] = dot(&columns[j], &columns[j]).sqrt();
+        let q: Vec<f64> = columns[j].iter().map(|v| v / r[j][j]).collect();
+        for k in j + 1..4 {
+            r[j][k] = dot(&q, &columns[k]);
+            let rjk = r[j][k];
+            columns[k].iter_mut().zip(&q).for_each(|(v, q)| *v -= rjk * q);
+        }
+        q_y[j] = dot(&q, &y);
+        let share = q_y[j];
+        y.iter_mut().zip(&q).for_each(|(v, q)| *v -= share * q);
+    }
+    let mut theta = [0.0; 4];
+    for j in (0..4).rev() {
+        let known: f64 = (j + 1..4).map(|k| r[j][k] * theta[k]).sum();
+        theta[j] = (q_y[j] - known) / r[j][j];
+    }
+    theta
+}
+
+#[test]
+fn psi_is_the_negative_gradient_of_the_frozen_predictor() {
+    let data = box_jenkins(400, 5, 0.02);
+    const N: usize = 8;
+    for shape in shapes() {
+        let theta: [f64; N] = start(&shape);
+        let run = |theta: [f64; N]| {
+            let mut predictor = Predictor::<AnyShape, N, N>::new(shape, Regressor::Gradient).unwrap();
+            let mut psi = [0.0; N];
+            let mut all = Vec::new();
+            for &(x, u) in &data {
+                let eps = predictor.predict(&theta, x, u, &mut psi);
+                predictor.correct(&theta);
+                all.push((eps, psi));
+            }
+            all
+        };
+        let at = run(theta);
+        for i in 0..shape.parameters() {
+            let step = 1e-6;
+            let shifted = |sign: f64| {
+                let mut moved = theta;
+                moved[i] += sign * step;
+                run(moved)
+            };
+            let (up, down) = (shifted(1.0), shifted(-1.0));
+            let size = at.iter().map(|(_, psi)| psi[i].abs()).fold(0.0, f64::max);
+            for t in 0..data.len() {
+                let difference = -(up[t].0 - down[t].0) / (2.0 * step);
+                assert!(
+                    (at[t].1[i] - difference).abs() < 1e-6 * size,
+                    "{shape:?} parameter {i} at {t}: {} and {difference}",
+                    at[t].1[i]
+                );
+            }
+        }
+    }
+}
+
+/// A physical model of Box-Jenkins with one noise pole (and a zero), with or without the delay.
+fn physical<const N: usize, const L: usize>(
+    nc: usize,
+    tracked_from: Option<usize>,
+    eta: [f64; N],
+) -> Physical<AnyShape, N, 4, L, Covariance<N>> {
+    let mut bounds = [[f64::NEG_INFINITY, f64::INFINITY]; N];
+    bounds[2] = [0.5, 100.0];
+    bounds[3] = [0.02, 5.0];
+    if tracked_from.is_some() {
+        bounds[4] = [0.01, 0.1];
+    }
+    let model = PhysicalModel {
+        shape: AnyShape {
+            nb: if tracked_from.is_some() { 3 } else { 2 },
+            nc,
+            nd: 1,
+            nf: 2,
+            ..AnyShape::default()
+        },
+        tracked_from,
+        sample_time: 0.01,
+        bounds,
+        stable: Stable::Predictor,
+    };
+    Physical::new(
+        model,
+        eta,
+        covariance::<N>(1.0, Forgetting::Exponential { lambda: [1.0; N] }),
+        bars::<N, 4>(1.0),
+    )
+    .unwrap()
+}
+
+#[test]
+fn psi_of_the_physical_recursion_is_its_negative_gradient() {
+    fn check<const N: usize, const L: usize>(nc: usize, tracked: Option<usize>, eta: [f64; N], steps: [f64; N]) {
+        let data = box_jenkins(300, 6, 0.02);
+        let run = |eta: [f64; N]| {
+            let mut recursion = physical::<N, L>(nc, tracked, eta);
+            data.iter()
+                .map(|&(x, u)| (recursion.follow(x, u).innovation, *recursion.psi()))
+                .collect::<Vec<_>>()
+        };
+        let at = run(eta);
+        for i in 0..N {
+            let shifted = |sign: f64| {
+                let mut moved = eta;
+                moved[i] += sign * steps[i];
+                run(moved)
+            };
+            let (up, down) = (shifted(1.0), shifted(-1.0));
+            let size = at.iter().map(|(_, psi)| psi[i].abs()).fold(0.0, f64::max);
+            for t in 0..data.len() {
+                let difference = -(up[t].0 - down[t].0) / (2.0 * steps[i]);
+                assert!(
+                    (at[t].1[i] - difference).abs() < 1e-5 * size,
+                    "{i} at {t}: {} {difference}",
+                    at[t].1[i]
+                );
+            }
+        }
+    }
+    check::<6, 6>(
+        1,
+        None,
+        [0.09, 0.036, 11.25, 0.35, 0.2, -0.8],
+        [1e-6, 1e-6, 1e-4, 1e-5, 1e-6, 1e-6],
+    );
+    // A delay inside a sample, where the model is smooth.
+    check::<6, 16>(
+        0,
+        Some(2),
+        [0.09, 0.036, 11.25, 0.35, 0.0437, -0.8],
+        [1e-6, 1e-6, 1e-4, 1e-5, 1e-6, 1e-6],
+    );
+}
+
+#[test]
+fn a_delay_that_moves_over_a_sample_leaves_the_response_continuous() {
+    let data = box_jenkins(400, 7, 0.0);
+    let run = |tau: f64| {
+        let mut recursion = physical::<6, 16>(0, Some(2), [0.09, 0.036, 11.25, 0.35, tau, -0.8]);
+        data.iter()
+            .map(|&(x, u)| recursion.follow(x, u).innovation)
+            .collect::<Vec<f64>>()
+    };
+    let (before, after) = (run(0.05 - 1e-9), run(0.05 + 1e-9));
+    let largest = before
+        .iter()
+        .zip(&after)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max);
+    assert!(largest < 1e-6, "{largest:e}");
+}
+
+#[test]
+fn a_delay_is_found_from_four_samples_away() {
+    let mut truth = physical::<6, 16>(0, Some(1), [0.09, 0.036, 11.25, 0.35, 0.0637, 0.0]);
+    let mut noise = Noise(8);
+    let mut recursion = physical::<6, 16>(0, Some(1), [0.07, 0.05, 9.0, 0.5, 0.02, -0.8]);
+    let mut slow = 0.0;
+    for _ in 0..40_000 {
+        slow = 0.97 * slow + 0.3 * noise.next();
+        // The innovation for u = 0 is minus the response of the truth.
+        let response = -truth.follow(slow, 0.0).innovation;
+        recursion.step(slow, response + 0.01 * noise.next());
+    }
+    let tau = recursion.eta()[4];
+    assert!((tau - 0.0637).abs() < 0.002, "{:?}", recursion.eta());
+}
+
+#[test]
+fn without_forgetting_the_error_bars_are_the_covariance_and_with_it_their_known_limit() {
+    let data = box_jenkins(30_000, 9, 0.02);
+    let shape = shapes()[0];
+    let spread_of = |lambda: f64| {
+        let adaptation = covariance::<4>(1.0, Forgetting::Exponential { lambda: [lambda; 4] });
+        let mut rls = Rls::new(shapes()[0], start(&shape), adaptation, bars::<4, 0>(1.0)).unwrap();
+        data.iter().for_each(|&(x, u)| {
+            rls.step(x, u);
+        });
+        (rls.spread(), rls.adaptation().matrix())
+    };
+    let (spread, p) = spread_of(1.0);
+    assert!(relative_difference(&p, &spread) < 1e-9);
+    let lambda = 1.0 - 1.0 / 4096.0;
+    let (spread, p) = spread_of(lambda);
+    for i in 0..4 {
+        // The limit holds for a stationary regressor; over 4096 samples its power scatters.
+        let ratio = spread[i][i] / (p[i][i] / (1.0 + lambda));
+        assert!((ratio - 1.0).abs() < 0.1, "{i}: {ratio}");
+    }
+}
+
+#[test]
+fn the_guard_holds_every_variance_within_its_bound() {
+    const BOUND: f64 = 50.0;
+    let mut noise = Noise(10);
+    for forgetting in ways::<5>().into_iter().skip(1) {
+        // What is forgotten in one round of the guard: e^{1/4}, or five samples with the smallest variable factor.
+        let slack = if matches!(forgetting, Forgetting::Variable { .. }) {
+            0.9_f64.powi(-5)
+        } else {
+            1.3
+        };
+        let mut adaptation = Covariance::new(Factored::diagonal([1.0; 5]), forgetting.clone(), [BOUND; 5]);
+        let mut bars: ErrorBars<5, 0> = ErrorBars::new(&diagonal::<5>(1.0), Level::new(1.0, 100.0, 0.99), 5.0);
+        for t in 0..200_000 {
+            // One direction is excited, then none, then all.
+            let psi: [f64; 5] = match t % 60_000 {
+                0..20_000 => [1.0, -2.0, 0.5, 0.0, 1.0].map(|v| v * noise.next()),
+                20_000..50_000 => [0.0; 5],
+                _ => std::array::from_fn(|_| noise.next()),
+            };
+            let eps = noise.next();
+            let moved = adaptation.advance(&psi, eps, &[0.0; 5], bars.variance());
+            bars.take(&Places::NONE, &Sensitivities::of_gradient(&psi), &moved.gain, eps);
+            adaptation.drift_into(&mut bars);
+            let (p, spread) = (adaptation.matrix(), bars.spread());
+            for i in 0..5 {
+                assert!(
+                    p[i][i] <= slack * BOUND && p[i][i] >= 0.0,
+                    "{forgetting:?} at {t}: {}",
+                    p[i][i]
+                );
+                assert!(
+                    spread[i][i] <= slack * BOUND && spread[i][i] >= 0.0,
+                    "{forgetting:?} at {t}: {}",
+                    spread[i][i]
+                );
+            }
+            assert!(adaptation.is_sound() && bars.is_sound());
+        }
+    }
+}
+
+#[test]
+fn pseudo_linear_regression_finds_a_model_with_coloured_noise() {
+    let data = box_jenkins(60_000, 11, 0.05);
+    let shape = AnyShape {
+        na: 2,
+        nb: 2,
+        nc: 2,
+        ..AnyShape::default()
+    };
+    // ARMAX data: the noise shares the poles.
+    let mut noise = Noise(12);
+    let (mut past, mut eps1, mut x1) = ([0.0; 2], 0.0, 0.0);
+    let armax: Vec<(f64, f64)> = data
+        .iter()
+        .map(|&(x, _)| {
+            let eps = 0.1 * noise.next();
+            let u = 1.5 * past[0] - 0.7 * past[1] + 0.5 * x - 0.2 * x1 + eps + 0.4 * eps1;
+            (past, eps1, x1) = ([u, past[0]], eps, x);
+            (x, u)
+        })
+        .collect();
+    let adaptation = covariance::<6>(100.0, Forgetting::Exponential { lambda: [1.0; 6] });
+    let mut recursion = Rpem::new(
+        shape,
+        Regressor::PseudoLinear,
+        Stable::Predictor,
+        [0.0; 6],
+        adaptation,
+        bars::<6, 2>(100.0),
+    )
+    .unwrap();
+    for &(x, u) in &armax {
+        recursion.step(x, u);
+    }
+    for (found, truth) in recursion.theta().iter().zip([-1.5, 0.7, 0.5, -0.2, 0.4, 0.0]) {
+        assert!((found - truth).abs() < 0.03, "{:?}", recursion.theta());
+    }
+}
+
+#[test]
+fn shapes_that_do_not_fit_and_unstable_starts_are_refused() {
+    let make = |shape: AnyShape, theta: [f64; 4]| {
+        let adaptation = covariance::<4>(1.0, Forgetting::Exponential { lambda: [1.0; 4] });
+        Rpem::new(
+            shape,
+            Regressor::Gradient,
+            Stable::Predictor,
+            theta,
+            adaptation,
+            bars::<4, 4>(1.0),
+        )
+    };
+    assert!(make(shapes()[5], [0.0; 4]).is_none());
+    assert!(make(AnyShape::default(), [0.0; 4]).is_none());
+    let oe = shapes()[2];
+    assert!(make(oe, [0.1, 0.1, -2.1, 1.1]).is_none());
+    assert!(make(oe, [0.1, 0.1, -1.8, 0.9]).is_some());
+    assert!(Window::<4, Vec<f64>>::new(vec![0.0; 3], 4).is_none());
+    assert!(
+        Rls::new(
+            AnyShape::default(),
+            [0.0; 4],
+            covariance::<4>(1.0, Forgetting::Exponential { lambda: [1.0; 4] }),
+            bars::<4, 0>(1.0)
+        )
+        .is_none()
+    );
+}
