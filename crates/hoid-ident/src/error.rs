@@ -133,6 +133,12 @@ pub enum IdentError {
     /// Not one start led to a finite loss.
     #[error("no start of the search gave a finite loss; check the scale of the data and the orders")]
     NoFiniteLoss,
+    /// A search that found no minimum, where nothing but a minimum serves.
+    #[error("the search did not come to rest ({reason}); lower the orders, or take a longer window")]
+    NotSettled {
+        /// How it ended.
+        reason: String,
+    },
     /// An empty range of orders.
     #[error("the range {range} is empty; write LO..HI with LO <= HI")]
     EmptyRange {

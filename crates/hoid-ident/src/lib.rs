@@ -13,6 +13,7 @@
 //! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
 //! | [`instrumental`] | instrumental variables, in open and closed loop |
 //! | [`TimeVarying`] | gains that follow a sigmoid, with the time and the rate of the change |
+//! | [`tracking`] | recursive estimates: traces, streaming |
 //! | [`order_search`] | ranges of orders and delay, criteria, the chosen model |
 //! | [`validation`] | VAF, NRMSE, residual tests |
 //! | `derived` | poles, zeros, crossover and margins with standard errors |
@@ -42,6 +43,7 @@ mod stable_coordinates;
 mod starts;
 mod stationary_past;
 mod time_varying;
+pub mod tracking;
 pub mod validation;
 
 pub use constraint::{Constraint, Prior};

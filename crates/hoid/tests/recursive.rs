@@ -1,0 +1,420 @@
+//! Recursive identification against its batch twin, by Monte Carlo, and with samples that are not as they should be.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+use std::collections::BTreeMap;
+
+use hoid::{
+    ident::tracking::{ForgettingRule, Memory, Method, Stable, StartAt, StartCovariance, TrackOptions, Tracker, track},
+    model::{remnant_gain::NoiseDefinition, scenario::RemnantStrength},
+    prelude::*,
+};
+
+const NK: usize = 29;
+const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
+
+fn scenario(condition: Condition, remnant_order: usize, noise_level: f64) -> Scenario {
+    let mut scenario = Scenario::condition(condition);
+    scenario.remnant.order = remnant_order;
+    scenario.remnant.strength = RemnantStrength::Level {
+        level: noise_level,
+        definition: NoiseDefinition::Response,
+    };
+    scenario
+}
+
+fn run(simulator: &Simulator, replication: u64) -> Record {
+    let stream = Stream {
+        seed: 71,
+        cell: 1,
+        replication,
+    };
+    simulator.run(stream, false).unwrap()
+}
+
+fn options(method: Method) -> TrackOptions {
+    let structure = method.usual_structure();
+    TrackOptions {
+        start: StartAt::Span(Some((0.0, 30.72))),
+        ..TrackOptions::new(method, structure, structure.operator_orders(NK))
+    }
+}
+
+/// Results of the runs in their order, on all cores.
+fn on_all_cores<T: Send>(runs: u64, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
+    let cores = std::thread::available_parallelism().map_or(1, |n| n.get() as u64);
+    let mut results: Vec<(u64, T)> = std::thread::scope(|scope| {
+        let one = &one;
+        let threads: Vec<_> = (0..cores)
+            .map(|c| {
+                let mine = (c..runs).step_by(cores as usize);
+                scope.spawn(move || mine.map(|r| (r, one(r))).collect::<Vec<_>>())
+            })
+            .collect();
+        threads.into_iter().flat_map(|t| t.join().unwrap()).collect()
+    });
+    results.sort_by_key(|(r, _)| *r);
+    results.into_iter().map(|(_, t)| t).collect()
+}
+
+/// Standard deviations of the z-scores of the operator at the end of a run of C1, m = 1, P_n = .1.
+fn z_scores(options: &TrackOptions, runs: u64) -> [f64; 5] {
+    let simulator = Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap();
+    let squares = on_all_cores(runs, |r| {
+        let record = run(&simulator, r);
+        let trace = track(&record, options, record.len()).unwrap();
+        let operator = trace.operator(trace.len() - 1).unwrap();
+        std::array::from_fn::<f64, 5, _>(|i| {
+            let (_, _, estimate) = operator.rows()[i];
+            let truth = record.channel(OPERATOR[i]).unwrap()[0];
+            ((estimate.value - truth) / estimate.standard_error.unwrap()).powi(2)
+        })
+    });
+    let deviations = std::array::from_fn(|i| (squares.iter().map(|s| s[i]).sum::<f64>() / runs as f64).sqrt());
+    println!("{} {:?}: {deviations:.3?}", options.method.name(), options.memory);
+    deviations
+}
+
+fn with_memory(method: Method, memory: Memory) -> TrackOptions {
+    TrackOptions {
+        memory: Some(memory),
+        ..options(method)
+    }
+}
+
+#[test]
+fn error_bars_hold_with_an_infinite_memory() {
+    for method in [Method::Rpem, Method::Physical] {
+        // From half of the record, whose own errors are nearly normal. The standard error of a standard deviation from 6000 runs is
+        // 1/sqrt(12000) = .009.
+        let half = TrackOptions {
+            start: StartAt::Span(Some((0.0, 40.96))),
+            ..with_memory(method, Memory::Infinite)
+        };
+        for deviation in z_scores(&half, 6000) {
+            assert!((0.95..=1.05).contains(&deviation), "{method:?}: {deviation}");
+        }
+    }
+}
+
+#[test]
+fn error_bars_hold_with_a_memory_of_256_samples() {
+    for method in [Method::Rpem, Method::Physical] {
+        for deviation in z_scores(&with_memory(method, Memory::Samples(256.0)), 2000) {
+            assert!((0.9..=1.1).contains(&deviation), "{method:?}: {deviation}");
+        }
+    }
+}
+
+#[test]
+fn error_bars_hold_with_a_memory_for_each_parameter() {
+    for method in [Method::Rpem, Method::Physical] {
+        for deviation in z_scores(&options(method), 2000) {
+            assert!((0.9..=1.1).contains(&deviation), "{method:?}: {deviation}");
+        }
+    }
+}
+
+/// A long record of C1: many periods of the forcing function.
+fn long_record() -> Record {
+    let mut long = scenario(Condition::C1, 1, 0.1);
+    long.measurement_s = 10_000.0;
+    run(&Simulator::new(&long).unwrap(), 0)
+}
+
+#[test]
+fn with_an_infinite_memory_it_comes_to_the_batch_fit_from_several_starts() {
+    let record = long_record();
+    let structure = Structure::BoxJenkins;
+    let orders = structure.operator_orders(NK);
+    let batch = Estimator::new(structure, orders)
+        .fit(std::slice::from_ref(&record))
+        .unwrap();
+    let from = |start, covariance, update_from_s| TrackOptions {
+        start,
+        covariance,
+        update_from_s,
+        memory: Some(Memory::Infinite),
+        ..options(Method::Rpem)
+    };
+    let span = |to: f64| from(StartAt::Span(Some((0.0, to))), StartCovariance::OfFit, None);
+    // With filters that are warm. The memory grows at the start, so that the way from there is forgotten.
+    let theta = |theta: Vec<f64>| from(StartAt::Theta(theta), StartCovariance::Multiple(10.0), Some(4.0));
+    let starts = [
+        ("batch fit of 20 s", span(20.0)),
+        ("batch fit of 60 s", span(60.0)),
+        ("a slower operator", theta(vec![0.03, -0.029, -0.7, -1.93, 0.938])),
+        ("a faster operator", theta(vec![0.06, -0.058, -0.8, -1.88, 0.9])),
+        (
+            "a faster operator with less remnant",
+            theta(vec![0.06, -0.058, -0.7, -1.88, 0.9]),
+        ),
+        ("an operator nearby", theta(vec![0.05, -0.049, -0.8, -1.9, 0.913])),
+        (
+            "a slower operator with more remnant",
+            theta(vec![0.03, -0.029, -0.9, -1.93, 0.938]),
+        ),
+        (
+            "an operator with hardly a noise model",
+            theta(vec![0.04, -0.039, -0.5, -1.92, 0.93]),
+        ),
+    ];
+    for (name, options) in starts {
+        let trace = track(&record, &options, record.len()).unwrap();
+        for (found, (parameter, expected)) in trace.parameters(trace.len() - 1).iter().zip(batch.parameters()) {
+            let distance = (found.value - expected.value) / expected.standard_error.unwrap();
+            println!("{name}, {parameter}: {distance:.3} standard errors from the batch fit");
+            assert!(distance.abs() < 0.1, "{name}, {parameter}: {distance}");
+        }
+    }
+}
+
+#[test]
+fn least_squares_with_an_infinite_memory_is_the_batch_fit() {
+    let record = run(&Simulator::new(&scenario(Condition::C1, 3, 0.1)).unwrap(), 5);
+    let structure = Structure::Arx;
+    let batch = Estimator {
+        initial_state: Some(InitialState::Zero),
+        ..Estimator::new(structure, structure.operator_orders(NK))
+    };
+    let batch = batch.fit(std::slice::from_ref(&record)).unwrap();
+    let recursive = TrackOptions {
+        start: StartAt::Nothing,
+        covariance: StartCovariance::Multiple(1e12),
+        memory: Some(Memory::Infinite),
+        ..options(Method::Rls)
+    };
+    let trace = track(&record, &recursive, record.len()).unwrap();
+    for (found, (name, expected)) in trace.parameters(trace.len() - 1).iter().zip(batch.parameters()) {
+        assert!(
+            (found.value - expected.value).abs() < 1e-8 * expected.value.abs(),
+            "{name}"
+        );
+        // Variances of the innovation: mean of normalised squares here, sum over N - p there.
+        let ratio = found.standard_error.unwrap() / expected.standard_error.unwrap();
+        assert!((ratio - 1.0).abs() < 1e-3, "{name}: {ratio}");
+    }
+}
+
+/// Signals that alternate every few thousand samples: the loop, silence, constants, saturation.
+fn alternating(k: usize, record: &Record) -> (f64, f64) {
+    let (e, u) = (record.input()[k % record.len()], record.output()[k % record.len()]);
+    match (k / 20_000) % 5 {
+        0 | 2 => (e, u),
+        1 => (0.0, 0.0),
+        3 => (0.7, -0.3),
+        _ => (e.clamp(-0.01, 0.01).signum(), u.clamp(-0.02, 0.02)),
+    }
+}
+
+#[test]
+fn a_million_samples_in_all_weathers_leave_numbers_and_a_bounded_covariance() {
+    let record = run(&Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap(), 6);
+    let span = record.span(0.0, 30.72).unwrap();
+    let rules = [
+        ForgettingRule::Exponential,
+        ForgettingRule::Directional,
+        ForgettingRule::Variable,
+        ForgettingRule::Window,
+        ForgettingRule::Gradient(0.5),
+        ForgettingRule::RandomWalk(BTreeMap::from([("d1".to_owned(), 0.01)])),
+    ];
+    let mut all: Vec<TrackOptions> = rules
+        .into_iter()
+        .map(|forgetting| TrackOptions {
+            memory: (forgetting == ForgettingRule::Window).then_some(Memory::Samples(500.0)),
+            forgetting,
+            ..options(Method::Rpem)
+        })
+        .collect();
+    all.extend([
+        options(Method::Rls),
+        options(Method::Physical),
+        options(Method::Refined),
+    ]);
+    on_all_cores(all.len() as u64, |i| {
+        let options = &all[i as usize];
+        let mut tracker = Tracker::new(options, Some(&span), record.sample_time()).unwrap();
+        let name = format!("{} {:?}", options.method.name(), options.forgetting);
+        for k in 0..1_000_000 {
+            let (e, u) = alternating(k, &record);
+            tracker.step(e, u);
+            if k % 1000 == 0 {
+                assert!(
+                    tracker.theta().iter().all(|t| t.is_finite()),
+                    "{name} at {k}: {:?}",
+                    tracker.theta()
+                );
+                assert!(tracker.innovation_variance().is_finite(), "{name} at {k}");
+                let covariance = tracker.covariance().unwrap_or_default();
+                // A silent window has no covariance, and one with little excitation a large one. The others: a thousand times the standard
+                // error of the start, in squares.
+                let window = options.forgetting == ForgettingRule::Window;
+                let bound = if window { f64::MAX } else { 1e12 };
+                assert!(
+                    covariance.iter().all(|c| c.is_finite() && c.abs() < bound),
+                    "{name} at {k}: {covariance:?}"
+                );
+            }
+        }
+    });
+}
+
+#[test]
+fn after_silence_the_estimate_recovers_as_fast_as_at_the_start() {
+    let simulator = Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap();
+    let (first, second) = (run(&simulator, 7), run(&simulator, 8));
+    let span = first.span(0.0, 30.72).unwrap();
+    for method in [Method::Rls, Method::Rpem, Method::Physical] {
+        let mut fresh = Tracker::new(&options(method), Some(&span), first.sample_time()).unwrap();
+        let mut silent = Tracker::new(&options(method), Some(&span), first.sample_time()).unwrap();
+        for k in 0..first.len() {
+            silent.step(first.input()[k], first.output()[k]);
+        }
+        for _ in 0..100_000 {
+            silent.step(0.0, 0.0);
+        }
+        let truth: Vec<f64> = OPERATOR.iter().map(|name| second.channel(name).unwrap()[0]).collect();
+        let mut errors = [[0.0; 5]; 2];
+        for k in 0..second.len() {
+            for (tracker, errors) in [&mut fresh, &mut silent].into_iter().zip(&mut errors) {
+                tracker.step(second.input()[k], second.output()[k]);
+                if k >= 1000
+                    && let Ok(operator) = tracker.operator()
+                {
+                    for (i, (_, _, estimate)) in operator.rows()[..5].iter().enumerate() {
+                        errors[i] += ((estimate.value - truth[i]) / truth[i]).powi(2);
+                    }
+                }
+            }
+        }
+        // RMS over 8192 samples from 10 s on. A start from the batch fit has the smaller covariance: it is better by up to a half.
+        println!("{method:?} fresh and after silence: {errors:?}");
+        if method != Method::Rpem {
+            for (fresh, silent) in errors[0].iter().zip(errors[1]) {
+                let limit = (0.05_f64.powi(2) * second.len() as f64).max(1.5 * fresh);
+                assert!(silent < limit, "{method:?}: {errors:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn hostile_samples_are_skipped_counted_and_forgotten() {
+    let record = run(&Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap(), 9);
+    let span = record.span(0.0, 30.72).unwrap();
+    let hostile = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -1e7];
+    for method in Method::ALL {
+        let options = options(method);
+        let mut clean = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
+        let mut tracker = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
+        let mut faults = 0;
+        for k in 0..record.len() {
+            let (e, u) = (record.input()[k], record.output()[k]);
+            clean.step(e, u);
+            let outcome = match k % 97 {
+                3 => tracker.step(e, hostile[k % 5]),
+                50 => tracker.step(hostile[k % 5], u),
+                51 if k % 194 == 51 => tracker.step(hostile[k % 5], hostile[(k + 1) % 5]),
+                _ => tracker.step(e, u),
+            };
+            let bad = matches!(k % 97, 3 | 50) || k % 194 == 51;
+            faults += u64::from(bad);
+            assert_eq!((outcome.skipped, outcome.innovation.is_none()), (bad, bad));
+            assert!(tracker.theta().iter().all(|t| t.is_finite()));
+        }
+        assert_eq!(tracker.counts().skipped, faults);
+        assert_eq!(tracker.counts().samples, record.len() as u64);
+        // Two per cent of the samples are missing: the estimate is another one, but none that its error bars exclude.
+        for (a, b) in clean.parameters().iter().zip(tracker.parameters()) {
+            let distance = (a.value - b.value).abs() / a.standard_error.unwrap();
+            assert!(distance < 3.0, "{method:?}: {distance}");
+        }
+    }
+}
+
+#[test]
+fn no_default_diverges_in_the_reference_conditions() {
+    let methods = [Method::Rls, Method::Rpem, Method::Physical, Method::Refined];
+    for condition in Condition::ALL {
+        for m in [1, 4] {
+            let simulator = Simulator::new(&scenario(condition, m, 0.2)).unwrap();
+            on_all_cores(4, |r| {
+                let record = run(&simulator, r);
+                for method in methods {
+                    let trace = track(&record, &options(method), 1).unwrap();
+                    for k in 0..trace.len() {
+                        let sound = trace.theta(k).iter().all(|t| t.abs() < 10.0);
+                        assert!(sound, "{condition:?} m = {m} run {r} {method:?}: {:?}", trace.theta(k));
+                    }
+                }
+            });
+        }
+    }
+}
+
+#[test]
+fn the_texts_own_settings_are_there() {
+    let record = run(&Simulator::new(&scenario(Condition::C4, 1, 0.1)).unwrap(), 10);
+    let text = TrackOptions {
+        memory: Some(Memory::Samples(256.0)),
+        covariance: StartCovariance::Multiple(0.1),
+        stable: Stable::PredictorAndNoise,
+        limit: Some(f64::INFINITY),
+        ..options(Method::Rpem)
+    };
+    let trace = track(&record, &text, 1).unwrap();
+    assert_eq!((trace.len(), trace.updated_from_s()), (8192, 0.0));
+    let (before, after) = (trace.operator(4000).unwrap(), trace.operator(8191).unwrap());
+    // K_e_dot rises from .036 to .09 s.
+    assert!((before.k_e_dot.value - 0.036).abs() < 0.012, "{:?}", before.k_e_dot);
+    assert!((after.k_e_dot.value - 0.09).abs() < 0.02, "{:?}", after.k_e_dot);
+    // By default nothing counts twice: the estimate stays until the span of its fit is over.
+    let default = track(&record, &options(Method::Rpem), 1).unwrap();
+    assert_eq!(default.theta(0), default.theta(3071));
+    assert_ne!(default.theta(3071), default.theta(3200));
+}
+
+#[test]
+fn the_delay_is_tracked_with_its_error() {
+    let mut inside = scenario(Condition::C1, 1, 0.1);
+    inside.initial.operator.tau_e_s = 0.3;
+    inside.last.operator.tau_e_s = 0.3;
+    let record = run(&Simulator::new(&inside).unwrap(), 11);
+    let tracked = TrackOptions {
+        track_delay_s: Some((0.1, 0.5)),
+        ..options(Method::Physical)
+    };
+    let trace = track(&record, &tracked, 1).unwrap();
+    let tau = trace.operator(trace.len() - 1).unwrap().tau_e_s;
+    let error = tau.standard_error.unwrap();
+    assert!(error < 0.006 && (tau.value - 0.3).abs() < 4.0 * error, "{tau:?}");
+    assert_eq!(trace.parameter_names(), ["b0", "b1", "b2", "d1", "f1", "f2"]);
+}
+
+#[test]
+fn contradictions_are_refused() {
+    let record = run(&Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap(), 12);
+    let refused = |options: TrackOptions| track(&record, &options, 1).unwrap_err().to_string();
+    let bj = Structure::BoxJenkins;
+    let says = refused(TrackOptions::new(Method::Rls, bj, bj.operator_orders(NK)));
+    assert!(says.contains("arx or fir"), "{says}");
+    let says = refused(TrackOptions {
+        memory_of: BTreeMap::from([("q7".to_owned(), Memory::Infinite)]),
+        ..options(Method::Rpem)
+    });
+    assert!(says.contains("q7") && says.contains("f2"), "{says}");
+    let says = refused(with_memory(Method::Rpem, Memory::Samples(1.0)));
+    assert!(says.contains("more than one sample"), "{says}");
+    let says = refused(TrackOptions {
+        start: StartAt::Theta(vec![0.1, 0.1, -0.5, -2.5, 1.6]),
+        ..options(Method::Rpem)
+    });
+    assert!(says.contains("stable"), "{says}");
+    let says = refused(TrackOptions {
+        start: StartAt::Span(Some((90.0, 95.0))),
+        ..options(Method::Rpem)
+    });
+    assert!(says.contains("90"), "{says}");
+    assert!(track(&record, &options(Method::Rls), 0).is_err());
+}
