@@ -20,19 +20,9 @@ use crate::IoError;
 /// # Ok::<(), hoid_io::IoError>(())
 /// ```
 pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), IoError> {
-    let file = || path.display().to_string();
-    // A link stays a link: the file that it names is replaced.
-    let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    let known = fs::metadata(&place).ok();
-    let unwritable = |source| IoError::Unwritable { file: file(), source };
-    match &known {
-        Some(known) if known.is_dir() => Err(IoError::Directory { file: file() }),
-        Some(known) if !known.is_file() => {
-            let direct = fs::OpenOptions::new().write(true).open(&place).map_err(unwritable)?;
-            fill(direct, write).map_err(unwritable).map(drop)
-        }
-        _ => replace(&place, known.map(|k| k.permissions()), write).map_err(unwritable),
-    }
+    let mut file = WholeFile::create(path)?;
+    file.write(write)?;
+    file.finish()
 }
 
 /// Makes a directory for results, and those above it, where they are not there yet.
@@ -46,11 +36,76 @@ pub fn make_directory(path: &Path) -> Result<(), IoError> {
     })
 }
 
-fn replace(
-    place: &Path,
+/// A file on its way: dropped before it is finished, it leaves everything as it was.
+pub(crate) struct WholeFile {
+    buffer: BufWriter<fs::File>,
+    /// As the user named it.
+    name: String,
+    /// Where the file is to be, and what it is until then; none for a pipe or a device.
+    beside: Option<Beside>,
+}
+
+struct Beside {
+    part: tempfile::TempPath,
+    place: PathBuf,
     permissions: Option<fs::Permissions>,
-    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> io::Result<()> {
+}
+
+impl WholeFile {
+    pub(crate) fn create(path: &Path) -> Result<Self, IoError> {
+        let name = path.display().to_string();
+        // A link stays a link: the file that it names is replaced.
+        let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let known = fs::metadata(&place).ok();
+        let opened = match known {
+            Some(known) if known.is_dir() => return Err(IoError::Directory { file: name }),
+            Some(known) if !known.is_file() => {
+                let direct = fs::OpenOptions::new().write(true).open(&place);
+                direct.map(|file| (file, None))
+            }
+            known => part(place, known.map(|k| k.permissions())).map(|(file, beside)| (file, Some(beside))),
+        };
+        match opened {
+            Ok((file, beside)) => Ok(Self {
+                buffer: BufWriter::with_capacity(1 << 16, file),
+                name,
+                beside,
+            }),
+            Err(source) => Err(IoError::Unwritable { file: name, source }),
+        }
+    }
+
+    /// Writes through `write`, behind what is there.
+    pub(crate) fn write<T>(&mut self, write: impl FnOnce(&mut dyn Write) -> io::Result<T>) -> Result<T, IoError> {
+        write(&mut self.buffer).map_err(|source| IoError::Unwritable {
+            file: self.name.clone(),
+            source,
+        })
+    }
+
+    /// Puts the file in its place, when everything is on the disk.
+    pub(crate) fn finish(self) -> Result<(), IoError> {
+        let Self { buffer, name, beside } = self;
+        let finished = buffer
+            .into_inner()
+            .map_err(io::IntoInnerError::into_error)
+            .and_then(|file| beside.map_or(Ok(()), |beside| beside.persist(file)));
+        finished.map_err(|source| IoError::Unwritable { file: name, source })
+    }
+}
+
+impl Beside {
+    fn persist(self, file: fs::File) -> io::Result<()> {
+        file.sync_all()?;
+        let part = tempfile::NamedTempFile::from_parts(file, self.part);
+        if let Some(permissions) = self.permissions {
+            fs::set_permissions(part.path(), permissions)?;
+        }
+        part.persist(self.place).map(drop).map_err(|error| error.error)
+    }
+}
+
+fn part(place: PathBuf, permissions: Option<fs::Permissions>) -> io::Result<(fs::File, Beside)> {
     if place.file_name().is_none() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"));
     }
@@ -58,23 +113,15 @@ fn replace(
         Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
         _ => PathBuf::from("."),
     };
-    let beside = beside().tempfile_in(parent)?;
-    let beside = {
-        let (file, name) = beside.into_parts();
-        let file = fill(file, write)?;
-        file.sync_all()?;
-        tempfile::NamedTempFile::from_parts(file, name)
-    };
-    if let Some(permissions) = permissions {
-        fs::set_permissions(beside.path(), permissions)?;
-    }
-    beside.persist(place).map(drop).map_err(|error| error.error)
-}
-
-fn fill(file: fs::File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<fs::File> {
-    let mut buffer = BufWriter::with_capacity(1 << 16, file);
-    write(&mut buffer)?;
-    buffer.into_inner().map_err(io::IntoInnerError::into_error)
+    let (file, part) = beside().tempfile_in(parent)?.into_parts();
+    Ok((
+        file,
+        Beside {
+            part,
+            place,
+            permissions,
+        },
+    ))
 }
 
 /// A file of the usual permissions (those of the umask), where temporary files are otherwise closed to all others.

@@ -5,24 +5,33 @@ use std::io::{self, Write};
 
 use hoid_model::{Channel, Record};
 
-/// Writes the record with the digits that give the same numbers back.
-pub(crate) fn write(file: &mut dyn Write, record: &Record) -> io::Result<()> {
-    // The order that a person reads in: the target first, then what the operator sees and does.
+/// The channels in the order that a person reads in: the target first, then what the operator sees and does.
+pub(crate) fn channels(record: &Record) -> Vec<&Channel> {
     let (target, others): (Vec<&Channel>, Vec<&Channel>) = record.channels().partition(|c| c.name == "f_t");
-    let channels: Vec<&Channel> = target.into_iter().chain(others).collect();
+    target.into_iter().chain(others).collect()
+}
 
+/// What stands beside the columns: units and sample time.
+pub(crate) fn comments(record: &Record, channels: &[&Channel]) -> Vec<String> {
+    let mut comments = Vec::new();
     if channels.iter().any(|c| !c.unit.is_empty()) {
-        write!(file, "# units: t s")?;
         // A comma or a line break has no place in this line: such a unit is left out.
         let fits = |text: &str| !text.is_empty() && !text.contains([',', '\n', '\r']);
-        for channel in channels.iter().filter(|c| fits(&c.name) && fits(&c.unit)) {
-            write!(file, ", {} {}", channel.name, channel.unit)?;
-        }
-        writeln!(file)?;
+        let with_unit = channels.iter().filter(|c| fits(&c.name) && fits(&c.unit));
+        let units: String = with_unit.map(|c| format!(", {} {}", c.name, c.unit)).collect();
+        comments.push(format!("units: t s{units}"));
     }
-    writeln!(file, "# sample_time: {} s", record.sample_time().s())?;
+    comments.push(format!("sample_time: {} s", record.sample_time().s()));
+    comments
+}
 
-    let mut csv = csv::Writer::from_writer(file);
+/// Writes the record with the digits that give the same numbers back.
+pub(crate) fn write(file: &mut dyn Write, record: &Record, separator: u8) -> io::Result<()> {
+    let channels = channels(record);
+    for comment in comments(record, &channels) {
+        writeln!(file, "# {comment}")?;
+    }
+    let mut csv = csv::WriterBuilder::new().delimiter(separator).from_writer(file);
     csv.write_field("t")?;
     for channel in &channels {
         csv.write_field(&channel.name)?;

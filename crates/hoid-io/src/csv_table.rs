@@ -10,13 +10,8 @@
 //! Blank lines are skipped; a byte order mark and CRLF are tolerated. The stated sample time says without rounding what t
 //! can only say up to its last digit; it counts where t agrees with it.
 
-use std::borrow::Cow;
-
 use crate::IoError;
-use crate::table::{Cell, Column, Source, Table};
-
-/// A cell in a message is cut to this many characters.
-const SHOWN: usize = 40;
+use crate::table::{Cell, Column, Source, Table, asides, check_names, shown};
 
 /// The text of the file, asked again when an error needs a line or a cell.
 struct CsvSource<'a> {
@@ -115,7 +110,7 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
     if starts.is_empty() {
         return Err(IoError::NoRows { file: file.to_owned() });
     }
-    let sample_time_s = asides(text, &mut columns);
+    let sample_time_s = asides(comments(text), &mut columns);
     Ok(Table {
         columns,
         rows: starts.len(),
@@ -130,7 +125,7 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
     })
 }
 
-fn text<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, IoError> {
+pub(crate) fn text<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, IoError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let not_text = |at: usize, found: String| IoError::NotText {
         file: file.to_owned(),
@@ -146,7 +141,7 @@ fn text<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, IoError> {
     })
 }
 
-fn reader(bytes: &[u8], separator: u8) -> csv::Reader<&[u8]> {
+pub(crate) fn reader(bytes: &[u8], separator: u8) -> csv::Reader<&[u8]> {
     csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
@@ -155,12 +150,12 @@ fn reader(bytes: &[u8], separator: u8) -> csv::Reader<&[u8]> {
         .from_reader(bytes)
 }
 
-fn is_aside(line: &str) -> bool {
+pub(crate) fn is_aside(line: &str) -> bool {
     line.trim().is_empty() || line.starts_with('#')
 }
 
 /// The separator that the header holds most of; the comma when it holds none.
-fn separator(header: &str) -> u8 {
+pub(crate) fn separator(header: &str) -> u8 {
     let mut quoted = false;
     let mut counts = [(b',', 0), (b';', 0), (b'\t', 0)];
     for byte in header.bytes() {
@@ -192,18 +187,7 @@ fn header(
             found: shown(&names.join(", ")),
         });
     }
-    for (second, name) in names.iter().enumerate() {
-        if name.is_empty() {
-            notes.push(format!("column {} has no name and is left out", second + 1));
-        } else if let Some(first) = names[..second].iter().position(|other| other == name) {
-            return Err(IoError::DuplicateColumn {
-                file: file.to_owned(),
-                name: shown(name),
-                first: first + 1,
-                second: second + 1,
-            });
-        }
-    }
+    check_names(&names, file, notes)?;
     let column = |name| Column {
         name,
         ..Column::default()
@@ -211,35 +195,14 @@ fn header(
     Ok(names.into_iter().map(column).collect())
 }
 
-/// Takes the units from the comment lines above the header, and gives the sample time that they state.
-fn asides(text: &str, columns: &mut [Column]) -> Option<f64> {
-    let mut sample_time_s = None;
-    for line in text.lines().take_while(|line| is_aside(line)) {
-        let line = line.trim_start_matches('#').trim();
-        if let Some(units) = line.strip_prefix("units:") {
-            for part in units.split(',').map(str::trim) {
-                // A name or a unit may hold blanks: the column that fits with the longest name is the one.
-                let unit_of = |column: &Column| {
-                    let unit = part.strip_prefix(column.name.as_str())?;
-                    unit.starts_with(char::is_whitespace).then(|| unit.trim().to_owned())
-                };
-                let best = columns
-                    .iter_mut()
-                    .filter(|c| !c.name.is_empty() && unit_of(c).is_some());
-                if let Some(column) = best.max_by_key(|c| c.name.len()) {
-                    column.unit = unit_of(column).unwrap_or_default();
-                }
-            }
-        } else if let Some(stated) = line.strip_prefix("sample_time:") {
-            let value = stated.trim().trim_end_matches('s').trim().parse().ok();
-            sample_time_s = value.filter(|ts: &f64| ts.is_finite() && *ts > 0.0);
-        }
-    }
-    sample_time_s
+/// The comment lines above the header, without their marks.
+pub(crate) fn comments(text: &str) -> impl Iterator<Item = &str> {
+    let lines = text.lines().take_while(|line| is_aside(line));
+    lines.filter_map(|line| line.strip_prefix('#'))
 }
 
 /// The start of a row, behind the comments and blank lines that the reader skips with it.
-fn row_start(bytes: &[u8], mut at: usize) -> usize {
+pub(crate) fn row_start(bytes: &[u8], mut at: usize) -> usize {
     while let Some(byte) = bytes.get(at) {
         match byte {
             b'\n' | b'\r' => at += 1,
@@ -250,7 +213,7 @@ fn row_start(bytes: &[u8], mut at: usize) -> usize {
     at
 }
 
-fn place(bytes: &[u8], at: usize) -> String {
+pub(crate) fn place(bytes: &[u8], at: usize) -> String {
     let before = &bytes[..at.min(bytes.len())];
     let count = |end| before.iter().filter(|b| **b == end).count();
     // A file with bare carriage returns has lines as well.
@@ -260,15 +223,6 @@ fn place(bytes: &[u8], at: usize) -> String {
         count(b'\r')
     };
     format!("line {}", lines + 1)
-}
-
-fn shown(text: &str) -> String {
-    let text = text.trim();
-    let cut = match text.char_indices().nth(SHOWN) {
-        Some((at, _)) => Cow::Owned(format!("{}...", &text[..at])),
-        None => Cow::Borrowed(text),
-    };
-    cut.escape_debug().to_string()
 }
 
 #[cfg(test)]
@@ -343,11 +297,5 @@ mod tests {
         assert!(message(b"PK\x03\x04\x00").contains("line 1: a zero byte"));
         let long = format!("t,e\n0,1\n{},2,3\n", "x".repeat(1000));
         assert!(message(long.as_bytes()).contains("line 3: 3 values"));
-    }
-
-    #[test]
-    fn long_and_strange_cells_are_shown_short() {
-        let shown = shown(&"\u{1b}[31mé".repeat(1000));
-        assert!(shown.chars().count() < 200 && !shown.contains('\u{1b}'), "{shown}");
     }
 }

@@ -299,7 +299,7 @@ pub enum IoError {
         end_s: f64,
     },
     /// A channel that cannot be the column of a file.
-    #[error("{file}: the channel \"{name}\" cannot be written: {reason}; rename it")]
+    #[error("{file}: the column \"{name}\" cannot be written: {reason}; rename it")]
     ChannelName {
         /// The file.
         file: String,
@@ -307,6 +307,62 @@ pub enum IoError {
         name: String,
         /// Why.
         reason: &'static str,
+    },
+    /// Columns of different lengths.
+    #[error("{file}: the column \"{column}\" holds {found} values, expected {expected} as in the first column")]
+    ColumnLength {
+        /// The file.
+        file: String,
+        /// Name of the column.
+        column: String,
+        /// Its values.
+        found: usize,
+        /// Those of the first column.
+        expected: usize,
+    },
+    /// A table without columns.
+    #[error("{file}: the table has no columns, expected one at least")]
+    NoColumns {
+        /// The file.
+        file: String,
+    },
+    /// Rows for another table.
+    #[error("{file}: rows of {found} cannot follow {expected}; append tables of the same columns in the same order")]
+    ColumnsDiffer {
+        /// The file.
+        file: String,
+        /// The columns of the rows.
+        found: String,
+        /// The columns of the file.
+        expected: String,
+    },
+    /// Bytes that are no Parquet.
+    #[error(
+        "{file} is no Parquet file: {found}, expected PAR1 at both ends; copy or write it again if it was cut short, or name it .csv if it is text"
+    )]
+    NotParquet {
+        /// The file.
+        file: String,
+        /// What stands there instead.
+        found: String,
+    },
+    /// Bytes that contradict the format of the file.
+    #[error("{file} is damaged: {found}; copy or write it again")]
+    Damaged {
+        /// The file.
+        file: String,
+        /// What contradicts the format, and where.
+        found: String,
+    },
+    /// What the format allows and hoid does not read.
+    #[error("{file}: {found}, which hoid does not read; {remedy}")]
+    Unsupported {
+        /// The file.
+        file: String,
+        /// What was found, and where.
+        found: String,
+        /// What to do.
+        remedy: &'static str,
     },
     /// What was read does not make a record.
     #[error("{file}: {source}")]

@@ -2,40 +2,16 @@
 //!
 //! Reading takes the columns that are asked for, finds the sampling, checks every value in use and gives a [`Record`], or the
 //! error that names the place. Nothing is repaired unless [`Repair`] asks for it, and what was repaired is said in the notes.
-//! The format follows from the extension, here and nowhere else; a new format is a function from bytes to a table, one that
-//! writes, and a line in [`Format`].
+//! The format follows from the extension; a new format is a function from bytes to a table, one that writes, and a line in
+//! [`Format`].
 
-use std::fs;
 use std::io::Write;
 use std::path::Path;
 
 use hoid_model::Record;
 
-use crate::{ColumnExpression, IoError, assemble, csv_record, csv_table, write_atomically};
-
-/// The formats of a record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Format {
-    Csv,
-}
-
-impl Format {
-    const EXPECTED: &'static str = ".csv (also as .tsv or .txt)";
-
-    fn of(path: &Path) -> Result<Self, IoError> {
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        match extension.as_deref() {
-            Some("csv" | "tsv" | "txt") => Ok(Self::Csv),
-            other => Err(IoError::UnknownFormat {
-                file: path.display().to_string(),
-                found: other.map_or(String::from("there is no extension"), |e| {
-                    format!("the extension is .{e}")
-                }),
-                expected: Self::EXPECTED,
-            }),
-        }
-    }
-}
+use crate::format::{Format, bytes_of};
+use crate::{ColumnExpression, IoError, assemble, csv_record, csv_table, parquet_record, write_atomically};
 
 /// What may be mended in a damaged record. By default nothing is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -90,16 +66,10 @@ pub struct ReadRecord {
 /// [`IoError`], naming the place in the file.
 pub fn read_record(path: &Path, options: &ReadOptions) -> Result<ReadRecord, IoError> {
     let file = path.display().to_string();
-    if path.is_dir() {
-        return Err(IoError::Directory { file });
-    }
-    let format = Format::of(path)?;
-    let bytes = fs::read(path).map_err(|source| IoError::Unreadable {
-        file: file.clone(),
-        source,
-    })?;
+    let (format, bytes) = bytes_of(path)?;
     let table = match format {
-        Format::Csv => csv_table::parse(&bytes, &file)?,
+        Format::Csv { .. } => csv_table::parse(&bytes, &file)?,
+        Format::Parquet => parquet_record::parse(bytes, &file)?,
     };
     let label = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     assemble::record_of(table, options).map(|read| ReadRecord {
@@ -109,13 +79,33 @@ pub fn read_record(path: &Path, options: &ReadOptions) -> Result<ReadRecord, IoE
 }
 
 /// Writes a record: t, then `f_t` where there is one, input, output, and the other channels in their order, all with the digits
-/// that give the same numbers back. Units and sample time stand above as comments; the label is not written.
+/// that give the same numbers back. Units and sample time are kept beside them as comments; the label is not written.
 ///
 /// # Errors
 /// [`IoError::UnknownFormat`], [`IoError::ChannelName`] for a channel that could not be read back, and those of
 /// [`write_atomically`].
 pub fn write_record(path: &Path, record: &Record) -> Result<(), IoError> {
     let format = Format::of(path)?;
+    check_names(record, || path.display().to_string())?;
+    match format {
+        Format::Csv { separator } => write_atomically(path, |file| csv_record::write(file, record, separator)),
+        Format::Parquet => parquet_record::write(path, record),
+    }
+}
+
+/// Writes a record as CSV into something that is open already, such as standard output.
+///
+/// # Errors
+/// [`IoError::ChannelName`]; [`IoError::Unwritable`] for what `out` says. `name` stands for it in both.
+pub fn write_record_csv(out: &mut dyn Write, name: &str, record: &Record) -> Result<(), IoError> {
+    check_names(record, || name.to_owned())?;
+    csv_record::write(out, record, b',').map_err(|source| IoError::Unwritable {
+        file: name.to_owned(),
+        source,
+    })
+}
+
+fn check_names(record: &Record, file: impl Fn() -> String) -> Result<(), IoError> {
     for name in record.channels().map(|c| c.name.as_str()) {
         let reason = match name {
             "t" => "t is the time of the samples",
@@ -124,12 +114,10 @@ pub fn write_record(path: &Path, record: &Record) -> Result<(), IoError> {
             _ => continue,
         };
         return Err(IoError::ChannelName {
-            file: path.display().to_string(),
+            file: file(),
             name: name.to_owned(),
             reason,
         });
     }
-    match format {
-        Format::Csv => write_atomically(path, |file: &mut dyn Write| csv_record::write(file, record)),
-    }
+    Ok(())
 }

@@ -4,9 +4,13 @@
 //! value that is missing or no number is NaN here; the file is asked again what stood there only when an error has to say
 //! so, which keeps a million rows cheap.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::IoError;
+
+/// A cell in a message is cut to this many characters.
+const SHOWN: usize = 40;
 
 /// What stands in a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,6 +52,14 @@ pub(crate) struct Precision {
 }
 
 impl Precision {
+    /// That of binary numbers in single precision, seven digits.
+    pub(crate) fn single() -> Self {
+        Self {
+            decimals: Some(45),
+            significant: 7,
+        }
+    }
+
     /// Takes one more printed number into account.
     pub(crate) fn add(&mut self, text: &str) {
         let (mantissa, exponent) = match text.trim().split_once(['e', 'E']) {
@@ -165,6 +177,60 @@ impl Table<'_> {
     }
 }
 
+/// Checks that the names differ, and notes the columns without one.
+pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>) -> Result<(), IoError> {
+    for (second, name) in names.iter().enumerate() {
+        if name.is_empty() {
+            notes.push(format!("column {} has no name and is left out", second + 1));
+        } else if let Some(first) = names[..second].iter().position(|other| other == name) {
+            return Err(IoError::DuplicateColumn {
+                file: file.to_owned(),
+                name: shown(name),
+                first: first + 1,
+                second: second + 1,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Takes the units from the comments above a table, and gives the sample time that they state.
+pub(crate) fn asides<'a>(comments: impl Iterator<Item = &'a str>, columns: &mut [Column]) -> Option<f64> {
+    let mut sample_time_s = None;
+    for line in comments {
+        let line = line.trim_start_matches('#').trim();
+        if let Some(units) = line.strip_prefix("units:") {
+            for part in units.split(',').map(str::trim) {
+                // A name or a unit may hold blanks: the column that fits with the longest name is the one.
+                let unit_of = |column: &Column| {
+                    let unit = part.strip_prefix(column.name.as_str())?;
+                    unit.starts_with(char::is_whitespace).then(|| unit.trim().to_owned())
+                };
+                let best = columns
+                    .iter_mut()
+                    .filter(|c| !c.name.is_empty() && unit_of(c).is_some());
+                if let Some(column) = best.max_by_key(|c| c.name.len()) {
+                    column.unit = unit_of(column).unwrap_or_default();
+                }
+            }
+        } else if let Some(stated) = line.strip_prefix("sample_time:") {
+            let value = stated.trim().trim_end_matches('s').trim().parse().ok();
+            sample_time_s = value.filter(|ts: &f64| ts.is_finite() && *ts > 0.0);
+        }
+    }
+    sample_time_s
+}
+
+/// A cell or a name for a message: short, and without anything that a terminal obeys.
+pub(crate) fn shown(text: &str) -> String {
+    let text = text.trim();
+    let cut = match text.char_indices().nth(SHOWN) {
+        Some((at, _)) => Cow::Owned(format!("{}...", &text[..at])),
+        None => Cow::Borrowed(text),
+    };
+    cut.escape_debug().to_string()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -204,5 +270,11 @@ mod tests {
         assert_eq!(Precision::default().unit(3.0), 0.0);
         // Nothing that can stand in a file gives anything but a number of s.
         assert!(precision(&["1e-99999999999", ".", "-", "e"]).unit(1e300) >= 0.0);
+    }
+
+    #[test]
+    fn long_and_strange_cells_are_shown_short() {
+        let shown = shown(&"\u{1b}[31mé".repeat(1000));
+        assert!(shown.chars().count() < 200 && !shown.contains('\u{1b}'), "{shown}");
     }
 }

@@ -165,7 +165,7 @@ fn channels_that_could_not_be_read_back_are_not_written() {
 #[test]
 fn other_extensions_and_places() {
     let desk = Desk::new();
-    for name in ["run.parquet", "run", "run.csv.gz"] {
+    for name in ["run.xlsx", "run", "run.csv.gz"] {
         fs::write(desk.path(name), "t,e,u\n0,1,2\n").unwrap();
         let message = read_record(&desk.path(name), &defaults()).unwrap_err().to_string();
         assert!(
