@@ -10,6 +10,26 @@ pub enum ReportError {
     /// Nothing to report.
     #[error("the report has no model; expected at least one fitted model")]
     NoModels,
+    /// No recursive estimate to report.
+    #[error("the report has no trace; expected one to {most} recursive estimates")]
+    NoTraces {
+        /// Most traces of a page.
+        most: usize,
+    },
+    /// More recursive estimates than a figure can show over each other.
+    #[error("the report has {found} traces, expected at most {most}: write a second report for the others")]
+    TooManyTraces {
+        /// Number of traces given.
+        found: usize,
+        /// Most traces of a page.
+        most: usize,
+    },
+    /// A recursive estimate without a row.
+    #[error("the trace {name:?} has no row, expected one or more: track a record that has samples")]
+    EmptyTrace {
+        /// Name of the trace.
+        name: String,
+    },
     /// The page template could not be filled: a defect of this crate.
     #[error("the page template could not be filled: {reason}; please report this as a defect")]
     Template {

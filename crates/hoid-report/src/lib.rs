@@ -3,14 +3,18 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`Report`], [`ModelSection`] | one self-contained HTML page about one or several fitted models |
-//! | [`figures`] | the figures of that page, each as an SVG text of its own |
+//! | [`TrackReport`], [`TraceSection`], [`BatchLine`] | one such page about recursive estimates over a record |
+//! | [`figures`] | the figures of these pages, each as an SVG text of its own |
 //! | [`numbers`] | numbers with as many digits as their standard error allows |
 
 mod error;
 pub mod figures;
 pub mod numbers;
+mod page;
 mod report;
 mod tables;
+mod track;
 
 pub use error::ReportError;
 pub use report::{ModelSection, Report};
+pub use track::{BatchLine, TraceSection, TrackReport};

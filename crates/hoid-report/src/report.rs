@@ -5,18 +5,16 @@ use hoid_ident::{
     validation::{Correlation, Quality, Validation},
 };
 use hoid_model::{OperatorParameters, Record};
-use minijinja::{Environment, UndefinedBehavior, Value, context};
+use minijinja::{Value, context};
 
 use crate::{
     ReportError,
     figures::{self, BodeModel, TrueResponse},
-    tables,
+    page, tables,
 };
 
 /// Records of a model whose time response is drawn.
 const MOST_TIME_RESPONSES: usize = 4;
-
-const TEMPLATE: &str = include_str!("../templates/report.html");
 
 /// What the page is about.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,25 +64,15 @@ impl Report<'_> {
             .enumerate()
             .map(|(i, (model, validations))| section(i, model, validations))
             .collect();
-        let settings: Vec<Value> = self
-            .settings
-            .iter()
-            .map(|(label, text)| context! { label, text })
-            .collect();
         let values = context! {
             title => self.title.clone(),
-            settings,
+            settings => page::facts(&self.settings),
             notes => self.notes.clone(),
             comparison => tables::comparison(&self.models, &qualities),
             bode => Value::from_safe_string(self.bode()),
             models => sections,
         };
-        let defect = |e: minijinja::Error| ReportError::Template { reason: e.to_string() };
-        let mut environment = Environment::new();
-        environment.set_undefined_behavior(UndefinedBehavior::SemiStrict);
-        environment.add_template("report.html", TEMPLATE).map_err(defect)?;
-        let page = environment.get_template("report.html").map_err(defect)?;
-        page.render(values).map_err(defect)
+        page::render("report.html", values)
     }
 
     fn bode(&self) -> String {

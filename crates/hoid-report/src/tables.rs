@@ -19,12 +19,12 @@ const Z_95: f64 = 1.959_963_984_540_054;
 /// Longest table of candidates.
 const MOST_CANDIDATES: usize = 30;
 
-fn html(text: impl Into<String>) -> Value {
+pub fn html(text: impl Into<String>) -> Value {
     Value::from_safe_string(text.into())
 }
 
 /// Name and unit of an operator parameter for the page.
-fn symbol(name: &str) -> (Value, &'static str) {
+pub fn symbol(name: &str) -> (Value, &'static str) {
     let (symbol, unit) = match name {
         "K_e" => ("<i>K</i><sub>e</sub>", "deg/deg"),
         "T_L" => ("<i>T</i><sub>L</sub>", "s"),
@@ -51,7 +51,7 @@ fn true_value(name: &str, truth: &OperatorParameters) -> Option<f64> {
 
 const OPERATOR_NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
-fn cell(estimate: Estimate) -> Value {
+pub fn cell(estimate: Estimate) -> Value {
     let (value, error) = with_uncertainty(estimate.value, estimate.standard_error);
     Value::from(if error == DASH {
         value

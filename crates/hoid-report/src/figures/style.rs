@@ -11,15 +11,15 @@ use kuva::render::{
 /// Width of every figure in units of the SVG.
 pub const WIDTH: f64 = 420.0;
 /// Space for tick labels and the label of the ordinate, the same in all figures so that panels align.
-const LEFT: f64 = 68.0;
-const RIGHT: f64 = 14.0;
+pub const LEFT: f64 = 68.0;
+pub const RIGHT: f64 = 14.0;
 /// Space above the axes.
 pub const TOP: f64 = 10.0;
 /// Space below the axes for ticks and the label of the abscissa.
 pub const BOTTOM: f64 = 48.0;
 /// Space below the axes for ticks alone.
 pub const BOTTOM_WITHOUT_LABEL: f64 = 26.0;
-const TEXT: u32 = 13;
+pub const TEXT: u32 = 13;
 
 pub const BLACK: &str = "#000000";
 pub const GREY: &str = "#999999";
@@ -83,10 +83,14 @@ pub fn add_legend(scene: &mut Scene, entries: &[(&str, &str, bool)]) {
         // Sans-serif text is a little narrower than this on average; a long name gets a row of its own, and no more.
         let name = shortened(name, LONGEST);
         let width = SAMPLE + GAP + 0.58 * f64::from(TEXT) * name.chars().count() as f64 + 14.0;
-        if x > LEFT && x + width > WIDTH {
+        if x > LEFT && x + width > scene.width {
             (x, y) = (LEFT, y + ROW);
         }
-        let start = if x + width > WIDTH { (WIDTH - width).max(4.0) } else { x };
+        let start = if x + width > scene.width {
+            (scene.width - width).max(4.0)
+        } else {
+            x
+        };
         scene.add(Primitive::Line {
             x1: start,
             y1: y - 4.5,
@@ -161,6 +165,22 @@ pub fn stacked(panels: Vec<(Vec<Plot>, Layout, f64)>) -> Scene {
         plots.push(plot);
         layouts.push(layout);
     }
+    figure.with_plots(plots).with_layouts(layouts).render()
+}
+
+/// Panels by rows in columns and rows of these widths and heights; the last row may be short.
+pub fn in_grid(panels: Vec<(Vec<Plot>, Layout)>, widths: &[f64], heights: &[f64]) -> Scene {
+    let mut figure = Figure::new(heights.len(), widths.len())
+        .with_cell_size(WIDTH, WIDTH)
+        .with_spacing(0.0)
+        .with_padding(0.0);
+    for (row, height) in heights.iter().enumerate() {
+        figure = figure.with_row_height(row, *height);
+    }
+    for (column, width) in widths.iter().enumerate() {
+        figure = figure.with_col_width(column, *width);
+    }
+    let (plots, layouts) = panels.into_iter().unzip();
     figure.with_plots(plots).with_layouts(layouts).render()
 }
 

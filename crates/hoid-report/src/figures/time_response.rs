@@ -4,10 +4,10 @@ use hoid_ident::validation::Validation;
 use hoid_model::Record;
 use kuva::prelude::Plot;
 
-use super::style::{self, BLUE, GREY, VERMILLION};
-
-/// Columns of the figure that a line is reduced to: one for each unit between its axes.
-const COLUMNS: usize = 340;
+use super::{
+    series::thinned,
+    style::{self, BLUE, GREY, VERMILLION},
+};
 
 /// The close-up shows this part of a record, when that has samples enough to be worth it.
 const CLOSE_UP: usize = 8;
@@ -79,40 +79,4 @@ pub fn time_response(id: &str, record: &Record, validation: &Validation) -> Stri
 /// True when the record is long enough for a close-up of its middle.
 pub fn has_close_up(record: &Record) -> bool {
     record.len() / CLOSE_UP >= SMALLEST_CLOSE_UP
-}
-
-/// Indices of the smallest and the largest value of each column, in order; all indices of a short series.
-fn thinned(values: &[f64]) -> Vec<usize> {
-    if values.len() <= 2 * COLUMNS {
-        return (0..values.len()).collect();
-    }
-    let mut kept = Vec::with_capacity(2 * COLUMNS + 2);
-    kept.push(0);
-    for column in 0..COLUMNS {
-        let (from, to) = (column * values.len() / COLUMNS, (column + 1) * values.len() / COLUMNS);
-        let by_value = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
-        let lowest = (from..to).min_by(by_value).unwrap_or(from);
-        let highest = (from..to).max_by(by_value).unwrap_or(from);
-        kept.extend([lowest.min(highest), lowest.max(highest)]);
-    }
-    kept.push(values.len() - 1);
-    kept.dedup();
-    kept
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn thinning_keeps_order_ends_and_peaks() {
-        let mut values: Vec<f64> = (0..50_000).map(|k| (k as f64 * 0.01).sin()).collect();
-        values[12_345] = 9.0;
-        let kept = thinned(&values);
-        assert!(kept.len() <= 2 * COLUMNS + 2);
-        assert!(kept.windows(2).all(|w| w[0] < w[1]));
-        assert_eq!((kept[0], kept[kept.len() - 1]), (0, 49_999));
-        assert!(kept.contains(&12_345));
-        assert_eq!(thinned(&[1.0, 2.0]), [0, 1]);
-    }
 }

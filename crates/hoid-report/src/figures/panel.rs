@@ -1,0 +1,217 @@
+//! One quantity over time, and the range of its ordinate.
+//!
+//! An estimate that leaves its usual range for a moment (T_L where K_e nearly vanishes) must not flatten all the rest. The ordinate
+//! therefore covers the truth, the batch fits and the estimates between their 10 and 90 % quantiles, and beyond that the quantiles of
+//! 1 and 99 % and the middle of the bands, as far as one and a half such ranges to either side. Where a truth is known and at least one
+//! method is near it, one that is far off does not flatten the others either: the ordinate ends at most two spans from the truth, a span
+//! being the range of the truth or a quarter of its size, and methods and batch fits beyond do not count. What lies outside is cut off at
+//! the axes, and [`TracePanel::beyond`] counts it.
+
+use super::{
+    axes::one_two_five,
+    series::{quantile, quantile_of, sorted},
+    style,
+};
+
+/// How far beyond its middle part an ordinate may reach, in ranges of that part.
+const MORE: f64 = 1.5;
+
+/// How a curve is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CurveKind {
+    /// Estimate: a line in the colour of its method, with its band.
+    Estimate,
+    /// Truth: a thin black line.
+    Truth,
+    /// Batch fit over a span: dashed, in the colour of its method.
+    Batch,
+    /// A count that stays until the next row, in the colour of its method.
+    Steps,
+    /// Bound of what is expected: a thin black line, not in the legend.
+    Bound,
+}
+
+/// One curve of a panel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TraceCurve {
+    /// How it is drawn.
+    pub kind: CurveKind,
+    /// Number of its method, which gives the colour.
+    pub method: usize,
+    /// Times in s, ascending.
+    pub times_s: Vec<f64>,
+    /// One value for each time. What is not finite is a gap.
+    pub values: Vec<f64>,
+    /// Lower and upper edge of the band at each time; empty for none.
+    pub band: Vec<(f64, f64)>,
+}
+
+/// Range of the ordinate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Ordinate {
+    /// From quantiles, as the module says.
+    Robust,
+    /// This one.
+    Within(f64, f64),
+    /// Logarithmic, the quantiles of 1 and 99 %.
+    Logarithmic,
+}
+
+/// Rows of a method that lie beyond the axes of a panel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Beyond {
+    /// Number of the method.
+    pub method: usize,
+    /// Rows with an estimate outside.
+    pub outside: usize,
+    /// Rows with an estimate.
+    pub rows: usize,
+}
+
+/// One quantity over time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TracePanel {
+    /// Name: `K_e` and the other parameters of the operator, `b0` and other coefficients are written with subscripts, the rest as it is.
+    pub name: String,
+    /// Unit, empty for none.
+    pub unit: String,
+    /// The curves, drawn in this order above all bands.
+    pub curves: Vec<TraceCurve>,
+    /// Range of the ordinate.
+    pub ordinate: Ordinate,
+}
+
+impl TracePanel {
+    fn pooled(&self, pick: impl Fn(&TraceCurve) -> Vec<f64>) -> Vec<f64> {
+        self.curves.iter().flat_map(pick).collect()
+    }
+
+    /// Range of the ordinate.
+    pub fn range(&self) -> (f64, f64) {
+        match self.ordinate {
+            Ordinate::Robust => self.robust_range(),
+            Ordinate::Within(low, high) => style::padded_range([low, high]),
+            Ordinate::Logarithmic => {
+                let positive = sorted(self.pooled(|c| c.values.iter().copied().filter(|v| *v > 0.0).collect()));
+                match (quantile(&positive, 0.01), quantile(&positive, 0.99)) {
+                    (Some(low), Some(high)) => (one_two_five(low, false), one_two_five(high * 1.05, true)),
+                    _ => (0.1, 1.0),
+                }
+            }
+        }
+    }
+
+    fn robust_range(&self) -> (f64, f64) {
+        let limit = self.limit();
+        let within = |v: f64| limit.map_or(v, |(low, high)| v.clamp(low, high));
+        let near = |v: f64| within(v) == v;
+        let (mut core, mut wanted) = (Vec::new(), Vec::new());
+        for curve in &self.curves {
+            let values = sorted(curve.values.iter().copied());
+            if curve.kind != CurveKind::Estimate {
+                core.extend(values.into_iter().filter(|v| near(*v)));
+                continue;
+            }
+            if !quantile(&values, 0.5).is_some_and(near) {
+                continue;
+            }
+            core.extend([0.1, 0.9].iter().filter_map(|q| quantile(&values, *q)));
+            wanted.extend([0.01, 0.99].iter().filter_map(|q| quantile(&values, *q)));
+            wanted.extend(quantile(&sorted(curve.band.iter().map(|b| b.0)), 0.25));
+            wanted.extend(quantile(&sorted(curve.band.iter().map(|b| b.1)), 0.75));
+        }
+        let (low, high) = style::padded_range(core.into_iter().map(within));
+        let more = MORE * (high - low);
+        let reach = wanted.into_iter().map(|v| within(v).clamp(low - more, high + more));
+        let (low, high) = reach.fold((low, high), |(l, h), v| (l.min(v), h.max(v)));
+        style::padded_range([low, high])
+    }
+
+    /// Two spans to either side of the truth, when the middle of an estimate lies there.
+    fn limit(&self) -> Option<(f64, f64)> {
+        let of = |kind| self.curves.iter().filter(move |c| c.kind == kind);
+        let truth = sorted(of(CurveKind::Truth).flat_map(|c| c.values.iter().copied()));
+        let (least, most) = (*truth.first()?, *truth.last()?);
+        let span = (most - least).max(0.25 * least.abs().max(most.abs()));
+        let (low, high) = (least - 2.0 * span, most + 2.0 * span);
+        let near = |c: &TraceCurve| quantile_of(&c.values, 0.5).is_some_and(|m| (low..=high).contains(&m));
+        of(CurveKind::Estimate).any(near).then_some((low, high))
+    }
+
+    /// The methods with rows beyond the axes of the panel when it stands alone.
+    pub fn beyond(&self) -> Vec<Beyond> {
+        let (low, high) = self.range();
+        let estimates = self.curves.iter().filter(|c| c.kind == CurveKind::Estimate);
+        let count = |c: &TraceCurve| {
+            let finite = || c.values.iter().filter(|v| v.is_finite());
+            Beyond {
+                method: c.method,
+                outside: finite().filter(|v| !(low..=high).contains(*v)).count(),
+                rows: finite().count(),
+            }
+        };
+        estimates.map(count).filter(|b| b.outside > 0).collect()
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    pub fn curve(kind: CurveKind, values: Vec<f64>) -> TraceCurve {
+        TraceCurve {
+            kind,
+            method: 0,
+            times_s: (0..values.len()).map(|k| 0.01 * k as f64).collect(),
+            values,
+            band: Vec::new(),
+        }
+    }
+
+    pub fn panel(curves: Vec<TraceCurve>) -> TracePanel {
+        TracePanel {
+            name: "T_L".to_owned(),
+            unit: "s".to_owned(),
+            curves,
+            ordinate: Ordinate::Robust,
+        }
+    }
+
+    #[test]
+    fn excursions_do_not_widen_the_ordinate() {
+        let mut values: Vec<f64> = (0..1000).map(|k| 1.0 + 0.1 * (f64::from(k) * 0.1).sin()).collect();
+        let quiet = panel(vec![curve(CurveKind::Estimate, values.clone())]).range();
+        for k in 500..530 {
+            values[k] = -1e6;
+        }
+        let with = panel(vec![curve(CurveKind::Estimate, values.clone())]);
+        let (low, high) = with.range();
+        // At most one and a half ranges of the middle part below it, and 5 % of room.
+        assert!(low > 0.3 && high < quiet.1 + 0.1, "{low} {high}");
+        let expected = Beyond {
+            method: 0,
+            outside: 30,
+            rows: 1000,
+        };
+        assert_eq!(with.beyond(), [expected]);
+        // The whole truth is always in.
+        let truth = vec![1.0, 1.0, -0.5, 1.0];
+        let (low, _) = panel(vec![curve(CurveKind::Estimate, values), curve(CurveKind::Truth, truth)]).range();
+        assert!(low < -0.5);
+    }
+
+    #[test]
+    fn a_method_far_from_the_truth_does_not_flatten_the_others() {
+        let truth = || curve(CurveKind::Truth, vec![11.25; 100]);
+        let near = curve(
+            CurveKind::Estimate,
+            (0..100).map(|k| 11.0 + 0.005 * f64::from(k)).collect(),
+        );
+        let far = curve(CurveKind::Estimate, vec![60.0; 100]);
+        let (low, high) = panel(vec![near, far.clone(), truth()]).range();
+        assert!(low > 9.0 && high < 13.0, "{low} {high}");
+        // Alone, it is what the figure is about.
+        let (low, high) = panel(vec![far, truth()]).range();
+        assert!(low < 11.25 && high > 60.0);
+    }
+}

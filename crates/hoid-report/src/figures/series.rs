@@ -1,0 +1,180 @@
+//! Long series drawn with few points: no peak is lost, and no gap is bridged.
+
+use std::ops::Range;
+
+/// Columns of a figure that a line is reduced to: one for each unit between its axes.
+pub const COLUMNS: usize = 340;
+
+/// More runs than this are joined where the gap between them is narrower than a column.
+const MOST_RUNS: usize = 200;
+
+/// Indices of the smallest and the largest value of each column, in order; all indices of a short series.
+pub fn thinned(values: &[f64]) -> Vec<usize> {
+    thinned_run(values, 0..values.len())
+}
+
+/// As [`thinned`], for a part of a series; columns are those of the whole. Values that are not finite are passed over.
+pub fn thinned_run(values: &[f64], run: Range<usize>) -> Vec<usize> {
+    let finite = |k: &usize| values[*k].is_finite();
+    if values.len() <= 2 * COLUMNS {
+        return run.filter(finite).collect();
+    }
+    let mut kept = Vec::with_capacity(2 * COLUMNS + 2);
+    kept.extend(run.clone().find(finite));
+    for column in columns(values.len(), &run) {
+        let by_value = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
+        let lowest = column.clone().filter(finite).min_by(by_value);
+        let highest = column.filter(finite).max_by(by_value);
+        if let (Some(lowest), Some(highest)) = (lowest, highest) {
+            kept.extend([lowest.min(highest), lowest.max(highest)]);
+        }
+    }
+    kept.extend(run.rev().find(finite));
+    kept.dedup();
+    kept
+}
+
+/// Indices of a run with the smallest lower and the largest upper edge of a band around each: first, middle of each column, last.
+pub fn thinned_band(lower: &[f64], upper: &[f64], run: Range<usize>) -> Vec<(usize, f64, f64)> {
+    let point = |k: usize| (k, lower[k], upper[k]);
+    if lower.len() <= 2 * COLUMNS {
+        return run.map(point).collect();
+    }
+    let mut kept = vec![point(run.start)];
+    for column in columns(lower.len(), &run) {
+        let least = lower[column.clone()].iter().copied().fold(f64::INFINITY, f64::min);
+        let most = upper[column.clone()].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        kept.push(((column.start + column.end) / 2, least, most));
+    }
+    kept.push(point(run.end - 1));
+    kept.dedup_by_key(|k| k.0);
+    kept
+}
+
+/// The parts of a run that lie in each column of a series of `n`.
+fn columns(n: usize, run: &Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    let run = run.clone();
+    let (first, last) = (run.start * COLUMNS / n, run.end * COLUMNS / n);
+    (first..=last.min(COLUMNS - 1))
+        .map(move |c| {
+            let (from, to) = (c * n / COLUMNS, (c + 1) * n / COLUMNS);
+            from.max(run.start)..to.min(run.end)
+        })
+        .filter(|c| !c.is_empty())
+}
+
+/// Those that differ from a neighbour, and both ends: a straight level needs no more.
+pub fn without_level<T: PartialEq>(kept: &[usize], value: impl Fn(usize) -> T) -> Vec<usize> {
+    let level = |i: usize| {
+        let same = |a: usize| value(kept[a]) == value(kept[i]);
+        i > 0 && i + 1 < kept.len() && same(i - 1) && same(i + 1)
+    };
+    let needed = kept.iter().enumerate().filter(|(i, _)| !level(*i));
+    needed.map(|(_, &k)| k).collect()
+}
+
+/// Runs of indices that are all known. Of very many, those closer to each other than a column are one.
+pub fn runs(n: usize, known: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+    let mut found: Vec<Range<usize>> = Vec::new();
+    for k in (0..n).filter(|k| known(*k)) {
+        match found.last_mut() {
+            Some(run) if run.end == k => run.end = k + 1,
+            _ => found.push(k..k + 1),
+        }
+    }
+    if found.len() <= MOST_RUNS {
+        return found;
+    }
+    let mut joined: Vec<Range<usize>> = Vec::new();
+    for run in found {
+        match joined.last_mut() {
+            Some(before) if (run.start - before.end) * COLUMNS < n => before.end = run.end,
+            _ => joined.push(run),
+        }
+    }
+    joined
+}
+
+/// The value below which the share `q` of the sorted values lies, by linear interpolation.
+pub fn quantile(sorted: &[f64], q: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    let at = q.clamp(0.0, 1.0) * last as f64;
+    let below = at.floor() as usize;
+    let (low, high) = (sorted[below], sorted[(below + 1).min(last)]);
+    Some(low + (at - below as f64) * (high - low))
+}
+
+/// The value below which the share `q` of those that are finite lies.
+pub fn quantile_of(values: &[f64], q: f64) -> Option<f64> {
+    quantile(&sorted(values.iter().copied()), q)
+}
+
+/// The finite values in ascending order.
+pub fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut finite: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
+    finite.sort_by(f64::total_cmp);
+    finite
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinning_keeps_order_ends_and_peaks() {
+        let mut values: Vec<f64> = (0..50_000).map(|k| (k as f64 * 0.01).sin()).collect();
+        values[12_345] = 9.0;
+        let kept = thinned(&values);
+        assert!(kept.len() <= 2 * COLUMNS + 2);
+        assert!(kept.windows(2).all(|w| w[0] < w[1]));
+        assert_eq!((kept[0], kept[kept.len() - 1]), (0, 49_999));
+        assert!(kept.contains(&12_345));
+        assert_eq!(thinned(&[1.0, 2.0]), [0, 1]);
+    }
+
+    #[test]
+    fn a_run_stays_within_its_ends() {
+        let values: Vec<f64> = (0..10_000).map(|k| (k as f64 * 0.05).cos()).collect();
+        for run in [0..1, 17..19, 4_000..9_999, 9_999..10_000, 0..10_000] {
+            let kept = thinned_run(&values, run.clone());
+            assert_eq!((kept[0], kept[kept.len() - 1]), (run.start, run.end - 1));
+            assert!(kept.windows(2).all(|w| w[0] < w[1]), "{run:?}");
+        }
+    }
+
+    #[test]
+    fn bands_keep_their_widest_reach() {
+        let n = 20_000;
+        let mut upper = vec![1.0; n];
+        upper[777] = 5.0;
+        let lower: Vec<f64> = upper.iter().map(|u| -u).collect();
+        let kept = thinned_band(&lower, &upper, 100..15_000);
+        assert!(kept.windows(2).all(|w| w[0].0 < w[1].0));
+        assert_eq!((kept[0].0, kept[kept.len() - 1].0), (100, 14_999));
+        assert!(kept.iter().any(|k| (k.1, k.2) == (-5.0, 5.0)));
+        assert!(kept.len() <= COLUMNS + 2);
+    }
+
+    #[test]
+    fn runs_end_at_gaps() {
+        assert_eq!(runs(10, |k| k != 3 && k != 7), [0..3, 4..7, 8..10]);
+        assert_eq!(runs(0, |_| true), []);
+        assert_eq!(runs(5, |_| false), []);
+        // Every second one: gaps far narrower than a column.
+        assert_eq!(runs(100_000, |k| k % 2 == 0), vec![0..99_999]);
+        // The wide gap of the same series stays.
+        assert_eq!(
+            runs(100_000, |k| k % 2 == 0 && !(40_000..50_000).contains(&k)),
+            vec![0..39_999, 50_000..99_999]
+        );
+    }
+
+    #[test]
+    fn quantiles_interpolate() {
+        let values = sorted([3.0, f64::NAN, 1.0, 2.0, f64::INFINITY]);
+        assert_eq!(values, [1.0, 2.0, 3.0]);
+        assert_eq!(quantile(&values, 0.25), Some(1.5));
+        assert_eq!(quantile(&values, 1.0), Some(3.0));
+        assert_eq!(quantile(&[], 0.5), None);
+    }
+}

@@ -1,0 +1,67 @@
+//! Coefficients by name, across structures: the poles of the operator stand in A of an ARX model and in F of a Box-Jenkins model.
+
+use hoid_ident::{Fit, tracking::Trace};
+
+/// A coefficient such as b0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Coefficient {
+    /// Its polynomial.
+    pub letter: char,
+    /// Its index.
+    pub index: usize,
+}
+
+impl Coefficient {
+    /// From its name.
+    pub fn parse(name: &str) -> Option<Self> {
+        let mut letters = name.chars();
+        let letter = letters.next()?;
+        let index = letters.as_str().parse().ok()?;
+        Some(Self { letter, index })
+    }
+
+    /// The panel it belongs to: with `joined`, f1 is at home with a1.
+    pub fn home(self, joined: bool) -> Self {
+        match self.letter {
+            'f' if joined => Self { letter: 'a', ..self },
+            _ => self,
+        }
+    }
+
+    /// Name of its panel.
+    pub fn panel_name(self, joined: bool) -> String {
+        let index = self.index;
+        match self.letter {
+            'a' if joined => format!("a{index}, f{index}"),
+            letter => format!("{letter}{index}"),
+        }
+    }
+}
+
+/// Those of a trace, in the order of theta.
+pub fn of_trace(trace: &Trace) -> Vec<Coefficient> {
+    trace
+        .parameter_names()
+        .iter()
+        .filter_map(|n| Coefficient::parse(n))
+        .collect()
+}
+
+/// Those of a fit, in the order of theta; none for a grey box, whose parameters are no coefficients.
+pub fn of_fit(fit: &Fit) -> Vec<Coefficient> {
+    if fit.is_grey_box() {
+        return Vec::new();
+    }
+    fit.parameters()
+        .iter()
+        .filter_map(|(n, _)| Coefficient::parse(n))
+        .collect()
+}
+
+/// True when some traces have their poles in A and others in F: then a1 and f1 are the same.
+pub fn joined(traces: &[&Trace]) -> bool {
+    let orders = |t: &&&Trace| t.options().orders;
+    traces.iter().any(|t| orders(&t).na > 0 && orders(&t).nf == 0)
+        && traces.iter().any(|t| orders(&t).nf > 0 && orders(&t).na == 0)
+        && !traces.iter().any(|t| orders(&t).nf > 0 && orders(&t).na > 0)
+}

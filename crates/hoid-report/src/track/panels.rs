@@ -1,0 +1,292 @@
+//! The figures of the page from traces.
+
+use std::collections::BTreeMap;
+
+use hoid_ident::tracking::{Method, OPERATOR_COLUMNS, StartAt};
+use hoid_model::{NotConvertible, Record, uncertainty::Estimate, uncertainty::OperatorEstimate};
+
+use super::{
+    TraceSection,
+    coefficients::{Coefficient, joined, of_fit, of_trace},
+    truth,
+};
+use crate::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, quantile_of};
+
+/// Two-sided 95 % point of the normal distribution.
+const Z_95: f64 = 1.959_963_984_540_054;
+
+/// A trace with the operator of each row.
+pub struct Evaluated<'a> {
+    pub section: &'a TraceSection<'a>,
+    pub operators: Vec<Result<OperatorEstimate, NotConvertible>>,
+}
+
+impl<'a> Evaluated<'a> {
+    pub fn new(section: &'a TraceSection<'a>) -> Self {
+        let rows = 0..section.trace.len();
+        Self {
+            section,
+            operators: rows.map(|row| section.trace.operator(row)).collect(),
+        }
+    }
+}
+
+/// The estimate of an operator's parameter.
+pub fn of_name(operator: &OperatorEstimate, name: &str) -> Option<Estimate> {
+    operator.rows().into_iter().find(|r| r.0 == name).map(|r| r.2)
+}
+
+/// Names of the parameters that are shown; tau_e only where a method tracks it.
+pub fn operator_names(traces: &[Evaluated<'_>]) -> Vec<&'static str> {
+    let mut names = OPERATOR_COLUMNS.to_vec();
+    if traces.iter().any(|t| t.section.trace.options().track_delay_s.is_some()) {
+        names.push("tau_e");
+    }
+    names
+}
+
+pub fn unit(name: &str) -> &'static str {
+    match name {
+        "K_e" => "deg/deg",
+        "T_L" | "K_e_dot" | "tau_e" => "s",
+        "omega_nm" => "rad/s",
+        "zeta_nm" => "-",
+        _ => "",
+    }
+}
+
+/// Which number of an estimate is drawn.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Shown {
+    Value,
+    Error,
+}
+
+/// A curve of estimates with band, or of their standard errors.
+fn curve(method: usize, times_s: &[f64], estimates: &[Option<Estimate>], shown: Shown) -> TraceCurve {
+    let error = |e: &Option<Estimate>| e.and_then(|e| e.standard_error).unwrap_or(f64::NAN);
+    let value = |e: &Option<Estimate>| e.map_or(f64::NAN, |e| e.value);
+    let edges = |e: &Option<Estimate>| (value(e) - Z_95 * error(e), value(e) + Z_95 * error(e));
+    TraceCurve {
+        kind: CurveKind::Estimate,
+        method,
+        times_s: times_s.to_vec(),
+        values: estimates
+            .iter()
+            .map(|e| if shown == Shown::Value { value(e) } else { error(e) })
+            .collect(),
+        band: if shown == Shown::Value {
+            estimates.iter().map(edges).collect()
+        } else {
+            Vec::new()
+        },
+    }
+}
+
+fn batch_curve(method: usize, (from_s, to_s): (f64, f64), estimate: Estimate, shown: Shown) -> Option<TraceCurve> {
+    let level = match shown {
+        Shown::Value => estimate.value,
+        Shown::Error => estimate.standard_error?,
+    };
+    Some(TraceCurve {
+        kind: CurveKind::Batch,
+        method,
+        times_s: vec![from_s, to_s],
+        values: vec![level; 2],
+        band: Vec::new(),
+    })
+}
+
+fn truth_curve(record: &Record, values: Vec<f64>) -> TraceCurve {
+    TraceCurve {
+        kind: CurveKind::Truth,
+        method: 0,
+        times_s: record.times_s(),
+        values,
+        band: Vec::new(),
+    }
+}
+
+/// The panels with legend, shaded start spans and the times from which the estimates move.
+fn grid(traces: &[Evaluated<'_>], record: &Record, panels: Vec<TracePanel>) -> TraceGrid {
+    let mut shaded_s: Vec<(f64, f64)> = Vec::new();
+    let mut marks_s: Vec<f64> = Vec::new();
+    for trace in traces.iter().map(|t| t.section.trace) {
+        if let (StartAt::Span(span), true) = (&trace.options().start, trace.start().is_some()) {
+            let begin = record.time_s(0);
+            let third = begin + record.len() as f64 * record.sample_time().s() / 3.0;
+            let span = span.unwrap_or((begin, third));
+            if !shaded_s.contains(&span) {
+                shaded_s.push(span);
+            }
+        }
+        let from = trace.updated_from_s();
+        if from > record.time_s(0) && !marks_s.contains(&from) {
+            marks_s.push(from);
+        }
+    }
+    TraceGrid {
+        panels,
+        columns: 1,
+        methods: traces.iter().map(|t| t.section.name.clone()).collect(),
+        shaded_s,
+        marks_s,
+        ..TraceGrid::default()
+    }
+}
+
+/// The parameters of the operator, one panel each.
+pub fn operator_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
+    grid(traces, record, operator_panels(traces, record, Shown::Value))
+}
+
+fn operator_panels(traces: &[Evaluated<'_>], record: &Record, shown: Shown) -> Vec<TracePanel> {
+    let panel = |name: &'static str| {
+        let mut curves = Vec::new();
+        for (method, t) in traces.iter().enumerate() {
+            let estimate = |o: &Result<OperatorEstimate, _>| o.as_ref().ok().and_then(|o| of_name(o, name));
+            let estimates: Vec<Option<Estimate>> = t.operators.iter().map(estimate).collect();
+            curves.push(curve(method, t.section.trace.times_s(), &estimates, shown));
+        }
+        for (method, t) in traces.iter().enumerate() {
+            for line in &t.section.batch {
+                let estimate = line.fit.operator().ok().and_then(|o| of_name(&o, name));
+                curves.extend(estimate.and_then(|e| batch_curve(method, (line.from_s, line.to_s), e, shown)));
+            }
+        }
+        if let (Shown::Value, Some(values)) = (shown, record.channel(name)) {
+            curves.push(truth_curve(record, values.to_vec()));
+        }
+        TracePanel {
+            name: name.to_owned(),
+            unit: unit(name).to_owned(),
+            curves,
+            ordinate: ordinate(shown),
+        }
+    };
+    operator_names(traces).into_iter().map(panel).collect()
+}
+
+fn ordinate(shown: Shown) -> Ordinate {
+    match shown {
+        Shown::Value => Ordinate::Robust,
+        Shown::Error => Ordinate::Logarithmic,
+    }
+}
+
+/// The coefficients, one panel each; where some methods have the poles in A and others in F, they share a panel.
+pub fn coefficient_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
+    grid(traces, record, coefficient_panels(traces, record, Shown::Value))
+}
+
+/// Standard errors over time, of the operator's parameters when they are what all methods move, else of the coefficients.
+pub fn error_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
+    let panels = if of_operator(traces) {
+        operator_panels(traces, record, Shown::Error)
+    } else {
+        coefficient_panels(traces, record, Shown::Error)
+    };
+    grid(traces, record, panels)
+}
+
+/// True when all methods move the parameters of the operator.
+pub fn of_operator(traces: &[Evaluated<'_>]) -> bool {
+    traces
+        .iter()
+        .all(|t| t.section.trace.options().method == Method::Physical)
+}
+
+fn coefficient_panels(traces: &[Evaluated<'_>], record: &Record, shown: Shown) -> Vec<TracePanel> {
+    let all: Vec<_> = traces.iter().map(|t| t.section.trace).collect();
+    let joined = joined(&all);
+    let mut curves: BTreeMap<Coefficient, [Vec<TraceCurve>; 3]> = BTreeMap::new();
+    for (method, t) in traces.iter().enumerate() {
+        let trace = t.section.trace;
+        let rows: Vec<Vec<Estimate>> = (0..trace.len()).map(|row| trace.parameters(row)).collect();
+        for (i, coefficient) in of_trace(trace).into_iter().enumerate() {
+            let estimates: Vec<Option<Estimate>> = rows.iter().map(|r| r.get(i).copied()).collect();
+            let [estimated, ..] = curves.entry(coefficient.home(joined)).or_default();
+            estimated.push(curve(method, trace.times_s(), &estimates, shown));
+        }
+        for line in &t.section.batch {
+            for (coefficient, (_, estimate)) in of_fit(line.fit).into_iter().zip(line.fit.parameters()) {
+                // A coefficient that no trace has makes no panel.
+                if let Some([_, batch, _]) = curves.get_mut(&coefficient.home(joined)) {
+                    batch.extend(batch_curve(method, (line.from_s, line.to_s), estimate, shown));
+                }
+            }
+        }
+        if shown == Shown::Value {
+            for (coefficient, values) in truth::coefficients(record, trace) {
+                let [.., known] = curves.entry(coefficient.home(joined)).or_default();
+                let curve = truth_curve(record, values);
+                if known.is_empty() {
+                    known.push(curve);
+                }
+            }
+        }
+    }
+    let panel = |(coefficient, parts): (Coefficient, [Vec<TraceCurve>; 3])| TracePanel {
+        name: coefficient.panel_name(joined),
+        unit: String::new(),
+        curves: parts.into_iter().flatten().collect(),
+        ordinate: ordinate(shown),
+    };
+    curves.into_iter().map(panel).collect()
+}
+
+/// Innovations with twice their standard deviation to either side, one panel for each method.
+pub fn innovation_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
+    let sigmas = |t: &Evaluated<'_>| -> Vec<f64> {
+        let variances = t.section.trace.innovation_variance().iter();
+        variances.map(|v| if *v >= 0.0 { v.sqrt() } else { f64::NAN }).collect()
+    };
+    let panel = |(method, t): (usize, &Evaluated<'_>)| {
+        let trace = t.section.trace;
+        let sigma = sigmas(t);
+        let typical = quantile_of(&sigma, 0.9).unwrap_or(0.0);
+        let sizes: Vec<f64> = trace.innovation().iter().map(|e| e.abs()).collect();
+        let reach = (4.0 * typical).max(quantile_of(&sizes, 0.99).unwrap_or(0.0));
+        let line = |kind, values: Vec<f64>| TraceCurve {
+            kind,
+            method,
+            times_s: trace.times_s().to_vec(),
+            values,
+            band: Vec::new(),
+        };
+        TracePanel {
+            name: "\u{3b5}".to_owned(),
+            unit: record.output_channel().unit.clone(),
+            curves: vec![
+                line(CurveKind::Estimate, trace.innovation().to_vec()),
+                line(CurveKind::Bound, sigma.iter().map(|s| 2.0 * s).collect()),
+                line(CurveKind::Bound, sigma.iter().map(|s| -2.0 * s).collect()),
+            ],
+            ordinate: Ordinate::Within(-reach, reach),
+        }
+    };
+    let panels = traces.iter().enumerate().map(panel).collect();
+    grid(traces, record, panels)
+}
+
+/// Steps shortened so far; `None` when there are none.
+pub fn shortened_grid(traces: &[Evaluated<'_>], record: &Record) -> Option<TraceGrid> {
+    let most = traces.iter().map(|t| t.section.trace.counts().shortened).max()?;
+    if most == 0 {
+        return None;
+    }
+    let curve = |(method, t): (usize, &Evaluated<'_>)| TraceCurve {
+        kind: CurveKind::Steps,
+        method,
+        times_s: t.section.trace.times_s().to_vec(),
+        values: t.section.trace.steps_shortened().iter().map(|s| *s as f64).collect(),
+        band: Vec::new(),
+    };
+    let panel = TracePanel {
+        name: "steps".to_owned(),
+        unit: "-".to_owned(),
+        curves: traces.iter().enumerate().map(curve).collect(),
+        ordinate: Ordinate::Within(0.0, most as f64),
+    };
+    Some(grid(traces, record, vec![panel]))
+}

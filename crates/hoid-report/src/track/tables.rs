@@ -1,0 +1,299 @@
+//! The tables of a page of recursive estimates as values for the template.
+
+use std::mem::discriminant;
+
+use hoid_ident::tracking::{ForgettingRule, Memory, Method, StartAt, StartCovariance, TrackOptions};
+use hoid_model::{NotConvertible, Record, uncertainty::Estimate};
+use minijinja::{Value, context};
+
+use super::{
+    BatchLine,
+    coefficients::{Coefficient, of_fit, of_trace},
+    panels::{Evaluated, of_name, operator_names},
+    truth,
+};
+use crate::{
+    numbers::{DASH, fixed, plain},
+    tables::{cell, html, symbol},
+};
+
+/// Time from which errors count, s: the start of a recursion from nothing is left out.
+const ERRORS_FROM_S: f64 = 10.0;
+
+/// One row a method: what it is, how it forgets, where it started.
+pub fn methods(traces: &[Evaluated<'_>], record: &Record) -> Vec<Value> {
+    let row = |t: &Evaluated<'_>| {
+        let trace = t.section.trace;
+        let options = trace.options();
+        let model = match options.track_delay_s {
+            Some((from, to)) => format!(
+                "{}({}), tau_e tracked in {} to {} s",
+                options.structure,
+                options.orders,
+                plain(from),
+                plain(to)
+            ),
+            None => format!("{}({})", options.structure, options.orders),
+        };
+        let average = match trace.averaged() {
+            1 => DASH.to_owned(),
+            n => format!("{n} rows, behind by {} s", plain(trace.averaging_delay_s())),
+        };
+        context! {
+            name => t.section.name.clone(), method => options.method.name(), model, average,
+            forgetting => forgetting(options),
+            start => start(options),
+            moves_from => format!("{} s", plain(trace.updated_from_s().max(record.time_s(0)))),
+        }
+    };
+    traces.iter().map(row).collect()
+}
+
+fn forgetting(options: &TrackOptions) -> String {
+    match (&options.forgetting, options.method) {
+        (_, Method::Window) => format!(
+            "window of {}, a fit every {} samples",
+            length(options.window),
+            options.every
+        ),
+        (ForgettingRule::Exponential, _) => format!("exponential, memory {}", memories(options)),
+        (ForgettingRule::RandomWalk(drifts), _) => {
+            let drifts: Vec<String> = drifts.iter().map(|(name, d)| format!("{name} {}", plain(*d))).collect();
+            format!("random walk, drift in one second {}", drifts.join(", "))
+        }
+        (ForgettingRule::Window, _) => format!("rectangular window, memory {}", memories(options)),
+        (ForgettingRule::Variable, _) => format!("variable, memory {}", memories(options)),
+        (ForgettingRule::Directional, _) => format!("directional, memory {}", memories(options)),
+        (ForgettingRule::Gradient(rate), _) => format!("none: normalised gradient, rate {}", plain(*rate)),
+    }
+}
+
+fn length(memory: Memory) -> String {
+    match memory {
+        Memory::Samples(n) => format!("{} samples", plain(n)),
+        Memory::Seconds(t) => format!("{} s", plain(t)),
+        Memory::Infinite => "no end".to_owned(),
+    }
+}
+
+/// Each memory once, with the parameters that have it.
+fn memories(options: &TrackOptions) -> String {
+    let Ok(all) = options.memories() else {
+        return DASH.to_owned();
+    };
+    let mut groups: Vec<(Memory, Vec<String>)> = Vec::new();
+    for (name, memory) in options.parameter_names().into_iter().zip(all) {
+        match groups.iter_mut().find(|g| g.0 == memory) {
+            Some(group) => group.1.push(name),
+            None => groups.push((memory, vec![name])),
+        }
+    }
+    if let [(memory, _)] = groups.as_slice() {
+        return length(*memory);
+    }
+    let of = |(memory, names): &(Memory, Vec<String>)| format!("{} for {}", length(*memory), names.join(", "));
+    groups.iter().map(of).collect::<Vec<_>>().join("; ")
+}
+
+fn start(options: &TrackOptions) -> String {
+    let covariance = match options.covariance {
+        StartCovariance::OfFit => "its covariance".to_owned(),
+        StartCovariance::Multiple(p) => format!("P = {} I", plain(p)),
+    };
+    match &options.start {
+        StartAt::Span(Some((from, to))) => format!("batch fit of [{}, {}] s, {covariance}", plain(*from), plain(*to)),
+        StartAt::Span(None) => format!("batch fit of the first third, {covariance}"),
+        StartAt::Theta(_) => "from coefficients that were given".to_owned(),
+        StartAt::Nothing => "from nothing".to_owned(),
+    }
+}
+
+/// One row a method: how many samples were taken, left out, shortened, and which rows do not convert.
+pub fn counts(traces: &[Evaluated<'_>]) -> Vec<Value> {
+    let row = |t: &Evaluated<'_>| {
+        let trace = t.section.trace;
+        let counts = trace.counts();
+        let reasons: Vec<String> = reasons(t)
+            .into_iter()
+            .map(|r| format!("{} from {} s on: {}", r.rows, fixed(r.first_s, 2), r.text))
+            .collect();
+        let outside = outside(t);
+        context! {
+            name => t.section.name.clone(), rows => trace.len(), samples => counts.samples,
+            skipped => counts.skipped, shortened => counts.shortened,
+            outside => outside.map_or(DASH.to_owned(), |share| fixed(100.0 * share, 1)),
+            not_convertible => t.operators.iter().filter(|o| o.is_err()).count(),
+            reasons,
+        }
+    };
+    traces.iter().map(row).collect()
+}
+
+/// A reason why rows do not convert.
+struct Reason {
+    rows: usize,
+    first_s: f64,
+    text: String,
+}
+
+/// The reasons, the most frequent first. Those that differ in their numbers alone are one, told as it came first.
+fn reasons(trace: &Evaluated<'_>) -> Vec<Reason> {
+    let mut found: Vec<(&NotConvertible, Reason)> = Vec::new();
+    let rows = trace.section.trace.times_s().iter().zip(&trace.operators);
+    for (time_s, reason) in rows.filter_map(|(t, o)| Some((*t, o.as_ref().err()?))) {
+        match found.iter_mut().find(|f| discriminant(f.0) == discriminant(reason)) {
+            Some((_, known)) => known.rows += 1,
+            None => {
+                let text = reason.to_string();
+                found.push((
+                    reason,
+                    Reason {
+                        rows: 1,
+                        first_s: time_s,
+                        text,
+                    },
+                ));
+            }
+        }
+    }
+    let mut reasons: Vec<Reason> = found.into_iter().map(|f| f.1).collect();
+    // Stable: equals stay in the order of time.
+    reasons.sort_by_key(|r| std::cmp::Reverse(r.rows));
+    reasons
+}
+
+/// Share of innovations larger than twice their standard deviation, from the time on at which the estimate moves.
+fn outside(trace: &Evaluated<'_>) -> Option<f64> {
+    let trace = trace.section.trace;
+    let rows = trace
+        .times_s()
+        .iter()
+        .zip(trace.innovation())
+        .zip(trace.innovation_variance());
+    let moving: Vec<bool> = rows
+        .filter(|((t, e), v)| **t >= trace.updated_from_s() && e.is_finite() && **v > 0.0)
+        .map(|((_, e), v)| e * e > 4.0 * v)
+        .collect();
+    (!moving.is_empty()).then(|| moving.iter().filter(|m| **m).count() as f64 / moving.len() as f64)
+}
+
+/// One row a parameter of the operator, one column a method: root of the mean squared relative error in %. `None` without a truth.
+pub fn errors(traces: &[Evaluated<'_>], record: &Record) -> Option<Value> {
+    let last_s = record.time_s(record.len() - 1);
+    let from_s = if last_s > ERRORS_FROM_S {
+        ERRORS_FROM_S
+    } else {
+        record.time_s(0)
+    };
+    let rows: Vec<Value> = operator_names(traces)
+        .into_iter()
+        .filter(|name| record.channel(name).is_some())
+        .map(|name| {
+            let (label, _) = symbol(name);
+            let cells: Vec<String> = traces
+                .iter()
+                .map(|t| relative_error(t, record, name, from_s).map_or(DASH.to_owned(), percent))
+                .collect();
+            context! { label, cells }
+        })
+        .collect();
+    let left_out: Vec<String> = traces
+        .iter()
+        .filter_map(|t| {
+            let times = t.section.trace.times_s().iter().zip(&t.operators);
+            let rows: Vec<bool> = times
+                .filter(|(time, _)| **time >= from_s)
+                .map(|(_, o)| o.is_err())
+                .collect();
+            let missing = rows.iter().filter(|r| **r).count();
+            (missing > 0).then(|| format!("{}: {missing} of {}", t.section.name, rows.len()))
+        })
+        .collect();
+    (!rows.is_empty()).then(|| context! { rows, from_s => plain(from_s), left_out => left_out.join("; ") })
+}
+
+fn relative_error(trace: &Evaluated<'_>, record: &Record, name: &str, from_s: f64) -> Option<f64> {
+    let times = trace.section.trace.times_s().iter().zip(&trace.operators);
+    let squares: Vec<f64> = times
+        .filter(|(t, _)| **t >= from_s)
+        .filter_map(|(t, o)| {
+            let estimate = of_name(o.as_ref().ok()?, name)?;
+            let relative = estimate.value / truth::parameter(record, name, *t)? - 1.0;
+            relative.is_finite().then_some(relative * relative)
+        })
+        .collect();
+    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+}
+
+fn percent(share: f64) -> String {
+    let value = 100.0 * share;
+    match value {
+        v if v < 1e4 => fixed(v, if v < 100.0 { 1 } else { 0 }),
+        _ => format!("{value:.1e}"),
+    }
+}
+
+/// The batch fits of one method: at the end of each span the recursive estimate, the fit and the truth.
+pub fn batch(trace: &Evaluated<'_>, record: &Record) -> Vec<Value> {
+    trace
+        .section
+        .batch
+        .iter()
+        .map(|line| span(trace, record, line))
+        .collect()
+}
+
+fn span(trace: &Evaluated<'_>, record: &Record, line: &BatchLine<'_>) -> Value {
+    let times = trace.section.trace.times_s();
+    // The span ends before its last time, up to rounding.
+    let end = line.to_s - 0.5 * record.sample_time().s();
+    let span = format!("[{}, {}] s", plain(line.from_s), plain(line.to_s));
+    let Some(row) = times.partition_point(|t| *t < end).checked_sub(1) else {
+        return context! { span, reason => "the trace begins later" };
+    };
+    let at_s = times[row];
+    let (now, fit) = (&trace.operators[row], line.fit.operator());
+    let mut rows = Vec::new();
+    for name in operator_names(std::slice::from_ref(trace)) {
+        let (label, unit) = symbol(name);
+        let of = |o: Option<Estimate>| o.map_or(Value::from(DASH), cell);
+        rows.push(context! {
+            label, unit,
+            recursive => of(now.as_ref().ok().and_then(|o| of_name(o, name))),
+            batch => of(fit.as_ref().ok().and_then(|o| of_name(o, name))),
+            truth => truth::parameter(record, name, at_s).map(plain),
+        });
+    }
+    let fitted: Vec<(Coefficient, Estimate)> = of_fit(line.fit)
+        .into_iter()
+        .zip(line.fit.parameters().into_iter().map(|p| p.1))
+        .collect();
+    let known = truth::coefficients(record, trace.section.trace);
+    let estimates = trace.section.trace.parameters(row);
+    for (coefficient, estimate) in of_trace(trace.section.trace).into_iter().zip(estimates) {
+        let batch = fitted.iter().find(|f| f.0 == coefficient).map(|f| f.1);
+        let values = known.iter().find(|k| k.0 == coefficient).map(|k| &k.1);
+        let truth = values.zip(truth::sample(record, at_s)).map(|(v, k)| plain(v[k]));
+        rows.push(context! {
+            label => symbol_of(&coefficient.panel_name(false)), unit => "",
+            recursive => cell(estimate), batch => batch.map_or(Value::from(DASH), cell), truth,
+        });
+    }
+    let mut remarks = Vec::new();
+    if let Err(reason) = now {
+        remarks.push(format!("recursive estimate not convertible: {reason}"));
+    }
+    if let Err(reason) = fit {
+        remarks.push(format!("batch fit not convertible: {reason}"));
+    }
+    context! { span, at => format!("{} s", fixed(at_s, 2)), rows, remarks, has_truth => record.channel("K_e").is_some() }
+}
+
+/// Name of a parameter, a coefficient, or several of them, for the page.
+pub fn symbol_of(name: &str) -> Value {
+    let one = |name: &str| match Coefficient::parse(name) {
+        Some(c) => format!("<i>{}</i><sub>{}</sub>", c.letter, c.index),
+        None => symbol(name).0.to_string(),
+    };
+    html(name.split(", ").map(one).collect::<Vec<_>>().join(", "))
+}

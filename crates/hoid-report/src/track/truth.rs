@@ -1,0 +1,68 @@
+//! What the recursion should have found, where the record says it: the columns of a simulation.
+
+use hoid_ident::tracking::Trace;
+use hoid_model::{OperatorParameters, Record};
+
+use super::coefficients::{Coefficient, of_trace};
+
+/// The parameters of the operator at a sample, when the record has them all.
+fn operator(record: &Record, k: usize) -> Option<OperatorParameters> {
+    let at = |name| record.channel(name).map(|values| values[k]);
+    Some(OperatorParameters {
+        k_e: at("K_e")?,
+        t_l_s: at("T_L")?,
+        omega_nm_rad_s: at("omega_nm")?,
+        zeta_nm: at("zeta_nm")?,
+        tau_e_s: at("tau_e")?,
+    })
+}
+
+/// Number of the sample at a time.
+pub fn sample(record: &Record, time_s: f64) -> Option<usize> {
+    let k = ((time_s - record.time_s(0)) / record.sample_time().s()).round();
+    (k >= 0.0 && k < record.len() as f64).then_some(k as usize)
+}
+
+/// A true parameter of the operator at a time.
+pub fn parameter(record: &Record, name: &str, time_s: f64) -> Option<f64> {
+    let values = record.channel(name)?;
+    sample(record, time_s).map(|k| values[k])
+}
+
+/// The true coefficients of B and of the poles at every sample, by the exact hold with the parameters of that sample. Empty without a
+/// truth, and for a model that is not that of the operator; B alone is left out when the delay is another one.
+pub fn coefficients(record: &Record, trace: &Trace) -> Vec<(Coefficient, Vec<f64>)> {
+    let orders = trace.options().orders;
+    let is_operator = orders.nb == 2 && (orders.na, orders.nf) != (2, 2) && (orders.na == 2 || orders.nf == 2);
+    if !is_operator || operator(record, 0).is_none() {
+        return Vec::new();
+    }
+    let mut before = None;
+    let mut held = [f64::NAN; 4];
+    let rows: Vec<[f64; 4]> = (0..record.len())
+        .map(|k| {
+            let now = operator(record, k);
+            if now != before {
+                before = now;
+                held = match now.map(|o| o.discretise(record.sample_time())) {
+                    Some(Ok(d)) if d.nk == orders.nk && trace.options().track_delay_s.is_none() => {
+                        [d.held.b0, d.held.b1, d.held.f1, d.held.f2]
+                    }
+                    Some(Ok(d)) => [f64::NAN, f64::NAN, d.held.f1, d.held.f2],
+                    _ => [f64::NAN; 4],
+                };
+            }
+            held
+        })
+        .collect();
+    let pole = if orders.na == 2 { 'a' } else { 'f' };
+    let wanted = [('b', 0), ('b', 1), (pole, 1), (pole, 2)];
+    of_trace(trace)
+        .into_iter()
+        .filter_map(|c| {
+            let at = wanted.iter().position(|w| *w == (c.letter, c.index))?;
+            let values: Vec<f64> = rows.iter().map(|r| r[at]).collect();
+            values.iter().any(|v| v.is_finite()).then_some((c, values))
+        })
+        .collect()
+}

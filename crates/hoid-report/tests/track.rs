@@ -1,0 +1,302 @@
+//! The page of recursive estimates, from simulated runs.
+#![allow(clippy::unwrap_used)]
+
+use hoid_ident::{
+    Estimator, Fit,
+    tracking::{Method, StartAt, StartCovariance, Trace, TrackOptions, track},
+};
+use hoid_model::{
+    Channel, Orders, Record, Structure,
+    scenario::{Condition, Scenario},
+};
+use hoid_report::{BatchLine, ReportError, TraceSection, TrackReport};
+use hoid_sim::{Simulator, Stream};
+
+const SPANS: [(f64, f64); 2] = [(0.0, 30.72), (51.20, 81.92)];
+
+fn run() -> Record {
+    let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
+    let stream = Stream {
+        seed: 5,
+        ..Stream::default()
+    };
+    simulator.run(stream, false).unwrap()
+}
+
+fn options(method: Method) -> TrackOptions {
+    let structure = method.usual_structure();
+    let mut options = TrackOptions::new(method, structure, structure.operator_orders(29));
+    options.start = StartAt::Span(Some(SPANS[0]));
+    options
+}
+
+fn tracked(method: Method, record: &Record) -> Trace {
+    track(record, &options(method), 4).unwrap()
+}
+
+fn fits(structure: Structure, record: &Record) -> Vec<Fit> {
+    let estimator = Estimator::new(structure, structure.operator_orders(29));
+    let fit = |(from, to)| estimator.fit(&[record.span(from, to).unwrap()]).unwrap();
+    SPANS.into_iter().map(fit).collect()
+}
+
+fn section<'a>(name: &str, trace: &'a Trace, fits: &'a [Fit]) -> TraceSection<'a> {
+    let line = |((from_s, to_s), fit)| BatchLine { from_s, to_s, fit };
+    TraceSection {
+        name: name.to_owned(),
+        trace,
+        batch: SPANS.into_iter().zip(fits).map(line).collect(),
+    }
+}
+
+fn report<'a>(record: &'a Record, traces: Vec<TraceSection<'a>>) -> TrackReport<'a> {
+    TrackReport {
+        title: "Title".to_owned(),
+        settings: vec![("seed".to_owned(), "5".to_owned())],
+        record,
+        traces,
+        notes: vec!["a note".to_owned()],
+    }
+}
+
+/// What every page must keep: nothing from outside, no NaN, no two equal ids, references that exist.
+fn check_page(html: &str) {
+    let without_namespace = html.replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
+    for outside in ["http", "src=", "<link", "<script", "@import", "url(\"", "//cdn"] {
+        assert!(!without_namespace.contains(outside), "{outside}");
+    }
+    for bad in [
+        "NaN",
+        "nan,",
+        ">inf",
+        ">-inf",
+        "undefined",
+        "none</td>",
+        "\u{e000}",
+        "\u{e001}",
+        "\u{e002}",
+    ] {
+        assert!(!html.contains(bad), "{bad} in the page");
+    }
+    let mut ids: Vec<&str> = html
+        .split(" id=\"")
+        .skip(1)
+        .filter_map(|s| s.split('"').next())
+        .collect();
+    let count = ids.len();
+    for reference in html.split("url(#").skip(1).filter_map(|s| s.split(')').next()) {
+        assert!(ids.contains(&reference), "{reference} does not exist");
+    }
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), count, "two equal ids");
+}
+
+/// A figure of the page by the id of its title.
+fn figure<'a>(html: &'a str, id: &str) -> &'a str {
+    let at = html.find(&format!("aria-labelledby=\"{id}-title\"")).unwrap();
+    let start = html[..at].rfind("<svg ").unwrap();
+    &html[start..start + html[start..].find("</svg>").unwrap()]
+}
+
+#[test]
+fn three_methods_over_each_other_show_all_that_is_asked_for() {
+    let record = run();
+    let (arx, bj) = (fits(Structure::Arx, &record), fits(Structure::BoxJenkins, &record));
+    let traces = [Method::Rls, Method::Rpem, Method::Physical].map(|m| tracked(m, &record));
+    let sections = vec![
+        section("RLS", &traces[0], &arx),
+        section("RPEM", &traces[1], &bj),
+        section("physical", &traces[2], &[]),
+    ];
+    let page = report(&record, sections);
+    let html = page.to_html().unwrap();
+    check_page(&html);
+    assert_eq!(html, page.to_html().unwrap());
+    assert!(html.len() < 1_200_000, "{}", html.len());
+
+    // Operator, coefficients, innovations, standard errors; shortened steps when there are any.
+    let shortened = traces.iter().any(|t| t.counts().shortened > 0);
+    assert_eq!(html.matches("<svg ").count(), 4 + usize::from(shortened));
+    assert_eq!(html.contains("No step had to be shortened"), !shortened);
+    for (id, axes) in [("operator", 5), ("coefficients", 5), ("errors", 5), ("innovation", 3)] {
+        let svg = figure(&html, id);
+        assert_eq!(svg.matches("rotate(-90").count(), axes, "{id}");
+        assert!(svg.contains("time (s)") && svg.contains(">physical<"), "{id}");
+    }
+    let operator = figure(&html, "operator");
+    assert!(operator.contains(">truth<") && operator.contains(">batch fit<"));
+    assert!(
+        figure(&html, "coefficients").contains("f<tspan"),
+        "a and f share a panel"
+    );
+
+    // Rows that do not convert are counted, with the reason.
+    let unconvertible = (0..traces[0].len())
+        .filter(|row| traces[0].operator(*row).is_err())
+        .count();
+    assert!(unconvertible > 100, "{unconvertible}");
+    assert!(html.contains(&format!(
+        "<td class=\"n\">{}</td><td class=\"n\">{unconvertible}</td><td>",
+        traces[0].len()
+    )));
+    assert!(html.contains("lies on the closed negative real axis"));
+    for trace in &traces {
+        assert!(html.contains(&format!("<td class=\"n\">{}</td>", trace.counts().samples)));
+    }
+    // Relative error against the truth, by its definition.
+    let k_e = record.channel("K_e").unwrap();
+    let squares: Vec<f64> = (0..traces[2].len())
+        .filter(|row| traces[2].times_s()[*row] >= 10.0)
+        .map(|row| {
+            let sample = (traces[2].times_s()[row] * 100.0).round() as usize;
+            (traces[2].operator(row).unwrap().k_e.value / k_e[sample] - 1.0).powi(2)
+        })
+        .collect();
+    let rms = 100.0 * (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+    let errors = &html[html.find("Relative error against the truth").unwrap()..];
+    let row = &errors[errors.find("<sub>e</sub></th>").unwrap()..];
+    assert!(row[..row.find("</tr>").unwrap()].ends_with(&format!("<td class=\"n\">{rms:.1}</td>")));
+
+    // A section each, with the start fit and the ends of the batch spans.
+    for name in ["RLS", "RPEM", "physical"] {
+        assert!(html.contains(&format!("\">{name}</h2>")));
+    }
+    assert_eq!(html.matches("<h3>Start: ").count(), 3);
+    assert_eq!(html.matches("recursive at 30.71 s").count(), 2);
+    assert_eq!(html.matches("recursive at 81.91 s").count(), 2);
+    let b0 = bj[1].parameters()[0].1;
+    let (value, error) = hoid_report::numbers::with_uncertainty(b0.value, b0.standard_error);
+    assert!(html.contains(&format!("<td class=\"n\">{value} \u{b1} {error}</td>")));
+    assert!(html.contains("exponential, memory 2.56 s for b0, b1; 20.48 s for d1, f1, f2"));
+}
+
+#[test]
+fn a_recording_has_no_truth() {
+    let simulated = run();
+    let record = Record::new(
+        simulated.sample_time(),
+        Channel::new("e<0>", "<deg>", simulated.input().to_vec()),
+        Channel::new("u", "<b>", simulated.output().to_vec()),
+    )
+    .unwrap();
+    let trace = tracked(Method::Physical, &record);
+    let hostile = "a<script>alert(1)</script> & \"b\" $x^2$";
+    let html = report(&record, vec![section(hostile, &trace, &[])]).to_html().unwrap();
+    check_page(&html);
+    assert!(!html.contains("<b>") && !html.contains("<deg>"));
+    assert!(!html.contains(">truth<") && !html.contains("Relative error") && !html.contains("Dashed"));
+    // Only the operator's own parameters move, so that their errors are shown.
+    assert!(html.contains("Standard errors of the parameters of the operator"));
+}
+
+#[test]
+fn a_start_from_nothing_and_shortened_steps_are_told() {
+    let record = run();
+    let mut options = options(Method::Rpem);
+    options.start = StartAt::Nothing;
+    options.covariance = StartCovariance::Multiple(1e4);
+    let trace = track(&record, &options, 1).unwrap();
+    assert!(trace.counts().shortened > 0);
+    let html = report(&record, vec![section("RPEM", &trace, &[])]).to_html().unwrap();
+    check_page(&html);
+    assert!(html.contains("There was no start fit") && html.contains("from nothing"));
+    assert!(!html.contains("Shaded"));
+    assert!(figure(&html, "shortened").contains(">steps"));
+    assert!(html.contains(&format!("<td class=\"n\">{}</td>", trace.counts().shortened)));
+}
+
+#[test]
+fn orders_that_are_no_operator_have_coefficients_alone() {
+    let record = run();
+    let orders = Orders {
+        na: 1,
+        nb: 1,
+        nk: 29,
+        ..Orders::default()
+    };
+    let mut options = TrackOptions::new(Method::Rls, Structure::Arx, orders);
+    options.start = StartAt::Span(Some(SPANS[0]));
+    let trace = track(&record, &options, 1).unwrap();
+    let html = report(&record, vec![section("small", &trace, &[])]).to_html().unwrap();
+    check_page(&html);
+    assert!(html.contains("8192 from 0.00 s on: the operator model has two coefficients in B and two poles"));
+    assert!(html.contains("(small: 7192 of 7192)"));
+    assert!(figure(&html, "coefficients").contains("b<tspan"));
+}
+
+#[test]
+fn short_records_and_averages_have_their_page() {
+    let long = run();
+    let record = long.span(0.0, 8.0).unwrap();
+    let mut options = options(Method::Rls);
+    options.start = StartAt::Span(None);
+    let trace = track(&record, &options, 1).unwrap().moving_average(101);
+    let fit = Estimator::new(Structure::Arx, Structure::Arx.operator_orders(29))
+        .fit(&[record.span(4.0, 8.0).unwrap()])
+        .unwrap();
+    let mut late = section("RLS", &trace, &[]);
+    late.batch = [(4.0, 8.0), (-3.0, -1.0)]
+        .map(|(from_s, to_s)| BatchLine {
+            from_s,
+            to_s,
+            fit: &fit,
+        })
+        .to_vec();
+    let html = report(&record, vec![late]).to_html().unwrap();
+    check_page(&html);
+    // Shorter than 10 s: errors over the whole record.
+    assert!(html.contains("with <i>t</i> &ge; 0 s"));
+    assert!(html.contains("101 rows, behind by 0.5 s"));
+    assert!(html.contains("nothing at the end of [-3, -1] s: the trace begins later"));
+    // One row alone.
+    let one = track(&record, &options, 800).unwrap();
+    assert_eq!(one.len(), 1);
+    check_page(&report(&record, vec![section("one", &one, &[])]).to_html().unwrap());
+}
+
+#[test]
+fn the_delay_is_shown_where_it_is_tracked() {
+    let record = run();
+    let mut with_delay = options(Method::Physical);
+    with_delay.track_delay_s = Some((0.2, 0.4));
+    let trace = track(&record, &with_delay, 8).unwrap();
+    let html = report(&record, vec![section("physical", &trace, &[])])
+        .to_html()
+        .unwrap();
+    check_page(&html);
+    assert_eq!(figure(&html, "operator").matches("rotate(-90").count(), 6);
+    assert!(html.contains("tau_e tracked in 0.2 to 0.4 s"));
+}
+
+#[test]
+fn windows_and_instruments_have_their_page() {
+    let record = run();
+    let mut window = options(Method::Window);
+    window.every = 500;
+    let traces = [track(&record, &window, 8).unwrap(), tracked(Method::Refined, &record)];
+    let sections = vec![section("window", &traces[0], &[]), section("RRIV", &traces[1], &[])];
+    let html = report(&record, sections).to_html().unwrap();
+    check_page(&html);
+    assert!(html.contains("window of 20 s, a fit every 500 samples"));
+    assert_eq!(figure(&html, "innovation").matches("rotate(-90").count(), 2);
+}
+
+#[test]
+fn reports_of_no_trace_or_of_too_many_are_errors() {
+    let record = run();
+    assert_eq!(
+        report(&record, Vec::new()).to_html(),
+        Err(ReportError::NoTraces { most: 4 })
+    );
+    let mut options = options(Method::Rls);
+    options.start = StartAt::Nothing;
+    let trace = track(&record, &options, 100).unwrap();
+    let five = (0..5).map(|_| section("RLS", &trace, &[])).collect();
+    let error = report(&record, five).to_html().unwrap_err();
+    assert_eq!(error, ReportError::TooManyTraces { found: 5, most: 4 });
+    assert_eq!(
+        error.to_string(),
+        "the report has 5 traces, expected at most 4: write a second report for the others"
+    );
+}
