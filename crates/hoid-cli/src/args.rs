@@ -28,10 +28,14 @@ pub struct Cli {
 pub enum Command {
     /// The whole path on a simulated run: simulate, identify, write a report
     Demo(DemoArgs),
-    /// Simulate one closed-loop run and write it as CSV
+    /// Simulate one closed-loop run and write it as CSV or Parquet
     Simulate(SimulateArgs),
     /// Identify a model and the operator's parameters from one or several records
     Identify(Box<IdentifyArgs>),
+    /// Track a model and the operator's parameters over a record, sample by sample
+    Track(Box<TrackArgs>),
+    /// Track live: samples as lines on standard input, one JSON line a sample on standard output
+    Stream(Box<StreamArgs>),
     /// Take discrete coefficients to operator parameters or back, or discretise a transfer function
     Convert(ConvertArgs),
     /// Crossover frequency, phase and gain margin of a scenario, and its remnant gains
@@ -93,7 +97,7 @@ pub struct SimulateArgs {
     /// Keep the run-in (t < 0) in the file
     #[arg(long)]
     pub keep_run_in: bool,
-    /// File to write
+    /// File to write; - writes CSV to standard output
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
 }
@@ -129,7 +133,7 @@ pub struct ReadArgs {
 
 #[derive(Debug, Args)]
 pub struct IdentifyArgs {
-    /// Record files (CSV); several share one model and have initial states of their own
+    /// Record files (CSV or Parquet); several share one model and have initial states of their own
     #[arg(required = true, value_name = "RECORD")]
     pub records: Vec<PathBuf>,
     #[command(flatten)]
@@ -154,7 +158,7 @@ pub struct IdentifyArgs {
     /// Parameters that each record has for itself, as K_e,T_L, for grey-box
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub individual: Vec<String>,
-    /// Write K_e, T_L and K_e_dot over time into this file (CSV), for time-varying
+    /// Write K_e, T_L and K_e_dot over time into this file (CSV or Parquet), for time-varying
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
     /// Orders, each a number or a range to search, as nb=2,nc=0,nd=1..4,nf=2; nb counts b0, b1, ...
@@ -320,6 +324,10 @@ macro_rules! names {
         }
     };
 }
+
+mod recursion;
+
+pub use recursion::{ForgettingName, RecursionArgs, StreamArgs, TrackArgs};
 
 names!(FitMethodName for Option<IvMethod> {
     Pem = None,

@@ -13,6 +13,9 @@ pub enum CliError {
     /// What was typed contradicts itself or cannot be read.
     #[error("{0}")]
     Usage(String),
+    /// A stream that cannot be read, understood or written.
+    #[error("{0}")]
+    Stream(String),
     #[error(transparent)]
     Model(#[from] ModelError),
     #[error(transparent)]

@@ -23,7 +23,7 @@ pub fn optional(value: Option<f64>) -> Value {
     value.map_or(Value::Null, number)
 }
 
-fn estimate(e: &Estimate) -> Value {
+pub fn estimate(e: &Estimate) -> Value {
     json!({"value": number(e.value), "standard_error": optional(e.standard_error)})
 }
 

@@ -9,6 +9,7 @@ mod error;
 mod json;
 mod orders;
 mod output;
+mod recursion;
 mod text;
 
 use std::process::ExitCode;
@@ -23,6 +24,8 @@ fn main() -> ExitCode {
         Command::Demo(args) => commands::demo::run(&args),
         Command::Simulate(args) => commands::simulate::run(&args),
         Command::Identify(args) => commands::identify::run(&args),
+        Command::Track(args) => commands::track::run(&args),
+        Command::Stream(args) => commands::stream::run(&args),
         Command::Convert(args) => commands::convert::run(&args),
         Command::Margins(args) => commands::margins::run(&args),
     };

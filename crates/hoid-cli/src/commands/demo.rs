@@ -3,17 +3,25 @@
 
 use std::path::PathBuf;
 
-use hoid_ident::{Choice, Estimator, Fit, choose_orders, order_search};
+use hoid_ident::{
+    Choice, Estimator, Fit, choose_orders, order_search,
+    tracking::{Method, StartAt, Trace, TrackOptions, track},
+};
 use hoid_io::{make_directory, write_record};
 use hoid_model::{
     Record, Structure,
     scenario::{Condition, Scenario},
     uncertainty::OperatorEstimate,
 };
-use hoid_report::{ModelSection, Report, numbers};
+use hoid_report::{BatchLine, ModelSection, Report, TraceSection, TrackReport, numbers};
 use hoid_sim::{Simulator, Stream};
 
-use crate::{args::DemoArgs, commands::identify::write_report, error::CliError, output, text};
+use crate::{
+    args::DemoArgs,
+    commands::identify::{write_page, write_report},
+    error::CliError,
+    output, text,
+};
 
 /// The spans of the reference text (V.B) that lie wholly before and wholly after the change, s.
 const SPANS: [(&str, f64, f64); 2] = [("before", 0.0, 30.72), ("after", 51.2, 81.92)];
@@ -48,9 +56,114 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
         .map(|(name, from, to)| identify(name, record.span(from, to)?))
         .collect::<Result<Vec<Stage>, CliError>>()?;
     output::print(&table(&stages));
+    let traces = tracked(&record, &stages)?;
+    output::print(&errors_over_time(&record, &traces));
     let page = report(args, &stages)?;
-    output::print(&format!("Report: {}\n", page.display()));
+    let page_of_traces = report_of_traces(args, &record, &stages, &traces)?;
+    output::print(&format!(
+        "Report: {}\nTracking: {}\n",
+        page.display(),
+        page_of_traces.display()
+    ));
     Ok(())
+}
+
+/// Traces of the whole run, from the batch fit before the change on: the two methods of the text, and the one in physical parameters.
+fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, CliError> {
+    let (_, from, to) = SPANS[0];
+    let nk = stages[0].choice.fit.orders().nk;
+    [Method::Rls, Method::Rpem, Method::Physical]
+        .into_iter()
+        .map(|method| {
+            let structure = method.usual_structure();
+            let options = TrackOptions {
+                start: StartAt::Span(Some((from, to))),
+                ..TrackOptions::new(method, structure, structure.operator_orders(nk))
+            };
+            Ok((format!("{}, {structure}", method.name()), track(record, &options, 1)?))
+        })
+        .collect()
+}
+
+/// RMS relative error of each trace from the first step of the estimate on.
+fn errors_over_time(record: &Record, traces: &[(String, Trace)]) -> String {
+    let mut rows = text::table(&[
+        "tracked by",
+        "K_e",
+        "T_L",
+        "K_e_dot",
+        "omega_nm",
+        "zeta_nm",
+        "rows that convert",
+    ]);
+    for (name, trace) in traces {
+        let (mut sums, mut count, mut all) = ([0.0; 5], 0usize, 0usize);
+        for (k, t) in trace.times_s().iter().enumerate() {
+            if *t < trace.updated_from_s() {
+                continue;
+            }
+            all += 1;
+            let Ok(operator) = trace.operator(k) else { continue };
+            count += 1;
+            for (sum, (column, _, estimate)) in sums.iter_mut().zip(operator.rows()) {
+                let truth = record.channel(column).map_or(f64::NAN, |c| c[k]);
+                *sum += ((estimate.value - truth) / truth).powi(2);
+            }
+        }
+        let mut row = vec![name.clone()];
+        row.extend(sums.map(|s| format!("{:.0} %", 100.0 * (s / count as f64).sqrt())));
+        row.push(format!("{count} of {all}"));
+        rows.add_row(row);
+    }
+    format!(
+        "The whole run, sample by sample from {} s on: RMS relative error\n{rows}\n\n",
+        SPANS[0].2
+    )
+}
+
+fn report_of_traces(
+    args: &DemoArgs,
+    record: &Record,
+    stages: &[Stage],
+    traces: &[(String, Trace)],
+) -> Result<PathBuf, CliError> {
+    let batch = |name: &str| -> Vec<BatchLine<'_>> {
+        stages
+            .iter()
+            .zip(SPANS)
+            .map(|(stage, (_, from_s, to_s))| BatchLine {
+                from_s,
+                to_s,
+                fit: if name.starts_with(Method::Rls.name()) {
+                    &stage.arx
+                } else {
+                    &stage.choice.fit
+                },
+            })
+            .collect()
+    };
+    let report = TrackReport {
+        title: "A person who adapts: condition C4, tracked".to_owned(),
+        settings: vec![
+            ("seed".to_owned(), args.seed.to_string()),
+            (
+                "start".to_owned(),
+                format!("batch fit of {} to {} s", SPANS[0].1, SPANS[0].2),
+            ),
+            ("hoid".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+        ],
+        record,
+        traces: traces
+            .iter()
+            .map(|(name, trace)| TraceSection {
+                name: name.clone(),
+                trace,
+                batch: batch(name),
+            })
+            .collect(),
+        notes: Vec::new(),
+    };
+    write_page(&args.out.join("tracking"), &report.to_html()?)
 }
 
 /// Box-Jenkins with nk and nd searched as `hoid identify` does by default, and ARX with the same delay.

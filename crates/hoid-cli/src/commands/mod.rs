@@ -5,6 +5,8 @@ pub mod demo;
 pub mod identify;
 pub mod margins;
 pub mod simulate;
+pub mod stream;
+pub mod track;
 
 use hoid_io::read_scenario;
 use hoid_model::{OperatorParameters, Record, scenario::Scenario};

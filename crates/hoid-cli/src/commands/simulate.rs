@@ -1,8 +1,8 @@
 //! `hoid simulate`: one closed-loop run into a file.
 
-use hoid_io::write_record;
+use hoid_io::{write_record, write_record_csv};
 use hoid_model::{
-    SampleTime,
+    Record, SampleTime,
     scenario::{RemnantStrength, Scenario},
 };
 use hoid_report::numbers;
@@ -19,9 +19,14 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         replication: args.replication,
     };
     let record = simulator.run(stream, args.keep_run_in)?;
-    write_record(&args.out, &record)?;
+    let piped = args.out.as_os_str() == "-";
+    if piped {
+        write_out(&record)?;
+    } else {
+        write_record(&args.out, &record)?;
+    }
     let rms = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
-    output::print(&format!(
+    let summary = format!(
         "{}: {} samples of {} s, seed {}, replication {}; rms e {} deg, rms u {} deg.\nWritten to {}.\n",
         scenario.name,
         record.len(),
@@ -30,8 +35,25 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         args.replication,
         numbers::plain(rms(record.input())),
         numbers::plain(rms(record.output())),
-        args.out.display(),
-    ));
+        if piped {
+            "standard output".to_owned()
+        } else {
+            args.out.display().to_string()
+        },
+    );
+    if piped {
+        output::complain(summary.trim_end());
+    } else {
+        output::print(&summary);
+    }
+    Ok(())
+}
+
+/// Writes the record to standard output.
+fn write_out(record: &Record) -> Result<(), CliError> {
+    let mut text = Vec::new();
+    write_record_csv(&mut text, "standard output", record)?;
+    output::print(&String::from_utf8_lossy(&text));
     Ok(())
 }
 

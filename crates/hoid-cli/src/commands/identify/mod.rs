@@ -104,7 +104,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
 }
 
 /// Reads a record as the options say; what was repaired or left out goes to standard error.
-fn read(path: &Path, args: &ReadArgs, with_input: bool) -> Result<Record, CliError> {
+pub fn read(path: &Path, args: &ReadArgs, with_input: bool) -> Result<Record, CliError> {
     let column = |text: &str| text.parse().map_err(CliError::from);
     let options = ReadOptions {
         input: if with_input { Some(column(&args.input)?) } else { None },
@@ -141,15 +141,10 @@ fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> MarginEstima
     fit.margins(|omega| element.response(omega), (low, high))
 }
 
-/// The options that every kind of fit shares, defaults included.
-fn common_settings(args: &IdentifyArgs, with_input: bool) -> Vec<(String, String)> {
-    let read = &args.read;
+/// How the records were read, defaults included.
+pub fn reading(read: &ReadArgs, with_input: bool) -> Vec<(String, String)> {
     let or_all = |bound: Option<f64>, all: &str| bound.map_or(all.to_owned(), |v| v.to_string());
     let mut list = vec![
-        (
-            "initial state".to_owned(),
-            format!("{:?}", args.initial_state).to_lowercase(),
-        ),
         ("output".to_owned(), read.output.clone()),
         (
             "sampling".to_owned(),
@@ -160,6 +155,27 @@ fn common_settings(args: &IdentifyArgs, with_input: bool) -> Vec<(String, String
             format!("{} to {}", or_all(read.from, "start"), or_all(read.to, "end")),
         ),
         ("detrend".to_owned(), format!("{:?}", read.detrend).to_lowercase()),
+    ];
+    if with_input {
+        list.insert(0, ("input".to_owned(), read.input.clone()));
+    }
+    if read.resample || read.fill {
+        list.push((
+            "repair".to_owned(),
+            format!("resample {}, fill {}", read.resample, read.fill),
+        ));
+    }
+    list
+}
+
+/// The options that every kind of fit shares, defaults included.
+fn common_settings(args: &IdentifyArgs, with_input: bool) -> Vec<(String, String)> {
+    let mut list = vec![(
+        "initial state".to_owned(),
+        format!("{:?}", args.initial_state).to_lowercase(),
+    )];
+    list.extend(reading(&args.read, with_input));
+    list.extend([
         (
             "search".to_owned(),
             format!(
@@ -169,20 +185,11 @@ fn common_settings(args: &IdentifyArgs, with_input: bool) -> Vec<(String, String
             ),
         ),
         ("largest number of steps".to_owned(), args.max_iterations.to_string()),
-    ];
-    if with_input {
-        list.insert(1, ("input".to_owned(), read.input.clone()));
-    }
+    ]);
     for (name, text) in [("fixed", &args.fix), ("bounds", &args.bound)] {
         if let Some(text) = text {
             list.push((name.to_owned(), text.clone()));
         }
-    }
-    if read.resample || read.fill {
-        list.push((
-            "repair".to_owned(),
-            format!("resample {}, fill {}", read.resample, read.fill),
-        ));
     }
     if let Some(h) = &args.controlled_element {
         list.push((
@@ -249,7 +256,11 @@ fn page(found: &Identified<'_>) -> String {
 
 /// Writes `report.html` into a directory, which is made if it is not there.
 pub fn write_report(directory: &Path, report: &Report<'_>) -> Result<PathBuf, CliError> {
-    let html = report.to_html()?;
+    write_page(directory, &report.to_html()?)
+}
+
+/// As [`write_report`], for the text of any page.
+pub fn write_page(directory: &Path, html: &str) -> Result<PathBuf, CliError> {
     make_directory(directory)?;
     let path = directory.join("report.html");
     write_atomically(&path, |out| out.write_all(html.as_bytes()))?;

@@ -1,0 +1,157 @@
+//! The times of the lines against an even grid: which samples are missing, which lines come too late.
+//!
+//! Live times jitter, and the clock that made them is not quite that of `--fs`. The grid therefore follows the times with a small gain; a
+//! line is late by whole samples when it lies beyond half a sample of the place where the next one is expected.
+
+/// Share of the difference by which the grid follows the times.
+const GAIN: f64 = 0.1;
+/// Longest gap that is bridged, s.
+pub const LONGEST_GAP_S: f64 = 10.0;
+/// Lines in a row, each later than the one before, after which a clock is believed to have been set back.
+const SET_BACK: usize = 10;
+/// Samples by which the grid may run ahead of the times before that is said.
+const AHEAD: f64 = 2.0;
+
+/// What the time of a line says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Arrival {
+    /// The next sample, after so many missing ones that are to be bridged; `left_out` when the gap was longer than that.
+    Sample { missing: usize, left_out: bool },
+    /// Not later than the last line.
+    Behind { last_s: f64 },
+}
+
+/// The grid.
+#[derive(Debug)]
+pub struct Clock {
+    sample_time_s: f64,
+    /// Place of the last sample on the grid, and its time.
+    last: Option<(f64, f64)>,
+    /// Last line behind, and how many in a row.
+    behind: Option<(f64, usize)>,
+    hurried: bool,
+}
+
+impl Clock {
+    pub fn new(sample_time_s: f64) -> Self {
+        Self {
+            sample_time_s,
+            last: None,
+            behind: None,
+            hurried: false,
+        }
+    }
+
+    /// Takes the time of a line.
+    pub fn take(&mut self, t: f64) -> Arrival {
+        let ts = self.sample_time_s;
+        let next = Arrival::Sample {
+            missing: 0,
+            left_out: false,
+        };
+        let Some((place, last_s)) = self.last else {
+            self.last = Some((t, t));
+            return next;
+        };
+        if t <= last_s {
+            let row = match self.behind {
+                Some((before, n)) if t > before => n + 1,
+                _ => 1,
+            };
+            self.behind = Some((t, row));
+            if row < SET_BACK {
+                return Arrival::Behind { last_s };
+            }
+            self.behind = None;
+            self.last = Some((t, t));
+            return Arrival::Sample {
+                missing: row - 1,
+                left_out: false,
+            };
+        }
+        self.behind = None;
+        let steps = ((t - place) / ts).round().max(1.0);
+        let most = (LONGEST_GAP_S / ts).floor();
+        if steps - 1.0 > most {
+            self.last = Some((t, t));
+            return Arrival::Sample {
+                missing: most as usize,
+                left_out: true,
+            };
+        }
+        let expected = place + steps * ts;
+        self.hurried |= expected - t > AHEAD * ts;
+        self.last = Some((expected + GAIN * (t - expected), t));
+        Arrival::Sample {
+            missing: steps as usize - 1,
+            left_out: false,
+        }
+    }
+
+    /// True once when the lines have come faster than the sampling frequency says.
+    pub fn hurried(&mut self) -> bool {
+        std::mem::take(&mut self.hurried)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn missing(clock: &mut Clock, t: f64) -> usize {
+        match clock.take(t) {
+            Arrival::Sample { missing, .. } => missing,
+            behind => panic!("{t}: {behind:?}"),
+        }
+    }
+
+    #[test]
+    fn jitter_and_drift_make_no_gaps_and_gaps_are_counted() {
+        let mut clock = Clock::new(0.01);
+        for k in 0..20_000 {
+            let k = f64::from(k);
+            // A clock that is 0.1 % slow, with a jitter of 0.35 samples.
+            let t = 0.010_01 * k + 0.0035 * (k * 2.3).sin();
+            assert_eq!(missing(&mut clock, t), 0, "{k}");
+        }
+        let mut clock = Clock::new(0.01);
+        for (t, gap) in [(0.0, 0), (0.01, 0), (0.03, 1), (0.0401, 0), (0.14, 9), (9.14, 899)] {
+            assert_eq!(missing(&mut clock, t), gap, "{t}");
+        }
+        assert_eq!(
+            clock.take(100.0),
+            Arrival::Sample {
+                missing: 1000,
+                left_out: true
+            }
+        );
+        assert_eq!(missing(&mut clock, 100.01), 0);
+        assert!(!clock.hurried());
+    }
+
+    #[test]
+    fn lines_behind_are_dropped_until_the_clock_is_believed() {
+        let mut clock = Clock::new(0.01);
+        missing(&mut clock, 1.0);
+        for t in [1.0, 0.5, 0.4, 1.0] {
+            assert_eq!(clock.take(t), Arrival::Behind { last_s: 1.0 });
+        }
+        assert_eq!(missing(&mut clock, 1.01), 0);
+        // One wild time does not end the stream.
+        missing(&mut clock, 1e300);
+        for k in 0..9 {
+            assert!(matches!(clock.take(1.02 + 0.01 * f64::from(k)), Arrival::Behind { .. }));
+        }
+        assert_eq!(missing(&mut clock, 1.11), 9);
+        assert_eq!(missing(&mut clock, 1.12), 0);
+    }
+
+    #[test]
+    fn lines_that_come_too_fast_are_noticed() {
+        let mut clock = Clock::new(0.01);
+        for k in 0..200 {
+            assert_eq!(missing(&mut clock, 0.005 * f64::from(k)), 0);
+        }
+        assert!(clock.hurried() && !clock.hurried());
+    }
+}

@@ -1,0 +1,151 @@
+//! One line of the output.
+
+use hoid_ident::tracking::Tracker;
+use hoid_model::{
+    NotConvertible,
+    uncertainty::{Estimate, OperatorEstimate},
+};
+use serde::{Serialize, Serializer, ser::SerializeMap};
+
+use super::live::Live;
+
+/// Counts since the beginning.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Counts {
+    /// Samples, those with a fault and missing ones included.
+    #[serde(skip)]
+    pub samples: u64,
+    /// Samples with a fault in e or u, missing ones included.
+    pub skipped: u64,
+    /// Of these, samples that were missing by the column t.
+    #[serde(skip)]
+    pub bridged: u64,
+    /// Steps that stability or a bound made shorter.
+    pub shortened: u64,
+    /// Lines that could not be taken for a sample.
+    pub dropped: u64,
+}
+
+#[derive(Serialize)]
+struct Line<'a> {
+    t: Option<f64>,
+    parameters: Option<Parameters<'a>>,
+    operator: Option<Operator>,
+    innovation: Option<f64>,
+    #[serde(flatten)]
+    counts: Counts,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fault: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    warm_up: Option<WarmUp<'a>>,
+}
+
+#[derive(Serialize)]
+struct WarmUp<'a> {
+    collected: usize,
+    needed: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reason: Option<&'a str>,
+}
+
+struct Parameters<'a> {
+    names: &'a [String],
+    estimates: Vec<Estimate>,
+}
+
+impl Serialize for Parameters<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let pairs = self.names.iter().zip(&self.estimates);
+        serializer.collect_map(pairs.map(|(name, e)| (name, Number::from(e))))
+    }
+}
+
+#[derive(Serialize)]
+struct Number {
+    value: f64,
+    standard_error: Option<f64>,
+}
+
+impl From<&Estimate> for Number {
+    fn from(e: &Estimate) -> Self {
+        Self {
+            value: e.value,
+            standard_error: e.standard_error,
+        }
+    }
+}
+
+struct Operator(Result<OperatorEstimate, NotConvertible>);
+
+impl Serialize for Operator {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        match &self.0 {
+            Ok(operator) => {
+                map.serialize_entry("convertible", &true)?;
+                map.serialize_entry("stable", &operator.parameters().is_stable())?;
+                for (name, _, e) in operator.rows() {
+                    map.serialize_entry(name, &Number::from(&e))?;
+                }
+            }
+            Err(reason) => {
+                map.serialize_entry("convertible", &false)?;
+                map.serialize_entry("reason", &reason.to_string())?;
+            }
+        }
+        map.end()
+    }
+}
+
+/// Where the recursion stands after a line of the input.
+pub struct Standing<'a> {
+    /// Time of the last sample, s.
+    pub t: Option<f64>,
+    pub live: &'a Live,
+    /// Names of the coefficients; empty during the warm-up.
+    pub names: &'a [String],
+    pub innovation: Option<f64>,
+    pub counts: Counts,
+    /// Faults since the last line.
+    pub fault: Option<String>,
+}
+
+impl Standing<'_> {
+    /// Writes the line into a buffer, its end included.
+    ///
+    /// # Errors
+    /// Those of the serialiser, which a buffer in memory does not have.
+    pub fn write(&self, buffer: &mut Vec<u8>) -> serde_json::Result<()> {
+        let tracker: Option<&Tracker> = match self.live {
+            Live::Tracking(tracker) => Some(tracker),
+            Live::Collecting(_) => None,
+        };
+        let line = Line {
+            t: self.t,
+            parameters: tracker.map(|t| Parameters {
+                names: self.names,
+                estimates: t.parameters(),
+            }),
+            // Other orders have no meaning as an operator at all.
+            operator: tracker.map(Tracker::operator).and_then(|o| match o {
+                Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. }) => None,
+                other => Some(Operator(other)),
+            }),
+            innovation: self.innovation,
+            counts: self.counts,
+            fault: self.fault.as_deref(),
+            warm_up: match self.live {
+                Live::Collecting(warm_up) => Some(WarmUp {
+                    collected: warm_up.collected,
+                    needed: warm_up.needed,
+                    reason: warm_up.trouble.as_deref(),
+                }),
+                Live::Tracking(_) => None,
+            },
+        };
+        buffer.clear();
+        serde_json::to_writer(&mut *buffer, &line)?;
+        buffer.push(b'\n');
+        Ok(())
+    }
+}

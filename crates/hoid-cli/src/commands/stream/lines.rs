@@ -1,0 +1,363 @@
+//! Lines of a stream, as hostile as they come: what they mean, or why they mean nothing. Nothing here ends a stream but a header that lacks
+//! a column.
+
+use std::io::{self, BufRead, ErrorKind};
+
+use crate::error::CliError;
+
+/// Longest line that is looked at, bytes; of a longer one the rest is left out, so that memory stays bounded.
+const LONGEST: usize = 1 << 16;
+/// Characters of a faulty cell that are shown.
+const SHOWN: usize = 24;
+
+/// Lines of bounded length.
+pub struct Lines<R> {
+    input: R,
+    bytes: Vec<u8>,
+}
+
+impl<R: BufRead> Lines<R> {
+    pub fn new(input: R) -> Self {
+        Self {
+            input,
+            bytes: Vec::new(),
+        }
+    }
+
+    /// The next line without its end; `Err` inside for a line that is too long, `None` at the end.
+    pub fn next(&mut self) -> io::Result<Option<Result<String, String>>> {
+        self.bytes.clear();
+        let mut length = 0;
+        loop {
+            let chunk = match self.input.fill_buf() {
+                Ok(chunk) => chunk,
+                Err(e) if e.kind() == ErrorKind::Interrupted => continue,
+                Err(e) => return Err(e),
+            };
+            if chunk.is_empty() && length == 0 {
+                return Ok(None);
+            }
+            let end = chunk.iter().position(|b| *b == b'\n');
+            let part = &chunk[..end.unwrap_or(chunk.len())];
+            let room = LONGEST - self.bytes.len();
+            self.bytes.extend_from_slice(&part[..part.len().min(room)]);
+            let used = end.map_or(chunk.len(), |e| e + 1);
+            let ended = end.is_some() || chunk.is_empty();
+            length += used;
+            self.input.consume(used);
+            if ended {
+                break;
+            }
+        }
+        Ok(Some(if self.bytes.len() < LONGEST {
+            Ok(String::from_utf8_lossy(&self.bytes).into_owned())
+        } else {
+            Err(format!("the line is longer than {LONGEST} bytes"))
+        }))
+    }
+}
+
+/// What a line means.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Meaning {
+    /// Nothing: blank, a comment, a header.
+    Nothing,
+    /// A sample.
+    Sample(Read),
+    /// A line that cannot be taken for a sample of its own, with the reason.
+    Unreadable(String),
+}
+
+/// A sample as read; a value with a fault is NaN.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Read {
+    /// Time in s; `None` without a column t.
+    pub t: Option<f64>,
+    pub e: f64,
+    pub u: f64,
+    /// External signal, where there is a column f_t and it holds a number.
+    pub reference: Option<f64>,
+    /// What is wrong with e or u.
+    pub fault: Option<String>,
+}
+
+/// Where the columns are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Places {
+    count: usize,
+    t: Option<usize>,
+    e: Option<usize>,
+    u: usize,
+    reference: Option<usize>,
+}
+
+/// The columns of a stream: found by the header, or by the number of cells in the first line of numbers.
+pub struct Columns {
+    input: String,
+    output: String,
+    with_input: bool,
+    largest: f64,
+    places: Option<Places>,
+}
+
+impl Columns {
+    pub fn new(input: &str, output: &str, with_input: bool, largest: f64) -> Self {
+        Self {
+            input: input.to_owned(),
+            output: output.to_owned(),
+            with_input,
+            largest,
+            places: None,
+        }
+    }
+
+    /// True when the samples have a column t.
+    pub fn have_time(&self) -> bool {
+        self.places.is_some_and(|p| p.t.is_some())
+    }
+
+    /// True once a header or a line of numbers has told the columns.
+    pub fn are_known(&self) -> bool {
+        self.places.is_some()
+    }
+
+    /// What a line means.
+    ///
+    /// # Errors
+    /// [`CliError::Stream`] for a header without the columns.
+    pub fn read(&mut self, line: &str) -> Result<Meaning, CliError> {
+        let line = line.trim_matches(['\r', ' ', '\u{feff}']);
+        if line.trim().is_empty() && !line.contains('\t') || line.starts_with('#') {
+            return Ok(Meaning::Nothing);
+        }
+        let separator = ['\t', ';', ','].into_iter().find(|s| line.contains(*s)).unwrap_or(',');
+        let cells: Vec<&str> = line.split(separator).map(|c| c.trim().trim_matches('"')).collect();
+        let places = match self.places {
+            Some(places) => places,
+            None => {
+                if is_header(&cells) {
+                    self.places = Some(self.by_header(&cells)?);
+                    return Ok(Meaning::Nothing);
+                }
+                match self.by_position(&cells) {
+                    Some(places) => *self.places.insert(places),
+                    None => return Ok(Meaning::Unreadable(format!("no numbers: {}", shown(line)))),
+                }
+            }
+        };
+        if cells.len() != places.count {
+            return Ok(Meaning::Unreadable(format!(
+                "{} cells, expected {}: {}",
+                cells.len(),
+                places.count,
+                shown(line)
+            )));
+        }
+        let t = match places.t.map(|i| number(cells[i])) {
+            None => None,
+            Some(Ok(t)) if t.is_finite() => Some(t),
+            Some(Ok(t)) => return Ok(Meaning::Unreadable(format!("t is {t}"))),
+            Some(Err(what)) => return Ok(Meaning::Unreadable(format!("t is {what}"))),
+        };
+        let mut faults = Vec::new();
+        let mut value = |name: &str, cell: &str| match number(cell) {
+            Ok(v) if v.abs() <= self.largest => v,
+            Ok(v) if v.is_finite() => {
+                faults.push(format!("{name} is {v:e}, beyond {}", self.largest));
+                f64::NAN
+            }
+            Ok(v) => {
+                faults.push(format!("{name} is {v}"));
+                f64::NAN
+            }
+            Err(what) => {
+                faults.push(format!("{name} is {what}"));
+                f64::NAN
+            }
+        };
+        let e = places.e.map_or(0.0, |i| value(&self.input, cells[i]));
+        let u = value(&self.output, cells[places.u]);
+        let reference = places.reference.and_then(|i| number(cells[i]).ok());
+        Ok(Meaning::Sample(Read {
+            t,
+            e,
+            u,
+            reference: reference.filter(|r| r.abs() <= self.largest),
+            fault: (!faults.is_empty()).then(|| faults.join("; ")),
+        }))
+    }
+
+    fn by_header(&self, cells: &[&str]) -> Result<Places, CliError> {
+        let place = |name: &str| cells.iter().position(|c| *c == name);
+        let e = place(&self.input);
+        match (e, place(&self.output)) {
+            (e, Some(u)) if e.is_some() || !self.with_input => Ok(Places {
+                count: cells.len(),
+                t: place("t"),
+                e: e.filter(|_| self.with_input),
+                u,
+                reference: place("f_t"),
+            }),
+            _ => Err(CliError::Stream(format!(
+                "the header has the columns {}, expected {}{}; choose by --input and --output",
+                cells.join(", "),
+                if self.with_input {
+                    format!("{} and ", self.input)
+                } else {
+                    String::new()
+                },
+                self.output
+            ))),
+        }
+    }
+
+    /// `e,u`, `t,e,u` or `t,e,u,f_t`; without input `u` or `t,u`.
+    fn by_position(&self, cells: &[&str]) -> Option<Places> {
+        let readable = |c: &str| matches!(number(c), Ok(_) | Err(Fault::Missing));
+        let any = cells.iter().any(|c| number(c).is_ok_and(f64::is_finite));
+        if !any || !cells.iter().all(|c| readable(c)) {
+            return None;
+        }
+        let places = |t, e, u, reference| Places {
+            count: cells.len(),
+            t,
+            e,
+            u,
+            reference,
+        };
+        match (self.with_input, cells.len()) {
+            (true, 2) => Some(places(None, Some(0), 1, None)),
+            (true, 3) => Some(places(Some(0), Some(1), 2, None)),
+            (true, 4) => Some(places(Some(0), Some(1), 2, Some(3))),
+            (false, 1) => Some(places(None, None, 0, None)),
+            (false, 2) => Some(places(Some(0), None, 1, None)),
+            _ => None,
+        }
+    }
+}
+
+/// Why a cell is no number.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Fault {
+    Missing,
+    Text(String),
+}
+
+impl std::fmt::Display for Fault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Missing => f.write_str("missing"),
+            Self::Text(text) => write!(f, "{text}, no number"),
+        }
+    }
+}
+
+fn number(cell: &str) -> Result<f64, Fault> {
+    match cell.parse::<f64>() {
+        Ok(value) => Ok(value),
+        Err(_)
+            if ["", "na", "n/a", "null"]
+                .iter()
+                .any(|word| cell.eq_ignore_ascii_case(word)) =>
+        {
+            Err(Fault::Missing)
+        }
+        Err(_) => Err(Fault::Text(shown(cell))),
+    }
+}
+
+/// A text between quotation marks, cut to a readable length.
+fn shown(text: &str) -> String {
+    let cut: String = text.chars().take(SHOWN).collect();
+    let rest = if text.chars().count() > SHOWN { "..." } else { "" };
+    format!("\"{}{rest}\"", cut.escape_debug())
+}
+
+/// Two or more names.
+fn is_header(cells: &[&str]) -> bool {
+    let is_name = |c: &&str| {
+        let first = c.chars().next();
+        first.is_some_and(|f| f.is_alphabetic() || f == '_') && number(c).is_err_and(|f| f != Fault::Missing)
+    };
+    cells.len() > 1 && cells.iter().all(is_name) || cells == ["u"]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(columns: &mut Columns, line: &str) -> Read {
+        match columns.read(line).unwrap() {
+            Meaning::Sample(read) => read,
+            other => panic!("{line}: {other:?}"),
+        }
+    }
+
+    fn usual() -> Columns {
+        Columns::new("e", "u", true, 1e6)
+    }
+
+    #[test]
+    fn columns_by_position_and_by_header() {
+        for (line, t, reference) in [
+            ("0.5,-1", None, None),
+            ("2 ; 0.5; -1", Some(2.0), None),
+            ("2\t.5\t-1e0\t7\r", Some(2.0), Some(7.0)),
+        ] {
+            let read = sample(&mut usual(), line);
+            assert_eq!((read.t, read.e, read.u, read.reference), (t, 0.5, -1.0, reference));
+            assert!(read.fault.is_none());
+        }
+        let mut columns = usual();
+        for nothing in ["", "  ", "# a comment", "t,f_t,\"e\",u,x"] {
+            assert_eq!(columns.read(nothing).unwrap(), Meaning::Nothing);
+        }
+        let read = sample(&mut columns, "1,2,3,4,abc");
+        assert_eq!(
+            (read.t, read.reference, read.e, read.u),
+            (Some(1.0), Some(2.0), 3.0, 4.0)
+        );
+        assert!(usual().read("t,y,z").is_err());
+        let mut alone = Columns::new("e", "u", false, 1e6);
+        assert_eq!(sample(&mut alone, "3").u, 3.0);
+    }
+
+    #[test]
+    fn faults_are_told_and_end_nothing() {
+        let mut columns = usual();
+        for unreadable in ["garbage", "\u{0}\u{1}", ",", "1,2,3,4,5"] {
+            assert!(
+                matches!(columns.read(unreadable).unwrap(), Meaning::Unreadable(_)),
+                "{unreadable}"
+            );
+        }
+        sample(&mut columns, "1,2");
+        for (line, fault) in [
+            ("NaN,2", "e is NaN"),
+            ("1,-inf", "u is -inf"),
+            ("1e300,2", "e is 1e300, beyond 1000000"),
+            (",", "e is missing; u is missing"),
+            ("1,abc", "u is \"abc\", no number"),
+            ("1e999,2", "e is inf"),
+        ] {
+            let read = sample(&mut columns, line);
+            assert_eq!(read.fault.as_deref(), Some(fault));
+            assert!(read.e.is_nan() || read.u.is_nan());
+        }
+        for unreadable in ["1", "1,2,3", "e,u,t", "t"] {
+            assert!(matches!(columns.read(unreadable).unwrap(), Meaning::Unreadable(_)));
+        }
+    }
+
+    #[test]
+    fn lines_of_any_length_and_end() {
+        let mut text = vec![b'x'; 3 * LONGEST];
+        text.extend_from_slice(b"\na,b\r\n\n\xff\xfe\nlast");
+        let mut lines = Lines::new(io::BufReader::with_capacity(100, text.as_slice()));
+        assert!(lines.next().unwrap().unwrap().is_err());
+        for expected in ["a,b\r", "", "\u{fffd}\u{fffd}", "last"] {
+            assert_eq!(lines.next().unwrap().unwrap().unwrap(), expected);
+        }
+        assert!(lines.next().unwrap().is_none());
+    }
+}

@@ -1,0 +1,280 @@
+//! `hoid stream`: a recursive estimate, live. Each line of standard input that is no comment gives one line of JSON on standard output,
+//! flushed, whatever the line holds.
+
+mod clock;
+mod line;
+mod lines;
+mod live;
+
+use std::{
+    collections::VecDeque,
+    io::{self, ErrorKind, Write},
+    process,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    thread,
+    time::{Duration, Instant},
+};
+
+use hoid_ident::{
+    Choice,
+    tracking::{Sample, TrackOptions},
+};
+use hoid_model::SampleTime;
+
+use crate::{
+    args::StreamArgs,
+    error::CliError,
+    output,
+    recursion::{self, Plan},
+};
+use clock::{Arrival, Clock, LONGEST_GAP_S};
+use line::{Counts, Standing};
+use lines::{Columns, Lines, Meaning, Read};
+use live::{Live, Taken};
+
+/// Length of the warm-up when none is typed, s.
+const USUAL_WARM_UP_S: f64 = 20.0;
+/// Faults that are kept for the next line.
+const FAULTS_TOLD: usize = 4;
+/// An interrupt waits so long for a line that is being written.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+pub fn run(args: &StreamArgs) -> Result<(), CliError> {
+    let sample_time = SampleTime::new(1.0 / args.fs)?;
+    let plan = Plan::new(&args.recursion, sample_time)?;
+    if args.recursion.start.is_some() && !plan.is_settled() {
+        return Err(CliError::Usage(
+            "--start leaves no warm-up to search nk and orders on; give --nk and --orders as single numbers, as --nk 29 \
+             --orders nd=1"
+                .to_owned(),
+        ));
+    }
+    let session = Arc::new(Mutex::new(Session::new(args, plan, sample_time)?));
+    end_on_interrupt(&session)?;
+    let mut input = Lines::new(io::stdin().lock());
+    let mut buffer = Vec::new();
+    let broken = |e: io::Error| CliError::Stream(format!("standard input cannot be read: {e}"));
+    while let Some(text) = input.next().map_err(broken)? {
+        let mut session = lock(&session);
+        if !session.take(text)? {
+            continue;
+        }
+        session.write(&mut buffer)?;
+        let mut out = io::stdout().lock();
+        match out.write_all(&buffer).and_then(|()| out.flush()) {
+            Ok(()) => {}
+            // Nobody reads any more: there is nothing left to do and nobody to tell.
+            Err(e) if e.kind() == ErrorKind::BrokenPipe => process::exit(0),
+            Err(e) => return Err(CliError::Stream(format!("standard output cannot be written: {e}"))),
+        }
+    }
+    output::complain(&lock(&session).summary());
+    Ok(())
+}
+
+/// Everything that a line changes.
+struct Session {
+    plan: Plan,
+    columns: Columns,
+    clock: Clock,
+    live: Live,
+    sample_time: SampleTime,
+    every: u64,
+    /// Lines that count for `every`.
+    lines: u64,
+    counts: Counts,
+    /// Time of the last sample, s.
+    t: Option<f64>,
+    innovation: Option<f64>,
+    names: Vec<String>,
+    faults: VecDeque<String>,
+}
+
+impl Session {
+    fn new(args: &StreamArgs, plan: Plan, sample_time: SampleTime) -> Result<Self, CliError> {
+        let length_s = args.warm_up.unwrap_or(USUAL_WARM_UP_S);
+        let samples = (length_s * args.fs).round();
+        if !(1.0..=1e7).contains(&samples) {
+            return Err(CliError::Usage(format!(
+                "--warm-up {length_s}: expected a time in s of one sample to 10 million"
+            )));
+        }
+        let with_input = recursion::structure(&args.recursion).has_input();
+        let largest = plan.options().largest;
+        let mut session = Self {
+            live: Live::new(&plan, samples as usize, sample_time)?,
+            plan,
+            columns: Columns::new(&args.input, &args.output, with_input, largest),
+            clock: Clock::new(sample_time.s()),
+            sample_time,
+            every: args.every as u64,
+            lines: 0,
+            counts: Counts::default(),
+            t: None,
+            innovation: None,
+            names: Vec::new(),
+            faults: VecDeque::new(),
+        };
+        if matches!(session.live, Live::Tracking(_)) {
+            let options = session.plan.options().clone();
+            session.began("started at once", &options, None);
+        }
+        Ok(session)
+    }
+
+    /// The tracker is there: its names, and all settings to standard error.
+    fn began(&mut self, when: &str, options: &TrackOptions, choice: Option<&Choice>) {
+        if let Live::Tracking(tracker) = &self.live {
+            self.names = tracker.parameter_names();
+        }
+        let settings = self.plan.settings(options, choice);
+        let each: Vec<String> = settings.iter().map(|(k, v)| format!("{k}: {v}")).collect();
+        output::complain(&format!("{when}; {}.", each.join("; ")));
+    }
+
+    /// Takes a line; true when the output has a line for it.
+    fn take(&mut self, text: Result<String, String>) -> Result<bool, CliError> {
+        let meaning = match text {
+            Ok(text) => self.columns.read(&text)?,
+            Err(reason) => Meaning::Unreadable(reason),
+        };
+        self.innovation = None;
+        match meaning {
+            Meaning::Nothing => return Ok(false),
+            Meaning::Sample(read) => self.timed(read),
+            // By its time the next line will tell whether a sample is missing.
+            Meaning::Unreadable(reason) if self.columns.have_time() || !self.columns.are_known() => {
+                self.dropped(format!("{reason}: dropped"));
+            }
+            Meaning::Unreadable(reason) => {
+                self.fault(reason);
+                self.sample(f64::NAN, f64::NAN, None);
+            }
+        }
+        self.lines += 1;
+        Ok(self.lines.is_multiple_of(self.every))
+    }
+
+    /// Takes a sample at its place in time.
+    fn timed(&mut self, read: Read) {
+        if let Some(t) = read.t {
+            match self.clock.take(t) {
+                Arrival::Behind { last_s } => {
+                    return self.dropped(format!("t = {t} s is not later than the last, {last_s} s: dropped"));
+                }
+                Arrival::Sample { missing, left_out } => {
+                    if left_out {
+                        self.fault(format!(
+                            "a gap before t = {t} s, of which {LONGEST_GAP_S} s are bridged"
+                        ));
+                    } else if missing > 0 {
+                        self.fault(format!("{missing} missing before t = {t} s, bridged"));
+                    }
+                    for _ in 0..missing {
+                        self.counts.bridged += 1;
+                        self.sample(f64::NAN, f64::NAN, None);
+                    }
+                    self.t = Some(t);
+                }
+            }
+            if self.clock.hurried() {
+                output::complain(&format!(
+                    "warning: at t = {t} s the lines run ahead of --fs {}: t advances by less than {} s a line",
+                    1.0 / self.sample_time.s(),
+                    self.sample_time.s()
+                ));
+            }
+        }
+        if let Some(fault) = read.fault {
+            self.fault(fault);
+        }
+        self.sample(read.e, read.u, read.reference);
+    }
+
+    fn sample(&mut self, e: f64, u: f64, reference: Option<f64>) {
+        self.counts.samples += 1;
+        self.counts.skipped += u64::from(!(e.is_finite() && u.is_finite()));
+        if !self.columns.have_time() {
+            self.t = Some((self.counts.samples - 1) as f64 * self.sample_time.s());
+        }
+        let Taken { outcome, started } = self.live.take(Sample { e, u, reference }, &self.plan);
+        if let Some(outcome) = outcome {
+            self.innovation = outcome.innovation;
+            self.counts.shortened += u64::from(outcome.shortened);
+        }
+        if let Some((options, choice)) = started {
+            let when = format!("started after {} samples", self.counts.samples);
+            self.began(&when, &options, choice.as_ref());
+        }
+    }
+
+    fn dropped(&mut self, reason: String) {
+        self.counts.dropped += 1;
+        self.fault(reason);
+    }
+
+    /// Keeps a fault for the next line of the output, the last ones where there are many.
+    fn fault(&mut self, text: String) {
+        if self.faults.len() == FAULTS_TOLD {
+            self.faults.pop_front();
+        }
+        self.faults.push_back(text);
+    }
+
+    /// Writes the line of the output into a buffer.
+    fn write(&mut self, buffer: &mut Vec<u8>) -> Result<(), CliError> {
+        let fault = (!self.faults.is_empty()).then(|| self.faults.drain(..).collect::<Vec<_>>().join("; "));
+        let standing = Standing {
+            t: self.t,
+            live: &self.live,
+            names: &self.names,
+            innovation: self.innovation,
+            counts: self.counts,
+            fault,
+        };
+        let unwritable = |e| CliError::Stream(format!("a line of the output cannot be made: {e}"));
+        standing.write(buffer).map_err(unwritable)
+    }
+
+    /// What there was, for the end.
+    fn summary(&self) -> String {
+        let c = self.counts;
+        let mut text = format!(
+            "{} samples: {} skipped for a fault in e or u ({} of them missing), {} steps made shorter; {} lines dropped.",
+            c.samples, c.skipped, c.bridged, c.shortened, c.dropped
+        );
+        if let Live::Collecting(warm_up) = &self.live {
+            text.push_str(&format!(
+                " The warm-up did not end: {} of {} samples{}.",
+                warm_up.collected,
+                warm_up.needed,
+                warm_up.trouble.as_ref().map_or(String::new(), |t| format!("; {t}"))
+            ));
+        }
+        text
+    }
+}
+
+fn lock(session: &Mutex<Session>) -> MutexGuard<'_, Session> {
+    session.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Ends with a summary and exit code 0 at an interrupt; a line that is being written is finished before.
+fn end_on_interrupt(session: &Arc<Mutex<Session>>) -> Result<(), CliError> {
+    let session = Arc::clone(session);
+    ctrlc::set_handler(move || {
+        let asked = Instant::now();
+        loop {
+            if let Ok(session) = session.try_lock() {
+                output::complain(&session.summary());
+                process::exit(0);
+            }
+            // A start fit, or a reader that takes nothing: lines are written whole, so that none is cut.
+            if asked.elapsed() > PATIENCE {
+                process::exit(0);
+            }
+            thread::sleep(Duration::from_millis(1));
+        }
+    })
+    .map_err(|e| CliError::Stream(format!("interrupts cannot be caught: {e}")))
+}

@@ -1,0 +1,385 @@
+//! What a recursion over a record found, in its three forms: the trace as a table, a page for people, JSON.
+
+use std::collections::BTreeMap;
+
+use hoid_ident::{
+    Choice, Fit,
+    tracking::{OPERATOR_COLUMNS, Trace},
+};
+use hoid_io::{ColumnValues, OutputColumn, OutputTable};
+use hoid_model::{
+    NotConvertible, Record,
+    remnant::RemnantDiscretisation,
+    uncertainty::{Estimate, OperatorEstimate},
+};
+use hoid_report::numbers;
+use serde_json::{Map, Value, json};
+
+use crate::{
+    error::CliError,
+    json::{self, Identified, number},
+    text,
+};
+
+/// Rows of the trace that are printed.
+const ROWS_SHOWN: usize = 8;
+/// Coefficients that are printed where there is no operator.
+const COEFFICIENTS_SHOWN: usize = 6;
+
+/// Everything that was found.
+pub struct Tracked<'a> {
+    pub file: String,
+    pub record: &'a Record,
+    /// The span of the start fit, where there was one.
+    pub span: Option<Record>,
+    pub trace: &'a Trace,
+    /// The operator in each row.
+    pub operators: Vec<Result<OperatorEstimate, NotConvertible>>,
+    pub choice: Option<&'a Choice>,
+    /// The file of the trace.
+    pub out: String,
+    pub settings: &'a [(String, String)],
+}
+
+/// Rows without an operator and their most frequent reason.
+struct NotConverted {
+    rows: usize,
+    reason: Option<String>,
+}
+
+impl Tracked<'_> {
+    /// The columns of the trace.
+    pub fn table(&self) -> OutputTable {
+        let trace = self.trace;
+        let rows = trace.len();
+        let mut columns = Vec::new();
+        let mut add = |name: String, values: ColumnValues| columns.push(OutputColumn { name, values });
+        add("t".to_owned(), ColumnValues::Real(trace.times_s().to_vec()));
+        let coefficients: Vec<Vec<Estimate>> = (0..rows).map(|row| trace.parameters(row)).collect();
+        for (i, name) in trace.parameter_names().into_iter().enumerate() {
+            let each = coefficients.iter().map(|c| c[i]);
+            let error = |e: Estimate| e.standard_error.unwrap_or(f64::NAN);
+            add(
+                name.clone(),
+                ColumnValues::Real(each.clone().map(|e| e.value).collect()),
+            );
+            add(format!("{name}_se"), ColumnValues::Real(each.map(error).collect()));
+        }
+        for name in self.operator_columns() {
+            let each = self.operators.iter().map(|o| value_of(o, name));
+            let value = |e: &Option<Estimate>| e.map_or(f64::NAN, |e| e.value);
+            let error = |e: &Option<Estimate>| e.and_then(|e| e.standard_error).unwrap_or(f64::NAN);
+            let all: Vec<Option<Estimate>> = each.collect();
+            add(name.to_owned(), ColumnValues::Real(all.iter().map(value).collect()));
+            add(
+                format!("{name}_se"),
+                ColumnValues::Real(all.iter().map(error).collect()),
+            );
+        }
+        let convertible = self.operators.iter().map(|o| u64::from(o.is_ok())).collect();
+        add("convertible".to_owned(), ColumnValues::Whole(convertible));
+        add("innovation".to_owned(), ColumnValues::Real(trace.innovation().to_vec()));
+        add(
+            "steps_shortened".to_owned(),
+            ColumnValues::Whole(trace.steps_shortened().to_vec()),
+        );
+        let mut comments = vec![
+            format!("hoid {} track {}", env!("CARGO_PKG_VERSION"), self.file),
+            "units: t s, K_e deg/deg, T_L s, K_e_dot s, omega_nm rad/s; _se are standard errors".to_owned(),
+        ];
+        comments.extend(self.settings.iter().map(|(k, v)| format!("{k}: {v}")));
+        if let Some(fit) = trace.start() {
+            comments.push(format!("start fit: {}", coefficients_text(fit)));
+        }
+        OutputTable { comments, columns }
+    }
+
+    /// The operator's columns: those of every trace, and the delay where it is tracked.
+    fn operator_columns(&self) -> Vec<&'static str> {
+        let mut names = OPERATOR_COLUMNS.to_vec();
+        if self.trace.options().track_delay_s.is_some() {
+            names.push("tau_e");
+        }
+        names
+    }
+
+    /// True where the coefficients stand for an operator at all.
+    fn has_operator(&self) -> bool {
+        self.operators.iter().any(|o| {
+            !matches!(
+                o,
+                Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. })
+            )
+        })
+    }
+
+    fn first_moved_row(&self) -> usize {
+        // Half a sample, so that rounding of the times does not decide.
+        let from = self.trace.updated_from_s() - self.record.sample_time().s() / 2.0;
+        let first = self.trace.times_s().partition_point(|t| *t < from);
+        first.min(self.trace.len().saturating_sub(1))
+    }
+
+    fn not_converted(&self) -> NotConverted {
+        let mut kinds: BTreeMap<&'static str, (usize, String)> = BTreeMap::new();
+        for reason in self.operators.iter().filter_map(|o| o.as_ref().err()) {
+            let (kind, example) = match reason {
+                NotConvertible::NegativeRealPole { .. } => (
+                    "pole",
+                    "a pole lies on the closed negative real axis, so that no real continuous system has it".to_owned(),
+                ),
+                NotConvertible::NoNaturalFrequency { .. } => (
+                    "frequency",
+                    "the continuous denominator has no positive omega_nm^2".to_owned(),
+                ),
+                other => ("other", other.to_string()),
+            };
+            kinds.entry(kind).or_insert((0, example)).0 += 1;
+        }
+        NotConverted {
+            rows: kinds.values().map(|(n, _)| n).sum(),
+            reason: kinds.into_values().max_by_key(|(n, _)| *n).map(|(_, text)| text),
+        }
+    }
+
+    /// Root of the mean square of the relative error, of the rows in which the estimate moved and converted, for each parameter whose truth
+    /// the record holds.
+    fn relative_errors(&self) -> Vec<(&'static str, f64)> {
+        let (begin, ts) = (self.record.time_s(0), self.record.sample_time().s());
+        let rows = self.first_moved_row()..self.trace.len();
+        let of = |name: &'static str| {
+            let truth = self.record.channel(name)?;
+            let squares: Vec<f64> = rows
+                .clone()
+                .filter_map(|row| {
+                    let found = value_of(&self.operators[row], name)?.value;
+                    let k = ((self.trace.times_s()[row] - begin) / ts).round() as usize;
+                    let truth = truth.get(k).copied().filter(|v| *v != 0.0)?;
+                    Some((found / truth - 1.0).powi(2))
+                })
+                .collect();
+            let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+            (!squares.is_empty()).then(|| (name, mean.sqrt()))
+        };
+        self.operator_columns().into_iter().filter_map(of).collect()
+    }
+
+    /// A summary for people.
+    ///
+    /// # Errors
+    /// Those of the quality of the start fit.
+    pub fn page(&self) -> Result<String, CliError> {
+        let mut page = text::records(std::slice::from_ref(&self.file), std::slice::from_ref(self.record));
+        if let Some(choice) = self.choice {
+            page.push('\n');
+            page.push_str(&text::candidates(choice));
+        }
+        if let (Some(fit), Some(span)) = (self.trace.start(), &self.span) {
+            let q = fit.quality(std::slice::from_ref(span))?;
+            page.push_str(&format!(
+                "\nStart: batch fit of {:.2} to {:.2} s, {}; VAF simulation {:.2} %, prediction {:.2} %.\n",
+                span.time_s(0),
+                span.time_s(span.len()),
+                fit.title(),
+                q.vaf_simulation,
+                q.vaf_prediction
+            ));
+        }
+        page.push_str(&self.rows_shown());
+        let errors = self.relative_errors();
+        if !errors.is_empty() {
+            let each: Vec<String> = errors
+                .iter()
+                .map(|(name, e)| format!("{name} {:.1} %", 100.0 * e))
+                .collect();
+            page.push_str(&format!(
+                "RMS relative error against the truth in the record, from {:.2} s on: {}.\n",
+                self.trace.times_s()[self.first_moved_row()],
+                each.join(", ")
+            ));
+        }
+        page.push_str(&self.counts());
+        page.push_str(&text::settings(self.settings));
+        page.push_str(&format!("Trace: {}\n", self.out));
+        Ok(page)
+    }
+
+    /// The estimate at a handful of times.
+    fn rows_shown(&self) -> String {
+        let trace = self.trace;
+        if trace.is_empty() {
+            return String::new();
+        }
+        let (first, last) = (self.first_moved_row(), trace.len() - 1);
+        let shown = ROWS_SHOWN.min(last - first + 1);
+        let mut picked: Vec<usize> = (0..shown)
+            .map(|i| first + (last - first) * i / (shown - 1).max(1))
+            .collect();
+        picked.dedup();
+        let with_operator = self.has_operator();
+        let units = ["deg/deg", "s", "s", "rad/s", "", "s"];
+        let mut header = vec!["t in s".to_owned()];
+        if with_operator {
+            let named = self.operator_columns().into_iter().zip(units);
+            header.extend(named.map(|(n, u)| {
+                if u.is_empty() {
+                    n.to_owned()
+                } else {
+                    format!("{n} ({u})")
+                }
+            }));
+        } else {
+            header.extend(trace.parameter_names().into_iter().take(COEFFICIENTS_SHOWN));
+        }
+        let mut rows = text::table(&header.iter().map(String::as_str).collect::<Vec<_>>());
+        for row in picked {
+            let mut cells = vec![format!("{:.2}", trace.times_s()[row])];
+            if with_operator {
+                let of = |name| value_of(&self.operators[row], name);
+                cells.extend(self.operator_columns().into_iter().map(|n| plus_minus(of(n))));
+            } else {
+                let all = trace.parameters(row);
+                cells.extend(all.into_iter().take(COEFFICIENTS_SHOWN).map(|e| plus_minus(Some(e))));
+            }
+            rows.add_row(cells);
+        }
+        format!(
+            "\nEstimate by {} with one standard error; the trace has all {} rows.\n{rows}\n",
+            trace.options().method.name(),
+            trace.len()
+        )
+    }
+
+    fn counts(&self) -> String {
+        let c = self.trace.counts();
+        let mut text = format!(
+            "{} samples; {} skipped for a fault in e or u; {} made shorter to stay stable or within bounds.\n",
+            c.samples,
+            c.skipped,
+            text::steps(usize::try_from(c.shortened).unwrap_or(usize::MAX))
+        );
+        if self.has_operator() {
+            let none = self.not_converted();
+            text.push_str(&format!("{} of {} rows have no operator", none.rows, self.trace.len()));
+            text.push_str(&match none.reason {
+                Some(reason) => format!("; most often {reason}.\n"),
+                None => ".\n".to_owned(),
+            });
+        }
+        text
+    }
+
+    /// The object of the contract.
+    ///
+    /// # Errors
+    /// Those of the quality of the start fit.
+    pub fn to_json(&self) -> Result<Value, CliError> {
+        let trace = self.trace;
+        let counts = trace.counts();
+        let mut map = Map::new();
+        let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
+        set("hoid", json!(env!("CARGO_PKG_VERSION")));
+        set(
+            "records",
+            json::records(std::slice::from_ref(&self.file), std::slice::from_ref(self.record)),
+        );
+        set("method", json!(trace.options().method.name()));
+        set("structure", json!(trace.options().structure.name()));
+        set("orders", json::orders(&trace.options().orders));
+        let start = match (trace.start(), &self.span) {
+            (Some(fit), Some(span)) => self.start_json(fit, span)?,
+            _ => Value::Null,
+        };
+        set("start", start);
+        set("updated_from", number(trace.updated_from_s()));
+        set("last", self.last_json());
+        set("samples", json!(counts.samples));
+        set("skipped", json!(counts.skipped));
+        set("steps_shortened", json!(counts.shortened));
+        set("rows", json!(trace.len()));
+        let none = self.not_converted();
+        set("rows_not_convertible", json!(none.rows));
+        set("not_convertible_reason", json!(none.reason));
+        let errors: Map<String, Value> = self
+            .relative_errors()
+            .into_iter()
+            .map(|(name, e)| (name.to_owned(), number(e)))
+            .collect();
+        set("rms_relative_error", Value::Object(errors));
+        set("trace", json!(self.out));
+        let settings: Map<String, Value> = self.settings.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
+        set("settings", Value::Object(settings));
+        Ok(Value::Object(map))
+    }
+
+    /// The start fit as `identify` gives it.
+    fn start_json(&self, fit: &Fit, span: &Record) -> Result<Value, CliError> {
+        let records = std::slice::from_ref(span);
+        let operator = fit.operator();
+        let remnant = (fit.orders().nd > 0).then(|| fit.remnant(RemnantDiscretisation::ZeroOrderHold));
+        Ok(Identified {
+            files: std::slice::from_ref(&self.file),
+            records,
+            fit,
+            choice: self.choice,
+            grey_box: None,
+            quality: fit.quality(records)?,
+            operator: &operator,
+            remnant: remnant.as_ref(),
+            margins: None,
+            validations: &[fit.validate(span)?],
+            ahead: None,
+            validation: None,
+            settings: &[(
+                "span in s".to_owned(),
+                format!("{} to {}", span.time_s(0), span.time_s(span.len())),
+            )],
+        }
+        .to_json())
+    }
+
+    fn last_json(&self) -> Value {
+        let trace = self.trace;
+        let Some(row) = trace.len().checked_sub(1) else {
+            return Value::Null;
+        };
+        let names = trace.parameter_names();
+        let parameters: Map<String, Value> = names
+            .into_iter()
+            .zip(trace.parameters(row))
+            .map(|(name, e)| (name, json::estimate(&e)))
+            .collect();
+        json!({
+            "t": number(trace.times_s()[row]),
+            "parameters": parameters,
+            "operator": json::operator(&self.operators[row]),
+            "innovation": number(trace.innovation()[row]),
+            "innovation_variance": number(trace.innovation_variance()[row]),
+        })
+    }
+}
+
+/// A parameter of the operator by its name.
+fn value_of(operator: &Result<OperatorEstimate, NotConvertible>, name: &str) -> Option<Estimate> {
+    let rows = operator.as_ref().ok()?.rows();
+    rows.into_iter().find(|(n, _, _)| *n == name).map(|(_, _, e)| e)
+}
+
+fn plus_minus(e: Option<Estimate>) -> String {
+    match e {
+        None => numbers::DASH.to_owned(),
+        Some(e) => match text::with_uncertainty(&e) {
+            (value, error) if error == numbers::DASH => value,
+            (value, error) => format!("{value} ± {error}"),
+        },
+    }
+}
+
+fn coefficients_text(fit: &Fit) -> String {
+    let each: Vec<String> = fit
+        .parameters()
+        .iter()
+        .map(|(name, e)| format!("{name}={}", e.value))
+        .collect();
+    each.join(", ")
+}

@@ -1,0 +1,49 @@
+//! Running the program as a user does.
+// Each file of tests uses its own part of this.
+#![allow(dead_code, clippy::unwrap_used)]
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output},
+};
+
+use serde_json::Value;
+
+pub fn hoid(directory: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hoid"))
+        .args(arguments)
+        .current_dir(directory)
+        .output()
+        .unwrap()
+}
+
+pub fn good(directory: &Path, arguments: &[&str]) -> String {
+    let output = hoid(directory, arguments);
+    assert!(
+        output.status.success(),
+        "{arguments:?}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    String::from_utf8(output.stdout).unwrap()
+}
+
+pub fn json(directory: &Path, arguments: &[&str]) -> Value {
+    serde_json::from_str(&good(directory, arguments)).unwrap()
+}
+
+/// Exit code and message of a command that fails, which must print nothing on standard output and leave no file behind.
+pub fn bad(directory: &Path, arguments: &[&str]) -> (i32, String) {
+    let files = |d: &Path| fs::read_dir(d).unwrap().count();
+    let before = files(directory);
+    let output = hoid(directory, arguments);
+    assert!(
+        output.stdout.is_empty(),
+        "{arguments:?}: {}",
+        String::from_utf8_lossy(&output.stdout)
+    );
+    assert_eq!(files(directory), before, "{arguments:?} left a file behind");
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(!message.contains("panicked"), "{message}");
+    (output.status.code().unwrap(), message)
+}

@@ -1,0 +1,436 @@
+//! `hoid stream` through real pipes.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::{
+    fmt::Write as _,
+    io::{BufRead, BufReader, Read, Write},
+    path::Path,
+    process::{Child, ChildStdin, Command, ExitStatus, Stdio},
+    sync::mpsc::{Receiver, channel},
+    thread,
+    time::{Duration, Instant},
+};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use common::{bad, good, json};
+
+/// Far beyond what a line takes, so that a slow machine fails no test and a line that never comes does not hang.
+const PATIENCE: Duration = Duration::from_secs(60);
+const AT_ONCE: [&str; 8] = [
+    "--method", "rpem", "--nk", "29", "--orders", "nd=1", "--start", "nothing",
+];
+
+/// A stream that is running.
+struct Stream {
+    child: Child,
+    input: Option<ChildStdin>,
+    lines: Receiver<String>,
+}
+
+impl Stream {
+    fn new(arguments: &[&str]) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))
+            .args(["stream", "--fs", "100"])
+            .args(arguments)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let (sender, lines) = channel();
+        let mut out = BufReader::new(child.stdout.take().unwrap());
+        thread::spawn(move || {
+            loop {
+                let mut line = String::new();
+                match out.read_line(&mut line) {
+                    Ok(n) if n > 0 => {}
+                    _ => return,
+                }
+                if sender.send(line).is_err() {
+                    return;
+                }
+            }
+        });
+        Self {
+            input: child.stdin.take(),
+            child,
+            lines,
+        }
+    }
+
+    fn write(&mut self, text: &str) {
+        let input = self.input.as_mut().unwrap();
+        input.write_all(text.as_bytes()).unwrap();
+        input.flush().unwrap();
+    }
+
+    fn line(&self) -> Value {
+        let line = self.lines.recv_timeout(PATIENCE).unwrap();
+        assert!(line.ends_with('\n'), "{line}");
+        serde_json::from_str(&line).unwrap()
+    }
+
+    fn ask(&mut self, line: &str) -> Value {
+        self.write(&format!("{line}\n"));
+        self.line()
+    }
+
+    fn interrupt(&self) {
+        let id = self.child.id().to_string();
+        assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    }
+
+    /// Waits for the end: how it ended, the lines that were left, what it said.
+    fn end(mut self) -> (ExitStatus, Vec<String>, String) {
+        drop(self.input.take());
+        let begun = Instant::now();
+        let status = loop {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                break status;
+            }
+            assert!(begun.elapsed() < PATIENCE, "the stream does not end");
+            thread::sleep(Duration::from_millis(2));
+        };
+        let mut said = String::new();
+        self.child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+        assert!(!said.contains("panicked"), "{said}");
+        (status, self.lines.iter().collect(), said)
+    }
+}
+
+fn wave(k: usize) -> (f64, f64) {
+    let t = k as f64 / 100.0;
+    (
+        (1.7 * t).sin() + 0.5 * (9.1 * t).sin(),
+        0.1 * (1.7 * t - 0.8).sin() + 0.03 * (23.0 * t).cos(),
+    )
+}
+
+/// Feeds a whole text and collects the answers.
+fn answers(arguments: &[&str], text: &str) -> (Vec<Value>, String) {
+    let mut stream = Stream::new(arguments);
+    let mut input = stream.input.take().unwrap();
+    let text = text.to_owned();
+    let writer = thread::spawn(move || input.write_all(text.as_bytes()).unwrap());
+    writer.join().unwrap();
+    let (status, lines, said) = stream.end();
+    assert!(status.success(), "{said}");
+    (lines.iter().map(|l| serde_json::from_str(l).unwrap()).collect(), said)
+}
+
+/// A simulated run as text, and in `c.csv`.
+fn simulated(directory: &Path, seed: &str) -> String {
+    let text = good(
+        directory,
+        &["simulate", "--condition", "C4", "--seed", seed, "--out", "-"],
+    );
+    good(
+        directory,
+        &["simulate", "--condition", "C4", "--seed", seed, "--out", "c.csv"],
+    );
+    assert_eq!(text, std::fs::read_to_string(directory.join("c.csv")).unwrap());
+    text
+}
+
+#[test]
+fn one_line_gives_one_line_at_once() {
+    let mut stream = Stream::new(&AT_ONCE);
+    for k in 0..200 {
+        let (e, u) = wave(k);
+        let line = stream.ask(&format!("{e},{u}"));
+        assert!((line["t"].as_f64().unwrap() - k as f64 / 100.0).abs() < 1e-9);
+        let names: Vec<&String> = line["parameters"].as_object().unwrap().keys().collect();
+        assert_eq!(names, ["b0", "b1", "d1", "f1", "f2"]);
+        assert!(line["innovation"].is_f64() && line["operator"]["convertible"].is_boolean());
+        assert_eq!((&line["skipped"], &line["dropped"]), (&0.into(), &0.into()));
+        assert!(line["shortened"].is_u64() && line.get("fault").is_none() && line.get("warm_up").is_none());
+    }
+    let (status, rest, said) = stream.end();
+    assert!(
+        status.success() && rest.is_empty() && said.contains("200 samples"),
+        "{said}"
+    );
+}
+
+#[test]
+fn simulate_into_stream_is_track() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    let mut simulate = Command::new(env!("CARGO_BIN_EXE_hoid"))
+        .args(["simulate", "--condition", "C4", "--seed", "3", "--out", "-"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
+        .args(["stream", "--fs", "100"])
+        .stdin(simulate.stdout.take().unwrap())
+        .output()
+        .unwrap();
+    assert!(simulate.wait().unwrap().success() && output.status.success());
+    let text = String::from_utf8(output.stdout).unwrap();
+    let lines: Vec<Value> = text.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    assert_eq!(lines.len(), 8192);
+    assert_eq!(lines[0]["warm_up"], serde_json::json!({"collected": 1, "needed": 2000}));
+    assert!(lines[1998]["parameters"].is_null() && lines[1999]["parameters"]["b0"]["value"].is_f64());
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("method: physical") && said.contains("nk=29"), "{said}");
+    // The same fit of the first 20 s, the same samples: the same numbers.
+    simulated(d, "3");
+    let tracked = json(
+        d,
+        &[
+            "track",
+            "c.csv",
+            "--start-span",
+            "0..20",
+            "--out",
+            "trace.csv",
+            "--json",
+        ],
+    );
+    let last = lines.last().unwrap();
+    assert_eq!(last["parameters"], tracked["last"]["parameters"]);
+    assert_eq!(last["operator"], tracked["last"]["operator"]);
+    assert_eq!(last["innovation"], tracked["last"]["innovation"]);
+}
+
+#[test]
+fn hostile_lines_are_told_and_counted_and_poison_nothing() {
+    let mut stream = Stream::new(&AT_ONCE);
+    let sound = |stream: &mut Stream, from: usize| {
+        let mut last = Value::Null;
+        for k in from..from + 300 {
+            let (e, u) = wave(k);
+            last = stream.ask(&format!("{e},{u}"));
+        }
+        last
+    };
+    let before = sound(&mut stream, 0);
+    assert_eq!(before["skipped"], 0);
+    let long = "7".repeat(200_000);
+    let hostile = [
+        ("NaN,0.1", "e is NaN"),
+        ("0.1,inf", "u is inf"),
+        ("1e300,0.1", "e is 1e300"),
+        ("0.1,-1e300", "u is -1e300"),
+        (",", "e is missing; u is missing"),
+        ("0.1,", "u is missing"),
+        ("abc,0.1", "e is \"abc\", no number"),
+        ("complete garbage", "1 cells, expected 2"),
+        ("1,2,3", "3 cells, expected 2"),
+        (long.as_str(), "longer"),
+        ("e,u", "no number"),
+        ("\u{1}\u{2}", "cells"),
+    ];
+    let mut skipped = 0;
+    for (text, fault) in hostile {
+        let line = stream.ask(text);
+        skipped += 1;
+        assert!(line["fault"].as_str().unwrap().contains(fault), "{line}");
+        assert_eq!(line["skipped"], skipped, "{line}");
+        assert!(line["innovation"].is_null());
+        // The estimate stays.
+        assert_eq!(line["parameters"], before["parameters"]);
+    }
+    // Blank lines and comments are nothing at all.
+    stream.write("\n   \n# a comment\n\r\n");
+    let after = sound(&mut stream, 300);
+    assert_eq!(after["skipped"], skipped);
+    for (name, p) in after["parameters"].as_object().unwrap() {
+        assert!(p["value"].as_f64().unwrap().abs() < 10.0, "{name}: {p}");
+    }
+    let (status, rest, said) = stream.end();
+    assert!(status.success() && rest.is_empty(), "{rest:?}");
+    assert!(said.contains("612 samples: 12 skipped"), "{said}");
+}
+
+#[test]
+fn late_lines_are_bridged_and_lines_behind_are_dropped() {
+    let mut stream = Stream::new(&AT_ONCE);
+    stream.write("t;e;u;f_t\n");
+    let row = |k: usize| {
+        let (e, u) = wave(k);
+        format!("{};{e};{u};0.5", k as f64 / 100.0)
+    };
+    for k in 0..50 {
+        assert!(stream.ask(&row(k)).get("fault").is_none());
+    }
+    let line = stream.ask(&row(53));
+    assert!(line["fault"].as_str().unwrap().contains("3 missing"), "{line}");
+    assert_eq!((&line["skipped"], &line["dropped"]), (&3.into(), &0.into()));
+    assert!(line["innovation"].is_f64());
+    let line = stream.ask(&row(53));
+    assert!(line["fault"].as_str().unwrap().contains("not later"), "{line}");
+    assert_eq!((&line["skipped"], &line["dropped"]), (&3.into(), &1.into()));
+    let line = stream.ask("x;1;2;3");
+    assert!(line["fault"].as_str().unwrap().contains("t is \"x\""), "{line}");
+    assert_eq!((&line["skipped"], &line["dropped"]), (&3.into(), &2.into()));
+    assert!(stream.ask(&row(54)).get("fault").is_none());
+    // A pause of a minute: ten seconds of it are bridged.
+    let line = stream.ask(&row(6054));
+    assert!(line["fault"].as_str().unwrap().contains("10 s are bridged"), "{line}");
+    assert_eq!(line["skipped"], 1003);
+    assert!(stream.ask(&row(6055)).get("fault").is_none());
+    let (status, _, said) = stream.end();
+    assert!(status.success() && said.contains("2 lines dropped"), "{said}");
+}
+
+#[test]
+fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
+    let directory = TempDir::new().unwrap();
+    let text = simulated(directory.path(), "1");
+    let mut input = String::new();
+    // Silence, then the run: of twice 6 s that are kept, the fit at 9 s sees 3 s of the run.
+    for _ in 0..600 {
+        input.push_str("0,0\n");
+    }
+    let rows = text.lines().filter(|l| l.starts_with(|c: char| c.is_ascii_digit()));
+    for row in rows.take(3000) {
+        let cells: Vec<&str> = row.split(',').collect();
+        writeln!(input, "{},{}", cells[2], cells[3]).unwrap();
+    }
+    let arguments = ["--warm-up", "6", "--nk", "29", "--orders", "nd=1"];
+    let (lines, said) = answers(&arguments, &input);
+    assert_eq!(lines.len(), 3600);
+    let tried = &lines[599]["warm_up"];
+    assert!(
+        tried["reason"].as_str().unwrap().contains("0 in every sample"),
+        "{tried}"
+    );
+    assert_eq!((&tried["collected"], &tried["needed"]), (&600.into(), &750.into()));
+    let last = lines.last().unwrap();
+    assert_eq!(last["operator"]["convertible"], true, "{last}");
+    assert!(said.contains("started after"), "{said}");
+    // A stream that ends before says so.
+    let (lines, said) = answers(&arguments, "0.1,0.2\n0.2,0.1\n");
+    assert_eq!(lines.len(), 2);
+    assert!(said.contains("The warm-up did not end: 2 of 600"), "{said}");
+    // Faults within the warm-up: a short one is bridged, a long one begins it anew.
+    let mut input: String = (0..50).map(|k| format!("{},{}\n", wave(k).0, wave(k).1)).collect();
+    input.push_str("nan,0\n0.1,0.2\n");
+    let (lines, _) = answers(&arguments, &input);
+    assert_eq!(lines.last().unwrap()["warm_up"]["collected"], 52);
+    let (lines, _) = answers(&arguments, &(input + &",\n".repeat(101) + "0.1,0.2\n"));
+    let last = &lines.last().unwrap()["warm_up"];
+    assert!(
+        last["collected"] == 1 && last["reason"].as_str().unwrap().contains("anew"),
+        "{last}"
+    );
+}
+
+#[test]
+fn every_nth_line_and_the_faults_between() {
+    let mut arguments = AT_ONCE.to_vec();
+    arguments.extend(["--every", "10"]);
+    let mut input: String = (0..40).map(|k| format!("{},{}\n", wave(k).0, wave(k).1)).collect();
+    input = input.replacen(&format!("{},{}\n", wave(14).0, wave(14).1), "nan,1\n", 1);
+    let (lines, _) = answers(&arguments, &input);
+    assert_eq!(lines.len(), 4);
+    assert!(lines[1]["fault"] == "e is NaN" && lines[2].get("fault").is_none());
+    assert!((lines[3]["t"].as_f64().unwrap() - 0.39).abs() < 1e-9);
+}
+
+#[test]
+fn a_reader_that_leaves_ends_the_stream_quietly() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))
+        .args(["stream", "--fs", "100"])
+        .args(AT_ONCE)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let mut input = child.stdin.take().unwrap();
+    // The program may be gone before the second line.
+    let _ = input.write_all(b"0.1,0.2\n0.1,0.2\n");
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    // The settings alone.
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        said.starts_with("started at once") && said.lines().count() == 1,
+        "{said}"
+    );
+    let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))
+        .args(["simulate", "--condition", "C1", "--out", "-"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_with_zero_and_whole_lines() {
+    // While it waits.
+    let mut stream = Stream::new(&AT_ONCE);
+    stream.ask("0.1,0.2");
+    stream.interrupt();
+    let begun = Instant::now();
+    while stream.child.try_wait().unwrap().is_none() {
+        assert!(begun.elapsed() < PATIENCE);
+        thread::sleep(Duration::from_millis(2));
+    }
+    let (status, rest, said) = stream.end();
+    assert_eq!(status.code(), Some(0));
+    assert!(rest.is_empty() && said.contains("1 samples"), "{said}");
+    // In the middle of its work.
+    let mut stream = Stream::new(&AT_ONCE);
+    let mut input = stream.input.take().unwrap();
+    let writer = thread::spawn(move || {
+        let text: String = (0..1000).map(|k| format!("{},{}\n", wave(k).0, wave(k).1)).collect();
+        while input.write_all(text.as_bytes()).is_ok() {}
+    });
+    stream.line();
+    thread::sleep(Duration::from_millis(100));
+    stream.interrupt();
+    let (status, rest, _) = stream.end();
+    writer.join().unwrap();
+    assert_eq!(status.code(), Some(0));
+    assert!(rest.len() > 10);
+    for line in rest {
+        assert!(
+            line.ends_with('\n') && serde_json::from_str::<Value>(&line).is_ok(),
+            "{line}"
+        );
+    }
+}
+
+#[test]
+fn wrong_usage_and_wrong_headers() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    for arguments in [
+        &["stream"][..],
+        &["stream", "--fs", "0"],
+        &["stream", "--fs", "100", "--start", "nothing"],
+        &["stream", "--fs", "100", "--start", "nothing", "--nk", "29"],
+        &["stream", "--fs", "100", "--start", "nothing", "--warm-up", "5"],
+        &["stream", "--fs", "100", "--warm-up", "0"],
+        &["stream", "--fs", "100", "--every", "0"],
+        &["stream", "--fs", "100", "--method", "rls", "--structure", "bj"],
+        &["stream", "--fs", "100", "--memory-of", "x=1000"],
+        &["stream", "--fs", "100", "--memory", "0.001s"],
+    ] {
+        let (code, message) = bad(d, arguments);
+        assert_eq!(code, 2, "{arguments:?}: {message}");
+    }
+    let mut stream = Stream::new(&[]);
+    stream.write("t,x,y\n0,1,2\n");
+    let (status, lines, said) = stream.end();
+    assert_eq!(status.code(), Some(1));
+    assert!(
+        lines.is_empty() && said.contains("t, x, y") && said.contains("--input"),
+        "{said}"
+    );
+}

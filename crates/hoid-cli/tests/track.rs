@@ -1,0 +1,326 @@
+//! `hoid track` as a user runs it.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::{fs, path::Path};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use common::{bad, good, json};
+
+const KNOWN_ORDERS: [&str; 4] = ["--nk", "29", "--orders", "nd=1"];
+
+fn simulated(condition: &str) -> TempDir {
+    let directory = TempDir::new().unwrap();
+    let arguments = ["simulate", "--condition", condition, "--seed", "1", "--out", "c.csv"];
+    good(directory.path(), &arguments);
+    directory
+}
+
+/// Runs `track` with the trace in `trace.csv`.
+fn tracked(directory: &Path, more: &[&str]) -> Value {
+    let mut arguments = vec!["track", "c.csv", "--out", "trace.csv", "--json"];
+    arguments.extend(more);
+    json(directory, &arguments)
+}
+
+/// Header and rows of a trace; an empty cell is NaN.
+fn trace(directory: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
+    let text = fs::read_to_string(directory.join("trace.csv")).unwrap();
+    let mut lines = text.lines().filter(|l| !l.starts_with('#'));
+    let header = lines.next().unwrap().split(',').map(str::to_owned).collect();
+    let number = |cell: &str| {
+        if cell.is_empty() {
+            f64::NAN
+        } else {
+            cell.parse().unwrap()
+        }
+    };
+    (header, lines.map(|l| l.split(',').map(number).collect()).collect())
+}
+
+fn column(trace: &(Vec<String>, Vec<Vec<f64>>), name: &str) -> Vec<f64> {
+    let place = trace.0.iter().position(|n| n == name).unwrap();
+    trace.1.iter().map(|row| row[place]).collect()
+}
+
+#[test]
+fn defaults_find_the_operator_and_its_change() {
+    let directory = simulated("C4");
+    let d = directory.path();
+    let found = tracked(d, &[]);
+    assert_eq!(found["method"], "physical");
+    assert_eq!(
+        found["orders"],
+        serde_json::json!({"na": 0, "nb": 2, "nc": 0, "nd": 1, "nf": 2, "nk": 29})
+    );
+    // The start is a fit as identify gives it, with the table of the search: nk 6..61, nd 1..4.
+    assert_eq!(found["start"]["candidates"].as_array().unwrap().len(), 224);
+    assert_eq!(found["start"]["records"][0]["samples"], 2731);
+    assert_eq!(found["start"]["operator"]["convertible"], true);
+    assert_eq!((&found["samples"], &found["skipped"]), (&8192.into(), &0.into()));
+    assert_eq!(found["rows_not_convertible"], 0);
+    assert!(found["steps_shortened"].is_u64() && found["not_convertible_reason"].is_null());
+    for name in ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"] {
+        let error = found["rms_relative_error"][name].as_f64().unwrap();
+        assert!(error > 0.0 && error < 0.3, "{name}: {error}");
+    }
+    let trace = trace(d);
+    assert_eq!(
+        trace.0.join(","),
+        "t,b0,b0_se,b1,b1_se,d1,d1_se,f1,f1_se,f2,f2_se,K_e,K_e_se,T_L,T_L_se,K_e_dot,K_e_dot_se,\
+         omega_nm,omega_nm_se,zeta_nm,zeta_nm_se,convertible,innovation,steps_shortened"
+    );
+    assert_eq!(trace.1.len(), 8192);
+    // Until the end of the start span the estimate stays.
+    let gain = column(&trace, "K_e");
+    assert!((0..2730).all(|k| gain[k] == gain[0]) && gain[2800] != gain[0]);
+    // Before and long after the change of C4, within five standard errors.
+    for (k, truth) in [(3500, 0.036), (8191, 0.084)] {
+        let (value, error) = (column(&trace, "K_e_dot")[k], column(&trace, "K_e_dot_se")[k]);
+        assert!((value - truth).abs() < 5.0 * error, "{k}: {value} +- {error}");
+    }
+    let last = trace.1.last().unwrap();
+    let of = |value: &Value| value["value"].as_f64().unwrap();
+    assert_eq!(of(&found["last"]["parameters"]["b0"]), last[1]);
+    assert_eq!(of(&found["last"]["operator"]["K_e"]), last[11]);
+    assert_eq!(found["last"]["t"].as_f64().unwrap(), last[0]);
+}
+
+#[test]
+fn the_page_reads_well() {
+    let directory = simulated("C4");
+    let d = directory.path();
+    let mut arguments = vec!["track", "c.csv", "--out", "trace.csv"];
+    arguments.extend(KNOWN_ORDERS);
+    let page = good(d, &arguments);
+    for part in [
+        "8192 samples of 0.01 s",
+        "Start: batch fit of 0.00 to 27.31 s, BJ(nb=2, nd=1, nf=2, nk=29)",
+        "omega_nm (rad/s)",
+        "RMS relative error",
+        "0 skipped for a fault in e or u",
+        "0 of 8192 rows have no operator",
+        "K_e 5 s (500 samples)",
+        "estimate moves from: 27.31 s",
+        "Trace: trace.csv",
+    ] {
+        assert!(page.contains(part), "{part:?} is not in:\n{page}");
+    }
+    assert_eq!(page.lines().filter(|l| l.contains('±')).count(), 8);
+    // A record without the truth.
+    let text = fs::read_to_string(d.join("c.csv")).unwrap();
+    let renamed = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"]
+        .iter()
+        .fold(text, |t, n| t.replace(&format!(",{n},"), &format!(",was_{n},")));
+    fs::write(d.join("c.csv"), renamed).unwrap();
+    assert!(!good(d, &arguments).contains("RMS relative error"));
+}
+
+#[test]
+fn every_method_structure_and_way_of_forgetting_runs() {
+    let directory = simulated("C4");
+    let d = directory.path();
+    let cases: [&[&str]; 17] = [
+        &["--method", "rls"],
+        &["--method", "rls", "--structure", "fir", "--orders", "nb=3"],
+        &["--method", "rls", "--forgetting", "window", "--covariance", "0.1"],
+        &["--method", "rpem", "--orders", "nd=1"],
+        &["--method", "rpem", "--structure", "oe"],
+        &["--method", "rpem", "--structure", "armax", "--pseudo-linear"],
+        &["--method", "rpem", "--structure", "ararx", "--stable", "noise"],
+        &["--method", "rpem", "--orders", "nd=1", "--forgetting", "variable"],
+        &["--method", "rpem", "--orders", "nd=1", "--forgetting", "directional"],
+        &[
+            "--method",
+            "rpem",
+            "--orders",
+            "nd=1",
+            "--forgetting",
+            "random-walk",
+            "--drift",
+            "b0=.01,b1=.01",
+        ],
+        &["--method", "rls", "--forgetting", "gradient", "--rate", ".01"],
+        &[
+            "--method", "window", "--orders", "nd=1", "--window", "15s", "--refit", "400",
+        ],
+        &["--method", "rriv", "--orders", "nd=1"],
+        &["--orders", "nd=2", "--memory-of", "K_e=5s,d=1000,zeta_nm=inf"],
+        &["--orders", "nd=1", "--bound", "omega_nm=5..30,zeta_nm=.1..1"],
+        &["--orders", "nd=1", "--moving-average", "1.28", "--start-span", "0..15"],
+        &["--orders", "nd=1", "--start", "nothing", "--update-from", "1"],
+    ];
+    for case in cases {
+        let mut arguments = vec!["--nk", "29", "--to", "30", "--every", "7"];
+        arguments.extend(case);
+        let found = tracked(d, &arguments);
+        let trace = trace(d);
+        // 3000 samples: every seventh and the last.
+        assert_eq!(trace.1.len(), 429, "{case:?}");
+        assert_eq!(found["rows"], 429);
+        let names = found["last"]["parameters"].as_object().unwrap();
+        assert!(names.values().all(|p| p["value"].is_f64()), "{case:?}");
+        for name in names.keys() {
+            assert!(column(&trace, name).iter().all(|v| v.is_finite()), "{case:?} {name}");
+        }
+        let convertible: f64 = column(&trace, "convertible").iter().sum();
+        assert_eq!(found["rows_not_convertible"], 429 - convertible as u64, "{case:?}");
+        assert_eq!(
+            found["not_convertible_reason"].is_null(),
+            convertible == 429.0,
+            "{case:?}"
+        );
+    }
+    let found = tracked(d, &["--orders", "nd=1", "--track-delay", ".2...4", "--to", "30"]);
+    assert!((found["last"]["operator"]["tau_e"]["value"].as_f64().unwrap() - 0.28).abs() < 0.03);
+    assert!(column(&trace(d), "tau_e_se").iter().all(|e| *e > 0.0));
+}
+
+#[test]
+fn memories_are_the_same_in_every_unit() {
+    let directory = simulated("C1");
+    let d = directory.path();
+    let rows = |more: &[&str]| {
+        let mut arguments = vec!["--method", "rpem", "--every", "50"];
+        arguments.extend(KNOWN_ORDERS);
+        arguments.extend(more);
+        tracked(d, &arguments);
+        trace(d).1
+    };
+    let samples = rows(&["--memory", "256"]);
+    assert_eq!(rows(&["--lambda", "0.99609375"]), samples);
+    assert_eq!(rows(&["--memory", "2.56s"]), samples);
+    assert_eq!(rows(&["--memory-of", "b=256,d1=256,f=2.56s"]), samples);
+    assert_ne!(rows(&[]), samples);
+    assert_ne!(rows(&["--memory", "inf"]), samples);
+    // Another start from the same numbers: theta moves from the first sample on.
+    let given = rows(&[
+        "--start",
+        "b0=.044,b1=-.043,d1=-.85,f1=-1.91,f2=.92",
+        "--covariance",
+        ".1",
+    ]);
+    assert!(given[2][1] != given[0][1]);
+}
+
+#[test]
+fn a_report_with_the_batch_fits() {
+    let directory = simulated("C4");
+    let d = directory.path();
+    let page = |more: &[&str]| {
+        let mut arguments = KNOWN_ORDERS.to_vec();
+        arguments.extend(["--every", "8", "--report", "out"]);
+        arguments.extend(more);
+        tracked(d, &arguments);
+        fs::read_to_string(d.join("out/report.html")).unwrap()
+    };
+    let own = page(&[]);
+    assert!(own.contains("<svg") && own.contains("c tracked by physical"));
+    let typed = page(&["--batch", "0..30.72,51.2..81.92"]);
+    assert!(typed.contains("51.2") && typed != own);
+    let (code, message) = bad(
+        d,
+        &[
+            "track", "c.csv", "--out", "x.csv", "--nk", "29", "--report", "r", "--batch", "90..95",
+        ],
+    );
+    assert!(code == 1 && message.contains("90"), "{message}");
+}
+
+#[test]
+fn what_does_not_fit_together_ends_with_two() {
+    let directory = simulated("C1");
+    let d = directory.path();
+    for (arguments, expected) in [
+        (&["--method", "rls", "--structure", "bj"][..], "arx or fir"),
+        (&["--method", "rls", "--structure", "arx", "--orders", "nd=1"], "nd"),
+        (&["--memory-of", "x=256"], "K_e, K_e_dot, omega_nm, zeta_nm"),
+        (&["--memory-of", "b0=256"], "K_e, K_e_dot, omega_nm, zeta_nm"),
+        (&["--memory-of", "K_e=0"], "no memory"),
+        (&["--memory-of", "K_e=5,K_e=6"], "twice"),
+        (&["--memory", "0"], "more than 1 sample"),
+        (&["--memory", "0.001s"], "memory"),
+        (&["--memory", "256", "--lambda", "0.9"], "--lambda"),
+        (&["--lambda", "1.5"], "factor"),
+        (&["--method", "kalman"], "rpem"),
+        (&["--structure", "arx"], "bj with nb = 2"),
+        (&["--structure", "grey-box"], "bj"),
+        (&["--forgetting", "random-walk"], "--drift"),
+        (&["--drift", "K_e=.1"], "--forgetting random-walk"),
+        (&["--forgetting", "random-walk", "--drift", "b0=.1"], "K_e"),
+        (&["--rate", ".1"], "--forgetting gradient"),
+        (&["--forgetting", "gradient", "--rate", "3"], "between 0 and 2"),
+        (&["--covariance", "-1"], "positive"),
+        (&["--largest", "0"], "positive"),
+        (&["--window", "10s"], "--method window"),
+        (&["--method", "window", "--memory", "256"], "--window"),
+        (&["--method", "window", "--window", "inf"], "seconds"),
+        (&["--method", "window", "--refit", "0"], "1 or more"),
+        (&["--method", "rpem", "--bound", "omega_nm=5..30"], "--method physical"),
+        (&["--bound", "K_x=5..30"], "K_e_dot"),
+        (&["--method", "rpem", "--track-delay", ".1...3"], "--method physical"),
+        (&["--start", "b0=1"], "--nk"),
+        (&["--start", "b0=1", "--nk", "29"], "--start lacks b1"),
+        (
+            &[
+                "--start",
+                "b0=1,b1=1,d1=0,f1=0,f2=0",
+                "--nk",
+                "29",
+                "--start-span",
+                "0..5",
+            ],
+            "drop one",
+        ),
+        (&["--every", "0"], "1 or more"),
+        (&["--batch", "0..20"], "--report"),
+        (&["--update-from", "100"], "81.92"),
+        (&["--moving-average", "-1"], "--moving-average"),
+        (&["--nk", "5..2"], "empty"),
+        (&["--method", "rpem", "--orders", "nx=2"], "nx"),
+    ] {
+        let mut all = vec!["track", "c.csv", "--out", "trace.csv"];
+        all.extend(arguments);
+        let (code, message) = bad(d, &all);
+        assert_eq!(code, 2, "{arguments:?}: {message}");
+        assert!(message.contains(expected), "{arguments:?}: {message}");
+    }
+    assert_eq!(bad(d, &["track", "c.csv"]).0, 2);
+}
+
+#[test]
+fn what_gives_no_result_ends_with_one() {
+    let directory = simulated("C1");
+    let d = directory.path();
+    let text = fs::read_to_string(d.join("c.csv")).unwrap();
+    fs::write(d.join("silent.csv"), "e,u\n".to_owned() + &"0,0\n".repeat(500)).unwrap();
+    fs::write(d.join("hole.csv"), text.replacen(",0.0", ",nan", 3000)).unwrap();
+    for (arguments, expected) in [
+        (&["absent.csv"][..], "cannot be read"),
+        (&["silent.csv", "--fs", "100"], "0 in every sample"),
+        (&["hole.csv"], "--fill"),
+        (&["c.csv", "--to", "0.5"], "samples"),
+        (&["c.csv", "--start-span", "500..600"], "500"),
+        (&["c.csv", "--input", "nobody"], "nobody"),
+        (
+            &["c.csv", "--nk", "29", "--start", "b0=1,b1=1,d1=0,f1=-2.1,f2=1.2"],
+            "start",
+        ),
+    ] {
+        let mut all = vec!["track", "--out", "trace.csv"];
+        all.extend(arguments);
+        let (code, message) = bad(d, &all);
+        assert_eq!(code, 1, "{arguments:?}: {message}");
+        assert!(message.contains(expected), "{arguments:?}: {message}");
+    }
+    for out in ["trace.xyz", "trace", "."] {
+        assert_eq!(bad(d, &["track", "c.csv", "--out", out]).0, 1, "{out}");
+    }
+    assert_eq!(
+        bad(d, &["track", "c.csv", "--nk", "29", "--out", "no/such/place.csv"]).0,
+        1
+    );
+}
