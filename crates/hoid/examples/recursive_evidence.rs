@@ -123,11 +123,11 @@ fn error_of_median(sorted: &[f64]) -> f64 {
     (sorted[(middle + away).min(n - 1)] - sorted[middle.saturating_sub(away)]) / 2.0
 }
 
-/// Time after the change at 40.96 s at which the median trace has covered 90 % of the step from .036 to .09 s.
+/// Time after the change at 40.96 s at which the median trace has covered 90 % of the step from .036 to .084 s.
 fn settling_time_s(traces: &[&[f64]]) -> f64 {
     for k in 4096..traces[0].len() {
         let mut values: Vec<f64> = traces.iter().map(|t| t[k]).filter(|v| v.is_finite()).collect();
-        if !values.is_empty() && median(&mut values) > 0.036 + 0.9 * (0.09 - 0.036) {
+        if !values.is_empty() && median(&mut values) > 0.036 + 0.9 * (0.084 - 0.036) {
             return (k - 4096) as f64 * 0.01;
         }
     }

@@ -366,9 +366,9 @@ fn the_texts_own_settings_are_there() {
     let trace = track(&record, &text, 1).unwrap();
     assert_eq!((trace.len(), trace.updated_from_s()), (8192, 0.0));
     let (before, after) = (trace.operator(4000).unwrap(), trace.operator(8191).unwrap());
-    // K_e_dot rises from .036 to .09 s.
+    // K_e_dot rises from .036 to .084 s.
     assert!((before.k_e_dot.value - 0.036).abs() < 0.012, "{:?}", before.k_e_dot);
-    assert!((after.k_e_dot.value - 0.09).abs() < 0.02, "{:?}", after.k_e_dot);
+    assert!((after.k_e_dot.value - 0.084).abs() < 0.02, "{:?}", after.k_e_dot);
     // By default nothing counts twice: the estimate stays until the span of its fit is over.
     let default = track(&record, &options(Method::Rpem), 1).unwrap();
     assert_eq!(default.theta(0), default.theta(3071));
