@@ -41,11 +41,6 @@ impl Past {
     pub fn newest(&self) -> &[f64] {
         &self.values[self.at..self.at + self.n]
     }
-
-    /// Zeros again.
-    pub fn clear(&mut self) {
-        self.values.fill(0.0);
-    }
 }
 
 /// `sum c_i x(t-i)` over as many terms as there are coefficients.

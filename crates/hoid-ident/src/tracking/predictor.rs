@@ -1,79 +1,84 @@
-//! One-step prediction, sample by sample, of `A u = (B/F) q^-nk e + (C/D) eps`:
-//!
-//! `w = B e(t-nk) - (F - 1) w`,  `v = A u - w`,  `eps = v + (D - 1) v - (C - 1) eps`.
+//! One-step prediction, sample by sample: the predictor of the kernel behind a delay line, for methods that need no gradient of it.
 //!
 //! The coefficients may change from sample to sample; the histories of w, v and eps keep the values that were right when they were
-//! taken.
+//! taken. A signal that overflows brings the filters to rest.
 
+use hoid_core::{
+    delay::DelayLine,
+    predictor::{AnyShape, Predictor as Kernel, Regressor},
+};
 use hoid_model::Orders;
 
-use super::past::{Past, bounded, weighted};
+use super::past::bounded;
+
+/// Room for coefficients.
+const ROOM: usize = 64;
 
 /// The predictor in direct form.
 #[derive(Debug, Clone)]
 pub(super) struct Predictor {
-    orders: Orders,
-    e: Past,
-    u: Past,
-    w: Past,
-    v: Past,
-    eps: Past,
+    kernel: Box<Kernel<AnyShape, ROOM, ROOM>>,
+    delay: DelayLine<Vec<f64>>,
+    nk: usize,
 }
 
 impl Predictor {
-    /// At rest.
-    pub fn new(orders: Orders) -> Self {
-        Self {
-            orders,
-            e: Past::new(orders.nk + orders.nb),
-            u: Past::new(orders.na),
-            w: Past::new(orders.nf),
-            v: Past::new(orders.nd),
-            eps: Past::new(orders.nc),
-        }
+    /// At rest. `None` for more than 64 coefficients.
+    pub fn new(orders: Orders) -> Option<Self> {
+        let shape = AnyShape {
+            na: orders.na,
+            nb: orders.nb,
+            nc: orders.nc,
+            nd: orders.nd,
+            nf: orders.nf,
+        };
+        Some(Self {
+            kernel: Box::new(Kernel::new(shape, Regressor::PseudoLinear)?),
+            delay: DelayLine::new(vec![0.0; orders.nk]),
+            nk: orders.nk,
+        })
     }
 
     /// Takes a sample and returns its prediction error eps under theta, in the order of [`Orders::parameter_names`].
     pub fn step(&mut self, theta: &[f64], e: f64, u: f64) -> f64 {
-        self.take(theta, e, Some(u)).1
+        let theta = padded(theta);
+        let eps = self.predict(&theta, e, u);
+        self.correct(&theta);
+        eps
     }
 
     /// Takes a sample whose output is missing; returns the prediction that takes its place.
     pub fn bridge(&mut self, theta: &[f64], e: f64) -> f64 {
-        self.take(theta, e, None).0
+        let theta = padded(theta);
+        // eps is the output less its prediction.
+        let prediction = -self.predict(&theta, e, 0.0);
+        self.kernel.bridge(&theta);
+        self.correct(&theta);
+        prediction
     }
 
-    /// The output, and its prediction error.
-    fn take(&mut self, theta: &[f64], e: f64, u: Option<f64>) -> (f64, f64) {
-        let o = &self.orders;
-        let (a, rest) = theta.split_at(o.na);
-        let (b, rest) = rest.split_at(o.nb);
-        let (c, rest) = rest.split_at(o.nc);
-        let (d, f) = rest.split_at(o.nd);
-        self.e.push(e);
-        let w = if o.nb > 0 {
-            weighted(b, &self.e.newest()[o.nk..]) - weighted(f, self.w.newest())
-        } else {
-            0.0
-        };
-        let feedback = weighted(a, self.u.newest()) - w;
-        let coloured = weighted(d, self.v.newest()) - weighted(c, self.eps.newest());
-        let u = bounded(u.unwrap_or(-feedback - coloured));
-        let v = u + feedback;
-        let eps = bounded(v + coloured);
-        self.u.push(u);
-        self.w.push(w);
-        self.v.push(v);
-        self.eps.push(eps);
-        (u, eps)
+    fn predict(&mut self, theta: &[f64; ROOM], e: f64, u: f64) -> f64 {
+        let x = self.delay.step(e);
+        bounded(self.kernel.predict(theta, x, u, &mut [0.0; ROOM]))
+    }
+
+    fn correct(&mut self, theta: &[f64; ROOM]) {
+        if !self.kernel.correct(theta).is_finite() {
+            self.kernel.rest();
+        }
     }
 
     /// At rest again.
     pub fn reset(&mut self) {
-        for past in [&mut self.e, &mut self.u, &mut self.w, &mut self.v, &mut self.eps] {
-            past.clear();
-        }
+        self.kernel.rest();
+        self.delay = DelayLine::new(vec![0.0; self.nk]);
     }
+}
+
+fn padded(theta: &[f64]) -> [f64; ROOM] {
+    let mut padded = [0.0; ROOM];
+    padded[..theta.len()].copy_from_slice(theta);
+    padded
 }
 
 #[cfg(test)]
@@ -106,7 +111,7 @@ mod tests {
             weights: None,
         };
         let batch = criterion.residuals_of(&theta, 0, &mut Workspace::default());
-        let mut predictor = Predictor::new(orders);
+        let mut predictor = Predictor::new(orders).unwrap();
         for (t, expected) in batch.iter().enumerate() {
             let eps = predictor.step(&theta, e[t], u[t]);
             // Rounding of 300 samples.
@@ -123,7 +128,7 @@ mod tests {
             nc: 1,
             ..Orders::default()
         };
-        let mut predictor = Predictor::new(orders);
+        let mut predictor = Predictor::new(orders).unwrap();
         let theta = [-0.5, 0.2];
         assert_eq!(predictor.step(&theta, 7.0, 1.0), 1.0);
         let second = 2.0 - 0.5 - 0.2;

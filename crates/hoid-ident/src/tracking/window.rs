@@ -86,6 +86,13 @@ impl WindowRecursion {
                 format!("{least} or more for {orders}"),
             );
         }
+        let Some(predictor) = Predictor::new(orders) else {
+            return refuse(
+                "the orders of a window",
+                format!("{p} coefficients"),
+                "at most 64".to_owned(),
+            );
+        };
         if every == 0 {
             return refuse("the samples between two fits", "0".to_owned(), "1 or more".to_owned());
         }
@@ -112,7 +119,7 @@ impl WindowRecursion {
             enough: (window / FIRST_SHARE).max(least),
             e: VecDeque::with_capacity(window),
             u: VecDeque::with_capacity(window),
-            predictor: Predictor::new(orders),
+            predictor,
             theta: given.map_or_else(|| vec![0.0; p], <[f64]>::to_vec),
             known: given.is_some(),
             covariance: covariance.map(<[f64]>::to_vec),
