@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use hoid_ident::{
     Choice, Estimator, Fit, choose_orders, order_search,
-    tracking::{Method, StartAt, Trace, TrackOptions, track},
+    tracking::{Method, OPERATOR_COLUMNS, StartAt, Trace, TrackOptions, track},
 };
 use hoid_io::{make_directory, write_record};
 use hoid_model::{
@@ -18,7 +18,10 @@ use hoid_sim::{Simulator, Stream};
 
 use crate::{
     args::DemoArgs,
-    commands::identify::{write_page, write_report},
+    commands::{
+        identify::{write_page, write_report},
+        track::relative_errors,
+    },
     error::CliError,
     output, text,
 };
@@ -97,22 +100,14 @@ fn errors_over_time(record: &Record, traces: &[(String, Trace)]) -> String {
         "rows that convert",
     ]);
     for (name, trace) in traces {
-        let (mut sums, mut count, mut all) = ([0.0; 5], 0usize, 0usize);
-        for (k, t) in trace.times_s().iter().enumerate() {
-            if *t < trace.updated_from_s() {
-                continue;
-            }
-            all += 1;
-            let Ok(operator) = trace.operator(k) else { continue };
-            count += 1;
-            for (sum, (column, _, estimate)) in sums.iter_mut().zip(operator.rows()) {
-                let truth = record.channel(column).map_or(f64::NAN, |c| c[k]);
-                *sum += ((estimate.value - truth) / truth).powi(2);
-            }
-        }
+        let operators: Vec<_> = (0..trace.len()).map(|row| trace.operator(row)).collect();
+        let first = trace.times_s().partition_point(|t| *t < trace.updated_from_s());
+        let errors = relative_errors(record, trace, &operators, first, &OPERATOR_COLUMNS);
+        let error = |column: &str| errors.iter().find(|(name, _)| *name == column);
         let mut row = vec![name.clone()];
-        row.extend(sums.map(|s| format!("{:.0} %", 100.0 * (s / count as f64).sqrt())));
-        row.push(format!("{count} of {all}"));
+        row.extend(OPERATOR_COLUMNS.map(|c| error(c).map_or("-".to_owned(), |(_, e)| format!("{:.0} %", 100.0 * e))));
+        let convert = operators[first..].iter().filter(|o| o.is_ok()).count();
+        row.push(format!("{convert} of {}", trace.len() - first));
         rows.add_row(row);
     }
     format!(

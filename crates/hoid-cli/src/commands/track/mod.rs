@@ -3,6 +3,8 @@
 mod report;
 mod result;
 
+pub use result::relative_errors;
+
 use hoid_ident::tracking::{StartAt, TrackOptions, track};
 use hoid_io::{check_table_path, write_table};
 use hoid_model::Record;

@@ -142,26 +142,14 @@ impl Tracked<'_> {
         }
     }
 
-    /// Root of the mean square of the relative error, of the rows in which the estimate moved and converted, for each parameter whose truth
-    /// the record holds.
     fn relative_errors(&self) -> Vec<(&'static str, f64)> {
-        let (begin, ts) = (self.record.time_s(0), self.record.sample_time().s());
-        let rows = self.first_moved_row()..self.trace.len();
-        let of = |name: &'static str| {
-            let truth = self.record.channel(name)?;
-            let squares: Vec<f64> = rows
-                .clone()
-                .filter_map(|row| {
-                    let found = value_of(&self.operators[row], name)?.value;
-                    let k = ((self.trace.times_s()[row] - begin) / ts).round() as usize;
-                    let truth = truth.get(k).copied().filter(|v| *v != 0.0)?;
-                    Some((found / truth - 1.0).powi(2))
-                })
-                .collect();
-            let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-            (!squares.is_empty()).then(|| (name, mean.sqrt()))
-        };
-        self.operator_columns().into_iter().filter_map(of).collect()
+        relative_errors(
+            self.record,
+            self.trace,
+            &self.operators,
+            self.first_moved_row(),
+            &self.operator_columns(),
+        )
     }
 
     /// A summary for people.
@@ -360,6 +348,32 @@ impl Tracked<'_> {
 }
 
 /// A parameter of the operator by its name.
+/// Root of the mean square of the relative error, of the rows from `first` on that converted, for each parameter whose truth the record
+/// holds.
+pub fn relative_errors(
+    record: &Record,
+    trace: &Trace,
+    operators: &[Result<OperatorEstimate, NotConvertible>],
+    first: usize,
+    columns: &[&'static str],
+) -> Vec<(&'static str, f64)> {
+    let (begin, ts) = (record.time_s(0), record.sample_time().s());
+    let of = |name: &'static str| {
+        let truth = record.channel(name)?;
+        let squares: Vec<f64> = (first..trace.len())
+            .filter_map(|row| {
+                let found = value_of(&operators[row], name)?.value;
+                let k = ((trace.times_s()[row] - begin) / ts).round() as usize;
+                let truth = truth.get(k).copied().filter(|v| *v != 0.0)?;
+                Some((found / truth - 1.0).powi(2))
+            })
+            .collect();
+        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+        (!squares.is_empty()).then(|| (name, mean.sqrt()))
+    };
+    columns.iter().copied().filter_map(of).collect()
+}
+
 fn value_of(operator: &Result<OperatorEstimate, NotConvertible>, name: &str) -> Option<Estimate> {
     let rows = operator.as_ref().ok()?.rows();
     rows.into_iter().find(|(n, _, _)| *n == name).map(|(_, _, e)| e)
