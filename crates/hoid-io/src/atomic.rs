@@ -25,6 +25,47 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::R
     file.finish()
 }
 
+/// The text of a file.
+///
+/// # Errors
+/// [`IoError::Unreadable`] for what the system says.
+pub fn read_text(path: &Path) -> Result<String, IoError> {
+    fs::read_to_string(path).map_err(|source| IoError::Unreadable {
+        file: path.display().to_string(),
+        source,
+    })
+}
+
+/// The bytes of a file.
+///
+/// # Errors
+/// [`IoError::Unreadable`] for what the system says.
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>, IoError> {
+    fs::read(path).map_err(|source| IoError::Unreadable {
+        file: path.display().to_string(),
+        source,
+    })
+}
+
+/// Names of the files in a directory, in no order.
+///
+/// # Errors
+/// [`IoError::Unreadable`] for what the system says.
+pub fn file_names(directory: &Path) -> Result<Vec<String>, IoError> {
+    let unreadable = |source| IoError::Unreadable {
+        file: directory.display().to_string(),
+        source,
+    };
+    let mut names = Vec::new();
+    for entry in fs::read_dir(directory).map_err(unreadable)? {
+        let entry = entry.map_err(unreadable)?;
+        if entry.path().is_file() {
+            names.push(entry.file_name().to_string_lossy().into_owned());
+        }
+    }
+    Ok(names)
+}
+
 /// Makes a directory for results, and those above it, where they are not there yet.
 ///
 /// # Errors

@@ -35,6 +35,18 @@ impl ColumnExpression {
         Self { text: name.into() }
     }
 
+    /// Every text in it that may be the name of a column.
+    pub(crate) fn terms(&self) -> Vec<&str> {
+        let mut terms = vec![self.text.as_str()];
+        terms.extend(self.text.strip_prefix('-'));
+        for (at, _) in self.text.match_indices('-') {
+            terms.extend([&self.text[..at], &self.text[at + 1..]]);
+        }
+        terms.iter_mut().for_each(|term| *term = term.trim());
+        terms.retain(|term| !term.is_empty());
+        terms
+    }
+
     /// The columns that are meant, among `names`.
     pub(crate) fn resolve(&self, names: &[&str], file: &str) -> Result<Signal, IoError> {
         let find = |name: &str| {

@@ -320,6 +320,40 @@ pub enum IoError {
         /// Those of the first column.
         expected: usize,
     },
+    /// Arrays of different lengths in one record.
+    #[error(
+        "{file}: {column} holds {found} values, expected {expected} as in {other}; choose arrays of one recording with --input and --output"
+    )]
+    UnequalColumns {
+        /// The file.
+        file: String,
+        /// Path of the one array.
+        column: String,
+        /// Its values.
+        found: usize,
+        /// Path of the other array.
+        other: String,
+        /// Its values.
+        expected: usize,
+    },
+    /// Streams without a common time.
+    #[error(
+        "{file}: input and output were recorded one after the other, expected a time in which both have samples; choose other streams with --input and --output"
+    )]
+    NoOverlap {
+        /// The file.
+        file: String,
+    },
+    /// A name that stands for several arrays.
+    #[error("{file}: \"{asked}\" may be any of {found}; give the whole path with --input and --output")]
+    AmbiguousColumn {
+        /// The file.
+        file: String,
+        /// The name.
+        asked: String,
+        /// The paths that end in it.
+        found: String,
+    },
     /// A table without columns.
     #[error("{file}: the table has no columns, expected one at least")]
     NoColumns {
@@ -345,6 +379,20 @@ pub enum IoError {
         file: String,
         /// What stands there instead.
         found: String,
+    },
+    /// Bytes of another format than the extension says.
+    #[error(
+        "{file} is no {format} file: {found}, expected {expected}; copy or write it again if it was cut short, or give it the extension of what it is"
+    )]
+    WrongFormat {
+        /// The file.
+        file: String,
+        /// The format of the extension.
+        format: &'static str,
+        /// What stands there instead.
+        found: String,
+        /// What such a file begins with.
+        expected: &'static str,
     },
     /// Bytes that contradict the format of the file.
     #[error("{file} is damaged: {found}; copy or write it again")]

@@ -9,20 +9,32 @@
 //! | `format` | the formats and their extensions |
 //! | `csv_table`, `csv_record`, `csv_columns` | CSV: in, out, and for columns of results |
 //! | `parquet`, `parquet_record` | Parquet, and records in it |
+//! | `arrays` | files of named arrays: paths, and the columns among them |
+//! | `mat` | variables of MATLAB |
+//! | `npz` | NPZ and NPY of numpy |
+//! | `column_record` | a record into any format of columns but CSV |
+//! | `xdf` | streams of the Lab Streaming Layer |
 //! | `table`, `assemble` | the columns of any format, and the record made of them |
 //! | `sampling`, `repair` | whether t is even; `--resample` and `--fill` |
+//! | `survey` | [`survey()`]: what is inside of a file |
 //! | `scenario_file` | [`read_scenario`]: scenarios in TOML |
+//! | `guarded` | panics of foreign readers as errors |
 //! | `atomic` | [`write_atomically`]: files that are whole or not there |
 //! | `error` | [`IoError`] |
 
+mod arrays;
 mod assemble;
 mod atomic;
 mod column_expression;
+mod column_record;
 mod csv_columns;
 mod csv_record;
 mod csv_table;
 mod error;
 mod format;
+mod guarded;
+mod mat;
+mod npz;
 mod output_table;
 mod parquet;
 mod parquet_record;
@@ -30,14 +42,17 @@ mod record_file;
 mod repair;
 mod sampling;
 mod scenario_file;
+mod survey;
 mod table;
 mod table_writer;
+mod xdf;
 
-pub use atomic::{make_directory, write_atomically};
+pub use atomic::{file_names, make_directory, read_bytes, read_text, write_atomically};
 pub use column_expression::ColumnExpression;
 pub use error::IoError;
 pub use output_table::{ColumnKind, ColumnSchema, ColumnValues, OutputColumn, OutputTable, TableSchema};
 pub use output_table::{check_table_path, read_table, write_table};
 pub use record_file::{ReadOptions, ReadRecord, Repair, read_record, write_record, write_record_csv};
-pub use scenario_file::{ScenarioFileError, parse_scenario, read_scenario};
+pub use scenario_file::{ScenarioFileError, parse_scenario, read_scenario, scenario_schema};
+pub use survey::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey, survey};
 pub use table_writer::TableWriter;

@@ -14,10 +14,11 @@
 use std::ops::Range;
 use std::path::Path;
 
+use crate::arrays::output_table_of;
 use crate::format::{Format, bytes_of, format_to_write};
 use crate::table::shown;
 use crate::table_writer::write_values;
-use crate::{IoError, csv_columns, parquet};
+use crate::{IoError, csv_columns, mat, npz, parquet, xdf};
 
 /// Columns to be written.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -221,7 +222,8 @@ pub fn check_table_path(path: &Path) -> Result<(), IoError> {
     format_to_write(path).map(drop)
 }
 
-/// Writes a table, whole or not at all: as CSV (`.csv`, `.txt`, with tabs `.tsv`) or Parquet (`.parquet`, `.pq`). The same
+/// Writes a table, whole or not at all: as CSV (`.csv`, `.txt`, with tabs `.tsv`), Parquet (`.parquet`, `.pq`),
+/// NPZ (`.npz`) or for MATLAB (`.mat`). The same
 /// table gives the same bytes.
 ///
 /// # Errors
@@ -260,6 +262,10 @@ pub fn read_table(path: &Path) -> Result<OutputTable, IoError> {
     match format {
         Format::Csv { .. } => csv_columns::read(&bytes, &file),
         Format::Parquet => from_parquet(bytes, &file),
+        Format::Npz => output_table_of(npz::read(&bytes, &file)?, &file),
+        Format::Mat => output_table_of(mat::read(bytes, &file)?, &file),
+        Format::Xdf => output_table_of(xdf::read(&bytes, &file)?, &file),
+        Format::Npy => output_table_of(npz::read_single(bytes, &file)?, &file),
     }
 }
 

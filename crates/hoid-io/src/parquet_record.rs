@@ -3,15 +3,9 @@
 //! Numeric columns of any type are numbers here, a null is a missing value, and text counts as in CSV. Units and sample time
 //! stand in the comments, in the words of CSV.
 
-use std::path::Path;
-
-use hoid_model::Record;
-
-use crate::output_table::{ColumnKind, ColumnSchema, TableSchema, Values};
+use crate::IoError;
 use crate::parquet::{self, Data};
 use crate::table::{Cell, Column, Precision, Source, Table, asides, check_names, shown};
-use crate::table_writer::write_values;
-use crate::{IoError, csv_record};
 
 /// What stood in the cells that are no finite numbers.
 struct ParquetSource<'a> {
@@ -119,22 +113,4 @@ fn column_of(read: parquet::ReadColumn, rows: usize) -> (Column, Cells) {
         .filter(|(_, value)| value.is_infinite());
     let infinite = infinite.map(|(row, value)| (row, *value)).collect();
     (column, Cells::Numbers { nulls, infinite })
-}
-
-/// Writes a record with the columns and comments of CSV.
-pub(crate) fn write(path: &Path, record: &Record) -> Result<(), IoError> {
-    let channels = csv_record::channels(record);
-    let t = record.times_s();
-    let names = std::iter::once("t").chain(channels.iter().map(|c| c.name.as_str()));
-    let values = std::iter::once(Values::Real(&t)).chain(channels.iter().map(|c| Values::Real(&c.values)));
-    let schema = TableSchema {
-        comments: csv_record::comments(record, &channels),
-        columns: names
-            .map(|name| ColumnSchema {
-                name: name.to_owned(),
-                kind: ColumnKind::Real,
-            })
-            .collect(),
-    };
-    write_values(path, schema, &values.collect::<Vec<_>>())
 }

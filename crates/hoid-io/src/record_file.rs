@@ -10,8 +10,12 @@ use std::path::Path;
 
 use hoid_model::Record;
 
-use crate::format::{Format, bytes_of};
-use crate::{ColumnExpression, IoError, assemble, csv_record, csv_table, parquet_record, write_atomically};
+use crate::arrays::table_of;
+use crate::format::{Format, bytes_of, format_to_write};
+use crate::{
+    ColumnExpression, IoError, assemble, column_record, csv_record, csv_table, mat, npz, parquet_record,
+    write_atomically, xdf,
+};
 
 /// What may be mended in a damaged record. By default nothing is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -70,6 +74,10 @@ pub fn read_record(path: &Path, options: &ReadOptions) -> Result<ReadRecord, IoE
     let table = match format {
         Format::Csv { .. } => csv_table::parse(&bytes, &file)?,
         Format::Parquet => parquet_record::parse(bytes, &file)?,
+        Format::Npz => table_of(npz::read(&bytes, &file)?, options, &file)?,
+        Format::Mat => table_of(mat::read(bytes, &file)?, options, &file)?,
+        Format::Xdf => table_of(xdf::read(&bytes, &file)?, options, &file)?,
+        Format::Npy => table_of(npz::read_single(bytes, &file)?, options, &file)?,
     };
     let label = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     assemble::record_of(table, options).map(|read| ReadRecord {
@@ -85,11 +93,11 @@ pub fn read_record(path: &Path, options: &ReadOptions) -> Result<ReadRecord, IoE
 /// [`IoError::UnknownFormat`], [`IoError::ChannelName`] for a channel that could not be read back, and those of
 /// [`write_atomically`].
 pub fn write_record(path: &Path, record: &Record) -> Result<(), IoError> {
-    let format = Format::of(path)?;
+    let format = format_to_write(path)?;
     check_names(record, || path.display().to_string())?;
     match format {
         Format::Csv { separator } => write_atomically(path, |file| csv_record::write(file, record, separator)),
-        Format::Parquet => parquet_record::write(path, record),
+        _ => column_record::write(path, record),
     }
 }
 

@@ -40,6 +40,7 @@ use hoid_model::{
     scenario::{Condition, OperatingState, Realisation, RemnantStrength, Scenario},
     schedule::Schedule,
 };
+use schemars::JsonSchema;
 use serde::Deserialize;
 use thiserror::Error;
 use toml::Spanned;
@@ -56,12 +57,14 @@ pub enum ScenarioFileError {
         /// What the system says.
         reason: String,
     },
-    /// No TOML, or keys and types that do not belong to a scenario. The reason names the line.
-    #[error("scenario file {path}: {reason}")]
+    /// No TOML, or keys and types that do not belong to a scenario.
+    #[error("scenario file {path}, line {line}: {reason}")]
     Syntax {
         /// The file.
         path: String,
-        /// What is wrong, with the line.
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong.
         reason: String,
     },
     /// A value without meaning.
@@ -98,14 +101,19 @@ pub enum ScenarioFileError {
 
 type Number = Spanned<f64>;
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct File {
+    #[schemars(with = "Option<String>")]
     condition: Option<Spanned<String>>,
     name: Option<String>,
+    #[schemars(with = "Option<f64>")]
     sample_time_s: Option<Number>,
+    #[schemars(with = "Option<f64>")]
     measurement_s: Option<Number>,
+    #[schemars(with = "Option<f64>")]
     run_in_s: Option<Number>,
+    #[schemars(with = "Option<f64>")]
     tau_e_s: Option<Number>,
     realisation: Option<RealisationKey>,
     #[serde(default)]
@@ -117,61 +125,78 @@ struct File {
     forcing: Option<Vec<SinusoidTable>>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 enum RealisationKey {
     Input,
     Output,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 enum DefinitionKey {
     Response,
     Remnant,
 }
 
-#[derive(Deserialize, Default)]
+#[derive(Deserialize, JsonSchema, Default)]
 #[serde(deny_unknown_fields)]
 struct StateTable {
     #[serde(rename = "K_e")]
+    #[schemars(with = "Option<f64>")]
     k_e: Option<Number>,
     #[serde(rename = "T_L_s")]
+    #[schemars(with = "Option<f64>")]
     t_l_s: Option<Number>,
+    #[schemars(with = "Option<f64>")]
     omega_nm_rad_s: Option<Number>,
+    #[schemars(with = "Option<f64>")]
     zeta_nm: Option<Number>,
     #[serde(rename = "K_c")]
+    #[schemars(with = "Option<f64>")]
     k_c: Option<Number>,
+    #[schemars(with = "Option<f64>")]
     omega_b_rad_s: Option<Number>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct ScheduleTable {
+    #[schemars(with = "Option<f64>")]
     rate_per_s: Option<Number>,
+    #[schemars(with = "Option<f64>")]
     midpoint_s: Option<Number>,
 }
 
-#[derive(Deserialize, Default)]
+#[derive(Deserialize, JsonSchema, Default)]
 #[serde(deny_unknown_fields)]
 struct RemnantTable {
+    #[schemars(with = "Option<i64>")]
     order: Option<Spanned<i64>>,
     #[serde(rename = "T_n_s")]
+    #[schemars(with = "Option<f64>")]
     t_n_s: Option<Number>,
+    #[schemars(with = "Option<f64>")]
     noise_level: Option<Number>,
     noise_definition: Option<DefinitionKey>,
     #[serde(rename = "K_n_initial_deg")]
+    #[schemars(with = "Option<f64>")]
     k_n_initial_deg: Option<Number>,
     #[serde(rename = "K_n_last_deg")]
+    #[schemars(with = "Option<f64>")]
     k_n_last_deg: Option<Number>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct SinusoidTable {
+    #[schemars(with = "f64")]
     amplitude_deg: Number,
+    #[schemars(with = "f64")]
     phase_rad: Number,
+    #[schemars(with = "Option<f64>")]
     omega_rad_s: Option<Number>,
+    #[schemars(with = "Option<f64>")]
     cycles: Option<Number>,
 }
 
@@ -199,12 +224,24 @@ pub fn read_scenario(path: &Path) -> Result<Scenario, ScenarioFileError> {
 pub fn parse_scenario(text: &str, path: &str, name: &str) -> Result<Scenario, ScenarioFileError> {
     let file: File = toml::from_str(text).map_err(|error| ScenarioFileError::Syntax {
         path: path.to_owned(),
-        reason: error.to_string().trim_end().to_owned(),
+        line: error.span().map_or(1, |span| line_of(text, span.start)),
+        reason: error.message().trim_end().to_owned(),
     })?;
     let source = Source { text, path };
     let scenario = source.scenario(file, name)?;
     scenario.resolve().map_err(|error| source.model(error))?;
     Ok(scenario)
+}
+
+/// JSON schema of a scenario file, as text.
+pub fn scenario_schema() -> String {
+    let schema = schemars::schema_for!(File);
+    format!("{:#}", schema.as_value())
+}
+
+/// Line of a byte of a text, from 1.
+fn line_of(text: &str, offset: usize) -> usize {
+    1 + text.bytes().take(offset).filter(|b| *b == b'\n').count()
 }
 
 /// The text that values are traced back to.
@@ -481,7 +518,7 @@ impl Source<'_> {
     fn value(&self, key: &str, offset: usize, found: &dyn std::fmt::Display, expected: &str) -> ScenarioFileError {
         ScenarioFileError::Value {
             path: self.path.to_owned(),
-            line: 1 + self.text.bytes().take(offset).filter(|b| *b == b'\n').count(),
+            line: line_of(self.text, offset),
             key: key.to_owned(),
             found: found.to_string(),
             expected: expected.to_owned(),

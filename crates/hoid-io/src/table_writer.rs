@@ -1,4 +1,5 @@
-//! Tables that are written while they grow, in bounded memory.
+//! Tables that are written while they grow: CSV and Parquet in bounded memory, the formats of whole arrays once all rows are
+//! there.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -7,7 +8,7 @@ use crate::atomic::WholeFile;
 use crate::csv_columns::CsvColumns;
 use crate::format::{Format, format_to_write};
 use crate::output_table::{ColumnKind, ColumnSchema, ColumnValues, OutputTable, TableSchema, Values};
-use crate::{IoError, parquet, write_atomically};
+use crate::{IoError, mat, npz, parquet, write_atomically};
 
 /// Rows that are written together. The file depends on the rows, not on how they came.
 const GROUP: usize = 1 << 16;
@@ -16,6 +17,14 @@ const GROUP: usize = 1 << 16;
 enum Sink {
     Csv(CsvColumns),
     Parquet(Box<parquet::Writer>),
+    Whole(WholeArrays),
+}
+
+/// Columns that wait for their end, since an array says its length first.
+struct WholeArrays {
+    format: Format,
+    schema: TableSchema,
+    columns: Vec<ColumnValues>,
 }
 
 impl Sink {
@@ -23,6 +32,11 @@ impl Sink {
         match format {
             Format::Csv { separator } => CsvColumns::start(file, &schema, separator).map(Self::Csv),
             Format::Parquet => parquet::Writer::start(file, schema).map(|writer| Self::Parquet(Box::new(writer))),
+            format => Ok(Self::Whole(WholeArrays {
+                format,
+                columns: schema.columns.iter().map(|column| none(column.kind)).collect(),
+                schema,
+            })),
         }
     }
 
@@ -30,6 +44,12 @@ impl Sink {
         match self {
             Self::Csv(csv) => csv.rows(file, values),
             Self::Parquet(parquet) => parquet.group(file, values),
+            Self::Whole(whole) => {
+                for (column, values) in whole.columns.iter_mut().zip(values) {
+                    extend(column, *values);
+                }
+                Ok(())
+            }
         }
     }
 
@@ -37,6 +57,25 @@ impl Sink {
         match self {
             Self::Csv(_) => Ok(()),
             Self::Parquet(parquet) => parquet.finish(file),
+            Self::Whole(WholeArrays {
+                format,
+                schema,
+                columns,
+            }) => {
+                let values: Vec<Values<'_>> = columns.iter().map(ColumnValues::all).collect();
+                write_whole(format, file, &schema, &values)
+            }
+        }
+    }
+}
+
+/// Writes all columns at once in a format that keeps each as one array.
+fn write_whole(format: Format, file: &mut dyn Write, schema: &TableSchema, values: &[Values<'_>]) -> io::Result<()> {
+    match format {
+        Format::Npz => npz::write(file, schema, values),
+        Format::Mat => mat::write(file, schema, values),
+        Format::Csv { .. } | Format::Parquet | Format::Npy | Format::Xdf => {
+            Err(io::Error::other("no format of whole arrays"))
         }
     }
 }
@@ -46,6 +85,9 @@ pub(crate) fn write_values(path: &Path, schema: TableSchema, values: &[Values<'_
     let format = format_to_write(path)?;
     let schema = schema.checked(&path.display().to_string())?;
     let rows = values.first().map_or(0, Values::len);
+    if format.is_whole() {
+        return write_atomically(path, |file| write_whole(format, file, &schema, values));
+    }
     write_atomically(path, |file| {
         let mut sink = Sink::start(format, file, schema)?;
         for start in (0..rows).step_by(GROUP) {
@@ -57,7 +99,8 @@ pub(crate) fn write_values(path: &Path, schema: TableSchema, values: &[Values<'_
     })
 }
 
-/// A table that grows by and by, for studies that are larger than memory. The file is in its place once
+/// A table that grows by and by, for studies that are larger than memory; NPZ and .mat keep their rows in
+/// memory until the end. The file is in its place once
 /// [`finish`](Self::finish) is done; a writer that is dropped before leaves everything as it was. The bytes are those that
 /// [`write_table`](crate::write_table) gives for all rows at once.
 pub struct TableWriter {

@@ -11,7 +11,7 @@ use hoid_io::{
 };
 use hoid_model::{Channel, Record, SampleTime};
 
-const FORMATS: [&str; 5] = ["csv", "TXT", "tsv", "parquet", "pq"];
+const FORMATS: [&str; 7] = ["csv", "TXT", "tsv", "parquet", "pq", "npz", "mat"];
 
 fn column(name: &str, values: ColumnValues) -> OutputColumn {
     OutputColumn {

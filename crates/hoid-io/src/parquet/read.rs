@@ -3,11 +3,6 @@
 //! A file is not trusted: values are fetched in parts, so that memory grows with what was decoded and not with what the file
 //! promises, and a panic of the crate becomes an error.
 
-use std::cell::Cell;
-use std::panic::{self, AssertUnwindSafe};
-use std::sync::Once;
-use std::thread;
-
 use bytes::Bytes;
 use half::f16;
 use parquet::basic::{Compression, ConvertedType, LogicalType, Type};
@@ -21,6 +16,7 @@ use parquet::schema::types::{ColumnDescPtr, ColumnDescriptor};
 
 use super::{COMMENTS, Data, ReadColumn, ReadFile};
 use crate::IoError;
+use crate::guarded::{guarded, told};
 use crate::table::shown;
 
 /// The magic bytes at both ends.
@@ -34,50 +30,7 @@ const PART: usize = 1 << 16;
 /// The columns in the bytes of a file.
 pub(crate) fn read(bytes: Vec<u8>, file: &str) -> Result<ReadFile, IoError> {
     check_ends(&bytes, file)?;
-    without_panic(|| columns(bytes.into(), file)).unwrap_or_else(|what| {
-        Err(IoError::Damaged {
-            file: file.to_owned(),
-            found: format!("it could not be read to its end ({})", told(&what)),
-        })
-    })
-}
-
-thread_local! {
-    static READING: Cell<bool> = const { Cell::new(false) };
-}
-
-/// The result, or the message of a panic.
-///
-/// The crate answers most damage by an error, but some by a panic: an index or a sum out of range. A user's file must not end
-/// a study, so this is the one place where a panic is caught. What it may leave half done is the crate's and is dropped here.
-/// The hook is passed through, once for the process, and keeps silent on a thread that is reading; any other panic is reported
-/// as before. With `panic = "abort"` nothing can be caught.
-fn without_panic<T>(read: impl FnOnce() -> T) -> Result<T, String> {
-    static HOOK: Once = Once::new();
-    // A hook cannot be set while the thread is falling.
-    if !thread::panicking() {
-        HOOK.call_once(|| {
-            let before = panic::take_hook();
-            panic::set_hook(Box::new(move |info| {
-                if !READING.get() {
-                    before(info);
-                }
-            }));
-        });
-    }
-    let outer = READING.replace(true);
-    let result = panic::catch_unwind(AssertUnwindSafe(read));
-    READING.set(outer);
-    result.map_err(|panic| match panic.downcast::<String>() {
-        Ok(text) => *text,
-        Err(panic) => panic.downcast_ref::<&str>().copied().unwrap_or_default().to_owned(),
-    })
-}
-
-/// What the crate says, short, and without anything that a terminal obeys.
-fn told(what: &str) -> String {
-    let line = what.lines().next().unwrap_or_default();
-    line.chars().take(200).collect::<String>().escape_debug().to_string()
+    guarded(file, || columns(bytes.into(), file))
 }
 
 /// Whether this is Parquet at all, in words that say what it is instead.
@@ -301,22 +254,6 @@ fn signed(bytes: &[u8]) -> i128 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_panic_is_a_message_and_the_next_is_reported_again() {
-        assert_eq!(without_panic(|| 1), Ok(1));
-        let nested = without_panic(|| {
-            assert_eq!(
-                without_panic(|| -> u8 { panic!("of {}", "two parts") }),
-                Err("of two parts".into())
-            );
-            assert!(READING.get());
-            panic!("of one")
-        });
-        assert_eq!(nested, Err::<u8, _>("of one".into()));
-        assert!(!READING.get());
-        assert_eq!(told("a\u{1b}[31m\nb"), "a\\u{1b}[31m");
-    }
 
     #[test]
     fn integers_in_bytes() {

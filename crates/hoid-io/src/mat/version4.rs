@@ -1,0 +1,100 @@
+//! Version 4 (MathWorks, "MAT-File Format", 2019, chapter 2): matrices behind a header of five numbers each.
+
+use crate::IoError;
+use crate::arrays::{Array, Budget, Entry, Kind, Numbers, Value};
+
+/// Bytes of the five numbers.
+const HEADER: usize = 20;
+const LONGEST_NAME: usize = 256;
+
+/// The variables of a file.
+pub(super) fn read(bytes: &[u8], budget: &mut Budget, file: &str) -> Result<Vec<Entry>, IoError> {
+    let mut rest = bytes;
+    let mut entries = Vec::new();
+    while !rest.is_empty() {
+        let (entry, behind) = variable(rest).map_err(|found| IoError::Damaged {
+            file: file.to_owned(),
+            found: format!("variable {}: {found}", entries.len() + 1),
+        })?;
+        budget.take((rest.len() - behind.len()) as u64, file)?;
+        entries.push(entry);
+        rest = behind;
+    }
+    Ok(entries)
+}
+
+fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
+    let header = bytes
+        .get(..HEADER)
+        .ok_or_else(|| format!("it ends after {} bytes", bytes.len()))?;
+    let number = |at: usize, big_endian: bool| {
+        let bytes = <[u8; 4]>::try_from(&header[4 * at..4 * at + 4]).unwrap_or_default();
+        if big_endian {
+            u32::from_be_bytes(bytes)
+        } else {
+            u32::from_le_bytes(bytes)
+        }
+    };
+    // Thousands: the order of bytes and other machines; hundreds: nothing; tens: the type; ones: what it is.
+    let big_endian = number(0, false) > 4999;
+    let kinds = number(0, big_endian);
+    if kinds > 1999 || !kinds.is_multiple_of(1000) && kinds % 1000 / 100 != 0 {
+        return Err(format!("its type is {kinds}"));
+    }
+    let kind = match kinds % 100 / 10 {
+        0 => Kind::F64,
+        1 => Kind::F32,
+        2 => Kind::I32,
+        3 => Kind::I16,
+        4 => Kind::U16,
+        5 => Kind::U8,
+        other => return Err(format!("its numbers are of type {other}")),
+    };
+    let [rows, columns, imaginary, name] = [1, 2, 3, 4].map(|at| number(at, big_endian) as usize);
+    if name > LONGEST_NAME {
+        return Err(format!("its name is {name} bytes long"));
+    }
+    let count = rows.checked_mul(columns);
+    let length = count.and_then(|count| count.checked_mul(kind.size() * if imaginary == 0 { 1 } else { 2 }));
+    let ends = || format!("{rows} x {columns} numbers end after {} bytes", bytes.len());
+    let data = bytes.get(HEADER + name..).ok_or_else(ends)?;
+    let (data, rest) = length
+        .and_then(|length| data.split_at_checked(length))
+        .ok_or_else(ends)?;
+    let text = &bytes[HEADER..HEADER + name];
+    let text: Vec<u8> = text.iter().copied().take_while(|byte| *byte != 0).collect();
+    let name = String::from_utf8_lossy(&text).into_owned();
+    let numbers = || Numbers::new(data.to_vec(), kind, big_endian);
+    let value = match kinds % 10 {
+        _ if imaginary != 0 => Value::Unread(String::from("complex numbers")),
+        0 => {
+            let numbers = numbers();
+            // Whole numbers stand for any: version 4 has one class.
+            let numbers = if kind.is_whole() {
+                Numbers::from_f64(&numbers.values())
+            } else {
+                numbers
+            };
+            Value::Array(Array {
+                numbers,
+                dims: vec![rows, columns],
+                last_fastest: false,
+            })
+        }
+        1 => {
+            let characters: Vec<char> = numbers().values().iter().map(|code| char::from(*code as u8)).collect();
+            let row = |at: usize| {
+                characters[at..]
+                    .iter()
+                    .step_by(rows)
+                    .collect::<String>()
+                    .trim_end()
+                    .to_owned()
+            };
+            Value::Texts((0..rows.min(characters.len())).map(row).collect())
+        }
+        2 => Value::Unread(String::from("a sparse matrix")),
+        other => return Err(format!("it is of kind {other}")),
+    };
+    Ok((Entry::new(name, value), rest))
+}

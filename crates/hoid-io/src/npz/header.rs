@@ -1,0 +1,227 @@
+//! The header of NPY: a Python dictionary of `descr`, `fortran_order` and `shape` (NEP 1, versions 1 to 3).
+//!
+//! The literal is read here because it is small, and because a general reader of Python literals recurses as deep as a hostile
+//! header says.
+
+/// What a header says.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Header {
+    pub(super) descr: Descr,
+    pub(super) fortran_order: bool,
+    pub(super) shape: Vec<usize>,
+}
+
+/// The type of an item.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Descr {
+    /// Such as `<f8`.
+    Plain(String),
+    /// The fields of a structured array, each with what stands behind its type, if anything does.
+    Fields(Vec<(String, Option<String>)>),
+}
+
+/// A Python literal as far as a header needs it.
+#[derive(Debug, Clone, PartialEq)]
+enum Literal {
+    Text(String),
+    Whole(usize),
+    Flag(bool),
+    Sequence(Vec<Literal>),
+}
+
+/// Sequences inside of sequences: a shape in a field in a list.
+const DEEPEST: usize = 6;
+
+/// Reads the text between the length and the numbers.
+pub(super) fn parse(text: &str) -> Option<Header> {
+    let mut reader = Reader { rest: text };
+    reader.token('{')?;
+    let (mut descr, mut fortran_order, mut shape) = (None, None, None);
+    while reader.token('}').is_none() {
+        let key = reader.text()?;
+        reader.token(':')?;
+        let value = reader.literal(0)?;
+        match (key.as_str(), value) {
+            ("descr", Literal::Text(text)) => descr = Some(Descr::Plain(text)),
+            ("descr", Literal::Sequence(fields)) => {
+                descr = Some(Descr::Fields(fields.iter().map(field).collect::<Option<_>>()?))
+            }
+            ("fortran_order", Literal::Flag(flag)) => fortran_order = Some(flag),
+            ("shape", Literal::Sequence(sides)) => {
+                let side = |side: &Literal| match side {
+                    Literal::Whole(side) => Some(*side),
+                    _ => None,
+                };
+                shape = Some(sides.iter().map(side).collect::<Option<_>>()?);
+            }
+            _ => return None,
+        }
+        if reader.token(',').is_none() {
+            reader.token('}')?;
+            break;
+        }
+    }
+    reader.rest.trim().is_empty().then_some(())?;
+    Some(Header {
+        descr: descr?,
+        fortran_order: fortran_order?,
+        shape: shape?,
+    })
+}
+
+/// A field: name and type, or name, type and shape. The name may be a pair of title and name.
+fn field(field: &Literal) -> Option<(String, Option<String>)> {
+    let Literal::Sequence(parts) = field else { return None };
+    let name = match parts.first()? {
+        Literal::Text(name) => name.clone(),
+        Literal::Sequence(names) => match names.last()? {
+            Literal::Text(name) => name.clone(),
+            _ => return None,
+        },
+        _ => return None,
+    };
+    match parts.get(1)? {
+        Literal::Text(descr) if parts.len() == 2 => Some((name, Some(descr.clone()))),
+        _ => Some((name, None)),
+    }
+}
+
+struct Reader<'a> {
+    rest: &'a str,
+}
+
+impl Reader<'_> {
+    fn token(&mut self, token: char) -> Option<()> {
+        self.rest = self.rest.trim_start();
+        self.rest = self.rest.strip_prefix(token)?;
+        Some(())
+    }
+
+    fn text(&mut self) -> Option<String> {
+        self.rest = self.rest.trim_start();
+        let quote = self.rest.chars().next().filter(|c| ['\'', '"'].contains(c))?;
+        let mut text = String::new();
+        let mut characters = self.rest.char_indices().skip(1);
+        loop {
+            match characters.next()? {
+                (at, c) if c == quote => {
+                    self.rest = &self.rest[at + 1..];
+                    return Some(text);
+                }
+                (_, '\\') => match characters.next()?.1 {
+                    c @ ('\\' | '\'' | '"') => text.push(c),
+                    // Python's other escapes do not stand in names that hoid could show.
+                    c => text.extend(['\\', c]),
+                },
+                (_, c) => text.push(c),
+            }
+        }
+    }
+
+    fn literal(&mut self, depth: usize) -> Option<Literal> {
+        self.rest = self.rest.trim_start();
+        let first = self.rest.chars().next()?;
+        match first {
+            '\'' | '"' => self.text().map(Literal::Text),
+            '(' | '[' => {
+                let end = if first == '(' { ')' } else { ']' };
+                self.token(first)?;
+                let mut items = Vec::new();
+                while self.token(end).is_none() {
+                    if depth == DEEPEST {
+                        return None;
+                    }
+                    items.push(self.literal(depth + 1)?);
+                    if self.token(',').is_none() {
+                        self.token(end)?;
+                        break;
+                    }
+                }
+                Some(Literal::Sequence(items))
+            }
+            '0'..='9' => {
+                let end = self.rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(self.rest.len());
+                let (digits, rest) = self.rest.split_at(end);
+                // Python 2 wrote long integers with an L.
+                self.rest = rest.strip_prefix('L').unwrap_or(rest);
+                digits.parse().ok().map(Literal::Whole)
+            }
+            _ => {
+                for (word, flag) in [("True", true), ("False", false)] {
+                    if let Some(rest) = self.rest.strip_prefix(word) {
+                        self.rest = rest;
+                        return Some(Literal::Flag(flag));
+                    }
+                }
+                None
+            }
+        }
+    }
+}
+
+/// A Python string literal.
+pub(super) fn quoted(text: &str) -> String {
+    format!("'{}'", text.replace('\\', "\\\\").replace('\'', "\\'"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headers_of_numpy() {
+        let plain = parse("{'descr': '<f8', 'fortran_order': False, 'shape': (3, 2), }  \n").unwrap();
+        assert_eq!(
+            plain,
+            Header {
+                descr: Descr::Plain("<f8".into()),
+                fortran_order: false,
+                shape: vec![3, 2]
+            }
+        );
+        assert_eq!(
+            parse("{'shape':(3L,),'fortran_order':True,'descr':'|b1'}")
+                .unwrap()
+                .shape,
+            [3]
+        );
+        assert_eq!(
+            parse("{'shape':(),'fortran_order':True,'descr':'|b1'}").unwrap().shape,
+            [0; 0]
+        );
+        let fields = parse(
+            "{'descr': [('t', '<f8'), ('a\\'b', '<i4', (2,)), (('x', 'y'), '<u2')], 'fortran_order': False, 'shape': (5,)}",
+        );
+        let expected = vec![
+            ("t".into(), Some("<f8".into())),
+            ("a'b".into(), None),
+            ("y".into(), Some("<u2".into())),
+        ];
+        assert_eq!(fields.unwrap().descr, Descr::Fields(expected));
+    }
+
+    #[test]
+    fn damage_is_seen() {
+        for text in [
+            "",
+            "{",
+            "{}",
+            "{'descr': '<f8'}",
+            "{'descr': '<f8', 'fortran_order': False, 'shape': (-3,)}",
+            "{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999999999999999,)}",
+            "{'descr': '<f8', 'fortran_order': False, 'shape': (3,)} x",
+            "{'descr': '<f8, 'fortran_order': False, 'shape': (3,)}",
+        ] {
+            assert_eq!(parse(text), None, "{text}");
+        }
+        let deep = format!("{{'descr': {}", "[".repeat(100_000));
+        assert_eq!(parse(&deep), None);
+    }
+
+    #[test]
+    fn texts_come_back() {
+        for text in ["e", "a'b", "a\\b", "\u{e9}"] {
+            assert_eq!(Reader { rest: &quoted(text) }.text().as_deref(), Some(text));
+        }
+    }
+}
