@@ -145,4 +145,44 @@ pub enum IdentError {
         /// The range as given.
         range: String,
     },
+    /// A span that holds no whole number of periods.
+    #[error(
+        "record {label} has {samples} samples ({span_s} s), which is not a whole number of periods of {period_s} s; {remedy}"
+    )]
+    NotWholePeriods {
+        /// The record.
+        label: String,
+        /// Samples of the span.
+        samples: usize,
+        /// Its duration, s.
+        span_s: f64,
+        /// The period of the excitation, s.
+        period_s: f64,
+        /// The nearest span that would do.
+        remedy: String,
+    },
+    /// A line of the excitation at which a channel does not move.
+    #[error(
+        "{channel} of record {label} has no power at the line {omega_rad_s} rad/s; leave this line out, or check the period and the span"
+    )]
+    NoLinePower {
+        /// Name of the channel.
+        channel: String,
+        /// The record.
+        label: String,
+        /// The line, rad/s.
+        omega_rad_s: f64,
+    },
+    /// A line that the sampling cannot show.
+    #[error(
+        "the line {omega_rad_s} rad/s does not lie below half the sampling frequency of record {label}, {nyquist_rad_s} rad/s; leave it out"
+    )]
+    LineBeyondNyquist {
+        /// The line, rad/s.
+        omega_rad_s: f64,
+        /// The record.
+        label: String,
+        /// Half its sampling frequency, rad/s.
+        nyquist_rad_s: f64,
+    },
 }

@@ -167,7 +167,7 @@ impl Estimator {
     }
 
     fn fit_iteratively(&self, criterion: &Criterion<'_>, sample_time: SampleTime) -> Result<Fit, IdentError> {
-        let mut workspace = Workspace::default();
+        let mut workspace = Workspace::of_thread();
         let informed = self.inform(criterion);
         let candidates: Vec<(String, Vec<f64>)> = match &self.start {
             Some(theta) => vec![("given".to_owned(), self.check_start(theta, &informed)?)],

@@ -329,7 +329,7 @@ impl Fit {
         };
         Ok(Series {
             first,
-            values: criterion.residuals_of(theta, 0, &mut Workspace::default()),
+            values: criterion.residuals_of(theta, 0, &mut Workspace::of_thread()),
         })
     }
 

@@ -14,6 +14,7 @@
 //! | [`instrumental`] | instrumental variables, in open and closed loop |
 //! | [`TimeVarying`] | gains that follow a sigmoid, with the time and the rate of the change |
 //! | [`tracking`] | recursive estimates: traces, streaming |
+//! | [`describing`] | describing function, coherence, remnant spectrum and margins by Fourier coefficients |
 //! | [`order_search`] | ranges of orders and delay, criteria, the chosen model |
 //! | [`validation`] | VAF, NRMSE, residual tests |
 //! | `derived` | poles, zeros, crossover and margins with standard errors |
@@ -24,6 +25,7 @@ mod checks;
 mod constraint;
 mod continuation;
 mod derived;
+pub mod describing;
 mod error;
 mod estimator;
 mod fit;

@@ -131,7 +131,7 @@ fn covariance(simulated: &Fit, fit: &Fit, records: &[Record], first: usize) -> R
     let theta = simulated.model().theta();
     let q = theta.len();
     let (mut gram, mut coloured) = (vec![0.0; q * q], vec![0.0; q * q]);
-    let mut workspace = Workspace::default();
+    let mut workspace = Workspace::of_thread();
     for record in 0..records.len() {
         let psi = criterion.jacobian(theta, record, &mut workspace);
         let filtered: Vec<Vec<f64>> = psi.iter().map(|x| backwards(model.c(), &poles[1..], x)).collect();

@@ -100,7 +100,7 @@ impl GreyBox {
         for criterion in &criteria {
             self.check_records(criterion, records)?;
         }
-        let mut workspace = Workspace::default();
+        let mut workspace = Workspace::of_thread();
         let Some(highest) = criteria.last() else {
             return Err(IdentError::NoFiniteLoss);
         };

@@ -281,7 +281,7 @@ mod tests {
                 for (i, value) in eta.iter_mut().enumerate() {
                     *value *= 1.0 + 0.01 * i as f64;
                 }
-                let mut ws = Workspace::default();
+                let mut ws = Workspace::of_thread();
                 let at = criterion.linearise(&eta, &mut ws);
                 for i in 0..eta.len() {
                     let h = 1e-5 * eta[i];
@@ -311,7 +311,7 @@ mod tests {
         let first = first_residual(&super::super::layout::orders(2, 61), InitialState::Estimate);
         let data = signals.iter().map(|(e, u)| Data { e, u }).collect();
         let criterion = PhysicalCriterion::new(layout, data, InitialState::Estimate, first);
-        let mut ws = Workspace::default();
+        let mut ws = Workspace::of_thread();
         let mut loss = |tau: f64| {
             criterion
                 .linearise(&[0.3, 0.05, 12.0, 0.4, tau, 0.05], &mut ws)

@@ -47,7 +47,7 @@ pub(crate) fn instrument_chain(criterion: &Criterion<'_>) -> Option<Vec<f64>> {
     }
     let (poles, b) = system.split_at(problem.poles);
     let (a, f) = if o.na > 0 { (poles, &[][..]) } else { (&[][..], poles) };
-    let mut workspace = Workspace::default();
+    let mut workspace = Workspace::of_thread();
     let left: Vec<Vec<f64>> = (0..white.data.len())
         .map(|record| white.residuals_of(&[a, b, f].concat(), record, &mut workspace))
         .collect();

@@ -185,7 +185,7 @@ impl InstrumentalVariable {
         solution: Solution,
         sample_time: hoid_model::SampleTime,
     ) -> Result<Fit, IdentError> {
-        let mut workspace = Workspace::default();
+        let mut workspace = Workspace::of_thread();
         let sum_of_squares: f64 = (0..criterion.data.len())
             .map(|record| {
                 let eps = criterion.residuals_of(&solution.theta, record, &mut workspace);

@@ -73,7 +73,13 @@ fn noise_of(system: &[f64], problem: &Problem<'_>, criterion: &Criterion<'_>, be
         weights: None,
     };
     let start = before.map_or_else(|| [d.as_slice(), &c].concat(), |n| [n.d.as_slice(), &n.c].concat());
-    match minimise(&arma, start, &SearchOptions::default(), None, &mut Workspace::default()) {
+    match minimise(
+        &arma,
+        start,
+        &SearchOptions::default(),
+        None,
+        &mut Workspace::of_thread(),
+    ) {
         Some(minimum) => {
             let (d, c) = minimum.theta.split_at(nd);
             Noise {
@@ -97,7 +103,7 @@ fn simulation_error(theta: &[f64], criterion: &Criterion<'_>) -> Vec<Vec<f64>> {
         first: first_residual(&orders, InitialState::Estimate),
         ..criterion.clone()
     };
-    let mut workspace = Workspace::default();
+    let mut workspace = Workspace::of_thread();
     (0..criterion.data.len())
         .map(|record| simulating.residuals_of(theta, record, &mut workspace))
         .collect()
@@ -109,7 +115,7 @@ fn covariance(theta: &[f64], rest: &Rest, problem: &Problem<'_>, criterion: &Cri
     // Rows that both the equation and the residuals have.
     let nd = o.nd;
     let first = (problem.first + nd).max(criterion.first);
-    let mut workspace = Workspace::default();
+    let mut workspace = Workspace::of_thread();
     let mut residual = Vec::new();
     let mut psi: Vec<Vec<f64>> = vec![Vec::new(); theta.len()];
     let mut w: Vec<Vec<f64>> = vec![Vec::new(); theta.len()];

@@ -266,7 +266,7 @@ impl TimeVarying {
         let mut best: Option<(String, Minimum)> = None;
         for (label, theta) in candidates {
             let known = best.as_ref().map(|(_, b)| b.at.sum_of_squares);
-            let Some(minimum) = minimise(criterion, theta, &look, known, &mut Workspace::default()) else {
+            let Some(minimum) = minimise(criterion, theta, &look, known, &mut Workspace::of_thread()) else {
                 continue;
             };
             if known.is_none_or(|known| minimum.at.sum_of_squares < known) {
@@ -354,7 +354,7 @@ fn search(
     options: &SearchOptions,
     rival: Option<f64>,
 ) -> Option<Minimum> {
-    let mut workspace = Workspace::default();
+    let mut workspace = Workspace::of_thread();
     let minimum = minimise(criterion, theta, options, rival, &mut workspace)?;
     let (low, high) = criterion.limits[DELAY];
     if minimum.termination.converged() || low == high {

@@ -1,6 +1,6 @@
 //! What is to be tracked, and how.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, str::FromStr};
 
 use hoid_core::{predictor::Regressor, recursion::Stable};
 use hoid_model::{Orders, SampleTime, Structure};
@@ -108,6 +108,31 @@ impl Memory {
                 expected: "more than one sample and at most 1e9, or inf where nothing is to be forgotten".to_owned(),
             })
         }
+    }
+}
+
+/// `256` samples, `2.56s`, or `inf`.
+impl FromStr for Memory {
+    type Err = IdentError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let trimmed = text.trim();
+        if ["inf", "infinite"]
+            .iter()
+            .any(|word| trimmed.eq_ignore_ascii_case(word))
+        {
+            return Ok(Self::Infinite);
+        }
+        let number = |part: &str| part.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+        let memory = match trimmed.strip_suffix('s') {
+            Some(seconds) => number(seconds).filter(|s| *s > 0.0).map(Self::Seconds),
+            None => number(trimmed).filter(|n| *n > 1.0).map(Self::Samples),
+        };
+        memory.ok_or_else(|| IdentError::BadOption {
+            option: "the memory".to_owned(),
+            found: text.to_owned(),
+            expected: "more than 1 sample (256), seconds (2.56s) or inf".to_owned(),
+        })
     }
 }
 
@@ -363,4 +388,20 @@ pub(super) const PHYSICAL_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zet
 /// True when `key` is the name, or the letter of its polynomial.
 fn is_named(name: &str, key: &str) -> bool {
     name == key || (key.len() == 1 && name.starts_with(key) && name[1..].bytes().all(|b| b.is_ascii_digit()))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn memories_as_written() {
+        assert_eq!("256".parse::<Memory>().unwrap(), Memory::Samples(256.0));
+        assert_eq!("2.56s".parse::<Memory>().unwrap(), Memory::Seconds(2.56));
+        assert_eq!("Inf".parse::<Memory>().unwrap(), Memory::Infinite);
+        for bad in ["", "0", "1", "-5", "nan", "0s", "s", "-infs", "2m"] {
+            assert!(bad.parse::<Memory>().is_err(), "{bad}");
+        }
+    }
 }

@@ -1,0 +1,352 @@
+//! From records to a describing function: coefficients at the lines of every run, their averages and errors.
+
+use hoid_model::{Channel, Complex64, Record, uncertainty::Estimate};
+
+use super::{
+    excitation::{Excitation, channel_of, refuse},
+    options::{Averaging, DescribingOptions, Realisation},
+    ratio::{Ratio, deviation, mean},
+    remnant::{Control, RemnantBand, share_and_ratio, spectrum},
+    window::{Window, advanced},
+};
+use crate::{IdentError, checks::common_sample_time};
+
+/// Amplitude of a line, as a part of the rms of its channel, below which it is rounding.
+const LEAST_LINE: f64 = 1e-12;
+
+/// The describing function at one line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Line {
+    /// Its frequency, rad/s.
+    pub omega_rad_s: f64,
+    /// Its number among the harmonics of the period.
+    pub harmonic: usize,
+    /// H, the average over runs.
+    pub response: Complex64,
+    /// sigma, the root of the mean square of `|dH|`; `None` for one run.
+    pub standard_error: Option<f64>,
+    /// Standard deviation of the ratios of single runs, as the root of the mean square modulus; `None` for one run.
+    pub spread: Option<f64>,
+    /// Squared coherence, 0 to 1; `None` for one run, where it is always 1.
+    pub coherence: Option<f64>,
+    /// `U_i/E_i`.
+    pub per_run: Vec<Complex64>,
+    /// The controlled element, where it is estimated.
+    pub element: Option<Complex64>,
+    pub(super) ratio: Ratio,
+    pub(super) element_ratio: Option<Ratio>,
+}
+
+impl Line {
+    /// `20 log10 |H|` in dB.
+    pub fn magnitude_db(&self) -> Estimate {
+        Estimate {
+            value: 20.0 * self.response.norm().log10(),
+            standard_error: self.relative_error().map(|r| 20.0 / std::f64::consts::LN_10 * r),
+        }
+    }
+
+    /// `arg H` in deg, between -180 and 180.
+    pub fn phase_deg(&self) -> Estimate {
+        Estimate {
+            value: self.response.arg().to_degrees(),
+            standard_error: self.relative_error().map(f64::to_degrees),
+        }
+    }
+
+    /// `sigma/(sqrt(2) |H|)`.
+    fn relative_error(&self) -> Option<f64> {
+        self.standard_error
+            .map(|s| s / (std::f64::consts::SQRT_2 * self.response.norm()))
+    }
+
+    /// Centre and radius of the circle in the complex plane that holds the true H with this probability, exact for a circular normal
+    /// remnant however small e is against it; `None` for one run, or where e does not differ from zero at this level.
+    pub fn confidence_circle(&self, probability: f64) -> Option<(Complex64, f64)> {
+        self.ratio.confidence_disc(probability)
+    }
+}
+
+/// What one run says by itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunSummary {
+    /// Label of its record.
+    pub label: String,
+    /// Periods in it.
+    pub periods: usize,
+    /// Root mean square of e.
+    pub rms_e: f64,
+    /// Root mean square of u.
+    pub rms_u: f64,
+    /// Share of the variance of u off the lines.
+    pub off_line_share: f64,
+    /// Power of the remnant in u as a part of the variance of u.
+    pub noise_ratio: f64,
+}
+
+/// A describing function with what the records say beside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DescribingFunction {
+    /// The lines, by frequency.
+    pub lines: Vec<Line>,
+    /// The runs: records or periods.
+    pub runs: Vec<RunSummary>,
+    /// Share of the variance of u off the lines, mean over runs.
+    pub off_line_share: Estimate,
+    /// Power of the remnant in u as a part of the variance of u (P_n of eq. 43), mean over runs.
+    pub noise_ratio: Estimate,
+    /// Spectrum of the remnant in u.
+    pub remnant_spectrum: Vec<RemnantBand>,
+    /// Root mean square of e, mean over runs.
+    pub rms_e: Estimate,
+    /// Root mean square of u, mean over runs.
+    pub rms_u: Estimate,
+}
+
+/// Coefficients of one run.
+struct Run {
+    label: String,
+    window: Window,
+    e: Vec<Complex64>,
+    u: Vec<Complex64>,
+    reference: Option<Vec<Complex64>>,
+    /// Output and input of the controlled element.
+    element: Option<(Vec<Complex64>, Vec<Complex64>)>,
+    rms: (f64, f64),
+}
+
+/// The describing function from e to u of one or several records at the lines of their excitation.
+///
+/// # Errors
+/// [`IdentError::NoRecords`], [`IdentError::MixedSampling`], [`IdentError::NotWholePeriods`], [`IdentError::LineBeyondNyquist`],
+/// [`IdentError::NoExcitation`] for e or u that does not move, [`IdentError::NoLinePower`] for a line without power,
+/// [`IdentError::BadOption`] for a channel that is not there.
+pub fn describe(
+    records: &[Record],
+    excitation: &Excitation,
+    options: &DescribingOptions,
+) -> Result<DescribingFunction, IdentError> {
+    let ts_s = common_sample_time(records)?.s();
+    if !options.offset_samples.is_finite() {
+        return refuse(
+            "the offset between e and u",
+            options.offset_samples,
+            "a finite number of samples",
+        );
+    }
+    if options.smoothing_bins == 0 {
+        return refuse("the bins averaged in the remnant spectrum", 0, "1 or more");
+    }
+    let mut runs = Vec::new();
+    for record in records {
+        runs.extend(runs_of(record, excitation, options)?);
+    }
+    let lines = excitation.harmonics().iter().zip(excitation.omega_rad_s());
+    let lines: Result<Vec<Line>, IdentError> = lines.map(|(&n, omega)| line(&runs, n, omega, options)).collect();
+    let lines = lines?;
+
+    let controls: Vec<Control<'_>> = runs
+        .iter()
+        .map(|run| Control {
+            coefficients: &run.u,
+            window: run.window,
+        })
+        .collect();
+    let remnant_spectrum = spectrum(&controls, excitation.harmonics(), ts_s, options.smoothing_bins);
+    let runs: Vec<RunSummary> = runs
+        .iter()
+        .zip(&controls)
+        .map(|(run, control)| {
+            let (share, ratio) = share_and_ratio(control, excitation.harmonics(), ts_s, &remnant_spectrum);
+            RunSummary {
+                label: run.label.clone(),
+                periods: run.window.periods,
+                rms_e: run.rms.0,
+                rms_u: run.rms.1,
+                off_line_share: share,
+                noise_ratio: ratio,
+            }
+        })
+        .collect();
+    let over_runs = |get: fn(&RunSummary) -> f64| mean(&runs.iter().map(get).collect::<Vec<f64>>());
+    Ok(DescribingFunction {
+        lines,
+        off_line_share: over_runs(|r| r.off_line_share),
+        noise_ratio: over_runs(|r| r.noise_ratio),
+        rms_e: over_runs(|r| r.rms_e),
+        rms_u: over_runs(|r| r.rms_u),
+        remnant_spectrum,
+        runs,
+    })
+}
+
+fn runs_of(record: &Record, excitation: &Excitation, options: &DescribingOptions) -> Result<Vec<Run>, IdentError> {
+    let window = Window::of_span(record, options.from_s, options.to_s, excitation.period_s())?;
+    let bin = |n: usize| n.saturating_mul(window.periods);
+    let beyond = |n: &&usize| bin(**n).saturating_mul(2) >= window.samples;
+    if let Some(n) = excitation.harmonics().iter().find(beyond) {
+        return Err(IdentError::LineBeyondNyquist {
+            omega_rad_s: std::f64::consts::TAU * *n as f64 / excitation.period_s(),
+            label: record.label().to_owned(),
+            nyquist_rad_s: record.sample_time().nyquist_rad_s(),
+        });
+    }
+    if record.input_channel().is_none() {
+        return refuse(
+            &format!("record {}", record.label()),
+            "no input",
+            "the tracking error as input, of which u is a function",
+        );
+    }
+    let span = window.first..window.first + window.samples;
+    for channel in record.channels().take(2) {
+        let part = &channel.values[span.clone()];
+        if part.iter().all(|v| *v == part[0]) {
+            return Err(IdentError::NoExcitation {
+                channel: channel.name.clone(),
+                label: record.label().to_owned(),
+                value: part[0],
+            });
+        }
+    }
+    let reference = match &options.averaging {
+        Averaging::Reference { channel } => Some(channel_of(record, channel, "the channel of the excitation")?),
+        _ => None,
+    };
+    let element = match &options.element {
+        None => None,
+        Some(element) => {
+            let output = channel_of(record, &element.output, "the output of the controlled element")?;
+            let disturbance = match &element.disturbance {
+                Some(name) => Some(channel_of(record, name, "the disturbance of the controlled element")?),
+                None => None,
+            };
+            Some((output, disturbance))
+        }
+    };
+    let windows = match options.realisation {
+        Realisation::Record => vec![window],
+        Realisation::Period => window.single_periods(),
+    };
+    let rms = |part: &[f64]| (part.iter().map(|v| v * v).sum::<f64>() / part.len() as f64).sqrt();
+    let run = |window: Window| -> Result<Run, IdentError> {
+        let (e, _) = window.samples_of(record.input(), 0.0);
+        let (u, late) = window.samples_of(record.output(), options.offset_samples);
+        let channel = |name: &str, values: &[f64]| Channel::new(name, "", values.to_vec());
+        let pair = Record::new(record.sample_time(), channel("e", e), channel("u", u))?.detrended(options.detrend);
+        let control = advanced(pair.output(), late);
+        let element = element.map(|(output, disturbance)| {
+            let mut input = control.clone();
+            if let Some(d) = disturbance {
+                for (sum, d) in input.iter_mut().zip(window.coefficients(d, options.offset_samples)) {
+                    *sum += d;
+                }
+            }
+            (window.coefficients(output, 0.0), input)
+        });
+        Ok(Run {
+            label: record.label().to_owned(),
+            window,
+            e: advanced(pair.input(), 0.0),
+            u: control,
+            reference: reference.map(|r| window.coefficients(r, 0.0)),
+            element,
+            rms: (rms(pair.input()), rms(pair.output())),
+        })
+    };
+    let runs: Result<Vec<Run>, IdentError> = windows.into_iter().map(run).collect();
+    let runs = runs?;
+    for run in &runs {
+        run.check_lines(record, excitation, options)?;
+    }
+    Ok(runs)
+}
+
+impl Run {
+    /// Every line must have power in what is divided by.
+    fn check_lines(
+        &self,
+        record: &Record,
+        excitation: &Excitation,
+        options: &DescribingOptions,
+    ) -> Result<(), IdentError> {
+        let names: Vec<&str> = record.channels().take(2).map(|c| c.name.as_str()).collect();
+        let mut channels = vec![(names[0], &self.e), (names[1], &self.u)];
+        if let (Averaging::Reference { channel }, Some(x)) = (&options.averaging, &self.reference) {
+            channels.push((channel, x));
+        }
+        if let (Some(element), Some((y, w))) = (&options.element, &self.element) {
+            channels.push((&element.output, y));
+            channels.push(("the input of the controlled element", w));
+        }
+        for (name, x) in channels {
+            let whole: f64 = x.iter().map(|c| c.norm_sqr()).sum();
+            for (n, omega_rad_s) in excitation.harmonics().iter().zip(excitation.omega_rad_s()) {
+                let size = x[n * self.window.periods].norm();
+                if size.is_nan() || size <= LEAST_LINE * whole.sqrt() {
+                    return Err(IdentError::NoLinePower {
+                        channel: name.to_owned(),
+                        label: self.label.clone(),
+                        omega_rad_s,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn line(runs: &[Run], harmonic: usize, omega_rad_s: f64, options: &DescribingOptions) -> Result<Line, IdentError> {
+    let one = Complex64::new(1.0, 0.0);
+    let at = |run: &Run, x: &[Complex64]| x[harmonic * run.window.periods];
+    let (mut terms, mut element_terms) = (Vec::new(), Vec::new());
+    let (mut cross, mut power_u, mut power_d) = (Complex64::new(0.0, 0.0), 0.0, 0.0);
+    for run in runs {
+        let (e, u) = (at(run, &run.e), at(run, &run.u));
+        // What the products are with: the ratios have the inverse of their denominator.
+        let (weight, element_weight, d) = match (&options.averaging, &run.reference) {
+            (Averaging::Reference { .. }, Some(reference)) => {
+                let d = at(run, reference);
+                (d.conj(), d.conj(), d)
+            }
+            (Averaging::SameExcitation, _) => (one, one, one),
+            _ => {
+                let input = run.element.as_ref().map_or(one, |(_, w)| at(run, w));
+                (e.inv(), input.inv(), e)
+            }
+        };
+        terms.push((u * weight, e * weight));
+        if let Some((y, w)) = &run.element {
+            element_terms.push((at(run, y) * element_weight, at(run, w) * element_weight));
+        }
+        cross += u * d.conj();
+        power_u += u.norm_sqr();
+        power_d += d.norm_sqr();
+    }
+    let ratio = Ratio(terms);
+    let element_ratio = options.element.as_ref().map(|_| Ratio(element_terms));
+    let response = ratio.value(None);
+    let element = element_ratio.as_ref().map(|r| r.value(None));
+    if !(response.is_finite() && element.is_none_or(Complex64::is_finite)) {
+        return Err(IdentError::NoLinePower {
+            channel: "the average of all runs".to_owned(),
+            label: runs.iter().map(|r| r.label.as_str()).collect::<Vec<_>>().join(", "),
+            omega_rad_s,
+        });
+    }
+    let per_run = ratio.per_run();
+    let parts = |get: fn(&Complex64) -> f64| deviation(&per_run.iter().map(get).collect::<Vec<f64>>());
+    let spread = parts(|h| h.re).zip(parts(|h| h.im)).map(|(re, im)| re.hypot(im));
+    Ok(Line {
+        omega_rad_s,
+        harmonic,
+        response,
+        standard_error: ratio.standard_error(),
+        spread,
+        coherence: (runs.len() > 1).then(|| cross.norm_sqr() / (power_u * power_d)),
+        per_run,
+        element,
+        ratio,
+        element_ratio,
+    })
+}

@@ -1,0 +1,301 @@
+//! The lines of a periodic excitation.
+//!
+//! A sum of sinusoids at harmonics `omega_k = n_k 2 pi/T` of one period T has all its power at these lines, and over a whole
+//! number of periods each of them is one bin of the discrete Fourier transform. Source: D. T. McRuer and H. R. Jex, *A Review
+//! of Quasi-Linear Pilot Models*, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249; H. J. Damveld et al., *Design of
+//! Forcing Functions for the Identification of Human Control Behavior*, J. Guidance, Control, and Dynamics 33 (2010) 1064-1081.
+
+use std::f64::consts::TAU;
+
+use hoid_model::{Record, forcing::ForcingFunction};
+
+use super::{
+    spectrum::{coefficients, power},
+    window::whole_periods,
+};
+use crate::IdentError;
+
+/// Deviation of a line from a harmonic that is taken as rounding, in harmonics.
+const ROUNDING: f64 = 1e-4;
+/// Share of the power of a channel that its lines must hold to be its lines.
+const SHARE_OF_LINES: f64 = 0.99;
+
+/// Harmonics of a period.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Excitation {
+    harmonics: Vec<usize>,
+    period_s: f64,
+}
+
+/// What counts as a line of a channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LineSearch {
+    /// Period T in s; the longest that all lines found are harmonics of where it is `None`.
+    pub period_s: Option<f64>,
+    /// Smallest amplitude of a line as a part of that of the largest. Default 0.01.
+    pub least_amplitude: f64,
+}
+
+impl Default for LineSearch {
+    fn default() -> Self {
+        Self {
+            period_s: None,
+            least_amplitude: 0.01,
+        }
+    }
+}
+
+impl Excitation {
+    /// The harmonics n_k of the period T in s.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] without harmonics, with a harmonic 0 or one that stands twice, or for a period that is not
+    /// positive.
+    pub fn of_harmonics(harmonics: &[usize], period_s: f64) -> Result<Self, IdentError> {
+        if !(period_s.is_finite() && period_s > 0.0) {
+            return refuse(
+                "the period of the excitation in s",
+                period_s,
+                "a positive finite number",
+            );
+        }
+        let mut sorted = harmonics.to_vec();
+        sorted.sort_unstable();
+        if sorted.is_empty() {
+            return refuse("the lines of the excitation", "none", "at least one");
+        }
+        if sorted[0] == 0 {
+            return refuse("a harmonic of the excitation", 0, "1 or more");
+        }
+        if let Some(twice) = sorted.windows(2).find(|w| w[0] == w[1]) {
+            return refuse(
+                "the lines of the excitation",
+                format!("{} twice", twice[0]),
+                "each once",
+            );
+        }
+        Ok(Self {
+            harmonics: sorted,
+            period_s,
+        })
+    }
+
+    /// The lines omega_k in rad/s, each a harmonic of the period T in s within 1e-4 of a harmonic.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] for a line that is none, and as [`Excitation::of_harmonics`].
+    pub fn new(omega_rad_s: &[f64], period_s: f64) -> Result<Self, IdentError> {
+        let mut harmonics = Vec::with_capacity(omega_rad_s.len());
+        for &omega in omega_rad_s {
+            let n = omega * period_s / TAU;
+            // Also refuses what is no number.
+            if !((n - n.round()).abs() <= ROUNDING && (0.5..1e9).contains(&n)) {
+                let nearest = n.round().max(1.0) * TAU / period_s;
+                return refuse(
+                    "a line of the excitation in rad/s",
+                    omega,
+                    format!("a harmonic of the period {period_s} s, such as {nearest}"),
+                );
+            }
+            harmonics.push(n.round() as usize);
+        }
+        Self::of_harmonics(&harmonics, period_s)
+    }
+
+    /// The lines of a forcing function of the period T in s.
+    ///
+    /// # Errors
+    /// As [`Excitation::new`].
+    pub fn of_forcing_function(forcing: &ForcingFunction, period_s: f64) -> Result<Self, IdentError> {
+        let omega: Vec<f64> = forcing
+            .sinusoids()
+            .iter()
+            .filter(|s| s.amplitude_deg != 0.0)
+            .map(|s| s.omega_rad_s)
+            .collect();
+        Self::new(&omega, period_s)
+    }
+
+    /// The lines of a channel of a record that spans whole periods: the bins with at least the amplitude of `search`. A span that
+    /// is wrong by a sample or so leaks too little to be seen; with the period given it is refused.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] for a channel that is not there, or whose power is not in such lines: noise, or a span of no
+    /// whole periods; [`IdentError::NoExcitation`] for a constant channel; [`IdentError::NotWholePeriods`].
+    pub fn found_in(record: &Record, channel: &str, search: &LineSearch) -> Result<Self, IdentError> {
+        let values = channel_of(record, channel, "the channel to find lines in")?;
+        if !(search.least_amplitude > 0.0 && search.least_amplitude <= 1.0) {
+            return refuse(
+                "the least amplitude of a line",
+                search.least_amplitude,
+                "above 0 and at most 1",
+            );
+        }
+        let n = values.len();
+        let span_s = n as f64 * record.sample_time().s();
+        let periods = match search.period_s {
+            None => None,
+            Some(period_s) => Some(whole_periods(record, n, period_s)?),
+        };
+        let x = coefficients(values);
+        let powers: Vec<f64> = (1..x.len()).map(|k| power(&x, k, n)).collect();
+        let (total, largest) = (powers.iter().sum::<f64>(), powers.iter().copied().fold(0.0, f64::max));
+        let mean_square = values.iter().map(|v| v * v).sum::<f64>() / n as f64;
+        // Rounding of the transform leaves about 1e-32 of the power in each bin.
+        if total <= 1e-24 * mean_square || largest == 0.0 {
+            return Err(IdentError::NoExcitation {
+                channel: channel.to_owned(),
+                label: record.label().to_owned(),
+                value: values[0],
+            });
+        }
+        let threshold = largest * search.least_amplitude * search.least_amplitude;
+        let bins: Vec<usize> = (1..=powers.len()).filter(|k| powers[k - 1] >= threshold).collect();
+        let held = bins.iter().map(|k| powers[k - 1]).sum::<f64>() / total;
+        let dense = bins.windows(2).filter(|w| w[1] == w[0] + 1).count();
+        if held < SHARE_OF_LINES || 2 * dense > bins.len() {
+            return refuse(
+                &format!("the lines of channel {channel} of record {}", record.label()),
+                format!(
+                    "{} bins, many side by side, with {:.1} % of the power",
+                    bins.len(),
+                    100.0 * held
+                ),
+                "single lines with nearly all of it; take a span of whole periods, or give the lines",
+            );
+        }
+        let common = match periods {
+            Some(m) => m,
+            None => bins.iter().copied().fold(0, greatest_common_divisor),
+        };
+        if let Some(between) = bins.iter().find(|k| *k % common != 0) {
+            return refuse(
+                &format!("a line of channel {channel} of record {} in rad/s", record.label()),
+                TAU * *between as f64 / span_s,
+                format!("a harmonic of the period {} s", span_s / common as f64),
+            );
+        }
+        let harmonics: Vec<usize> = bins.iter().map(|k| k / common).collect();
+        let period_s = search.period_s.unwrap_or(span_s / common as f64);
+        Self::of_harmonics(&harmonics, period_s)
+    }
+
+    /// The harmonics n_k, ascending.
+    pub fn harmonics(&self) -> &[usize] {
+        &self.harmonics
+    }
+
+    /// The period T, s.
+    pub fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
+    /// The lines omega_k in rad/s, ascending.
+    pub fn omega_rad_s(&self) -> Vec<f64> {
+        self.harmonics.iter().map(|n| TAU * *n as f64 / self.period_s).collect()
+    }
+}
+
+fn greatest_common_divisor(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
+}
+
+/// The values of a channel by its name.
+pub(super) fn channel_of<'r>(record: &'r Record, channel: &str, what: &str) -> Result<&'r [f64], IdentError> {
+    match record.channel(channel) {
+        Some(values) => Ok(values),
+        None => {
+            let names: Vec<&str> = record.channels().map(|c| c.name.as_str()).collect();
+            refuse(
+                &format!("{what} of record {}", record.label()),
+                channel,
+                format!("one of {}", names.join(", ")),
+            )
+        }
+    }
+}
+
+pub(super) fn refuse<T>(option: &str, found: impl ToString, expected: impl ToString) -> Result<T, IdentError> {
+    Err(IdentError::BadOption {
+        option: option.to_owned(),
+        found: found.to_string(),
+        expected: expected.to_string(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::{Channel, SampleTime};
+
+    use super::*;
+
+    fn record(values: Vec<f64>) -> Record {
+        let ts = SampleTime::HUNDREDTH;
+        let zero = vec![0.0; values.len()];
+        Record::new(ts, Channel::new("e", "deg", values), Channel::new("u", "deg", zero)).unwrap()
+    }
+
+    fn reference(samples: usize, noise: f64) -> Record {
+        let f = ForcingFunction::reference().samples(0.0, SampleTime::HUNDREDTH, samples);
+        // A fixed sequence that looks like noise.
+        let rough = |k: usize| noise * (k as f64 * k as f64 * 0.7).sin();
+        record(f.iter().enumerate().map(|(k, v)| v + rough(k)).collect())
+    }
+
+    #[test]
+    fn lines_are_found_where_the_forcing_function_has_them() {
+        let given = Excitation::of_forcing_function(&ForcingFunction::reference(), 81.92).unwrap();
+        assert_eq!(given.harmonics(), [3, 5, 8, 13, 22, 34, 53, 86, 139, 229]);
+        for (samples, noise) in [(8192, 0.0), (16384, 0.0), (8192, 0.02)] {
+            let found = Excitation::found_in(&reference(samples, noise), "e", &LineSearch::default()).unwrap();
+            assert_eq!(found.harmonics(), given.harmonics());
+            assert!((found.period_s() - 81.92).abs() < 1e-9);
+        }
+        let same = Excitation::new(&given.omega_rad_s(), 81.92).unwrap();
+        assert_eq!(same, given);
+    }
+
+    #[test]
+    fn a_span_that_leaks_is_refused() {
+        for samples in [4096, 8000, 8150] {
+            let refused = Excitation::found_in(&reference(samples, 0.0), "e", &LineSearch::default());
+            assert!(
+                matches!(refused, Err(IdentError::BadOption { .. })),
+                "{samples}: {refused:?}"
+            );
+        }
+        let search = LineSearch {
+            period_s: Some(81.92),
+            ..LineSearch::default()
+        };
+        for samples in [4096, 8191] {
+            let refused = Excitation::found_in(&reference(samples, 0.0), "e", &search);
+            assert!(matches!(refused, Err(IdentError::NotWholePeriods { .. })));
+        }
+        // The lines of two periods taken for those of one of twice the length would be harmonics too; the other way round not.
+        let wrong = LineSearch {
+            period_s: Some(40.96),
+            ..LineSearch::default()
+        };
+        assert!(Excitation::found_in(&reference(8192, 0.0), "e", &wrong).is_err());
+    }
+
+    #[test]
+    fn what_has_no_lines_is_refused() {
+        let search = LineSearch::default();
+        assert!(matches!(
+            Excitation::found_in(&record(vec![2.5; 100]), "e", &search),
+            Err(IdentError::NoExcitation { .. })
+        ));
+        assert!(Excitation::found_in(&record(vec![1.0, 2.0, 4.0]), "f_t", &search).is_err());
+        assert!(Excitation::of_harmonics(&[], 1.0).is_err());
+        assert!(Excitation::of_harmonics(&[0, 1], 1.0).is_err());
+        assert!(Excitation::of_harmonics(&[3, 1, 3], 1.0).is_err());
+        for period in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(Excitation::of_harmonics(&[1], period).is_err());
+            assert!(Excitation::new(&[1.0], period).is_err());
+        }
+        assert!(Excitation::new(&[1.0, f64::NAN], TAU).is_err());
+        assert!(Excitation::new(&[1.5], TAU).is_err());
+    }
+}

@@ -1,0 +1,132 @@
+//! A ratio of sums over runs, `H = sum a_i / sum b_i`, and its error.
+//!
+//! `dH = sum (a_i - H b_i) / sum b_i` to the first order, with independent terms: `sigma^2 = n/(n-1) sum |a_i - H b_i|^2 /
+//! |sum b_i|^2`. Without linearisation: the mean of `a_i - H b_i` is zero at the true H alone, and n times its square over their
+//! sample variance there has the F distribution with 2 and 2(n - 1) degrees of freedom for circular normal errors. The values of H that a
+//! level of F does not exclude are a disc, as long as the denominator differs from zero at this level (E. C. Fieller, J. Royal
+//! Statistical Society B 16 (1954) 175-185, for complex ratios). What is computed from several ratios has its standard error by the jackknife over runs, `sigma^2 = (n-1)/n
+//! sum (y_(i) - mean)^2`, y_(i) without run i (B. Efron, *The Jackknife, the Bootstrap and Other Resampling Plans*, 1982,
+//! chapter 3).
+
+use hoid_model::{Complex64, uncertainty::Estimate};
+
+/// Terms of numerator and denominator, one of each a run.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Ratio(pub Vec<(Complex64, Complex64)>);
+
+impl Ratio {
+    fn sums(&self, without: Option<usize>) -> (Complex64, Complex64) {
+        let zero = Complex64::new(0.0, 0.0);
+        let kept = self.0.iter().enumerate().filter(|(i, _)| Some(*i) != without);
+        kept.fold((zero, zero), |(a, b), (_, term)| (a + term.0, b + term.1))
+    }
+
+    /// H, without one of the runs on request.
+    pub fn value(&self, without: Option<usize>) -> Complex64 {
+        let (a, b) = self.sums(without);
+        a / b
+    }
+
+    /// `a_i/b_i`.
+    pub fn per_run(&self) -> Vec<Complex64> {
+        self.0.iter().map(|(a, b)| a / b).collect()
+    }
+
+    /// sigma; `None` for one run.
+    pub fn standard_error(&self) -> Option<f64> {
+        let n = self.0.len() as f64;
+        let (a, b) = self.sums(None);
+        let h = a / b;
+        let squares: f64 = self.0.iter().map(|(a, b)| (a - h * b).norm_sqr()).sum();
+        (n > 1.0).then(|| (n / (n - 1.0) * squares).sqrt() / b.norm())
+    }
+
+    /// Centre and radius of the disc that holds the true ratio with this probability; `None` for one run, or where there is no bound.
+    pub fn confidence_disc(&self, probability: f64) -> Option<(Complex64, f64)> {
+        let n = self.0.len() as f64;
+        let (a, b) = self.sums(None);
+        // The level of F(2, 2(n - 1)) in closed form.
+        let level = (n - 1.0) * ((1.0 - probability).powf(-1.0 / (n - 1.0)) - 1.0);
+        let scale = n * level / (n - 1.0);
+        let (mut aa, mut bb, mut ab) = (0.0, 0.0, Complex64::new(0.0, 0.0));
+        for (a_i, b_i) in &self.0 {
+            let (a_i, b_i) = (a_i - a / n, b_i - b / n);
+            aa += a_i.norm_sqr();
+            bb += b_i.norm_sqr();
+            ab += a_i * b_i.conj();
+        }
+        // |A - H B|^2 <= scale sum |a_i - H b_i - mean|^2 as p |H|^2 - 2 Re(H* q) + r <= 0.
+        let p = b.norm_sqr() - scale * bb;
+        let q = a * b.conj() - scale * ab;
+        let r = a.norm_sqr() - scale * aa;
+        let square = (q.norm_sqr() - p * r) / (p * p);
+        (n > 1.0 && p > 0.0 && square.is_finite()).then(|| (q / p, square.max(0.0).sqrt()))
+    }
+}
+
+/// A value with the standard error of the jackknife; none where one of the values without a run does not exist, or there is
+/// only one run.
+pub(super) fn jackknife(value: f64, without: &[Option<f64>]) -> Estimate {
+    let known: Vec<f64> = without.iter().copied().flatten().collect();
+    let n = without.len();
+    if n < 2 || known.len() < n {
+        return Estimate::fixed(value);
+    }
+    let mean = known.iter().sum::<f64>() / n as f64;
+    let squares: f64 = known.iter().map(|v| (v - mean).powi(2)).sum();
+    Estimate::with_variance(value, squares * (n as f64 - 1.0) / n as f64)
+}
+
+/// Mean with its standard error from the spread; none for one value.
+pub(super) fn mean(values: &[f64]) -> Estimate {
+    let n = values.len() as f64;
+    let value = values.iter().sum::<f64>() / n;
+    match deviation(values) {
+        Some(s) => Estimate::with_variance(value, s * s / n),
+        None => Estimate::fixed(value),
+    }
+}
+
+/// Standard deviation with n - 1; `None` for fewer than two values.
+pub(super) fn deviation(values: &[f64]) -> Option<f64> {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.len() > 1).then(|| (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn with_equal_denominators_it_is_the_mean_and_its_error() {
+        let values = [1.0, 2.0, 4.0, 4.5];
+        let terms = |b: f64| {
+            values
+                .iter()
+                .map(|v| (Complex64::new(0.0, v * b), Complex64::new(b, 0.0)))
+                .collect()
+        };
+        let (ratio, expected) = (Ratio(terms(3.0)), mean(&values));
+        assert!((ratio.value(None) - Complex64::new(0.0, expected.value)).norm() < 1e-15);
+        let error = expected.standard_error.unwrap();
+        assert!((ratio.standard_error().unwrap() - error).abs() < 1e-15);
+        // The jackknife of a mean is the classical formula.
+        let without: Vec<Option<f64>> = (0..4).map(|i| Some(ratio.value(Some(i)).im)).collect();
+        assert!((jackknife(expected.value, &without).standard_error.unwrap() - error).abs() < 1e-15);
+        assert_eq!(jackknife(1.0, &[Some(1.0), None]).standard_error, None);
+        // For a complex mean, |dH|^2 <= F sigma^2: F(2, 6) is exceeded by 5 % at 5.143.
+        let (centre, radius) = ratio.confidence_disc(0.95).unwrap();
+        assert!((centre - ratio.value(None)).norm() < 1e-14 && (radius / error - 5.143_f64.sqrt()).abs() < 1e-4);
+        let zero = Complex64::new(0.0, 0.0);
+        let vague = Ratio(vec![
+            (zero + 1.0, zero + 1.0),
+            (zero + 2.0, zero - 0.9),
+            (zero + 1.5, zero + 0.3),
+        ]);
+        assert_eq!(vague.confidence_disc(0.95), None);
+        let one = Ratio(vec![(Complex64::new(1.0, 0.0), Complex64::new(2.0, 0.0))]);
+        assert_eq!((one.standard_error(), one.confidence_disc(0.95)), (None, None));
+        assert_eq!(mean(&[2.0]), Estimate::fixed(2.0));
+    }
+}

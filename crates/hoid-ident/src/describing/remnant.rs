@@ -1,0 +1,166 @@
+//! The remnant in u: its power off the lines.
+//!
+//! Over whole periods the response to the excitation has no power between its lines, so that all of it there is remnant. Bin k
+//! of a window of N samples gives the one-sided density `|U_k|^2/2 / (2 pi/(N Ts))` per rad/s, with a relative standard error of
+//! 1 (chi-square with two degrees of freedom); the mean over n runs and neighbouring bins, m values, has one of `1/sqrt(m)`
+//! (J. S. Bendat and A. G. Piersol, *Random Data*, 2010, section 8.5.4).
+//!
+//! At the lines the remnant stands too. With the density of the neighbourhood there, `noise ratio = power of the remnant /
+//! var(u)` estimates P_n of eq. 43, where the share off the lines leaves the lines out.
+
+use std::f64::consts::TAU;
+
+use hoid_model::Complex64;
+
+use super::{spectrum::power, window::Window};
+
+/// Mean density of the remnant in u over a band of frequencies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RemnantBand {
+    /// Mean frequency of its bins, rad/s.
+    pub omega_rad_s: f64,
+    /// One-sided power density of u off the lines, square of the unit of u per rad/s: its integral is a variance.
+    pub density: f64,
+    /// Values that the mean is over: bins of all runs.
+    pub values: usize,
+}
+
+impl RemnantBand {
+    /// Standard error of the density for a remnant that is stationary and normal.
+    pub fn standard_error(&self) -> f64 {
+        self.density / (self.values as f64).sqrt()
+    }
+}
+
+/// u of one run.
+pub(super) struct Control<'a> {
+    pub coefficients: &'a [Complex64],
+    pub window: Window,
+}
+
+impl Control<'_> {
+    fn width_rad_s(&self, ts_s: f64) -> f64 {
+        TAU / (self.window.samples as f64 * ts_s)
+    }
+
+    fn is_line(&self, k: usize, harmonics: &[usize]) -> bool {
+        k.is_multiple_of(self.window.periods) && harmonics.binary_search(&(k / self.window.periods)).is_ok()
+    }
+
+    fn power(&self, k: usize) -> f64 {
+        power(self.coefficients, k, self.window.samples)
+    }
+
+    /// Variance, and the power off the lines.
+    fn powers(&self, harmonics: &[usize]) -> (f64, f64) {
+        let bins = 1..self.coefficients.len();
+        let all: f64 = bins.clone().map(|k| self.power(k)).sum();
+        let off: f64 = bins
+            .filter(|k| !self.is_line(*k, harmonics))
+            .map(|k| self.power(k))
+            .sum();
+        (all, off)
+    }
+}
+
+/// Bands of `neighbours` bins of the shortest window, each the mean over the bins off the lines of all runs.
+pub(super) fn spectrum(runs: &[Control<'_>], harmonics: &[usize], ts_s: f64, neighbours: usize) -> Vec<RemnantBand> {
+    let widest = runs.iter().map(|r| r.width_rad_s(ts_s)).fold(0.0, f64::max);
+    let band_rad_s = widest * neighbours.max(1) as f64;
+    // Sums of frequency and density, and their number.
+    let mut bands: Vec<(f64, f64, usize)> = Vec::new();
+    for run in runs {
+        let width = run.width_rad_s(ts_s);
+        for k in (1..run.coefficients.len()).filter(|k| !run.is_line(*k, harmonics)) {
+            let omega = k as f64 * width;
+            // Half a bin up: a frequency at an edge belongs to the band below, whatever its rounding.
+            let band = ((omega - 0.5 * width) / band_rad_s).max(0.0) as usize;
+            if bands.len() <= band {
+                bands.resize(band + 1, (0.0, 0.0, 0));
+            }
+            let b = &mut bands[band];
+            *b = (b.0 + omega, b.1 + run.power(k) / width, b.2 + 1);
+        }
+    }
+    let mean = |&(omega, density, values): &(f64, f64, usize)| RemnantBand {
+        omega_rad_s: omega / values as f64,
+        density: density / values as f64,
+        values,
+    };
+    bands.iter().filter(|b| b.2 > 0).map(mean).collect()
+}
+
+/// Share of the power of u off the lines, and noise ratio of one run.
+pub(super) fn share_and_ratio(
+    run: &Control<'_>,
+    harmonics: &[usize],
+    ts_s: f64,
+    spectrum: &[RemnantBand],
+) -> (f64, f64) {
+    let (all, off) = run.powers(harmonics);
+    let width = run.width_rad_s(ts_s);
+    let at_lines: f64 = harmonics
+        .iter()
+        .map(|h| (h * run.window.periods) as f64 * width)
+        .map(|omega| width * density_at(spectrum, omega))
+        .sum();
+    (off / all, (off + at_lines) / all)
+}
+
+/// Density between the centres of two bands by linear interpolation; that of the first or the last band outside.
+fn density_at(spectrum: &[RemnantBand], omega: f64) -> f64 {
+    let above = spectrum.partition_point(|b| b.omega_rad_s <= omega);
+    match (above.checked_sub(1).map(|i| &spectrum[i]), spectrum.get(above)) {
+        (Some(low), Some(high)) => {
+            let part = (omega - low.omega_rad_s) / (high.omega_rad_s - low.omega_rad_s);
+            low.density + part * (high.density - low.density)
+        }
+        (Some(end), None) | (None, Some(end)) => end.density,
+        (None, None) => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::spectrum::coefficients, *};
+
+    #[test]
+    fn bands_hold_the_power_off_the_lines() {
+        let n = 512;
+        let x: Vec<f64> = (0..n).map(|k| (k as f64 * k as f64 * 0.37).sin()).collect();
+        let c = coefficients(&x);
+        let window = Window {
+            first: 0,
+            samples: n,
+            periods: 2,
+        };
+        let run = Control {
+            coefficients: &c,
+            window,
+        };
+        let harmonics = [3, 5, 40];
+        let (all, off) = run.powers(&harmonics);
+        let on: f64 = [6, 10, 80].iter().map(|k| power(&c, *k, n)).sum();
+        assert!((all - on - off).abs() < 1e-14);
+        let ts = 0.1;
+        let width = TAU / (n as f64 * ts);
+        for neighbours in [1, 7, 1000] {
+            let bands = spectrum(
+                &[Control {
+                    coefficients: &c,
+                    window,
+                }],
+                &harmonics,
+                ts,
+                neighbours,
+            );
+            let sum: f64 = bands.iter().map(|b| b.density * b.values as f64 * width).sum();
+            assert!((sum - off).abs() < 1e-14 * n as f64, "{neighbours}");
+            assert_eq!(bands.iter().map(|b| b.values).sum::<usize>(), 256 - 3);
+            assert!(bands.windows(2).all(|b| b[0].omega_rad_s < b[1].omega_rad_s));
+            let (share, ratio) = share_and_ratio(&run, &harmonics, ts, &bands);
+            assert!((share - off / all).abs() < 1e-15 && ratio > share);
+        }
+        assert_eq!(density_at(&[], 1.0), 0.0);
+    }
+}

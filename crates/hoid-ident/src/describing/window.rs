@@ -1,0 +1,156 @@
+//! Spans of whole periods, and the Fourier coefficients of two channels that are recorded at an offset.
+//!
+//! With `e[k]` belonging to `u[k + s]`, s of any size, `U(omega) e^{j omega s Ts}` is the coefficient of u at the time of e: exact
+//! for what is periodic. The whole samples of s are taken from the record where it reaches so far, which is exact for the rest
+//! as well.
+
+use std::f64::consts::TAU;
+
+use hoid_model::{Complex64, Record};
+
+use super::spectrum::coefficients;
+use crate::IdentError;
+
+/// A span of a record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Window {
+    pub first: usize,
+    pub samples: usize,
+    /// Periods of the excitation that it holds: the bin of its first harmonic.
+    pub periods: usize,
+}
+
+/// The number of periods in `samples` samples of a record, when it is a whole one within half a sample.
+pub(super) fn whole_periods(record: &Record, samples: usize, period_s: f64) -> Result<usize, IdentError> {
+    let ts = record.sample_time().s();
+    let of_period = period_s / ts;
+    let nearest = (samples as f64 / of_period).round();
+    // A period of no whole number of samples cannot be met better than by half a sample.
+    if nearest >= 1.0 && (samples as f64 - nearest * of_period).abs() <= 0.5 + 1e-6 {
+        return Ok(nearest as usize);
+    }
+    let fitting = (samples as f64 / of_period + 1e-9).floor();
+    let remedy = if fitting >= 1.0 {
+        let end_s = record.time_s(0) + fitting * period_s;
+        format!(
+            "the nearest whole span in it is {} s, {fitting} periods (from {} s to {end_s} s)",
+            fitting * period_s,
+            record.time_s(0),
+        )
+    } else {
+        format!("it needs at least {period_s} s")
+    };
+    Err(IdentError::NotWholePeriods {
+        label: record.label().to_owned(),
+        samples,
+        span_s: samples as f64 * ts,
+        period_s,
+        remedy,
+    })
+}
+
+impl Window {
+    /// The samples of a record with `from_s <= t < to_s`, which must be whole periods.
+    pub fn of_span(record: &Record, from_s: Option<f64>, to_s: Option<f64>, period_s: f64) -> Result<Self, IdentError> {
+        let ts = record.sample_time().s();
+        let start_s = record.time_s(0);
+        let part = record.span(from_s.unwrap_or(start_s), to_s.unwrap_or(f64::INFINITY))?;
+        let periods = whole_periods(&part, part.len(), period_s)?;
+        Ok(Self {
+            first: ((part.time_s(0) - start_s) / ts).round() as usize,
+            samples: part.len(),
+            periods,
+        })
+    }
+
+    /// Its periods one by one.
+    pub fn single_periods(self) -> Vec<Self> {
+        let edge = |i: usize| (i * self.samples + self.periods / 2) / self.periods;
+        let one = |i: usize| Self {
+            first: self.first + edge(i),
+            samples: edge(i + 1) - edge(i),
+            periods: 1,
+        };
+        (0..self.periods).map(one).collect()
+    }
+
+    /// Its samples of a channel that is `offset` samples late, and the part of the offset that is left.
+    pub fn samples_of(self, values: &[f64], offset: f64) -> (&[f64], f64) {
+        let whole = offset.floor();
+        let begin = self.first as f64 + whole;
+        if begin >= 0.0 && begin + self.samples as f64 <= values.len() as f64 {
+            let begin = begin as usize;
+            return (&values[begin..begin + self.samples], offset - whole);
+        }
+        (&values[self.first..self.first + self.samples], offset)
+    }
+
+    /// Coefficients of a channel that is `offset` samples late.
+    pub fn coefficients(self, values: &[f64], offset: f64) -> Vec<Complex64> {
+        let (samples, rest) = self.samples_of(values, offset);
+        advanced(samples, rest)
+    }
+}
+
+/// Coefficients of samples that are `offset` samples late.
+pub(super) fn advanced(samples: &[f64], offset: f64) -> Vec<Complex64> {
+    let mut x = coefficients(samples);
+    if offset != 0.0 {
+        let turn = TAU * offset / samples.len() as f64;
+        for (k, c) in x.iter_mut().enumerate() {
+            *c *= Complex64::from_polar(1.0, turn * k as f64);
+        }
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::{Channel, SampleTime};
+
+    use super::*;
+
+    fn record(n: usize, ts: f64) -> Record {
+        let x = Channel::new("u", "deg", (0..n).map(|k| k as f64).collect());
+        Record::of_output(SampleTime::new(ts).unwrap(), x)
+            .unwrap()
+            .starting_at(-1.0)
+    }
+
+    #[test]
+    fn spans_of_whole_periods_are_found_and_others_named() {
+        let r = record(1000, 0.01);
+        let w = Window::of_span(&r, Some(0.0), Some(6.0), 2.0).unwrap();
+        assert_eq!((w.first, w.samples, w.periods), (100, 600, 3));
+        let parts = w.single_periods();
+        assert_eq!(parts.iter().map(|p| p.first).collect::<Vec<_>>(), [100, 300, 500]);
+        assert!(parts.iter().all(|p| p.samples == 200 && p.periods == 1));
+        assert_eq!(Window::of_span(&r, None, None, 2.5).unwrap().periods, 4);
+        // 10/3 s are 333.3 samples: three periods are the whole record.
+        assert_eq!(Window::of_span(&r, None, None, 10.0 / 3.0).unwrap().periods, 3);
+        let message = Window::of_span(&r, None, None, 3.0).unwrap_err().to_string();
+        assert!(message.contains("9 s, 3 periods (from -1 s to 8 s)"), "{message}");
+        let message = Window::of_span(&r, None, None, 20.0).unwrap_err().to_string();
+        assert!(message.contains("at least 20 s"), "{message}");
+        assert!(Window::of_span(&r, Some(50.0), None, 2.0).is_err());
+    }
+
+    #[test]
+    fn an_offset_is_taken_back() {
+        let (n, period) = (400_usize, 200.0);
+        let wave = |t: f64| (TAU * 3.0 * t / period + 0.3).sin() + 0.2 * (TAU * 11.0 * t / period).cos();
+        let at = |shift: f64| -> Vec<f64> { (0..n).map(|k| wave(k as f64 - shift)).collect() };
+        let w = Window {
+            first: 100,
+            samples: 200,
+            periods: 1,
+        };
+        let reference = w.coefficients(&at(0.0), 0.0);
+        // The last one reaches beyond the record, and is a phase alone.
+        for shift in [1.0, 0.37, -0.6, 12.25, -3.0, 150.0] {
+            for (a, b) in w.coefficients(&at(shift), shift).iter().zip(&reference) {
+                assert!((a - b).norm() < 1e-12, "{shift}");
+            }
+        }
+    }
+}
