@@ -1,0 +1,366 @@
+//! Claims on batch fits of ARX(2, 2) models: bias by remnant order, delay and noise level.
+
+use super::{
+    At, Claim, DELAYS, DISCRETE, Evidence, HIGHER, LEVELS, NMS, ORDERS, Part, Source, TRUE_DELAY, Theme, bias_of, each,
+    measure::{Study, bias, linearity, med},
+    rules::{ACCEPTABLE, CLOSE, LARGE, LINEAR, MATTERS},
+};
+
+const PLANS: &[&str] = &["bias"];
+
+pub(super) const CLAIMS: &[Claim] = &[
+    Claim {
+        id: "arx-large-at-m1",
+        theme: Theme::BatchArx,
+        statement: "\"A large relative bias is obtained for m0 = 1\" by ARX.",
+        place: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
+        measure: "Magnitude of the median bias of a1, a2, b0 and b1 over the noise levels, C1, n_k* = 29.",
+        plans: PLANS,
+        source: Source::Data(large_at_first_order),
+    },
+    Claim {
+        id: "arx-b-around-50",
+        theme: Theme::BatchArx,
+        statement: "For m0 >= 2 the ARX error \"in b0 and b1 is still around 50 % in most cases\".",
+        place: "V.A.1, Fig. 5",
+        measure: "Magnitude of the median bias of b0 and b1 over m0 = 2 to 4 and the noise levels, C1, n_k* = 29; its sign is shown beside it.",
+        plans: PLANS,
+        source: Source::Data(b_around_fifty),
+    },
+    Claim {
+        id: "arx-a-acceptable",
+        theme: Theme::BatchArx,
+        statement: "For m0 >= 2 \"ARX bias is diminished to acceptable values\", but for b0 and b1.",
+        place: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
+        measure: "Magnitude of the median bias of a1 and a2 over m0 = 2 to 4 and the noise levels, C1, n_k* = 29.",
+        plans: PLANS,
+        source: Source::Data(a_acceptable),
+    },
+    Claim {
+        id: "arx-linear-in-delay",
+        theme: Theme::BatchArx,
+        statement: "\"Changes in model time delay produce a linear trend in computed relative bias\" of ARX.",
+        place: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
+        measure: "R^2 of the straight line through the median biases over n_k* = 25 to 30, by coefficient, m0 and noise level, C1.",
+        plans: PLANS,
+        source: Source::Data(linear_in_delay),
+    },
+    Claim {
+        id: "arx-no-optimum-at-29",
+        theme: Theme::BatchArx,
+        statement: "ARX biases \"do not oscillate around zero and no optimal results are found for actual HO time delay\".",
+        place: "6.1.1, Fig. C.1",
+        measure: "Magnitude of the median bias at n_k* = 29 less the smallest of the other delays, points of %, by coefficient, C1.",
+        plans: PLANS,
+        source: Source::Data(no_optimum),
+    },
+    Claim {
+        id: "arx-lead-and-lag",
+        theme: Theme::BatchArx,
+        statement: "\"ARX estimators provide poles at lower frequencies when smaller n_k* are chosen, and vice versa.\"",
+        place: "V.A.1; 6.1.1, Figs. D.1 to D.4",
+        measure: "Median of the paired change of omega_nm from n_k* = 29 to the others, % of the true value, m0 = 2 to 4, C1.",
+        plans: PLANS,
+        source: Source::Data(lead_and_lag),
+    },
+    Claim {
+        id: "arx-more-noise-more-bias",
+        theme: Theme::BatchArx,
+        statement: "\"Increments in noise level give as a result a greater bias in general\" of ARX.",
+        place: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
+        measure: "Growth of the magnitude of the median bias from P_n = 0.1 to 0.2 and from 0.2 to 0.3, points of %, by coefficient, C1, n_k* = 29.",
+        plans: PLANS,
+        source: Source::Data(more_noise),
+    },
+    Claim {
+        id: "arx-null-without-remnant",
+        theme: Theme::BatchArx,
+        statement: "\"A null bias can be obtained in a remnant-free scenario if the ideal time delay is employed\" (ARX).",
+        place: "V.A.1; 6.1.1, Figs. C.1, C.9",
+        measure: "Magnitude of the bias of the coefficients at P_n = 0, n_k* = 29, C1 and C2.",
+        plans: PLANS,
+        source: Source::Data(null_without_remnant),
+    },
+    Claim {
+        id: "arx-only-gain-ideal",
+        theme: Theme::BatchArx,
+        statement: "At the true delay \"only the HO gain K_e results achieve the ideal performance\" (ARX).",
+        place: "6.1.1, Fig. C.2",
+        measure: "Magnitude of the median bias of K_e, and of T_L, omega_nm and zeta_nm, m0 = 2 to 4, C1, n_k* = 29.",
+        plans: PLANS,
+        source: Source::Data(only_gain),
+    },
+    Claim {
+        id: "arx-c2-against-c1",
+        theme: Theme::BatchArx,
+        statement: "In C2 \"K_e and T_L present a greater bias when compared to C1, while omega_nm and zeta_nm are slightly improved\" (ARX).",
+        place: "6.1.1, Figs. C.2, C.10",
+        measure: "Magnitude of the median bias in C2 less that in C1, points of %, m0 = 2 to 4, n_k* = 29.",
+        plans: PLANS,
+        source: Source::Data(second_condition),
+    },
+    Claim {
+        id: "arx-poles-by-order",
+        theme: Theme::BatchArx,
+        statement: "\"For higher remnant orders in simulation data, the location of poles moves\" to lower frequencies (ARX).",
+        place: "V.A.2, Fig. 10; 6.1.1, Figs. D.1 to D.4",
+        measure: "Median bias of omega_nm at m0 = 3 less that at 2, and at 4 less that at 3, points of %, C1 and C2, n_k* = 29.",
+        plans: PLANS,
+        source: Source::Data(poles_by_order),
+    },
+    Claim {
+        id: "arx-zero-by-noise",
+        theme: Theme::BatchArx,
+        statement: "\"The zero is located at lower frequencies for higher noise levels in ARX results.\"",
+        place: "V.A.2, Fig. 10",
+        measure: "Growth of the median T_L (the zero is at 1 / T_L) from one noise level to the next, % of the true value, m0 = 2 to 4, C1.",
+        plans: PLANS,
+        source: Source::Data(zero_by_noise),
+    },
+    Claim {
+        id: "arx-misses-poles-at-m1",
+        theme: Theme::BatchArx,
+        statement: "\"The correct location of poles is completely missed when a first-order remnant filter is simulated\" (ARX).",
+        place: "6.1.1, Figs. D.1, 10",
+        measure: "Share of fits whose poles do not convert into omega_nm and zeta_nm, or have omega_nm wrong by more than 25 %, m0 = 1, C1 and C2.",
+        plans: PLANS,
+        source: Source::Data(poles_missed),
+    },
+];
+
+/// Magnitude of the median bias of some parameters, each with a test.
+fn biases(
+    study: Study<'_>,
+    cells: &[At],
+    names: &[&str],
+    part: &mut Part,
+    limit: f64,
+    above: bool,
+) -> Result<(), String> {
+    for at in cells {
+        for name in names {
+            let found = study.median(&at.arx(&bias_of(name), TRUE_DELAY))?.abs();
+            match above {
+                true => part.above(at.label(name), found, limit),
+                false => part.below(at.label(name), found, limit),
+            }
+        }
+    }
+    Ok(())
+}
+
+fn large_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("|median bias| beyond 25 %");
+    biases(study, &each(&["C1"], &[1], &LEVELS), &DISCRETE, &mut part, LARGE, true)?;
+    for name in DISCRETE {
+        let at = At {
+            condition: "C1",
+            m0: 1,
+            level: 0.1,
+        };
+        part.show(
+            format!("median bias of {name} at P_n = 0.1, %"),
+            study.median(&at.arx(&bias_of(name), TRUE_DELAY))?,
+        );
+    }
+    Ok(vec![part])
+}
+
+fn b_around_fifty(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("|median bias| from 25 to 75 %");
+    for at in each(&["C1"], &HIGHER, &LEVELS) {
+        for name in ["b0", "b1"] {
+            let found = study.median(&at.arx(&bias_of(name), TRUE_DELAY))?;
+            part.around(at.label(name), found.abs(), 50.0);
+            if name == "b0" && at.level == 0.1 {
+                part.show(format!("median bias of b0 at m0 = {}, P_n = 0.1, %", at.m0), found);
+            }
+        }
+    }
+    Ok(vec![part])
+}
+
+fn a_acceptable(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let mut part = Part::new("|median bias| within 10 %");
+    biases(
+        evidence.study("bias")?,
+        &each(&["C1"], &HIGHER, &LEVELS),
+        &["a1", "a2"],
+        &mut part,
+        ACCEPTABLE,
+        false,
+    )?;
+    Ok(vec![part])
+}
+
+fn linear_in_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut parts = Vec::new();
+    for (orders, label) in [(&ORDERS[..1], "m0 = 1"), (&ORDERS[1..], "m0 >= 2")] {
+        let mut part = Part::new(&format!("R^2 over n_k* at least 0.9, {label}"));
+        for at in each(&["C1"], orders, &LEVELS) {
+            for name in DISCRETE {
+                let queries = DELAYS.map(|nk| at.arx(&bias_of(name), nk));
+                let found = study.of(&queries, &|s| linearity(&s.iter().map(|v| med(v)).collect::<Vec<_>>()))?;
+                part.above(at.label(name), found, LINEAR);
+            }
+        }
+        parts.push(part);
+    }
+    Ok(parts)
+}
+
+fn no_optimum(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("|median bias| at 29 less the smallest at another delay above 0");
+    for at in each(&["C1"], &ORDERS, &LEVELS) {
+        for name in DISCRETE {
+            let queries = DELAYS.map(|nk| at.arx(&bias_of(name), nk));
+            let found = study.of(&queries, &|s| {
+                let others = s.iter().enumerate().filter(|(i, _)| DELAYS[*i] != TRUE_DELAY);
+                let best = others.map(|(_, v)| bias(v)).fold(f64::INFINITY, f64::min);
+                DELAYS
+                    .iter()
+                    .position(|nk| *nk == TRUE_DELAY)
+                    .map_or(f64::NAN, |i| bias(&s[i]))
+                    - best
+            })?;
+            part.above(at.label(name), found, 0.0);
+        }
+    }
+    Ok(vec![part])
+}
+
+fn lead_and_lag(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut lower = Part::new("omega_nm at smaller n_k* lower than at 29");
+    let mut higher = Part::new("omega_nm at n_k* = 30 higher than at 29");
+    for at in each(&["C1"], &HIGHER, &LEVELS) {
+        let omega = |nk| at.arx("bias_omega_nm", nk);
+        for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
+            let change = study.difference(&omega(nk), &omega(TRUE_DELAY))?;
+            let label = at.label(&format!("n_k* = {nk}"));
+            match nk < TRUE_DELAY {
+                true => lower.below(label, change, 0.0),
+                false => higher.above(label, change, 0.0),
+            }
+        }
+    }
+    Ok(vec![lower, higher])
+}
+
+fn more_noise(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("growth of |median bias| above 0");
+    for at in each(&["C1"], &ORDERS, &LEVELS[..2]) {
+        let more = At {
+            level: if at.level < 0.15 { 0.2 } else { 0.3 },
+            ..at
+        };
+        for name in DISCRETE {
+            let [less, more] = [at, more].map(|at| study.median(&at.arx(&bias_of(name), TRUE_DELAY)));
+            part.above(at.label(name), more?.abs().minus(less?.abs()), 0.0);
+        }
+    }
+    Ok(vec![part])
+}
+
+fn null_without_remnant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let mut part = Part::new("|bias| within 0.001 %");
+    biases(
+        evidence.study("bias")?,
+        &each(&["C1", "C2"], &[1], &[0.0]),
+        &DISCRETE,
+        &mut part,
+        1e-3,
+        false,
+    )?;
+    Ok(vec![part])
+}
+
+fn only_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let cells = each(&["C1"], &HIGHER, &LEVELS);
+    let mut gain = Part::new("|median bias| of K_e within 5 %");
+    biases(study, &cells, &["K_e"], &mut gain, CLOSE, false)?;
+    let mut others = Part::new("|median bias| of T_L, omega_nm, zeta_nm beyond 5 %");
+    biases(study, &cells, &["T_L", "omega_nm", "zeta_nm"], &mut others, CLOSE, true)?;
+    Ok(vec![gain, others])
+}
+
+/// A size of the bias in C2 less that in C1, for the zero and for the neuromuscular parameters.
+pub(super) fn conditions(
+    size: &dyn Fn(At, &str) -> Result<super::Value, String>,
+    orders: &[usize],
+) -> Result<Vec<Part>, String> {
+    let mut worse = Part::new("K_e and T_L: bias in C2 less that in C1 above 0");
+    let mut better = Part::new("omega_nm and zeta_nm: bias in C2 less that in C1 below 0");
+    for at in each(&["C1"], orders, &LEVELS) {
+        let change = |name: &str| {
+            let [first, second] = ["C1", "C2"].map(|condition| size(At { condition, ..at }, &bias_of(name)));
+            Ok::<_, String>(second?.minus(first?))
+        };
+        for name in ["K_e", "T_L"] {
+            worse.above(at.label(name), change(name)?, 0.0);
+        }
+        for name in NMS {
+            better.below(at.label(name), change(name)?, 0.0);
+        }
+    }
+    Ok(vec![worse, better])
+}
+
+fn second_condition(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    conditions(
+        &|at, quantity| Ok(study.median(&at.arx(quantity, TRUE_DELAY))?.abs()),
+        &HIGHER,
+    )
+}
+
+fn poles_by_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("change of the median bias of omega_nm with m0 below 0");
+    for at in each(&["C1", "C2"], &HIGHER[1..], &LEVELS) {
+        let [lower, higher] =
+            [at.m0 - 1, at.m0].map(|m0| study.median(&At { m0, ..at }.arx("bias_omega_nm", TRUE_DELAY)));
+        part.below(at.label(""), higher?.minus(lower?), 0.0);
+    }
+    for at in each(&["C1"], &HIGHER, &[0.1]) {
+        part.show(
+            format!("median bias of omega_nm at m0 = {}, P_n = 0.1, C1, %", at.m0),
+            study.median(&at.arx("bias_omega_nm", TRUE_DELAY))?,
+        );
+    }
+    Ok(vec![part])
+}
+
+fn zero_by_noise(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("growth of the median T_L with the noise level above 0.1 %");
+    for at in each(&["C1"], &HIGHER, &LEVELS[..2]) {
+        let more = At {
+            level: if at.level < 0.15 { 0.2 } else { 0.3 },
+            ..at
+        };
+        let [less, more] = [at, more].map(|at| study.median(&at.arx("bias_T_L", TRUE_DELAY)));
+        part.above(at.label(""), more?.minus(less?), MATTERS);
+    }
+    Ok(vec![part])
+}
+
+fn poles_missed(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("share of fits without the poles above 0.9");
+    for at in each(&["C1", "C2"], &[1], &LEVELS) {
+        let omega = study.sample(&at.arx("bias_omega_nm", TRUE_DELAY))?;
+        let missed: Vec<f64> = omega
+            .iter()
+            .map(|bias| f64::from(u8::from(bias.is_nan() || bias.abs() > LARGE)))
+            .collect();
+        part.above(at.label(""), super::measure::share_of(&missed), 0.9);
+    }
+    Ok(vec![part])
+}

@@ -1,0 +1,266 @@
+//! Claims on batch fits of Box-Jenkins models with m* = m0: bias by remnant order, delay and noise level.
+
+use super::{
+    At, Claim, DELAYS, DISCRETE, Evidence, HIGHER, LEVELS, ORDERS, Part, Source, TRUE_DELAY, Theme,
+    batch_arx::conditions,
+    bias_of, each,
+    measure::{linearity, med},
+    rules::{ACCEPTABLE, CLOSE, LARGE, LINEAR},
+};
+
+const PLANS: &[&str] = &["bias"];
+
+pub(super) const CLAIMS: &[Claim] = &[
+    Claim {
+        id: "bj-same-for-all-orders",
+        theme: Theme::BatchBj,
+        statement: "\"The remnant filter order no longer meaningfully affects the bias and accuracy in BJ estimation.\"",
+        place: "V.A.1, Fig. 6; VIII; 6.1.2",
+        measure: "Median bias at m0 = 2 to 4 less that at m0 = 1, BJ(m* = m0), C1 and C2, n_k* = 29, points of %, by coefficient and noise level.",
+        plans: PLANS,
+        source: Source::Data(all_orders),
+    },
+    Claim {
+        id: "bj-close-to-zero",
+        theme: Theme::BatchBj,
+        statement: "BJ: \"relative bias values are close to zero for increasing values in noise level\".",
+        place: "V.A.1, Fig. 6",
+        measure: "Magnitude of the median bias, BJ(m* = m0), C1, n_k* = 29, by coefficient, m0 and noise level.",
+        plans: PLANS,
+        source: Source::Data(close_to_zero),
+    },
+    Claim {
+        id: "bj-around-noise-free",
+        theme: Theme::BatchBj,
+        statement: "BJ: \"results fluctuate around the bias of the remnant-free case at each model time delay\".",
+        place: "V.A.1, Fig. 6; 6.1.2, Fig. C.3",
+        measure: "Median bias less that at P_n = 0, BJ(m* = m0), C1, n_k* = 25 to 30, points of %, by coefficient, m0 and noise level.",
+        plans: PLANS,
+        source: Source::Data(around_noise_free),
+    },
+    Claim {
+        id: "bj-linear-in-delay",
+        theme: Theme::BatchBj,
+        statement: "\"The BJ estimator creates lag or lead depending on the assumed delay, hence, a linear trend is also found.\"",
+        place: "V.A.1, Fig. 6",
+        measure: "R^2 of the straight line through the median biases over n_k* = 25 to 30, BJ(m* = m0), by coefficient, m0 and noise level, C1.",
+        plans: PLANS,
+        source: Source::Data(linear_in_delay),
+    },
+    Claim {
+        id: "bj-lead-and-lag",
+        theme: Theme::BatchBj,
+        statement: "\"BJ poles are placed at lower frequencies for smaller model time delays, and vice versa.\"",
+        place: "6.1.2, Figs. D.5 to D.8",
+        measure: "Median of the paired change of omega_nm from n_k* = 29 to the others, % of the true value, BJ(m* = m0), C1.",
+        plans: PLANS,
+        source: Source::Data(lead_and_lag),
+    },
+    Claim {
+        id: "bj-almost-exact",
+        theme: Theme::BatchBj,
+        statement: "BJ(m* = 1): \"almost 100 % accurate estimations in all scenarios\".",
+        place: "V.A.2, Fig. 10",
+        measure: "Median response_error of BJ(m* = 1), C1, n_k* = 29, by m0 and noise level.",
+        plans: PLANS,
+        source: Source::Data(almost_exact),
+    },
+    Claim {
+        id: "bj-m2-worst-without-remnant",
+        theme: Theme::BatchBj,
+        statement: "Remnant-free: \"a remnant order equal to 2 produces the highest deviations\" of BJ.",
+        place: "6.1.2, Figs. D.5 to D.8",
+        measure: "response_error of BJ(m* = 2) less the largest of the other orders without remnant, C1, n_k* = 25 to 28 and 30, %.",
+        plans: PLANS,
+        source: Source::Data(second_order_worst),
+    },
+    Claim {
+        id: "bj-t-n-100-percent",
+        theme: Theme::BatchBj,
+        statement: "Remnant time constant T_n at orders above 1: \"relative biases around 100 % are obtained\".",
+        place: "6.1.2, Fig. C.5",
+        measure: "Magnitude of the median bias of T_n (backward Euler, as in B.2), BJ(m* = m0), m0 = 2 to 4, C1, n_k* = 29; of the exact retrieval beside it.",
+        plans: PLANS,
+        source: Source::Data(remnant_time_constant),
+    },
+    Claim {
+        id: "bj-remnant-gain",
+        theme: Theme::BatchBj,
+        statement: "\"The estimation of the remnant gain also presents important errors for orders greater than 1.\"",
+        place: "6.1.2, Fig. C.5",
+        measure: "Magnitude of the median bias of K_n (backward Euler, as in B.2), BJ(m* = m0), m0 = 2 to 4, C1, n_k* = 29; of the exact retrieval beside it.",
+        plans: PLANS,
+        source: Source::Data(remnant_gain),
+    },
+    Claim {
+        id: "bj-c2-against-c1",
+        theme: Theme::BatchBj,
+        statement: "In C2 \"K_e and T_L present a less precise estimation, while the neuromuscular dynamics are better captured\" (BJ).",
+        place: "6.1.2, Figs. C.4, C.12",
+        measure: "Median |bias| in C2 less that in C1, points of %, BJ(m* = m0), n_k* = 29, by m0 and noise level.",
+        plans: PLANS,
+        source: Source::Data(second_condition),
+    },
+];
+
+fn all_orders(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("|difference of the median bias to that at m0 = 1| within 5 points");
+    for at in each(&["C1", "C2"], &HIGHER, &LEVELS) {
+        for name in DISCRETE {
+            let first = study.median(&At { m0: 1, ..at }.bj(&bias_of(name), 1, TRUE_DELAY))?;
+            let found = study.median(&at.bj(&bias_of(name), at.m0, TRUE_DELAY))?;
+            part.below(at.label(name), found.minus(first).abs(), CLOSE);
+        }
+    }
+    Ok(vec![part])
+}
+
+fn close_to_zero(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("|median bias| within 5 %");
+    for at in each(&["C1"], &ORDERS, &LEVELS) {
+        for name in DISCRETE {
+            part.below(
+                at.label(name),
+                study.median(&at.bj(&bias_of(name), at.m0, TRUE_DELAY))?.abs(),
+                CLOSE,
+            );
+        }
+    }
+    Ok(vec![part])
+}
+
+fn around_noise_free(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut parts = Vec::new();
+    for (is_true, label) in [(true, "n_k* = 29"), (false, "other n_k*")] {
+        let mut part = Part::new(&format!("|median bias less that at P_n = 0| within 5 points, {label}"));
+        for at in each(&["C1"], &ORDERS, &LEVELS) {
+            for nk in DELAYS.into_iter().filter(|nk| (*nk == TRUE_DELAY) == is_true) {
+                for name in DISCRETE {
+                    let fit = |at: At| study.median(&at.bj(&bias_of(name), at.m0, nk));
+                    let change = fit(at)?.minus(fit(At { level: 0.0, ..at })?);
+                    part.below(at.label(&format!("n_k* = {nk}, {name}")), change.abs(), CLOSE);
+                }
+            }
+        }
+        parts.push(part);
+    }
+    Ok(parts)
+}
+
+fn linear_in_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("R^2 over n_k* at least 0.9");
+    for at in each(&["C1"], &ORDERS, &LEVELS) {
+        for name in DISCRETE {
+            let queries = DELAYS.map(|nk| at.bj(&bias_of(name), at.m0, nk));
+            let found = study.of(&queries, &|s| linearity(&s.iter().map(|v| med(v)).collect::<Vec<_>>()))?;
+            part.above(at.label(name), found, LINEAR);
+        }
+    }
+    Ok(vec![part])
+}
+
+fn lead_and_lag(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut lower = Part::new("omega_nm at smaller n_k* lower than at 29");
+    let mut higher = Part::new("omega_nm at n_k* = 30 higher than at 29");
+    for at in each(&["C1"], &ORDERS, &LEVELS) {
+        let omega = |nk| at.bj("bias_omega_nm", at.m0, nk);
+        for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
+            let change = study.difference(&omega(nk), &omega(TRUE_DELAY))?;
+            let label = at.label(&format!("n_k* = {nk}"));
+            match nk < TRUE_DELAY {
+                true => lower.below(label, change, 0.0),
+                false => higher.above(label, change, 0.0),
+            }
+        }
+    }
+    Ok(vec![lower, higher])
+}
+
+fn almost_exact(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("median response_error within 10 %");
+    for at in each(&["C1"], &ORDERS, &LEVELS) {
+        part.below(
+            at.label(""),
+            study.median(&at.bj("response_error", 1, TRUE_DELAY))?,
+            ACCEPTABLE,
+        );
+    }
+    Ok(vec![part])
+}
+
+/// Without remnant there is one record, whatever m0.
+pub(super) const SILENT: At = At {
+    condition: "C1",
+    m0: 1,
+    level: 0.0,
+};
+
+fn second_order_worst(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("response_error of m* = 2 less the largest of the others above 0");
+    for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
+        let queries = ORDERS.map(|m| SILENT.bj("response_error", m, nk));
+        let found = study.of(&queries, &|s| {
+            med(&s[1]) - [0, 2, 3].map(|i| med(&s[i])).into_iter().fold(f64::MIN, f64::max)
+        })?;
+        part.above(SILENT.label(&format!("n_k* = {nk}")), found, 0.0);
+    }
+    for m in ORDERS {
+        part.show(
+            format!("response_error of m* = {m} at n_k* = 25, %"),
+            study.median(&SILENT.bj("response_error", m, 25))?,
+        );
+    }
+    Ok(vec![part])
+}
+
+/// Biases of a remnant parameter as the text retrieves it, with the exact retrieval shown beside it.
+fn remnant(
+    evidence: &Evidence<'_>,
+    name: &str,
+    mut part: Part,
+    test: &dyn Fn(&mut Part, String, super::Value),
+) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    for at in each(&["C1"], &HIGHER, &LEVELS) {
+        let found = study.median(&at.bj(&format!("bias_{name}_backward_euler"), at.m0, TRUE_DELAY))?;
+        test(&mut part, at.label(""), found.abs());
+        if at.level == 0.1 {
+            part.show(
+                format!("median bias of {name} at m0 = {}, backward Euler, %", at.m0),
+                found,
+            );
+            let exact = study.median(&at.bj(&bias_of(name), at.m0, TRUE_DELAY))?;
+            part.show(format!("median bias of {name} at m0 = {}, exact, %", at.m0), exact);
+        }
+    }
+    Ok(vec![part])
+}
+
+fn remnant_time_constant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let part = Part::new("|median bias| of T_n from 50 to 150 %");
+    remnant(evidence, "T_n", part, &|part, label, found| {
+        part.around(label, found, 100.0)
+    })
+}
+
+fn remnant_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let part = Part::new("|median bias| of K_n beyond 25 %");
+    remnant(evidence, "K_n", part, &|part, label, found| {
+        part.above(label, found, LARGE)
+    })
+}
+
+fn second_condition(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    conditions(
+        &|at, quantity| study.typical(&at.bj(quantity, at.m0, TRUE_DELAY)),
+        &ORDERS,
+    )
+}

@@ -1,0 +1,218 @@
+//! Claims on recursive least squares of ARX models, with a factor (V.B) and with a matrix (6.2.1) of forgetting.
+
+use super::{
+    At, Claim, DISCRETE, Evidence, HIGHER, LEVELS, NMS, Part, Source, Theme, bias_of, each,
+    measure::med,
+    rules::{ACCEPTABLE, CLOSE, LARGE, QUARTER},
+};
+
+/// Noise levels of the plan of V.B.
+pub(super) const RECURSIVE_LEVELS: [f64; 3] = [0.01, 0.1, 0.2];
+
+pub(super) const CLAIMS: &[Claim] = &[
+    Claim {
+        id: "rls-large-at-m1",
+        theme: Theme::Recursive,
+        statement: "m0 = 1: \"ARX models lead to significant relative bias while BJ provides almost null bias after full convergence\".",
+        place: "V.B, Fig. 11",
+        measure: "Magnitude of the bias of the median trace over the last 30.72 s, C4, m0 = 1, RLS and RPEM, by coefficient and noise level.",
+        plans: &["recursive"],
+        source: Source::Data(large_at_first_order),
+    },
+    Claim {
+        id: "rls-10-times-less",
+        theme: Theme::Recursive,
+        statement: "\"When simulations with m0 >= 2 are conducted, the bias in ARX estimations is reduced by almost 10 times.\"",
+        place: "V.B, Fig. 12",
+        measure: "Bias of the median trace over the last 30.72 s at m0 = 1 over that at m0 = 2 to 4, RLS, C4, coefficients; and median RMS error of omega_nm and zeta_nm likewise.",
+        plans: &["recursive"],
+        source: Source::Data(ten_times),
+    },
+    Claim {
+        id: "rls-nms-persistent",
+        theme: Theme::Recursive,
+        statement: "The bias of ARX for m0 >= 2 \"is still persistent in NMS coefficients\"; \"it will always have a bias\".",
+        place: "V.B, Fig. 12; VII",
+        measure: "Magnitude of the bias of the median trace of omega_nm and zeta_nm over the last 30.72 s, RLS, C4, m0 = 2 to 4.",
+        plans: &["recursive"],
+        source: Source::Data(persistent),
+    },
+    Claim {
+        id: "batch-represents-recursion",
+        theme: Theme::Recursive,
+        statement: "\"Batch-fitting results also represent the real functioning of RLS and RPEM algorithms.\"",
+        place: "V.B, Figs. 11, 12",
+        measure: "Bias of the median trace over the last 30.72 s less the median bias of the batch fit of that span, C4, points of %, by coefficient, m0, noise level.",
+        plans: &["recursive"],
+        source: Source::Data(like_batch),
+    },
+    Claim {
+        id: "rls-a2-violates",
+        theme: Theme::Recursive,
+        statement: "m0 = 1: \"condition a2 > 0 is not fulfilled at multiple occasions\", with \"many divergences in the computation\".",
+        place: "6.2.1, Figs. G.1, G.5",
+        measure: "Median share of the trace that does not convert at m0 = 1 and at m0 = 2 to 4, RLS with matrix, C3.",
+        plans: &["recursive-arx"],
+        source: Source::Data(violates),
+    },
+    Claim {
+        id: "rls-gain-always-accurate",
+        theme: Theme::Recursive,
+        statement: "\"Nonetheless the estimation of the HO gain is always accurate\" (recursive ARX).",
+        place: "6.2.1, Figs. G.5 to G.8",
+        measure: "Magnitude of the bias of the median trace of K_e over the last 30.72 s, RLS with matrix, C3, m0 = 2 to 4; at m0 = 1, where models do not convert, of the static gain at the end.",
+        plans: &["recursive-arx"],
+        source: Source::Data(gain),
+    },
+    Claim {
+        id: "rls-heavily-reduced",
+        theme: Theme::Recursive,
+        statement: "\"When the simulation remnant order is increased, the bias is heavily reduced\" (recursive ARX).",
+        place: "6.2.1, Figs. G.1 to G.4",
+        measure: "Bias of the median trace over the last 30.72 s at m0 = 2 to 4 over that at m0 = 1, RLS with matrix, C3, by coefficient.",
+        plans: &["recursive-arx"],
+        source: Source::Data(heavily_reduced),
+    },
+    Claim {
+        id: "rls-more-noise-more-error",
+        theme: Theme::Recursive,
+        statement: "\"An increment in noise level clearly produces a bigger error in b0 and b1\" (recursive ARX).",
+        place: "6.2.1, Figs. G.1 to G.4",
+        measure: "Growth of the magnitude of the bias of the median trace over the last 30.72 s from one noise level to the next, m0 = 2 to 4, C3, points of %.",
+        plans: &["recursive-arx"],
+        source: Source::Data(more_noise),
+    },
+];
+
+fn large_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut arx = Part::new("RLS: |bias of the median trace| beyond 25 %");
+    let mut bj = Part::new("RPEM: |bias of the median trace| within 5 %");
+    for at in each(&["C4"], &[1], &RECURSIVE_LEVELS) {
+        for name in DISCRETE {
+            arx.above(at.label(name), study.trace_bias(&at.rls(""), name)?.abs(), LARGE);
+            bj.below(
+                at.label(name),
+                study.trace_bias(&at.rpem(""), &super::with_f(name))?.abs(),
+                CLOSE,
+            );
+        }
+    }
+    Ok(vec![arx, bj])
+}
+
+fn ten_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut discrete = Part::new("coefficients: bias at m0 = 1 over that at higher m0 from 5 to 15");
+    let mut nms = Part::new("omega_nm and zeta_nm: RMS error at m0 = 1 over that at higher m0 from 5 to 15");
+    for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+        let first = At { m0: 1, ..at };
+        for name in DISCRETE {
+            let [reference, found] = [first, at].map(|at| study.trace_bias(&at.rls(""), name));
+            discrete.around(at.label(name), reference?.abs().over(found?.abs()), 10.0);
+        }
+        for name in NMS {
+            let [reference, found] = [first, at].map(|at| study.median(&at.rls(&format!("rms_{name}"))));
+            nms.around(at.label(name), reference?.over(found?), 10.0);
+        }
+    }
+    Ok(vec![discrete, nms])
+}
+
+fn persistent(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut part = Part::new("|bias of the median trace| beyond 5 %");
+    for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+        for name in NMS {
+            part.above(at.label(name), study.trace_bias(&at.rls(""), name)?.abs(), CLOSE);
+        }
+    }
+    Ok(vec![part])
+}
+
+fn like_batch(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut arx = Part::new("|RLS less OLS| within 5 points");
+    let mut bj = Part::new("|RPEM less PEM| within 5 points");
+    for at in each(&["C4"], &[1, 2, 3, 4], &RECURSIVE_LEVELS) {
+        for name in DISCRETE {
+            let with_f = super::with_f(name);
+            let ols = study.median(&at.query(&bias_of(name)).name("OLS last"))?;
+            let pem = study.median(&at.query(&bias_of(&with_f)).name("PEM last"))?;
+            arx.below(
+                at.label(name),
+                study.trace_bias(&at.rls(""), name)?.minus(ols).abs(),
+                CLOSE,
+            );
+            bj.below(
+                at.label(name),
+                study.trace_bias(&at.rpem(""), &with_f)?.minus(pem).abs(),
+                CLOSE,
+            );
+        }
+    }
+    Ok(vec![arx, bj])
+}
+
+fn violates(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive-arx")?;
+    let mut first = Part::new("m0 = 1: share that does not convert above 0.25");
+    let mut others = Part::new("m0 >= 2: share that does not convert below 0.01");
+    for at in each(&["C3"], &[1, 2, 3, 4], &LEVELS) {
+        let found = study.median(&at.rls("share_not_convertible"))?;
+        match at.m0 {
+            1 => first.above(at.label(""), found, 0.25),
+            _ => others.below(at.label(""), found, 0.01),
+        }
+    }
+    Ok(vec![first, others])
+}
+
+fn gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive-arx")?;
+    let mut first = Part::new("m0 = 1: |median bias of (b0 + b1) / (1 + a1 + a2) at the end| within 10 %");
+    let mut others = Part::new("m0 >= 2: |bias of the median trace of K_e| within 10 %");
+    for at in each(&["C3"], &[1], &LEVELS) {
+        let queries = DISCRETE.map(|name| at.rls(name));
+        let k_e = study.truth(&queries[0])?.operator[0];
+        let found = study.of(&queries, &|s| {
+            let gains: Vec<f64> = (0..s[0].len())
+                .map(|i| (s[2][i] + s[3][i]) / (1.0 + s[0][i] + s[1][i]))
+                .collect();
+            100.0 * (med(&gains) - k_e) / k_e
+        })?;
+        first.below(at.label(""), found.abs(), ACCEPTABLE);
+    }
+    for at in each(&["C3"], &HIGHER, &LEVELS) {
+        others.below(at.label(""), study.trace_bias(&at.rls(""), "K_e")?.abs(), ACCEPTABLE);
+    }
+    Ok(vec![first, others])
+}
+
+fn heavily_reduced(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive-arx")?;
+    let mut part = Part::new("|bias| at higher m0 over that at m0 = 1 below 0.25");
+    for at in each(&["C3"], &HIGHER, &LEVELS) {
+        for name in DISCRETE {
+            let [reference, found] = [At { m0: 1, ..at }, at].map(|at| study.trace_bias(&at.rls(""), name));
+            part.below(at.label(name), found?.abs().over(reference?.abs()), QUARTER);
+        }
+    }
+    Ok(vec![part])
+}
+
+fn more_noise(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive-arx")?;
+    let mut part = Part::new("growth of |bias| with the noise level above 0");
+    for at in each(&["C3"], &HIGHER, &LEVELS[..2]) {
+        let more = At {
+            level: if at.level < 0.15 { 0.2 } else { 0.3 },
+            ..at
+        };
+        for name in ["b0", "b1"] {
+            let [less, more] = [at, more].map(|at| study.trace_bias(&at.rls(""), name));
+            part.above(at.label(name), more?.abs().minus(less?.abs()), 0.0);
+        }
+    }
+    Ok(vec![part])
+}

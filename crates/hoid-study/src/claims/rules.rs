@@ -1,0 +1,386 @@
+//! From numbers with Monte Carlo errors to a verdict.
+//!
+//! 1. **A cell.** A claim is tested in each cell (a scenario, an estimator, a parameter) of which it speaks, with the measured value x, its
+//!    Monte Carlo error s and a margin of 2 s.
+//!    - *Comparison* (larger, smaller, no larger than): the cell passes when x is beyond the limit by more than the margin, fails when it is on the
+//!      other side by more, and is undecided within the margin.
+//!    - *Number* (around 50 %, 10 times): the cell passes when x lies within the range of the wording, widened by the margin, and fails
+//!      otherwise. It is undecided where it would pass with a margin of more than half the range: such an x says nothing of the number.
+//!    - Where less than half of the replications give a value (models that do not convert) the cell is undecided.
+//! 2. **A part** of a claim (same figure of merit, same test) holds when 90 % of its decided cells pass, holds in part when 50 % do, and does not
+//!    hold otherwise. When less than half of its cells are decided, the replications do not decide it.
+//! 3. **A claim** holds when all its parts hold, does not hold when none of them does even in part, and holds in part otherwise. When no part is
+//!    decided, it cannot be tested.
+//!
+//! What words mean, the same for all claims:
+//!
+//! | wording | test |
+//! |---|---|
+//! | around x, x %, x times | from x / 2 to 3 x / 2 |
+//! | large, important, considerable, huge, wrong bias | beyond 25 % of the true value |
+//! | acceptable, accurate, always accurate | within 10 % |
+//! | close to zero, null on average, the same, not affected | within 5 points of % of the true value |
+//! | null without remnant | within 0.001 % |
+//! | heavily, highly reduced | less than a quarter remains |
+//! | the same VAF | within 1 point of % |
+//! | slight, small, matters more | at least 0.1 points of % of the true value |
+//! | a linear trend | R^2 of the straight line at least 0.9 |
+
+/// A large bias, % of the true value.
+pub(super) const LARGE: f64 = 25.0;
+/// An acceptable bias, % of the true value.
+pub(super) const ACCEPTABLE: f64 = 10.0;
+/// A bias that is close to zero, or to another, points of % of the true value.
+pub(super) const CLOSE: f64 = 5.0;
+/// The least difference that matters, points of % of the true value.
+pub(super) const MATTERS: f64 = 0.1;
+/// What remains of something that is heavily reduced.
+pub(super) const QUARTER: f64 = 0.25;
+/// R^2 of a linear trend.
+pub(super) const LINEAR: f64 = 0.9;
+
+const MARGIN: f64 = 2.0;
+const HOLDS_FROM: f64 = 0.9;
+const IN_PART_FROM: f64 = 0.5;
+
+/// What the data say of a claim.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Verdict {
+    /// It holds.
+    Holds,
+    /// It holds in part.
+    HoldsInPart,
+    /// It does not hold.
+    DoesNotHold,
+    /// It cannot be tested, and why.
+    CannotBeTested(String),
+}
+
+impl Verdict {
+    /// In words, without the reason.
+    pub fn words(&self) -> &'static str {
+        match self {
+            Self::Holds => "holds",
+            Self::HoldsInPart => "holds in part",
+            Self::DoesNotHold => "does not hold",
+            Self::CannotBeTested(_) => "cannot be tested",
+        }
+    }
+}
+
+impl std::fmt::Display for Verdict {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::CannotBeTested(reason) => write!(f, "cannot be tested: {reason}"),
+            other => f.write_str(other.words()),
+        }
+    }
+}
+
+/// A number and its Monte Carlo error, 0 for one that does not depend on chance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Value {
+    /// The number; not a number where too few replications give one.
+    pub value: f64,
+    /// Its Monte Carlo error.
+    pub error: f64,
+}
+
+impl Value {
+    /// The magnitude, with the same error.
+    #[must_use]
+    pub fn abs(self) -> Self {
+        Self {
+            value: self.value.abs(),
+            ..self
+        }
+    }
+
+    /// The difference to a number from other replications.
+    #[must_use]
+    pub fn minus(self, other: Self) -> Self {
+        Self {
+            value: self.value - other.value,
+            error: self.error.hypot(other.error),
+        }
+    }
+
+    /// The mean of numbers from different replications.
+    #[must_use]
+    pub fn mean(values: &[Self]) -> Self {
+        let n = values.len() as f64;
+        Self {
+            value: values.iter().map(|v| v.value).sum::<f64>() / n,
+            error: values.iter().map(|v| v.error * v.error).sum::<f64>().sqrt() / n,
+        }
+    }
+
+    /// The ratio to a number from other replications; errors to first order.
+    #[must_use]
+    pub fn over(self, other: Self) -> Self {
+        let value = self.value / other.value;
+        Self {
+            value,
+            error: value.abs() * (self.error / self.value).hypot(other.error / other.value),
+        }
+    }
+}
+
+/// How a cell ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CellOutcome {
+    /// As claimed.
+    Passes,
+    /// Not as claimed.
+    Fails,
+    /// Within the margin, or without a value.
+    Undecided,
+}
+
+/// What is asked of the value of a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bound {
+    /// Larger than this.
+    Above(f64),
+    /// Smaller than this.
+    Below(f64),
+    /// A claimed number: from, to.
+    Between(f64, f64),
+}
+
+/// A claim in one cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CellTest {
+    /// Which cell.
+    pub label: String,
+    /// What was measured.
+    pub measured: Value,
+    /// What is claimed.
+    pub bound: Bound,
+}
+
+impl CellTest {
+    /// Whether the value is as claimed.
+    pub fn outcome(&self) -> CellOutcome {
+        let Value { value, error } = self.measured;
+        if !value.is_finite() || !error.is_finite() {
+            return CellOutcome::Undecided;
+        }
+        let margin = MARGIN * error;
+        let beyond = match self.bound {
+            Bound::Above(limit) => value - limit,
+            Bound::Below(limit) => limit - value,
+            Bound::Between(low, high) => {
+                return if !(low - margin..=high + margin).contains(&value) {
+                    CellOutcome::Fails
+                } else if margin > 0.5 * (high - low) {
+                    CellOutcome::Undecided
+                } else {
+                    CellOutcome::Passes
+                };
+            }
+        };
+        if beyond > margin {
+            CellOutcome::Passes
+        } else if beyond < -margin || margin == 0.0 {
+            CellOutcome::Fails
+        } else {
+            CellOutcome::Undecided
+        }
+    }
+}
+
+/// The cells of a claim with one figure of merit and one test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// The figure of merit and what is claimed of it.
+    pub label: String,
+    /// Its cells.
+    pub tests: Vec<CellTest>,
+    /// Numbers beside those that are tested.
+    pub shown: Vec<(String, Value)>,
+}
+
+impl Part {
+    pub(super) fn new(label: &str) -> Self {
+        Self {
+            label: label.to_owned(),
+            tests: Vec::new(),
+            shown: Vec::new(),
+        }
+    }
+
+    /// Shows a number that is not tested.
+    pub(super) fn show(&mut self, label: String, value: Value) {
+        self.shown.push((label, value));
+    }
+
+    fn add(&mut self, label: String, measured: Value, bound: Bound) {
+        self.tests.push(CellTest { label, measured, bound });
+    }
+
+    /// A cell in which the value is claimed to be larger than a limit.
+    pub(super) fn above(&mut self, label: String, measured: Value, limit: f64) {
+        self.add(label, measured, Bound::Above(limit));
+    }
+
+    /// A cell in which the value is claimed to be smaller than a limit.
+    pub(super) fn below(&mut self, label: String, measured: Value, limit: f64) {
+        self.add(label, measured, Bound::Below(limit));
+    }
+
+    /// A cell in which the value is claimed to be around a number.
+    pub(super) fn around(&mut self, label: String, measured: Value, number: f64) {
+        self.between(label, measured, 0.5 * number, 1.5 * number);
+    }
+
+    /// A cell in which the value is claimed to be from one number to another.
+    pub(super) fn between(&mut self, label: String, measured: Value, low: f64, high: f64) {
+        self.add(label, measured, Bound::Between(low, high));
+    }
+
+    /// Cells with an outcome.
+    pub fn count(&self, outcome: CellOutcome) -> usize {
+        self.tests.iter().filter(|test| test.outcome() == outcome).count()
+    }
+
+    /// Cells whose value is above and below the range of a claimed number by more than the margin.
+    pub fn beyond(&self) -> (usize, usize) {
+        let fails = self.tests.iter().filter(|test| test.outcome() == CellOutcome::Fails);
+        fails.fold((0, 0), |(above, below), test| match test.bound {
+            Bound::Between(low, _) if test.measured.value < low => (above, below + 1),
+            Bound::Between(..) => (above + 1, below),
+            _ => (above, below),
+        })
+    }
+
+    /// Rule 2; none when the replications do not decide.
+    pub fn verdict(&self) -> Option<Verdict> {
+        let (passes, fails) = (self.count(CellOutcome::Passes), self.count(CellOutcome::Fails));
+        let decided = passes + fails;
+        if decided == 0 || 2 * decided < self.tests.len() {
+            return None;
+        }
+        let share = passes as f64 / decided as f64;
+        Some(if share >= HOLDS_FROM {
+            Verdict::Holds
+        } else if share >= IN_PART_FROM {
+            Verdict::HoldsInPart
+        } else {
+            Verdict::DoesNotHold
+        })
+    }
+}
+
+/// Rule 3.
+pub fn verdict(parts: &[Part]) -> Verdict {
+    let each: Vec<Option<Verdict>> = parts.iter().map(Part::verdict).collect();
+    let is = |asked: &Verdict| each.iter().filter(|found| found.as_ref() == Some(asked)).count();
+    if each.iter().all(Option::is_none) {
+        let cells: usize = parts.iter().map(|part| part.tests.len()).sum();
+        let open: usize = parts.iter().map(|part| part.count(CellOutcome::Undecided)).sum();
+        return Verdict::CannotBeTested(format!("the replications leave {open} of {cells} cells undecided"));
+    }
+    if is(&Verdict::Holds) == each.len() {
+        Verdict::Holds
+    } else if is(&Verdict::Holds) + is(&Verdict::HoldsInPart) == 0 {
+        Verdict::DoesNotHold
+    } else {
+        Verdict::HoldsInPart
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cell(value: f64, error: f64, bound: Bound) -> CellOutcome {
+        CellTest {
+            label: String::new(),
+            measured: Value { value, error },
+            bound,
+        }
+        .outcome()
+    }
+
+    fn part(passes: usize, fails: usize, open: usize) -> Part {
+        let mut part = Part::new("by hand");
+        for (count, value) in [(passes, 3.0), (fails, -3.0), (open, 1.0)] {
+            for _ in 0..count {
+                part.above(String::new(), Value { value, error: 1.0 }, 0.0);
+            }
+        }
+        part
+    }
+
+    #[test]
+    fn a_cell_passes_beyond_two_errors() {
+        use CellOutcome::{Fails, Passes, Undecided};
+        for (value, outcome) in [(12.1, Passes), (11.9, Undecided), (8.1, Undecided), (7.9, Fails)] {
+            assert_eq!(cell(value, 1.0, Bound::Above(10.0)), outcome);
+            assert_eq!(cell(-value, 1.0, Bound::Below(-10.0)), outcome);
+        }
+        // Without chance there is nothing between: what is not larger is not larger.
+        assert_eq!(cell(10.0, 0.0, Bound::Above(10.0)), Fails);
+        assert_eq!(cell(10.0 + 1e-9, 0.0, Bound::Above(10.0)), Passes);
+        let around = Bound::Between(25.0, 75.0);
+        for (value, outcome) in [
+            (50.0, Passes),
+            (76.9, Passes),
+            (77.1, Fails),
+            (23.1, Passes),
+            (22.9, Fails),
+        ] {
+            assert_eq!(cell(value, 1.0, around), outcome);
+        }
+        // 2 s = 26 is more than half of 75 - 25.
+        for (value, outcome) in [(50.0, Undecided), (100.9, Undecided), (101.1, Fails)] {
+            assert_eq!(cell(value, 13.0, around), outcome);
+        }
+        for (value, error) in [(f64::NAN, 1.0), (1.0, f64::NAN), (f64::INFINITY, 1.0)] {
+            assert_eq!(cell(value, error, around), Undecided);
+            assert_eq!(cell(value, error, Bound::Above(0.0)), Undecided);
+        }
+    }
+
+    #[test]
+    fn a_part_goes_by_the_share_of_decided_cells() {
+        assert_eq!(part(9, 1, 0).verdict(), Some(Verdict::Holds));
+        assert_eq!(part(8, 1, 0).verdict(), Some(Verdict::HoldsInPart));
+        assert_eq!(part(1, 1, 0).verdict(), Some(Verdict::HoldsInPart));
+        assert_eq!(part(4, 5, 0).verdict(), Some(Verdict::DoesNotHold));
+        assert_eq!(part(5, 0, 5).verdict(), Some(Verdict::Holds));
+        assert_eq!(part(5, 0, 6).verdict(), None);
+        assert_eq!(part(0, 0, 0).verdict(), None);
+    }
+
+    #[test]
+    fn a_claim_goes_by_its_parts() {
+        let (yes, half, no, open) = (part(9, 0, 0), part(5, 4, 0), part(0, 9, 0), part(1, 0, 9));
+        let of = |parts: &[&Part]| verdict(&parts.iter().map(|part| (*part).clone()).collect::<Vec<_>>());
+        assert_eq!(of(&[&yes, &yes]), Verdict::Holds);
+        assert_eq!(of(&[&yes, &no]), Verdict::HoldsInPart);
+        assert_eq!(of(&[&yes, &open]), Verdict::HoldsInPart);
+        assert_eq!(of(&[&half]), Verdict::HoldsInPart);
+        assert_eq!(of(&[&no, &no]), Verdict::DoesNotHold);
+        assert_eq!(of(&[&no, &open]), Verdict::DoesNotHold);
+        assert!(matches!(of(&[&open, &open]), Verdict::CannotBeTested(reason) if reason.contains("18 of 20")));
+        assert!(matches!(of(&[]), Verdict::CannotBeTested(_)));
+    }
+
+    #[test]
+    fn errors_of_differences_and_ratios() {
+        let (a, b) = (Value { value: 8.0, error: 0.3 }, Value { value: 2.0, error: 0.4 });
+        assert_eq!(a.minus(b), Value { value: 6.0, error: 0.5 });
+        assert_eq!(
+            Value::mean(&[a, b]),
+            Value {
+                value: 5.0,
+                error: 0.25
+            }
+        );
+        let ratio = a.over(b);
+        // sqrt((0.3 / 8)^2 + (0.4 / 2)^2) = 0.203485
+        assert!((ratio.value - 4.0).abs() < 1e-12 && (ratio.error - 4.0 * 0.203_485).abs() < 1e-5);
+    }
+}

@@ -1,0 +1,46 @@
+//! Claims and their verdicts as a table.
+
+use hoid_io::{ColumnValues, OutputColumn, OutputTable};
+
+use super::{Claim, Finding};
+
+/// A table of claims, a row each, with what was measured in words and the first of the numbers.
+pub fn claims_table(findings: &[(Claim, Finding)]) -> OutputTable {
+    let text = |name: &str, of: &dyn Fn(&Claim, &Finding) -> String| OutputColumn {
+        name: name.to_owned(),
+        values: ColumnValues::Text(findings.iter().map(|(claim, finding)| of(claim, finding)).collect()),
+    };
+    let whole = |name: &str, of: &dyn Fn(&Finding) -> usize| OutputColumn {
+        name: name.to_owned(),
+        values: ColumnValues::Whole(findings.iter().map(|(_, finding)| of(finding) as u64).collect()),
+    };
+    let real = |name: &str, of: &dyn Fn(&super::Measured) -> f64| OutputColumn {
+        name: name.to_owned(),
+        values: ColumnValues::Real(
+            findings
+                .iter()
+                .map(|(_, finding)| finding.measured.first().map_or(f64::NAN, of))
+                .collect(),
+        ),
+    };
+    OutputTable {
+        comments: vec!["Statements of the reference text and what the data say of them".to_owned()],
+        columns: vec![
+            text("id", &|claim, _| claim.id.to_owned()),
+            text("theme", &|claim, _| claim.theme.title().to_owned()),
+            text("statement", &|claim, _| claim.statement.to_owned()),
+            text("place", &|claim, _| claim.place.to_owned()),
+            text("measure", &|claim, _| claim.measure.to_owned()),
+            text("plans", &|claim, _| claim.plans.join(" ")),
+            text("verdict", &|_, finding| finding.verdict.to_string()),
+            whole("passed", &|finding| finding.passed),
+            whole("failed", &|finding| finding.failed),
+            whole("cells", &|finding| finding.of),
+            real("value", &|measured| measured.value),
+            real("error", &|measured| measured.error),
+            real("least", &|measured| measured.least),
+            real("most", &|measured| measured.most),
+            text("found", &|_, finding| finding.text.clone()),
+        ],
+    }
+}

@@ -1,0 +1,129 @@
+//! Why a study cannot be run.
+
+use hoid_io::IoError;
+use thiserror::Error;
+
+/// What can go wrong with a study as a whole. A fit that fails is a row of the results with its reason, not an error.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum StudyError {
+    /// A plan without meaning.
+    #[error("plan {path}{}: {reason}", .line.map_or_else(String::new, |line| format!(", line {line}")))]
+    Plan {
+        /// The file.
+        path: String,
+        /// Line, from 1, where one can be named.
+        line: Option<usize>,
+        /// What is wrong and what was expected.
+        reason: String,
+    },
+    /// A file that cannot be read or written.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// A share that is none.
+    #[error("shard {found:?}: expected I/N with 1 <= I <= N, such as 2/7")]
+    BadShard {
+        /// What was given.
+        found: String,
+    },
+    /// A `study.json` that is not one.
+    #[error(
+        "{file}: {reason}; expected the file that hoid wrote: take another directory, or remove this one to start anew"
+    )]
+    Manifest {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Results would be overwritten.
+    #[error("{directory} already holds a study: go on with --resume, or take another directory")]
+    Occupied {
+        /// The directory.
+        directory: String,
+    },
+    /// Results that do not belong together.
+    #[error("{directory} holds another study: {reason}; take another directory")]
+    OtherStudy {
+        /// The directory.
+        directory: String,
+        /// What differs.
+        reason: String,
+    },
+    /// No results where some were expected.
+    #[error("{directory:?} holds no study: expected a directory that `hoid study run` has written")]
+    NoStudy {
+        /// The directory.
+        directory: String,
+    },
+    /// A study without its tables.
+    #[error("{directory} holds a study that is not finished: go on with --resume, or merge its shards")]
+    Unfinished {
+        /// The directory.
+        directory: String,
+    },
+    /// A table that is not what the plan beside it says.
+    #[error("{file}: {reason}; expected the table that hoid wrote: run the study again")]
+    Table {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A study that is already whole.
+    #[error("{directory} holds a whole study, there is nothing to merge: expected directories written with --shard")]
+    Whole {
+        /// The directory.
+        directory: String,
+    },
+    /// A part that is there twice.
+    #[error("block {block} is both in {first} and in {second}: name each shard once")]
+    Overlap {
+        /// The block.
+        block: u64,
+        /// Where it is.
+        first: String,
+        /// Where it is too.
+        second: String,
+    },
+    /// Parts that are missing.
+    #[error(
+        "{missing} of {blocks} blocks of {plan} are missing, the first is {first}: run the missing shards, or finish those that were stopped with --resume"
+    )]
+    Gap {
+        /// How many.
+        missing: u64,
+        /// Of how many.
+        blocks: u64,
+        /// The first that is missing.
+        first: u64,
+        /// Name of the study.
+        plan: String,
+    },
+    /// Threads that the system does not give.
+    #[error("no threads: {reason}; try --jobs 1")]
+    Threads {
+        /// What the system says.
+        reason: String,
+    },
+    /// A pattern of file names that is none.
+    #[error("pattern {pattern:?}: {reason}; expected something like {{subject}}_{{condition}}_{{run}}.csv")]
+    Pattern {
+        /// The pattern.
+        pattern: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A directory without runs.
+    #[error("no file in {directory} matches the pattern: look at the names there, and at --pattern")]
+    NoRuns {
+        /// The directory.
+        directory: String,
+    },
+    /// A virtual experiment that cannot be simulated.
+    #[error("the virtual experiment cannot be simulated: {reason}")]
+    Virtual {
+        /// Why, and the remedy.
+        reason: String,
+    },
+}

@@ -1,0 +1,214 @@
+//! Over the runs of a subject and condition: means with their errors, the chosen delays, mean traces.
+
+use std::collections::BTreeMap;
+
+use hoid_io::{ColumnKind, ColumnSchema, ColumnValues, OutputTable, TableSchema};
+
+use crate::{columns::Rows, statistics::Statistics};
+
+/// Reads a column of texts.
+pub(super) fn texts<'a>(table: &'a OutputTable, name: &str) -> &'a [String] {
+    match table.column(name) {
+        Some(ColumnValues::Text(values)) => values,
+        _ => &[],
+    }
+}
+
+/// Reads a column of numbers.
+pub(super) fn numbers<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
+    match table.column(name) {
+        Some(ColumnValues::Real(values)) => values,
+        _ => &[],
+    }
+}
+
+fn schema(texts: &[&str], numbers: &[&str]) -> TableSchema {
+    let column = |name: &&str, kind| ColumnSchema {
+        name: (*name).to_owned(),
+        kind,
+    };
+    TableSchema {
+        comments: Vec::new(),
+        columns: texts
+            .iter()
+            .map(|n| column(n, ColumnKind::Text))
+            .chain(numbers.iter().map(|n| column(n, ColumnKind::Real)))
+            .collect(),
+    }
+}
+
+/// Subject, condition, window, estimator, parameter.
+type Key = [String; 5];
+
+/// Estimates collected over runs.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Averages(BTreeMap<Key, Vec<f64>>);
+
+impl Averages {
+    /// Adds the estimates of a run.
+    pub fn add(&mut self, estimates: &OutputTable) {
+        let columns = ["subject", "condition", "window", "estimator", "parameter"].map(|name| texts(estimates, name));
+        let values = numbers(estimates, "value");
+        for (row, status) in texts(estimates, "status").iter().enumerate() {
+            if status == "ok" {
+                let key = columns.map(|column| column[row].clone());
+                self.0.entry(key).or_default().push(values[row]);
+            }
+        }
+    }
+
+    /// Mean, spread and error over the runs.
+    pub fn table(&self) -> OutputTable {
+        let mut rows = Rows::new(&schema(
+            &["subject", "condition", "window", "estimator", "parameter"],
+            &["runs", "mean", "standard_error", "sd", "median", "least", "most"],
+        ));
+        for (key, values) in &self.0 {
+            let s = Statistics::of(values);
+            rows.begin();
+            for (name, text) in ["subject", "condition", "window", "estimator", "parameter"]
+                .iter()
+                .zip(key)
+            {
+                rows.text(name, text);
+            }
+            let figures = [s.count as f64, s.mean, s.mean_se, s.sd, s.median, s.least, s.most];
+            for (name, value) in ["runs", "mean", "standard_error", "sd", "median", "least", "most"]
+                .iter()
+                .zip(figures)
+            {
+                rows.real(name, value);
+            }
+        }
+        rows.into_table(Vec::new())
+    }
+}
+
+/// Delays and T_n that were chosen beforehand (Table 3): a row for each run, by subject, condition and place in the manifest.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Delays(BTreeMap<(String, String, usize), DelaysOfRun>);
+
+#[derive(Debug, Clone, Default)]
+struct DelaysOfRun {
+    run: String,
+    values: BTreeMap<&'static str, f64>,
+}
+
+const DELAY_COLUMNS: [(&str, &str, &str); 4] = [
+    ("ARX", "nk", "ARX_nk"),
+    ("BJ", "nk", "BJ_nk"),
+    ("BJ", "nd", "BJ_nd"),
+    ("BJ", "T_n", "BJ_T_n"),
+];
+
+impl Delays {
+    /// Adds a run; `place` is its number in the manifest.
+    pub fn add(&mut self, estimates: &OutputTable, place: usize) {
+        let [subject, condition, run, window, estimator, parameter] =
+            ["subject", "condition", "run", "window", "estimator", "parameter"].map(|name| texts(estimates, name));
+        let values = numbers(estimates, "value");
+        for row in 0..values.len() {
+            let column = DELAY_COLUMNS
+                .iter()
+                .find(|(of, name, _)| estimator[row] == *of && parameter[row] == *name && window[row].is_empty());
+            if let Some((_, _, column)) = column {
+                let key = (subject[row].clone(), condition[row].clone(), place);
+                let of_run = self.0.entry(key).or_default();
+                of_run.run.clone_from(&run[row]);
+                of_run.values.insert(column, values[row]);
+            }
+        }
+    }
+
+    /// The table.
+    pub fn table(&self) -> OutputTable {
+        let columns = DELAY_COLUMNS.map(|(_, _, column)| column);
+        let mut rows = Rows::new(&schema(&["subject", "condition", "run"], &columns));
+        for ((subject, condition, _), DelaysOfRun { run, values }) in &self.0 {
+            rows.begin();
+            rows.text("subject", subject);
+            rows.text("condition", condition);
+            rows.text("run", run);
+            for column in columns {
+                rows.real(column, values.get(column).copied().unwrap_or(f64::NAN));
+            }
+        }
+        rows.into_table(Vec::new())
+    }
+}
+
+/// Traces of all runs at equal times.
+#[derive(Debug, Clone, Default)]
+pub(super) struct TraceAverages {
+    names: Vec<String>,
+    values: BTreeMap<[String; 3], BTreeMap<u64, Vec<Vec<f64>>>>,
+}
+
+impl TraceAverages {
+    /// For these parameters; those that end in `_se` are averaged as variances.
+    pub fn new(names: Vec<String>) -> Self {
+        Self {
+            names,
+            values: BTreeMap::new(),
+        }
+    }
+
+    /// Adds the traces of a run.
+    pub fn add(&mut self, traces: &OutputTable) {
+        let keys = ["subject", "condition", "estimator"].map(|name| texts(traces, name));
+        let columns: Vec<&[f64]> = self.names.iter().map(|name| numbers(traces, name)).collect();
+        for (row, t) in numbers(traces, "t").iter().enumerate() {
+            let key = keys.map(|column| column[row].clone());
+            let at = self.values.entry(key).or_default().entry(t.max(0.0).to_bits());
+            let all = at.or_insert_with(|| vec![Vec::new(); columns.len()]);
+            for (values, column) in all.iter_mut().zip(&columns) {
+                if let Some(value) = column.get(row).filter(|v| v.is_finite()) {
+                    values.push(*value);
+                }
+            }
+        }
+    }
+
+    /// Median, quartiles, mean and standard deviation over the runs at each time; of a standard error the median variance.
+    pub fn table(&self) -> OutputTable {
+        const FIGURES: [&str; 6] = ["runs", "mean", "sd", "lower_quartile", "median", "upper_quartile"];
+        let mut columns: Vec<String> = vec!["t".to_owned()];
+        for name in &self.names {
+            match name.strip_suffix("_se") {
+                Some(of) => columns.push(format!("{of}_variance")),
+                None => columns.extend(FIGURES.map(|figure| format!("{name}_{figure}"))),
+            }
+        }
+        let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
+        let mut rows = Rows::new(&schema(&["subject", "condition", "estimator"], &columns));
+        for (key, times) in &self.values {
+            for (bits, all) in times {
+                rows.begin();
+                for (name, text) in ["subject", "condition", "estimator"].iter().zip(key) {
+                    rows.text(name, text);
+                }
+                rows.real("t", f64::from_bits(*bits));
+                for (name, values) in self.names.iter().zip(all).filter(|(_, values)| !values.is_empty()) {
+                    let s = Statistics::of(values);
+                    match name.strip_suffix("_se") {
+                        Some(of) => rows.real(&format!("{of}_variance"), s.median * s.median),
+                        None => {
+                            let figures = [
+                                s.count as f64,
+                                s.mean,
+                                s.sd,
+                                s.lower_quartile,
+                                s.median,
+                                s.upper_quartile,
+                            ];
+                            for (figure, value) in FIGURES.iter().zip(figures) {
+                                rows.real(&format!("{name}_{figure}"), value);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        rows.into_table(Vec::new())
+    }
+}

@@ -1,0 +1,145 @@
+//! Names of files as patterns: `{subject}_{condition}_{run}*.csv`.
+//!
+//! A name in braces stands for one or more characters, as few as possible, `*` for any number of them; everything else stands for itself.
+
+use crate::StudyError;
+
+/// Parts of a file name.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Part {
+    Text(String),
+    Name(String),
+    Any,
+}
+
+/// A pattern of file names.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Pattern(Vec<Part>);
+
+/// What the names in braces stand for in one file name.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Matched {
+    /// `{subject}`.
+    pub subject: String,
+    /// `{condition}`; empty where the pattern has none.
+    pub condition: String,
+    /// `{run}`.
+    pub run: String,
+}
+
+const NAMES: [&str; 3] = ["subject", "condition", "run"];
+
+impl Pattern {
+    /// Reads a pattern.
+    ///
+    /// # Errors
+    /// [`StudyError::Pattern`] for braces that are not closed, other names, one that is there twice, two names without a text between them, or a
+    /// pattern without `{run}`.
+    pub fn new(text: &str) -> Result<Self, StudyError> {
+        let bad = |reason: String| StudyError::Pattern {
+            pattern: text.to_owned(),
+            reason,
+        };
+        let mut parts: Vec<Part> = Vec::new();
+        let mut rest = text;
+        while !rest.is_empty() {
+            if let Some(after) = rest.strip_prefix('*') {
+                parts.push(Part::Any);
+                rest = after;
+            } else if let Some(after) = rest.strip_prefix('{') {
+                let (name, after) = after
+                    .split_once('}')
+                    .ok_or_else(|| bad("a brace is not closed".to_owned()))?;
+                if !NAMES.contains(&name) {
+                    return Err(bad(format!(
+                        "{{{name}}} is no name, expected {{subject}}, {{condition}} or {{run}}"
+                    )));
+                }
+                if parts.contains(&Part::Name(name.to_owned())) {
+                    return Err(bad(format!("{{{name}}} is there twice")));
+                }
+                if matches!(parts.last(), Some(Part::Name(_))) {
+                    return Err(bad(format!("nothing separates {{{name}}} from the name before it")));
+                }
+                parts.push(Part::Name(name.to_owned()));
+                rest = after;
+            } else {
+                let end = rest.find(['*', '{']).unwrap_or(rest.len());
+                parts.push(Part::Text(rest[..end].to_owned()));
+                rest = &rest[end..];
+            }
+        }
+        if !parts.contains(&Part::Name("run".to_owned())) {
+            return Err(bad("it has no {run}".to_owned()));
+        }
+        Ok(Self(parts))
+    }
+
+    /// What the names stand for in a file name; none where it does not match.
+    pub fn matches(&self, name: &str) -> Option<Matched> {
+        let mut found = Matched::default();
+        found_in(&self.0, name, &mut found).then_some(found)
+    }
+}
+
+fn found_in(parts: &[Part], text: &str, found: &mut Matched) -> bool {
+    let Some((first, rest)) = parts.split_first() else {
+        return text.is_empty();
+    };
+    if let Part::Text(expected) = first {
+        return text
+            .strip_prefix(expected.as_str())
+            .is_some_and(|after| found_in(rest, after, found));
+    }
+    let least = usize::from(*first != Part::Any);
+    let ends = text.char_indices().map(|(i, _)| i).chain([text.len()]).skip(least);
+    for end in ends {
+        if found_in(rest, &text[end..], found) {
+            if let Part::Name(name) = first {
+                let value = text[..end].to_owned();
+                match name.as_str() {
+                    "subject" => found.subject = value,
+                    "condition" => found.condition = value,
+                    _ => found.run = value,
+                }
+            }
+            return true;
+        }
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn names_are_found() {
+        let pattern = Pattern::new("{subject}_{condition}_{run}_d_only.csv").unwrap();
+        let found = pattern.matches("P03_fo_11_d_only.csv").unwrap();
+        assert_eq!(
+            (found.subject.as_str(), found.condition.as_str(), found.run.as_str()),
+            ("P03", "fo", "11")
+        );
+        assert_eq!(pattern.matches("P03_fo_11_r_only.csv"), None);
+        let loose = Pattern::new("s{subject}-*run{run}.*").unwrap();
+        let found = loose.matches("s7-C4-run12.mat").unwrap();
+        assert_eq!((found.subject.as_str(), found.run.as_str()), ("7", "12"));
+        assert_eq!(loose.matches("s-run1.csv"), None);
+    }
+
+    #[test]
+    fn bad_patterns_are_refused() {
+        for bad in [
+            "{subject",
+            "{name}_{run}",
+            "{run}_{run}",
+            "{subject}{run}",
+            "{subject}.csv",
+            "",
+        ] {
+            assert!(matches!(Pattern::new(bad), Err(StudyError::Pattern { .. })), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! What stands beside the results: `study.json`.
+//!
+//! It says which plan and which program made the parts of a directory, and which share of the study they are. Two directories belong
+//! together when plan, replications, seed and version are the same.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Plan, StudyError};
+
+/// A share of a study: part `index` of `of`, from 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shard {
+    /// Which.
+    pub index: u64,
+    /// Of how many.
+    pub of: u64,
+}
+
+impl std::str::FromStr for Shard {
+    type Err = StudyError;
+
+    /// `I/N` with `1 <= I <= N`.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let parts = text.split_once('/').map(|(i, n)| (i.trim().parse(), n.trim().parse()));
+        match parts {
+            Some((Ok(index), Ok(of))) if index >= 1 && index <= of => Ok(Self { index, of }),
+            _ => Err(StudyError::BadShard { found: text.to_owned() }),
+        }
+    }
+}
+
+impl std::fmt::Display for Shard {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}/{}", self.index, self.of)
+    }
+}
+
+impl Shard {
+    /// Whether a block belongs to it: blocks are dealt out in turn, so that shards take about the same time.
+    pub(crate) fn has(self, block: u64) -> bool {
+        block % self.of == self.index - 1
+    }
+}
+
+/// The content of `study.json`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Manifest {
+    /// Version of the program.
+    pub hoid: String,
+    pub study: String,
+    pub plan_sha256: String,
+    pub seed: u64,
+    pub replications: u64,
+    /// Blocks of the whole study.
+    pub blocks: u64,
+    pub shard: Option<Shard>,
+    /// True once the tables are there.
+    pub complete: bool,
+}
+
+pub(crate) const PLAN: &str = "plan.toml";
+const NAME: &str = "study.json";
+
+impl Manifest {
+    pub fn of(plan: &Plan, blocks: u64, shard: Option<Shard>) -> Self {
+        Self {
+            hoid: env!("CARGO_PKG_VERSION").to_owned(),
+            study: plan.name.clone(),
+            plan_sha256: plan.hash(),
+            seed: plan.seed,
+            replications: plan.replications,
+            blocks,
+            shard,
+            complete: false,
+        }
+    }
+
+    /// The manifest of a directory; none where it holds no study.
+    pub fn read(directory: &Path) -> Result<Option<Self>, StudyError> {
+        let path = directory.join(NAME);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let text = hoid_io::read_text(&path)?;
+        serde_json::from_str(&text)
+            .map(Some)
+            .map_err(|error| StudyError::Manifest {
+                file: path.display().to_string(),
+                reason: error.to_string(),
+            })
+    }
+
+    pub fn write(&self, directory: &Path) -> Result<(), StudyError> {
+        let text = serde_json::to_string_pretty(self).unwrap_or_default();
+        let path = directory.join(NAME);
+        Ok(hoid_io::write_atomically(&path, |file| writeln!(file, "{text}"))?)
+    }
+
+    /// What keeps two parts from belonging to one study; none when they do.
+    pub fn differs(&self, other: &Self) -> Option<String> {
+        let pairs = [
+            ("hoid version", &self.hoid, &other.hoid),
+            ("study", &self.study, &other.study),
+            ("plan (sha256)", &self.plan_sha256, &other.plan_sha256),
+        ];
+        let numbers = [
+            ("seed", self.seed, other.seed),
+            ("replications", self.replications, other.replications),
+            ("blocks", self.blocks, other.blocks),
+        ];
+        pairs
+            .into_iter()
+            .map(|(name, a, b)| (name, a.clone(), b.clone()))
+            .chain(numbers.map(|(name, a, b)| (name, a.to_string(), b.to_string())))
+            .find(|(_, a, b)| a != b)
+            .map(|(name, a, b)| format!("{name} {a} there, {b} here"))
+    }
+}
+
+/// Where the parts of a block stand.
+pub(crate) fn part(directory: &Path, block: u64, table: &str) -> PathBuf {
+    directory.join("parts").join(format!("{block:06}-{table}.parquet"))
+}

@@ -1,0 +1,286 @@
+//! Estimators of a plan: `[[estimators]]`.
+//!
+//! ```toml
+//! [[estimators]]
+//! name = "BJ"
+//! method = "fit"                  # or "grey-box", "rls", "rpem", "physical", "window", "rriv", "record"
+//! structure = "bj"
+//! orders = { nd = [1, 2], nk = "true" }
+//! ```
+//!
+//! The keys are those of the command line, with units where it has none. `"true"` as an order takes what the scenario has: nk of its
+//! delay, nd of its remnant; `nk = "ramp"` is one less. Orders that are left out are those of the operator's structure, `nk = "true"`.
+
+use std::collections::BTreeMap;
+
+use hoid_ident::{
+    Estimator, GreyBox,
+    tracking::{Method, StartAt, TrackOptions},
+};
+use hoid_model::{Detrend, Orders, SampleTime, Structure, scenario::ResolvedScenario};
+
+use super::{
+    PlanProblem,
+    estimator_table::{EstimatorTable, OfScenario, Order, OrdersTable, StartValue, TaskKey},
+    grid::{Axis, Variant},
+};
+
+/// One estimator of a study: what is done with each record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EstimatorCell {
+    /// Its name in the plan.
+    pub name: String,
+    /// The name, and what stands for the lists of its table.
+    pub label: String,
+    /// What stands for the lists.
+    pub axes: Vec<Axis>,
+    /// The estimator from whose VAF that of this one is counted.
+    pub versus: Option<String>,
+    /// Names of the scenarios that it takes; none for all.
+    pub scenarios: Option<Vec<String>>,
+    /// Span of the record that it takes, s; none for all.
+    pub span_s: Option<(f64, f64)>,
+    /// It takes every so manieth sample.
+    pub decimate: usize,
+    /// What is taken out of e and u before.
+    pub detrend: Detrend,
+    /// What it does.
+    pub task: Task,
+    /// Label of its start, empty for its own.
+    pub start: String,
+    pub(crate) orders: OrdersTable,
+    pub(crate) start_values: BTreeMap<String, f64>,
+}
+
+/// What is done with a record.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Task {
+    /// The record itself is described: levels and noise level.
+    Describe,
+    /// A polynomial model is fitted.
+    Fit(Box<Estimator>),
+    /// The operator's parameters are fitted.
+    GreyBox(Box<GreyBox>),
+    /// The operator is tracked.
+    Track(Box<TrackOptions>),
+}
+
+impl EstimatorCell {
+    pub(crate) fn of(variant: &Variant) -> Result<Self, PlanProblem> {
+        let table: EstimatorTable = variant.read()?;
+        let at = |key: &str, reason: String| PlanProblem {
+            line: variant.line_of_key(key).or_else(|| variant.lines.first().copied()),
+            reason: format!("{key} {reason}"),
+        };
+        let method = table.method.recursion();
+        let structure = table.structure.map_or_else(
+            || method.map_or(Structure::BoxJenkins, Method::usual_structure),
+            Structure::from,
+        );
+        table.check_placement(method, &at)?;
+        if table.method == TaskKey::Fit && table.structure.is_none() {
+            return Err(at(
+                "structure",
+                "is missing, expected one such as \"arx\" or \"bj\"".to_owned(),
+            ));
+        }
+        let decimate = table.decimate.unwrap_or(1);
+        if decimate == 0 {
+            return Err(at("decimate", "is 0, expected 1 or more".to_owned()));
+        }
+        for (key, span) in [("span_s", table.span_s), ("start_span_s", table.start_span_s)] {
+            if let Some((from, to)) = span
+                && !(from < to && from.is_finite() && to.is_finite())
+            {
+                return Err(at(
+                    key,
+                    format!("is [{from}, {to}], expected a beginning before its end"),
+                ));
+            }
+        }
+        let (mut start, mut start_values) = (String::new(), BTreeMap::new());
+        for (name, value) in table.start.iter().flatten() {
+            match value {
+                StartValue::Name(text) if name == "name" => start.clone_from(text),
+                StartValue::Name(text) => {
+                    return Err(at("start", format!("has {name} = {text:?}, expected a number")));
+                }
+                StartValue::Number(value) => {
+                    start_values.insert(name.clone(), *value);
+                }
+            }
+        }
+        if start.is_empty() && !start_values.is_empty() {
+            "given".clone_into(&mut start);
+        }
+        let task = match (table.method, method) {
+            (TaskKey::Record, _) => Task::Describe,
+            (TaskKey::GreyBox, _) => Task::GreyBox(Box::new(table.grey_box(&at)?)),
+            (_, Some(method)) => Task::Track(Box::new(table.track(method, structure, &at)?)),
+            _ => Task::Fit(Box::new(table.fit(structure))),
+        };
+        let short = |axis: &Axis| format!("{}={}", axis.key.trim_start_matches("orders_"), axis.value);
+        let label: Vec<String> = variant.axes.iter().map(short).collect();
+        let cell = Self {
+            label: [std::slice::from_ref(&table.name), label.as_slice()].concat().join(" "),
+            name: table.name,
+            axes: variant.axes.clone(),
+            versus: table.versus,
+            scenarios: table.scenarios,
+            span_s: table.span_s,
+            decimate,
+            detrend: table.detrend.map_or(Detrend::None, Detrend::from),
+            task,
+            start,
+            orders: table.orders,
+            start_values,
+        };
+        Ok(cell)
+    }
+
+    /// Whether it takes the records of a scenario.
+    pub fn takes(&self, scenario: &str) -> bool {
+        self.scenarios
+            .as_ref()
+            .is_none_or(|names| names.iter().any(|n| n == scenario))
+    }
+
+    /// The structure; none where the record itself is described.
+    pub fn structure(&self) -> Option<Structure> {
+        match &self.task {
+            Task::Describe => None,
+            Task::Fit(estimator) => Some(estimator.structure),
+            Task::GreyBox(_) => Some(Structure::BoxJenkins),
+            Task::Track(options) => Some(options.structure),
+        }
+    }
+
+    /// Method as in the plan.
+    pub fn method(&self) -> &'static str {
+        match &self.task {
+            Task::Describe => "record",
+            Task::Fit(_) => "fit",
+            Task::GreyBox(_) => "grey-box",
+            Task::Track(options) => options.method.name(),
+        }
+    }
+
+    /// Orders for a scenario.
+    pub fn orders(&self, scenario: &ResolvedScenario) -> Orders {
+        let Some(structure) = self.structure() else {
+            return Orders::default();
+        };
+        let (ts, table) = (scenario.scenario().sample_time.s() * self.decimate as f64, &self.orders);
+        // The delay in whole samples, but for the rounding of the quotient: what is left over is for b0 and those after it.
+        let delay = (scenario.scenario().initial.operator.tau_e_s / ts + 1e-9).floor() as usize;
+        let of = |order: Option<Order>, usual: usize, simulated: usize| match order {
+            None => usual,
+            Some(Order::Number(n)) => n,
+            Some(Order::Scenario(OfScenario::True)) => simulated,
+            Some(Order::Scenario(OfScenario::Ramp)) => simulated.saturating_sub(1),
+        };
+        let usual = structure.operator_orders(if structure.has_input() { delay + 1 } else { 0 });
+        let nd = match &self.task {
+            Task::GreyBox(_) => scenario.scenario().remnant.order,
+            _ => usual.nd,
+        };
+        Orders {
+            na: table.na.unwrap_or(usual.na),
+            nb: table.nb.unwrap_or(usual.nb),
+            nc: table.nc.unwrap_or(usual.nc),
+            nd: of(table.nd, nd, scenario.scenario().remnant.order),
+            nf: table.nf.unwrap_or(usual.nf),
+            nk: of(table.nk, usual.nk, delay + 1),
+        }
+    }
+
+    /// Start of a coefficient, where the plan gives one.
+    pub fn start_value(&self, name: &str) -> Option<f64> {
+        self.start_values.get(name).copied()
+    }
+
+    /// Start of theta for these orders, where the plan gives one; coefficients that it leaves out are zero.
+    pub(crate) fn theta(&self, orders: &Orders) -> Option<Vec<f64>> {
+        if self.start.is_empty() {
+            return None;
+        }
+        let of = |name: &String| self.start_values.get(name).copied().unwrap_or(0.0);
+        Some(orders.parameter_names().iter().map(of).collect())
+    }
+
+    /// The task with the orders and the start of a scenario.
+    pub fn task_for(&self, scenario: &ResolvedScenario) -> Task {
+        let orders = self.orders(scenario);
+        let mut task = self.task.clone();
+        match &mut task {
+            Task::Describe => {}
+            Task::Fit(estimator) => {
+                estimator.orders = orders;
+                estimator.start = self.theta(&orders);
+            }
+            Task::GreyBox(grey) => grey.order = orders.nd..=orders.nd,
+            Task::Track(options) => {
+                options.orders = orders;
+                if let Some(theta) = self.theta(&orders) {
+                    options.start = StartAt::Theta(theta);
+                }
+            }
+        }
+        task
+    }
+
+    /// Checks orders, start and options against a scenario: the key and what is wrong with it.
+    pub(crate) fn check(&self, scenario: &ResolvedScenario) -> Result<(), (&'static str, String)> {
+        let orders = self.orders(scenario);
+        if let Some(structure) = self.structure() {
+            orders.check(structure).map_err(|error| ("orders", error.to_string()))?;
+        }
+        let names = orders.parameter_names();
+        if let Some(name) = self.start_values.keys().find(|name| !names.contains(name)) {
+            return Err((
+                "start",
+                format!("start has {name}, expected one of {}", names.join(", ")),
+            ));
+        }
+        let ts = scenario.scenario().sample_time.s();
+        let end_s = scenario.scenario().measurement_s;
+        for (key, span) in [("span_s", self.span_s), ("start_span_s", self.start_span_s())] {
+            if let Some((from, to)) = span
+                && (from < -1e-9 || to > end_s + ts)
+            {
+                return Err((
+                    key,
+                    format!("the span {from} to {to} s leaves the record, which lasts from 0 to {end_s} s"),
+                ));
+            }
+        }
+        match self.task_for(scenario) {
+            Task::Track(options) => {
+                options.check().map_err(|error| ("memory_of", error.to_string()))?;
+                let sample_time =
+                    SampleTime::new(ts * self.decimate as f64).map_err(|error| ("decimate", error.to_string()))?;
+                for memory in options.memories().map_err(|error| ("memory_of", error.to_string()))? {
+                    memory
+                        .lambda(sample_time)
+                        .map_err(|error| ("memory", error.to_string()))?;
+                }
+                Ok(())
+            }
+            Task::GreyBox(grey) if grey.order.start() == &0 => Err((
+                "orders",
+                "orders.nd is 0, expected the order of the remnant filter, 1 or more, for the grey box".to_owned(),
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    fn start_span_s(&self) -> Option<(f64, f64)> {
+        match &self.task {
+            Task::Track(options) => match options.start {
+                StartAt::Span(span) => span,
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Named plans: the reference text's studies, what it leaves for later, and an example.
+
+use crate::{Plan, StudyError};
+
+/// A plan that comes with the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NamedPlan {
+    /// Its name.
+    pub name: &'static str,
+    /// Its text, to be read, copied and changed.
+    pub text: &'static str,
+}
+
+macro_rules! named {
+    ($($name:literal),+ $(,)?) => {
+        /// All named plans, in the order in which they are run.
+        pub const NAMED_PLANS: &[NamedPlan] = &[$(NamedPlan {
+            name: $name,
+            text: include_str!(concat!("../plans/", $name, ".toml")),
+        }),+];
+    };
+}
+
+named![
+    "noise-level",
+    "bias",
+    "initial-conditions",
+    "recursive",
+    "recursive-arx",
+    "decimation",
+    "remnant-time-constant",
+    "noise-definition",
+    "memory",
+    "forgetting",
+    "lead-change",
+];
+
+impl NamedPlan {
+    /// Replications of each named plan, those of the reference text.
+    pub const REPLICATIONS: u64 = 100;
+
+    /// The plan of a name.
+    pub fn find(name: &str) -> Option<Self> {
+        NAMED_PLANS.iter().copied().find(|plan| plan.name == name)
+    }
+
+    /// The plan, read.
+    ///
+    /// # Errors
+    /// As [`Plan::parse`].
+    pub fn plan(&self) -> Result<Plan, StudyError> {
+        Plan::parse(self.text, self.name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn named_plans_are_right_and_called_as_their_files() {
+        for named in NAMED_PLANS {
+            let plan = named.plan().unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(plan.name, named.name);
+            assert!(!plan.title.is_empty() && !plan.description.is_empty(), "{}", plan.name);
+            assert_eq!(plan.replications, NamedPlan::REPLICATIONS, "{}", plan.name);
+        }
+    }
+}

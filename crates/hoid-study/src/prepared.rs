@@ -1,0 +1,53 @@
+//! The record as an estimator takes it: a span, every so manieth sample, without mean or line.
+
+use std::borrow::Cow;
+
+use hoid_model::{Channel, Detrend, Record, SampleTime};
+
+use crate::plan::EstimatorCell;
+
+/// The record as an estimator takes it: span, every so manieth sample, without mean or line.
+pub(crate) fn prepared<'r>(record: &'r Record, estimator: &EstimatorCell) -> Result<Cow<'r, Record>, String> {
+    let mut record = match estimator.span_s {
+        None => Cow::Borrowed(record),
+        Some((from, to)) => Cow::Owned(record.span(from, to).map_err(|error| error.to_string())?),
+    };
+    if estimator.decimate > 1 {
+        record = Cow::Owned(decimated(&record, estimator.decimate)?);
+    }
+    if estimator.detrend != Detrend::None {
+        record = Cow::Owned(record.into_owned().detrended(estimator.detrend));
+    }
+    Ok(record)
+}
+
+/// Every `n`-th sample of all channels, without a filter.
+fn decimated(record: &Record, n: usize) -> Result<Record, String> {
+    let text = |error: hoid_model::ModelError| error.to_string();
+    let thinned = |channel: &Channel| {
+        Channel::new(
+            &channel.name,
+            &channel.unit,
+            channel.values.iter().step_by(n).copied().collect(),
+        )
+    };
+    let sample_time = SampleTime::new(record.sample_time().s() * n as f64).map_err(text)?;
+    let input = record.input_channel().map(thinned).ok_or("the record has no input")?;
+    let mut thin = Record::new(sample_time, input, thinned(record.output_channel()))
+        .map_err(text)?
+        .labelled(record.label())
+        .starting_at(record.time_s(0));
+    for channel in record
+        .channels()
+        .filter(|c| thin_lacks(&thin, c))
+        .map(thinned)
+        .collect::<Vec<_>>()
+    {
+        thin = thin.with_channel(channel).map_err(text)?;
+    }
+    Ok(thin)
+}
+
+fn thin_lacks(thin: &Record, channel: &Channel) -> bool {
+    thin.channel(&channel.name).is_none()
+}

@@ -1,0 +1,210 @@
+//! What rows of a study somebody looks for.
+
+use std::collections::BTreeMap;
+
+/// A description of rows: what it does not name may be anything.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Query {
+    quantity: Option<String>,
+    cell: Option<u64>,
+    scenario: Option<String>,
+    condition: Option<String>,
+    remnant_order: Option<usize>,
+    noise_level: Option<f64>,
+    t_n_s: Option<f64>,
+    axes: Vec<(String, String)>,
+    estimator: Option<String>,
+    name: Option<String>,
+    method: Option<String>,
+    nd: Option<usize>,
+    nk: Option<usize>,
+    start: Option<String>,
+    decimate: Option<usize>,
+}
+
+impl std::fmt::Display for Query {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        fn shown<T: ToString>(name: &str, asked: Option<&T>) -> Option<String> {
+            asked.map(|asked| format!("{name} {}", asked.to_string()))
+        }
+        let mut all: Vec<String> = [
+            self.quantity.clone(),
+            shown("cell", self.cell.as_ref()),
+            shown("scenario", self.scenario.as_ref()),
+            shown("condition", self.condition.as_ref()),
+            shown("m0 =", self.remnant_order.as_ref()),
+            shown("P_n =", self.noise_level.as_ref()),
+            shown("T_n =", self.t_n_s.as_ref()),
+            shown("estimator", self.estimator.as_ref()),
+            shown("name", self.name.as_ref()),
+            shown("method", self.method.as_ref()),
+            shown("m* =", self.nd.as_ref()),
+            shown("n_k* =", self.nk.as_ref()),
+            shown("start", self.start.as_ref()),
+            shown("decimate", self.decimate.as_ref()),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        all.extend(self.axes.iter().map(|(key, value)| format!("{key} {value}")));
+        f.write_str(&all.join(", "))
+    }
+}
+
+/// What describes a cell and an estimator.
+#[derive(Debug, Clone)]
+pub(crate) struct Subject {
+    pub cell: u64,
+    pub scenario: String,
+    pub condition: String,
+    pub remnant_order: usize,
+    pub noise_level: f64,
+    pub t_n_s: f64,
+    pub axes: BTreeMap<String, String>,
+    pub estimator: String,
+    pub name: String,
+    pub method: String,
+    pub nd: Option<usize>,
+    pub nk: Option<usize>,
+    pub start: String,
+    pub decimate: usize,
+}
+
+impl Query {
+    /// All rows of a quantity.
+    pub fn of(quantity: &str) -> Self {
+        Self::default().quantity_of(quantity)
+    }
+
+    /// The same rows of another quantity.
+    #[must_use]
+    pub fn quantity_of(mut self, quantity: &str) -> Self {
+        self.quantity = Some(quantity.to_owned());
+        self
+    }
+
+    /// The quantity, where one is named.
+    pub fn quantity(&self) -> Option<&str> {
+        self.quantity.as_deref()
+    }
+
+    /// Of the cell of this number.
+    #[must_use]
+    pub fn cell(mut self, cell: u64) -> Self {
+        self.cell = Some(cell);
+        self
+    }
+
+    /// Of the scenario of this name.
+    #[must_use]
+    pub fn scenario(mut self, scenario: &str) -> Self {
+        self.scenario = Some(scenario.to_owned());
+        self
+    }
+
+    /// Of cells that started from this condition.
+    #[must_use]
+    pub fn condition(mut self, condition: &str) -> Self {
+        self.condition = Some(condition.to_owned());
+        self
+    }
+
+    /// Of a simulated remnant of this order m0.
+    #[must_use]
+    pub fn remnant_order(mut self, order: usize) -> Self {
+        self.remnant_order = Some(order);
+        self
+    }
+
+    /// Of this demanded noise level.
+    #[must_use]
+    pub fn noise_level(mut self, level: f64) -> Self {
+        self.noise_level = Some(level);
+        self
+    }
+
+    /// Of this time constant of the simulated remnant, s.
+    #[must_use]
+    pub fn t_n_s(mut self, t_n_s: f64) -> Self {
+        self.t_n_s = Some(t_n_s);
+        self
+    }
+
+    /// Of this entry of a list of the plan, such as ("memory", "1s").
+    #[must_use]
+    pub fn axis(mut self, key: &str, value: &str) -> Self {
+        self.axes.push((key.to_owned(), value.to_owned()));
+        self
+    }
+
+    /// Of the estimator with this label.
+    #[must_use]
+    pub fn estimator(mut self, label: &str) -> Self {
+        self.estimator = Some(label.to_owned());
+        self
+    }
+
+    /// Of the estimators of this name.
+    #[must_use]
+    pub fn name(mut self, name: &str) -> Self {
+        self.name = Some(name.to_owned());
+        self
+    }
+
+    /// Of this method.
+    #[must_use]
+    pub fn method(mut self, method: &str) -> Self {
+        self.method = Some(method.to_owned());
+        self
+    }
+
+    /// Of noise models of this order m*.
+    #[must_use]
+    pub fn nd(mut self, nd: usize) -> Self {
+        self.nd = Some(nd);
+        self
+    }
+
+    /// Of models with this delay n_k*, samples.
+    #[must_use]
+    pub fn nk(mut self, nk: usize) -> Self {
+        self.nk = Some(nk);
+        self
+    }
+
+    /// From the start with this label.
+    #[must_use]
+    pub fn start(mut self, start: &str) -> Self {
+        self.start = Some(start.to_owned());
+        self
+    }
+
+    /// Of estimators that took every so manieth sample.
+    #[must_use]
+    pub fn decimate(mut self, decimate: usize) -> Self {
+        self.decimate = Some(decimate);
+        self
+    }
+
+    pub(crate) fn takes(&self, s: &Subject) -> bool {
+        fn is<T: PartialEq>(asked: Option<&T>, found: &T) -> bool {
+            asked.is_none_or(|asked| asked == found)
+        }
+        // Levels and time constants are written in a plan and in a query with the same few digits.
+        let near = |asked: Option<f64>, found: f64| asked.is_none_or(|asked| (asked - found).abs() <= 1e-9);
+        is(self.cell.as_ref(), &s.cell)
+            && is(self.remnant_order.as_ref(), &s.remnant_order)
+            && near(self.noise_level, s.noise_level)
+            && (self.nd.is_none() || self.nd == s.nd)
+            && (self.nk.is_none() || self.nk == s.nk)
+            && is(self.name.as_ref(), &s.name)
+            && is(self.condition.as_ref(), &s.condition)
+            && is(self.scenario.as_ref(), &s.scenario)
+            && near(self.t_n_s, s.t_n_s)
+            && is(self.estimator.as_ref(), &s.estimator)
+            && is(self.method.as_ref(), &s.method)
+            && is(self.start.as_ref(), &s.start)
+            && is(self.decimate.as_ref(), &s.decimate)
+            && self.axes.iter().all(|(key, value)| s.axes.get(key) == Some(value))
+    }
+}

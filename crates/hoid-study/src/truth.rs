@@ -1,0 +1,118 @@
+//! What was simulated: the settings and true parameters of each cell.
+
+use hoid_io::{ColumnKind, ColumnSchema, OutputTable, TableSchema};
+use hoid_model::{
+    scenario::{OperatingState, RemnantStrength},
+    schedule::Schedule,
+    uncertainty::OperatorEstimate,
+};
+
+use crate::{
+    columns::{OPERATOR, Rows, comments},
+    plan::{Cell, Plan},
+};
+
+/// True parameters of one state of a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrueState {
+    /// K_e, T_L, K_e_dot, omega_nm, zeta_nm.
+    pub operator: [f64; 5],
+    /// f1, f2 (a1, a2 of the text), b0, b1 at the sample time of the simulation.
+    pub discrete: [f64; 4],
+    /// K_n, deg.
+    pub k_n: f64,
+}
+
+impl Cell {
+    /// True parameters before and after the change; the same where nothing changes.
+    pub fn truth(&self) -> [TrueState; 2] {
+        let scenario = self.resolved.scenario();
+        let ends = [f64::NEG_INFINITY, f64::INFINITY];
+        let states = [&scenario.initial, &scenario.last];
+        [0, 1].map(|i| {
+            let at = self.resolved.parameters_at(match scenario.schedule {
+                Schedule::Constant => 0.0,
+                Schedule::Sigmoid { .. } => ends[i].clamp(-1e9, 1e9),
+            });
+            state(states[i], at.k_n, scenario.sample_time)
+        })
+    }
+}
+
+fn state(of: &OperatingState, k_n: f64, sample_time: hoid_model::SampleTime) -> TrueState {
+    let rows = OperatorEstimate::from(of.operator).rows();
+    let held = of.operator.discretise(sample_time).ok();
+    TrueState {
+        operator: [0, 1, 2, 3, 4].map(|i| rows[i].2.value),
+        discrete: held.map_or([f64::NAN; 4], |h| [h.held.f1, h.held.f2, h.held.b0, h.held.b1]),
+        k_n,
+    }
+}
+
+/// The table of cells.
+pub(crate) fn cells_table(plan: &Plan) -> OutputTable {
+    use ColumnKind::{Real, Text, Whole};
+    let mut columns: Vec<(String, ColumnKind)> = vec![
+        ("cell".to_owned(), Whole),
+        ("scenario".to_owned(), Text),
+        ("condition".to_owned(), Text),
+        ("replications".to_owned(), Whole),
+        ("remnant_order".to_owned(), Whole),
+    ];
+    columns.extend(
+        [
+            "noise_level",
+            "T_n",
+            "sample_time_s",
+            "measurement_s",
+            "change_s",
+            "rate_per_s",
+        ]
+        .map(|n| (n.to_owned(), Real)),
+    );
+    const STATE: [&str; 10] = [
+        "K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "f1", "f2", "b0", "b1", "K_n",
+    ];
+    for when in ["initial", "last"] {
+        columns.extend(STATE.map(|name| (format!("{name}_{when}"), Real)));
+    }
+    columns.push(("tau_e".to_owned(), Real));
+    let schema = TableSchema {
+        comments: comments(plan),
+        columns: columns
+            .into_iter()
+            .map(|(name, kind)| ColumnSchema { name, kind })
+            .collect(),
+    };
+    let mut rows = Rows::new(&schema);
+    for cell in &plan.cells {
+        let scenario = cell.resolved.scenario();
+        rows.begin();
+        rows.whole("cell", cell.index);
+        rows.text("scenario", &cell.scenario);
+        rows.text("condition", &cell.condition);
+        rows.whole("replications", cell.replications);
+        rows.whole("remnant_order", scenario.remnant.order as u64);
+        if let RemnantStrength::Level { level, .. } = scenario.remnant.strength {
+            rows.real("noise_level", level);
+        }
+        rows.real("T_n", scenario.remnant.time_constant_s);
+        rows.real("sample_time_s", scenario.sample_time.s());
+        rows.real("measurement_s", scenario.measurement_s);
+        rows.real("tau_e", scenario.initial.operator.tau_e_s);
+        if let Schedule::Sigmoid { rate_per_s, midpoint_s } = scenario.schedule {
+            rows.real("change_s", midpoint_s);
+            rows.real("rate_per_s", rate_per_s);
+        }
+        for (state, when) in cell.truth().iter().zip(["initial", "last"]) {
+            for (name, value) in OPERATOR.iter().zip(state.operator) {
+                rows.real(&format!("{name}_{when}"), value);
+            }
+            for (name, value) in STATE[5..9].iter().zip(state.discrete) {
+                rows.real(&format!("{name}_{when}"), value);
+            }
+            rows.real(&format!("K_n_{when}"), state.k_n);
+        }
+    }
+    rows.into_table(schema.comments)
+}
