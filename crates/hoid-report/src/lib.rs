@@ -4,17 +4,22 @@
 //! |---|---|
 //! | [`Report`], [`ModelSection`] | one self-contained HTML page about one or several fitted models |
 //! | [`TrackReport`], [`TraceSection`], [`BatchLine`] | one such page about recursive estimates over a record |
+//! | [`GroupReport`], [`GroupTables`] | one such page about a group of recorded runs |
 //! | [`figures`] | the figures of these pages, each as an SVG text of its own |
+//! | [`reproduction`] | tables, figures and claims of the reference text, from the results of studies |
 //! | [`numbers`] | numbers with as many digits as their standard error allows |
 
 mod error;
 pub mod figures;
+mod group;
 pub mod numbers;
 mod page;
 mod report;
+pub mod reproduction;
 mod tables;
 mod track;
 
 pub use error::ReportError;
+pub use group::{GroupReport, GroupTables};
 pub use report::{ModelSection, Report};
 pub use track::{BatchLine, TraceSection, TrackReport};

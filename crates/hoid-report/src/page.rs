@@ -4,9 +4,11 @@ use minijinja::{Environment, UndefinedBehavior, Value, context};
 
 use crate::ReportError;
 
-const TEMPLATES: [(&str, &str); 4] = [
+const TEMPLATES: [(&str, &str); 6] = [
     ("report.html", include_str!("../templates/report.html")),
     ("track.html", include_str!("../templates/track.html")),
+    ("group.html", include_str!("../templates/group.html")),
+    ("reproduction.html", include_str!("../templates/reproduction.html")),
     ("parts.html", include_str!("../templates/parts.html")),
     ("style.css", include_str!("../templates/style.css")),
 ];

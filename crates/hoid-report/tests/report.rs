@@ -1,9 +1,14 @@
 //! The page as a whole, from simulated runs.
 #![allow(clippy::unwrap_used)]
 
-use hoid_ident::{Choice, Estimator, Fit, MarginEstimates, OrderRanges, choose_orders, order_search::Criterion};
+use hoid_ident::{
+    Choice, Estimator, Fit, MarginEstimates, OrderRanges, choose_orders,
+    describing::{Averaging, DescribingOptions, Excitation, describe},
+    order_search::Criterion,
+};
 use hoid_model::{
     Channel, OperatorParameters, Orders, Record, SampleTime, Structure,
+    forcing::{ForcingFunction, REFERENCE_PERIOD_S},
     remnant::RemnantDiscretisation,
     scenario::{Condition, Scenario},
     uncertainty::Estimate,
@@ -354,4 +359,46 @@ fn bode_has_a_band_for_each_model_with_errors_and_the_dashed_truth() {
     }
     let without = figures::bode("b", &[model("first", &arx)], &[]);
     assert!(!without.contains("stroke-dasharray") && !without.contains("true operator"));
+}
+
+#[test]
+fn a_describing_function_stands_over_the_models() {
+    let records = runs(5);
+    let fit = fitted(Structure::BoxJenkins, &records);
+    let model = figures::BodeModel {
+        name: "BJ",
+        fit: &fit,
+        records: &records,
+    };
+    let truth = figures::TrueResponse {
+        operator: truth(),
+        sample_time: SampleTime::HUNDREDTH,
+    };
+    let forcing = ForcingFunction::reference();
+    let excitation = Excitation::of_forcing_function(&forcing, REFERENCE_PERIOD_S).unwrap();
+    let options = DescribingOptions {
+        averaging: Averaging::SameExcitation,
+        ..DescribingOptions::default()
+    };
+    let h = describe(&records, &excitation, &options).unwrap();
+    let points = figures::BodePoints::of_describing_function("describing function", &h);
+    let svg = figures::bode_with_points("b", &[model], &[truth], std::slice::from_ref(&points));
+    // Ten lines in two panels, and the legend.
+    assert_eq!(svg.matches("<circle").count(), 21);
+    assert!(svg.contains(">describing function<") && !svg.contains("NaN"));
+    let without = figures::bode_with_points("b", &[model], &[truth], &[]);
+    assert_eq!(without, figures::bode("b", &[model], &[truth]));
+
+    let mut hostile = points.clone();
+    hostile.magnitude_db[0].value = f64::NEG_INFINITY;
+    hostile.omega_rad_s[1] = f64::NAN;
+    hostile.phase_deg[2].standard_error = Some(f64::INFINITY);
+    for models in [&[model][..], &[]] {
+        let svg = figures::bode_with_points("b", models, &[], std::slice::from_ref(&hostile));
+        assert!(svg.ends_with("</svg>") && !svg.contains("NaN") && !svg.contains("inf"));
+        assert_eq!(svg.matches("<circle").count(), 2 * 8 + 1);
+    }
+    if let Some(directory) = std::env::var_os("HOID_FIGURES") {
+        std::fs::write(std::path::Path::new(&directory).join("bode_points.svg"), svg).unwrap();
+    }
 }

@@ -1,38 +1,104 @@
-//! Labels and ticks of the panels over time: subscripts, and as many digits as a step needs.
+//! Labels and ticks of panels: subscripts, and as many digits as a step needs.
+
+use std::sync::Arc;
+
+use kuva::prelude::{Layout, TickFormat};
 
 use super::style;
 
-/// Stand in the text of labels for the begin and end of a subscript and the end of the label; they become tags.
+/// Stand in the text of labels for the begin and end of a subscript and of a superscript, and the end of the label; they become tags.
 const SUB: char = '\u{e000}';
 const BACK: char = '\u{e001}';
 const END: char = '\u{e002}';
+const SUPER: char = '\u{e003}';
+const DOWN: char = '\u{e004}';
+const SIGNS: [char; 5] = [SUB, BACK, END, SUPER, DOWN];
 
-const MOST_TICKS: f64 = 5.2;
+/// Height between the ticks of an ordinate at the least, and of a decade that has labels at 2 and 5 as well.
+const TICK_HEIGHT: f64 = 16.0;
+const HIGH_DECADE: f64 = 48.0;
+/// Parts of a circle, deg.
+const PHASE_STEPS: [f64; 6] = [15.0, 30.0, 45.0, 90.0, 180.0, 360.0];
+/// A logarithmic abscissa has labels at 2 and 5 as well where a decade is as wide.
+const WIDE_DECADE: f64 = 95.0;
+/// Width of the label of a tick with the space to its neighbour.
+const TICK_WIDTH: f64 = 34.0;
+/// The library draws no smaller number on a logarithmic axis.
+const LEAST: f64 = 1e-10;
 
 /// Name and unit of a panel; several names are separated by commas. [`tagged`] completes it in the finished figure.
 pub fn panel_label(name: &str, unit: &str) -> String {
     let names: Vec<String> = name.split(", ").map(symbol).collect();
     let unit = match unit {
         "" => String::new(),
-        unit => format!(" ({})", plain(unit)),
+        unit => format!(" ({})", marks(unit)),
     };
-    // What follows a subscript stands in a tag of its own, which ends with the label.
-    let name = names.join(", ");
-    let ends = END.to_string().repeat(name.matches(BACK).count());
-    style::label(&format!("{name}{unit}{ends}"))
+    style::label(&closed(&format!("{}{unit}", names.join(", "))))
+}
+
+/// What follows a subscript stands in a tag of its own, which ends with the label.
+fn closed(text: &str) -> String {
+    let ends = END.to_string().repeat(text.matches([BACK, DOWN]).count());
+    format!("{text}{ends}")
+}
+
+/// Text of a label with its subscripts and superscripts: `n_k^*`, `B_r(b_0^{d,0})`. After `_` or `^` stands one sign or several in
+/// braces; words such as `my_model` and `run_2` stay as they are. [`tagged`] completes it in the finished figure.
+pub fn marked(text: &str) -> String {
+    style::label(&closed(&marks(text)))
+}
+
+fn marks(text: &str) -> String {
+    let signs: Vec<char> = plain(text).chars().collect();
+    let mut result = String::new();
+    let mut at = 0;
+    while at < signs.len() {
+        let (open, close) = match signs[at] {
+            '_' => (SUB, BACK),
+            '^' => (SUPER, DOWN),
+            _ => ('\0', '\0'),
+        };
+        let rest = &signs[at + 1..];
+        let in_word = at > 1 && signs[at - 1].is_alphanumeric() && signs[at - 2].is_alphanumeric();
+        let length = match rest {
+            _ if open == '\0' || at == 0 => 0,
+            ['{', inner @ ..] => inner.iter().position(|c| *c == '}').map_or(0, |end| end + 2),
+            [_, next, ..] if next.is_alphanumeric() => 0,
+            _ if in_word && open == SUB => 0,
+            [one, ..] if one.is_alphanumeric() || *one == '*' => 1,
+            _ => 0,
+        };
+        if length == 0 {
+            result.push(signs[at]);
+        } else {
+            result.push(open);
+            result.extend(rest[..length].iter().filter(|c| length == 1 || !matches!(c, '{' | '}')));
+            result.push(close);
+        }
+        at += 1 + length;
+    }
+    result
+}
+
+/// The signs of a label that are printed.
+pub fn printed(text: &str) -> impl Iterator<Item = char> {
+    text.chars().filter(|c| !SIGNS.contains(c))
 }
 
 /// A figure with the tags of its subscripts.
 pub fn tagged(svg: &str) -> String {
-    svg.replace(&format!("{BACK} ("), "</tspan><tspan dy=\"-3\" dx=\"4\">(")
+    svg.replace(&format!("{BACK} "), "</tspan><tspan dy=\"-3\" dx=\"4\">")
+        .replace(&format!("{DOWN} "), "</tspan><tspan dy=\"4\" dx=\"4\">")
         .replace(SUB, "<tspan dy=\"3\" font-size=\"10\">")
         .replace(BACK, "</tspan><tspan dy=\"-3\">")
+        .replace(SUPER, "<tspan dy=\"-4\" font-size=\"10\">")
+        .replace(DOWN, "</tspan><tspan dy=\"4\">")
         .replace(END, "</tspan>")
 }
 
 /// Text without the characters that become tags.
 pub fn plain(text: &str) -> String {
-    text.replace([SUB, BACK, END], "")
+    text.replace(SIGNS, "")
 }
 
 /// A parameter with its subscript; other text as it is.
@@ -46,15 +112,15 @@ fn symbol(name: &str) -> String {
         "tau_e" => ("\u{3c4}", "e"),
         other => match other.char_indices().nth(1).map(|(at, _)| other.split_at(at)) {
             Some((letter, digits)) if digits.bytes().all(|b| b.is_ascii_digit()) => (letter, digits),
-            _ => return plain(other),
+            _ => return marks(other),
         },
     };
     format!("{letter}{SUB}{sub}{BACK}")
 }
 
-/// Step of 1, 2 or 5 times a power of ten that gives few enough ticks.
-pub fn tick_step(span: f64) -> f64 {
-    let least = span / MOST_TICKS;
+/// Step of 1, 2 or 5 times a power of ten that gives at most so many ticks.
+pub fn tick_step(span: f64, most: f64) -> f64 {
+    let least = span / most;
     let power = 10f64.powf(least.log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0]
         .into_iter()
@@ -76,6 +142,74 @@ pub fn tick(value: f64, step: f64) -> String {
     }
     let digits = (value.abs().log10().floor() - place).clamp(0.0, 6.0) as usize;
     format!("{value:.digits$e}")
+}
+
+/// A layout with the ticks of an ordinate of this height in `unit`; their numbers stand there where `labelled`.
+pub fn with_ordinate(
+    layout: Layout,
+    (low, high): (f64, f64),
+    unit: &str,
+    logarithmic: bool,
+    height: f64,
+    labelled: bool,
+) -> Layout {
+    if logarithmic {
+        let decades = (high / low).log10();
+        let all = decades < 1.02 || height / decades > HIGH_DECADE;
+        let format = move |v: f64| match labelled && (all || is_power_of_ten(v)) {
+            true => log_tick(v),
+            false => String::new(),
+        };
+        return layout
+            .with_log_y()
+            .with_y_tick_format(TickFormat::Custom(Arc::new(format)));
+    }
+    let most = height / TICK_HEIGHT;
+    let of_circle = PHASE_STEPS.into_iter().find(|s| (high - low) / s <= most);
+    let step = match of_circle {
+        Some(step) if unit == "deg" && high - low > PHASE_STEPS[0] => step,
+        _ => tick_step(high - low, most),
+    };
+    let format = move |v: f64| if labelled { tick(v, step) } else { String::new() };
+    layout
+        .with_y_tick_step(step)
+        .with_y_tick_format(TickFormat::Custom(Arc::new(format)))
+}
+
+/// A layout with the ticks of an abscissa of this width.
+pub fn with_abscissa(layout: Layout, (low, high): (f64, f64), logarithmic: bool, width: f64) -> Layout {
+    if logarithmic {
+        let decades = (high / low).log10();
+        let all = decades < 1.02 || width / decades > WIDE_DECADE;
+        let format = move |v: f64| match all || is_power_of_ten(v) {
+            true => log_tick(v),
+            false => String::new(),
+        };
+        return layout
+            .with_log_x()
+            .with_x_tick_format(TickFormat::Custom(Arc::new(format)));
+    }
+    let step = tick_step(high - low, (width / TICK_WIDTH).max(2.0));
+    let format = move |v: f64| tick(v, step);
+    layout
+        .with_x_tick_step(step)
+        .with_x_tick_format(TickFormat::Custom(Arc::new(format)))
+}
+
+/// Range of a logarithmic axis that holds these values, at 1, 2 or 5 times a power of ten; from 0.1 to 1 where none is positive.
+pub fn log_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+    let drawable = values.into_iter().filter(|v| style::is_drawable(*v) && *v >= LEAST);
+    let start = (f64::INFINITY, 0.0_f64);
+    let (low, high) = drawable.fold(start, |(l, h), v| (l.min(v), h.max(v)));
+    if low > high {
+        return (0.1, 1.0);
+    }
+    let (from, to) = (one_two_five(low, false), one_two_five(high, true));
+    if to > from * 1.5 {
+        (from, to)
+    } else {
+        (from / 2.0, to * 2.0)
+    }
 }
 
 pub fn log_tick(value: f64) -> String {
@@ -109,7 +243,7 @@ mod tests {
 
     #[test]
     fn ticks_tell_their_step_apart() {
-        assert_eq!(tick_step(1.0), 0.2);
+        assert_eq!(tick_step(1.0, 5.2), 0.2);
         assert_eq!(tick(0.1 + 0.2, 0.1), "0.3");
         assert_eq!(tick(1e-17, 0.1), "0");
         assert_eq!(tick(1.25e-5, 5e-7), "1.25e-5");
@@ -118,5 +252,34 @@ mod tests {
         assert!((one_two_five(0.0051, true) - 0.01).abs() < 1e-12);
         assert_eq!(log_tick(0.02), "0.02");
         assert_eq!(log_tick(1e-5), "1e-5");
+    }
+
+    #[test]
+    fn subscripts_and_superscripts_are_found() {
+        let shown = |text: &str| tagged(&marked(text));
+        let (sub, sup) = (
+            "<tspan dy=\"3\" font-size=\"10\">",
+            "<tspan dy=\"-4\" font-size=\"10\">",
+        );
+        assert_eq!(
+            shown("n_k^*"),
+            format!("n{sub}k</tspan><tspan dy=\"-3\">{sup}*</tspan><tspan dy=\"4\"></tspan></tspan>")
+        );
+        assert_eq!(
+            shown("m^0 = 1"),
+            format!("m{sup}0</tspan><tspan dy=\"4\" dx=\"4\">= 1</tspan>")
+        );
+        assert_eq!(shown("b_{nm}"), format!("b{sub}nm</tspan><tspan dy=\"-3\"></tspan>"));
+        for plain in ["my_model", "run_2", "_", "a_", "^2", "a_{b", "x_ y", ""] {
+            assert_eq!(shown(plain), plain);
+        }
+        assert_eq!(printed(&marked("P_n = 0.1")).collect::<String>(), "Pn = 0.1");
+    }
+
+    #[test]
+    fn logarithmic_ranges_hold_their_values() {
+        assert_eq!(log_range([0.03, 7.0, -1.0, 0.0, f64::NAN]), (0.02, 10.0));
+        assert_eq!(log_range([1.0]), (0.5, 2.0));
+        assert_eq!(log_range([-1.0, f64::INFINITY]), (0.1, 1.0));
     }
 }

@@ -10,7 +10,13 @@ use hoid_ident::{Fit, ResponsePoint};
 use hoid_model::{Complex64, OperatorParameters, PolynomialModel, Record, SampleTime, Structure};
 use kuva::prelude::{BandPlot, Plot};
 
-use super::style::{self, BLACK, MODEL_COLOURS};
+use super::{
+    bode_points::{BodePoints, Z_95},
+    frame::Area,
+    legend::{Entry, Sample, add_legend},
+    scale::Scale,
+    style::{self, BLACK, MODEL_COLOURS},
+};
 
 const UPPER: f64 = 175.0;
 const LOWER: f64 = 205.0;
@@ -24,9 +30,6 @@ const POINTS: usize = 240;
 /// Range in which a person controls, rad/s; from a tenth to fifty the axis has ticks at 1, 2 and 5 of each decade.
 const LOWEST_RAD_S: f64 = 0.1;
 const HIGHEST_RAD_S: f64 = 50.0;
-/// Two-sided 95 % point of the normal distribution.
-const Z_95: f64 = 1.959_963_984_540_054;
-
 /// A model in the figure.
 #[derive(Debug, Clone, Copy)]
 pub struct BodeModel<'a> {
@@ -53,7 +56,14 @@ pub struct TrueResponse {
 /// Bands are 1.96 standard errors to either side; a model without standard errors has none. A truth that no discrete model
 /// stands for (a delay of no whole number of samples) is drawn without the hold.
 pub fn bode(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse]) -> String {
-    let omega = frequencies(models);
+    bode_with_points(id, models, truths, &[])
+}
+
+/// The same with points over it, such as a describing function of the same records, with error bars of 1.96 standard errors. The axes
+/// reach to all points below 50 rad/s. The first set is black, further ones have the colours that no model has.
+pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse], points: &[BodePoints]) -> String {
+    let points: Vec<BodePoints> = points.iter().map(BodePoints::drawable).collect();
+    let omega = frequencies(models, &points);
     let mut curves: Vec<(Curve, &str)> = Vec::new();
     for (i, model) in models.iter().enumerate() {
         let delay_s = model.fit.orders().nk as f64 * model.fit.model().sample_time().s();
@@ -62,8 +72,20 @@ pub fn bode(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse]) -> Stri
     }
     let truths: Vec<Curve> = truths.iter().map(|t| Curve::of_truth(t, &omega)).collect();
 
+    let first: Option<Vec<f64>> = curves
+        .iter()
+        .map(|(c, _)| c)
+        .chain(&truths)
+        .next()
+        .map(|c| c.phase_deg.iter().map(|p| p.0).collect());
+    let points: Vec<BodePoints> = points
+        .into_iter()
+        .map(|p| p.on_branch_of(first.as_deref().map(|phase| (&omega[..], phase))))
+        .collect();
+
     let limits = (omega[0], omega[omega.len() - 1]);
     let mut panels = Vec::new();
+    let mut scales = Vec::new();
     for is_phase in [false, true] {
         let series = |c: &Curve| {
             if is_phase {
@@ -73,7 +95,11 @@ pub fn bode(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse]) -> Stri
             }
         };
         let all = curves.iter().map(|(c, _)| c).chain(&truths);
-        let (low, high) = style::padded_range(all.flat_map(|c| series(c).into_iter().map(|p| p.0)));
+        let of_points = |p: &BodePoints| -> Vec<f64> {
+            BodePoints::reach(if is_phase { &p.phase_deg } else { &p.magnitude_db }).collect()
+        };
+        let values = all.flat_map(|c| series(c).into_iter().map(|p| p.0));
+        let (low, high) = style::padded_range(values.chain(points.iter().flat_map(of_points)));
         let room = 0.05 * (high - low);
         let step = tick_step(
             high - low + 2.0 * room,
@@ -106,22 +132,52 @@ pub fn bode(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse]) -> Stri
                 .with_y_label("magnitude (dB)")
                 .with_force_margins_y(style::TOP, style::BOTTOM_WITHOUT_LABEL)
         };
+        // A figure of points alone still has its axes.
+        if plots.is_empty() {
+            plots.push(style::line([], BLACK, 1.0).into());
+        }
+        let (top, below) = if is_phase {
+            (UPPER, style::BOTTOM)
+        } else {
+            (0.0, style::BOTTOM_WITHOUT_LABEL)
+        };
+        scales.push(Scale {
+            area: Area {
+                left: style::LEFT,
+                top: top + style::TOP,
+                width: style::WIDTH - style::LEFT - style::RIGHT,
+                height: height - style::TOP - below,
+            },
+            x: limits,
+            y: range,
+            log_x: true,
+            log_y: false,
+        });
         panels.push((plots, layout, height));
     }
     let mut entries: Vec<_> = models
         .iter()
         .zip(&curves)
-        .map(|(m, (_, colour))| (m.name, *colour, false))
+        .map(|(m, (_, colour))| Entry::new(m.name, colour, Sample::Line))
         .collect();
     if !truths.is_empty() {
-        entries.push(("true operator", BLACK, true));
+        entries.push(Entry::new("true operator", BLACK, Sample::Dashed));
     }
     let mut scene = style::stacked(panels);
-    style::add_legend(&mut scene, &entries);
+    for (i, set) in points.iter().enumerate() {
+        let colour = match i {
+            0 => BLACK,
+            _ => MODEL_COLOURS[(models.len() + i - 1) % MODEL_COLOURS.len()],
+        };
+        set.draw(&mut scene, &scales[0], &set.magnitude_db, colour);
+        set.draw(&mut scene, &scales[1], &set.phase_deg, colour);
+        entries.push(Entry::new(&set.name, colour, Sample::Point));
+    }
+    add_legend(&mut scene, &entries);
     style::finish(id, "Frequency response with 95 % bands", &scene)
 }
 
-fn frequencies(models: &[BodeModel<'_>]) -> Vec<f64> {
+fn frequencies(models: &[BodeModel<'_>], points: &[BodePoints]) -> Vec<f64> {
     let nyquist = models
         .iter()
         .map(|m| m.fit.model().sample_time().nyquist_rad_s())
@@ -133,6 +189,9 @@ fn frequencies(models: &[BodeModel<'_>]) -> Vec<f64> {
         .map(|r| r.len() as f64 * r.sample_time().s())
         .fold(0.0, f64::max);
     let low = (TAU / longest_s).max(LOWEST_RAD_S).min(high / 10.0);
+    // A point at the very edge would be cut in half.
+    let below = points.iter().flat_map(|p| &p.omega_rad_s).map(|w| w / 1.1);
+    let low = below.filter(|w| *w > 1e-6 * high).fold(low, f64::min);
     let ratio = (high / low).ln() / (POINTS - 1) as f64;
     (0..POINTS).map(|i| low * (ratio * i as f64).exp()).collect()
 }
@@ -188,7 +247,7 @@ impl Curve {
 }
 
 /// Phase without jumps, in deg. The first value is the principal one with the delay taken out.
-fn unwrap(phases: &[(f64, f64)], delay_s: f64) -> Vec<f64> {
+pub fn unwrap(phases: &[(f64, f64)], delay_s: f64) -> Vec<f64> {
     let mut before: Option<f64> = None;
     phases
         .iter()

@@ -1,20 +1,53 @@
-//! The figures of the report, each as one SVG text.
+//! The figures of reports and studies, each as one SVG text.
 //!
-//! All are drawn 420 units wide with 13-unit text: 7.5 pt in a column of 85 mm. Colours are those of Okabe and Ito
-//! (*Color Universal Design*, 2008), on white. The same data give the same bytes. `id` must be different for figures that stand
-//! on one page: it is the prefix of all ids inside the SVG.
+//! | function | what it draws |
+//! |---|---|
+//! | [`bode`] | frequency response of fitted models with 95 % bands |
+//! | [`autocorrelation`], [`cross_correlation`] | tests of the residuals |
+//! | [`time_response`] | measured, predicted and simulated output |
+//! | [`trace_panels`] | estimates over time, by method and level: recursions, batch fits, truth |
+//! | [`box_plots`] | the spread of the results of many runs, in groups and series |
+//! | [`maps`] | a value over two orders as coloured cells |
+//! | [`bode_grid`] | several responses in each of several Bode pairs |
+//! | [`curves`] | any other curves, with bands, error bars, markers and stems |
+//!
+//! Figures are 420 units wide, or 840 where panels stand side by side, with 13-unit text: 7.5 pt in a column of 85 mm and on a page of
+//! 170 mm. Colours are those of Okabe and Ito (*Color Universal Design*, 2008), on white: the hue tells the method, its shade the level,
+//! black the truth; see [`Shade`]. In names and titles, `_` and `^` before a sign or braces make subscripts and superscripts. What is
+//! not finite is a gap. The same data give the same bytes. `id` must be different for figures that stand on one page: it is the
+//! prefix of all ids inside the SVG.
 
 mod axes;
 mod bode;
+mod bode_grid;
+mod bode_points;
+mod box_statistics;
+mod boxes;
+mod colour_bar;
 mod correlation;
+mod curves;
+mod draw;
+mod frame;
+mod legend;
+mod maps;
+mod palette;
 mod panel;
+mod scale;
 mod series;
 mod style;
 mod time_response;
 mod trace;
 
-pub use bode::{BodeModel, TrueResponse, bode};
+pub use bode::{BodeModel, TrueResponse, bode, bode_with_points};
+pub use bode_grid::{BodeColumn, BodeCurve, BodeGrid, bode_grid};
+pub use bode_points::BodePoints;
+pub use box_statistics::BoxStatistics;
+pub use boxes::{BoxGrid, BoxPanel, BoxRange, BoxSeries, box_plots};
+pub use colour_bar::MapColours;
 pub use correlation::{autocorrelation, cross_correlation};
+pub use curves::{Curve, CurveGrid, CurvePanel, LineKind, curves};
+pub use maps::{MapGrid, MapPanel, maps};
+pub use palette::{Shade, shade};
 pub use panel::{Beyond, CurveKind, Ordinate, TraceCurve, TracePanel};
 pub(crate) use series::quantile_of;
 pub(crate) use time_response::has_close_up;

@@ -21,7 +21,7 @@ const MORE: f64 = 1.5;
 pub enum CurveKind {
     /// Estimate: a line in the colour of its method, with its band.
     Estimate,
-    /// Truth: a thin black line.
+    /// Truth: a thin dashed black line.
     Truth,
     /// Batch fit over a span: dashed, in the colour of its method.
     Batch,
@@ -38,6 +38,8 @@ pub struct TraceCurve {
     pub kind: CurveKind,
     /// Number of its method, which gives the colour.
     pub method: usize,
+    /// Number of its level among those of the grid, which gives the shade; of no matter where the grid has none.
+    pub level: usize,
     /// Times in s, ascending.
     pub times_s: Vec<f64>,
     /// One value for each time. What is not finite is a gap.
@@ -162,6 +164,7 @@ pub(super) mod tests {
         TraceCurve {
             kind,
             method: 0,
+            level: 0,
             times_s: (0..values.len()).map(|k| 0.01 * k as f64).collect(),
             values,
             band: Vec::new(),

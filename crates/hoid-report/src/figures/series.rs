@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-/// Columns of a figure that a line is reduced to: one for each unit between its axes.
+/// Columns that a line is reduced to in a figure of one column: one for each unit between its axes.
 pub const COLUMNS: usize = 340;
 
 /// More runs than this are joined where the gap between them is narrower than a column.
@@ -10,18 +10,18 @@ const MOST_RUNS: usize = 200;
 
 /// Indices of the smallest and the largest value of each column, in order; all indices of a short series.
 pub fn thinned(values: &[f64]) -> Vec<usize> {
-    thinned_run(values, 0..values.len())
+    thinned_run(values, 0..values.len(), COLUMNS)
 }
 
-/// As [`thinned`], for a part of a series; columns are those of the whole. Values that are not finite are passed over.
-pub fn thinned_run(values: &[f64], run: Range<usize>) -> Vec<usize> {
+/// As [`thinned`], for a part of a series; the whole has so many columns. Values that are not finite are passed over.
+pub fn thinned_run(values: &[f64], run: Range<usize>, parts: usize) -> Vec<usize> {
     let finite = |k: &usize| values[*k].is_finite();
-    if values.len() <= 2 * COLUMNS {
+    if values.len() <= 2 * parts {
         return run.filter(finite).collect();
     }
     let mut kept = Vec::with_capacity(2 * COLUMNS + 2);
     kept.extend(run.clone().find(finite));
-    for column in columns(values.len(), &run) {
+    for column in columns(values.len(), &run, parts) {
         let by_value = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
         let lowest = column.clone().filter(finite).min_by(by_value);
         let highest = column.filter(finite).max_by(by_value);
@@ -35,13 +35,13 @@ pub fn thinned_run(values: &[f64], run: Range<usize>) -> Vec<usize> {
 }
 
 /// Indices of a run with the smallest lower and the largest upper edge of a band around each: first, middle of each column, last.
-pub fn thinned_band(lower: &[f64], upper: &[f64], run: Range<usize>) -> Vec<(usize, f64, f64)> {
+pub fn thinned_band(lower: &[f64], upper: &[f64], run: Range<usize>, parts: usize) -> Vec<(usize, f64, f64)> {
     let point = |k: usize| (k, lower[k], upper[k]);
-    if lower.len() <= 2 * COLUMNS {
+    if lower.len() <= 2 * parts {
         return run.map(point).collect();
     }
     let mut kept = vec![point(run.start)];
-    for column in columns(lower.len(), &run) {
+    for column in columns(lower.len(), &run, parts) {
         let least = lower[column.clone()].iter().copied().fold(f64::INFINITY, f64::min);
         let most = upper[column.clone()].iter().copied().fold(f64::NEG_INFINITY, f64::max);
         kept.push(((column.start + column.end) / 2, least, most));
@@ -52,12 +52,12 @@ pub fn thinned_band(lower: &[f64], upper: &[f64], run: Range<usize>) -> Vec<(usi
 }
 
 /// The parts of a run that lie in each column of a series of `n`.
-fn columns(n: usize, run: &Range<usize>) -> impl Iterator<Item = Range<usize>> {
+fn columns(n: usize, run: &Range<usize>, parts: usize) -> impl Iterator<Item = Range<usize>> {
     let run = run.clone();
-    let (first, last) = (run.start * COLUMNS / n, run.end * COLUMNS / n);
-    (first..=last.min(COLUMNS - 1))
+    let (first, last) = (run.start * parts / n, run.end * parts / n);
+    (first..=last.min(parts - 1))
         .map(move |c| {
-            let (from, to) = (c * n / COLUMNS, (c + 1) * n / COLUMNS);
+            let (from, to) = (c * n / parts, (c + 1) * n / parts);
             from.max(run.start)..to.min(run.end)
         })
         .filter(|c| !c.is_empty())
@@ -136,7 +136,7 @@ mod tests {
     fn a_run_stays_within_its_ends() {
         let values: Vec<f64> = (0..10_000).map(|k| (k as f64 * 0.05).cos()).collect();
         for run in [0..1, 17..19, 4_000..9_999, 9_999..10_000, 0..10_000] {
-            let kept = thinned_run(&values, run.clone());
+            let kept = thinned_run(&values, run.clone(), COLUMNS);
             assert_eq!((kept[0], kept[kept.len() - 1]), (run.start, run.end - 1));
             assert!(kept.windows(2).all(|w| w[0] < w[1]), "{run:?}");
         }
@@ -148,7 +148,7 @@ mod tests {
         let mut upper = vec![1.0; n];
         upper[777] = 5.0;
         let lower: Vec<f64> = upper.iter().map(|u| -u).collect();
-        let kept = thinned_band(&lower, &upper, 100..15_000);
+        let kept = thinned_band(&lower, &upper, 100..15_000, COLUMNS);
         assert!(kept.windows(2).all(|w| w[0].0 < w[1].0));
         assert_eq!((kept[0].0, kept[kept.len() - 1].0), (100, 14_999));
         assert!(kept.iter().any(|k| (k.1, k.2) == (-5.0, 5.0)));

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use kuva::prelude::{Figure, Layout, LinePlot, Plot, SvgBackend, Theme, TickFormat};
-use kuva::render::{
-    color::Color,
-    render::{Primitive, Scene, TextAnchor},
+use kuva::{
+    prelude::{Figure, Layout, LinePlot, Plot, SvgBackend, Theme, TickFormat},
+    render::render::Scene,
 };
+
+use super::axes::{plain, tagged};
 
 /// Width of every figure in units of the SVG.
 pub const WIDTH: f64 = 420.0;
@@ -71,59 +72,6 @@ pub fn line(points: impl IntoIterator<Item = (f64, f64)>, colour: &str, width: f
         .with_stroke_width(width)
 }
 
-/// Adds the legend below the figure, which grows by it: name, colour and whether the line is dashed. Entries share a row as
-/// long as they fit.
-pub fn add_legend(scene: &mut Scene, entries: &[(&str, &str, bool)]) {
-    const ROW: f64 = 18.0;
-    const SAMPLE: f64 = 22.0;
-    const GAP: f64 = 6.0;
-    const LONGEST: usize = 48;
-    let (mut x, mut y) = (LEFT, scene.height + 15.0);
-    for (name, colour, dashed) in entries {
-        // Sans-serif text is a little narrower than this on average; a long name gets a row of its own, and no more.
-        let name = shortened(name, LONGEST);
-        let width = SAMPLE + GAP + 0.58 * f64::from(TEXT) * name.chars().count() as f64 + 14.0;
-        if x > LEFT && x + width > scene.width {
-            (x, y) = (LEFT, y + ROW);
-        }
-        let start = if x + width > scene.width {
-            (scene.width - width).max(4.0)
-        } else {
-            x
-        };
-        scene.add(Primitive::Line {
-            x1: start,
-            y1: y - 4.5,
-            x2: start + SAMPLE,
-            y2: y - 4.5,
-            stroke: Color::from(*colour),
-            stroke_width: 2.0,
-            stroke_dasharray: dashed.then(|| "6 3".to_owned()),
-        });
-        scene.add(Primitive::Text {
-            x: start + SAMPLE + GAP,
-            y,
-            content: label(&name),
-            anchor: TextAnchor::Start,
-            size: TEXT,
-            rotate: None,
-            bold: false,
-            color: None,
-        });
-        x = start + width;
-    }
-    scene.height = y + 7.0;
-}
-
-fn shortened(text: &str, longest: usize) -> String {
-    if text.chars().count() <= longest {
-        return text.to_owned();
-    }
-    let mut short: String = text.chars().take(longest - 1).collect();
-    short.push('\u{2026}');
-    short
-}
-
 /// Text of the user: a dollar sign would open a formula.
 pub fn label(text: &str) -> String {
     text.replace('$', "\\$")
@@ -132,13 +80,18 @@ pub fn label(text: &str) -> String {
 /// Name and unit of an axis.
 pub fn axis_label(name: &str, unit: &str) -> String {
     let unit = if unit.is_empty() { "-" } else { unit };
-    label(&format!("{name} ({unit})"))
+    label(&plain(&format!("{name} ({unit})")))
+}
+
+/// True for what has a place on an axis: beyond this size the differences of numbers overflow.
+pub fn is_drawable(value: f64) -> bool {
+    value.abs() < 1e100
 }
 
 /// Range of values with 5 % of room on both sides; a range of zero width becomes one around it.
 pub fn padded_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for value in values.into_iter().filter(|v| v.is_finite()) {
+    for value in values.into_iter().filter(|v| is_drawable(*v)) {
         low = low.min(value);
         high = high.max(value);
     }
@@ -192,13 +145,13 @@ pub fn finish(id: &str, title: &str, scene: &Scene) -> String {
     };
     let font = scene.font_family.as_deref().map(escaped).unwrap_or_default();
     let (width, height) = (scene.width, scene.height);
-    let (id, title) = (escaped(id), escaped(title));
+    let (id, title) = (escaped(id), escaped(&plain(title)));
     // The generator's stamp would change the bytes with its version.
     let body = match body.split_once("-->") {
         Some((stamp, rest)) if stamp.trim_start().starts_with("<!--") => rest,
         _ => body,
     };
-    let body = renumbered(body, "kuva-clip-", &format!("{id}-clip-"));
+    let body = tagged(&renumbered(body, "kuva-clip-", &format!("{id}-clip-")));
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
          font-family=\"{font}\" fill=\"black\" role=\"img\" aria-labelledby=\"{id}-title\"><title id=\"{id}-title\">{title}</title>{body}"
@@ -248,12 +201,6 @@ mod tests {
         assert_eq!(padded_range([0.0, f64::NAN]), (-1.0, 1.0));
         assert_eq!(padded_range([2.0]), (1.8, 2.2));
         assert_eq!(padded_range([0.0, 1.0]), (-0.05, 1.05));
-    }
-
-    #[test]
-    fn long_names_are_cut() {
-        assert_eq!(shortened("abc", 3), "abc");
-        assert_eq!(shortened("\u{3c9}\u{3c9}\u{3c9}\u{3c9}", 3), "\u{3c9}\u{3c9}\u{2026}");
     }
 
     #[test]

@@ -5,6 +5,7 @@ use hoid_model::Record;
 use kuva::prelude::Plot;
 
 use super::{
+    legend::{Entry, Sample, add_legend},
     series::thinned,
     style::{self, BLUE, GREY, VERMILLION},
 };
@@ -68,11 +69,11 @@ pub fn time_response(id: &str, record: &Record, validation: &Validation) -> Stri
     panels.push((plots, layout(span, LOWER).with_x_label("time (s)"), LOWER));
     let mut scene = style::stacked(panels);
     let entries = [
-        ("measured", GREY, false),
-        ("predicted", VERMILLION, false),
-        ("simulated", BLUE, false),
+        Entry::new("measured", GREY, Sample::Line),
+        Entry::new("predicted", VERMILLION, Sample::Line),
+        Entry::new("simulated", BLUE, Sample::Line),
     ];
-    style::add_legend(&mut scene, &entries);
+    add_legend(&mut scene, &entries);
     style::finish(id, "Measured, simulated and predicted output over time", &scene)
 }
 

@@ -1,27 +1,25 @@
 //! Quantities over time in a grid of panels with one time axis: recursive estimates, their bands and errors, innovations.
 
-use std::{ops::Range, sync::Arc};
+use std::ops::Range;
 
 use kuva::{
-    prelude::{BandPlot, Plot, ReferenceLine, ShadedRegion, TickFormat},
-    render::render::{Primitive, Scene, TextAnchor},
+    prelude::{BandPlot, Plot, ReferenceLine, ShadedRegion},
+    render::render::Scene,
 };
 
 use super::{
-    axes::{is_power_of_ten, log_tick, panel_label, plain, tagged, tick, tick_step},
+    axes::{panel_label, with_abscissa, with_ordinate},
+    draw::BAND_OPACITY,
+    frame::{self, Frame, Ordinates},
+    legend::{Entry, Sample, add_legend_by},
+    palette::shade,
     panel::{CurveKind, Ordinate, TraceCurve, TracePanel},
     series::{runs, thinned_band, thinned_run, without_level},
-    style::{self, BLACK, GREY, LEFT, MODEL_COLOURS, RIGHT, TEXT, WIDTH},
+    style::{self, BLACK, GREY},
 };
 
-/// Height between the axes of a panel, and the space around them where no time stands below.
+/// Height between the axes of a panel.
 const HEIGHT: f64 = 84.0;
-const SPACE: f64 = 8.0;
-/// Between neighbouring panels that share their ordinate.
-const GAP: f64 = 16.0;
-const TITLE: f64 = 18.0;
-/// Centre of the label of the ordinate.
-const LABEL_AT: f64 = 13.0;
 
 const DASHES: &str = "#444444";
 
@@ -36,6 +34,9 @@ pub struct TraceGrid {
     pub titles: Vec<String>,
     /// Names of the methods, for the legend; empty for none.
     pub methods: Vec<String>,
+    /// Names of the levels of each method, such as those of the noise, from the lowest; empty for none. They are shades of the
+    /// colour of the method.
+    pub levels: Vec<String>,
     /// Spans that are shaded, s.
     pub shaded_s: Vec<(f64, f64)>,
     /// Times with a dotted line, s.
@@ -49,88 +50,36 @@ pub fn trace_panels(id: &str, title: &str, grid: &TraceGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();
     if n == 0 {
-        return style::finish(id, title, &Scene::new(WIDTH, 1.0));
+        return frame::empty(id, title);
     }
-    let rows = n.div_ceil(columns);
-    let widths = grid.widths(columns);
     let time = grid.time_range();
-    let ranges = grid.ranges(columns);
-    let mut cells = Vec::with_capacity(n);
-    let mut heights = Vec::with_capacity(rows);
-    let mut labels: Vec<(f64, f64, String)> = Vec::new();
-    let mut y = 0.0;
-    for row in 0..rows {
-        let in_row = row * columns..n.min((row + 1) * columns);
-        let top = if row == 0 && !grid.titles.is_empty() {
-            TITLE
-        } else {
-            0.0
-        } + SPACE;
-        // The lowest panel of each column has the times.
-        let bottom = if in_row.clone().any(|i| i + columns >= n) {
-            style::BOTTOM
-        } else {
-            SPACE
-        };
-        let height = top + HEIGHT + bottom;
-        let mut x = 0.0;
-        for (column, i) in in_row.enumerate() {
-            let panel = &grid.panels[i];
-            let first = column == 0 || !grid.shared_ordinates;
-            let margin = if first { LEFT } else { GAP };
-            let layout = panel
-                .layout(time, ranges[i], height, first)
-                .with_width(widths[column])
-                .with_force_margins(margin, RIGHT)
-                .with_force_margins_y(top, bottom);
-            let layout = if i + columns >= n {
-                layout.with_x_label("time (s)")
-            } else {
-                layout.with_x_tick_format(TickFormat::Custom(Arc::new(|_| String::new())))
-            };
-            cells.push((panel.plots(ranges[i]), grid.marked(layout, time)));
-            if first {
-                labels.push((
-                    x + LABEL_AT,
-                    y + top + 0.5 * HEIGHT,
-                    panel_label(&panel.name, &panel.unit),
-                ));
-            }
-            x += widths[column];
-        }
-        y += height;
-        heights.push(height);
-    }
-    let mut scene = style::in_grid(cells, &widths, &heights);
-    for (x, y, content) in labels {
-        scene.add(text(x + 4.5, y, content, Some(-90.0)));
-    }
-    let mut x = 0.0;
-    for (column, title) in grid.titles.iter().take(columns).enumerate() {
-        let margin = if column == 0 || !grid.shared_ordinates {
-            LEFT
-        } else {
-            GAP
-        };
-        let middle = x + margin + 0.5 * (widths[column] - margin - RIGHT);
-        scene.add(text(middle, TITLE, style::label(&plain(title)), None));
-        x += widths[column];
-    }
+    let ranges = frame::of_rows(
+        grid.panels.iter().map(TracePanel::range).collect(),
+        columns,
+        grid.shared_ordinates,
+    );
+    let labels = grid.panels.iter().map(|p| (p.name.as_str(), p.unit.as_str()));
+    let ordinates = Ordinates::of(labels, columns, grid.shared_ordinates);
+    let frame = Frame::new(n, columns, HEIGHT, ordinates, !grid.titles.is_empty());
+    let cell = |(i, panel): (usize, &TracePanel)| {
+        let layout = style::layout(time, ranges[i], HEIGHT);
+        let layout = with_abscissa(layout, time, false, frame.area(i).width);
+        let logarithmic = panel.ordinate == Ordinate::Logarithmic;
+        let layout = with_ordinate(layout, ranges[i], &panel.unit, logarithmic, HEIGHT, frame.has_ticks(i));
+        let layout = frame.fitted(i, layout);
+        (
+            panel.plots(ranges[i], grid.levels.len(), frame.area(i).parts()),
+            grid.marked(layout, time),
+        )
+    };
+    let cells = grid.panels.iter().enumerate().map(cell).collect();
+    let label = |i: usize| panel_label(&grid.panels[i].name, &grid.panels[i].unit);
+    let mut scene = frame.drawn(cells, "time (s)", label, &grid.titles, 0.0);
     grid.add_legend(&mut scene);
-    tagged(&style::finish(id, title, &scene))
+    style::finish(id, title, &scene)
 }
 
 impl TraceGrid {
-    fn widths(&self, columns: usize) -> Vec<f64> {
-        let whole = if columns == 1 { WIDTH } else { 2.0 * WIDTH };
-        if !self.shared_ordinates {
-            return vec![whole / columns as f64; columns];
-        }
-        let axes = (whole - LEFT - RIGHT * columns as f64 - GAP * (columns - 1) as f64) / columns as f64;
-        let of = |column| if column == 0 { LEFT } else { GAP } + axes + RIGHT;
-        (0..columns).map(of).collect()
-    }
-
     fn time_range(&self) -> (f64, f64) {
         let times = self.panels.iter().flat_map(|p| &p.curves).flat_map(|c| &c.times_s);
         let finite = times.copied().filter(|t| t.is_finite());
@@ -140,21 +89,6 @@ impl TraceGrid {
         } else {
             style::padded_range([low])
         }
-    }
-
-    /// The range of each panel; one for each row when they share it.
-    fn ranges(&self, columns: usize) -> Vec<(f64, f64)> {
-        let own: Vec<(f64, f64)> = self.panels.iter().map(TracePanel::range).collect();
-        if !self.shared_ordinates {
-            return own;
-        }
-        let of_row = |row: &[(f64, f64)]| {
-            let widest = row
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), r| (l.min(r.0), h.max(r.1)));
-            vec![widest; row.len()]
-        };
-        own.chunks(columns).flat_map(of_row).collect()
     }
 
     fn marked(&self, mut layout: kuva::prelude::Layout, (from, to): (f64, f64)) -> kuva::prelude::Layout {
@@ -175,28 +109,34 @@ impl TraceGrid {
     }
 
     fn add_legend(&self, scene: &mut Scene) {
-        let names: Vec<String> = self.methods.iter().map(|m| plain(m)).collect();
-        let mut entries: Vec<(&str, &str, bool)> = names
-            .iter()
-            .enumerate()
-            .map(|(i, name)| (name.as_str(), MODEL_COLOURS[i % MODEL_COLOURS.len()], false))
-            .collect();
+        let mut entries = Vec::new();
+        for (method, name) in self.methods.iter().enumerate() {
+            if self.levels.is_empty() {
+                entries.push(Entry::new(name, &shade(method, 0, 1), Sample::Line));
+            }
+            for (level, of_level) in self.levels.iter().enumerate() {
+                let name = match name.is_empty() {
+                    true => of_level.clone(),
+                    false => format!("{name}, {of_level}"),
+                };
+                let colour = shade(method, level, self.levels.len());
+                entries.push(Entry::new(&name, &colour, Sample::Line));
+            }
+        }
         let has = |kind| self.panels.iter().flat_map(|p| &p.curves).any(|c| c.kind == kind);
         if has(CurveKind::Batch) {
-            entries.push(("batch fit", DASHES, true));
+            entries.push(Entry::new("batch fit", DASHES, Sample::Dashed));
         }
         if has(CurveKind::Truth) {
-            entries.push(("truth", BLACK, false));
+            entries.push(Entry::new("truth", BLACK, Sample::Dashed));
         }
-        if !entries.is_empty() {
-            style::add_legend(scene, &entries);
-        }
+        add_legend_by(scene, &entries, self.levels.len());
     }
 }
 
 impl TracePanel {
     /// The curves within a range: bands first, then lines.
-    fn plots(&self, (low, high): (f64, f64)) -> Vec<Plot> {
+    fn plots(&self, (low, high): (f64, f64), levels: usize, parts: usize) -> Vec<Plot> {
         let logarithmic = self.ordinate == Ordinate::Logarithmic;
         let half = 0.5 * (high - low);
         // Beyond the axes the path is cut; without bound, numbers of 1e300 would stand in the file.
@@ -207,18 +147,19 @@ impl TracePanel {
         let drawable = |v: f64| v.is_finite() && (v > 0.0 || !logarithmic);
         let mut plots: Vec<Plot> = Vec::new();
         for curve in self.curves.iter().filter(|c| !c.band.is_empty()) {
-            plots.extend(curve.bands((low, high)));
+            plots.extend(curve.bands((low, high), levels, parts));
         }
         for curve in &self.curves {
             let n = curve.values.len().min(curve.times_s.len());
             let values = &curve.values[..n];
             for run in runs(n, |k| drawable(values[k]) && curve.times_s[k].is_finite()) {
-                let points = curve.points(run, bounded);
+                let points = curve.points(run, parts, bounded);
                 let line = match curve.kind {
-                    CurveKind::Estimate => style::line(points, curve.colour(), 1.2),
-                    CurveKind::Truth | CurveKind::Bound => style::line(points, BLACK, 1.0),
-                    CurveKind::Batch => style::line(points, curve.colour(), 1.8).with_dashed(),
-                    CurveKind::Steps => style::line(points, curve.colour(), 1.4).with_step(),
+                    CurveKind::Estimate => style::line(points, &curve.colour(levels), 1.2),
+                    CurveKind::Truth => style::line(points, BLACK, 1.2).with_dashed(),
+                    CurveKind::Bound => style::line(points, BLACK, 1.0),
+                    CurveKind::Batch => style::line(points, &curve.colour(levels), 1.8).with_dashed(),
+                    CurveKind::Steps => style::line(points, &curve.colour(levels), 1.4).with_step(),
                 };
                 plots.push(line.into());
             }
@@ -232,12 +173,12 @@ impl TracePanel {
 }
 
 impl TraceCurve {
-    fn colour(&self) -> &'static str {
-        MODEL_COLOURS[self.method % MODEL_COLOURS.len()]
+    fn colour(&self, levels: usize) -> String {
+        shade(self.method, self.level, levels)
     }
 
     /// The rows of a run that are drawn: none on the level of both neighbours. One row alone is as long as its sample.
-    fn points(&self, run: Range<usize>, bounded: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
+    fn points(&self, run: Range<usize>, parts: usize, bounded: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
         let at = |k: usize| (self.times_s[k], bounded(self.values[k]));
         if run.len() == 1 {
             let (t, y) = at(run.start);
@@ -249,18 +190,18 @@ impl TraceCurve {
         }
         let whole: Vec<usize> = run.clone().collect();
         let turns = without_level(&whole, |k| self.values[k]);
-        let thin = thinned_run(&self.values, run);
+        let thin = thinned_run(&self.values, run, parts);
         let kept = if turns.len() <= thin.len() { turns } else { thin };
         kept.into_iter().map(at).collect()
     }
 
-    fn bands(&self, (low, high): (f64, f64)) -> Vec<Plot> {
+    fn bands(&self, (low, high): (f64, f64), levels: usize, parts: usize) -> Vec<Plot> {
         let n = self.band.len().min(self.times_s.len());
         let cut = |v: f64| v.clamp(low, high);
         let lower: Vec<f64> = self.band[..n].iter().map(|b| cut(b.0)).collect();
         let upper: Vec<f64> = self.band[..n].iter().map(|b| cut(b.1)).collect();
         let band = |run: Range<usize>| -> Plot {
-            let kept = thinned_band(&lower, &upper, run);
+            let kept = thinned_band(&lower, &upper, run, parts);
             let places: Vec<usize> = (0..kept.len()).collect();
             let needed: Vec<_> = without_level(&places, |i| (kept[i].1, kept[i].2))
                 .into_iter()
@@ -271,8 +212,8 @@ impl TraceCurve {
                 needed.iter().map(|k| k.1),
                 needed.iter().map(|k| k.2),
             )
-            .with_color(self.colour())
-            .with_opacity(0.2)
+            .with_color(self.colour(levels))
+            .with_opacity(BAND_OPACITY)
             .into()
         };
         runs(n, |k| lower[k].is_finite() && upper[k].is_finite())
@@ -283,44 +224,13 @@ impl TraceCurve {
     }
 }
 
-impl TracePanel {
-    fn layout(&self, time: (f64, f64), (low, high): (f64, f64), height: f64, labelled: bool) -> kuva::prelude::Layout {
-        let layout = style::layout(time, (low, high), height);
-        if self.ordinate == Ordinate::Logarithmic {
-            let narrow = high / low < 10.5;
-            let format = move |v: f64| match labelled && (narrow || is_power_of_ten(v)) {
-                true => log_tick(v),
-                false => String::new(),
-            };
-            return layout
-                .with_log_y()
-                .with_y_tick_format(TickFormat::Custom(Arc::new(format)));
-        }
-        let step = tick_step(high - low);
-        let format = move |v: f64| if labelled { tick(v, step) } else { String::new() };
-        layout
-            .with_y_tick_step(step)
-            .with_y_tick_format(TickFormat::Custom(Arc::new(format)))
-    }
-}
-
-fn text(x: f64, y: f64, content: String, rotate: Option<f64>) -> Primitive {
-    Primitive::Text {
-        x,
-        y,
-        content,
-        anchor: TextAnchor::Middle,
-        size: TEXT,
-        rotate,
-        bold: false,
-        color: None,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::{
-        super::panel::tests::{curve, panel},
+        super::{
+            panel::tests::{curve, panel},
+            series::COLUMNS,
+        },
         *,
     };
 
@@ -353,7 +263,7 @@ mod tests {
     fn a_jump_stays_a_jump_and_a_level_costs_nothing() {
         let values: Vec<f64> = (0..100_000).map(|k| if k < 50_000 { 1.0 } else { 2.0 }).collect();
         let truth = curve(CurveKind::Truth, values);
-        let points = truth.points(0..100_000, |v| v);
+        let points = truth.points(0..100_000, COLUMNS, |v| v);
         assert_eq!(points.len(), 4);
         assert!(points[2].0 - points[1].0 < 0.011);
     }
@@ -394,6 +304,32 @@ mod tests {
         assert!(svg.contains("a<tspan dy=\"3\" font-size=\"10\">1</tspan>"), "{svg}");
         assert!(svg.contains("(&lt;b&gt;)") && svg.contains("&lt;x&gt;"));
         assert_eq!(svg.matches("<tspan").count(), svg.matches("</tspan>").count());
+    }
+
+    #[test]
+    fn levels_are_shades_and_a_row_of_one_quantity_has_one_label() {
+        let of = |kind, level| TraceCurve {
+            level,
+            ..curve(kind, vec![1.0, 2.0, 1.5])
+        };
+        let curves = vec![
+            of(CurveKind::Estimate, 0),
+            of(CurveKind::Estimate, 1),
+            of(CurveKind::Batch, 1),
+        ];
+        let grid = TraceGrid {
+            panels: vec![panel(curves.clone()), panel(curves)],
+            columns: 2,
+            methods: vec!["RLS".to_owned()],
+            levels: vec!["low".to_owned(), "high".to_owned()],
+            ..TraceGrid::default()
+        };
+        let svg = trace_panels("g", "t", &grid).to_uppercase();
+        // In each panel and in the legend, which shows the batch fit in grey.
+        let lines = |level| svg.matches(&format!("STROKE=\"{}\"", shade(0, level, 2))).count();
+        assert_eq!((lines(0), lines(1)), (3, 5));
+        assert!(svg.contains("RLS, LOW") && svg.contains("RLS, HIGH"));
+        assert_eq!(svg.matches("ROTATE(-90").count(), 1);
     }
 
     #[test]

@@ -70,6 +70,7 @@ fn curve(method: usize, times_s: &[f64], estimates: &[Option<Estimate>], shown: 
     TraceCurve {
         kind: CurveKind::Estimate,
         method,
+        level: 0,
         times_s: times_s.to_vec(),
         values: estimates
             .iter()
@@ -91,6 +92,7 @@ fn batch_curve(method: usize, (from_s, to_s): (f64, f64), estimate: Estimate, sh
     Some(TraceCurve {
         kind: CurveKind::Batch,
         method,
+        level: 0,
         times_s: vec![from_s, to_s],
         values: vec![level; 2],
         band: Vec::new(),
@@ -101,6 +103,7 @@ fn truth_curve(record: &Record, values: Vec<f64>) -> TraceCurve {
     TraceCurve {
         kind: CurveKind::Truth,
         method: 0,
+        level: 0,
         times_s: record.times_s(),
         values,
         band: Vec::new(),
@@ -250,6 +253,7 @@ pub fn innovation_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
         let line = |kind, values: Vec<f64>| TraceCurve {
             kind,
             method,
+            level: 0,
             times_s: trace.times_s().to_vec(),
             values,
             band: Vec::new(),
@@ -278,6 +282,7 @@ pub fn shortened_grid(traces: &[Evaluated<'_>], record: &Record) -> Option<Trace
     let curve = |(method, t): (usize, &Evaluated<'_>)| TraceCurve {
         kind: CurveKind::Steps,
         method,
+        level: 0,
         times_s: t.section.trace.times_s().to_vec(),
         values: t.section.trace.steps_shortened().iter().map(|s| *s as f64).collect(),
         band: Vec::new(),

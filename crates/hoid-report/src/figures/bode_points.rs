@@ -1,0 +1,181 @@
+//! Points with error bars over a Bode pair: describing functions beside the models that were fitted to the same records.
+//!
+//! The phase of a point is known but for whole turns. It is drawn on the branch that is nearest to the first curve, and without a
+//! curve unwrapped from point to point with the delay of the points taken out.
+
+use hoid_ident::describing::DescribingFunction;
+use hoid_model::uncertainty::Estimate;
+use kuva::render::render::Scene;
+
+use super::{bode::unwrap, draw, scale::Scale};
+
+const RADIUS: f64 = 2.4;
+/// Half of the end of an error bar.
+const CAP: f64 = 2.5;
+/// Two-sided 95 % point of the normal distribution.
+pub(super) const Z_95: f64 = 1.959_963_984_540_054;
+
+/// Points of a frequency response.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct BodePoints {
+    /// Their name in the legend.
+    pub name: String,
+    /// Frequencies, rad/s, ascending.
+    pub omega_rad_s: Vec<f64>,
+    /// Magnitude in dB at each, with its standard error if there is one. What is not finite is left out.
+    pub magnitude_db: Vec<Estimate>,
+    /// Phase in deg at each, on any branch, with its standard error if there is one.
+    pub phase_deg: Vec<Estimate>,
+    /// Delay that is taken out while the phase is unwrapped where there is no curve, s.
+    pub delay_s: f64,
+}
+
+impl BodePoints {
+    /// The lines of a describing function.
+    pub fn of_describing_function(name: &str, h: &DescribingFunction) -> Self {
+        Self {
+            name: name.to_owned(),
+            omega_rad_s: h.lines.iter().map(|l| l.omega_rad_s).collect(),
+            magnitude_db: h.lines.iter().map(|l| l.magnitude_db()).collect(),
+            phase_deg: h.lines.iter().map(|l| l.phase_deg()).collect(),
+            delay_s: 0.0,
+        }
+    }
+
+    /// The lines at which all numbers are finite and the frequency has a logarithm.
+    pub(super) fn drawable(&self) -> Self {
+        let n = self
+            .omega_rad_s
+            .len()
+            .min(self.magnitude_db.len())
+            .min(self.phase_deg.len());
+        let sound = |k: &usize| {
+            let w = self.omega_rad_s[*k];
+            w.is_finite() && w > 0.0 && self.magnitude_db[*k].value.is_finite() && self.phase_deg[*k].value.is_finite()
+        };
+        let kept: Vec<usize> = (0..n).filter(sound).collect();
+        Self {
+            name: self.name.clone(),
+            omega_rad_s: kept.iter().map(|k| self.omega_rad_s[*k]).collect(),
+            magnitude_db: kept.iter().map(|k| self.magnitude_db[*k]).collect(),
+            phase_deg: kept.iter().map(|k| self.phase_deg[*k]).collect(),
+            delay_s: if self.delay_s.is_finite() { self.delay_s } else { 0.0 },
+        }
+    }
+
+    /// The same on the branch of a curve: frequencies and phases in deg.
+    pub(super) fn on_branch_of(mut self, curve: Option<(&[f64], &[f64])>) -> Self {
+        let pairs: Vec<(f64, f64)> = self
+            .omega_rad_s
+            .iter()
+            .copied()
+            .zip(self.phase_deg.iter().map(|p| p.value))
+            .collect();
+        let unwrapped = unwrap(&pairs, self.delay_s);
+        for ((phase, &omega), alone) in self.phase_deg.iter_mut().zip(&self.omega_rad_s).zip(unwrapped) {
+            phase.value = match curve.and_then(|(w, y)| interpolated(w, y, omega)) {
+                Some(near) => phase.value + 360.0 * ((near - phase.value) / 360.0).round(),
+                None => alone,
+            };
+        }
+        self
+    }
+
+    /// Ends of the error bars, and the values themselves.
+    pub(super) fn reach(values: &[Estimate]) -> impl Iterator<Item = f64> + '_ {
+        values.iter().flat_map(|v| {
+            let half = half_bar(v);
+            [v.value - half, v.value, v.value + half]
+        })
+    }
+
+    /// Bars of 1.96 standard errors and points; none outside the axes.
+    pub(super) fn draw(&self, scene: &mut Scene, scale: &Scale, values: &[Estimate], colour: &str) {
+        let mut at = Vec::new();
+        for (&omega, value) in self.omega_rad_s.iter().zip(values).filter(|(w, _)| scale.has_x(**w)) {
+            let (x, half) = (scale.place_x(omega), half_bar(value));
+            let (low, high) = (value.value - half, value.value + half);
+            if high < scale.y.0 || low > scale.y.1 {
+                continue;
+            }
+            if half > 0.0 {
+                let place = |v: f64| scale.place_y(scale.cut(v));
+                scene.add(draw::line((x, place(low)), (x, place(high)), colour, 1.0, None));
+                for end in [low, high].into_iter().filter(|end| scale.cut(*end) == *end) {
+                    scene.add(draw::line(
+                        (x - CAP, place(end)),
+                        (x + CAP, place(end)),
+                        colour,
+                        1.0,
+                        None,
+                    ));
+                }
+            }
+            if scale.cut(value.value) == value.value {
+                at.push((x, scale.place_y(value.value)));
+            }
+        }
+        draw::points(scene, &at, RADIUS, colour, None);
+    }
+}
+
+fn half_bar(value: &Estimate) -> f64 {
+    value.standard_error.map_or(0.0, |s| Z_95 * s).clamp(0.0, 1e6)
+}
+
+/// Linear between the points of a curve, the nearest end outside; `None` without a finite value.
+fn interpolated(omega: &[f64], y: &[f64], at: f64) -> Option<f64> {
+    let n = omega.len().min(y.len());
+    let above = omega[..n].partition_point(|w| *w <= at);
+    let value = match (above.checked_sub(1), above < n) {
+        (Some(low), true) => {
+            let part = (at - omega[low]) / (omega[above] - omega[low]);
+            y[low] + part * (y[above] - y[low])
+        }
+        (Some(low), false) => y[low],
+        (None, true) => y[above],
+        (None, false) => return None,
+    };
+    value.is_finite().then_some(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(phase: &[f64]) -> BodePoints {
+        BodePoints {
+            name: "H".to_owned(),
+            omega_rad_s: (1..=phase.len()).map(|k| k as f64).collect(),
+            magnitude_db: vec![Estimate::fixed(0.0); phase.len()],
+            phase_deg: phase.iter().map(|p| Estimate::fixed(*p)).collect(),
+            delay_s: 0.0,
+        }
+    }
+
+    #[test]
+    fn phases_join_the_branch_of_the_curve() {
+        let joined = points(&[100.0, 60.0, -170.0]).on_branch_of(Some((&[0.5, 3.5], &[-200.0, -600.0])));
+        let phases: Vec<f64> = joined.phase_deg.iter().map(|p| p.value).collect();
+        assert_eq!(phases, [-260.0, -300.0, -530.0]);
+        let alone = points(&[-100.0, 170.0, 100.0]).on_branch_of(None);
+        let phases: Vec<f64> = alone.phase_deg.iter().map(|p| p.value).collect();
+        assert_eq!(phases, [-100.0, -190.0, -260.0]);
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_is_left_out() {
+        let mut broken = points(&[1.0, f64::NAN, 3.0, 4.0]);
+        broken.omega_rad_s[0] = 0.0;
+        broken.magnitude_db.truncate(3);
+        assert_eq!(broken.drawable().omega_rad_s, [3.0]);
+        assert_eq!(
+            BodePoints::reach(&[Estimate {
+                value: 1.0,
+                standard_error: Some(f64::INFINITY)
+            }])
+            .count(),
+            3
+        );
+    }
+}

@@ -1,0 +1,86 @@
+//! The numbers of a box plot.
+//!
+//! A box reaches from the first to the third quartile with a line at the median; whiskers end at the last value within 1.5
+//! interquartile ranges of the box, and what lies beyond is a point (Tukey, *Exploratory Data Analysis*, 1977).
+
+use super::{
+    series::{quantile, sorted},
+    style,
+};
+
+/// Whiskers end within so many interquartile ranges of the box.
+const REACH: f64 = 1.5;
+
+/// What a box shows of a sample.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct BoxStatistics {
+    /// Number of values; zero where there is none, and a cross is drawn in the place of the box.
+    pub count: usize,
+    /// The smallest value within 1.5 interquartile ranges of the box.
+    pub lower_whisker: f64,
+    /// First quartile.
+    pub lower_quartile: f64,
+    /// Second quartile.
+    pub median: f64,
+    /// Third quartile.
+    pub upper_quartile: f64,
+    /// The largest value within 1.5 interquartile ranges of the box.
+    pub upper_whisker: f64,
+    /// The values beyond the whiskers.
+    pub outliers: Vec<f64>,
+}
+
+impl BoxStatistics {
+    /// Of the values that are finite; quartiles by linear interpolation between ranks.
+    pub fn of(values: &[f64]) -> Self {
+        let values = sorted(values.iter().copied());
+        let quartile = |q| quantile(&values, q).unwrap_or_default();
+        let (lower, upper) = (quartile(0.25), quartile(0.75));
+        let reach = REACH * (upper - lower);
+        let within = |v: &f64| (lower - reach..=upper + reach).contains(v);
+        let inside: Vec<f64> = values.iter().copied().filter(within).collect();
+        Self {
+            count: values.len(),
+            // An interpolated quartile may lie beyond the last value within reach.
+            lower_whisker: inside.first().copied().unwrap_or_default().min(lower),
+            lower_quartile: lower,
+            median: quartile(0.5),
+            upper_quartile: upper,
+            upper_whisker: inside.last().copied().unwrap_or_default().max(upper),
+            outliers: values.into_iter().filter(|v| !within(v)).collect(),
+        }
+    }
+
+    /// Lower whisker, quartiles, upper whisker.
+    pub(super) fn marks(&self) -> [f64; 5] {
+        [
+            self.lower_whisker,
+            self.lower_quartile,
+            self.median,
+            self.upper_quartile,
+            self.upper_whisker,
+        ]
+    }
+
+    /// True when there is a box to draw.
+    pub(super) fn is_drawable(&self) -> bool {
+        self.count > 0 && self.marks().iter().all(|v| style::is_drawable(*v))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn statistics_are_those_of_tukey() {
+        let mut values: Vec<f64> = (1..=11).map(f64::from).collect();
+        values.extend([100.0, -50.0, f64::NAN]);
+        let found = BoxStatistics::of(&values);
+        // 13 values: quartiles at ranks 4, 7, 10 are 3, 6, 9; the reach is 9 to either side.
+        assert_eq!(found.marks(), [1.0, 3.0, 6.0, 9.0, 11.0]);
+        assert_eq!((found.count, found.outliers), (13, vec![-50.0, 100.0]));
+        assert_eq!(BoxStatistics::of(&[2.0]).marks(), [2.0; 5]);
+        assert_eq!(BoxStatistics::of(&[f64::NAN]), BoxStatistics::default());
+    }
+}

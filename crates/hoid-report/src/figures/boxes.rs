@@ -1,0 +1,370 @@
+//! Box plots of the results of many runs: groups on the abscissa, in each group one box for each series.
+//! What a box shows is told by [`BoxStatistics`].
+
+use kuva::{
+    prelude::Plot,
+    render::render::{Scene, TextAnchor},
+};
+
+use super::{
+    BoxStatistics,
+    axes::{marked, panel_label, with_ordinate},
+    draw::{self, INK},
+    frame::{self, Area, Frame, Ordinates},
+    legend::{Entry, Sample, add_legend_by},
+    palette::{Shade, is_dark},
+    style::{self, BLACK, TEXT},
+};
+
+/// Height between the axes of a panel, and of one that is the whole figure.
+const HEIGHT: f64 = 112.0;
+const ALONE: f64 = 150.0;
+/// Space above a panel for the number of outliers beyond.
+const COUNTS: f64 = 10.0;
+/// The names of the groups below the axis, and a second row of them below the first.
+const NAMES_BELOW: f64 = 17.0;
+const SECOND: f64 = 9.5;
+/// Part of the width of a group that its boxes take, and of its place that a box takes.
+const GROUP: f64 = 0.86;
+const BOX: f64 = 0.8;
+const WIDEST: f64 = 26.0;
+
+/// Range of the ordinate of box plots.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum BoxRange {
+    /// All boxes, whiskers and outliers.
+    #[default]
+    Full,
+    /// Boxes and whiskers; outliers beyond are counted above the panel, and a triangle at its edge tells whose they are.
+    Whiskers,
+}
+
+/// A series: boxes of one colour.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BoxSeries {
+    /// Its name in the legend.
+    pub name: String,
+    /// Its colour.
+    pub shade: Shade,
+}
+
+/// One panel of box plots.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct BoxPanel {
+    /// Name of the quantity, such as `B_r(b_0)`; after `_` or `^` stands one sign, or several in braces.
+    pub name: String,
+    /// Its unit; empty for none.
+    pub unit: String,
+    /// The boxes by group and, in each, by series; a place that is not there is one without a value.
+    pub boxes: Vec<Vec<BoxStatistics>>,
+}
+
+/// Panels of box plots with common groups and series.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct BoxGrid {
+    /// The panels by rows.
+    pub panels: Vec<BoxPanel>,
+    /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as a page.
+    pub columns: usize,
+    /// Text above each column; empty for none.
+    pub titles: Vec<String>,
+    /// Name of what the groups differ in, such as `n_k^*`.
+    pub abscissa: String,
+    /// Names of the groups.
+    pub groups: Vec<String>,
+    /// The series of each group.
+    pub series: Vec<BoxSeries>,
+    /// Range of the ordinates.
+    pub range: BoxRange,
+    /// True when panels of a row have one ordinate.
+    pub shared_ordinates: bool,
+    /// True when zero is in every range, with a line.
+    pub with_zero: bool,
+    /// What every range reaches to both sides of its middle at least, so that rounding is not drawn as a spread; zero for none.
+    pub least_reach: f64,
+}
+
+/// Box plots as one figure. `title` is what a screen reader says.
+pub fn box_plots(id: &str, title: &str, grid: &BoxGrid) -> String {
+    let columns = grid.columns.max(1);
+    let n = grid.panels.len();
+    if n == 0 || grid.groups.is_empty() {
+        return frame::empty(id, title);
+    }
+    let labels = grid.panels.iter().map(|p| (p.name.as_str(), p.unit.as_str()));
+    let ordinates = Ordinates::of(labels, columns, grid.shared_ordinates);
+    let ranges = frame::of_rows(
+        grid.panels.iter().map(|p| grid.range_of(p)).collect(),
+        columns,
+        grid.shared_ordinates,
+    );
+    let height = if n == 1 { ALONE } else { HEIGHT };
+    let above = match grid.range {
+        BoxRange::Full => 0.0,
+        BoxRange::Whiskers => COUNTS,
+    };
+    let titled = !grid.titles.is_empty();
+    let frame = Frame::with_space(n, columns, height, ordinates, titled, (above, 0.0));
+    let groups = (0.5, grid.groups.len() as f64 + 0.5);
+    let cell = |(i, panel): (usize, &BoxPanel)| {
+        let layout = style::layout(groups, ranges[i], height);
+        let layout = with_ordinate(layout, ranges[i], &panel.unit, false, height, frame.has_ticks(i));
+        let layout = frame
+            .fitted(i, layout)
+            .with_x_categories(vec![String::new(); grid.groups.len()]);
+        (vec![Plot::from(style::line([], BLACK, 1.0))], layout)
+    };
+    let cells = grid.panels.iter().enumerate().map(cell).collect();
+    let label = |i: usize| panel_label(&grid.panels[i].name, &grid.panels[i].unit);
+    let mut scene = frame.drawn(cells, &grid.abscissa, label, &grid.titles, 0.0);
+    let mut missing = false;
+    for (i, panel) in grid.panels.iter().enumerate() {
+        missing |= grid.draw(&mut scene, panel, frame.area(i), ranges[i]);
+        if frame.is_lowest(i) {
+            grid.add_names(&mut scene, frame.area(i));
+        }
+    }
+    grid.add_legend(&mut scene, missing);
+    style::finish(id, title, &scene)
+}
+
+impl BoxGrid {
+    fn range_of(&self, panel: &BoxPanel) -> (f64, f64) {
+        let boxes = panel.boxes.iter().flatten().filter(|b| b.is_drawable());
+        let mut values: Vec<f64> = boxes.clone().flat_map(BoxStatistics::marks).collect();
+        if self.range == BoxRange::Full {
+            values.extend(boxes.flat_map(|b| b.outliers.iter().copied()));
+        }
+        if self.with_zero {
+            values.push(0.0);
+        }
+        let (low, high) = style::padded_range(values);
+        let (middle, reach) = (0.5 * (low + high), 0.5 * (high - low));
+        if reach < self.least_reach {
+            (middle - self.least_reach, middle + self.least_reach)
+        } else {
+            (low, high)
+        }
+    }
+
+    /// The names of the groups, smaller or in two rows where they are long.
+    fn add_names(&self, scene: &mut Scene, area: Area) {
+        let names: Vec<String> = self.groups.iter().map(|g| marked(g)).collect();
+        let pitch = area.width / names.len() as f64;
+        let widest = |size| names.iter().map(|n| draw::text_width(n, size)).fold(0.0, f64::max);
+        let size = if widest(TEXT) < pitch { TEXT } else { draw::SMALL };
+        let staggered = widest(size) > pitch;
+        for (k, name) in names.iter().enumerate() {
+            let x = area.left + pitch * (k as f64 + 0.5);
+            let y = area.bottom()
+                + if staggered && k % 2 == 1 {
+                    NAMES_BELOW + SECOND
+                } else {
+                    NAMES_BELOW
+                };
+            scene.add(draw::text(x, y, name.clone(), size, TextAnchor::Middle, None));
+        }
+    }
+
+    /// Draws the boxes of a panel; true when one is missing.
+    fn draw(&self, scene: &mut Scene, panel: &BoxPanel, area: Area, (low, high): (f64, f64)) -> bool {
+        let y_of = |v: f64| area.bottom() - (v.clamp(low, high) - low) / (high - low) * area.height;
+        if self.with_zero && low < 0.0 && high > 0.0 {
+            let y = y_of(0.0);
+            scene.add(draw::line((area.left, y), (area.right(), y), "#666666", 0.8, None));
+        }
+        let of_group = area.width / self.groups.len() as f64;
+        for k in 1..self.groups.len() {
+            let x = area.left + of_group * k as f64;
+            scene.add(draw::line(
+                (x, area.top),
+                (x, area.bottom()),
+                "#cccccc",
+                0.6,
+                Some("2 2"),
+            ));
+        }
+        let pitch = GROUP * of_group / self.series.len().max(1) as f64;
+        let half = 0.5 * (BOX * pitch).min(WIDEST);
+        let (mut above, mut below, mut missing) = (0, 0, false);
+        for group in 0..self.groups.len() {
+            let start = area.left + of_group * (group as f64 + 0.5 * (1.0 - GROUP));
+            for (place, series) in self.series.iter().enumerate() {
+                let x = start + pitch * (place as f64 + 0.5);
+                let statistics = panel.boxes.get(group).and_then(|b| b.get(place));
+                let Some(statistics) = statistics.filter(|b| b.is_drawable()) else {
+                    missing = true;
+                    draw::cross(scene, (x, area.bottom() - 6.0), half.min(3.0), INK, 1.0);
+                    continue;
+                };
+                let colour = series.shade.colour();
+                draw_box(scene, statistics, x, half, &colour, &y_of);
+                let over = statistics.outliers.iter().filter(|v| **v > high).count();
+                let under = statistics.outliers.iter().filter(|v| **v < low).count();
+                if over > 0 {
+                    draw::triangle(scene, (x, area.top), half.clamp(2.0, 3.5), true, &colour);
+                }
+                if under > 0 {
+                    draw::triangle(scene, (x, area.bottom()), half.clamp(2.0, 3.5), false, &colour);
+                }
+                let inside = |v: &&f64| (low..=high).contains(*v);
+                let at: Vec<(f64, f64)> = statistics
+                    .outliers
+                    .iter()
+                    .filter(inside)
+                    .map(|v| (x, y_of(*v)))
+                    .collect();
+                let radius = if at.len() > 30 { 0.7 } else { 1.1 };
+                draw::points(scene, &at, radius, &colour, None);
+                above += over;
+                below += under;
+            }
+        }
+        let told = [(above, "above"), (below, "below")];
+        let told: Vec<String> = told
+            .iter()
+            .filter(|t| t.0 > 0)
+            .map(|(count, side)| format!("{count} {side}"))
+            .collect();
+        if !told.is_empty() {
+            let y = area.top - 3.0;
+            scene.add(draw::text(
+                area.right(),
+                y,
+                told.join(", "),
+                draw::SMALL,
+                TextAnchor::End,
+                None,
+            ));
+        }
+        missing
+    }
+
+    fn add_legend(&self, scene: &mut Scene, missing: bool) {
+        let named = self.series.iter().filter(|s| !s.name.is_empty());
+        let mut entries: Vec<Entry> = named
+            .map(|s| Entry::new(&s.name, &s.shade.colour(), Sample::Box))
+            .collect();
+        if missing {
+            entries.push(Entry::new("no value", INK, Sample::Cross));
+        }
+        // Levels of one method stand in one row.
+        let levels = self.series.first().map_or(1, |s| s.shade.levels);
+        add_legend_by(scene, &entries, levels);
+    }
+}
+
+fn draw_box(
+    scene: &mut Scene,
+    statistics: &BoxStatistics,
+    x: f64,
+    half: f64,
+    colour: &str,
+    y_of: &impl Fn(f64) -> f64,
+) {
+    let [lowest, lower, median, upper, highest] = statistics.marks().map(y_of);
+    for (end, side) in [(lowest, lower), (highest, upper)] {
+        scene.add(draw::line((x, side), (x, end), INK, 0.8, None));
+        scene.add(draw::line((x - 0.6 * half, end), (x + 0.6 * half, end), INK, 0.8, None));
+    }
+    let size = (2.0 * half, lower - upper);
+    scene.add(draw::rectangle((x - half, upper), size, colour, Some((INK, 0.6))));
+    // A box without height is its median alone.
+    let on_box = if size.1 < 2.0 || !is_dark(colour) {
+        BLACK
+    } else {
+        "#FFFFFF"
+    };
+    scene.add(draw::line((x - half, median), (x + half, median), on_box, 1.2, None));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::draw::tests::has, *};
+
+    fn grid(boxes: Vec<Vec<BoxStatistics>>) -> BoxGrid {
+        let (groups, series) = (boxes.len(), boxes.first().map_or(0, Vec::len));
+        BoxGrid {
+            panels: vec![BoxPanel {
+                name: "B_r(b0)".to_owned(),
+                unit: "%".to_owned(),
+                boxes,
+            }],
+            groups: (0..groups).map(|g| format!("{}", 26 + g)).collect(),
+            series: (0..series)
+                .map(|level| BoxSeries {
+                    name: format!("P_n = 0.{level}"),
+                    shade: Shade {
+                        method: 0,
+                        level,
+                        levels: series,
+                    },
+                })
+                .collect(),
+            ..BoxGrid::default()
+        }
+    }
+
+    #[test]
+    fn a_box_stands_at_the_place_of_its_numbers() {
+        // Ordinate from 0 to 10 with 5 % of room: -0.5 to 10.5 over the height of the axes.
+        let one = BoxStatistics {
+            count: 5,
+            lower_whisker: 0.0,
+            lower_quartile: 2.0,
+            median: 5.0,
+            upper_quartile: 8.0,
+            upper_whisker: 9.0,
+            outliers: vec![10.0],
+        };
+        let svg = box_plots("b", "t", &grid(vec![vec![one]]));
+        let y = |v: f64| 8.0 + ALONE * (10.5 - v) / 11.0;
+        let middle = style::LEFT + 0.5 * (style::WIDTH - style::LEFT - style::RIGHT);
+        let side = middle - 0.5 * WIDEST;
+        let height = ALONE * 6.0 / 11.0;
+        let rect = [("x", side), ("y", y(8.0)), ("width", WIDEST), ("height", height)];
+        assert!(has(&svg, "rect", &rect), "{svg}");
+        let line = |from: (f64, f64), to: (f64, f64)| {
+            has(
+                &svg,
+                "line",
+                &[("x1", from.0), ("y1", from.1), ("x2", to.0), ("y2", to.1)],
+            )
+        };
+        assert!(line((middle, y(2.0)), (middle, y(0.0))), "lower whisker");
+        assert!(line((middle, y(8.0)), (middle, y(9.0))), "upper whisker");
+        assert!(line((side, y(5.0)), (side + WIDEST, y(5.0))), "median");
+        assert!(has(&svg, "circle", &[("cx", middle), ("cy", y(10.0))]), "outlier");
+        // The ordinate of the library agrees: its tick at 2 is level with the lower quartile.
+        assert!(line((style::LEFT - 5.0, y(2.0)), (style::LEFT, y(2.0))), "tick");
+        assert!(svg.contains(">10</text>") && svg.contains(">0</text>"));
+    }
+
+    #[test]
+    fn outliers_beyond_are_counted_and_missing_boxes_crossed() {
+        let mut one = BoxStatistics::of(&[1.0, 2.0, 3.0, 4.0, 5.0]);
+        one.outliers = vec![1000.0, 2000.0, -300.0];
+        let missing = BoxStatistics::default();
+        let broken = BoxStatistics {
+            count: 3,
+            median: f64::NAN,
+            ..one.clone()
+        };
+        let mut grid = grid(vec![vec![one, missing], vec![broken]]);
+        let whole = box_plots("b", "t", &grid);
+        assert!(!whole.contains("above") && whole.contains(">2000</text>"));
+        assert_eq!(whole.matches("no value").count(), 1);
+        grid.range = BoxRange::Whiskers;
+        let cut = box_plots("b", "t", &grid);
+        assert!(cut.contains("2 above, 1 below") && !cut.contains(">2000<") && !cut.contains("NaN"));
+        assert_eq!(cut, box_plots("b", "t", &grid));
+    }
+
+    #[test]
+    fn an_empty_grid_is_a_small_figure() {
+        for grid in [BoxGrid::default(), grid(vec![]), grid(vec![vec![]])] {
+            let svg = box_plots("b", "t", &grid);
+            assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>") && !svg.contains("NaN"));
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Colours of values, and the bar that tells them.
+//!
+//! They are viridis (Smith and van der Walt, 2015), evenly spaced in lightness, or for differences those from red over white at zero to
+//! blue of Harrower and Brewer (2003), of which both ends are equally dark.
+
+use kuva::{
+    prelude::ColorMap,
+    render::render::{Scene, TextAnchor},
+};
+
+use super::{
+    axes::{marked, tick, tick_step},
+    draw,
+    style::{BLACK, TEXT},
+};
+
+/// Space for the bar at the right, its width, and the number of its steps.
+pub const BESIDE: f64 = 72.0;
+const BAR: f64 = 12.0;
+const STEPS: usize = 64;
+/// Height between its ticks.
+const TICK_HEIGHT: f64 = 30.0;
+
+/// Colours of the cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MapColours {
+    /// From dark for the smallest value to light for the largest.
+    #[default]
+    Sequential,
+    /// White at zero, equally far to both sides.
+    Diverging,
+}
+
+/// From values to colours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ColourScale {
+    pub low: f64,
+    pub high: f64,
+    pub colours: MapColours,
+}
+
+impl ColourScale {
+    /// The colour `#rrggbb` of a value; those beyond the ends have the colour of the end.
+    pub fn colour(&self, value: f64) -> String {
+        let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
+        let map = match self.colours {
+            MapColours::Sequential => ColorMap::Viridis,
+            MapColours::Diverging => ColorMap::RedBlue,
+        };
+        let (r, g, b) = map.map_rgb(share).unwrap_or_default();
+        format!("#{r:02X}{g:02X}{b:02X}")
+    }
+
+    /// A bar of the colours with ticks and the name of the value, at the right end of the figure.
+    pub fn add_bar(&self, scene: &mut Scene, top: f64, bottom: f64, name: &str) {
+        let left = scene.width - BESIDE + 2.0;
+        let height = bottom - top;
+        let step = height / STEPS as f64;
+        for k in 0..STEPS {
+            let share = (k as f64 + 0.5) / STEPS as f64;
+            let value = self.low + share * (self.high - self.low);
+            let colour = self.colour(value);
+            let corner = (left, bottom - step * (k + 1) as f64);
+            scene.add(draw::rectangle(corner, (BAR, step), &colour, Some((&colour, 0.4))));
+        }
+        scene.add(draw::rectangle((left, top), (BAR, height), "none", Some((BLACK, 0.8))));
+        let ticks = tick_step(self.high - self.low, (height / TICK_HEIGHT).max(2.0));
+        let first = (self.low / ticks - 1e-9).ceil();
+        let last = (self.high / ticks + 1e-9).floor();
+        let many = (last - first).clamp(0.0, 20.0) as usize;
+        for k in 0..=many {
+            let value = (first + k as f64) * ticks;
+            let y = bottom - height * (value - self.low) / (self.high - self.low);
+            scene.add(draw::line((left + BAR, y), (left + BAR + 4.0, y), BLACK, 1.0, None));
+            let at = left + BAR + 7.0;
+            scene.add(draw::text(
+                at,
+                y + 4.5,
+                tick(value, ticks),
+                TEXT,
+                TextAnchor::Start,
+                None,
+            ));
+        }
+        let x = scene.width - 5.0;
+        scene.add(draw::centred(x, top + 0.5 * height, marked(name), Some(-90.0)));
+    }
+}

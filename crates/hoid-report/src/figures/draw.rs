@@ -1,0 +1,163 @@
+//! Marks that are drawn at places of the figure itself, above the axes: coordinates in its units.
+
+use kuva::render::{
+    color::Color,
+    render::{PathData, Primitive, Scene, TextAnchor},
+};
+
+use super::{
+    axes::printed,
+    style::{GREY, TEXT},
+};
+
+/// Outlines, whiskers, and the marks of what is missing.
+pub const INK: &str = "#333333";
+/// Size of numbers inside a panel, and of labels that would be too long.
+pub const SMALL: u32 = 10;
+/// Of bands around lines.
+pub const BAND_OPACITY: f64 = 0.2;
+
+/// Distance of the lines of a hatching.
+const HATCH: f64 = 5.0;
+
+pub fn line(from: (f64, f64), to: (f64, f64), colour: &str, width: f64, dashes: Option<&str>) -> Primitive {
+    Primitive::Line {
+        x1: from.0,
+        y1: from.1,
+        x2: to.0,
+        y2: to.1,
+        stroke: Color::from(colour),
+        stroke_width: width,
+        stroke_dasharray: dashes.map(str::to_owned),
+    }
+}
+
+pub fn rectangle(
+    (x, y): (f64, f64),
+    (width, height): (f64, f64),
+    fill: &str,
+    stroke: Option<(&str, f64)>,
+) -> Primitive {
+    Primitive::Rect {
+        x,
+        y,
+        width,
+        height,
+        fill: Color::from(fill),
+        stroke: stroke.map(|s| Color::from(s.0)),
+        stroke_width: stroke.map(|s| s.1),
+        opacity: None,
+    }
+}
+
+pub fn points(scene: &mut Scene, at: &[(f64, f64)], radius: f64, colour: &str, opacity: Option<f64>) {
+    if at.is_empty() {
+        return;
+    }
+    scene.add(Primitive::CircleBatch {
+        cx: at.iter().map(|p| p.0).collect(),
+        cy: at.iter().map(|p| p.1).collect(),
+        r: radius,
+        fill: Color::from(colour),
+        fill_opacity: opacity,
+        stroke: None,
+        stroke_width: None,
+    });
+}
+
+pub fn cross(scene: &mut Scene, (x, y): (f64, f64), half: f64, colour: &str, width: f64) {
+    scene.add(line((x - half, y - half), (x + half, y + half), colour, width, None));
+    scene.add(line((x - half, y + half), (x + half, y - half), colour, width, None));
+}
+
+/// A triangle that points up or down with its tip at a place.
+pub fn triangle(scene: &mut Scene, (x, y): (f64, f64), half: f64, up: bool, colour: &str) {
+    let base = if up { y + 1.7 * half } else { y - 1.7 * half };
+    let (left, right) = (x - half, x + half);
+    scene.add(Primitive::Path(Box::new(PathData {
+        d: format!("M {x:.2} {y:.2} L {left:.2} {base:.2} L {right:.2} {base:.2} Z"),
+        fill: Some(Color::from(colour)),
+        stroke: Color::None,
+        stroke_width: 0.0,
+        opacity: None,
+        stroke_dasharray: None,
+    })));
+}
+
+/// A pale rectangle with diagonal lines: nothing is known here.
+pub fn hatched(scene: &mut Scene, (x, y): (f64, f64), (width, height): (f64, f64)) {
+    scene.add(rectangle((x, y), (width, height), "#f2f2f2", None));
+    let mut offset = HATCH;
+    while offset < width + height {
+        let from = (x + (offset - height).max(0.0), y + offset.min(height));
+        let to = (x + offset.min(width), y + (offset - width).max(0.0));
+        scene.add(line(from, to, GREY, 0.6, None));
+        offset += HATCH;
+    }
+}
+
+pub fn text(x: f64, y: f64, content: String, size: u32, anchor: TextAnchor, rotate: Option<f64>) -> Primitive {
+    Primitive::Text {
+        x,
+        y,
+        content,
+        anchor,
+        size,
+        rotate,
+        bold: false,
+        color: None,
+    }
+}
+
+/// Text in the middle of a place, in the size of all labels.
+pub fn centred(x: f64, y: f64, content: String, rotate: Option<f64>) -> Primitive {
+    text(x, y, content, TEXT, TextAnchor::Middle, rotate)
+}
+
+/// The same, smaller where it is longer than its room.
+pub fn fitted(x: f64, y: f64, content: String, room: f64, rotate: Option<f64>) -> Primitive {
+    let size = match text_width(&content, TEXT) > room {
+        true => SMALL,
+        false => TEXT,
+    };
+    text(x, y, content, size, TextAnchor::Middle, rotate)
+}
+
+/// Width of sans-serif text, a little more on average; the signs of subscripts have none.
+pub fn text_width(text: &str, size: u32) -> f64 {
+    let of = |sign: char| match sign {
+        ' ' | '.' | ',' | ':' | ';' | 'i' | 'j' | 'l' | '|' | '\'' | 'I' => 0.28,
+        '-' | '(' | ')' | '[' | ']' | 'f' | 't' | 'r' | '/' => 0.34,
+        'm' | 'M' | 'w' | 'W' | '%' | '\u{3c9}' => 0.88,
+        'A'..='Z' => 0.7,
+        _ => 0.56,
+    };
+    f64::from(size) * printed(text).map(of).sum::<f64>()
+}
+
+#[cfg(test)]
+pub mod tests {
+    use super::*;
+
+    /// True when the figure has an element with these numbers, to the hundredth that it is written with.
+    pub fn has(svg: &str, element: &str, numbers: &[(&str, f64)]) -> bool {
+        let number = |tag: &str, name: &str| -> Option<f64> {
+            let (_, rest) = tag.split_once(&format!(" {name}=\""))?;
+            rest.split_once('"')?.0.parse().ok()
+        };
+        let open = format!("<{element} ");
+        let tags = svg.split(&open).skip(1);
+        let mut tags = tags.filter_map(|rest| Some(format!(" {}", rest.split_once('>')?.0)));
+        tags.any(|tag| {
+            let near = |(name, wanted): &(&str, f64)| number(&tag, name).is_some_and(|v| (v - wanted).abs() < 0.006);
+            numbers.iter().all(near)
+        })
+    }
+
+    #[test]
+    fn widths_of_text() {
+        // Helvetica: digits 0.556, the point 0.278 of the size.
+        assert!((text_width("-0.55", 10) - 22.9).abs() < 0.5);
+        assert_eq!(text_width("", 13), 0.0);
+    }
+}

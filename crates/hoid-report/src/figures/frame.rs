@@ -1,0 +1,292 @@
+//! The grid that figures of several panels stand in: widths, heights and margins of its cells, labels of rows and titles of columns.
+//!
+//! One column is as wide as a column of text, several as a page. Axes are equally wide in all columns. Only the lowest panel of a
+//! column has the ticks and the name of the abscissa.
+
+use std::sync::Arc;
+
+use kuva::{
+    prelude::{Layout, Plot, TickFormat},
+    render::render::Scene,
+};
+
+use super::{
+    axes::marked,
+    draw,
+    style::{self, LEFT, RIGHT, WIDTH},
+};
+
+/// Above the axes of a panel, and below where no abscissa stands.
+const SPACE: f64 = 8.0;
+/// Before a panel that shares the ordinate of its neighbour.
+const GAP: f64 = 16.0;
+/// Before a panel with ticks of its own, but no label.
+const TICKS: f64 = 50.0;
+/// After such a panel, but for the last: less than the half of a tick's label, which reaches into the space of the next.
+const NARROW: f64 = 5.0;
+const TITLE: f64 = 18.0;
+/// Centre of the label of the ordinate.
+const LABEL_AT: f64 = 13.0;
+/// The name of the abscissa below its axis.
+const NAME_BELOW: f64 = 40.0;
+
+/// Which panels of a row have ticks and the label of the ordinate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ordinates {
+    /// Each has both.
+    Each,
+    /// Each has ticks, the first the label.
+    Ticks,
+    /// The first has both: all have the same range.
+    Shared,
+}
+
+impl Ordinates {
+    /// For panels with these names and units by rows: one label is enough for a row of one quantity.
+    pub fn of<'a>(labels: impl Iterator<Item = (&'a str, &'a str)>, columns: usize, shared: bool) -> Self {
+        let labels: Vec<(&str, &str)> = labels.collect();
+        let one = |row: &[(&str, &str)]| row.iter().all(|l| *l == row[0]);
+        match shared {
+            true => Self::Shared,
+            false if labels.chunks(columns.max(1)).all(one) => Self::Ticks,
+            false => Self::Each,
+        }
+    }
+}
+
+/// Rectangle between the axes of a panel, in units of the figure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Area {
+    pub left: f64,
+    pub top: f64,
+    pub width: f64,
+    pub height: f64,
+}
+
+impl Area {
+    /// Columns that a line between these axes is reduced to: one for each unit.
+    pub fn parts(&self) -> usize {
+        self.width.max(1.0) as usize
+    }
+
+    pub fn right(&self) -> f64 {
+        self.left + self.width
+    }
+
+    pub fn bottom(&self) -> f64 {
+        self.top + self.height
+    }
+}
+
+/// Sizes of a grid of `n` panels by rows; the last row may be short.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    n: usize,
+    columns: usize,
+    ordinates: Ordinates,
+    titled: bool,
+    above: f64,
+    axes_height: f64,
+    widths: Vec<f64>,
+    heights: Vec<f64>,
+}
+
+impl Frame {
+    /// Panels with axes of this height.
+    pub fn new(n: usize, columns: usize, axes_height: f64, ordinates: Ordinates, titled: bool) -> Self {
+        Self::with_space(n, columns, axes_height, ordinates, titled, (0.0, 0.0))
+    }
+
+    /// Panels in a figure that leaves some units above each panel and at its right.
+    pub fn with_space(
+        n: usize,
+        columns: usize,
+        axes_height: f64,
+        ordinates: Ordinates,
+        titled: bool,
+        (above, beside): (f64, f64),
+    ) -> Self {
+        let columns = columns.max(1);
+        let whole = if columns == 1 { WIDTH } else { 2.0 * WIDTH } - beside;
+        let mut frame = Self {
+            n,
+            columns,
+            ordinates,
+            titled,
+            above,
+            axes_height,
+            widths: Vec::new(),
+            heights: Vec::new(),
+        };
+        let margins: f64 = (0..columns).map(|c| frame.left(c) + frame.right(c)).sum();
+        let axes = (whole - margins) / columns as f64;
+        frame.widths = (0..columns).map(|c| frame.left(c) + axes + frame.right(c)).collect();
+        frame.heights = (0..n.div_ceil(columns))
+            .map(|row| frame.top(row) + axes_height + frame.bottom(row))
+            .collect();
+        frame
+    }
+
+    fn left(&self, column: usize) -> f64 {
+        match self.ordinates {
+            _ if column == 0 => LEFT,
+            Ordinates::Each => LEFT,
+            Ordinates::Ticks => TICKS,
+            Ordinates::Shared => GAP,
+        }
+    }
+
+    fn right(&self, column: usize) -> f64 {
+        match self.ordinates {
+            Ordinates::Ticks if column + 1 < self.columns => NARROW,
+            _ => RIGHT,
+        }
+    }
+
+    fn top(&self, row: usize) -> f64 {
+        SPACE + self.above + if row == 0 && self.titled { TITLE } else { 0.0 }
+    }
+
+    fn bottom(&self, row: usize) -> f64 {
+        let last = self.n.min((row + 1) * self.columns);
+        if last + self.columns > self.n {
+            style::BOTTOM
+        } else {
+            SPACE
+        }
+    }
+
+    /// True for the lowest panel of a column.
+    pub fn is_lowest(&self, i: usize) -> bool {
+        i + self.columns >= self.n
+    }
+
+    /// True for a panel with ticks at its ordinate.
+    pub fn has_ticks(&self, i: usize) -> bool {
+        i.is_multiple_of(self.columns) || self.ordinates != Ordinates::Shared
+    }
+
+    /// True for a panel with a label at its ordinate.
+    pub fn has_label(&self, i: usize) -> bool {
+        i.is_multiple_of(self.columns) || self.ordinates == Ordinates::Each
+    }
+
+    /// Where the axes of a panel are.
+    pub fn area(&self, i: usize) -> Area {
+        let (row, column) = (i / self.columns, i % self.columns);
+        let left = self.left(column);
+        Area {
+            left: self.widths[..column].iter().sum::<f64>() + left,
+            top: self.heights[..row].iter().sum::<f64>() + self.top(row),
+            width: self.widths[column] - left - self.right(column),
+            height: self.axes_height,
+        }
+    }
+
+    /// A layout with the size and margins of a panel, and no ticks at the abscissa where it is not the lowest.
+    pub fn fitted(&self, i: usize, layout: Layout) -> Layout {
+        let (row, column) = (i / self.columns, i % self.columns);
+        let layout = layout
+            .with_width(self.widths[column])
+            .with_height(self.heights[row])
+            .with_force_margins(self.left(column), self.right(column))
+            .with_force_margins_y(self.top(row), self.bottom(row));
+        if self.is_lowest(i) {
+            return layout;
+        }
+        layout.with_x_tick_format(TickFormat::Custom(Arc::new(|_| String::new())))
+    }
+
+    /// The panels with the name of the abscissa, the labels of their ordinates and the titles of the columns.
+    pub fn drawn(
+        &self,
+        cells: Vec<(Vec<Plot>, Layout)>,
+        abscissa: &str,
+        label: impl Fn(usize) -> String,
+        titles: &[String],
+        beside: f64,
+    ) -> Scene {
+        let mut scene = style::in_grid(cells, &self.widths, &self.heights);
+        for i in (0..self.n).filter(|i| self.has_label(*i)) {
+            let area = self.area(i);
+            let (x, y) = (area.left - LEFT + LABEL_AT + 4.5, area.top + 0.5 * area.height);
+            let room = area.height + 2.0 * SPACE;
+            scene.add(draw::fitted(x, y, label(i), room, Some(-90.0)));
+        }
+        for area in (0..self.n).filter(|i| self.is_lowest(*i)).map(|i| self.area(i)) {
+            let (x, y) = (area.left + 0.5 * area.width, area.bottom() + NAME_BELOW);
+            scene.add(draw::fitted(x, y, marked(abscissa), area.width + 2.0 * SPACE, None));
+        }
+        for (column, title) in titles.iter().take(self.columns.min(self.n)).enumerate() {
+            let area = self.area(column);
+            let middle = area.left + 0.5 * area.width;
+            scene.add(draw::fitted(middle, TITLE, marked(title), area.width + SPACE, None));
+        }
+        // The widths of the cells add up to it but for rounding.
+        scene.width = (scene.width + beside).round();
+        scene
+    }
+}
+
+/// A figure without a panel.
+pub fn empty(id: &str, title: &str) -> String {
+    style::finish(id, title, &Scene::new(WIDTH, 1.0))
+}
+
+/// The range of each panel, or for each the widest of its row.
+pub fn of_rows(own: Vec<(f64, f64)>, columns: usize, shared: bool) -> Vec<(f64, f64)> {
+    if !shared {
+        return own;
+    }
+    let of_row = |row: &[(f64, f64)]| {
+        let start = (f64::INFINITY, f64::NEG_INFINITY);
+        let widest = row.iter().fold(start, |(l, h), r| (l.min(r.0), h.max(r.1)));
+        vec![widest; row.len()]
+    };
+    own.chunks(columns.max(1)).flat_map(of_row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_are_equally_wide_and_fill_the_page() {
+        for ordinates in [Ordinates::Each, Ordinates::Ticks, Ordinates::Shared] {
+            for columns in [1, 2, 4] {
+                let frame = Frame::with_space(2 * columns, columns, 80.0, ordinates, true, (5.0, 30.0));
+                let areas: Vec<Area> = (0..2 * columns).map(|i| frame.area(i)).collect();
+                assert!(areas.iter().all(|a| (a.width - areas[0].width).abs() < 1e-9));
+                let whole = if columns == 1 { WIDTH } else { 2.0 * WIDTH };
+                assert!((areas[columns - 1].right() - (whole - 30.0 - RIGHT)).abs() < 1e-9);
+                assert!(
+                    areas
+                        .windows(2)
+                        .all(|w| w[1].left > w[0].right() || w[1].top > w[0].bottom())
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_lowest_of_a_short_last_row_are_told() {
+        let frame = Frame::new(5, 2, 80.0, Ordinates::Shared, false);
+        let lowest: Vec<bool> = (0..5).map(|i| frame.is_lowest(i)).collect();
+        assert_eq!(lowest, [false, false, false, true, true]);
+    }
+
+    #[test]
+    fn rows_of_several_quantities_have_a_label_for_each() {
+        let of = |labels: [&'static str; 4], shared| Ordinates::of(labels.into_iter().map(|l| (l, "s")), 2, shared);
+        assert_eq!(of(["a", "a", "b", "b"], false), Ordinates::Ticks);
+        assert_eq!(of(["a", "b", "a", "b"], false), Ordinates::Each);
+        assert_eq!(of(["a", "a", "b", "b"], true), Ordinates::Shared);
+    }
+
+    #[test]
+    fn rows_share_their_widest_range() {
+        let own = vec![(0.0, 1.0), (-1.0, 0.5), (3.0, 4.0)];
+        assert_eq!(of_rows(own.clone(), 2, true), [(-1.0, 1.0), (-1.0, 1.0), (3.0, 4.0)]);
+        assert_eq!(of_rows(own.clone(), 2, false), own);
+    }
+}

@@ -1,0 +1,170 @@
+//! The legend below a figure.
+
+use kuva::render::render::{Scene, TextAnchor};
+
+use super::{
+    axes::marked,
+    draw,
+    style::{LEFT, TEXT},
+};
+
+const ROW: f64 = 18.0;
+const SAMPLE: f64 = 22.0;
+const GAP: f64 = 6.0;
+const BETWEEN: f64 = 14.0;
+const LONGEST: usize = 48;
+
+/// How an entry is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sample {
+    /// A continuous line.
+    Line,
+    /// A dashed line.
+    Dashed,
+    /// A filled box.
+    Box,
+    /// A point.
+    Point,
+    /// A line with a point.
+    LinePoint,
+    /// A small cross.
+    Cross,
+    /// A hatched box.
+    Hatched,
+}
+
+/// One entry.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// What it says; see [`marked`] for subscripts.
+    pub name: String,
+    /// Colour `#rrggbb`.
+    pub colour: String,
+    /// What it shows.
+    pub sample: Sample,
+}
+
+impl Entry {
+    pub fn new(name: &str, colour: &str, sample: Sample) -> Self {
+        Self {
+            name: name.to_owned(),
+            colour: colour.to_owned(),
+            sample,
+        }
+    }
+}
+
+/// Adds the legend below the figure, which grows by it: in one row where that is wide enough, else in columns, else, with long names,
+/// in rows of as many entries as fit.
+pub fn add_legend(scene: &mut Scene, entries: &[Entry]) {
+    add_legend_by(scene, entries, 1);
+}
+
+/// The same with a multiple of so many columns where there are several rows, so that what belongs together is not parted.
+pub fn add_legend_by(scene: &mut Scene, entries: &[Entry], multiple: usize) {
+    if entries.is_empty() {
+        return;
+    }
+    let names: Vec<String> = entries.iter().map(|e| marked(&shortened(&e.name, LONGEST))).collect();
+    let widths: Vec<f64> = names
+        .iter()
+        .map(|n| SAMPLE + GAP + draw::text_width(n, TEXT) + BETWEEN)
+        .collect();
+    let last = scene.width - 4.0 + BETWEEN;
+    let whole: f64 = widths.iter().sum();
+    let pitch = widths.iter().copied().fold(0.0, f64::max);
+    let columns = ((last - LEFT) / pitch) as usize;
+    let columns = if columns > multiple {
+        columns - columns % multiple.max(1)
+    } else {
+        columns
+    };
+    let in_one_row = whole <= last - 8.0;
+    let left = if in_one_row { LEFT.min(last - whole) } else { LEFT };
+    let (mut x, mut y) = (left, scene.height + 15.0);
+    for (i, entry) in entries.iter().enumerate() {
+        let (start, advance) = match columns {
+            _ if in_one_row => (x, widths[i]),
+            2.. => {
+                if i > 0 && i.is_multiple_of(columns) {
+                    (x, y) = (left, y + ROW);
+                }
+                (x, pitch)
+            }
+            _ => {
+                if x > left && x + widths[i] > last {
+                    (x, y) = (left, y + ROW);
+                }
+                (x.min(last - widths[i]).max(4.0), widths[i])
+            }
+        };
+        add_sample(scene, entry, start, y - 4.5);
+        let at = start + SAMPLE + GAP;
+        scene.add(draw::text(at, y, names[i].clone(), TEXT, TextAnchor::Start, None));
+        x = start + advance;
+    }
+    scene.height = y + 7.0;
+}
+
+fn add_sample(scene: &mut Scene, entry: &Entry, x: f64, y: f64) {
+    let colour = entry.colour.as_str();
+    let middle = x + 0.5 * SAMPLE;
+    let line = |dashes: Option<&str>| draw::line((x, y), (x + SAMPLE, y), colour, 2.0, dashes);
+    match entry.sample {
+        Sample::Line => scene.add(line(None)),
+        Sample::Dashed => scene.add(line(Some("6 3"))),
+        Sample::Box => scene.add(draw::rectangle(
+            (x + 3.0, y - 5.0),
+            (SAMPLE - 6.0, 10.0),
+            colour,
+            Some((draw::INK, 0.7)),
+        )),
+        Sample::Point => draw::points(scene, &[(middle, y)], 2.6, colour, None),
+        Sample::LinePoint => {
+            scene.add(line(None));
+            draw::points(scene, &[(middle, y)], 2.6, colour, None);
+        }
+        Sample::Cross => draw::cross(scene, (middle, y), 3.5, colour, 1.3),
+        Sample::Hatched => draw::hatched(scene, (x + 3.0, y - 5.0), (SAMPLE - 6.0, 10.0)),
+    }
+}
+
+fn shortened(text: &str, longest: usize) -> String {
+    if text.chars().count() <= longest {
+        return text.to_owned();
+    }
+    let mut short: String = text.chars().take(longest - 1).collect();
+    short.push('\u{2026}');
+    short
+}
+
+#[cfg(test)]
+mod tests {
+    use kuva::render::render::Primitive;
+
+    use super::*;
+
+    #[test]
+    fn long_names_are_cut() {
+        assert_eq!(shortened("abc", 3), "abc");
+        assert_eq!(shortened("\u{3c9}\u{3c9}\u{3c9}\u{3c9}", 3), "\u{3c9}\u{3c9}\u{2026}");
+    }
+
+    #[test]
+    fn entries_stay_within_the_figure() {
+        let mut scene = Scene::new(420.0, 100.0);
+        let entries: Vec<Entry> = (0..9)
+            .map(|k| Entry::new(&"name ".repeat(1 + k), "#000000", Sample::Line))
+            .collect();
+        add_legend(&mut scene, &entries);
+        let mut before = (0.0, 0.0);
+        for element in &scene.elements {
+            if let Primitive::Text { x, y, .. } = element {
+                assert!(*x > 0.0 && *x < 420.0 && *y < scene.height);
+                assert!((*y, *x) > before, "entries in reading order");
+                before = (*y, *x);
+            }
+        }
+        assert!(scene.height > 100.0 + 3.0 * ROW);
+    }
+}

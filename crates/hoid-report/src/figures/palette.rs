@@ -1,0 +1,134 @@
+//! The colours of all figures: the hue tells the method, the shade of the hue the level (noise, sample time, memory), black the truth.
+//!
+//! Hues are those of Okabe and Ito (*Color Universal Design*, 2008). Shades of one hue are spaced evenly in lightness `L*` (CIE 1976),
+//! light for the lowest level and dark for the highest, so that their order is kept in grey print as well.
+
+use super::style::MODEL_COLOURS;
+
+/// Lightness of the lowest and the highest of several levels.
+const LIGHTEST: f64 = 76.0;
+const DARKEST: f64 = 22.0;
+
+/// Whose colour a curve or box has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shade {
+    /// Number of the method, which gives the hue: 0 (ARX) is blue, 1 (BJ) vermillion.
+    pub method: usize,
+    /// Number of the level from the lowest, which gives the lightness.
+    pub level: usize,
+    /// How many levels there are; the hue itself where it is one or none.
+    pub levels: usize,
+}
+
+impl Shade {
+    /// The hue of a method.
+    pub fn of_method(method: usize) -> Self {
+        Self {
+            method,
+            level: 0,
+            levels: 1,
+        }
+    }
+
+    /// Its colour as `#rrggbb`.
+    pub fn colour(self) -> String {
+        shade(self.method, self.level, self.levels)
+    }
+}
+
+/// The colour `#rrggbb` of a level of a method; levels beyond the last are as dark as that.
+pub fn shade(method: usize, level: usize, levels: usize) -> String {
+    let hue = MODEL_COLOURS[method % MODEL_COLOURS.len()];
+    if levels < 2 {
+        return hue.to_owned();
+    }
+    let share = level.min(levels - 1) as f64 / (levels - 1) as f64;
+    let wanted = LIGHTEST + share * (DARKEST - LIGHTEST);
+    let hue = channels(hue);
+    let end = if wanted > lightness(hue) { 255.0 } else { 0.0 };
+    let mixed = |part: f64| hue.map(|c| c + part * (end - c));
+    // Lightness is monotonic in the part of white or black.
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        let too_far = (lightness(mixed(middle)) > wanted) == (end > 0.0);
+        if too_far {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    let [r, g, b] = mixed(low).map(|c| c.round() as u8);
+    format!("#{r:02X}{g:02X}{b:02X}")
+}
+
+/// True when white stands out better than black on a colour `#rrggbb`: by contrast of luminance, below `L*` of 50.
+pub fn is_dark(colour: &str) -> bool {
+    lightness(channels(colour)) < 50.0
+}
+
+/// The channels of `#rrggbb`; a part that is no number is zero.
+fn channels(colour: &str) -> [f64; 3] {
+    let part = |i: usize| {
+        let digits = colour.get(1 + 2 * i..3 + 2 * i).unwrap_or("00");
+        u8::from_str_radix(digits, 16).map_or(0.0, f64::from)
+    };
+    [part(0), part(1), part(2)]
+}
+
+/// CIE 1976 lightness `L*` of an sRGB colour, 0 to 100.
+fn lightness(channels: [f64; 3]) -> f64 {
+    let [r, g, b] = channels.map(|c| {
+        let c = c / 255.0;
+        if c <= 0.04045 {
+            c / 12.92
+        } else {
+            ((c + 0.055) / 1.055).powf(2.4)
+        }
+    });
+    let y = 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    if y > 0.008856 {
+        116.0 * y.cbrt() - 16.0
+    } else {
+        903.3 * y
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lightness_falls_evenly_with_the_level_in_every_hue() {
+        for method in 0..MODEL_COLOURS.len() {
+            for levels in [2, 3, 4, 7] {
+                let of = |level| lightness(channels(&shade(method, level, levels)));
+                let step = (DARKEST - LIGHTEST) / (levels - 1) as f64;
+                for level in 1..levels {
+                    // Rounding to whole channels moves L* by up to 0.4.
+                    assert!(
+                        (of(level) - of(level - 1) - step).abs() < 0.8,
+                        "{method} {level} {levels}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn one_level_is_the_hue_itself() {
+        assert_eq!(shade(0, 0, 1), MODEL_COLOURS[0]);
+        assert_eq!(shade(7, 3, 0), MODEL_COLOURS[1]);
+        assert_eq!(shade(1, 9, 3), shade(1, 2, 3));
+        assert_eq!(Shade::of_method(1).colour(), MODEL_COLOURS[1]);
+    }
+
+    #[test]
+    fn lightness_of_white_black_and_mid_grey() {
+        assert!((lightness([255.0; 3]) - 100.0).abs() < 1e-3);
+        assert_eq!(lightness([0.0; 3]), 0.0);
+        // L* of sRGB 119 is 50.03.
+        assert!((lightness([119.0; 3]) - 50.03).abs() < 0.01);
+        assert!(is_dark("#000000") && !is_dark("#FFFFFF") && is_dark("x"));
+    }
+}

@@ -1,0 +1,83 @@
+//! Places of numbers between the axes of a panel, linear or logarithmic.
+
+use super::{frame::Area, style};
+
+/// Places of numbers between the axes of a panel.
+pub struct Scale {
+    pub area: Area,
+    pub x: (f64, f64),
+    pub y: (f64, f64),
+    pub log_x: bool,
+    pub log_y: bool,
+}
+
+impl Scale {
+    /// True for a number within the abscissa.
+    pub fn has_x(&self, x: f64) -> bool {
+        (self.x.0..=self.x.1).contains(&x)
+    }
+
+    /// True for a number that has a place on the ordinate or beyond its ends.
+    pub fn has_y(&self, y: f64) -> bool {
+        style::is_drawable(y) && (y > 0.0 || !self.log_y)
+    }
+
+    pub fn cut(&self, y: f64) -> f64 {
+        y.clamp(self.y.0, self.y.1)
+    }
+
+    /// Beyond the axes the path is cut; without bound, numbers of 1e300 would stand in the file.
+    pub fn bounded(&self, y: f64) -> f64 {
+        let (low, high) = self.y;
+        let span = high - low;
+        match self.log_y {
+            true => y.clamp(low / 10.0, high * 10.0),
+            false => y.clamp(low - span, high + span),
+        }
+    }
+
+    pub fn place_x(&self, x: f64) -> f64 {
+        self.area.left + self.area.width * share(x, self.x, self.log_x)
+    }
+
+    pub fn place_y(&self, y: f64) -> f64 {
+        self.area.bottom() - self.area.height * share(y, self.y, self.log_y)
+    }
+}
+
+fn share(value: f64, (low, high): (f64, f64), logarithmic: bool) -> f64 {
+    match logarithmic {
+        true => (value / low).ln() / (high / low).ln(),
+        false => (value - low) / (high - low),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_places() {
+        let area = Area {
+            left: 10.0,
+            top: 20.0,
+            width: 100.0,
+            height: 50.0,
+        };
+        let scale = Scale {
+            area,
+            x: (0.0, 4.0),
+            y: (1.0, 100.0),
+            log_x: false,
+            log_y: true,
+        };
+        assert_eq!(scale.place_x(1.0), 35.0);
+        assert!((scale.place_y(10.0) - 45.0).abs() < 1e-12);
+        assert_eq!(
+            (scale.cut(1e3), scale.bounded(1e9), scale.bounded(0.5)),
+            (100.0, 1e3, 0.5)
+        );
+        assert!(scale.has_x(4.0) && !scale.has_x(f64::NAN) && !scale.has_x(-1.0));
+        assert!(scale.has_y(1e9) && !scale.has_y(0.0) && !scale.has_y(f64::INFINITY));
+    }
+}
