@@ -28,7 +28,7 @@ pub struct Cli {
 pub enum Command {
     /// The whole path on a simulated run: simulate, identify, write a report
     Demo(DemoArgs),
-    /// Simulate one closed-loop run and write it as CSV or Parquet
+    /// Simulate one closed-loop run and write it as CSV, Parquet, NPZ or .mat
     Simulate(SimulateArgs),
     /// Identify a model and the operator's parameters from one or several records
     Identify(Box<IdentifyArgs>),
@@ -36,10 +36,21 @@ pub enum Command {
     Track(Box<TrackArgs>),
     /// Track live: samples as lines on standard input, one JSON line a sample on standard output
     Stream(Box<StreamArgs>),
+    /// Show what is inside of a file: columns, sampling, ranges, what is suspicious, and a sketch of each
+    Info(InfoArgs),
     /// Take discrete coefficients to operator parameters or back, or discretise a transfer function
     Convert(ConvertArgs),
     /// Crossover frequency, phase and gain margin of a scenario, and its remnant gains
     Margins(MarginsArgs),
+    /// Analyse many recorded runs by subject and condition
+    Group(GroupArgs),
+    /// Simulate a virtual experiment for `hoid group`: subjects, conditions and runs, with the truth beside them
+    SimulateGroup(SimulateGroupArgs),
+    /// Monte Carlo studies: run a plan, join shares, list plans
+    #[command(subcommand)]
+    Study(StudyCommand),
+    /// The tables, figures and claims of the reference text, each from a named study
+    Reproduce(ReproduceArgs),
 }
 
 #[derive(Debug, Args)]
@@ -91,6 +102,9 @@ pub struct SimulateArgs {
     /// Seed of the random streams
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
+    /// Cell of a study, to repeat one of its runs: seed, cell and replication name the random stream
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub cell: u64,
     /// Replication: runs with the same seed and another replication are independent
     #[arg(long, value_name = "R", default_value_t = 0)]
     pub replication: u64,
@@ -133,7 +147,7 @@ pub struct ReadArgs {
 
 #[derive(Debug, Args)]
 pub struct IdentifyArgs {
-    /// Record files (CSV or Parquet); several share one model and have initial states of their own
+    /// Record files (CSV, Parquet, NPZ, MATLAB .mat, XDF); several share one model and have initial states of their own
     #[arg(required = true, value_name = "RECORD")]
     pub records: Vec<PathBuf>,
     #[command(flatten)]
@@ -158,7 +172,7 @@ pub struct IdentifyArgs {
     /// Parameters that each record has for itself, as K_e,T_L, for grey-box
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub individual: Vec<String>,
-    /// Write K_e, T_L and K_e_dot over time into this file (CSV or Parquet), for time-varying
+    /// Write K_e, T_L and K_e_dot over time into this file (CSV, Parquet, NPZ or .mat), for time-varying
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
     /// Orders, each a number or a range to search, as nb=2,nc=0,nd=1..4,nf=2; nb counts b0, b1, ...
@@ -219,6 +233,16 @@ pub struct IdentifyArgs {
     /// Write a report (HTML) into this directory
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
+    /// Print one JSON object instead of tables
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct InfoArgs {
+    /// File of any format that is read: CSV, Parquet, NPZ, NPY, MATLAB .mat, XDF
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
     /// Print one JSON object instead of tables
     #[arg(long)]
     pub json: bool,
@@ -325,9 +349,13 @@ macro_rules! names {
     };
 }
 
+mod group;
 mod recursion;
+mod study;
 
+pub use group::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs};
 pub use recursion::{ForgettingName, RecursionArgs, StreamArgs, TrackArgs};
+pub use study::{ReproduceArgs, StudyCommand, StudyMergeArgs, StudyRunArgs};
 
 names!(FitMethodName for Option<IvMethod> {
     Pem = None,

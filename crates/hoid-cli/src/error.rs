@@ -5,6 +5,7 @@ use hoid_io::{IoError, ScenarioFileError};
 use hoid_model::ModelError;
 use hoid_report::ReportError;
 use hoid_sim::SimError;
+use hoid_study::StudyError;
 use thiserror::Error;
 
 /// Everything that a command can run into.
@@ -16,6 +17,11 @@ pub enum CliError {
     /// A stream that cannot be read, understood or written.
     #[error("{0}")]
     Stream(String),
+    /// Work that was interrupted and can be resumed.
+    #[error("{0}")]
+    Stopped(String),
+    #[error(transparent)]
+    Study(#[from] StudyError),
     #[error(transparent)]
     Model(#[from] ModelError),
     #[error(transparent)]
@@ -34,7 +40,9 @@ impl CliError {
     /// 2 for wrong usage, 1 for data and tasks that give no result.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Usage(_) => 2,
+            Self::Usage(_)
+            | Self::Study(StudyError::Plan { .. } | StudyError::BadShard { .. } | StudyError::Pattern { .. }) => 2,
+            Self::Stopped(_) => 130,
             _ => 1,
         }
     }

@@ -26,8 +26,13 @@ fn main() -> ExitCode {
         Command::Identify(args) => commands::identify::run(&args),
         Command::Track(args) => commands::track::run(&args),
         Command::Stream(args) => commands::stream::run(&args),
+        Command::Info(args) => commands::info::run(&args),
         Command::Convert(args) => commands::convert::run(&args),
         Command::Margins(args) => commands::margins::run(&args),
+        Command::Group(args) => commands::group::run(&args),
+        Command::SimulateGroup(args) => commands::group::simulate(&args),
+        Command::Reproduce(args) => commands::reproduce::run(&args),
+        Command::Study(command) => commands::study::run_command(&command),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -21,10 +21,12 @@ pub fn complain(text: &str) {
 }
 
 /// A progress bar on standard error with rate and time left; invisible where standard error is no terminal.
-pub fn progress(total: usize) -> ProgressBar {
+pub fn progress(total: usize, what: &str) -> ProgressBar {
     let bar = ProgressBar::new(total as u64);
-    // The template is a constant; should it be wrong, the plain bar does as well.
-    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} candidates, {per_sec}, {eta} left") {
+    // Should the template be wrong, the plain bar does as well.
+    if let Ok(style) =
+        ProgressStyle::with_template(&format!("{{bar:30}} {{pos}}/{{len}} {what}, {{per_sec}}, {{eta}} left"))
+    {
         bar.set_style(style);
     }
     bar

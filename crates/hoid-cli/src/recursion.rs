@@ -111,7 +111,7 @@ impl Plan {
             search: self.options.search,
             ..Estimator::new(self.options.structure, combinations[0])
         };
-        let bar = output::progress(combinations.len());
+        let bar = output::progress(combinations.len(), "candidates");
         let records = std::slice::from_ref(span);
         let choice = choose_orders_with(&template, &self.ranges, self.criterion, records, &|| bar.inc(1));
         bar.finish_and_clear();

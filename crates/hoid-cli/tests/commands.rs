@@ -406,6 +406,50 @@ fn convert_goes_both_ways_and_says_what_does_not_convert() {
 }
 
 #[test]
+fn info_shows_what_is_inside() {
+    let directory = TempDir::new().unwrap();
+    let at = directory.path();
+    write(at, "run.csv", "t,e,u,k", 200, |k| {
+        let (t, e, u) = wave(k);
+        let t = if k < 150 { t } else { t + 0.05 };
+        format!("{t},{:.1},{},7", e, u.min(0.6))
+    });
+    let found = json(at, &["info", "run.csv", "--json"]);
+    assert_eq!(found["format"], "CSV");
+    let sampling = &found["samplings"][0];
+    assert_eq!(
+        (&sampling["gaps"], &sampling["missing"]),
+        (&Value::from(1), &Value::from(5))
+    );
+    assert!((sampling["sample_time"].as_f64().unwrap() - 0.01).abs() < 1e-9);
+    let column = |name: &str| {
+        found["columns"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|c| c["path"] == name)
+            .unwrap()["values"]
+            .clone()
+    };
+    assert!((column("e")["quantum"].as_f64().unwrap() - 0.1).abs() < 1e-9);
+    assert!(column("u")["saturated_high"].as_u64().unwrap() > 10 && column("u")["quantum"].is_null());
+    assert_eq!(column("k")["constant"], true);
+    let text = good(at, &["info", "run.csv"]);
+    for words in [
+        "CSV, 4 columns",
+        "1 gaps (5 samples",
+        "constant",
+        "quantised in steps of 0.1",
+        "saturated at 0.6",
+        "█",
+    ] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    fs::write(at.join("bad.mat"), "t,e,u").unwrap();
+    assert!(bad(at, &["info", "bad.mat"]).1.contains("is no MATLAB file"));
+}
+
+#[test]
 fn margins_of_both_states() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();

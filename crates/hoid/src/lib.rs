@@ -25,6 +25,7 @@ pub use hoid_io as io;
 pub use hoid_model as model;
 pub use hoid_report as report;
 pub use hoid_sim as sim;
+pub use hoid_study as study;
 
 /// What most programs use.
 pub mod prelude {

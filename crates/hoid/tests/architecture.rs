@@ -6,13 +6,14 @@ use std::{collections::BTreeMap, process::Command};
 use serde_json::Value;
 
 /// What each crate may depend on within the workspace.
-const ALLOWED: [(&str, &[&str]); 9] = [
+const ALLOWED: [(&str, &[&str]); 10] = [
     ("hoid-core", &[]),
     ("hoid-model", &["hoid-core"]),
     ("hoid-ident", &["hoid-core", "hoid-model"]),
     ("hoid-sim", &["hoid-core", "hoid-model"]),
     ("hoid-io", &["hoid-model"]),
-    ("hoid-report", &["hoid-model", "hoid-ident"]),
+    ("hoid-study", &["hoid-model", "hoid-ident", "hoid-sim", "hoid-io"]),
+    ("hoid-report", &["hoid-model", "hoid-ident", "hoid-io", "hoid-study"]),
     (
         "hoid",
         &[
@@ -21,12 +22,20 @@ const ALLOWED: [(&str, &[&str]); 9] = [
             "hoid-ident",
             "hoid-sim",
             "hoid-io",
+            "hoid-study",
             "hoid-report",
         ],
     ),
     (
         "hoid-cli",
-        &["hoid-model", "hoid-ident", "hoid-sim", "hoid-io", "hoid-report"],
+        &[
+            "hoid-model",
+            "hoid-ident",
+            "hoid-sim",
+            "hoid-io",
+            "hoid-study",
+            "hoid-report",
+        ],
     ),
     ("xtask", &[]),
 ];

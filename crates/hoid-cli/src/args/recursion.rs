@@ -68,7 +68,7 @@ pub struct RecursionArgs {
     pub start: Option<String>,
     /// Memory of all parameters, in which the weight of a sample falls to 1/e: samples (256), seconds (2.56s) or inf
     /// [default: rls 2.56s; rpem, rriv 2.56s for b, 20.48s for the others; physical 5s for K_e, 1.5s for K_e_dot, inf for the others]
-    #[arg(long, value_name = "N|Ss|inf", value_parser = parse_memory)]
+    #[arg(long, value_name = "N|Ss|inf", value_parser = str::parse::<Memory>)]
     pub memory: Option<Memory>,
     /// Factor of forgetting instead of --memory: lambda = 1 - 1/memory in samples
     #[arg(long, value_name = "L", value_parser = parse_lambda, conflicts_with = "memory")]
@@ -102,7 +102,7 @@ pub struct RecursionArgs {
     #[arg(long, value_name = "LO..HI", value_parser = parse_span)]
     pub track_delay: Option<(f64, f64)>,
     /// Length of the window for --method window: samples or seconds [default: 20s]
-    #[arg(long, value_name = "N|Ss", value_parser = parse_memory)]
+    #[arg(long, value_name = "N|Ss", value_parser = str::parse::<Memory>)]
     pub window: Option<Memory>,
     /// Samples between two fits for --method window [default: 25]
     #[arg(long, value_name = "N")]
@@ -119,7 +119,7 @@ pub struct RecursionArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct TrackArgs {
-    /// Record file (CSV or Parquet)
+    /// Record file (CSV, Parquet, NPZ, MATLAB .mat, XDF)
     #[arg(value_name = "RECORD")]
     pub record: PathBuf,
     #[command(flatten)]
@@ -139,7 +139,7 @@ pub struct TrackArgs {
     /// Keep every N-th sample of the trace
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_count)]
     pub every: usize,
-    /// File for the trace (CSV or Parquet): the estimate at each sample with its standard errors
+    /// File for the trace (CSV, Parquet, NPZ or .mat): the estimate at each sample with its standard errors
     #[arg(long, value_name = "TRACE")]
     pub out: PathBuf,
     /// Write a report (HTML) into this directory: parameters over time with bands, innovations, standard errors
@@ -176,21 +176,6 @@ pub struct StreamArgs {
     pub output: String,
 }
 
-/// `N` samples, `Ss` seconds, or `inf`.
-pub fn parse_memory(text: &str) -> Result<Memory, String> {
-    let usage = "write more than 1 sample (256), seconds (2.56s) or inf";
-    let text = text.trim();
-    if ["inf", "infinite"].iter().any(|word| text.eq_ignore_ascii_case(word)) {
-        return Ok(Memory::Infinite);
-    }
-    let number = |part: &str| part.trim().parse::<f64>().ok().filter(|v| v.is_finite());
-    let memory = match text.strip_suffix('s') {
-        Some(seconds) => number(seconds).filter(|s| *s > 0.0).map(Memory::Seconds),
-        None => number(text).filter(|n| *n > 1.0).map(Memory::Samples),
-    };
-    memory.ok_or_else(|| format!("{text:?} is no memory; {usage}"))
-}
-
 fn parse_lambda(text: &str) -> Result<Memory, String> {
     match text.trim().parse::<f64>() {
         Ok(1.0) => Ok(Memory::Infinite),
@@ -204,7 +189,7 @@ fn parse_lambda(text: &str) -> Result<Memory, String> {
 fn parse_memories(text: &str) -> Result<Vec<(String, Memory)>, String> {
     crate::orders::parse_pairs(text)?
         .into_iter()
-        .map(|(name, value)| match parse_memory(&value) {
+        .map(|(name, value)| match value.parse::<Memory>() {
             Ok(memory) => Ok((name, memory)),
             Err(e) => Err(format!("{name}: {e}")),
         })
@@ -233,12 +218,6 @@ mod tests {
 
     #[test]
     fn memories_as_typed() {
-        assert_eq!(parse_memory("256").unwrap(), Memory::Samples(256.0));
-        assert_eq!(parse_memory("2.56s").unwrap(), Memory::Seconds(2.56));
-        assert_eq!(parse_memory("Inf").unwrap(), Memory::Infinite);
-        for bad in ["", "0", "1", "-5", "nan", "0s", "s", "-infs", "2m"] {
-            assert!(parse_memory(bad).is_err(), "{bad}");
-        }
         assert_eq!(parse_lambda("0.75").unwrap(), Memory::Samples(4.0));
         assert_eq!(parse_lambda("1").unwrap(), Memory::Infinite);
         for bad in ["0", "1.1", "-1", "x", "NaN"] {

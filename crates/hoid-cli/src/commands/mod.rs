@@ -2,10 +2,14 @@
 
 pub mod convert;
 pub mod demo;
+pub mod group;
 pub mod identify;
+pub mod info;
 pub mod margins;
+pub mod reproduce;
 pub mod simulate;
 pub mod stream;
+pub mod study;
 pub mod track;
 
 use hoid_io::read_scenario;

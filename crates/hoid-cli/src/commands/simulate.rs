@@ -15,7 +15,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
     let simulator = Simulator::new(&scenario)?;
     let stream = Stream {
         seed: args.seed,
-        cell: 0,
+        cell: args.cell,
         replication: args.replication,
     };
     let record = simulator.run(stream, args.keep_run_in)?;

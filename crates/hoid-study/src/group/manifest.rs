@@ -178,7 +178,7 @@ pub struct ConditionFacts {
     /// Period of the excitation, s; the longest that all its lines are harmonics of where it is left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
-    /// Samples by which u is recorded later than the e that it answers: e[k] belongs to u[k + offset].
+    /// Samples by which u is recorded later than the e that it answers: `e[k]` belongs to `u[k + offset]`.
     pub offset_samples: f64,
     /// Whether the describing function is fitted with a lead.
     pub lead: bool,

@@ -232,7 +232,7 @@ fn prediction_error(
                 .to_owned(),
         ));
     }
-    let bar = output::progress(combinations.len());
+    let bar = output::progress(combinations.len(), "candidates");
     let choice = choose_orders_with(&estimator, ranges, Criterion::from(args.criterion), records, &|| {
         bar.inc(1)
     });

@@ -1,0 +1,104 @@
+//! Options of `hoid group`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use hoid_model::scenario::Condition;
+use hoid_study::group::Trouble;
+
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub struct GroupArgs {
+    #[command(subcommand)]
+    pub command: Option<GroupCommand>,
+    #[command(flatten)]
+    pub run: GroupRunArgs,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum GroupCommand {
+    /// Write a manifest of the files in a directory, to be looked through and completed
+    Init(GroupInitArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct GroupRunArgs {
+    /// Manifest in TOML, or a directory with group.toml
+    #[arg(value_name = "DIR|MANIFEST", required = true)]
+    pub manifest: Option<PathBuf>,
+    /// Directory for tables, report and parts; it is made if it is not there
+    #[arg(long, value_name = "DIR", required = true)]
+    pub out: Option<PathBuf>,
+    /// Threads. Default: one a core
+    #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+    /// Go on with a group that was stopped
+    #[arg(long)]
+    pub resume: bool,
+    /// Write CSV beside Parquet
+    #[arg(long)]
+    pub csv: bool,
+    /// Print the outcome as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct GroupInitArgs {
+    /// Directory with one file a run
+    #[arg(value_name = "DIR")]
+    pub directory: PathBuf,
+    /// Names of the files: {subject}, {condition} and {run} stand for what is taken from them, * for anything
+    #[arg(long, value_name = "PATTERN", default_value = "{subject}_{condition}_{run}.csv")]
+    pub pattern: String,
+    /// The manifest; standard output where it is -. Default: group.toml in the directory
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct SimulateGroupArgs {
+    /// Directory for the files, truth.csv and group.toml
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Subjects
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    pub subjects: u64,
+    /// Conditions, separated by commas
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "C1,C2,C3,C4,C5,C6"
+    )]
+    pub conditions: Vec<Condition>,
+    /// Runs of each subject and condition
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    pub runs: u64,
+    /// Spread of the parameters between subjects, 0.1 for 10 %
+    #[arg(long, value_name = "S", default_value_t = 0.1)]
+    pub between_subjects: f64,
+    /// Spread of the parameters between the runs of a subject
+    #[arg(long, value_name = "S", default_value_t = 0.03)]
+    pub between_runs: f64,
+    /// Order of the remnant filter
+    #[arg(long, value_name = "1..4", default_value_t = 1)]
+    pub remnant_order: usize,
+    /// Noise level P_n = var(u_n) / var(u)
+    #[arg(long, value_name = "P", default_value_t = 0.1)]
+    pub noise_level: f64,
+    /// Seed of the random streams
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// What is wrong with the sampling: jitter, missing, repeated, slow-clock, saturated, quantised
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_trouble)]
+    pub trouble: Vec<Trouble>,
+}
+
+fn parse_trouble(text: &str) -> Result<Trouble, String> {
+    let names = || Trouble::ALL.map(Trouble::name).join(", ");
+    Trouble::ALL
+        .into_iter()
+        .find(|trouble| trouble.name() == text.trim())
+        .ok_or_else(|| format!("{text:?} is no trouble, expected some of {}", names()))
+}

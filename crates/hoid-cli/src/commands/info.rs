@@ -1,0 +1,144 @@
+//! `hoid info`: what is inside of a file, before anything is identified.
+
+use hoid_io::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey, survey};
+use hoid_report::numbers;
+use serde_json::{Value, json};
+
+use crate::{args::InfoArgs, error::CliError, json, output, text};
+
+pub fn run(args: &InfoArgs) -> Result<(), CliError> {
+    let found = survey(&args.file)?;
+    if args.json {
+        json::print(&object(&found));
+    } else {
+        output::print(&words(&args.file.display().to_string(), &found));
+    }
+    Ok(())
+}
+
+fn words(file: &str, found: &FileSurvey) -> String {
+    let mut text = format!("{file}: {}, {} columns\n", found.format, found.columns.len());
+    for sampling in &found.samplings {
+        text.push_str(&sampled(sampling));
+    }
+    let mut table = text::table(&["column", "unit", "type", "rows", "min", "max", "mean", "deviation"]);
+    let mut sketches = Vec::new();
+    for column in &found.columns {
+        let rows = if column.rows == 0 {
+            String::new()
+        } else {
+            column.rows.to_string()
+        };
+        let mut cells = vec![column.path.clone(), column.unit.clone(), column.kind.clone(), rows];
+        if let Some(v) = &column.values {
+            cells.extend([v.min, v.max, v.mean, v.deviation].map(numbers::plain));
+            sketches.push((column, v));
+        }
+        table.add_row(cells);
+    }
+    text.push_str(&format!("{table}\n"));
+    let width = sketches
+        .iter()
+        .map(|(column, _)| column.path.chars().count())
+        .max()
+        .unwrap_or(0);
+    for (column, values) in sketches {
+        let remarks = remarks(values);
+        let line = format!("{:width$}  {}  {remarks}", column.path, values.sketch);
+        text.push_str(&format!("{}\n", line.trim_end()));
+    }
+    for note in &found.notes {
+        text.push_str(&format!("Note: {note}.\n"));
+    }
+    text
+}
+
+fn sampled(s: &SamplingSurvey) -> String {
+    let mut line = format!(
+        "{}: {} rows from {} to {} s, {:.4} Hz (sample time {:.6} s), jitter {:.2e} s",
+        s.path,
+        s.rows,
+        numbers::plain(s.span_s.0),
+        numbers::plain(s.span_s.1),
+        1.0 / s.sample_time_s,
+        s.sample_time_s,
+        s.jitter_s
+    );
+    if let Some(first) = s.first_gap_s {
+        line.push_str(&format!(
+            ", {} gaps ({} samples, the first after {first} s)",
+            s.gaps, s.missing
+        ));
+    } else {
+        line.push_str(", no gaps");
+    }
+    if s.not_increasing > 0 {
+        line.push_str(&format!(", t does not increase in {} rows", s.not_increasing));
+    }
+    if s.repeated > 0 {
+        line.push_str(&format!(", {} rows repeat the one before", s.repeated));
+    }
+    line.push('\n');
+    line
+}
+
+/// What is suspicious in a column.
+fn remarks(v: &ValueSurvey) -> String {
+    let mut remarks = Vec::new();
+    if v.missing > 0 {
+        remarks.push(format!("{} missing", v.missing));
+    }
+    if v.constant {
+        remarks.push(String::from("constant"));
+    }
+    if let Some(quantum) = v.quantum {
+        remarks.push(format!("quantised in steps of {}", numbers::plain(quantum)));
+    }
+    for (rows, end) in [(v.saturated_low, v.min), (v.saturated_high, v.max)] {
+        if rows > 0 {
+            remarks.push(format!("saturated at {} in {rows} rows", numbers::plain(end)));
+        }
+    }
+    remarks.join(", ")
+}
+
+fn object(found: &FileSurvey) -> Value {
+    let column = |c: &ColumnSurvey| {
+        let values = c.values.as_ref().map_or(Value::Null, |v| {
+            json!({
+                "missing": v.missing,
+                "min": json::number(v.min),
+                "max": json::number(v.max),
+                "mean": json::number(v.mean),
+                "deviation": json::number(v.deviation),
+                "constant": v.constant,
+                "quantum": json::optional(v.quantum),
+                "saturated_low": v.saturated_low,
+                "saturated_high": v.saturated_high,
+                "sketch": v.sketch,
+            })
+        });
+        json!({"path": c.path, "unit": c.unit, "type": c.kind, "rows": c.rows, "values": values})
+    };
+    let sampling = |s: &SamplingSurvey| {
+        json!({
+            "path": s.path,
+            "rows": s.rows,
+            "first_s": json::number(s.span_s.0),
+            "last_s": json::number(s.span_s.1),
+            "sample_time": json::number(s.sample_time_s),
+            "jitter_s": json::number(s.jitter_s),
+            "gaps": s.gaps,
+            "missing": s.missing,
+            "first_gap_s": json::optional(s.first_gap_s),
+            "not_increasing": s.not_increasing,
+            "repeated": s.repeated,
+        })
+    };
+    json!({
+        "format": found.format,
+        "samplings": found.samplings.iter().map(sampling).collect::<Vec<_>>(),
+        "columns": found.columns.iter().map(column).collect::<Vec<_>>(),
+        "notes": found.notes,
+    })
+}

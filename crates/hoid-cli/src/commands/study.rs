@@ -1,0 +1,211 @@
+//! `hoid study`: plans, runs, shares.
+
+use std::{
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+};
+
+use hoid_study::{NAMED_PLANS, NamedPlan, Outcome, Plan, RunOptions, merge, plan_schema, run};
+use serde_json::json;
+
+use crate::{
+    args::{StudyCommand, StudyMergeArgs, StudyRunArgs},
+    error::CliError,
+    output,
+};
+
+pub fn run_command(command: &StudyCommand) -> Result<(), CliError> {
+    match command {
+        StudyCommand::Run(args) => run_plan(args),
+        StudyCommand::Merge(args) => merge_shards(args),
+        StudyCommand::Check(args) => {
+            output::print(&description(&plan_of(&args.plan)?));
+            Ok(())
+        }
+        StudyCommand::Plans(args) => list(args.name.as_deref()),
+        StudyCommand::Schema => {
+            output::print(&plan_schema());
+            Ok(())
+        }
+    }
+}
+
+/// A plan by its file, or else by its name.
+fn plan_of(path: &Path) -> Result<Plan, CliError> {
+    if !path.exists()
+        && let Some(named) = path.to_str().and_then(NamedPlan::find)
+    {
+        return Ok(named.plan()?);
+    }
+    Ok(Plan::read(path)?)
+}
+
+fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
+    let mut plan = plan_of(&args.plan)?;
+    if let Some(replications) = args.replications {
+        plan = plan.with_replications(replications)?;
+    }
+    let options = RunOptions {
+        shard: args.shard,
+        jobs: args.jobs.map(usize::from),
+        resume: args.resume,
+        csv: args.csv,
+    };
+    let outcome = run_with_progress(&plan, &args.out, &options)?;
+    if args.json {
+        output::print(&format!("{:#}\n", outcome_json(&plan, &outcome)));
+        return Ok(());
+    }
+    let mut text = format!("{}: {} estimates made\n", plan.name, outcome.estimates);
+    if let Some(shard) = args.shard {
+        text.push_str(&format!(
+            "shard {shard} is in {}; join all {} with `hoid study merge`\n",
+            args.out.display(),
+            shard.of
+        ));
+    }
+    text.push_str(&tables_text(&outcome));
+    output::print(&text);
+    Ok(())
+}
+
+/// Runs a plan with a progress bar; an interrupt stops it so that it can be resumed.
+pub fn run_with_progress(plan: &Plan, directory: &Path, options: &RunOptions) -> Result<Outcome, CliError> {
+    let stopped = stop_at_interrupt();
+    let bar = output::progress(usize::try_from(plan.estimates()).unwrap_or(usize::MAX), "estimates");
+    let outcome = run(
+        plan,
+        directory,
+        options,
+        &|progress| {
+            bar.set_length(progress.total);
+            bar.set_position(progress.done);
+        },
+        &|| !stopped.load(Ordering::Relaxed),
+    );
+    bar.finish_and_clear();
+    let outcome = outcome?;
+    if outcome.finished {
+        Ok(outcome)
+    } else {
+        Err(CliError::Stopped(format!(
+            "{} was stopped; what is done is in {}, go on with --resume",
+            plan.name,
+            directory.display()
+        )))
+    }
+}
+
+/// A flag that an interrupt sets; a second interrupt ends the program at once, with nothing lost but the blocks on their way.
+pub fn stop_at_interrupt() -> Arc<AtomicBool> {
+    let stopped = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stopped);
+    // Studies run one after the other set it anew; without a handler an interrupt ends the program, which can be resumed as well.
+    let _ = ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    });
+    stopped
+}
+
+fn merge_shards(args: &StudyMergeArgs) -> Result<(), CliError> {
+    let outcome = merge(&args.shards, &args.out, args.csv)?;
+    if args.json {
+        let tables: Vec<String> = outcome.tables.iter().map(|t| t.display().to_string()).collect();
+        output::print(&format!(
+            "{:#}\n",
+            json!({ "hoid": env!("CARGO_PKG_VERSION"), "estimates": outcome.estimates, "tables": tables })
+        ));
+        return Ok(());
+    }
+    output::print(&format!("{} estimates\n{}", outcome.estimates, tables_text(&outcome)));
+    Ok(())
+}
+
+fn tables_text(outcome: &Outcome) -> String {
+    outcome
+        .tables
+        .iter()
+        .map(|table| format!("  {}\n", table.display()))
+        .collect()
+}
+
+fn outcome_json(plan: &Plan, outcome: &Outcome) -> serde_json::Value {
+    let tables: Vec<String> = outcome.tables.iter().map(|t| t.display().to_string()).collect();
+    json!({
+        "hoid": env!("CARGO_PKG_VERSION"),
+        "study": plan.name,
+        "plan_sha256": plan.hash(),
+        "seed": plan.seed,
+        "replications": plan.replications,
+        "estimates": outcome.estimates,
+        "tables": tables,
+    })
+}
+
+fn description(plan: &Plan) -> String {
+    let mut text = format!("{}: {}\n", plan.name, plan.title);
+    if !plan.description.trim().is_empty() {
+        text.push_str(&format!("{}\n", plan.description.trim()));
+    }
+    text.push_str(&format!(
+        "seed {}, {} replications, {} cells, {} estimators, {} estimates in all\n",
+        plan.seed,
+        plan.replications,
+        plan.cells.len(),
+        plan.estimators.len(),
+        plan.estimates()
+    ));
+    const MOST: usize = 12;
+    let mut list = |title: &str, entries: Vec<String>| {
+        text.push_str(&format!("{title}\n"));
+        entries
+            .iter()
+            .take(MOST)
+            .for_each(|entry| text.push_str(&format!("  {entry}\n")));
+        if entries.len() > MOST {
+            text.push_str(&format!("  ... and {} more\n", entries.len() - MOST));
+        }
+    };
+    let of_cell = |cell: &hoid_study::plan::Cell| {
+        let axes: Vec<String> = cell
+            .axes
+            .iter()
+            .map(|axis| format!("{}={}", axis.key, axis.value))
+            .collect();
+        format!("{:3}  {} {}", cell.index, cell.scenario, axes.join(" "))
+    };
+    list("cells", plan.cells.iter().map(of_cell).collect());
+    list("estimators", plan.estimators.iter().map(|e| e.label.clone()).collect());
+    text
+}
+
+fn list(name: Option<&str>) -> Result<(), CliError> {
+    let Some(name) = name else {
+        let mut text = String::new();
+        for named in NAMED_PLANS {
+            let plan = named.plan()?;
+            text.push_str(&format!(
+                "{:22} {} ({} estimates)\n",
+                plan.name,
+                plan.title,
+                plan.estimates()
+            ));
+        }
+        output::print(&text);
+        return Ok(());
+    };
+    let named = NamedPlan::find(name).ok_or_else(|| {
+        let known: Vec<&str> = NAMED_PLANS.iter().map(|p| p.name).collect();
+        CliError::Usage(format!(
+            "no plan is called {name}; expected one of {}",
+            known.join(", ")
+        ))
+    })?;
+    output::print(named.text);
+    Ok(())
+}

@@ -1,0 +1,255 @@
+//! Studies and the reproduction as a user runs them.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Stdio},
+    time::{Duration, Instant},
+};
+
+use tempfile::TempDir;
+
+use common::{bad, good, json};
+
+const PLAN: &str = r#"
+name = "short"
+seed = 3
+replications = 40
+block = 2
+
+[[scenarios]]
+condition = ["C1", "C2"]
+remnant.noise_level = 0.1
+
+[[estimators]]
+name = "BJ"
+method = "fit"
+structure = "bj"
+orders.nd = [1, 2]
+"#;
+
+fn with_plan() -> TempDir {
+    let directory = TempDir::new().unwrap();
+    fs::write(directory.path().join("plan.toml"), PLAN).unwrap();
+    directory
+}
+
+fn parts(directory: &Path) -> usize {
+    fs::read_dir(directory.join("parts")).map_or(0, |entries| {
+        entries
+            .filter(|e| e.as_ref().unwrap().path().extension().is_some_and(|x| x == "parquet"))
+            .count()
+    })
+}
+
+#[test]
+fn a_study_that_was_killed_goes_on_to_the_same_bytes() {
+    let directory = with_plan();
+    let at = directory.path();
+    good(at, &["study", "run", "plan.toml", "--out", "whole"]);
+    let mut killed = 0;
+    // Kills at several instants, whatever the program is writing then.
+    for wait_ms in [0, 35, 71, 13] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))
+            .args([
+                "study",
+                "run",
+                "plan.toml",
+                "--out",
+                "killed",
+                "--resume",
+                "--jobs",
+                "1",
+            ])
+            .current_dir(at)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let (before, begin) = (parts(&at.join("killed")), Instant::now());
+        while parts(&at.join("killed")) <= before && child.try_wait().unwrap().is_none() {
+            assert!(begin.elapsed() < Duration::from_secs(60), "nothing is written");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        std::thread::sleep(Duration::from_millis(wait_ms));
+        // SIGKILL: the program cannot tidy up.
+        if child.kill().is_ok() && !child.wait().unwrap().success() {
+            killed += 1;
+        }
+    }
+    assert!(killed > 0, "the study was over before it could be killed");
+    let (_, message) = bad(at, &["study", "run", "plan.toml", "--out", "killed"]);
+    assert!(message.contains("--resume"), "{message}");
+    good(at, &["study", "run", "plan.toml", "--out", "killed", "--resume"]);
+    for name in [
+        "cells.parquet",
+        "fits.parquet",
+        "summary.parquet",
+        "study.json",
+        "plan.toml",
+    ] {
+        let read = |study: &str| fs::read(at.join(study).join(name)).unwrap();
+        assert!(read("whole") == read("killed"), "{name}");
+    }
+    assert!(!at.join("killed/parts").exists());
+}
+
+#[test]
+fn shards_are_joined_and_told_apart() {
+    let directory = with_plan();
+    let at = directory.path();
+    let few = ["--replications", "3"];
+    good(
+        at,
+        &[&["study", "run", "plan.toml", "--out", "whole", "--csv"], &few[..]].concat(),
+    );
+    for shard in ["1/2", "2/2"] {
+        let out = &shard[..1];
+        good(
+            at,
+            &[&["study", "run", "plan.toml", "--out", out, "--shard", shard], &few[..]].concat(),
+        );
+    }
+    let (code, message) = bad(at, &["study", "merge", "1", "--out", "merged"]);
+    assert!(code == 1 && message.contains("are missing"), "{message}");
+    let merged = json(at, &["study", "merge", "2", "1", "--out", "merged", "--csv", "--json"]);
+    assert_eq!(merged["estimates"], 2 * 2 * 3);
+    for name in ["cells.csv", "fits.csv", "summary.csv"] {
+        let read = |study: &str| fs::read_to_string(at.join(study).join(name)).unwrap();
+        assert!(read("whole") == read("merged"), "{name}");
+        assert!(read("whole").contains("plan sha256"), "{name}");
+    }
+}
+
+#[test]
+fn a_run_of_a_study_can_be_repeated_by_hand() {
+    let directory = with_plan();
+    let at = directory.path();
+    good(
+        at,
+        &[
+            "study",
+            "run",
+            "plan.toml",
+            "--out",
+            "s",
+            "--csv",
+            "--replications",
+            "2",
+        ],
+    );
+    good(
+        at,
+        &[
+            "simulate",
+            "--condition",
+            "C2",
+            "--noise-level",
+            "0.1",
+            "--seed",
+            "3",
+            "--cell",
+            "1",
+            "--replication",
+            "1",
+            "--out",
+            "run.csv",
+        ],
+    );
+    let fit = json(
+        at,
+        &[
+            "identify",
+            "run.csv",
+            "--structure",
+            "bj",
+            "--orders",
+            "nb=2,nc=0,nd=2,nf=2",
+            "--nk",
+            "29",
+            "--json",
+        ],
+    );
+    let value = fit["parameters"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|p| p["name"] == "f1")
+        .unwrap()["value"]
+        .as_f64()
+        .unwrap();
+    let table = fs::read_to_string(at.join("s/fits.csv")).unwrap();
+    let lines: Vec<Vec<&str>> = table
+        .lines()
+        .filter(|l| !l.starts_with('#'))
+        .map(|l| l.split(',').collect())
+        .collect();
+    let column = |name: &str| lines[0].iter().position(|c| *c == name).unwrap();
+    let row = lines[1..]
+        .iter()
+        .find(|l| l[column("cell")] == "1" && l[column("replication")] == "1" && l[column("nd")] == "2.0")
+        .unwrap();
+    assert_eq!(row[column("f1")].parse::<f64>().unwrap(), value);
+}
+
+#[test]
+fn wrong_plans_and_names_are_refused() {
+    let directory = TempDir::new().unwrap();
+    let at = directory.path();
+    fs::write(
+        at.join("bad.toml"),
+        PLAN.replace("noise_level = 0.1", "noise_level = 1.5"),
+    )
+    .unwrap();
+    let (code, message) = bad(at, &["study", "run", "bad.toml", "--out", "x"]);
+    assert!(code == 2 && message.contains("bad.toml, line 9"), "{message}");
+    let (code, message) = bad(at, &["study", "check", "nothing.toml"]);
+    assert!(code == 1 && message.contains("nothing.toml"), "{message}");
+    let (code, message) = bad(at, &["study", "plans", "nothing"]);
+    assert!(code == 2 && message.contains("recursive"), "{message}");
+    let (code, message) = bad(at, &["reproduce", "--only", "fig-99"]);
+    assert!(code == 2 && message.contains("--list"), "{message}");
+    let (code, _) = bad(at, &["study", "run", "bias", "--out", "x", "--shard", "3/2"]);
+    assert_eq!(code, 2);
+}
+
+#[test]
+fn the_reproduction_draws_what_is_asked_for() {
+    let directory = TempDir::new().unwrap();
+    let at = directory.path();
+    let list = good(at, &["reproduce", "--list"]);
+    for name in ["table-2", "fig-12", "C.16", "D.18", "E.16", "F.8", "G.8", "H.12", "A.1"] {
+        assert!(list.lines().any(|line| line.starts_with(&format!("{name} "))), "{name}");
+    }
+    let arguments = [
+        "reproduce",
+        "--only",
+        "table-2,fig-3,A.1",
+        "--replications",
+        "2",
+        "--out",
+        "r",
+    ];
+    good(at, &arguments);
+    let page = fs::read_to_string(at.join("r/index.html")).unwrap();
+    for part in [
+        "figures/fig-3.svg",
+        "figures/A.1.svg",
+        "tables/table-2.csv",
+        "1.56349",
+        "studies/noise-level/plan.toml",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    let read = || {
+        ["r/figures/A.1.svg", "r/figures/A.1.csv", "r/figures/fig-3.svg"].map(|name| fs::read(at.join(name)).unwrap())
+    };
+    let before = read();
+    good(at, &arguments);
+    assert!(read() == before, "drawn again from the study that is there");
+    let (_, message) = bad(at, &["reproduce", "--only", "A.1", "--replications", "3", "--out", "r"]);
+    assert!(message.contains("replications 2 there, 3 here"), "{message}");
+}
