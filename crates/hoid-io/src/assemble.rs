@@ -5,16 +5,21 @@ use std::ops::Range;
 use hoid_model::{Channel, ModelError, Record, SampleTime};
 
 use crate::column_expression::{Signal, list};
+use crate::preparation::Step;
 use crate::repair::{self, OpenEnd};
 use crate::sampling::{self, Uneven};
 use crate::table::{Precision, Table};
-use crate::{ColumnExpression, IoError, ReadOptions, ReadRecord};
+use crate::{ColumnExpression, IoError, ReadOptions, ReadRecord, Trouble, TroubleKind, trouble};
 
 /// Resampling makes at most so many samples out of one.
 const LARGEST_FACTOR: usize = 100;
 
-/// The record in a table.
-pub(crate) fn record_of(table: Table<'_>, options: &ReadOptions) -> Result<ReadRecord, IoError> {
+/// The record in a table, without rows that are there twice where that is asked for.
+pub(crate) fn record_of(
+    mut table: Table<'_>,
+    options: &ReadOptions,
+    drop_repeated: bool,
+) -> Result<ReadRecord, IoError> {
     let file = table.source.file().to_owned();
     let names = table.names();
     let resolve = |expression: &ColumnExpression| expression.resolve(&names, &file);
@@ -29,10 +34,89 @@ pub(crate) fn record_of(table: Table<'_>, options: &ReadOptions) -> Result<ReadR
         let available = list(&names);
         return Err(IoError::NoSampling { file, available });
     }
-    let mut reader = Reader { table, options, file };
+    let trouble = trouble_in(&table, time, input.into_iter().chain([output]), options);
+    let mut steps = Vec::new();
+    match (drop_repeated, time) {
+        (true, Some(_)) => {
+            let (kept, step) = repair::drop_repeated(table);
+            table = kept;
+            steps.extend(step);
+        }
+        (true, None) => table.notes.push(String::from(
+            "there is no column t, so that a row written twice cannot be told from a value that holds: no row is dropped",
+        )),
+        _ => {}
+    }
+    let mut reader = Reader {
+        table,
+        options,
+        file,
+        steps,
+    };
     let grid = reader.grid(time)?;
     let input = input.zip(options.input.as_ref());
-    reader.record(grid, time, input, (output, &options.output))
+    let read = reader.record(grid, time, input, (output, &options.output))?;
+    Ok(ReadRecord { trouble, ..read })
+}
+
+/// What is wrong with the columns that are asked for, within the span.
+///
+/// # Errors
+/// [`IoError::NoSuchColumn`] and [`IoError::Expression`].
+pub(crate) fn trouble_of(table: &Table<'_>, options: &ReadOptions) -> Result<(Vec<Trouble>, Range<usize>), IoError> {
+    let file = table.source.file();
+    let names = table.names();
+    let signals = options.input.iter().chain([&options.output]);
+    let signals: Vec<Signal> = signals.map(|one| one.resolve(&names, file)).collect::<Result<_, _>>()?;
+    let time = names.iter().position(|name| *name == "t");
+    let rows = span_rows(table, time, options);
+    Ok((trouble_in(table, time, signals.into_iter(), options), rows))
+}
+
+fn trouble_in(
+    table: &Table<'_>,
+    time: Option<usize>,
+    signals: impl Iterator<Item = Signal>,
+    options: &ReadOptions,
+) -> Vec<Trouble> {
+    let signals: Vec<Signal> = signals.collect();
+    let mut used: Vec<usize> = signals.iter().copied().flat_map(Signal::columns).collect();
+    used.sort_unstable();
+    used.dedup();
+    // A frequency to resample to says nothing of the clock of the file.
+    let nominal_hz = options.sampling_hz.filter(|_| !options.repair.resample);
+    let mut found = trouble::of_table(table, &used, time, nominal_hz, span_rows(table, time, options));
+    // A difference may rightly have one constant term, such as a reference of zero.
+    let names = |one: &Trouble, column: usize| table.columns[column].name == one.channel;
+    let constant: Vec<Trouble> = found
+        .iter()
+        .filter(|one| one.kind == TroubleKind::Constant)
+        .cloned()
+        .collect();
+    found.retain(|one| {
+        let is_fair = |signal: &Signal| match signal {
+            Signal::Difference(a, b) if names(one, *a) => constant.iter().all(|other| !names(other, *b)),
+            Signal::Difference(a, b) if names(one, *b) => constant.iter().all(|other| !names(other, *a)),
+            _ => false,
+        };
+        one.kind != TroubleKind::Constant || !signals.iter().any(is_fair)
+    });
+    found
+}
+
+/// The rows of the span, as far as the time of the file tells.
+fn span_rows(table: &Table<'_>, time: Option<usize>, options: &ReadOptions) -> Range<usize> {
+    let at = |row: usize| match (time, options.sampling_hz) {
+        (Some(time), _) => table.columns[time].values[row],
+        (None, Some(hz)) => row as f64 / hz,
+        (None, None) => f64::NAN,
+    };
+    let (from, to) = options.span_s;
+    let start = from.map_or(0, |from| {
+        (0..table.rows).find(|row| at(*row) >= from).unwrap_or(table.rows)
+    });
+    let end = to.and_then(|to| (start..table.rows).find(|row| at(*row) >= to));
+    start..end.unwrap_or(table.rows)
 }
 
 /// Where the samples of the record come from.
@@ -51,6 +135,7 @@ struct Reader<'a> {
     table: Table<'a>,
     options: &'a ReadOptions,
     file: String,
+    steps: Vec<Step>,
 }
 
 impl Reader<'_> {
@@ -168,15 +253,16 @@ impl Reader<'_> {
             });
         }
         let longest = t.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
-        self.table.notes.push(format!(
-            "resampled linearly from {} samples to {samples} at {} Hz; the longest step between two samples is {longest:.6} s",
-            t.len(),
-            1.0 / ts
-        ));
+        self.steps.push(Step::Interpolate {
+            from_samples: t.len(),
+            to_samples: samples as usize,
+            to_hz: 1.0 / ts,
+            longest_step_s: longest,
+        });
         // Half as many samples or fewer: what lies above the new Nyquist frequency folds down.
         if 2.0 * samples <= t.len() as f64 {
             self.table.notes.push(String::from(
-                "resampling to the lower frequency applied no low-pass filter: filter the recording first if it holds power above half of it",
+                "resampling to the lower frequency applied no low-pass filter: read at the old frequency and give the new one with --new-fs if the recording holds power above half of it",
             ));
         }
         Ok(Grid {
@@ -298,11 +384,11 @@ impl Reader<'_> {
             }
         })?;
         if bridged.values > 0 {
-            let note = format!(
-                "column {}: {} missing values bridged linearly, at most {} in a row",
-                source.name, bridged.values, bridged.longest
-            );
-            self.table.notes.push(note);
+            self.steps.push(Step::Fill {
+                channel: source.name.clone(),
+                values: bridged.values,
+                longest: bridged.longest,
+            });
         }
         Ok(values)
     }
@@ -315,12 +401,7 @@ impl Reader<'_> {
         output: (Signal, &ColumnExpression),
     ) -> Result<ReadRecord, IoError> {
         let signals = || input.into_iter().chain([output]);
-        let used = |column: usize| {
-            signals().any(|(signal, _)| match signal {
-                Signal::Column(a) | Signal::Negative(a) => a == column,
-                Signal::Difference(a, b) => a == column || b == column,
-            })
-        };
+        let used = |column: usize| signals().any(|(signal, _)| signal.columns().any(|used| used == column));
         let mut columns: Vec<Option<Channel>> = Vec::with_capacity(self.table.columns.len());
         for column in 0..self.table.columns.len() {
             let name = self.table.columns[column].name.clone();
@@ -362,6 +443,8 @@ impl Reader<'_> {
         Ok(ReadRecord {
             record,
             notes: self.table.notes,
+            steps: self.steps,
+            trouble: Vec::new(),
         })
     }
 }

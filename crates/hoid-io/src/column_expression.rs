@@ -29,6 +29,17 @@ pub(crate) enum Signal {
     Difference(usize, usize),
 }
 
+impl Signal {
+    /// The columns that it is made of.
+    pub(crate) fn columns(self) -> impl Iterator<Item = usize> {
+        let (a, b) = match self {
+            Self::Column(a) | Self::Negative(a) => (a, None),
+            Self::Difference(a, b) => (a, Some(b)),
+        };
+        std::iter::once(a).chain(b)
+    }
+}
+
 impl ColumnExpression {
     /// The column of this name.
     pub fn column(name: impl Into<String>) -> Self {

@@ -298,6 +298,32 @@ pub enum IoError {
         /// Last time of the record, s.
         end_s: f64,
     },
+    /// A step of the preparation that cannot be taken.
+    #[error("{record}: {step}: {found}, expected {expected}")]
+    Preparation {
+        /// Label of the record.
+        record: String,
+        /// The step, as the option is called.
+        step: &'static str,
+        /// What was found.
+        found: String,
+        /// What was expected, or the remedy.
+        expected: String,
+    },
+    /// Text that is no scale.
+    #[error("the scale \"{found}\": expected {expected}")]
+    Scaling {
+        /// The text, or the factor.
+        found: String,
+        /// What a scale may be.
+        expected: String,
+    },
+    /// Text that is no offset.
+    #[error("the offset \"{found}\": expected a number of samples (1, -0.5) or of seconds (0.0167s)")]
+    Offset {
+        /// The text.
+        found: String,
+    },
     /// A channel that cannot be the column of a file.
     #[error("{file}: the column \"{name}\" cannot be written: {reason}; rename it")]
     ChannelName {

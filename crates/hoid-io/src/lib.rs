@@ -2,7 +2,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | `record_file` | [`read_record`], [`write_record`]: the format by extension, what to read and how |
+//! | `record_file` | [`read_record`], [`read_prepared`], [`write_record`]: the format by extension, what to read and how |
 //! | `column_expression` | [`ColumnExpression`]: which columns are input and output |
 //! | `output_table` | [`OutputTable`], [`write_table`], [`read_table`]: columns of results |
 //! | `table_writer` | [`TableWriter`]: the same in bounded memory |
@@ -15,7 +15,10 @@
 //! | `column_record` | a record into any format of columns but CSV |
 //! | `xdf` | streams of the Lab Streaming Layer |
 //! | `table`, `assemble` | the columns of any format, and the record made of them |
+//! | `preparation` | [`Preparation`]: scale, offset, rate, run-in and trend of channels, and the account of it |
 //! | `sampling`, `repair` | whether t is even; `--resample` and `--fill` |
+//! | `trouble` | [`Trouble`]: what is wrong with the sampling, where and how much |
+//! | `stretches` | [`read_stretches`]: the records between troubles |
 //! | `survey` | [`survey()`]: what is inside of a file |
 //! | `scenario_file` | [`read_scenario`]: scenarios in TOML |
 //! | `guarded` | panics of foreign readers as errors |
@@ -38,13 +41,16 @@ mod npz;
 mod output_table;
 mod parquet;
 mod parquet_record;
+mod preparation;
 mod record_file;
 mod repair;
 mod sampling;
 mod scenario_file;
+mod stretches;
 mod survey;
 mod table;
 mod table_writer;
+mod trouble;
 mod xdf;
 
 pub use atomic::{file_names, make_directory, read_bytes, read_text, write_atomically};
@@ -52,7 +58,10 @@ pub use column_expression::ColumnExpression;
 pub use error::IoError;
 pub use output_table::{ColumnKind, ColumnSchema, ColumnValues, OutputColumn, OutputTable, TableSchema};
 pub use output_table::{check_table_path, read_table, write_table};
-pub use record_file::{ReadOptions, ReadRecord, Repair, read_record, write_record, write_record_csv};
+pub use preparation::{NewRate, Offset, Preparation, Scaling, Step};
+pub use record_file::{ReadOptions, ReadRecord, Repair, read_prepared, read_record, write_record, write_record_csv};
 pub use scenario_file::{ScenarioFileError, parse_scenario, read_scenario, scenario_schema};
+pub use stretches::read_stretches;
 pub use survey::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey, survey};
 pub use table_writer::TableWriter;
+pub use trouble::{Place, Trouble, TroubleKind};

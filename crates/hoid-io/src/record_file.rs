@@ -6,15 +6,17 @@
 //! [`Format`].
 
 use std::io::Write;
+use std::mem;
 use std::path::Path;
 
 use hoid_model::Record;
 
 use crate::arrays::table_of;
 use crate::format::{Format, bytes_of, format_to_write};
+use crate::table::Table;
 use crate::{
-    ColumnExpression, IoError, assemble, column_record, csv_record, csv_table, mat, npz, parquet_record,
-    write_atomically, xdf,
+    ColumnExpression, IoError, Preparation, Step, Trouble, assemble, column_record, csv_record, csv_table, mat, npz,
+    parquet_record, write_atomically, xdf,
 };
 
 /// What may be mended in a damaged record. By default nothing is.
@@ -55,13 +57,17 @@ impl Default for ReadOptions {
     }
 }
 
-/// A record, and what a person should know about how it was read: columns left out, values repaired.
+/// A record, what was done to it, and what else a person should know about how it was read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadRecord {
     /// The record, labelled with the name of the file without extension.
     pub record: Record,
-    /// One sentence each.
+    /// What was not read or looks odd, such as columns left out; one sentence each.
     pub notes: Vec<String>,
+    /// What was done to the numbers of the file, in this order.
+    pub steps: Vec<Step>,
+    /// What is wrong with the input, the output and their time in the file, before anything was done; within the span that is read.
+    pub trouble: Vec<Trouble>,
 }
 
 /// Reads a record from a file: input, output, and each other column of numbers as a channel of its own.
@@ -69,21 +75,39 @@ pub struct ReadRecord {
 /// # Errors
 /// [`IoError`], naming the place in the file.
 pub fn read_record(path: &Path, options: &ReadOptions) -> Result<ReadRecord, IoError> {
+    read_prepared(path, options, &Preparation::default())
+}
+
+/// Reads a record and prepares it: the units, the alignment and the rate that the estimator is to see.
+///
+/// # Errors
+/// [`IoError`], naming the place in the file or the step of the preparation.
+pub fn read_prepared(path: &Path, options: &ReadOptions, preparation: &Preparation) -> Result<ReadRecord, IoError> {
     let file = path.display().to_string();
-    let (format, bytes) = bytes_of(path)?;
-    let table = match format {
-        Format::Csv { .. } => csv_table::parse(&bytes, &file)?,
-        Format::Parquet => parquet_record::parse(bytes, &file)?,
-        Format::Npz => table_of(npz::read(&bytes, &file)?, options, &file)?,
-        Format::Mat => table_of(mat::read(bytes, &file)?, options, &file)?,
-        Format::Xdf => table_of(xdf::read(&bytes, &file)?, options, &file)?,
-        Format::Npy => table_of(npz::read_single(bytes, &file)?, options, &file)?,
-    };
+    let (format, mut bytes) = bytes_of(path)?;
+    let table = table(format, &mut bytes, &file, options)?;
     let label = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
-    assemble::record_of(table, options).map(|read| ReadRecord {
-        record: read.record.labelled(label.unwrap_or_default()),
-        ..read
-    })
+    let mut read = assemble::record_of(table, options, preparation.drop_repeated)?;
+    let (record, steps) = preparation.apply(read.record.labelled(label.unwrap_or_default()))?;
+    read.steps.extend(steps);
+    Ok(ReadRecord { record, ..read })
+}
+
+/// The columns of a file.
+pub(crate) fn table<'a>(
+    format: Format,
+    bytes: &'a mut Vec<u8>,
+    file: &'a str,
+    options: &ReadOptions,
+) -> Result<Table<'a>, IoError> {
+    match format {
+        Format::Csv { .. } => csv_table::parse(bytes, file),
+        Format::Parquet => parquet_record::parse(mem::take(bytes), file),
+        Format::Npz => table_of(npz::read(bytes, file)?, options, file),
+        Format::Mat => table_of(mat::read(mem::take(bytes), file)?, options, file),
+        Format::Xdf => table_of(xdf::read(bytes, file)?, options, file),
+        Format::Npy => table_of(npz::read_single(mem::take(bytes), file)?, options, file),
+    }
 }
 
 /// Writes a record: t, then `f_t` where there is one, input, output, and the other channels in their order, all with the digits

@@ -1,10 +1,13 @@
-//! The two remedies for damaged records, applied only when they are asked for: straight lines over missing values, and
-//! straight lines from an uneven t to an even grid.
+//! The remedies for damaged records, applied only when they are asked for: rows that were written twice are dropped, straight
+//! lines are drawn over missing values, and from an uneven t to an even grid.
 //!
-//! Both invent data. Over a gap of one or two samples that does little harm; a long straight line is seen by every
+//! The lines invent data. Over a gap of one or two samples that does little harm; a long straight line is seen by every
 //! estimator as a person who behaves like that.
 
 use std::ops::Range;
+
+use crate::preparation::Step;
+use crate::table::{Source, Table};
 
 /// Why missing values could not be bridged: nothing stands on one side of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,6 +45,68 @@ pub(crate) fn fill(values: &mut [f64], t: Option<&[f64]>) -> Result<Bridged, Ope
         at = run.end;
     }
     Ok(bridged)
+}
+
+/// A table without some of its rows; messages still name the rows of the file.
+struct Kept<'a> {
+    source: Box<dyn Source + 'a>,
+    rows: Vec<usize>,
+}
+
+impl Source for Kept<'_> {
+    fn file(&self) -> &str {
+        self.source.file()
+    }
+
+    fn place(&self, row: usize) -> String {
+        self.source.place(self.rows.get(row).copied().unwrap_or(row))
+    }
+
+    fn cell(&self, row: usize, column: usize) -> String {
+        self.source.cell(self.rows.get(row).copied().unwrap_or(row), column)
+    }
+}
+
+/// Drops each row that is in all columns, the time among them, what the row before is.
+pub(crate) fn drop_repeated(table: Table<'_>) -> (Table<'_>, Option<Step>) {
+    let same = |row: &usize| {
+        table.columns.iter().enumerate().all(|(index, column)| {
+            let (a, b) = (column.values[row - 1], column.values[*row]);
+            let texts = [row - 1, *row].map(|row| column.texts.binary_search(&row).is_ok());
+            match texts {
+                [false, false] => a == b || a.is_nan() && b.is_nan(),
+                [true, true] => table.source.cell(row - 1, index) == table.source.cell(*row, index),
+                _ => false,
+            }
+        })
+    };
+    let repeated: Vec<usize> = (1..table.rows).filter(same).collect();
+    let Some(first) = repeated.first() else {
+        return (table, None);
+    };
+    let step = Step::DropRepeated {
+        rows: repeated.len(),
+        first_row: first + 1,
+    };
+    let rows: Vec<usize> = (0..table.rows)
+        .filter(|row| repeated.binary_search(row).is_err())
+        .collect();
+    let Table {
+        mut columns, source, ..
+    } = table;
+    for column in &mut columns {
+        column.values = rows.iter().map(|row| column.values[*row]).collect();
+        let texts = (0..rows.len()).filter(|row| column.texts.binary_search(&rows[*row]).is_ok());
+        column.texts = texts.collect();
+    }
+    let table = Table {
+        columns,
+        rows: rows.len(),
+        source: Box::new(Kept { source, rows }),
+        sample_time_s: table.sample_time_s,
+        notes: table.notes,
+    };
+    (table, Some(step))
 }
 
 fn next_run(values: &[f64], from: usize) -> Option<Range<usize>> {

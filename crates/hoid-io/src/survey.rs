@@ -1,27 +1,19 @@
 //! What is inside of a file, before anything is chosen: columns, their sampling and ranges, and what is suspicious in them.
 //!
-//! Nothing is judged finally here: a channel may rightly be constant. A channel is
-//!
-//! - constant where all values are one;
-//! - quantised where its values, fewer than half as many as its rows, lie on a grid `v_min + k q` within `1e-3 q`, `q` being the
-//!   smallest step between two of them;
-//! - saturated where it stays at its smallest or largest value for 5 rows or more, and twice as long as at any other.
-//!
-//! The sampling is that of `t` beside the columns: the typical step is the mean of the steps below 1.5 times their median, a gap
-//! is a step of 1.5 times it or more, and the jitter is the deviation of the other steps from it.
+//! Nothing is judged finally here: a channel may rightly be constant. What is suspicious is found by `trouble`, in columns that
+//! belong to one time together; a column that is constant is only marked, because many files carry such.
 
 use std::path::Path;
 
 use crate::arrays::{Contents, Holds, TIMES};
 use crate::format::{Format, bytes_of};
-use crate::table::Table;
-use crate::{IoError, csv_table, mat, npz, parquet_record, xdf};
+use crate::table::{Precision, Table};
+use crate::trouble::{self, Grid, Signal, Signals};
+use crate::{IoError, Trouble, TroubleKind, csv_table, mat, npz, parquet_record, xdf};
 
 /// Characters of a sketch.
 const SKETCH: usize = 32;
 const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
-/// Rows that a saturated channel stays at its end.
-const STAY: usize = 5;
 
 /// What a file holds.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +24,8 @@ pub struct FileSurvey {
     pub columns: Vec<ColumnSurvey>,
     /// The sampling of each structure with a time, one for a flat table.
     pub samplings: Vec<SamplingSurvey>,
+    /// What is wrong with the sampling, structure by structure.
+    pub trouble: Vec<Trouble>,
     /// What to know about how it was read.
     pub notes: Vec<String>,
 }
@@ -85,13 +79,13 @@ pub struct SamplingSurvey {
     pub rows: usize,
     /// First and last finite time, s.
     pub span_s: (f64, f64),
-    /// Typical step, s.
+    /// Sample time of the even grid behind the time, s.
     pub sample_time_s: f64,
-    /// Largest deviation of a step from the typical one, gaps left aside, s.
+    /// Largest deviation of a time from the even grid, s.
     pub jitter_s: f64,
-    /// Steps of 1.5 sample times or more.
+    /// Places where rows are missing.
     pub gaps: usize,
-    /// Samples missing in them.
+    /// Rows missing in them.
     pub missing: u64,
     /// Time of the row before the first gap, s.
     pub first_gap_s: Option<f64>,
@@ -110,6 +104,7 @@ struct Read {
     kind: String,
     values: Option<Vec<f64>>,
     rows: usize,
+    precision: Precision,
 }
 
 /// Looks into a file of any format that is read.
@@ -133,6 +128,7 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
         .filter(is_time)
         .filter_map(|time| sampling(time, &columns))
         .collect();
+    let trouble = troubles(&columns);
     let survey = |column: Read| ColumnSurvey {
         values: column.values.as_deref().and_then(values),
         path: column.path,
@@ -143,6 +139,7 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
     Ok(FileSurvey {
         format: format.name(),
         samplings,
+        trouble,
         columns: columns.into_iter().map(survey).collect(),
         notes,
     })
@@ -160,6 +157,7 @@ fn of_table(table: Table<'_>) -> (Vec<Read>, Vec<String>) {
             kind: String::from(if text { "text" } else { "numbers" }),
             values: (!text).then_some(column.values),
             rows,
+            precision: column.precision,
         }
     };
     (table.columns.into_iter().map(read).collect(), table.notes)
@@ -178,8 +176,45 @@ fn of_arrays(contents: &Contents) -> (Vec<Read>, Vec<String>) {
             Holds::Texts(_) | Holds::Unread(_) => None,
         },
         path: leaf.path,
+        precision: Precision::default(),
     };
     (leaves.into_iter().map(read).collect(), contents.notes.clone())
+}
+
+fn signal(column: &Read) -> Signal<'_> {
+    Signal {
+        name: &column.path,
+        values: column.values.as_deref().unwrap_or_default(),
+    }
+}
+
+/// What is wrong with the columns that stand beside each other, by structure and length.
+fn troubles(columns: &[Read]) -> Vec<Trouble> {
+    let mut seen: Vec<(&str, usize)> = Vec::new();
+    let mut found = Vec::new();
+    for column in columns.iter().filter(|column| column.rows > 1) {
+        let key = (column.parent.as_str(), column.rows);
+        if seen.contains(&key) {
+            continue;
+        }
+        seen.push(key);
+        let beside = || columns.iter().filter(|c| (c.parent.as_str(), c.rows) == key);
+        let time = TIMES
+            .iter()
+            .find_map(|name| beside().find(|c| c.name == *name && c.values.is_some()));
+        let is_time = |c: &Read| time.is_some_and(|time| time.path == c.path);
+        let numbers = || beside().filter(|c| c.values.is_some() && !is_time(c));
+        let is_clock = |c: &&Read| trouble::names_a_clock(&c.name) || TIMES.contains(&c.name.as_str());
+        found.extend(trouble::find(&Signals {
+            columns: numbers().filter(|c| !is_clock(c)).map(signal).collect(),
+            time: time.map(signal),
+            precision: time.map(|c| c.precision).unwrap_or_default(),
+            clocks: numbers().filter(is_clock).map(signal).collect(),
+            ..Signals::default()
+        }));
+    }
+    found.retain(|one| one.kind != TroubleKind::Constant);
+    found
 }
 
 /// The numbers of a column; none where no value is finite.
@@ -200,7 +235,12 @@ fn values(all: &[f64]) -> Option<ValueSurvey> {
     };
     let deviation = (finite.iter().map(|v| (v - mean).powi(2) / n).sum::<f64>()).sqrt();
     let constant = min == max;
-    let (low, high) = if constant { (0, 0) } else { saturated(&finite, min, max) };
+    let rails = trouble::rails(all);
+    let at_rail = |upper: bool| {
+        let rail = rails.iter().find(|rail| rail.is_upper == upper);
+        rail.map_or(0, |rail| rail.rows())
+    };
+    let (low, high) = (at_rail(false), at_rail(true));
     Some(ValueSurvey {
         missing: all.len() - finite.len(),
         min,
@@ -208,53 +248,11 @@ fn values(all: &[f64]) -> Option<ValueSurvey> {
         mean,
         deviation,
         constant,
-        quantum: quantum(&finite),
+        quantum: trouble::quantum(&finite).map(|(step, _)| step),
         saturated_low: low,
         saturated_high: high,
         sketch: sketch(all, min, max),
     })
-}
-
-/// The step of a grid on which all values lie.
-fn quantum(finite: &[f64]) -> Option<f64> {
-    let mut levels = finite.to_vec();
-    levels.sort_unstable_by(f64::total_cmp);
-    levels.dedup();
-    if levels.len() < 2 || 2 * levels.len() > finite.len() {
-        return None;
-    }
-    let step = levels
-        .windows(2)
-        .map(|pair| pair[1] - pair[0])
-        .fold(f64::INFINITY, f64::min);
-    let off = |level: &f64| {
-        let steps = (level - levels[0]) / step;
-        (steps - steps.round()).abs()
-    };
-    (step > 0.0 && levels.iter().all(|level| off(level) < 1e-3)).then_some(step)
-}
-
-/// Rows at the smallest and the largest value, where the column stays there.
-fn saturated(finite: &[f64], min: f64, max: f64) -> (usize, usize) {
-    let (mut low, mut high, mut other) = (0, 0, 0);
-    let mut run = 0;
-    for (k, value) in finite.iter().enumerate() {
-        run = if k > 0 && finite[k - 1] == *value { run + 1 } else { 1 };
-        let longest = if *value == min {
-            &mut low
-        } else if *value == max {
-            &mut high
-        } else {
-            &mut other
-        };
-        *longest = run.max(*longest);
-    }
-    let stays = |longest: usize| longest >= STAY && longest >= 2 * other;
-    let count = |end: f64| finite.iter().filter(|value| **value == end).count();
-    (
-        if stays(low) { count(min) } else { 0 },
-        if stays(high) { count(max) } else { 0 },
-    )
 }
 
 /// Means of equal parts as bars; a blank where no value is finite.
@@ -293,17 +291,11 @@ fn sampling(time: &Read, columns: &[Read]) -> Option<SamplingSurvey> {
         .filter(|t| t.is_finite())
         .collect();
     let &[first, .., last] = t.as_slice() else { return None };
-    let steps: Vec<f64> = t.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let mut forward: Vec<f64> = steps.iter().copied().filter(|step| *step > 0.0).collect();
-    let middle = forward.len() / 2;
-    if forward.is_empty() {
+    let grid = Grid::of(time.values.as_ref()?);
+    if !grid.sample_time_s.is_finite() {
         return None;
     }
-    let median = *forward.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let usual: Vec<f64> = forward.iter().copied().filter(|step| *step < 1.5 * median).collect();
-    let sample_time_s = usual.iter().sum::<f64>() / usual.len().max(1) as f64;
-    let is_gap = |step: f64| step >= 1.5 * sample_time_s;
-    let gaps = || (0..steps.len()).filter(|k| is_gap(steps[*k]));
+    let all = time.values.as_ref()?;
     let beside: Vec<&Vec<f64>> = columns
         .iter()
         .filter(|column| column.parent == time.parent && column.rows == time.rows && column.path != time.path)
@@ -319,17 +311,15 @@ fn sampling(time: &Read, columns: &[Read]) -> Option<SamplingSurvey> {
         path: time.path.clone(),
         rows: time.rows,
         span_s: (first, last),
-        sample_time_s,
-        jitter_s: usual
-            .iter()
-            .map(|step| (step - sample_time_s).abs())
-            .fold(0.0, f64::max),
-        gaps: gaps().count(),
-        missing: gaps()
-            .map(|k| ((steps[k] / sample_time_s).round() - 1.0).max(1.0) as u64)
+        sample_time_s: grid.sample_time_s,
+        jitter_s: grid.jitter(all).map_or(0.0, |(_, worst, _)| worst),
+        gaps: grid.gaps().count(),
+        missing: grid
+            .gaps()
+            .map(|(_, missing)| missing as u64)
             .fold(0, u64::saturating_add),
-        first_gap_s: gaps().next().map(|k| t[k]),
-        not_increasing: steps.iter().filter(|step| **step <= 0.0).count(),
+        first_gap_s: grid.gaps().next().map(|(i, _)| all[grid.rows[i]]),
+        not_increasing: time.rows - grid.rows.len() - all.iter().filter(|t| !t.is_finite()).count(),
         repeated: if beside.is_empty() {
             0
         } else {
@@ -379,6 +369,7 @@ mod tests {
             kind: String::new(),
             rows: values.len(),
             values: Some(values),
+            precision: Precision::default(),
         };
         let mut t: Vec<f64> = (0..100)
             .map(|k| 0.01 * f64::from(k) + if k >= 50 { 0.03 } else { 0.0 })
@@ -389,7 +380,7 @@ mod tests {
         x[31] = x[30];
         let columns = [read("t", t), read("x", x), read("c", vec![1.0; 100])];
         let found = sampling(&columns[0], &columns).unwrap();
-        assert!((found.sample_time_s - 0.01).abs() < 1e-9 && (found.jitter_s - 0.002).abs() < 1e-9);
+        assert!((found.sample_time_s - 0.01).abs() < 1e-5 && (found.jitter_s - 0.002).abs() < 2e-4);
         // The row behind the one that stands still is two steps late.
         assert_eq!(
             (found.gaps, found.missing, found.not_increasing, found.repeated),

@@ -190,7 +190,7 @@ fn other_extensions_and_places() {
 fn expressions_choose_and_combine() {
     let desk = Desk::new();
     let text = "# units: t s, r deg, y deg, stick mV\nt,r,y,stick\n0,1,0.25,3\n0.5,2,0.5,4\n";
-    let ReadRecord { record, notes } = desk.read(text, &options("r-y", "-stick")).unwrap();
+    let ReadRecord { record, notes, .. } = desk.read(text, &options("r-y", "-stick")).unwrap();
     assert!(notes.is_empty());
     assert_eq!((record.input(), record.output()), (&[0.75, 1.5][..], &[-3.0, -4.0][..]));
     assert_eq!(
@@ -344,9 +344,9 @@ fn fill_bridges_and_says_so() {
     assert_eq!(read.record.channel("d").unwrap(), [1.0, 2.0, 3.0, 4.0]);
     assert_eq!(read.record.times_s(), [0.0, 1.0, 2.0, 3.0]);
     assert!(
-        read.notes
+        read.steps
             .iter()
-            .any(|n| n == "column e: 2 missing values bridged linearly, at most 2 in a row")
+            .any(|step| step.to_string() == "column e: 2 missing values bridged linearly, at most 2 in a row")
     );
     let open = desk.error("t,e,u\n0,1,2\n1,,2\n", &fill(FILL));
     assert!(
@@ -396,9 +396,11 @@ fn resample_goes_over_gaps_and_jitter() {
         assert!((read.record.output()[k] - (1.0 - t)).abs() < 1e-14, "{k}");
     }
     assert!(
-        read.notes[0].contains("from 9 samples to 11 at 10 Hz; the longest step"),
+        read.steps[0]
+            .to_string()
+            .contains("from 9 samples to 11 at 10 Hz; the longest step"),
         "{:?}",
-        read.notes
+        read.steps
     );
     let twenty = desk.read(&text, &ask(RESAMPLE, Some(20.0))).unwrap().record;
     assert_eq!((twenty.len(), twenty.sample_time().s()), (21, 0.05));
@@ -406,7 +408,7 @@ fn resample_goes_over_gaps_and_jitter() {
     assert_eq!(coarse.record.times_s(), [0.0, 0.25, 0.5, 0.75, 1.0]);
     assert!((coarse.record.input()[1] - 2.5).abs() < 1e-14);
     let slow = desk.read(&text, &ask(RESAMPLE, Some(2.0))).unwrap();
-    assert!(slow.notes[1].contains("no low-pass filter"), "{:?}", slow.notes);
+    assert!(slow.notes[0].contains("no low-pass filter"), "{:?}", slow.notes);
     // An even record is left alone, and one with a time that jumps away is no record.
     let even = "t,e,u\n0.0,1,2\n0.1,2,3\n0.2,4,5\n";
     assert_eq!(
@@ -549,4 +551,23 @@ fn recordings_of_people_are_read() {
     }
     assert!(read > 0);
     eprintln!("{read} recordings read");
+}
+
+#[test]
+fn a_constant_term_of_a_difference_is_no_trouble() {
+    let desk = Desk::new();
+    let rows: String = (0..50)
+        .map(|k| format!("{:.2},0,{},7\n", 0.01 * f64::from(k), f64::from(k * k % 17).sqrt()))
+        .collect();
+    let text = format!("t,r,y,u\n{rows}");
+    let found = |input: &str, output: &str| -> Vec<String> {
+        let read = desk.read(&text, &options(input, output)).unwrap();
+        read.trouble
+            .iter()
+            .map(|one| format!("{}: {one}", one.kind.name()))
+            .collect()
+    };
+    assert_eq!(found("r-y", "u"), ["constant: u is constant: 7"]);
+    assert_eq!(found("y", "-r"), ["constant: r is constant: 0"]);
+    assert_eq!(found("r-u", "y").len(), 2);
 }

@@ -51,6 +51,12 @@ pub enum ModelError {
         /// The channel that it is compared with.
         reference: String,
     },
+    /// Parameters of an operator that do not make one.
+    #[error("{reason}")]
+    Operator {
+        /// What is wrong.
+        reason: String,
+    },
     /// A record without a sample.
     #[error("the record {label} has no samples; check the columns and the time span")]
     EmptyRecord {
@@ -70,6 +76,16 @@ pub enum ModelError {
         name: String,
         /// The names that exist.
         available: String,
+    },
+    /// Two records that do not follow each other.
+    #[error("{label} cannot be joined: found {found}, expected {expected}")]
+    Joined {
+        /// Label of the second record.
+        label: String,
+        /// What differs.
+        found: String,
+        /// What is needed.
+        expected: &'static str,
     },
     /// A time span that holds no samples of the record.
     #[error("the span {from_s} to {to_s} s holds no samples: the record covers {start_s} to {end_s} s")]

@@ -46,6 +46,38 @@ const AT_ORIGIN: f64 = 1e-12;
 pub const PHYSICAL_NAMES: [&str; 4] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm"];
 
 impl OperatorParameters {
+    /// From the parameters by name: `K_e`, `T_L` or `K_e_dot`, `omega_nm`, `zeta_nm`, and `tau_e`, which is zero when it is not named.
+    ///
+    /// # Errors
+    /// [`ModelError::Operator`] for a name that is not there, is lacking, or stands beside one that says the same.
+    pub fn of_names(pairs: &[(String, f64)]) -> Result<Self, ModelError> {
+        const NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
+        let wrong = |reason: String| ModelError::Operator { reason };
+        if let Some((name, _)) = pairs.iter().find(|(name, _)| !NAMES.contains(&name.as_str())) {
+            return Err(wrong(format!(
+                "there is no parameter {name}; expected {}",
+                NAMES.join(", ")
+            )));
+        }
+        let find = |name: &str| pairs.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
+        let need = |name: &str| find(name).ok_or_else(|| wrong(format!("{name} is lacking")));
+        let k_e = need("K_e")?;
+        let t_l_s = match (find("T_L"), find("K_e_dot")) {
+            (Some(t_l), None) => t_l,
+            (None, Some(k_e_dot)) if k_e != 0.0 => k_e_dot / k_e,
+            (None, Some(_)) => return Err(wrong("K_e = 0 has no T_L = K_e_dot/K_e".to_owned())),
+            (Some(_), Some(_)) => return Err(wrong("give T_L or K_e_dot, not both".to_owned())),
+            (None, None) => return Err(wrong("T_L (or K_e_dot) is lacking".to_owned())),
+        };
+        Ok(Self {
+            k_e,
+            t_l_s,
+            omega_nm_rad_s: need("omega_nm")?,
+            zeta_nm: need("zeta_nm")?,
+            tau_e_s: find("tau_e").unwrap_or(0.0),
+        })
+    }
+
     /// Error-rate gain `K_e_dot = K_e T_L`, s.
     pub fn k_e_dot(&self) -> f64 {
         self.k_e * self.t_l_s

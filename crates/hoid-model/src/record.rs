@@ -184,6 +184,11 @@ impl Record {
         self.input.iter().chain([&self.output]).chain(&self.others)
     }
 
+    /// Its channels to keep, without a copy: input, output, others.
+    pub fn into_channels(self) -> (Option<Channel>, Channel, Vec<Channel>) {
+        (self.input, self.output, self.others)
+    }
+
     /// The values of a channel by its name.
     pub fn channel(&self, name: &str) -> Option<&[f64]> {
         self.channels().find(|c| c.name == name).map(|c| c.values.as_slice())
@@ -215,6 +220,47 @@ impl Record {
             output: cut(&self.output),
             others: self.others.iter().map(cut).collect(),
         })
+    }
+
+    /// This record and, from its next sample on, another: what happens at the seam is known to have happened there.
+    ///
+    /// Channels that only one of them has are left out; label, names and units are those of the first.
+    ///
+    /// # Errors
+    /// [`ModelError::Joined`] when their sample times differ by more than one part in a million, or only one of them has an input.
+    pub fn joined(mut self, next: &Self) -> Result<Self, ModelError> {
+        let (first, second) = (self.sample_time.s(), next.sample_time.s());
+        let refuse = |found: String, expected: &'static str| ModelError::Joined {
+            label: next.label.clone(),
+            found,
+            expected,
+        };
+        if (first - second).abs() > 1e-6 * first {
+            return Err(refuse(
+                format!("a sample time of {second} s behind {first} s"),
+                "the same; resample one of them",
+            ));
+        }
+        match (&mut self.input, &next.input) {
+            (Some(input), Some(more)) => input.values.extend_from_slice(&more.values),
+            (None, None) => {}
+            _ => {
+                return Err(refuse(
+                    "an input in one of them only".to_owned(),
+                    "an input in both or in none",
+                ));
+            }
+        }
+        self.output.values.extend_from_slice(&next.output.values);
+        self.others
+            .retain_mut(|channel| match next.others.iter().find(|c| c.name == channel.name) {
+                Some(more) => {
+                    channel.values.extend_from_slice(&more.values);
+                    true
+                }
+                None => false,
+            });
+        Ok(self)
     }
 
     /// The same record with the mean or the line taken out of input and output; other channels stay as they are.
@@ -288,6 +334,42 @@ mod tests {
             Err(ModelError::DuplicateChannel { .. })
         ));
         assert!(good.with_channel(channel("x", &[0.0, f64::INFINITY])).is_err());
+    }
+
+    #[test]
+    fn records_are_joined_by_the_channels_that_both_have() {
+        let first = record(&[1.0, 2.0], &[3.0, 4.0])
+            .unwrap()
+            .starting_at(5.0)
+            .with_channel(channel("x", &[7.0, 7.0]))
+            .unwrap()
+            .with_channel(channel("n", &[0.1, 0.2]))
+            .unwrap();
+        let second = record(&[5.0], &[6.0])
+            .unwrap()
+            .with_channel(channel("n", &[0.3]))
+            .unwrap();
+        let joined = first.clone().joined(&second).unwrap();
+        assert_eq!(
+            (joined.input(), joined.output()),
+            (&[1.0, 2.0, 5.0][..], &[3.0, 4.0, 6.0][..])
+        );
+        assert_eq!(
+            (joined.channel("n"), joined.channel("x")),
+            (Some(&[0.1, 0.2, 0.3][..]), None)
+        );
+        assert!((joined.time_s(2) - 5.02).abs() < 1e-12);
+        // What was joined is cut apart again.
+        assert_eq!(joined.span(5.0, 5.02).unwrap().output(), first.output());
+        let slower = Record::new(
+            SampleTime::new(0.02).unwrap(),
+            channel("e", &[1.0]),
+            channel("u", &[1.0]),
+        )
+        .unwrap();
+        assert!(matches!(first.clone().joined(&slower), Err(ModelError::Joined { .. })));
+        let alone = Record::of_output(first.sample_time(), channel("u", &[1.0])).unwrap();
+        assert!(matches!(first.joined(&alone), Err(ModelError::Joined { .. })));
     }
 
     #[test]

@@ -128,6 +128,24 @@ pub enum RemnantStrength {
     },
 }
 
+impl RemnantStrength {
+    /// With another level, another definition of it, or both. `None` for a definition without a level where the gain itself is given.
+    pub fn changed(self, level: Option<f64>, definition: Option<NoiseDefinition>) -> Option<Self> {
+        match (self, level, definition) {
+            (same, None, None) => Some(same),
+            (Self::Level { level, definition }, new_level, new_definition) => Some(Self::Level {
+                level: new_level.unwrap_or(level),
+                definition: new_definition.unwrap_or(definition),
+            }),
+            (Self::Gain { .. }, Some(level), definition) => Some(Self::Level {
+                level,
+                definition: definition.unwrap_or_default(),
+            }),
+            (Self::Gain { .. }, None, Some(_)) => None,
+        }
+    }
+}
+
 /// The remnant of the operator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RemnantSetting {
@@ -259,6 +277,23 @@ impl Scenario {
             &self.forcing.lines(),
             self.sample_time,
         )
+    }
+
+    /// Remnant gain of a state for another order and noise level than those of the scenario.
+    ///
+    /// # Errors
+    /// As [`remnant_gain`].
+    pub fn remnant_gain_for(
+        &self,
+        state: &OperatingState,
+        order: usize,
+        level: f64,
+        definition: NoiseDefinition,
+    ) -> Result<f64, ModelError> {
+        let mut scenario = self.clone();
+        scenario.remnant.order = order;
+        scenario.remnant.strength = RemnantStrength::Level { level, definition };
+        scenario.remnant_gain_of(state, 0.0)
     }
 
     /// Checks the scenario and computes what a simulation needs.

@@ -1,0 +1,139 @@
+//! Channels that were recorded late are put beside the others.
+//!
+//! A channel with the offset d was recorded d samples later than it happened: its sample k + d goes beside sample k of the
+//! others, `x'(k) = x(k + d)`. An offset of whole samples moves rows and changes no number. Between samples the band-limited
+//! signal is taken by the windowed sinc of `kernel`: up to 0.8 of the Nyquist frequency its error is below 1e-4 of the amplitude
+//! (80 dB); above, the channel is not what it was. Rows for which a channel has no sample, or not all that the filter needs,
+//! are cut.
+
+use std::str::FromStr;
+
+use super::{
+    Bench, Step, decimal,
+    kernel::{Kernel, PASS},
+};
+use crate::IoError;
+
+/// Distance from a whole number of samples that is none.
+const WHOLE: f64 = 1e-6;
+
+/// By how much a channel was recorded later than it happened; negative when earlier.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Offset {
+    /// In samples of the record as it was read.
+    Samples(f64),
+    /// In s.
+    Seconds(f64),
+}
+
+/// `1`, `-0.5`, `0.0167s`.
+impl FromStr for Offset {
+    type Err = IoError;
+
+    /// # Errors
+    /// [`IoError::Offset`].
+    fn from_str(text: &str) -> Result<Self, IoError> {
+        let trimmed = text.trim();
+        let number = |part: &str| part.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+        let offset = match trimmed.strip_suffix('s') {
+            Some(seconds) => number(seconds).map(Self::Seconds),
+            None => number(trimmed).map(Self::Samples),
+        };
+        offset.ok_or_else(|| IoError::Offset { found: text.to_owned() })
+    }
+}
+
+/// An offset as whole samples and a rest.
+#[derive(Clone, Copy)]
+struct Shift {
+    samples: f64,
+    interpolated: bool,
+}
+
+impl Bench {
+    pub(super) fn offset(&mut self, offset: &std::collections::BTreeMap<String, Offset>) -> Result<(), IoError> {
+        const STEP: &str = "offset";
+        let ts = self.sample_time.s();
+        let named = offset.iter().map(|(name, offset)| (name.clone(), *offset));
+        let shifts: Vec<(usize, Shift)> = self
+            .find(STEP, named)?
+            .into_iter()
+            .map(|(channel, offset)| {
+                let samples = match offset {
+                    Offset::Samples(samples) => samples,
+                    Offset::Seconds(seconds) => seconds / ts,
+                };
+                let interpolated = (samples - samples.round()).abs() > WHOLE;
+                let samples = if interpolated { samples } else { samples.round() };
+                (channel, Shift { samples, interpolated })
+            })
+            .filter(|(_, shift)| shift.samples != 0.0)
+            .collect();
+        if shifts.is_empty() {
+            return Ok(());
+        }
+        if let Some((channel, shift)) = shifts.iter().find(|(_, shift)| !shift.samples.is_finite()) {
+            let found = format!("{}={}", self.channels[*channel].name, shift.samples);
+            return Err(self.error(STEP, found, "a finite number of samples or seconds"));
+        }
+        let kernel = Kernel::interpolating();
+        let half = |shift: Shift| if shift.interpolated { kernel.half() as f64 } else { 0.0 };
+        let last = self.len() as f64 - 1.0;
+        // The rows for which every channel has what it needs; in floating point, since an offset may be of any size.
+        let (mut from, mut to) = (0.0_f64, last);
+        for (_, shift) in &shifts {
+            from = from.max((half(*shift) - shift.samples).ceil());
+            to = to.min((last - half(*shift) - shift.samples).floor());
+        }
+        if from > to {
+            let each: Vec<String> = shifts
+                .iter()
+                .map(|(channel, shift)| format!("{}={}", self.channels[*channel].name, decimal(shift.samples)))
+                .collect();
+            let more = if shifts.iter().any(|(_, shift)| shift.interpolated) {
+                format!(" (and {} to each side for interpolation)", kernel.half())
+            } else {
+                String::new()
+            };
+            return Err(self.error(
+                STEP,
+                format!(
+                    "{} samples{more} in a record of {} samples",
+                    each.join(", "),
+                    self.len()
+                ),
+                "offsets that leave samples in which all channels overlap",
+            ));
+        }
+        let (from, to) = (from as usize, to as usize);
+        let rows = from..to + 1;
+        let cut = (rows.start, self.len() - rows.end);
+        let moved: Vec<(usize, Vec<f64>)> = shifts
+            .iter()
+            .map(|(channel, shift)| {
+                let values = &self.channels[*channel].values;
+                let first = rows.start as f64 + shift.samples;
+                let values = if shift.interpolated {
+                    kernel.values(values, first, 1.0, rows.len())
+                } else {
+                    values[first as usize..first as usize + rows.len()].to_vec()
+                };
+                (*channel, values)
+            })
+            .collect();
+        self.keep(rows);
+        for ((channel, values), (_, shift)) in moved.into_iter().zip(&shifts) {
+            let channel = &mut self.channels[channel];
+            channel.values = values;
+            self.steps.push(Step::Offset {
+                channel: channel.name.clone(),
+                samples: shift.samples,
+                seconds: shift.samples * ts,
+                interpolated: shift.interpolated,
+                pass_hz: shift.interpolated.then_some(PASS * 0.5 / ts),
+                cut_samples: cut,
+            });
+        }
+        Ok(())
+    }
+}

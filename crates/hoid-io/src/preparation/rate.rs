@@ -1,0 +1,109 @@
+//! Another sampling rate, with a low-pass filter against aliasing; all channels alike.
+//!
+//! Every M-th sample, or a new sampling frequency, is taken from the record by the windowed sinc of `kernel`. Its pass band
+//! ends at 0.8 of the lower one of the old and the new Nyquist frequency, where the ripple is below 1e-4 (0.001 dB). When the
+//! frequency falls, its stop band begins at the new Nyquist frequency: what would fold down is 80 dB below. The filter has linear phase, its
+//! delay is compensated, and it is the same for all channels, so that what is between e and u stays between them. New samples
+//! lie on the grid that begins with the first sample of the record; those whose filter would reach beyond the record are cut.
+//!
+//! A model with a hold (all of this project) sees an input that is held over the new sample time T, while the person saw one that
+//! was held over the old Ts, if any. A hold of T delays by T/2: to agree with the data, the delay of the model is shorter by
+//! `(T - Ts) / 2` than the one that is found at the old rate.
+
+use super::{
+    Bench, Step, decimal,
+    kernel::{Kernel, PASS, STOP_DB},
+};
+use crate::IoError;
+use hoid_model::SampleTime;
+
+/// A new rate makes at most so many samples out of one.
+const LARGEST_FACTOR: f64 = 100.0;
+
+/// Another sampling rate.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum NewRate {
+    /// That of the record.
+    #[default]
+    Kept,
+    /// Every M-th sample.
+    Decimated(usize),
+    /// A sampling frequency, Hz.
+    Hz(f64),
+}
+
+impl Bench {
+    pub(super) fn rate(&mut self, rate: NewRate) -> Result<(), IoError> {
+        let old = self.sample_time;
+        let (step, factor, new) = match rate {
+            NewRate::Kept | NewRate::Decimated(1) => return Ok(()),
+            NewRate::Decimated(0) => return Err(self.error("decimate", "factor 0", "1 or more")),
+            NewRate::Decimated(factor) => ("decimate", factor as f64, SampleTime::new(factor as f64 * old.s())),
+            NewRate::Hz(hz) => {
+                let new = SampleTime::new(1.0 / hz).map_err(|_| {
+                    self.error(
+                        "rate",
+                        format!("{hz} Hz"),
+                        "a positive finite number of samples in a second",
+                    )
+                })?;
+                if new.matches(old) {
+                    return Ok(());
+                }
+                ("new-fs", new.s() / old.s(), Ok(new))
+            }
+        };
+        let (length, last) = (self.len(), self.len() as f64 - 1.0);
+        if factor < 1.0 / LARGEST_FACTOR {
+            return Err(self.error(
+                step,
+                format!("{} samples out of one", decimal(1.0 / factor)),
+                format!("at most {LARGEST_FACTOR}"),
+            ));
+        }
+        let too_long = |bench: &Self| {
+            bench.error(
+                step,
+                format!(
+                    "{length} samples for a filter that reaches {} to each side",
+                    Kernel::limiting((1.0 / factor).min(1.0), usize::MAX)
+                        .map_or_else(|| "too many".to_owned(), |kernel| kernel.half().to_string())
+                ),
+                "a longer record, or a smaller change of the rate",
+            )
+        };
+        let kernel = if factor > 1.0 {
+            Kernel::limiting(1.0 / factor, length).ok_or_else(|| too_long(self))?
+        } else {
+            Kernel::interpolating()
+        };
+        let new = new.map_err(|_| too_long(self))?;
+        let half = kernel.half() as f64;
+        // On the grid that begins with the first sample of the record; a bound on a sample, up to rounding, takes that sample.
+        let first = ((half - 1e-10) / factor).ceil();
+        let end = ((last - half + 1e-10) / factor).floor();
+        if first > end {
+            return Err(too_long(self));
+        }
+        let n = (end - first) as usize + 1;
+        for channel in &mut self.channels {
+            channel.values = kernel.values(&channel.values, first * factor, factor, n);
+        }
+        let cut_s = (first * new.s(), last * old.s() - end * new.s());
+        self.start_s += cut_s.0;
+        self.sample_time = new;
+        let nyquist_hz = 0.5 / old.s().max(new.s());
+        self.steps.push(Step::Rate {
+            factor,
+            from_hz: 1.0 / old.s(),
+            to_hz: 1.0 / new.s(),
+            pass_hz: PASS * nyquist_hz,
+            stop_hz: (factor > 1.0).then_some(nyquist_hz),
+            stop_db: STOP_DB,
+            taps: 2 * kernel.half() + 1,
+            cut_s,
+            delay_s: 0.5 * (new.s() - old.s()),
+        });
+        Ok(())
+    }
+}

@@ -1,0 +1,161 @@
+//! Factors and units of channels: `u=12.5`, `u=12.5:deg`, `e=rad:deg`.
+//!
+//! A factor says by what the numbers of the file are multiplied; behind a colon stands the unit that they then have. Two known
+//! units of one kind give the factor themselves, exactly: `rad:deg` is 180 / pi. Parameters of the operator are ratios of u and
+//! e: with e in deg and u in V the gain K_e is in V/deg.
+
+use std::f64::consts::PI;
+use std::str::FromStr;
+
+use super::{Bench, Step, decimal};
+use crate::IoError;
+
+/// Known units: name, kind, and size in the first unit of its kind.
+const UNITS: [(&str, &str, f64); 18] = [
+    ("rad", "angle", 1.0),
+    ("mrad", "angle", 1e-3),
+    ("deg", "angle", PI / 180.0),
+    ("rev", "angle", 2.0 * PI),
+    ("arcmin", "angle", PI / 10_800.0),
+    ("m", "length", 1.0),
+    ("cm", "length", 1e-2),
+    ("mm", "length", 1e-3),
+    ("in", "length", 0.0254),
+    ("ft", "length", 0.3048),
+    ("V", "voltage", 1.0),
+    ("mV", "voltage", 1e-3),
+    ("uV", "voltage", 1e-6),
+    ("N", "force", 1.0),
+    ("mN", "force", 1e-3),
+    ("lbf", "force", 4.448_221_615_260_5),
+    ("Nm", "torque", 1.0),
+    ("mNm", "torque", 1e-3),
+];
+
+/// What a channel is multiplied by, and the unit that it has then.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scaling {
+    /// The factor, finite and not 0.
+    factor: f64,
+    /// The unit that the file must not contradict.
+    from: Option<&'static str>,
+    /// The unit behind it; `None` keeps none, because the old one is no longer true.
+    to: Option<String>,
+}
+
+impl Scaling {
+    /// Multiplication by a factor, after which the unit is `unit`, or unknown.
+    ///
+    /// # Errors
+    /// [`IoError::Scaling`] unless the factor is finite and not 0.
+    pub fn by(factor: f64, unit: Option<&str>) -> Result<Self, IoError> {
+        if factor == 0.0 || !factor.is_finite() {
+            return Err(refused(
+                &factor.to_string(),
+                "a factor that is finite and not 0, since a channel times 0 says nothing",
+            ));
+        }
+        Ok(Self {
+            factor,
+            from: None,
+            to: unit.map(str::to_owned),
+        })
+    }
+
+    /// The factor.
+    pub fn factor(&self) -> f64 {
+        self.factor
+    }
+
+    /// The unit that the channel has then, where it is known.
+    pub fn unit(&self) -> Option<&str> {
+        self.to.as_deref()
+    }
+}
+
+/// `FACTOR`, `FACTOR:UNIT` or `UNIT:UNIT`.
+impl FromStr for Scaling {
+    type Err = IoError;
+
+    /// # Errors
+    /// [`IoError::Scaling`].
+    fn from_str(text: &str) -> Result<Self, IoError> {
+        let (left, right) = match text.split_once(':') {
+            Some((left, right)) => (left.trim(), Some(right.trim())),
+            None => (text.trim(), None),
+        };
+        let known = |name: &str| UNITS.into_iter().find(|(unit, ..)| *unit == name);
+        // A number is a number: "1:deg" names a unit and changes no value.
+        if let Ok(factor) = left.parse::<f64>() {
+            if right == Some("") {
+                return Err(refused(text, "a unit behind the colon, as 12.5:deg"));
+            }
+            return Self::by(factor, right).map_err(|_| {
+                refused(
+                    text,
+                    "a factor that is finite and not 0, since a channel times 0 says nothing",
+                )
+            });
+        }
+        let (Some(from), Some(to)) = (known(left), right.and_then(known)) else {
+            let names: Vec<&str> = UNITS.iter().map(|(name, ..)| *name).collect();
+            return Err(refused(
+                text,
+                &format!(
+                    "a factor (12.5), a factor and a unit (12.5:deg) or two units (rad:deg) of {}",
+                    names.join(", ")
+                ),
+            ));
+        };
+        if from.1 != to.1 {
+            return Err(refused(
+                text,
+                &format!(
+                    "two units of one kind, but {} is {} and {} is {}",
+                    from.0, from.1, to.0, to.1
+                ),
+            ));
+        }
+        Ok(Self {
+            factor: from.2 / to.2,
+            from: Some(from.0),
+            to: Some(to.0.to_owned()),
+        })
+    }
+}
+
+fn refused(found: &str, expected: &str) -> IoError {
+    IoError::Scaling {
+        found: found.to_owned(),
+        expected: expected.to_owned(),
+    }
+}
+
+impl Bench {
+    pub(super) fn scale(&mut self, scale: &std::collections::BTreeMap<String, Scaling>) -> Result<(), IoError> {
+        const STEP: &str = "scale";
+        let named = scale.iter().map(|(name, scaling)| (name.clone(), scaling));
+        for (channel, scaling) in self.find(STEP, named)? {
+            let found = self.channels[channel].unit.clone();
+            if let Some(from) = scaling.from.filter(|from| !found.is_empty() && *from != found) {
+                return Err(self.error(
+                    STEP,
+                    format!(
+                        "{} is in {found} by its file, and to be taken from {from}",
+                        self.channels[channel].name
+                    ),
+                    format!("the unit of the file, or a factor such as {}", decimal(scaling.factor)),
+                ));
+            }
+            let channel = &mut self.channels[channel];
+            channel.values.iter_mut().for_each(|value| *value *= scaling.factor);
+            channel.unit = scaling.to.clone().unwrap_or_default();
+            self.steps.push(Step::Scale {
+                channel: channel.name.clone(),
+                factor: scaling.factor,
+                unit: scaling.to.clone(),
+            });
+        }
+        Ok(())
+    }
+}

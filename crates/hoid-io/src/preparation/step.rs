@@ -1,0 +1,230 @@
+//! The account of what was done to a record: for people in words, for programs with its numbers.
+
+use std::fmt;
+
+use hoid_model::Detrend;
+use serde::Serialize;
+
+use super::decimal;
+
+/// One step, in the order in which it was taken.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "step", rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Step {
+    /// Rows that were there twice, time included, were dropped.
+    DropRepeated {
+        /// Rows dropped.
+        rows: usize,
+        /// The first of them, from 1.
+        first_row: usize,
+    },
+    /// Only a part between troubles was taken.
+    Mask {
+        /// Kinds of trouble that are cut out.
+        what: Vec<&'static str>,
+        /// Time of the first sample of the part, s.
+        from_s: f64,
+        /// Time behind its last sample, s.
+        to_s: f64,
+    },
+    /// Missing values were bridged by straight lines.
+    Fill {
+        /// The column.
+        channel: String,
+        /// Values bridged.
+        values: usize,
+        /// Longest run of them.
+        longest: usize,
+    },
+    /// An uneven time was brought onto an even grid by straight lines.
+    Interpolate {
+        /// Samples before.
+        from_samples: usize,
+        /// Samples behind.
+        to_samples: usize,
+        /// Sampling frequency of the grid, Hz.
+        to_hz: f64,
+        /// Longest step between two samples, s.
+        longest_step_s: f64,
+    },
+    /// A channel was multiplied.
+    Scale {
+        /// The channel.
+        channel: String,
+        /// The factor.
+        factor: f64,
+        /// The unit behind it, where it is known.
+        unit: Option<String>,
+    },
+    /// A channel that was recorded late was put beside the others.
+    Offset {
+        /// The channel.
+        channel: String,
+        /// By how much it was late, samples.
+        samples: f64,
+        /// The same in s.
+        seconds: f64,
+        /// Whether values between samples were taken, by a band-limited interpolation.
+        interpolated: bool,
+        /// End of the band in which the interpolation is exact to 1e-4, Hz.
+        pass_hz: Option<f64>,
+        /// Samples cut at the start and at the end of the record.
+        cut_samples: (usize, usize),
+    },
+    /// Another sampling rate.
+    Rate {
+        /// New sample time by the old one.
+        factor: f64,
+        /// Old sampling frequency, Hz.
+        from_hz: f64,
+        /// New sampling frequency, Hz.
+        to_hz: f64,
+        /// End of the pass band, Hz.
+        pass_hz: f64,
+        /// Begin of the stop band, Hz; none where the frequency rises.
+        stop_hz: Option<f64>,
+        /// Attenuation in the stop band, dB.
+        stop_db: f64,
+        /// Length of the filter, samples of the old rate.
+        taps: usize,
+        /// Time without samples at the start and at the end, s.
+        cut_s: (f64, f64),
+        /// By how much the delay of a model with a hold is shorter than at the old rate, s.
+        delay_s: f64,
+    },
+    /// The first seconds were dropped.
+    RunIn {
+        /// Length of the run-in, s.
+        seconds: f64,
+        /// Samples dropped, beside those that a filter had cut.
+        samples: usize,
+    },
+    /// The mean or the straight line of input and output was taken out.
+    Detrend {
+        /// "mean" or "linear".
+        how: &'static str,
+    },
+}
+
+impl Step {
+    /// The step for what is taken out; none for nothing.
+    pub(super) fn of_detrend(how: Detrend) -> Option<Self> {
+        match how {
+            Detrend::None => None,
+            Detrend::Mean => Some(Self::Detrend { how: "mean" }),
+            Detrend::Linear => Some(Self::Detrend { how: "linear" }),
+        }
+    }
+
+    /// The name of the step, as in JSON.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::DropRepeated { .. } => "drop-repeated",
+            Self::Mask { .. } => "mask",
+            Self::Fill { .. } => "fill",
+            Self::Interpolate { .. } => "interpolate",
+            Self::Scale { .. } => "scale",
+            Self::Offset { .. } => "offset",
+            Self::Rate { .. } => "rate",
+            Self::RunIn { .. } => "run-in",
+            Self::Detrend { .. } => "detrend",
+        }
+    }
+}
+
+/// The step as a phrase without a full stop.
+impl fmt::Display for Step {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::DropRepeated { rows, first_row } => {
+                write!(f, "{rows} repeated rows dropped, the first of them row {first_row}")
+            }
+            Self::Mask { what, from_s, to_s } => write!(
+                f,
+                "only {} to {} s taken, between what is {}",
+                decimal(*from_s),
+                decimal(*to_s),
+                what.join(" or ")
+            ),
+            Self::Fill {
+                channel,
+                values,
+                longest,
+            } => write!(
+                f,
+                "column {channel}: {values} missing values bridged linearly, at most {longest} in a row"
+            ),
+            Self::Interpolate {
+                from_samples,
+                to_samples,
+                to_hz,
+                longest_step_s,
+            } => write!(
+                f,
+                "resampled linearly from {from_samples} samples to {to_samples} at {} Hz; the longest step between two samples is \
+                 {longest_step_s:.6} s",
+                decimal(*to_hz)
+            ),
+            Self::Scale { channel, factor, unit } => {
+                write!(f, "{channel} times {}", decimal(*factor))?;
+                unit.iter().try_for_each(|unit| write!(f, " (now in {unit})"))
+            }
+            Self::Offset {
+                channel,
+                samples,
+                seconds,
+                interpolated,
+                pass_hz,
+                cut_samples: (start, end),
+            } => {
+                let way = if *samples > 0.0 { "earlier" } else { "later" };
+                write!(
+                    f,
+                    "{channel} moved {way} by {} samples ({} s)",
+                    decimal(samples.abs()),
+                    decimal(seconds.abs())
+                )?;
+                if let (true, Some(pass)) = (interpolated, pass_hz) {
+                    write!(f, ", by a sinc function, to 1e-4 up to {} Hz", decimal(*pass))?;
+                }
+                write!(f, "; {start} samples cut at the start, {end} at the end")
+            }
+            Self::Rate {
+                from_hz,
+                to_hz,
+                pass_hz,
+                stop_hz,
+                stop_db,
+                taps,
+                cut_s,
+                delay_s,
+                ..
+            } => {
+                write!(
+                    f,
+                    "{} Hz to {} Hz by a linear-phase filter of {taps} samples on all channels, pass band to {} Hz",
+                    decimal(*from_hz),
+                    decimal(*to_hz),
+                    decimal(*pass_hz)
+                )?;
+                if let Some(stop) = stop_hz {
+                    write!(f, ", {stop_db} dB from {} Hz", decimal(*stop))?;
+                }
+                write!(
+                    f,
+                    "; {} s cut at the start, {} s at the end; the longer hold makes the delay of a model {} by {} s",
+                    decimal(cut_s.0),
+                    decimal(cut_s.1),
+                    if *delay_s > 0.0 { "shorter" } else { "longer" },
+                    decimal(delay_s.abs())
+                )
+            }
+            Self::RunIn { seconds, samples } => {
+                write!(f, "run-in of {} s dropped ({samples} samples)", decimal(*seconds))
+            }
+            Self::Detrend { how: "mean" } => write!(f, "mean of input and output taken out"),
+            Self::Detrend { .. } => write!(f, "straight line of input and output taken out"),
+        }
+    }
+}

@@ -1,0 +1,353 @@
+use std::f64::consts::PI;
+
+use super::*;
+
+const TS: f64 = 0.01;
+
+/// Waves below 0.8 of the Nyquist frequency of 50 Hz: Hz, amplitude, phase.
+const WAVES: [(f64, f64, f64); 5] = [
+    (0.13, 1.0, 0.3),
+    (1.7, 0.8, 1.1),
+    (6.3, 0.5, -2.0),
+    (17.0, 0.4, 0.5),
+    (39.0, 0.3, 2.0),
+];
+
+fn signal(t: f64) -> f64 {
+    WAVES.iter().map(|(hz, a, p)| a * (2.0 * PI * hz * t + p).cos()).sum()
+}
+
+fn channel(name: &str, n: usize, f: impl Fn(f64) -> f64) -> Channel {
+    Channel::new(name, "", (0..n).map(|k| f(k as f64 * TS)).collect())
+}
+
+fn record(n: usize, e: impl Fn(f64) -> f64, u: impl Fn(f64) -> f64) -> Record {
+    let ts = SampleTime::new(TS).unwrap();
+    Record::new(ts, channel("r-y", n, e), channel("stick", n, u))
+        .unwrap()
+        .labelled("run")
+        .starting_at(3.0)
+}
+
+fn with(change: impl FnOnce(&mut Preparation)) -> Preparation {
+    let mut preparation = Preparation::default();
+    change(&mut preparation);
+    preparation
+}
+
+fn moved(channel: &str, offset: Offset) -> Preparation {
+    with(|p| p.offset = BTreeMap::from([(channel.to_owned(), offset)]))
+}
+
+fn scaled(channel: &str, scaling: Scaling) -> Preparation {
+    with(|p| p.scale = BTreeMap::from([(channel.to_owned(), scaling)]))
+}
+
+fn message(preparation: &Preparation, n: usize) -> String {
+    preparation.apply(record(n, signal, signal)).unwrap_err().to_string()
+}
+
+fn largest(a: &[f64], b: impl Fn(usize) -> f64) -> f64 {
+    a.iter().enumerate().map(|(k, v)| (v - b(k)).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn nothing_asked_for_changes_nothing() {
+    let whole = record(50, signal, f64::sin);
+    let (same, steps) = Preparation::default().apply(whole.clone()).unwrap();
+    assert_eq!((same, steps.len()), (whole, 0));
+}
+
+#[test]
+fn scales_and_units() {
+    let preparation = with(|p| {
+        p.scale.insert("e".into(), "rad:deg".parse().unwrap());
+        p.scale.insert("stick".into(), "12.5:deg".parse().unwrap());
+    });
+    let (found, steps) = preparation.apply(record(5, |_| PI, |_| 2.0)).unwrap();
+    assert!((found.input()[0] - 180.0).abs() < 1e-12 && found.output()[0] == 25.0);
+    assert_eq!((found.output_channel().unit.as_str(), steps.len()), ("deg", 2));
+    assert_eq!(steps[1].to_string(), "stick times 12.5 (now in deg)");
+    // There and back, for all pairs.
+    for (from, to) in [("rad", "deg"), ("deg", "mrad"), ("in", "cm"), ("V", "mV"), ("lbf", "N")] {
+        let there: Scaling = format!("{from}:{to}").parse().unwrap();
+        let back: Scaling = format!("{to}:{from}").parse().unwrap();
+        assert!((there.factor() * back.factor() - 1.0).abs() < 1e-15, "{from} {to}");
+    }
+    for bad in [
+        "0",
+        "NaN",
+        "inf",
+        "",
+        ":",
+        "deg",
+        "rad:m",
+        "deg:",
+        "2:",
+        "rad:furlong",
+        "1e999",
+    ] {
+        let message = bad.parse::<Scaling>().unwrap_err().to_string();
+        assert!(message.contains("expected"), "{bad}: {message}");
+    }
+    let unknown = scaled("q", Scaling::by(2.0, None).unwrap());
+    assert_eq!(
+        message(&unknown, 5),
+        "run: scale: there is no channel \"q\", expected one of r-y, stick, or e and u for input and output"
+    );
+    let twice = with(|p| {
+        for name in ["e", "r-y"] {
+            p.scale.insert(name.into(), Scaling::by(2.0, None).unwrap());
+        }
+    });
+    assert!(message(&twice, 5).contains("named twice"));
+    let ts = SampleTime::new(TS).unwrap();
+    let in_deg = Record::of_output(ts, Channel::new("u", "deg", vec![1.0])).unwrap();
+    let contradicted = scaled("u", "rad:deg".parse().unwrap());
+    let message = contradicted.apply(in_deg).unwrap_err().to_string();
+    assert!(message.contains("in deg by its file"), "{message}");
+}
+
+#[test]
+fn whole_offsets_move_rows_and_change_no_number() {
+    // The output stands two samples late in the file.
+    let late = record(100, signal, |t| signal(t - 2.0 * TS));
+    let preparation = moved("u", Offset::Samples(2.0));
+    let (found, steps) = preparation.apply(late.clone()).unwrap();
+    assert_eq!(found.output(), &late.output()[2..]);
+    assert_eq!(found.input(), &late.input()[..98]);
+    assert!((found.time_s(0) - 3.0).abs() < 1e-12);
+    assert!(matches!(
+        steps[0],
+        Step::Offset {
+            interpolated: false,
+            cut_samples: (0, 2),
+            ..
+        }
+    ));
+    // In s, and early: the same rows the other way round.
+    let early = moved("e", Offset::Seconds(-0.02));
+    let (found, _) = early.apply(late.clone()).unwrap();
+    assert_eq!(found.input(), &late.input()[..98]);
+    assert_eq!(found.output(), &late.output()[2..]);
+    assert!((found.time_s(0) - 3.02).abs() < 1e-12);
+}
+
+#[test]
+fn parts_of_a_sample_are_band_limited_interpolation() {
+    for offset in [0.5, 1.0 / 3.0, -0.71, 3.017] {
+        let n = 600;
+        let late = record(n, signal, |t| signal(t - offset * TS));
+        let preparation = moved("u", Offset::Samples(offset));
+        let (found, steps) = preparation.apply(late).unwrap();
+        let begin = found.time_s(0) - 3.0;
+        // The sum of the amplitudes is 3: 1e-4 of it as stated.
+        let error = largest(found.output(), |k| signal(begin + k as f64 * TS));
+        assert!(error < 3e-4, "{offset}: {error:e}");
+        assert!(largest(found.input(), |k| signal(begin + k as f64 * TS)) < 1e-12);
+        // Edges are cut, not invented.
+        let Step::Offset {
+            cut_samples: (start, end),
+            ..
+        } = &steps[0]
+        else {
+            panic!()
+        };
+        assert!(found.len() + start + end == n && *start + *end >= 28);
+    }
+}
+
+#[test]
+fn decimation_keeps_the_pass_band_and_lets_nothing_fold_down() {
+    for factor in [2_usize, 3, 5, 10] {
+        let new_nyquist = 50.0 / factor as f64;
+        let low = |t: f64| 2.0 + (2.0 * PI * 0.79 * new_nyquist * t).cos() + (2.0 * PI * 0.2 * t).sin();
+        let n = 4000;
+        let decimate = with(|p| p.rate = NewRate::Decimated(factor));
+        let (found, steps) = decimate.apply(record(n, low, |t| low(t) + 1.0)).unwrap();
+        let begin = found.time_s(0) - 3.0;
+        let ts = found.sample_time().s();
+        assert!((ts - factor as f64 * TS).abs() < 1e-15);
+        // 0.001 dB of ripple is 1.2e-4 of an amplitude of 1; the delay is compensated, else the error would be of order 1.
+        assert!(largest(found.input(), |k| low(begin + k as f64 * ts)) < 1.2e-4);
+        // The same on both channels: what is between them stays, to rounding.
+        let both = largest(found.output(), |k| found.input()[k] + 1.0);
+        assert!(both < 1e-12, "{both:e}");
+        // From the new Nyquist frequency on nothing comes through.
+        for i in 0..40 {
+            let hz = new_nyquist * (1.0 + 1e-9) + f64::from(i) / 40.0 * (50.0 - new_nyquist);
+            let (alias, _) = decimate
+                .apply(record(n, |t| (2.0 * PI * hz * t).cos(), |t| (2.0 * PI * hz * t).sin()))
+                .unwrap();
+            let leak = largest(alias.input(), |_| 0.0).max(largest(alias.output(), |_| 0.0));
+            assert!(leak < 1e-4, "{hz} Hz: {leak:e}");
+        }
+        let Step::Rate { cut_s, .. } = &steps[0] else { panic!() };
+        let covered = (found.len() - 1) as f64 * ts + cut_s.0 + cut_s.1;
+        assert!((covered - (n - 1) as f64 * TS).abs() < 1e-9, "{covered}");
+    }
+}
+
+#[test]
+fn a_new_rate_down_and_up() {
+    for hz in [60.0, 128.0, 250.0, 36.7] {
+        let edge = 0.8 * 0.5 * f64::min(hz, 100.0);
+        let low = |t: f64| (2.0 * PI * 0.99 * edge * t).cos() + (2.0 * PI * 0.5 * t).sin();
+        let (found, _) = with(|p| p.rate = NewRate::Hz(hz))
+            .apply(record(3000, low, low))
+            .unwrap();
+        let (begin, ts) = (found.time_s(0) - 3.0, found.sample_time().s());
+        assert!((ts * hz - 1.0).abs() < 1e-12);
+        let error = largest(found.input(), |k| low(begin + k as f64 * ts));
+        assert!(error < 2e-4, "{hz}: {error:e}");
+        // On the grid of the first sample.
+        let steps = (found.time_s(0) - 3.0) / ts;
+        assert!((steps - steps.round()).abs() < 1e-6, "{steps}");
+    }
+    // The rate that it has anyhow.
+    assert!(
+        with(|p| p.rate = NewRate::Hz(100.0))
+            .apply(record(3, signal, signal))
+            .unwrap()
+            .1
+            .is_empty()
+    );
+}
+
+#[test]
+fn run_in_counts_from_the_file_and_trend_comes_last() {
+    let preparation = with(|p| {
+        p.run_in_s = 5.0;
+        p.rate = NewRate::Decimated(4);
+        p.detrend = Detrend::Mean;
+        p.offset.insert("u".into(), Offset::Samples(1.0));
+    });
+    let (found, steps) = preparation.apply(record(2000, signal, signal)).unwrap();
+    assert!((found.time_s(0) - 8.0).abs() < 1e-9, "{}", found.time_s(0));
+    assert!(found.input().iter().sum::<f64>().abs() < 1e-9);
+    let names: Vec<&str> = steps.iter().map(Step::name).collect();
+    assert_eq!(names, ["offset", "rate", "run-in", "detrend"]);
+    assert!(
+        steps[1]
+            .to_string()
+            .starts_with("100 Hz to 25 Hz by a linear-phase filter of"),
+        "{}",
+        steps[1]
+    );
+}
+
+#[test]
+fn what_cannot_be_done_is_said() {
+    let rate = |rate| with(|p| p.rate = rate);
+    for (preparation, n, words) in [
+        (rate(NewRate::Decimated(0)), 10, "decimate: factor 0"),
+        (rate(NewRate::Decimated(4)), 1, "decimate: 1 samples for a filter"),
+        (rate(NewRate::Decimated(4)), 200, "a longer record"),
+        (rate(NewRate::Decimated(usize::MAX)), 200, "a longer record"),
+        (rate(NewRate::Hz(f64::NAN)), 200, "expected a positive"),
+        (rate(NewRate::Hz(-1.0)), 200, "expected a positive"),
+        (rate(NewRate::Hz(1e9)), 200, "at most 100"),
+        (rate(NewRate::Hz(1e-9)), 200, "a longer record"),
+        (with(|p| p.run_in_s = -1.0), 10, "run-in: -1 s"),
+        (with(|p| p.run_in_s = f64::NAN), 10, "run-in: NaN s"),
+        (with(|p| p.run_in_s = 0.1), 10, "0.1 s leave nothing of 0.1 s"),
+        (
+            moved("u", Offset::Samples(10.0)),
+            10,
+            "stick=10 samples in a record of 10",
+        ),
+        (moved("u", Offset::Seconds(-1e300)), 10, "offset"),
+        (moved("u", Offset::Samples(f64::NAN)), 10, "a finite number"),
+        (moved("u", Offset::Samples(0.5)), 20, "to each side for interpolation"),
+        (moved("x", Offset::Samples(1.0)), 20, "no channel \"x\""),
+    ] {
+        let message = message(&preparation, n);
+        assert!(message.contains(words), "{words}: {message}");
+    }
+    for bad in ["", "s", "x", "NaN", "infs", "1 s s"] {
+        assert!(bad.parse::<Offset>().is_err(), "{bad}");
+    }
+    assert_eq!(" 0.02s".parse::<Offset>().unwrap(), Offset::Seconds(0.02));
+    // A factor that leaves floating point is an error of the record.
+    let large = scaled("u", Scaling::by(1e300, None).unwrap());
+    assert!(
+        large
+            .apply(record(5, signal, |_| 1e300))
+            .unwrap_err()
+            .to_string()
+            .contains("finite")
+    );
+}
+
+/// Numbers that look arbitrary, the same in every run.
+struct Arbitrary(u64);
+
+impl Arbitrary {
+    fn next(&mut self) -> u64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 >> 33
+    }
+
+    fn number(&mut self) -> f64 {
+        const ODD: [f64; 12] = [
+            0.0,
+            1.0,
+            -1.0,
+            0.5,
+            1e-12,
+            1e12,
+            f64::NAN,
+            f64::INFINITY,
+            -f64::INFINITY,
+            f64::MAX,
+            5e-324,
+            2.0,
+        ];
+        match self.next() % 4 {
+            0 => ODD[self.next() as usize % ODD.len()],
+            _ => (self.next() as f64 / 2.0_f64.powi(30) - 1.0) * 10_f64.powi((self.next() % 7) as i32 - 3),
+        }
+    }
+}
+
+#[test]
+fn nothing_panics_and_what_comes_out_is_a_record() {
+    let mut any = Arbitrary(7);
+    let mut done = 0;
+    for _ in 0..4000 {
+        let n = 1 + any.next() as usize % 300;
+        let preparation = with(|p| {
+            let names = ["e", "u", "r-y", "stick", "q"];
+            for _ in 0..any.next() % 3 {
+                let name = names[any.next() as usize % names.len()].to_owned();
+                let offset = if any.next().is_multiple_of(2) {
+                    Offset::Samples(any.number())
+                } else {
+                    Offset::Seconds(any.number())
+                };
+                p.offset.insert(name, offset);
+            }
+            if let Ok(scaling) = Scaling::by(any.number(), None) {
+                p.scale
+                    .insert(names[any.next() as usize % names.len()].to_owned(), scaling);
+            }
+            p.rate = match any.next() % 4 {
+                0 => NewRate::Decimated(any.next() as usize % 6),
+                1 => NewRate::Hz(any.number().abs() * 10.0),
+                _ => NewRate::Kept,
+            };
+            if any.next().is_multiple_of(2) {
+                p.run_in_s = any.number();
+            }
+        });
+        if let Ok((found, steps)) = preparation.apply(record(n, signal, signal)) {
+            done += 1;
+            assert!(found.channels().all(|c| c.values.len() == found.len()) && found.len() <= 100 * n);
+            assert!(steps.iter().all(|step| !step.to_string().is_empty()));
+        }
+    }
+    assert!(done > 300, "{done}");
+}

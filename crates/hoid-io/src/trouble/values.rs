@@ -1,0 +1,214 @@
+//! Saturation, quantisation, constants and missing values of one channel.
+//!
+//! A channel is quantised where its values, fewer than half as many as its rows, lie on a grid within `1e-3 q`, q being the smallest
+//! step between two of them; the smallest and the largest may lie off it, as the rails of a stick do.
+//!
+//! It is saturated at an end where it stays there as no peak does. In full precision no two values in a row are equal by chance: three rows
+//! at the extreme value are a rail. In steps a peak stays longest at its top: of a parabola with its top at the far edge of the last step,
+//! 3 times as long there as on average at the next three steps. A rail is told where the rows at the extreme are at least 6 times as many as that
+//! average, with a stay of 5 rows at least, and where the channel came there and stayed more than once.
+
+use std::ops::Range;
+
+use super::{Signal, Signals, Trouble, TroubleKind, at, counted, short};
+
+/// A quantised channel is told from this step on, as a share of its deviation: its noise has 1e-5 of its power there.
+const COARSE: f64 = 1e-2;
+/// Rows in a row at the extreme that are a rail, for values in full precision and in steps.
+const STAY: (usize, usize) = (3, 5);
+/// Rows at a rail against the average of the next steps.
+const PEAK: usize = 6;
+
+/// What a rail of a channel is.
+pub(crate) struct Rail {
+    /// The value at which it stays.
+    pub(crate) value: f64,
+    pub(crate) is_upper: bool,
+    /// Stays, as rows.
+    pub(crate) stays: Vec<Range<usize>>,
+}
+
+impl Rail {
+    /// Rows at the rail.
+    pub(crate) fn rows(&self) -> usize {
+        self.stays.iter().map(Range::len).sum()
+    }
+}
+
+/// Distinct finite values in increasing order; those within rounding of the range are one.
+fn levels(values: &[f64]) -> Vec<f64> {
+    let mut levels: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    levels.sort_unstable_by(f64::total_cmp);
+    levels.dedup();
+    let range = match levels.as_slice() {
+        [first, .., last] => last - first,
+        _ => return levels,
+    };
+    let mut kept = 0.0;
+    let mut first = true;
+    levels.retain(|level| {
+        let keep = first || level - kept > 1e-12 * range;
+        if keep {
+            kept = *level;
+        }
+        first = false;
+        keep
+    });
+    levels
+}
+
+/// Whether the values are fewer than half as many as the rows.
+pub(super) fn is_coarse(values: &[f64]) -> bool {
+    2 * levels(values).len() <= values.len()
+}
+
+/// The step of a grid on which all values lie, and the number of levels.
+pub(crate) fn quantum(values: &[f64]) -> Option<(f64, usize)> {
+    let levels = levels(values);
+    if levels.len() < 2 || 2 * levels.len() > values.len() {
+        return None;
+    }
+    let inner = if levels.len() > 4 {
+        &levels[1..levels.len() - 1]
+    } else {
+        &levels[..]
+    };
+    let step = inner
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .fold(f64::INFINITY, f64::min);
+    let off = |level: &f64| {
+        let steps = (level - inner[0]) / step;
+        (steps - steps.round()).abs()
+    };
+    (step > 0.0 && step.is_finite() && inner.iter().all(|level| off(level) < 1e-3)).then_some((step, levels.len()))
+}
+
+/// The rails of a channel, lower and upper.
+pub(crate) fn rails(values: &[f64]) -> Vec<Rail> {
+    let levels = levels(values);
+    if levels.len() < 4 {
+        // A switch or a constant stays at its ends by its nature.
+        return Vec::new();
+    }
+    let coarse = 2 * levels.len() <= values.len();
+    let count = |level: f64| values.iter().filter(|v| **v == level).count();
+    let rail = |is_upper: bool| {
+        let (extreme, next) = if is_upper {
+            (levels[levels.len() - 1], &levels[levels.len() - 4..levels.len() - 1])
+        } else {
+            (levels[0], &levels[1..4])
+        };
+        let mut stays: Vec<Range<usize>> = Vec::new();
+        for (row, _) in values.iter().enumerate().filter(|(_, v)| **v == extreme) {
+            match stays.last_mut() {
+                Some(stay) if stay.end == row => stay.end = row + 1,
+                _ => stays.push(row..row + 1),
+            }
+        }
+        let rows: usize = stays.iter().map(Range::len).sum();
+        let beside: usize = next.iter().map(|level| count(*level)).sum();
+        // What begins or ends the record may be a value that settles.
+        let inner = || {
+            stays
+                .iter()
+                .filter(|stay| stay.start > 0 && stay.end < values.len())
+                .map(Range::len)
+        };
+        let longest = inner().max().unwrap_or(0);
+        let stayed = inner().filter(|length| *length >= STAY.0).count();
+        let is_rail = if coarse {
+            longest >= STAY.1 && 3 * rows >= PEAK * beside && stayed > 1
+        } else {
+            longest >= STAY.0
+        };
+        is_rail.then_some(Rail {
+            value: extreme,
+            is_upper,
+            stays,
+        })
+    };
+    [rail(false), rail(true)].into_iter().flatten().collect()
+}
+
+pub(super) fn find(signals: &Signals<'_>, signal: Signal<'_>, found: &mut Vec<Trouble>) {
+    let values = signal.values;
+    let n = values.len();
+    let name = signal.name;
+    let mut tell = |kind, rows: usize, size: f64, unit: &str, places, text| {
+        found.push(Trouble {
+            kind,
+            channel: name.to_owned(),
+            rows,
+            share: rows as f64 / n as f64,
+            size,
+            unit: unit.to_owned(),
+            places,
+            text,
+        });
+    };
+    missing(signals, signal, &mut tell);
+    let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    let Some(first) = finite.first() else { return };
+    if finite.iter().all(|v| v == first) {
+        if n > 1 {
+            let text = format!("{name} is constant: {}", short(*first));
+            tell(TroubleKind::Constant, n, 0.0, "", vec![signals.place(&(0..n))], text);
+        }
+        return;
+    }
+    for rail in rails(values) {
+        let places: Vec<super::Place> = rail.stays.iter().map(|stay| signals.place(stay)).collect();
+        let seconds = |place: &super::Place| place.to_s.zip(place.from_s).map_or(0.0, |(to, from)| to - from);
+        let longest = places.iter().map(seconds).fold(0.0, f64::max);
+        let text = format!(
+            "{name} stays at its {} value, {}, in {} ({} %), in {}; the first is {}",
+            if rail.is_upper { "largest" } else { "smallest" },
+            short(rail.value),
+            counted(rail.rows(), "row"),
+            short(100.0 * rail.rows() as f64 / n as f64),
+            counted(places.len(), "place"),
+            places.first().map(at).unwrap_or_default()
+        );
+        tell(TroubleKind::Saturated, rail.rows(), longest, "s", places, text);
+    }
+    let mean = finite.iter().map(|v| v / finite.len() as f64).sum::<f64>();
+    let deviation = finite
+        .iter()
+        .map(|v| (v - mean).powi(2) / finite.len() as f64)
+        .sum::<f64>()
+        .sqrt();
+    if let Some((step, count)) = quantum(&finite).filter(|(step, _)| *step >= COARSE * deviation) {
+        let text = format!(
+            "{name} is quantised: {count} levels in steps of {} ({} % of its deviation)",
+            short(step),
+            short(100.0 * step / deviation)
+        );
+        tell(TroubleKind::Quantised, n, step, "", Vec::new(), text);
+    }
+}
+
+fn missing(
+    signals: &Signals<'_>,
+    signal: Signal<'_>,
+    tell: &mut impl FnMut(TroubleKind, usize, f64, &str, Vec<super::Place>, String),
+) {
+    let mut gone: Vec<Range<usize>> = Vec::new();
+    for (row, _) in signal.values.iter().enumerate().filter(|(_, v)| !v.is_finite()) {
+        match gone.last_mut() {
+            Some(run) if run.end == row => run.end = row + 1,
+            _ => gone.push(row..row + 1),
+        }
+    }
+    let places: Vec<super::Place> = gone.iter().map(|run| signals.place(run)).collect();
+    let Some(first) = places.first() else { return };
+    let rows: usize = gone.iter().map(Range::len).sum();
+    let text = format!(
+        "{} has no finite value in {} ({} %), the first {}",
+        signal.name,
+        counted(rows, "row"),
+        short(100.0 * rows as f64 / signal.values.len() as f64),
+        at(first)
+    );
+    tell(TroubleKind::Missing, rows, rows as f64, "rows", places, text);
+}
