@@ -112,6 +112,10 @@ pub struct Covariance<const N: usize> {
     turn: usize,
 }
 
+crate::state!([const N: usize] Covariance<N> {
+    factors, first, scales, uniform, bound, guard, forgotten, settled, early, early_share, power, largest_power, period, wait, turn,
+});
+
 /// Rounds of the guard within the shortest memory, where N is not too large for it: variances stay within e^{1/4} of the bound.
 const TURNS_IN_A_MEMORY: f64 = 4.0;
 /// `psi' P psi` below which there is no excitation.
@@ -162,7 +166,7 @@ impl<const N: usize> Covariance<N> {
             }
         });
         Self {
-            first: factors.clone(),
+            first: factors,
             factors,
             forgetting,
             scales,

@@ -7,6 +7,13 @@ pub struct DelayLine<M> {
     oldest: usize,
 }
 
+impl<M: AsMut<[f64]>> crate::state::State for DelayLine<M> {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        self.memory.as_mut().visit(each);
+        self.oldest.visit(each);
+    }
+}
+
 impl<M: AsMut<[f64]>> DelayLine<M> {
     /// Takes the memory of the line and fills it with zeros (the state of rest).
     pub fn new(mut memory: M) -> Self {

@@ -37,6 +37,8 @@ pub struct Level {
     lambda: f64,
 }
 
+crate::state!([] Level { sum, weight, lambda });
+
 impl Level {
     /// Starts from a variance that `weight` residuals gave; weight 0 starts from nothing.
     pub fn new(variance: f64, weight: f64, lambda: f64) -> Self {
@@ -58,6 +60,20 @@ impl Level {
     #[inline(always)]
     pub fn variance(&self) -> f64 {
         if self.weight > 0.0 { self.sum / self.weight } else { 0.0 }
+    }
+
+    /// Number of residuals that the variance rests on.
+    #[inline(always)]
+    pub fn weight(&self) -> f64 {
+        self.weight
+    }
+
+    /// The same variance, from no more than `weight` residuals: what comes next counts the more.
+    pub fn doubt(&mut self, weight: f64) {
+        if self.weight > weight && weight > 0.0 {
+            self.sum *= weight / self.weight;
+            self.weight = weight;
+        }
     }
 }
 
@@ -164,6 +180,10 @@ pub struct ErrorBars<const N: usize, const K: usize> {
     limit: f64,
     wait: u32,
 }
+
+crate::state!([const N: usize, const K: usize] ErrorBars<N, K> {
+    theta, cross, filters, start, level, limit, wait,
+});
 
 /// Variances of theta beyond this multiple of those at the start say that nothing is known.
 pub const NOTHING_KNOWN: f64 = 1e6;

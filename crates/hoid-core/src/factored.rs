@@ -13,12 +13,14 @@
 //! N is the room for parameters. Where there are fewer, their d is zero and nothing happens to them.
 
 /// `U D U'` of an N x N matrix.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Factored<const N: usize> {
     /// Column j holds `U_ij`, i < j; the rest is not used.
     u: [[f64; N]; N],
     d: [f64; N],
 }
+
+crate::state!([const N: usize] Factored<N> { u, d });
 
 impl<const N: usize> Factored<N> {
     /// A diagonal matrix.

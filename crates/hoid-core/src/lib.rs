@@ -17,13 +17,19 @@
 //! | [`window`] | the adaptation of a rectangular window |
 //! | [`predictor`] | one-step predictor of the general model with its gradient |
 //! | [`rls`], [`rpem`], [`physical`] | recursive least squares, prediction-error method in polynomials and in physical parameters |
+//! | [`adaptive`] | a bank of hypotheses of when the person changed |
 //! | [`recursion`] | outcome of a step, stability of a step |
+//! | [`mod@state`] | the numbers that change, to save a recursion and go on elsewhere |
 #![no_std]
 
 #[cfg(test)]
 extern crate std;
 
+#[macro_use]
+pub mod state;
+
 pub mod adaptation;
+pub mod adaptive;
 pub mod delay;
 pub mod divided_differences;
 pub mod error_bars;

@@ -64,6 +64,11 @@ struct Polynomials<const N: usize> {
     whole_samples: usize,
 }
 
+crate::state!([const N: usize] Polynomials<N> { theta, jacobian, whole_samples });
+crate::state!([S, const N: usize, const K: usize, const L: usize, A: crate::state::State] Physical<S, N, K, L, A> {
+    predictor, eta, polynomials, psi, adaptation, bars, restarts,
+});
+
 impl<S: Shape, const N: usize> PhysicalModel<S, N> {
     /// Number of operator parameters in front of c and d.
     fn operator(&self) -> usize {

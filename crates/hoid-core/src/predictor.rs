@@ -168,6 +168,10 @@ pub struct Predictor<S, const N: usize, const L: usize> {
     pending: [f64; 2],
 }
 
+crate::state!([S, const N: usize, const L: usize] Predictor<S, N, L> {
+    x, filtered_x, x_over_f, u, w, v, eps, filtered_u, filtered_eps, filtered_v, w_over_f, filtered_w, pending,
+});
+
 /// `sum_j c_j h_j` over the coefficients.
 #[inline(always)]
 fn dot(coefficients: &[f64], history: &[f64]) -> f64 {

@@ -21,6 +21,8 @@ pub struct Rls<S, const N: usize, A> {
     restarts: u64,
 }
 
+crate::state!([S, const N: usize, A: crate::state::State] Rls<S, N, A> { theta, psi, adaptation, bars, restarts });
+
 impl<S: Shape, const N: usize, A: Adaptation<N>> Rls<S, N, A> {
     /// Starts from theta `[a.., b..]` with zeros before the first sample. `None` when there is no parameter, more than N, or one of
     /// C, D or F.

@@ -24,6 +24,10 @@ pub struct Rpem<S, const N: usize, const K: usize, A> {
     restarts: u64,
 }
 
+crate::state!([S, const N: usize, const K: usize, A: crate::state::State] Rpem<S, N, K, A> {
+    predictor, theta, psi, adaptation, bars, restarts,
+});
+
 impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>> Rpem<S, N, K, A> {
     /// Starts from `theta = [a.. b.. c.. d.. f..]` with filters at rest. `None` when the shape does not fit in N and K, or
     /// theta is not stable.

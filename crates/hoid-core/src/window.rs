@@ -27,6 +27,8 @@ struct Sums<const N: usize> {
     right: [f64; N],
 }
 
+crate::state!([const N: usize] Sums<N> { gram, right });
+
 /// The adaptation of the module, with its memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Window<const N: usize, M> {
@@ -42,6 +44,21 @@ pub struct Window<const N: usize, M> {
     largest: [f64; N],
     /// Samples whose window did not determine theta.
     held: u64,
+}
+
+impl<const N: usize, M: AsMut<[f64]>> crate::state::State for Window<N, M> {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        let parts: &mut [&mut dyn crate::state::State] = &mut [
+            &mut self.memory.as_mut(),
+            &mut self.filled,
+            &mut self.next,
+            &mut self.growing,
+            &mut self.fading,
+            &mut self.largest,
+            &mut self.held,
+        ];
+        crate::state::visit_all(parts, each);
+    }
 }
 
 impl<const N: usize> Sums<N> {

@@ -316,6 +316,36 @@ fn fit_neighbours(
         .collect()
 }
 
+/// The fit of one model where the ranges leave nothing open, else that of the best of them with the table it was chosen from. `template` gives
+/// the options; its start belongs to the first case alone.
+///
+/// # Errors
+/// Those of [`Estimator::fit`] and [`choose_orders`]; [`IdentError::BadStart`] for a start where several models are tried.
+pub fn fit_or_choose(
+    template: &Estimator,
+    ranges: &OrderRanges,
+    criterion: Criterion,
+    records: &[Record],
+    each: &(dyn Fn() + Sync),
+) -> Result<(Fit, Option<Choice>), IdentError> {
+    let combinations = ranges.combinations()?;
+    if let [orders] = combinations.as_slice() {
+        let estimator = Estimator {
+            orders: *orders,
+            ..template.clone()
+        };
+        return Ok((estimator.fit(records)?, None));
+    }
+    if template.start.is_some() {
+        return Err(IdentError::BadStart {
+            reason: "it belongs to one model, but a range of orders or delays is searched; give nk and the orders as single numbers"
+                .to_owned(),
+        });
+    }
+    let choice = choose_orders_with(template, ranges, criterion, records, each)?;
+    Ok((choice.fit.clone(), Some(choice)))
+}
+
 impl Choice {
     /// Delays nk that the data do not tell from the best one, the other orders being those of the chosen model: the smallest
     /// and the largest with `n ln(V/V_min) <= 3.84`, the 95 % point of chi-square with one degree of freedom (a profile

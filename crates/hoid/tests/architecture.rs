@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, process::Command};
 use serde_json::Value;
 
 /// What each crate may depend on within the workspace.
-const ALLOWED: [(&str, &[&str]); 10] = [
+const ALLOWED: [(&str, &[&str]); 11] = [
     ("hoid-core", &[]),
     ("hoid-model", &["hoid-core"]),
     ("hoid-ident", &["hoid-core", "hoid-model"]),
@@ -34,6 +34,17 @@ const ALLOWED: [(&str, &[&str]); 10] = [
             "hoid-sim",
             "hoid-io",
             "hoid-study",
+            "hoid-report",
+        ],
+    ),
+    (
+        "hoid-python",
+        &[
+            "hoid-model",
+            "hoid-ident",
+            "hoid-sim",
+            "hoid-study",
+            "hoid-io",
             "hoid-report",
         ],
     ),

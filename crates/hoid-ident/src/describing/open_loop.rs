@@ -118,7 +118,7 @@ impl OpenLoop {
     /// The same with the phase interpolated apart from that of a delay in s, such as the one of
     /// [`DescribingFunction::fit_gain_lead_delay`].
     pub fn margins_with_delay(&self, delay_s: f64) -> DescribingMargins {
-        let of = |response: &Vec<Complex64>| crossover(&self.omega_rad_s, response, delay_s);
+        let of = |response: &Vec<Complex64>| Crossover::of(&self.omega_rad_s, response, delay_s);
         let without: Vec<Option<Crossover>> = self.without.iter().map(of).collect();
         let per_run: Vec<Option<Crossover>> = self.per_run.iter().map(of).collect();
         let estimate = |get: fn(&Crossover) -> f64| {
@@ -139,25 +139,28 @@ impl OpenLoop {
     }
 }
 
-/// The lowest crossover between lines where the magnitude falls.
-fn crossover(omega: &[f64], response: &[Complex64], delay_s: f64) -> Option<Crossover> {
-    let mut pairs = omega.windows(2).zip(response.windows(2));
-    pairs.find_map(|(w, l)| {
-        let (above, below) = (l[0].norm().ln(), l[1].norm().ln());
-        if !(above >= 0.0 && below < 0.0 && (above - below).is_finite()) {
-            return None;
-        }
-        let part = above / (above - below);
-        let at = w[0] * (part * (w[1] / w[0]).ln()).exp();
-        let by_delay = |omega: f64| Complex64::from_polar(1.0, -delay_s * omega);
-        let rest = l[1] / l[0] / by_delay(w[1] - w[0]);
-        let turn = (-l[0] * by_delay(at - w[0])).arg() + part * rest.arg();
-        let found = Crossover {
-            omega_rad_s: at,
-            phase_margin_deg: Complex64::from_polar(1.0, turn).arg().to_degrees(),
-        };
-        found.phase_margin_deg.is_finite().then_some(found)
-    })
+impl Crossover {
+    /// The lowest crossover where the magnitude of an open loop falls, between ascending frequencies in rad/s at which its response is known; none
+    /// where it does not. The phase of the delay in s is interpolated apart.
+    pub fn of(omega_rad_s: &[f64], response: &[Complex64], delay_s: f64) -> Option<Self> {
+        let mut pairs = omega_rad_s.windows(2).zip(response.windows(2));
+        pairs.find_map(|(w, l)| {
+            let (above, below) = (l[0].norm().ln(), l[1].norm().ln());
+            if !(above >= 0.0 && below < 0.0 && (above - below).is_finite()) {
+                return None;
+            }
+            let part = above / (above - below);
+            let at = w[0] * (part * (w[1] / w[0]).ln()).exp();
+            let by_delay = |omega: f64| Complex64::from_polar(1.0, -delay_s * omega);
+            let rest = l[1] / l[0] / by_delay(w[1] - w[0]);
+            let turn = (-l[0] * by_delay(at - w[0])).arg() + part * rest.arg();
+            let found = Self {
+                omega_rad_s: at,
+                phase_margin_deg: Complex64::from_polar(1.0, turn).arg().to_degrees(),
+            };
+            found.phase_margin_deg.is_finite().then_some(found)
+        })
+    }
 }
 
 #[cfg(test)]
@@ -173,12 +176,12 @@ mod tests {
             .iter()
             .map(|w| Complex64::from_polar(2.5 / w, phase(*w).to_radians()))
             .collect();
-        let found = crossover(&omega, &response, 0.0).unwrap();
+        let found = Crossover::of(&omega, &response, 0.0).unwrap();
         assert!((found.omega_rad_s - 2.5).abs() < 1e-12);
         assert!((found.phase_margin_deg - (180.0 + phase(2.5))).abs() < 1e-10);
         // Around the negative axis, and beyond.
         let turned: Vec<Complex64> = response.iter().map(|l| l * Complex64::from_polar(1.0, -1.2)).collect();
-        let found = crossover(&omega, &turned, 0.0).unwrap();
+        let found = Crossover::of(&omega, &turned, 0.0).unwrap();
         assert!((found.phase_margin_deg - (180.0 + phase(2.5) - 1.2_f64.to_degrees())).abs() < 1e-10);
     }
 
@@ -189,22 +192,22 @@ mod tests {
             .iter()
             .map(|w| Complex64::new(0.0, -4.0 / w) * Complex64::from_polar(1.0, -0.3 * w))
             .collect();
-        let found = crossover(&omega, &response, 0.3).unwrap();
+        let found = Crossover::of(&omega, &response, 0.3).unwrap();
         assert!((found.omega_rad_s - 4.0).abs() < 1e-12);
         assert!((found.phase_margin_deg - (90.0 - 1.2_f64.to_degrees())).abs() < 1e-10);
-        assert!(crossover(&omega, &response, 0.0).unwrap().phase_margin_deg < found.phase_margin_deg - 1.0);
-        assert_eq!(crossover(&omega, &response, f64::NAN), None);
+        assert!(Crossover::of(&omega, &response, 0.0).unwrap().phase_margin_deg < found.phase_margin_deg - 1.0);
+        assert_eq!(Crossover::of(&omega, &response, f64::NAN), None);
     }
 
     #[test]
     fn no_crossover_is_none() {
         let omega = [1.0, 2.0];
         let small = [Complex64::new(0.5, 0.0), Complex64::new(0.1, 0.0)];
-        assert_eq!(crossover(&omega, &small, 0.0), None);
+        assert_eq!(Crossover::of(&omega, &small, 0.0), None);
         let rising = [Complex64::new(0.1, 0.0), Complex64::new(2.0, 0.0)];
-        assert_eq!(crossover(&omega, &rising, 0.0), None);
+        assert_eq!(Crossover::of(&omega, &rising, 0.0), None);
         let broken = [Complex64::new(f64::NAN, 0.0), Complex64::new(0.0, 0.0)];
-        assert_eq!(crossover(&omega, &broken, 0.0), None);
-        assert_eq!(crossover(&[], &[], 0.0), None);
+        assert_eq!(Crossover::of(&omega, &broken, 0.0), None);
+        assert_eq!(Crossover::of(&[], &[], 0.0), None);
     }
 }

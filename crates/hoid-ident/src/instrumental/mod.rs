@@ -44,6 +44,9 @@ use equation::{Problem, Source};
 
 pub(crate) use chain::instrument_chain;
 
+/// Channel of the forcing function in a record that has one.
+pub(crate) const FORCING_CHANNEL: &str = "f_t";
+
 /// Residuals below this share of the output, in amplitude, are rounding.
 const EXACT: f64 = 1e-11;
 
@@ -98,6 +101,18 @@ pub enum Instruments {
     /// The part of the input that follows this channel, which the noise does not reach: the forcing function f_t or a known
     /// disturbance. For a closed loop.
     External(String),
+}
+
+impl Instruments {
+    /// The forcing function f_t where all records have it: in a closed loop it is the signal that the noise does not reach. Else those that
+    /// are simulated.
+    pub fn usual(records: &[Record]) -> Self {
+        if records.iter().all(|r| r.channel(FORCING_CHANNEL).is_some()) {
+            Self::External(FORCING_CHANNEL.to_owned())
+        } else {
+            Self::Simulated
+        }
+    }
 }
 
 impl fmt::Display for Instruments {

@@ -3,6 +3,7 @@
 //! The kernel's covariance is that of a recursion with the gradient z; whether its innovation is that of a gradient or of instruments
 //! does not enter the gain. Where rounding has lost it, as by a jump of the scale of 1e8 and more, it starts again.
 
+use hoid_core::state::{State, visit_all};
 use hoid_core::{
     adaptation::{Adaptation, Covariance, Forgetting as Rule},
     factored::Factored,
@@ -18,6 +19,12 @@ pub(super) const ROOM: usize = 16;
 pub(super) struct Forgetting {
     covariance: Box<Covariance<ROOM>>,
     start: Box<Covariance<ROOM>>,
+}
+
+impl State for Forgetting {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        visit_all(&mut [&mut *self.covariance, &mut *self.start], each);
+    }
 }
 
 impl Forgetting {

@@ -4,6 +4,7 @@ use hoid_core::{
     adaptation::{Adaptation, Covariance, Forgetting, Move},
     error_bars::{ErrorBars, Level},
     factored::Factored,
+    state::State,
     window::Window,
 };
 use hoid_model::SampleTime;
@@ -31,6 +32,15 @@ const LEVEL_MEMORIES: f64 = 4.0;
 pub(super) enum Gain<const N: usize> {
     Covariance(Covariance<N>),
     Window(Window<N, Vec<f64>>),
+}
+
+impl<const N: usize> State for Gain<N> {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        match self {
+            Self::Covariance(c) => c.visit(each),
+            Self::Window(w) => w.visit(each),
+        }
+    }
 }
 
 impl<const N: usize> Gain<N> {
@@ -106,7 +116,7 @@ impl<const N: usize> Gain<N> {
         let bound = std::array::from_fn(|i| {
             let room = match options.covariance {
                 // N samples of the start leave 1/N of the information of a sample, a memory 1 - lambda of it.
-                StartCovariance::OfFit if from.fit.is_some() && i < p => {
+                StartCovariance::OfFit if from.from_fit && i < p => {
                     ROOM_TO_GROW * (from.residuals * (1.0 - lambda[i])).max(1.0)
                 }
                 _ => ROOM_WITHOUT_FIT,
@@ -115,13 +125,11 @@ impl<const N: usize> Gain<N> {
         });
         let covariance = Covariance::new(factors, forgetting, bound);
         // Gradients on the way from a start that no data speak for must not be remembered for ever; least squares has none.
-        Ok(Self::Covariance(
-            if from.fit.is_some() || options.method == Method::Rls {
-                covariance
-            } else {
-                covariance.with_growing_memory(EARLY_FORGETTING, EARLY_SHARE)
-            },
-        ))
+        Ok(Self::Covariance(if from.from_fit || options.method == Method::Rls {
+            covariance
+        } else {
+            covariance.with_growing_memory(EARLY_FORGETTING, EARLY_SHARE)
+        }))
     }
 }
 

@@ -9,6 +9,7 @@ use hoid_core::{
     predictor::{AnyShape, FixedShape, Shape},
     rls::Rls,
     rpem::Rpem,
+    state::State,
 };
 use hoid_model::{
     SampleTime,
@@ -126,7 +127,10 @@ impl Plan<'_> {
         Some(all.saturating_sub(self.tracked_from().unwrap_or(0)))
     }
 
-    fn linear<S: Shape + Send + 'static, const N: usize>(&self, shape: S) -> Result<Box<dyn Recursion>, IdentError> {
+    fn linear<S: Shape + Send + Sync + 'static, const N: usize>(
+        &self,
+        shape: S,
+    ) -> Result<Box<dyn Recursion>, IdentError> {
         let rls = Rls::new(shape, self.values(), self.gain::<N>()?, self.bars::<N, 0>()?).ok_or_else(|| {
             IdentError::BadOption {
                 option: "the orders".to_owned(),
@@ -141,7 +145,7 @@ impl Plan<'_> {
         }))
     }
 
-    fn polynomials<S: Shape + Send + 'static, const N: usize, const K: usize>(
+    fn polynomials<S: Shape + Send + Sync + 'static, const N: usize, const K: usize>(
         &self,
         shape: S,
     ) -> Result<Box<dyn Recursion>, IdentError> {
@@ -164,7 +168,7 @@ impl Plan<'_> {
         }))
     }
 
-    fn physical<S: Shape + Send + 'static, const N: usize, const K: usize, const L: usize>(
+    fn physical<S: Shape + Send + Sync + 'static, const N: usize, const K: usize, const L: usize>(
         &self,
         shape: S,
     ) -> Result<Box<dyn Recursion>, IdentError> {
@@ -205,13 +209,17 @@ fn scaled<const N: usize>(spread: &[[f64; N]; N], variance: f64, parameters: usi
     }
 }
 
+hoid_core::state!([S, const N: usize, A: State] Linear<S, N, A> { rls, delay });
+hoid_core::state!([S, const N: usize, const K: usize, A: State] Polynomials<S, N, K, A> { rpem, delay });
+hoid_core::state!([S, const N: usize, const K: usize, const L: usize, A: State] InPhysical<S, N, K, L, A> { recursion, delay });
+
 struct Linear<S, const N: usize, A> {
     rls: Rls<S, N, A>,
     delay: DelayLine<Vec<f64>>,
     parameters: usize,
 }
 
-impl<S: Shape + Send, const N: usize, A: Adaptation<N> + Send> Recursion for Linear<S, N, A> {
+impl<S: Shape + Send + Sync, const N: usize, A: Adaptation<N> + State + Send + Sync> Recursion for Linear<S, N, A> {
     fn step(&mut self, sample: Sample) -> Taken {
         let x = self.delay.step(sample.e);
         self.rls.step(x, sample.u).into()
@@ -252,7 +260,9 @@ struct Polynomials<S, const N: usize, const K: usize, A> {
     parameters: usize,
 }
 
-impl<S: Shape + Send, const N: usize, const K: usize, A: Adaptation<N> + Send> Recursion for Polynomials<S, N, K, A> {
+impl<S: Shape + Send + Sync, const N: usize, const K: usize, A: Adaptation<N> + State + Send + Sync> Recursion
+    for Polynomials<S, N, K, A>
+{
     fn step(&mut self, sample: Sample) -> Taken {
         let x = self.delay.step(sample.e);
         self.rpem.step(x, sample.u).into()
@@ -295,8 +305,8 @@ struct InPhysical<S, const N: usize, const K: usize, const L: usize, A> {
     fixed_tau_s: f64,
 }
 
-impl<S: Shape + Send, const N: usize, const K: usize, const L: usize, A: Adaptation<N> + Send> Recursion
-    for InPhysical<S, N, K, L, A>
+impl<S: Shape + Send + Sync, const N: usize, const K: usize, const L: usize, A: Adaptation<N> + State + Send + Sync>
+    Recursion for InPhysical<S, N, K, L, A>
 {
     fn step(&mut self, sample: Sample) -> Taken {
         let x = self.delay.step(sample.e);

@@ -31,6 +31,8 @@ pub(super) struct Following {
     samples: f64,
 }
 
+hoid_core::state!([] Following { pole, filters, weights, p, power, samples });
+
 impl Following {
     /// At rest, with no weights.
     pub fn new() -> Self {

@@ -6,9 +6,13 @@
 //! | `start` | where a recursion starts: batch fit, theta, nothing |
 //! | `gain` | the way of forgetting |
 //! | `kernel` | RLS, RPEM and the physical recursion of the real-time kernel |
+//! | `adaptive`, `change` | the bank of hypotheses of the real-time kernel, and the changes that it declares |
 //! | `window`, `predictor` | the batch fit over a sliding window |
 //! | `refined`, `laguerre`, `forgetting` | recursive refined instrumental variable |
-//! | `trace` | the estimate at every sample |
+//! | `plan` | orders that are still open, searched on the start span |
+//! | `live` | the warm-up of a stream, then its tracker |
+//! | `saved` | a tracker as numbers, to go on elsewhere |
+//! | `trace`, `columns` | the estimate at every sample |
 //!
 //! **A recursion starts with what is known.** By default it is the batch fit of the first third of a record, with the covariance of that
 //! fit; until the end of that span the filters follow and the estimate stays, so that no sample counts twice and the error bars hold. With
@@ -18,39 +22,47 @@
 //! [`TrackOptions::largest`]. An error e is then replaced by the last good one, an output u by the one-step prediction, and the estimate
 //! stays at that sample. Each is counted.
 
+mod adaptive;
+mod change;
+mod columns;
 mod forgetting;
 mod gain;
 mod kernel;
 mod laguerre;
+mod live;
 mod options;
 mod past;
+mod plan;
 mod predictor;
 mod refined;
+mod saved;
 mod start;
 mod trace;
 mod window;
 
-use hoid_core::recursion::Step;
+use hoid_core::{recursion::Step, state::State};
 use hoid_model::{
     NotConvertible, Record, SampleTime,
     uncertainty::{Estimate, OperatorEstimate},
 };
 
+pub use change::{Change, ErrorThreshold};
+pub use columns::{Columns, value_of};
+pub use live::{Choose, Live, LiveOutcome, WarmUp};
 pub use options::{ForgettingRule, Memory, Method, StartAt, StartCovariance, TrackOptions};
+pub use plan::{TrackPlan, narrowed};
 pub use trace::{OPERATOR_COLUMNS, Trace};
 
 /// Regressor and stability of the recursions, options of the kernel.
 pub use hoid_core::{predictor::Regressor, recursion::Stable};
 
+use adaptive::AdaptiveRecursion;
 use refined::{RefinedRecursion, RefinedStart};
 use start::StartState;
 use trace::{operator_of, pack, packed_len, polynomial_orders};
 use window::WindowRecursion;
 
-use crate::{Estimator, Fit, IdentError};
-
-/// Channel of the forcing function in a record that has one.
-const FORCING: &str = "f_t";
+use crate::{Estimator, Fit, IdentError, instrumental::FORCING_CHANNEL};
 
 /// One sample of the loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,7 +94,7 @@ impl From<Step> for Taken {
 }
 
 /// A recursive method. Samples are finite and not too large.
-pub(crate) trait Recursion: Send {
+pub(crate) trait Recursion: State + Send + Sync {
     /// Takes a sample: filters and estimate move on.
     fn step(&mut self, sample: Sample) -> Taken;
     /// Takes a sample into the filters alone; the estimate stays.
@@ -95,6 +107,14 @@ pub(crate) trait Recursion: Send {
     fn covariance(&self, into: &mut [f64]) -> bool;
     /// Innovation variance as tracked.
     fn innovation_variance(&self) -> f64;
+    /// Logarithm of the odds of a recent change, where the recursion has them.
+    fn change_odds(&self) -> Option<f64> {
+        None
+    }
+    /// The change that was declared at the last sample.
+    fn change(&self) -> Option<Change> {
+        None
+    }
     /// Number of fits that failed, and why the last did, for methods that fit.
     fn failures(&self) -> Option<(usize, String)> {
         None
@@ -134,7 +154,7 @@ pub struct Tracker {
     recursion: Box<dyn Recursion>,
     last_e: f64,
     counts: Counts,
-    start: Option<Fit>,
+    start: StartState,
 }
 
 impl std::fmt::Debug for Tracker {
@@ -162,7 +182,7 @@ impl Tracker {
             sample_time,
             last_e: 0.0,
             counts: Counts::default(),
-            start: start.fit,
+            start,
         })
     }
 
@@ -252,6 +272,16 @@ impl Tracker {
         }
     }
 
+    /// Logarithm of the odds that the person changed within the last four seconds, by [`Method::Adaptive`].
+    pub fn change_odds(&self) -> Option<f64> {
+        self.recursion.change_odds()
+    }
+
+    /// The change that was declared at the last sample, if one was.
+    pub fn change(&self) -> Option<Change> {
+        self.recursion.change()
+    }
+
     /// Innovation variance as tracked.
     pub fn innovation_variance(&self) -> f64 {
         self.recursion.innovation_variance()
@@ -269,7 +299,7 @@ impl Tracker {
 
     /// The batch fit that the tracker started from.
     pub fn start(&self) -> Option<&Fit> {
-        self.start.as_ref()
+        self.start.fit.as_ref()
     }
 
     /// The options.
@@ -294,16 +324,13 @@ fn recursion(
             let window = options.window.samples(sample_time)?;
             let known = match options.start {
                 StartAt::Nothing => None,
-                _ => Some((
-                    start.values.as_slice(),
-                    start.fit.is_some().then_some(covariance.as_slice()),
-                )),
+                _ => Some((start.values.as_slice(), start.from_fit.then_some(covariance.as_slice()))),
             };
             let recursion = WindowRecursion::new(estimator, sample_time, window, options.every, known)?;
             Ok(Box::new(recursion))
         }
         Method::Refined => {
-            if start.fit.is_none() {
+            if !start.from_fit {
                 return Err(IdentError::BadStart {
                     reason: "rriv makes its instruments with a model; start it from the batch fit of a span".to_owned(),
                 });
@@ -322,6 +349,7 @@ fn recursion(
             let recursion = RefinedRecursion::new(options.orders, from, &lambda, options.instruments.is_some())?;
             Ok(Box::new(recursion))
         }
+        Method::Adaptive => Ok(Box::new(AdaptiveRecursion::new(options, start, sample_time)?)),
         _ => kernel::build(options, start, sample_time),
     }
 }
@@ -350,8 +378,8 @@ pub fn track(record: &Record, options: &TrackOptions, every: usize) -> Result<Tr
         _ => (None, f64::NEG_INFINITY),
     };
     let mut options = options.clone();
-    if options.method == Method::Refined && options.instruments.is_none() && record.channel(FORCING).is_some() {
-        options.instruments = Some(FORCING.to_owned());
+    if options.method == Method::Refined && options.instruments.is_none() && record.channel(FORCING_CHANNEL).is_some() {
+        options.instruments = Some(FORCING_CHANNEL.to_owned());
     }
     let options = &options;
     let reference = match &options.instruments {
@@ -386,8 +414,10 @@ pub fn track(record: &Record, options: &TrackOptions, every: usize) -> Result<Tr
         innovation: Vec::with_capacity(rows),
         innovation_variance: Vec::with_capacity(rows),
         shortened: Vec::with_capacity(rows),
+        change_odds: Vec::new(),
+        changes: Vec::new(),
         counts: Counts::default(),
-        start: tracker.start.clone(),
+        start: tracker.start.fit.clone(),
         failures: None,
         every,
         averaged: 1,
@@ -405,6 +435,9 @@ pub fn track(record: &Record, options: &TrackOptions, every: usize) -> Result<Tr
             reference: reference.map(|r| r[k]),
         };
         let outcome = tracker.take(sample, t >= first_update);
+        if let Some(change) = tracker.change() {
+            trace.changes.push((t, change));
+        }
         if (k + 1) % every != 0 && k + 1 != record.len() {
             continue;
         }
@@ -418,6 +451,7 @@ pub fn track(record: &Record, options: &TrackOptions, every: usize) -> Result<Tr
         trace.innovation.push(outcome.innovation.unwrap_or(f64::NAN));
         trace.innovation_variance.push(tracker.innovation_variance());
         trace.shortened.push(tracker.counts.shortened);
+        trace.change_odds.extend(tracker.change_odds());
     }
     trace.counts = tracker.counts;
     trace.failures = tracker.failures();

@@ -5,7 +5,11 @@ use std::{collections::BTreeMap, str::FromStr};
 use hoid_core::{predictor::Regressor, recursion::Stable};
 use hoid_model::{Orders, SampleTime, Structure};
 
+use super::adaptive::LARGEST_ND;
 use crate::{Constraint, IdentError, SearchOptions};
+
+/// Order of the noise model of the method adaptive when none is named.
+const USUAL_ND: usize = 6;
 
 /// A recursive method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -20,11 +24,20 @@ pub enum Method {
     Window,
     /// Recursive refined instrumental variable: Box-Jenkins with nc = 0.
     Refined,
+    /// A bank of hypotheses of when the person changed, in physical parameters: Box-Jenkins with nc = 0.
+    Adaptive,
 }
 
 impl Method {
     /// All methods.
-    pub const ALL: [Self; 5] = [Self::Rls, Self::Rpem, Self::Physical, Self::Window, Self::Refined];
+    pub const ALL: [Self; 6] = [
+        Self::Rls,
+        Self::Rpem,
+        Self::Physical,
+        Self::Window,
+        Self::Refined,
+        Self::Adaptive,
+    ];
 
     /// Name as on the command line.
     pub fn name(self) -> &'static str {
@@ -34,6 +47,22 @@ impl Method {
             Self::Physical => "physical",
             Self::Window => "window",
             Self::Refined => "rriv",
+            Self::Adaptive => "adaptive",
+        }
+    }
+
+    /// True for a method that estimates physical parameters.
+    pub fn is_physical(self) -> bool {
+        matches!(self, Self::Physical | Self::Adaptive)
+    }
+
+    /// The operator's orders with the noise model that the method takes when none is named: of order 1, for adaptive of order 6, for its
+    /// odds need innovations that are white.
+    pub fn usual_orders(self, nk: usize) -> Orders {
+        let orders = self.usual_structure().operator_orders(nk);
+        match self {
+            Self::Adaptive => Orders { nd: USUAL_ND, ..orders },
+            _ => orders,
         }
     }
 
@@ -48,13 +77,14 @@ impl Method {
     /// Memory when none is named: what the parameters in question keep, in seconds.
     ///
     /// RLS: 2.56 s for all, the text's 256 samples at 100 Hz. RPEM and RRIV: 2.56 s for B, 20.48 s for the others. Physical: 5 s for
-    /// K_e, 1.5 s for K_e_dot, without end for the others, which a person hardly changes within a run.
+    /// K_e, 1.5 s for K_e_dot, without end for the others, which a person hardly changes within a run. Adaptive: none, its memory is what it
+    /// finds.
     pub fn usual_memory(self, parameter: &str) -> Memory {
         match (self, parameter) {
             (Self::Rls, _) => Memory::Seconds(2.56),
             (Self::Physical, "K_e") => Memory::Seconds(5.0),
             (Self::Physical, "K_e_dot") => Memory::Seconds(1.5),
-            (Self::Physical, _) => Memory::Infinite,
+            (Self::Physical | Self::Adaptive, _) => Memory::Infinite,
             (_, name) if name.starts_with('b') => Memory::Seconds(2.56),
             _ => Memory::Seconds(20.48),
         }
@@ -213,11 +243,13 @@ pub struct TrackOptions {
     pub every: usize,
     /// Limits of the search of start fits and windows.
     pub search: SearchOptions,
-    /// Multiple of the innovation's standard deviation beyond which an innovation moves the estimate no further. Default: 5 for rpem and
-    /// physical, none (infinite) for rls, as in the text. A window has none.
+    /// Multiple of the innovation's standard deviation beyond which an innovation moves the estimate no further. Default: 5 for rpem,
+    /// physical and adaptive, none (infinite) for rls, as in the text. A window has none.
     pub limit: Option<f64>,
     /// Magnitude of e or u beyond which a sample is taken for a fault. Default 1e6.
     pub largest: f64,
+    /// Logarithm of the odds from which [`Method::Adaptive`] declares a change. Default 6.
+    pub alarm: f64,
 }
 
 impl TrackOptions {
@@ -243,12 +275,13 @@ impl TrackOptions {
             search: SearchOptions::default(),
             limit: None,
             largest: 1e6,
+            alarm: 6.0,
         }
     }
 
     /// Names of the parameters that the recursion moves: theta, or the physical ones.
     pub fn parameter_names(&self) -> Vec<String> {
-        if self.method != Method::Physical {
+        if !self.method.is_physical() {
             return self.orders.parameter_names();
         }
         let mut names: Vec<String> = PHYSICAL_NAMES[..4].iter().map(|n| (*n).to_owned()).collect();
@@ -290,7 +323,7 @@ impl TrackOptions {
     pub fn limit_in_use(&self) -> f64 {
         match (self.method, &self.forgetting) {
             (_, ForgettingRule::Window) => f64::INFINITY,
-            (Method::Rpem | Method::Physical, _) => self.limit.unwrap_or(5.0),
+            (Method::Rpem | Method::Physical | Method::Adaptive, _) => self.limit.unwrap_or(5.0),
             _ => self.limit.unwrap_or(f64::INFINITY),
         }
     }
@@ -316,12 +349,12 @@ impl TrackOptions {
                 format!("{} with {o}", self.structure),
                 "arx or fir; take rpem for structures with C, D or F",
             ),
-            Method::Physical if !(o.na == 0 && o.nb == 2 && o.nf == 2) => bad(
-                "the orders of physical",
+            Method::Physical | Method::Adaptive if !(o.na == 0 && o.nb == 2 && o.nf == 2) => bad(
+                &format!("the orders of {}", self.method.name()),
                 format!("{} with {o}", self.structure),
                 "bj with nb = 2 and nf = 2, the operator; nc and nd are free",
             ),
-            Method::Physical if o.nk == 0 => bad(
+            Method::Physical | Method::Adaptive if o.nk == 0 => bad(
                 "the delay",
                 "nk = 0".to_owned(),
                 "nk of 1 or more: the hold alone delays by one sample",
@@ -331,19 +364,40 @@ impl TrackOptions {
                 format!("{} with {o}", self.structure),
                 "bj with nc = 0, or oe",
             ),
-            Method::Window | Method::Refined if self.forgetting != ForgettingRule::Exponential => bad(
-                "the way of forgetting",
-                format!("{:?} with {}", self.forgetting, self.method.name()),
-                "none for the method window, which has its own length, and exponential forgetting for rriv",
-            ),
+            Method::Window | Method::Refined | Method::Adaptive if self.forgetting != ForgettingRule::Exponential => {
+                bad(
+                    "the way of forgetting",
+                    format!("{:?} with {}", self.forgetting, self.method.name()),
+                    "none for window and adaptive, which have their own, and exponential forgetting for rriv",
+                )
+            }
             Method::Rls | Method::Window | Method::Refined if self.regressor == Regressor::PseudoLinear => bad(
                 "the regressor",
                 format!("pseudo-linear with {}", self.method.name()),
                 "rpem, whose gradient it replaces",
             ),
-            Method::Physical if self.regressor == Regressor::PseudoLinear => bad(
+            Method::Adaptive if !(o.nc == 0 && o.nd <= LARGEST_ND) => bad(
+                "the noise model of adaptive",
+                format!("nc={},nd={}", o.nc, o.nd),
+                "nc = 0 and nd of at most 8",
+            ),
+            Method::Adaptive if self.memory.is_some() || !self.memory_of.is_empty() => bad(
+                "the memory",
+                "with adaptive".to_owned(),
+                "none: it remembers for as long as nothing changes; take physical to set memories",
+            ),
+            Method::Adaptive
+                if self.covariance != StartCovariance::OfFit || !matches!(self.start, StartAt::Span(_)) =>
+            {
+                bad(
+                    "the start of adaptive",
+                    "no batch fit, or a covariance of its own".to_owned(),
+                    "the batch fit of a span, whose noise model and covariance it needs",
+                )
+            }
+            Method::Physical | Method::Adaptive if self.regressor == Regressor::PseudoLinear => bad(
                 "the regressor",
-                "pseudo-linear with physical".to_owned(),
+                format!("pseudo-linear with {}", self.method.name()),
                 "rpem, whose gradient it replaces",
             ),
             m if self.track_delay_s.is_some() && m != Method::Physical => bad(
@@ -374,6 +428,9 @@ impl TrackOptions {
                 limit.to_string(),
                 "a positive multiple of sigma, or inf",
             );
+        }
+        if self.alarm.is_nan() {
+            return bad("the alarm", "NaN".to_owned(), "a logarithm of odds, such as 6");
         }
         if self.largest.is_nan() || self.largest <= 0.0 {
             return bad("the largest magnitude", self.largest.to_string(), "a positive number");

@@ -1,5 +1,7 @@
 //! The last values of a signal, the newest first.
 
+use hoid_core::state::{State, visit_all};
+
 /// Largest size of a value in a recursion. Its fourth power is still a number, so that covariances of filtered signals are.
 const LARGEST: f64 = 1e60;
 
@@ -14,6 +16,12 @@ pub(super) struct Past {
     values: Vec<f64>,
     n: usize,
     at: usize,
+}
+
+impl State for Past {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        visit_all(&mut [&mut self.values.as_mut_slice(), &mut self.at], each);
+    }
 }
 
 impl Past {

@@ -3,6 +3,7 @@
 //! The coefficients may change from sample to sample; the histories of w, v and eps keep the values that were right when they were
 //! taken. A signal that overflows brings the filters to rest.
 
+use hoid_core::state::{State, visit_all};
 use hoid_core::{
     delay::DelayLine,
     predictor::{AnyShape, Predictor as Kernel, Regressor},
@@ -20,6 +21,12 @@ pub(super) struct Predictor {
     kernel: Box<Kernel<AnyShape, ROOM, ROOM>>,
     delay: DelayLine<Vec<f64>>,
     nk: usize,
+}
+
+impl State for Predictor {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        visit_all(&mut [&mut *self.kernel, &mut self.delay], each);
+    }
 }
 
 impl Predictor {

@@ -26,6 +26,7 @@
 
 mod filters;
 
+use hoid_core::state::{State, visit_all};
 use hoid_core::{error_bars::NOTHING_KNOWN, stability::roots_inside};
 use hoid_model::Orders;
 
@@ -88,6 +89,32 @@ pub(crate) struct RefinedRecursion {
     rest: Past,
     shortened: usize,
     work: Work,
+}
+
+impl State for RefinedRecursion {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        let parts: &mut [&mut dyn State] = &mut [
+            &mut self.theta.as_mut_slice(),
+            &mut self.auxiliary.as_mut_slice(),
+            &mut self.share,
+            &mut self.spread.as_mut_slice(),
+            &mut self.first_spread.as_mut_slice(),
+            &mut self.variance,
+            &mut self.least_variance,
+            &mut self.samples,
+            &mut self.newest_share,
+            &mut self.system_gain,
+            &mut self.noise_gain,
+            &mut self.measured,
+            &mut self.output,
+            &mut self.rest,
+            &mut self.shortened,
+        ];
+        visit_all(parts, each);
+        if let Some((following, simulated, last)) = &mut self.instrument {
+            visit_all(&mut [following, simulated, last], each);
+        }
+    }
 }
 
 /// Vectors of one step, all of the length of theta.

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use hoid_core::{recursion::Stable, stability::roots_inside};
 use hoid_model::{Record, SampleTime, operator::retrieval_jacobian};
 
-use super::options::{Method, PHYSICAL_NAMES, StartAt, StartCovariance, TrackOptions};
+use super::options::{PHYSICAL_NAMES, StartAt, StartCovariance, TrackOptions};
 use crate::{Constraint, Estimator, Fit, GreyBox, IdentError};
 
 /// Variance of P for a start from nothing, in units of the innovation variance.
@@ -38,7 +38,9 @@ pub(super) struct StartState {
     pub variance: f64,
     /// Residuals that gave it.
     pub residuals: f64,
-    /// The fit.
+    /// True where a fit gave it.
+    pub from_fit: bool,
+    /// The fit, where it is at hand.
     pub fit: Option<Fit>,
 }
 
@@ -63,7 +65,7 @@ impl StartState {
                 reason: format!("found {theta:?}; expected finite values of {}", names.join(", ")),
             });
         }
-        let values = if options.method == Method::Physical {
+        let values = if options.method.is_physical() {
             physical_values(options, theta, sample_time)?
         } else {
             theta.to_vec()
@@ -74,7 +76,7 @@ impl StartState {
     fn nothing(options: &TrackOptions, sample_time: SampleTime) -> Result<Self, IdentError> {
         let o = &options.orders;
         let mut values = vec![0.0; options.parameter_names().len()];
-        if options.method == Method::Physical {
+        if options.method.is_physical() {
             let first = if options.track_delay_s.is_some() { 5 } else { 4 };
             values[..first].copy_from_slice(&TYPICAL_OPERATOR[..first]);
             if let Some((low, high)) = options.track_delay_s {
@@ -103,13 +105,14 @@ impl StartState {
             values,
             variance: 0.0,
             residuals: 0.0,
+            from_fit: false,
             fit: None,
         }
     }
 
     /// From the batch fit of a record.
     fn fitted(options: &TrackOptions, record: &Record) -> Result<Self, IdentError> {
-        let (values, covariance, fit) = if options.method == Method::Physical {
+        let (values, covariance, fit) = if options.method.is_physical() {
             fit_physical(options, record)?
         } else {
             let estimator = Estimator {
@@ -136,6 +139,7 @@ impl StartState {
             spread,
             variance,
             residuals: (fit.residual_count() - fit.free_count() - fit.state_count()) as f64,
+            from_fit: true,
             fit: Some(fit),
         })
     }
@@ -207,7 +211,7 @@ fn stabilised(options: &TrackOptions, mut values: Vec<f64>) -> Vec<f64> {
         return values;
     }
     let first = match options.method {
-        Method::Physical => values.len() - o.nd,
+        m if m.is_physical() => values.len() - o.nd,
         _ => o.na + o.nb + o.nc,
     };
     let d = &mut values[first..first + o.nd];

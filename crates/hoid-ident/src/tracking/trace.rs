@@ -5,7 +5,7 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate, operator_estimate},
 };
 
-use super::{Counts, options::TrackOptions};
+use super::{Change, Counts, options::TrackOptions};
 use crate::{Fit, IdentError};
 
 /// The estimate at every sample that was kept, with its uncertainty.
@@ -24,6 +24,10 @@ pub struct Trace {
     pub(super) innovation: Vec<f64>,
     pub(super) innovation_variance: Vec<f64>,
     pub(super) shortened: Vec<u64>,
+    /// Logarithm of the odds of a recent change, where the method has them.
+    pub(super) change_odds: Vec<f64>,
+    /// Times at which changes were declared, s, with the changes.
+    pub(super) changes: Vec<(f64, Change)>,
     pub(super) counts: Counts,
     /// The batch fit that the recursion started from.
     pub(super) start: Option<Fit>,
@@ -141,6 +145,16 @@ impl Trace {
     /// How often stability or a bound had made a step shorter, up to each row.
     pub fn steps_shortened(&self) -> &[u64] {
         &self.shortened
+    }
+
+    /// Logarithm of the odds that the person changed within the last four seconds, in each row; empty for methods without hypotheses.
+    pub fn change_odds(&self) -> &[f64] {
+        &self.change_odds
+    }
+
+    /// The changes that were declared, each with the time in s at which it was; rows that are not kept included.
+    pub fn changes(&self) -> &[(f64, Change)] {
+        &self.changes
     }
 
     /// Samples that were not as they should be.

@@ -10,6 +10,7 @@
 //!
 //! **Failures.** Where a fit fails, as for a window without excitation, theta and covariance stay as they were.
 
+use hoid_core::state::{State, visit_all};
 use std::collections::VecDeque;
 
 use hoid_model::{Channel, Record, SampleTime};
@@ -52,6 +53,40 @@ pub(crate) struct WindowRecursion {
     fits: usize,
     failures: usize,
     last_failure: Option<IdentError>,
+}
+
+impl State for WindowRecursion {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        // The samples that are kept, and the covariance that may be there: first how many.
+        for kept in [&mut self.e, &mut self.u] {
+            let mut length = kept.len();
+            length.visit(each);
+            kept.resize(length.min(self.window.saturating_add(1)), 0.0);
+            kept.make_contiguous().visit(each);
+        }
+        let mut there = self.covariance.is_some();
+        there.visit(each);
+        self.covariance = there.then(|| {
+            let p = self.theta.len();
+            self.covariance.take().unwrap_or_else(|| vec![0.0; p * p])
+        });
+        if let Some(covariance) = &mut self.covariance {
+            covariance.as_mut_slice().visit(each);
+        }
+        let parts: &mut [&mut dyn State] = &mut [
+            &mut self.predictor,
+            &mut self.theta.as_mut_slice(),
+            &mut self.known,
+            &mut self.variance,
+            &mut self.innovations,
+            &mut self.since_fit,
+            &mut self.since_comparison,
+            &mut self.compared_loss,
+            &mut self.fits,
+            &mut self.failures,
+        ];
+        visit_all(parts, each);
+    }
 }
 
 impl WindowRecursion {

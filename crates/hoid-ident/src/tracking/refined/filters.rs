@@ -11,6 +11,8 @@ pub(super) struct Filtered {
     pub out: Past,
 }
 
+hoid_core::state!([] Filtered { raw, out });
+
 impl Filtered {
     pub fn new(orders: &Orders) -> Self {
         Self {
@@ -38,6 +40,8 @@ pub(super) struct Simulated {
     pub input_filtered: Filtered,
     pub response_filtered: Filtered,
 }
+
+hoid_core::state!([] Simulated { input, response, input_filtered, response_filtered });
 
 impl Simulated {
     pub fn new(orders: &Orders) -> Self {

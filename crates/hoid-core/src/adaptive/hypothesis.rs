@@ -1,0 +1,210 @@
+//! One hypothesis: a Kalman filter of the operator that supposes that the person last changed at its birth.
+//!
+//! With `y = D u` and `r` the whitened signals, the innovation and its negative gradient at eta are
+//!
+//! `eps = y - K_e psi_1 - K_e_dot psi_2`, `psi_1 = r_1 + d_omega r_3 + d_zeta r_5`, `psi_2 = r_2 + d_omega r_4 + d_zeta r_6`,
+//! `psi_3 = K_e r_3 + K_e_dot r_4`, `psi_4 = K_e r_5 + K_e_dot r_6`,
+//!
+//! with `d_omega`, `d_zeta` the distances from the point of the filters. Before it is seen, eps has a Student distribution of the variance
+//! `v = sigma^2 + psi' P psi` and of the n residuals that sigma^2 rests on, with the logarithm of its density
+//! `-ln(v)/2 - (n + 1)/2 ln(1 + eps^2/(n v)) - 1/(4 n)` up to a constant (the Gamma functions give `-1/(4 n) + O(n^{-3})`).
+//!
+//! An innovation beyond the limit counts as one at the limit, in the density and in sigma^2, and as a measurement of so large
+//! a variance that it lies there (P. J. Huber, *Robust Statistics*, 1981, section 7.3): an outlier tells nothing of who foretells better.
+
+use crate::{
+    adaptive::{Suppositions, response::Signals},
+    error_bars::Level,
+    factored::Factored,
+    state::State,
+};
+
+/// Number of the operator's parameters: K_e, K_e_dot, omega_nm, zeta_nm.
+pub const OPERATOR: usize = 4;
+/// Variances and signals beyond this would overflow in products.
+pub(super) const LARGEST: f64 = 1e60;
+/// Largest square of an innovation over its variance that sigma^2 takes.
+const LEVEL_LIMIT: f64 = 9.0;
+/// Least innovation variance, as a share of that at the start: what a silence leaves.
+const LEAST_SHARE: f64 = 1e-9;
+
+/// The filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hypothesis {
+    /// `[K_e, K_e_dot, omega_nm, zeta_nm]`.
+    pub eta: [f64; OPERATOR],
+    /// Its covariance.
+    pub covariance: Factored<OPERATOR>,
+    /// Innovation variance.
+    pub level: Level,
+    /// Probability.
+    pub weight: f64,
+    /// Sample of its birth.
+    pub born: u64,
+    /// What held before: eta, variances of the gains, innovation variance.
+    pub before: Before,
+    least: f64,
+}
+
+/// What held before a change.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Before {
+    /// `[K_e, K_e_dot, omega_nm, zeta_nm]`.
+    pub eta: [f64; OPERATOR],
+    /// Covariance of K_e and K_e_dot: variances, then the covariance.
+    pub gains: [f64; 3],
+    /// Innovation variance.
+    pub variance: f64,
+}
+
+crate::state!([] Hypothesis { eta, covariance, level, weight, born, before, least });
+crate::state!([] Before { eta, gains, variance });
+
+/// A place of the bank: whether there is a hypothesis, and it.
+impl State for Option<Hypothesis> {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        let mut is_there = self.is_some();
+        is_there.visit(each);
+        // What is restored into a place that was empty replaces all of these numbers.
+        *self = is_there.then(|| self.take().unwrap_or_else(Hypothesis::nothing));
+        if let Some(hypothesis) = self {
+            hypothesis.visit(each);
+        }
+    }
+}
+
+/// psi at eta, of the whitened signals of filters about a point.
+#[inline(always)]
+pub fn gradient(eta: &[f64; OPERATOR], r: &Signals, about: [f64; 2]) -> [f64; OPERATOR] {
+    let (omega, zeta) = (eta[2] - about[0], eta[3] - about[1]);
+    [
+        r[0] + omega * r[2] + zeta * r[4],
+        r[1] + omega * r[3] + zeta * r[5],
+        eta[0] * r[2] + eta[1] * r[3],
+        eta[0] * r[4] + eta[1] * r[5],
+    ]
+}
+
+impl Hypothesis {
+    fn nothing() -> Self {
+        Self {
+            eta: [0.0; OPERATOR],
+            covariance: Factored::diagonal([0.0; OPERATOR]),
+            level: Level::new(0.0, 1.0, 1.0),
+            weight: 0.0,
+            born: 0,
+            before: Before::default(),
+            least: 0.0,
+        }
+    }
+
+    /// From the estimate at the start, its covariance and the innovation variance. `None` unless the covariance is positive.
+    pub fn new(eta: [f64; OPERATOR], covariance: &[[f64; OPERATOR]; OPERATOR], level: Level) -> Option<Self> {
+        let covariance = Factored::of(covariance)?;
+        let mut first = Self {
+            eta,
+            covariance,
+            level,
+            weight: 1.0,
+            born: 0,
+            before: Before {
+                eta,
+                gains: [0.0; 3],
+                variance: level.variance(),
+            },
+            least: LEAST_SHARE * level.variance(),
+        };
+        first.before = first.now();
+        Some(first)
+    }
+
+    /// Takes a sample: the innovation, and the logarithm of the density that it had.
+    #[inline(always)]
+    pub fn step(&mut self, y: f64, r: &Signals, about: [f64; 2], suppositions: &Suppositions) -> (f64, f64) {
+        let psi = gradient(&self.eta, r, about);
+        let eps = y - self.eta[0] * psi[0] - self.eta[1] * psi[1];
+        let variance = self.level.variance().max(self.least);
+        let total = variance + self.covariance.along(&psi);
+        if !(total > 0.0 && total < LARGEST) {
+            return (eps, 0.0);
+        }
+        let limit = suppositions.limit * libm::sqrt(total);
+        let excess = eps.abs() / limit;
+        let (used, doubt) = if excess > 1.0 {
+            (libm::copysign(limit, eps), excess * excess)
+        } else {
+            (eps, 1.0)
+        };
+        let square = used * used / total;
+        let n = self.level.weight();
+        let density = -0.5 * libm::log(total) - 0.5 * (n + 1.0) * libm::log1p(square / n) - 0.25 / n;
+        let gain = self.covariance.measure(&psi, variance * doubt);
+        for i in 0..OPERATOR {
+            let [low, high] = suppositions.bounds[i];
+            let moved = self.eta[i] + gain[i] * used;
+            // Bounds need not be ordered numbers here: a comparison that fails changes nothing.
+            self.eta[i] = if moved < low {
+                low
+            } else if moved > high {
+                high
+            } else {
+                moved
+            };
+        }
+        self.level.take(square.min(LEVEL_LIMIT) * variance);
+        (eps, density)
+    }
+
+    /// `g^2` and `g^2/omega^2` at the crossover.
+    fn scales(&self, suppositions: &Suppositions) -> [f64; 2] {
+        let square = suppositions.crossover * suppositions.crossover;
+        let g = self.eta[0] * self.eta[0] + square * self.eta[1] * self.eta[1];
+        [g, g / square]
+    }
+
+    /// What the gains drift between two births, until no less is known than after a change.
+    pub fn drift(&mut self, suppositions: &Suppositions) {
+        let scales = self.scales(suppositions);
+        let drift = suppositions.drift * suppositions.drift * f64::from(suppositions.spacing);
+        for i in 0..2 {
+            let jump = suppositions.jump[i] * suppositions.jump[i];
+            if self.covariance.element(i, i) < jump * scales[i] {
+                self.widen(i, drift * scales[i]);
+            }
+        }
+    }
+
+    /// The hypothesis that the person changes now.
+    pub fn opened(&self, now: u64, suppositions: &Suppositions) -> Self {
+        let mut child = *self;
+        let scales = self.scales(suppositions);
+        for i in 0..2 {
+            child.widen(i, suppositions.jump[i] * suppositions.jump[i] * scales[i]);
+        }
+        child.level.doubt(suppositions.doubt);
+        child.born = now;
+        child.before = self.now();
+        child
+    }
+
+    fn widen(&mut self, i: usize, variance: f64) {
+        let mut unit = [0.0; OPERATOR];
+        unit[i] = 1.0;
+        self.covariance.add(variance, unit);
+    }
+
+    /// What holds.
+    pub fn now(&self) -> Before {
+        let p = &self.covariance;
+        Before {
+            eta: self.eta,
+            gains: [p.element(0, 0), p.element(1, 1), p.element(0, 1)],
+            variance: self.level.variance(),
+        }
+    }
+
+    /// True when every number inside is finite.
+    pub fn is_sound(&self) -> bool {
+        self.covariance.is_sound() && self.eta.iter().all(|e| e.is_finite()) && self.level.variance().is_finite()
+    }
+}

@@ -1,0 +1,104 @@
+//! Response of the neuromuscular system to a held error and to its rate, with derivatives by omega_nm and zeta_nm.
+//!
+//! With the exact hold of [`crate::held_operator`] for the gains `[1, 0]` and `[0, 1]`,
+//!
+//! `x(t) = b0 e(t) + b1 e(t-1) - f1 x(t-1) - f2 x(t-2)`,
+//! `x'(t) = b0' e(t) + b1' e(t-1) - f1' x(t-1) - f2' x(t-2) - f1 x'(t-1) - f2 x'(t-2)`,
+//!
+//! where `'` is the derivative by omega_nm or zeta_nm. The filters stand at a point `[omega, zeta]`. When it moves, all that they remember moves
+//! along its derivative: a filter whose past belongs to another point would have a kink there, which the whitening filter, a difference of
+//! high order, makes larger than the noise.
+
+use crate::held_operator::held_operator;
+
+/// x1, x2, their derivatives by omega_nm, their derivatives by zeta_nm.
+pub type Signals = [f64; 6];
+
+/// The filters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Response {
+    at: [f64; 2],
+    sample_time: f64,
+    /// `b[gain][lag]` and `f[lag - 1]`, each with its derivatives.
+    b: [[[f64; 3]; 2]; 2],
+    f: [[f64; 3]; 2],
+    input: f64,
+    past: [Signals; 2],
+}
+
+crate::state!([] Response { at, b, f, input, past });
+
+impl Response {
+    /// At rest at the point `[omega_nm, zeta_nm]` (rad/s, 1). Ts in s.
+    pub fn new(at: [f64; 2], sample_time: f64) -> Self {
+        let mut response = Self {
+            at,
+            sample_time,
+            b: [[[0.0; 3]; 2]; 2],
+            f: [[0.0; 3]; 2],
+            input: 0.0,
+            past: [[0.0; 6]; 2],
+        };
+        response.set(at);
+        response
+    }
+
+    fn set(&mut self, at: [f64; 2]) {
+        self.at = at;
+        for (gain, gains) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
+            let (value, by) = held_operator([gains[0], gains[1], at[0], at[1]], self.sample_time);
+            for lag in 0..2 {
+                self.b[gain][lag] = [value[lag], by[lag][2], by[lag][3]];
+                self.f[lag] = [value[2 + lag], by[2 + lag][2], by[2 + lag][3]];
+            }
+        }
+    }
+
+    /// Takes the delayed error of a sample.
+    #[inline(always)]
+    pub fn step(&mut self, e: f64) -> Signals {
+        let ([f1, f2], [x1, x2]) = (&self.f, &self.past);
+        let mut x = [0.0; 6];
+        for gain in 0..2 {
+            let [b0, b1] = &self.b[gain];
+            x[gain] = b0[0] * e + b1[0] * self.input - f1[0] * x1[gain] - f2[0] * x2[gain];
+            for by in 1..3 {
+                let i = 2 * by + gain;
+                x[i] = b0[by] * e + b1[by] * self.input
+                    - f1[by] * x1[gain]
+                    - f2[by] * x2[gain]
+                    - f1[0] * x1[i]
+                    - f2[0] * x2[i];
+            }
+        }
+        self.input = e;
+        self.past = [x, *x1];
+        x
+    }
+
+    /// Moves the point, and what the filters remember, here and in `elsewhere`, along its derivative.
+    pub fn move_to(&mut self, at: [f64; 2], elsewhere: &mut [Signals]) {
+        let by = [at[0] - self.at[0], at[1] - self.at[1]];
+        if by == [0.0; 2] || !at.iter().all(|a| a.is_finite()) {
+            return;
+        }
+        for x in self.past.iter_mut().chain(elsewhere) {
+            for gain in 0..2 {
+                x[gain] += by[0] * x[2 + gain] + by[1] * x[4 + gain];
+            }
+        }
+        self.set(at);
+    }
+
+    /// Brings the filters to rest.
+    pub fn rest(&mut self) {
+        self.input = 0.0;
+        self.past = [[0.0; 6]; 2];
+    }
+
+    /// The point `[omega_nm, zeta_nm]`.
+    #[inline(always)]
+    pub fn about(&self) -> [f64; 2] {
+        self.at
+    }
+}

@@ -1,0 +1,346 @@
+//! The numbers of the page "A person who changes" of the book that take too long for a test.
+//!
+//! `cargo run --release -p hoid-ident --example adaptive_evidence -- table|detection [RUNS]`
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+use hoid_ident::tracking::{
+    ErrorThreshold, Memory, Method, Sample, Stable, StartAt, StartCovariance, TrackOptions, Tracker,
+};
+use hoid_model::{
+    Record,
+    remnant_gain::NoiseDefinition,
+    scenario::{Condition, Realisation, RemnantStrength, Scenario},
+};
+use hoid_sim::{Simulator, Stream};
+
+const NK: usize = 29;
+const COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
+const LEVELS: [f64; 4] = [0.01, 0.1, 0.2, 0.3];
+/// End of the start fit, change, and end of the search for it, s.
+const START_S: f64 = 30.72;
+const CHANGE_S: f64 = 40.96;
+const FOUND_UNTIL_S: f64 = CHANGE_S + 5.0;
+/// Alarms of one event: further ones within this time do not count, s.
+const ONE_EVENT_S: f64 = 4.0;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let runs = arguments.get(1).map_or(100, |n| n.parse().unwrap());
+    match arguments.first().map(String::as_str) {
+        Some("table") => table(runs),
+        Some("detection") => detection(runs),
+        _ => println!("table or detection, and a number of runs"),
+    }
+}
+
+fn simulator(condition: Condition, remnant_order: usize, level: f64) -> Simulator {
+    let mut scenario = Scenario::condition(condition);
+    scenario.remnant.order = remnant_order;
+    scenario.remnant.strength = RemnantStrength::Level {
+        level,
+        definition: NoiseDefinition::Response,
+    };
+    scenario.realisation = Realisation::Output;
+    Simulator::new(&scenario).unwrap()
+}
+
+/// Seed 7000; the method was set on seed 9000, and looked at on seed 5000.
+fn run(simulator: &Simulator, condition: Condition, order: usize, level: usize, replication: u64) -> Record {
+    let stream = Stream {
+        seed: 7000,
+        cell: condition as u64 * 16 + order as u64 * 4 + level as u64,
+        replication,
+    };
+    simulator.run(stream, false).unwrap()
+}
+
+/// Results of the runs in their order, on all cores.
+fn on_all_cores<T: Send>(runs: usize, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut results: Vec<(u64, T)> = std::thread::scope(|scope| {
+        let one = &one;
+        let threads: Vec<_> = (0..cores)
+            .map(|c| {
+                scope.spawn(move || {
+                    let mine = (c..runs).step_by(cores);
+                    mine.map(|r| (r as u64, one(r as u64))).collect::<Vec<_>>()
+                })
+            })
+            .collect();
+        threads.into_iter().flat_map(|t| t.join().unwrap()).collect()
+    });
+    results.sort_by_key(|(r, _)| *r);
+    results.into_iter().map(|(_, t)| t).collect()
+}
+
+fn options(method: Method) -> TrackOptions {
+    TrackOptions {
+        start: StartAt::Span(Some((0.0, START_S))),
+        ..TrackOptions::new(method, method.usual_structure(), method.usual_orders(NK))
+    }
+}
+
+/// RLS or RPEM by the text's own settings.
+fn of_the_text(method: Method) -> TrackOptions {
+    TrackOptions {
+        memory: Some(Memory::Samples(256.0)),
+        covariance: StartCovariance::Multiple(0.1),
+        stable: Stable::PredictorAndNoise,
+        limit: Some(f64::INFINITY),
+        ..options(method)
+    }
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.filter(|v| !v.is_nan()).collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// What one run of one method gave.
+struct Found {
+    /// RMS of the relative error over t in [10, 81.92] s, per cent.
+    errors: [f64; 5],
+    /// Share of samples after the start fit, and within 5 s after the change, in which 1.96 standard errors cover the truth.
+    covered: [f64; 5],
+    covered_through: [f64; 5],
+    /// Time after the change at which K_e_dot has covered half, and nine tenths, of its step, s.
+    settling_s: [f64; 2],
+}
+
+fn follow(record: &Record, options: &TrackOptions) -> Found {
+    let truth = COLUMNS.map(|c| record.channel(c).unwrap());
+    let span = record.span(0.0, START_S).unwrap();
+    let mut tracker = Tracker::new(options, Some(&span), record.sample_time()).unwrap();
+    let from = if options.covariance == StartCovariance::OfFit {
+        START_S - 0.005
+    } else {
+        -1.0
+    };
+    let (mut squares, mut rows) = ([0.0; 5], 0.0);
+    let (mut covered, mut through, mut counts) = ([0.0; 5], [0.0; 5], [0.0; 2]);
+    let mut settling_s = [f64::INFINITY; 2];
+    let (first, last) = (truth[2][0], truth[2][record.len() - 1]);
+    for k in 0..record.len() {
+        let t = record.time_s(k);
+        let sample = Sample {
+            e: record.input()[k],
+            u: record.output()[k],
+            reference: None,
+        };
+        tracker.take(sample, t >= from);
+        if t < 10.0 - 1e-9 {
+            continue;
+        }
+        let Ok(operator) = tracker.operator() else { continue };
+        rows += 1.0;
+        let after_start = t > START_S;
+        let changing = (CHANGE_S..FOUND_UNTIL_S).contains(&t);
+        counts[0] += f64::from(after_start);
+        counts[1] += f64::from(changing);
+        for (i, (_, _, e)) in operator.rows()[..5].iter().enumerate() {
+            let error = e.value - truth[i][k];
+            squares[i] += (error / truth[i][k]).powi(2);
+            let inside = f64::from(error.abs() <= 1.96 * e.standard_error.unwrap_or(f64::NAN));
+            covered[i] += if after_start { inside } else { 0.0 };
+            through[i] += if changing { inside } else { 0.0 };
+        }
+        if t >= CHANGE_S {
+            let part = (operator.k_e_dot.value - first) / (last - first);
+            for (settled, share) in settling_s.iter_mut().zip([0.5, 0.9]) {
+                if part >= share && settled.is_infinite() {
+                    *settled = t - CHANGE_S;
+                }
+            }
+        }
+    }
+    Found {
+        errors: squares.map(|s: f64| 100.0 * (s / rows).sqrt()),
+        covered: covered.map(|c| c / counts[0]),
+        covered_through: through.map(|c| c / counts[1]),
+        settling_s,
+    }
+}
+
+fn row(values: [f64; 5], digits: usize) -> String {
+    values
+        .map(|v| {
+            if v > 999.0 {
+                ">999".to_owned()
+            } else {
+                format!("{v:.digits$}")
+            }
+        })
+        .join(" / ")
+}
+
+/// Errors, coverage and settling times of each cell, and what they come to over the cells.
+fn table(runs: usize) {
+    println!(
+        "RMS relative error in %, {}, median of {runs} runs",
+        COLUMNS.join(" / ")
+    );
+    println!(
+        "| cell | RLS | RPEM | physical | adaptive | adaptive: covered, % | within 5 s of the change, % | 50, 90 % of K_e_dot, s |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    let methods = [
+        of_the_text(Method::Rls),
+        of_the_text(Method::Rpem),
+        options(Method::Physical),
+        options(Method::Adaptive),
+    ];
+    let mut ratios: [Vec<[[f64; 5]; 2]>; 2] = [Vec::new(), Vec::new()];
+    for condition in Condition::ALL {
+        let steady = matches!(condition, Condition::C1 | Condition::C2);
+        for order in 1..=4 {
+            for (l, level) in LEVELS.into_iter().enumerate() {
+                let simulator = simulator(condition, order, level);
+                let found = on_all_cores(runs, |r| {
+                    let record = run(&simulator, condition, order, l, r);
+                    methods.each_ref().map(|options| follow(&record, options))
+                });
+                let errors =
+                    [0, 1, 2, 3].map(|m| [0, 1, 2, 3, 4].map(|i| median(found.iter().map(|f| f[m].errors[i]))));
+                let mean = |of: fn(&Found) -> [f64; 5]| {
+                    [0, 1, 2, 3, 4].map(|i| 100.0 * found.iter().map(|f| of(&f[3])[i]).sum::<f64>() / runs as f64)
+                };
+                let settled = [0, 1].map(|q| median(found.iter().map(|f| f[3].settling_s[q])));
+                println!(
+                    "| {condition} m0={order} P_n={level} | {} | {} | {} | {} | {} | {} | {:.2}, {:.2} |",
+                    row(errors[0], 1),
+                    row(errors[1], 1),
+                    row(errors[2], 1),
+                    row(errors[3], 1),
+                    row(mean(|f| f.covered), 0),
+                    row(mean(|f| f.covered_through), 0),
+                    settled[0],
+                    settled[1],
+                );
+                let better = |i: usize| {
+                    if errors[0][i].is_nan() {
+                        errors[1][i]
+                    } else {
+                        errors[0][i].min(errors[1][i])
+                    }
+                };
+                ratios[usize::from(steady)].push([2, 3].map(|m| [0, 1, 2, 3, 4].map(|i| errors[m][i] / better(i))));
+            }
+        }
+    }
+    for (name, ratios) in ["C3 to C6", "C1 and C2"].into_iter().zip(&ratios) {
+        for (m, method) in ["physical", "adaptive"].into_iter().enumerate() {
+            let all = |i: usize| ratios.iter().map(move |r| r[m][i]);
+            println!(
+                "{name}, {method} over the better of RLS and RPEM: median cell {}, worst {}; cells above 1: {}",
+                row([0, 1, 2, 3, 4].map(|i| median(all(i))), 2),
+                row([0, 1, 2, 3, 4].map(|i| all(i).fold(0.0, f64::max)), 2),
+                row([0, 1, 2, 3, 4].map(|i| all(i).filter(|r| *r > 1.0).count() as f64), 0),
+            );
+        }
+    }
+}
+
+/// A statistic in time, from the end of the start fit on.
+type Statistic = Vec<(f64, f64)>;
+
+/// First crossing after the change within 5 s, and the events outside these 5 s.
+fn alarms(statistic: &Statistic, threshold: f64, changes: bool) -> (Option<f64>, usize) {
+    let (mut lag, mut events, mut quiet_from) = (None, 0, 0.0);
+    for &(t, s) in statistic {
+        if s <= threshold {
+            continue;
+        }
+        let fresh = t >= quiet_from;
+        if changes && (CHANGE_S..FOUND_UNTIL_S).contains(&t) {
+            if lag.is_none() {
+                lag = Some(t - CHANGE_S);
+            }
+        } else if fresh && !(changes && t >= FOUND_UNTIL_S) {
+            events += 1;
+        }
+        quiet_from = t + ONE_EVENT_S;
+    }
+    (lag, events)
+}
+
+/// Hits in C4 and C6 against false alarms in C1 and C2, of the odds and of the baseline.
+fn detection(runs: usize) {
+    let statistics = |record: &Record| -> [Statistic; 2] {
+        let span = record.span(0.0, START_S).unwrap();
+        let options = options(Method::Adaptive);
+        let mut tracker = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
+        let mut baseline = ErrorThreshold::new(span.input(), record.sample_time()).unwrap();
+        let mut both = [Vec::new(), Vec::new()];
+        for k in 0..record.len() {
+            let (t, e) = (record.time_s(k), record.input()[k]);
+            let sample = Sample {
+                e,
+                u: record.output()[k],
+                reference: None,
+            };
+            let after_start = t >= START_S - 0.005;
+            tracker.take(sample, after_start);
+            let distance = baseline.step(e);
+            if after_start {
+                both[0].push((t, tracker.change_odds().unwrap()));
+                both[1].push((t, distance));
+            }
+        }
+        both
+    };
+    // Of each method and threshold: lags and misses per condition, false alarms and hours.
+    let thresholds: [Vec<f64>; 2] = [
+        vec![-1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0],
+        vec![2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 8.0, 10.0, 15.0],
+    ];
+    let mut lags = [0, 1].map(|m: usize| vec![[Vec::new(), Vec::new()]; thresholds[m].len()]);
+    let mut events = [0, 1].map(|m: usize| vec![0; thresholds[m].len()]);
+    let mut hours = 0.0;
+    for condition in [Condition::C1, Condition::C2, Condition::C4, Condition::C6] {
+        let changes = matches!(condition, Condition::C4 | Condition::C6);
+        for order in 1..=4 {
+            for (l, level) in LEVELS.into_iter().enumerate().take(3) {
+                let simulator = simulator(condition, order, level);
+                let found = on_all_cores(runs, |r| {
+                    let both = statistics(&run(&simulator, condition, order, l, r));
+                    [0, 1].map(|m: usize| {
+                        let of = |k: &f64| alarms(&both[m], *k, changes);
+                        thresholds[m].iter().map(of).collect::<Vec<_>>()
+                    })
+                });
+                for each in &found {
+                    for m in 0..2 {
+                        for (k, (lag, count)) in each[m].iter().enumerate() {
+                            if changes {
+                                lags[m][k][usize::from(condition == Condition::C6)].push(lag.unwrap_or(f64::INFINITY));
+                            } else {
+                                events[m][k] += count;
+                            }
+                        }
+                    }
+                    hours += if changes { 0.0 } else { 51.2 / 3600.0 };
+                }
+            }
+        }
+    }
+    println!("P_n = .01, .1, .2; m0 = 1 to 4; {runs} runs a cell; {hours:.1} hours of steady tracking in C1 and C2");
+    println!(
+        "| statistic | threshold | false alarms an hour | C4 found, % | median lag, s | C6 found, % | median lag, s |"
+    );
+    println!("|---|---|---|---|---|---|---|");
+    for (m, name) in ["log odds", "k sigma of e and its rate"].into_iter().enumerate() {
+        for (k, threshold) in thresholds[m].iter().enumerate() {
+            let cells = lags[m][k].each_ref().map(|lags| {
+                let hits = lags.iter().filter(|l| l.is_finite()).count();
+                let share = 100.0 * hits as f64 / lags.len() as f64;
+                format!("{share:.1} | {:.2}", median(lags.iter().copied()))
+            });
+            println!(
+                "| {name} | {threshold} | {:.2} | {} |",
+                events[m][k] as f64 / hours,
+                cells.join(" | ")
+            );
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! Fits on records that were prepared: what alignment, units and another rate do to the parameters of the operator.
+#![allow(clippy::unwrap_used)]
+
+use hoid::{
+    ident::GreyBox,
+    io::{NewRate, Offset, Preparation, Scaling},
+    prelude::*,
+};
+
+fn run(replication: u64) -> Record {
+    let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+    let stream = Stream {
+        seed: 21,
+        cell: 0,
+        replication,
+    };
+    simulator.run(stream, false).unwrap()
+}
+
+/// A record of e and u alone, the output `late` samples behind.
+fn bare(record: &Record, late: usize) -> Record {
+    let n = record.len();
+    let channel = |name: &str, values: &[f64]| Channel::new(name, "", values.to_vec());
+    Record::new(
+        record.sample_time(),
+        channel("e", &record.input()[late..]),
+        channel("u", &record.output()[..n - late]),
+    )
+    .unwrap()
+}
+
+fn prepared(record: Record, change: impl FnOnce(&mut Preparation)) -> Record {
+    let mut preparation = Preparation::default();
+    change(&mut preparation);
+    preparation.apply(record).unwrap().0
+}
+
+#[test]
+fn an_offset_gives_the_fit_of_the_aligned_record() {
+    let whole = run(1);
+    // u stands three samples late in the file.
+    let late = bare(&whole, 3);
+    let aligned = prepared(late, |p| {
+        p.offset.insert("u".into(), Offset::Samples(3.0));
+    });
+    let n = aligned.len();
+    assert_eq!(aligned.input(), &whole.input()[3..3 + n]);
+    assert_eq!(aligned.output(), &whole.output()[3..3 + n]);
+}
+
+#[test]
+fn units_change_the_gains_and_nothing_else() {
+    let orders = Structure::BoxJenkins.operator_orders(29);
+    let fit = |record: Record| Estimator::new(Structure::BoxJenkins, orders).fit(&[record]).unwrap();
+    let plain = fit(bare(&run(1), 0)).operator().unwrap();
+    let volts = fit(prepared(bare(&run(1), 0), |p| {
+        p.scale.insert("u".into(), Scaling::by(0.25, Some("V")).unwrap());
+    }))
+    .operator()
+    .unwrap();
+    // The search ends within 1e-12 of the loss, which leaves 1e-6 of a parameter.
+    for (found, expected) in [
+        (volts.k_e.value, 0.25 * plain.k_e.value),
+        (volts.t_l_s.value, plain.t_l_s.value),
+        (volts.omega_nm_rad_s.value, plain.omega_nm_rad_s.value),
+        (volts.zeta_nm.value, plain.zeta_nm.value),
+    ] {
+        assert!((found / expected - 1.0).abs() < 1e-5, "{found} {expected}");
+    }
+}
+
+#[test]
+fn a_fit_of_every_fourth_sample_is_the_same_person_with_a_longer_hold() {
+    const RUNS: u64 = 12;
+    const FACTOR: usize = 4;
+    // Gain, lead, frequency and damping of the muscles, and the delay, which is shorter by the half of what the hold grows.
+    let expected = [0.09, 0.4, 11.25, 0.35, 0.28 - 0.5 * 0.01 * (FACTOR as f64 - 1.0)];
+    let mut sums = [[0.0; 2]; 5];
+    let mut worst = 0.0_f64;
+    for replication in 0..RUNS {
+        let record = prepared(bare(&run(replication), 0), |p| p.rate = NewRate::Decimated(FACTOR));
+        assert!((record.sample_time().s() - 0.04).abs() < 1e-15);
+        let fit = GreyBox::new(1..=4).fit(&[record]).unwrap();
+        let o = fit.operator(0).unwrap();
+        let tau = o.tau_e_s;
+        let all = [o.k_e, o.t_l_s, o.omega_nm_rad_s, o.zeta_nm, tau];
+        for ((sum, estimate), truth) in sums.iter_mut().zip(all).zip(expected) {
+            sum[0] += estimate.value / RUNS as f64;
+            sum[1] += estimate.standard_error.unwrap().powi(2) / (RUNS * RUNS) as f64;
+            worst = worst.max((estimate.value - truth).abs() / estimate.standard_error.unwrap());
+        }
+    }
+    for (name, (sum, truth)) in ["K_e", "T_L", "omega_nm", "zeta_nm", "tau_e"]
+        .iter()
+        .zip(sums.iter().zip(expected))
+    {
+        println!("{name}: {:.5} +- {:.5}, expected {truth:.5}", sum[0], sum[1].sqrt());
+    }
+    println!("worst single estimate: {worst:.2} standard errors");
+    for (sum, truth) in sums.iter().zip(expected) {
+        assert!(
+            (sum[0] - truth).abs() < 4.0 * sum[1].sqrt() + 0.01 * truth,
+            "{} {truth}",
+            sum[0]
+        );
+    }
+}
