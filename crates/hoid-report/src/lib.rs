@@ -20,6 +20,6 @@ mod tables;
 mod track;
 
 pub use error::ReportError;
-pub use group::{GroupReport, GroupTables};
+pub use group::{FrequencyTables, GroupReport, GroupTables};
 pub use report::{ModelSection, Report};
 pub use track::{BatchLine, TraceSection, TrackReport};

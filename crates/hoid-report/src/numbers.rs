@@ -40,6 +40,11 @@ pub fn interval(value: f64, standard_error: Option<f64>, factor: f64) -> String 
 
 /// A number without standard error: five significant digits. A dash for what is not finite.
 pub fn plain(value: f64) -> String {
+    significant(value, DIGITS_ALONE)
+}
+
+/// A number with so many significant digits; a dash for what is not finite.
+pub fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return DASH.to_owned();
     }
@@ -47,7 +52,7 @@ pub fn plain(value: f64) -> String {
         return "0".to_owned();
     }
     let exponent = exponent_for(value.abs());
-    let text = written(value, last_digit(value, DIGITS_ALONE), exponent);
+    let text = written(value, last_digit(value, digits), exponent);
     match exponent {
         0 => without_trailing_zeros(&text).to_owned(),
         _ => text,

@@ -44,7 +44,7 @@ pub use columns::OPERATOR;
 pub use error::StudyError;
 pub use manifest::Shard;
 pub use plan::{Plan, plan_schema};
-pub use plans::{NAMED_PLANS, NamedPlan};
+pub use plans::{FURTHER_PLANS, NAMED_PLANS, NamedPlan};
 pub use query::Query;
 pub use results::{Bands, Results, SummaryRow, TraceSummary};
 pub use run::{Outcome, Progress, RunOptions, merge, run};

@@ -12,9 +12,9 @@ pub struct NamedPlan {
 }
 
 macro_rules! named {
-    ($($name:literal),+ $(,)?) => {
-        /// All named plans, in the order in which they are run.
-        pub const NAMED_PLANS: &[NamedPlan] = &[$(NamedPlan {
+    ($(#[$doc:meta])* $list:ident: $($name:literal),+ $(,)?) => {
+        $(#[$doc])*
+        pub const $list: &[NamedPlan] = &[$(NamedPlan {
             name: $name,
             text: include_str!(concat!("../plans/", $name, ".toml")),
         }),+];
@@ -22,6 +22,8 @@ macro_rules! named {
 }
 
 named![
+    /// The named plans of the reproduction, in the order in which they are run.
+    NAMED_PLANS:
     "noise-level",
     "bias",
     "initial-conditions",
@@ -34,6 +36,11 @@ named![
     "forgetting",
     "lead-change",
 ];
+named![
+    /// Named plans of what goes beyond the reference text.
+    FURTHER_PLANS:
+    "adaptation",
+];
 
 impl NamedPlan {
     /// Replications of each named plan, those of the reference text.
@@ -41,7 +48,8 @@ impl NamedPlan {
 
     /// The plan of a name.
     pub fn find(name: &str) -> Option<Self> {
-        NAMED_PLANS.iter().copied().find(|plan| plan.name == name)
+        let all = NAMED_PLANS.iter().chain(FURTHER_PLANS);
+        all.copied().find(|plan| plan.name == name)
     }
 
     /// The plan, read.
@@ -59,7 +67,7 @@ mod tests {
 
     #[test]
     fn named_plans_are_right_and_called_as_their_files() {
-        for named in NAMED_PLANS {
+        for named in NAMED_PLANS.iter().chain(FURTHER_PLANS) {
             let plan = named.plan().unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(plan.name, named.name);
             assert!(!plan.title.is_empty() && !plan.description.is_empty(), "{}", plan.name);

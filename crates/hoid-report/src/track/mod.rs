@@ -142,6 +142,8 @@ impl TrackReport<'_> {
                 coefficients => of_fits::coefficients(fit),
                 operator => of_fits::operator(fit, None),
             }),
+            watched => !trace.section.trace.change_odds().is_empty(),
+            changes => tables::changes(trace),
             batch => tables::batch(trace, self.record),
         }
     }

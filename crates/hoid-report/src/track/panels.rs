@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_ident::tracking::{Method, OPERATOR_COLUMNS, StartAt};
+use hoid_ident::tracking::{OPERATOR_COLUMNS, StartAt};
 use hoid_model::{NotConvertible, Record, uncertainty::Estimate, uncertainty::OperatorEstimate};
 
 use super::{
@@ -194,9 +194,7 @@ pub fn error_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
 
 /// True when all methods move the parameters of the operator.
 pub fn of_operator(traces: &[Evaluated<'_>]) -> bool {
-    traces
-        .iter()
-        .all(|t| t.section.trace.options().method == Method::Physical)
+    traces.iter().all(|t| t.section.trace.options().method.is_physical())
 }
 
 fn coefficient_panels(traces: &[Evaluated<'_>], record: &Record, shown: Shown) -> Vec<TracePanel> {

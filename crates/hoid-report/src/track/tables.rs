@@ -2,7 +2,7 @@
 
 use std::mem::discriminant;
 
-use hoid_ident::tracking::{ForgettingRule, Memory, Method, StartAt, StartCovariance, TrackOptions};
+use hoid_ident::tracking::{Change, ForgettingRule, Memory, Method, StartAt, StartCovariance, TrackOptions};
 use hoid_model::{NotConvertible, Record, uncertainty::Estimate};
 use minijinja::{Value, context};
 
@@ -56,6 +56,7 @@ fn forgetting(options: &TrackOptions) -> String {
             length(options.window),
             options.every
         ),
+        (_, Method::Adaptive) => "since the last change, by hypotheses".to_owned(),
         (ForgettingRule::Exponential, _) => format!("exponential, memory {}", memories(options)),
         (ForgettingRule::RandomWalk(drifts), _) => {
             let drifts: Vec<String> = drifts.iter().map(|(name, d)| format!("{name} {}", plain(*d))).collect();
@@ -127,6 +128,24 @@ pub fn counts(traces: &[Evaluated<'_>]) -> Vec<Value> {
         }
     };
     traces.iter().map(row).collect()
+}
+
+/// One row a change that was declared.
+pub fn changes(trace: &Evaluated<'_>) -> Vec<Value> {
+    let pair = |[before, after]: [f64; 2], digits| format!("{} → {}", fixed(before, digits), fixed(after, digits));
+    let row = |(t, c): &(f64, Change)| {
+        let changed = c.changed();
+        context! {
+            declared => fixed(*t, 2),
+            since => fixed(t - c.seconds_ago, 2),
+            odds => fixed(c.odds, 1),
+            what => if changed.is_empty() { DASH.to_owned() } else { changed.join(", ") },
+            k_e => pair(c.k_e.map(|e| e.value), 4),
+            t_l => pair(c.t_l_s, 3),
+            remnant => fixed((c.innovation_variance[1] / c.innovation_variance[0]).sqrt(), 2),
+        }
+    };
+    trace.section.trace.changes().iter().map(row).collect()
 }
 
 /// A reason why rows do not convert.

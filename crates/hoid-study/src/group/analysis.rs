@@ -3,90 +3,54 @@
 //! nk, and for Box-Jenkins nd and T_n, are chosen beforehand: on each of two sub-batches every delay in the range is fitted, and nk is the
 //! average of the two best, rounded. With these, ARX and Box-Jenkins models are fitted to the sub-batches and to the whole run, and the recursions
 //! start from the fit of the first sub-batch. A row says what was estimated in which window; what fails is a row with its reason.
+//!
+//! Beside the fits of single runs stands one of all runs of a person in a condition that does not change: a Box-Jenkins model with initial states of each run,
+//! the delay that fits best, and the greatest order of the noise model that the manifest allows. In a closed loop a noise model that is too small biases the
+//! operator, and one run is too short for a great one.
 
 use std::path::Path;
 
 use hoid_ident::{
     Estimator, Fit, GreyBox, OrderRanges, choose_orders,
+    describing::Crossover,
     order_search::Criterion,
-    tracking::{Method, StartAt, Trace, TrackOptions, track},
+    tracking::{Method, StartAt, TrackOptions, track},
 };
-use hoid_io::{ColumnKind, ColumnSchema, OutputTable, ReadOptions, Repair, TableSchema, read_record};
-use hoid_model::{Detrend, Record, Structure, remnant::RemnantDiscretisation, uncertainty::Estimate};
-
-use super::manifest::{Detrending, Manifest, RunEntry};
-use crate::{
-    columns::{OPERATOR, Rows},
-    statistics::median,
+use hoid_io::{OutputTable, TableSchema};
+use hoid_model::{
+    Complex64, ContinuousTransferFunction, Record, Structure, remnant::RemnantDiscretisation, uncertainty::Estimate,
 };
 
-/// Most coefficients of a polynomial in the tables.
-const MOST_ND: usize = 20;
+use super::{
+    frequency::transfer_function,
+    manifest::{ConditionFacts, Manifest, RunEntry},
+    reading::read_file,
+    responses::{followed_phases_deg, grid, responses_schema},
+    tables::{real, schema, text},
+    traces::{self, TraceColumns},
+};
+use crate::{columns::Rows, statistics::median};
 
 /// The tables of one run.
 pub(super) struct RunTables {
     pub estimates: OutputTable,
+    pub responses: OutputTable,
     pub traces: OutputTable,
 }
 
 /// One estimate a row, in long form.
 pub(super) fn estimates_schema() -> TableSchema {
-    use ColumnKind::{Real, Text};
-    schema(&[
-        ("subject", Text),
-        ("condition", Text),
-        ("run", Text),
-        ("window", Text),
-        ("from_s", Real),
-        ("to_s", Real),
-        ("estimator", Text),
-        ("parameter", Text),
-        ("value", Real),
-        ("standard_error", Real),
-        ("status", Text),
-        ("reason", Text),
-    ])
+    schema(
+        text(&["subject", "condition", "run", "window"])
+            .chain(real(&["from_s", "to_s"]))
+            .chain(text(&["estimator", "parameter"]))
+            .chain(real(&["value", "standard_error"]))
+            .chain(text(&["status", "reason"])),
+    )
 }
 
-/// Names of the parameters of traces: those of RLS, of Box-Jenkins models and of the operator.
-pub(super) fn trace_names(nd: usize) -> Vec<String> {
-    let fixed = ["a1", "a2", "b0", "b1", "f1", "f2"].map(str::to_owned);
-    let d = (1..=nd.min(MOST_ND)).map(|i| format!("d{i}"));
-    fixed.into_iter().chain(d).chain(OPERATOR.map(str::to_owned)).collect()
-}
-
-/// One kept point of a recursion a row.
-pub(super) fn traces_schema(nd: usize) -> TableSchema {
-    use ColumnKind::{Real, Text};
-    let mut columns = vec![
-        ("subject", Text),
-        ("condition", Text),
-        ("run", Text),
-        ("estimator", Text),
-        ("t", Real),
-    ];
-    let names: Vec<String> = trace_names(nd)
-        .into_iter()
-        .flat_map(|name| [format!("{name}_se"), name])
-        .collect();
-    let mut names: Vec<&str> = names.iter().map(String::as_str).collect();
-    names.sort_unstable();
-    columns.extend(names.into_iter().map(|name| (name, Real)));
-    schema(&columns)
-}
-
-fn schema(columns: &[(&str, ColumnKind)]) -> TableSchema {
-    TableSchema {
-        comments: Vec::new(),
-        columns: columns
-            .iter()
-            .map(|(name, kind)| ColumnSchema {
-                name: (*name).to_owned(),
-                kind: *kind,
-            })
-            .collect(),
-    }
-}
+/// Name of the span that is the whole run.
+const WHOLE: &str = "whole";
 
 /// A span of the run with its name.
 #[derive(Clone, Copy)]
@@ -99,54 +63,108 @@ struct Window {
 struct Bench<'a> {
     manifest: &'a Manifest,
     entry: &'a RunEntry,
+    /// What is known of its condition.
+    facts: ConditionFacts,
+    element: Option<ContinuousTransferFunction>,
+    columns: TraceColumns,
     rows: Rows,
+    responses: Rows,
     traces: Rows,
 }
 
 /// Analyses a run; `base` is the directory of the manifest.
 pub(super) fn analyse(manifest: &Manifest, base: &Path, entry: &RunEntry) -> RunTables {
-    let mut bench = Bench {
-        manifest,
-        entry,
-        rows: Rows::new(&estimates_schema()),
-        traces: Rows::new(&traces_schema(manifest.analysis.nd.1)),
-    };
+    let mut bench = Bench::new(manifest, entry);
     match read(manifest, base, entry) {
-        Ok(record) => bench.analyse(&record),
+        Ok(run) => bench.analyse(&run),
         Err(reason) => bench.failed(None, "read", &reason),
     }
-    RunTables {
-        estimates: bench.rows.into_table(Vec::new()),
-        traces: bench.traces.into_table(Vec::new()),
-    }
+    bench.tables()
 }
 
-/// The record of a run as the manifest wants it.
-pub(super) fn read(manifest: &Manifest, base: &Path, entry: &RunEntry) -> Result<Record, String> {
-    let reading = &manifest.read;
-    let text = |error: hoid_io::IoError| error.to_string();
-    let options = ReadOptions {
-        input: Some(reading.input.parse().map_err(text)?),
-        output: reading.output.parse().map_err(text)?,
-        sampling_hz: reading.sampling_hz,
-        span_s: (reading.from_s, reading.to_s),
-        repair: Repair {
-            resample: reading.resample,
-            fill: reading.fill,
-        },
+/// Name of the run that is all of them.
+const ALL: &str = "all";
+
+/// Fits all runs of a person in a condition at once.
+pub(super) fn analyse_together(manifest: &Manifest, base: &Path, entries: &[&RunEntry]) -> RunTables {
+    const LABEL: &str = "BJ, all runs";
+    let all = RunEntry {
+        run: ALL.to_owned(),
+        ..entries[0].clone()
     };
-    let read = read_record(&base.join(&entry.file), &options).map_err(text)?;
-    Ok(read.record.detrended(match reading.detrend {
-        Detrending::None => Detrend::None,
-        Detrending::Mean => Detrend::Mean,
-        Detrending::Linear => Detrend::Linear,
-    }))
+    let mut bench = Bench::new(manifest, &all);
+    let records: Vec<Record> = entries
+        .iter()
+        .filter_map(|entry| read(manifest, base, entry).ok())
+        .map(|run| run.record)
+        .collect();
+    // What cannot be read is told by its own run.
+    if let Some(first) = records.first() {
+        let window = bench.windows(first)[2];
+        match bench.together(&records) {
+            Ok(fit) => bench.fit_rows(window, LABEL, &fit, first),
+            Err(reason) => bench.failed(Some(window), LABEL, &reason),
+        }
+    }
+    bench.tables()
 }
 
-impl Bench<'_> {
-    fn analyse(&mut self, record: &Record) {
+/// A run as the manifest wants it.
+pub(super) struct Run {
+    pub record: Record,
+    /// Where the second file begins, s, for a run that is joined of two.
+    seam_s: Option<f64>,
+}
+
+/// Reads a run.
+pub(super) fn read(manifest: &Manifest, base: &Path, entry: &RunEntry) -> Result<Run, String> {
+    let read = |file: &Path| read_file(manifest, &entry.condition, &base.join(file)).map(|read| read.record);
+    let record = read(&entry.file)?;
+    let Some(then) = &entry.then else {
+        return Ok(Run { record, seam_s: None });
+    };
+    let seam_s = record.time_s(record.len());
+    let next = read(then)?;
+    let record = record.joined(&next).map_err(|error| error.to_string())?;
+    Ok(Run {
+        record,
+        seam_s: Some(seam_s),
+    })
+}
+
+impl<'a> Bench<'a> {
+    fn new(manifest: &'a Manifest, entry: &'a RunEntry) -> Self {
+        let facts = manifest.conditions.get(&entry.condition).cloned().unwrap_or_default();
+        let columns = TraceColumns::of(&manifest.analysis);
+        Self {
+            manifest,
+            entry,
+            element: facts
+                .controlled_element
+                .as_deref()
+                .and_then(|e| transfer_function(e).ok()),
+            facts,
+            rows: Rows::new(&estimates_schema()),
+            responses: Rows::new(&responses_schema()),
+            traces: Rows::new(&columns.schema()),
+            columns,
+        }
+    }
+
+    fn tables(self) -> RunTables {
+        RunTables {
+            estimates: self.rows.into_table(Vec::new()),
+            responses: self.responses.into_table(Vec::new()),
+            traces: self.traces.into_table(Vec::new()),
+        }
+    }
+
+    fn analyse(&mut self, run: &Run) {
+        let record = &run.record;
         let windows = self.windows(record);
-        for (name, value) in [("rms_e", rms(record.input())), ("rms_u", rms(record.output()))] {
+        let change = run.seam_s.or(self.facts.change_s).map(|at| ("change_s", at));
+        let of_record = [("rms_e", rms(record.input())), ("rms_u", rms(record.output()))];
+        for (name, value) in of_record.into_iter().chain(change) {
             self.row(Some(windows[2]), "record", name, Estimate::fixed(value));
         }
         for structure in [Structure::Arx, Structure::BoxJenkins] {
@@ -179,8 +197,23 @@ impl Bench<'_> {
                         ..TrackOptions::new(method, structure, orders)
                     };
                     match track(record, &options, self.manifest.analysis.trace_every) {
-                        Ok(trace) => self.trace_rows(&trace, &windows),
-                        Err(error) => self.failed(None, &method.name().to_uppercase(), &error.to_string()),
+                        Ok(trace) => {
+                            traces::write(&mut self.traces, &self.columns, self.entry, &trace);
+                            for window in &windows[..2] {
+                                for (name, values) in traces::values_within(&trace, window.from_s, window.to_s) {
+                                    let middle = median(&values);
+                                    if middle.is_finite() {
+                                        self.row(
+                                            Some(*window),
+                                            &traces::label_of(method),
+                                            &name,
+                                            Estimate::fixed(middle),
+                                        );
+                                    }
+                                }
+                            }
+                        }
+                        Err(error) => self.failed(None, &traces::label_of(method), &error.to_string()),
                     }
                 }
             }
@@ -205,7 +238,7 @@ impl Bench<'_> {
         [
             window("first", first),
             window("last", last),
-            window("whole", (begin, end)),
+            window(WHOLE, (begin, end)),
         ]
     }
 
@@ -216,11 +249,7 @@ impl Bench<'_> {
         structure: Structure,
         windows: &[Window; 3],
     ) -> Result<hoid_model::Orders, String> {
-        let ts = record.sample_time().s();
-        let (least, most) = self.manifest.analysis.delay_s;
-        let samples = |delay_s: f64| (delay_s / ts).round() as usize + 1;
-        let mut ranges = OrderRanges::from(structure.operator_orders(1));
-        ranges.nk = samples(least)..=samples(most);
+        let mut ranges = self.ranges(record, structure);
         if structure == Structure::BoxJenkins {
             ranges.nd = self.manifest.analysis.nd.0..=self.manifest.analysis.nd.1;
         }
@@ -259,6 +288,26 @@ impl Bench<'_> {
         })
     }
 
+    /// The operator's orders with the delays of the manifest.
+    fn ranges(&self, record: &Record, structure: Structure) -> OrderRanges {
+        let (least, most) = self.manifest.analysis.delay_s;
+        let samples = |delay_s: f64| (delay_s / record.sample_time().s()).round() as usize + 1;
+        let mut ranges = OrderRanges::from(structure.operator_orders(1));
+        ranges.nk = samples(least)..=samples(most);
+        ranges
+    }
+
+    /// The fit of all runs.
+    fn together(&self, records: &[Record]) -> Result<Fit, String> {
+        let structure = Structure::BoxJenkins;
+        let mut ranges = self.ranges(&records[0], structure);
+        let nd = self.manifest.analysis.nd.1;
+        ranges.nd = nd..=nd;
+        let template = Estimator::new(structure, structure.operator_orders(1));
+        let choice = choose_orders(&template, &ranges, Criterion::Bic, records).map_err(|e| e.to_string())?;
+        Ok(choice.fit)
+    }
+
     fn fit_rows(&mut self, window: Window, label: &str, fit: &Fit, record: &Record) {
         for (name, estimate) in fit.parameters() {
             self.row(Some(window), label, &name, estimate);
@@ -275,6 +324,7 @@ impl Bench<'_> {
             let vaf = hoid_ident::validation::vaf(&part.output()[simulated.first..], &simulated.values);
             self.row(Some(window), label, "vaf", Estimate::fixed(vaf));
         }
+        self.response_rows(window, label, fit, record.sample_time().s());
         match fit.operator() {
             Ok(operator) => {
                 for (name, _, estimate) in operator.rows() {
@@ -299,66 +349,63 @@ impl Bench<'_> {
                     options.fit(&[part]).map_err(|e| e.to_string())
                 });
             match found {
-                Ok(fit) => match fit.operator(0) {
-                    Ok(operator) => {
-                        for (name, _, estimate) in operator.rows() {
-                            self.row(Some(*window), LABEL, name, estimate);
+                Ok(fit) => {
+                    self.response_rows(*window, LABEL, fit.polynomial_fit(0), record.sample_time().s());
+                    match fit.operator(0) {
+                        Ok(operator) => {
+                            for (name, _, estimate) in operator.rows() {
+                                self.row(Some(*window), LABEL, name, estimate);
+                            }
                         }
+                        Err(reason) => self.not_convertible(*window, LABEL, &reason.to_string()),
                     }
-                    Err(reason) => self.not_convertible(*window, LABEL, &reason.to_string()),
-                },
+                }
                 Err(reason) => self.failed(Some(*window), LABEL, &reason),
             }
         }
     }
 
-    /// The kept points of a trace from where it moves, and its medians in the sub-batches.
-    fn trace_rows(&mut self, trace: &Trace, windows: &[Window; 3]) {
-        let label = trace.options().method.name().to_uppercase();
-        let names = trace.parameter_names();
-        let mut columns: Vec<(String, Vec<f64>)> = names
+    /// Frequency response of the fit of the whole run, and crossover and phase margin with the controlled element, where that is known.
+    fn response_rows(&mut self, window: Window, label: &str, fit: &Fit, sample_time_s: f64) {
+        if window.name != WHOLE {
+            return;
+        }
+        let omega = grid(sample_time_s);
+        let advance = self.facts.offset_samples * sample_time_s;
+        let response: Vec<Complex64> = omega
             .iter()
-            .cloned()
-            .chain(OPERATOR.map(str::to_owned))
-            .map(|n| (n, Vec::new()))
+            .map(|w| fit.model().response(*w) * Complex64::from_polar(1.0, w * advance))
             .collect();
-        // Before it moves, a trace is the fit that it starts from.
-        let from_s = trace.updated_from_s() - 0.5 * trace.sample_time().s();
-        let moving: Vec<usize> = (0..trace.len()).filter(|k| trace.times_s()[*k] >= from_s).collect();
-        for &k in &moving {
-            let rows = &mut self.traces;
+        for ((w, h), phase_deg) in omega.iter().zip(&response).zip(followed_phases_deg(&response)) {
+            let rows = &mut self.responses;
             rows.begin();
             rows.text("subject", &self.entry.subject);
             rows.text("condition", &self.entry.condition);
             rows.text("run", &self.entry.run);
-            rows.text("estimator", &label);
-            rows.real("t", trace.times_s()[k]);
-            let mut values: Vec<Estimate> = trace.parameters(k);
-            match trace.operator(k) {
-                Ok(operator) => values.extend(operator.rows()[..5].iter().map(|(_, _, estimate)| *estimate)),
-                Err(_) => values.extend([Estimate::fixed(f64::NAN); 5]),
-            }
-            for ((name, column), estimate) in columns.iter_mut().zip(values) {
-                column.push(estimate.value);
-                rows.real(name, estimate.value);
-                if let Some(se) = estimate.standard_error {
-                    rows.real(&format!("{name}_se"), se);
-                }
-            }
+            rows.text("estimator", label);
+            rows.real("omega_rad_s", *w);
+            rows.real("magnitude_db", 20.0 * h.norm().log10());
+            rows.real("phase_deg", phase_deg);
         }
-        for window in &windows[..2] {
-            for (name, column) in &columns {
-                let inside: Vec<f64> = moving
-                    .iter()
-                    .zip(column)
-                    .filter(|(k, _)| (window.from_s..window.to_s).contains(&trace.times_s()[**k]))
-                    .map(|(_, v)| *v)
-                    .collect();
-                let middle = median(&inside);
-                if middle.is_finite() {
-                    self.row(Some(*window), &label, name, Estimate::fixed(middle));
-                }
-            }
+        let Some(element) = &self.element else { return };
+        let open_loop: Vec<Complex64> = omega
+            .iter()
+            .zip(&response)
+            .map(|(w, h)| h * element.response(*w))
+            .collect();
+        if let Some(found) = Crossover::of(&omega, &open_loop, 0.0) {
+            self.row(
+                Some(window),
+                label,
+                "crossover_rad_s",
+                Estimate::fixed(found.omega_rad_s),
+            );
+            self.row(
+                Some(window),
+                label,
+                "phase_margin_deg",
+                Estimate::fixed(found.phase_margin_deg),
+            );
         }
     }
 

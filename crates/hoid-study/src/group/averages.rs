@@ -2,40 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use hoid_io::{ColumnKind, ColumnSchema, ColumnValues, OutputTable, TableSchema};
+use hoid_io::{OutputTable, TableSchema};
 
-use crate::{columns::Rows, statistics::Statistics};
-
-/// Reads a column of texts.
-pub(super) fn texts<'a>(table: &'a OutputTable, name: &str) -> &'a [String] {
-    match table.column(name) {
-        Some(ColumnValues::Text(values)) => values,
-        _ => &[],
-    }
-}
-
-/// Reads a column of numbers.
-pub(super) fn numbers<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
-    match table.column(name) {
-        Some(ColumnValues::Real(values)) => values,
-        _ => &[],
-    }
-}
-
-fn schema(texts: &[&str], numbers: &[&str]) -> TableSchema {
-    let column = |name: &&str, kind| ColumnSchema {
-        name: (*name).to_owned(),
-        kind,
-    };
-    TableSchema {
-        comments: Vec::new(),
-        columns: texts
-            .iter()
-            .map(|n| column(n, ColumnKind::Text))
-            .chain(numbers.iter().map(|n| column(n, ColumnKind::Real)))
-            .collect(),
-    }
-}
+use super::tables::{numbers, real, schema, text, texts};
+use crate::{
+    columns::Rows,
+    statistics::{Statistics, median},
+};
 
 /// Subject, condition, window, estimator, parameter.
 type Key = [String; 5];
@@ -60,8 +33,15 @@ impl Averages {
     /// Mean, spread and error over the runs.
     pub fn table(&self) -> OutputTable {
         let mut rows = Rows::new(&schema(
-            &["subject", "condition", "window", "estimator", "parameter"],
-            &["runs", "mean", "standard_error", "sd", "median", "least", "most"],
+            text(&["subject", "condition", "window", "estimator", "parameter"]).chain(real(&[
+                "runs",
+                "mean",
+                "standard_error",
+                "sd",
+                "median",
+                "least",
+                "most",
+            ])),
         ));
         for (key, values) in &self.0 {
             let s = Statistics::of(values);
@@ -123,7 +103,7 @@ impl Delays {
     /// The table.
     pub fn table(&self) -> OutputTable {
         let columns = DELAY_COLUMNS.map(|(_, _, column)| column);
-        let mut rows = Rows::new(&schema(&["subject", "condition", "run"], &columns));
+        let mut rows = Rows::new(&schema(text(&["subject", "condition", "run"]).chain(real(&columns))));
         for ((subject, condition, _), DelaysOfRun { run, values }) in &self.0 {
             rows.begin();
             rows.text("subject", subject);
@@ -136,6 +116,9 @@ impl Delays {
         rows.into_table(Vec::new())
     }
 }
+
+/// What is told of a parameter over the runs at one time.
+const FIGURES: [&str; 6] = ["runs", "mean", "sd", "lower_quartile", "median", "upper_quartile"];
 
 /// Traces of all runs at equal times.
 #[derive(Debug, Clone, Default)]
@@ -151,6 +134,18 @@ impl TraceAverages {
             names,
             values: BTreeMap::new(),
         }
+    }
+
+    /// The columns.
+    pub fn schema(names: &[String]) -> TableSchema {
+        let mut columns: Vec<String> = vec!["t".to_owned()];
+        for name in names {
+            match name.strip_suffix("_se") {
+                Some(of) => columns.push(format!("{of}_variance")),
+                None => columns.extend(FIGURES.map(|figure| format!("{name}_{figure}"))),
+            }
+        }
+        schema(text(&["subject", "condition", "estimator"]).chain(real(&columns)))
     }
 
     /// Adds the traces of a run.
@@ -169,18 +164,21 @@ impl TraceAverages {
         }
     }
 
+    /// Times of an estimator's rows and the medians of a parameter over the runs.
+    pub fn medians(&self, key: &[String; 3], name: &str) -> (Vec<f64>, Vec<f64>) {
+        let at = self.names.iter().position(|known| known == name);
+        let (Some(times), Some(at)) = (self.values.get(key), at) else {
+            return (Vec::new(), Vec::new());
+        };
+        times
+            .iter()
+            .map(|(bits, all)| (f64::from_bits(*bits), median(&all[at])))
+            .unzip()
+    }
+
     /// Median, quartiles, mean and standard deviation over the runs at each time; of a standard error the median variance.
     pub fn table(&self) -> OutputTable {
-        const FIGURES: [&str; 6] = ["runs", "mean", "sd", "lower_quartile", "median", "upper_quartile"];
-        let mut columns: Vec<String> = vec!["t".to_owned()];
-        for name in &self.names {
-            match name.strip_suffix("_se") {
-                Some(of) => columns.push(format!("{of}_variance")),
-                None => columns.extend(FIGURES.map(|figure| format!("{name}_{figure}"))),
-            }
-        }
-        let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
-        let mut rows = Rows::new(&schema(&["subject", "condition", "estimator"], &columns));
+        let mut rows = Rows::new(&Self::schema(&self.names));
         for (key, times) in &self.values {
             for (bits, all) in times {
                 rows.begin();

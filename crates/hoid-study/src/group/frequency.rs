@@ -2,23 +2,37 @@
 //!
 //! For each subject and each condition whose excitation the manifest names: the describing function over the runs that can be read, crossover and
 //! phase margin with the controlled element, and gain, lead and delay. They stand beside the parametric fits and assume nothing of their structure.
+//!
+//! How far a fit is from it: with `H_j` the describing function at line j, `s_j` its standard error and `F_j` the median response of the fits over the
+//! runs, the distance is `sqrt(sum |F_j - H_j|^2/s_j^2 / sum |H_j|^2/s_j^2)`, the deviation relative to H with the lines weighted as they are known, and in
+//! errors `sqrt(mean |F_j - H_j|^2/s_j^2)`. The errors of a line are known from its few runs alone; each is drawn towards the median of all lines,
+//! `r_j^2 <- (nu r_j^2 + 4 r~^2)/(nu + 4)` with `r = s/|H|` and `nu = 2 (runs - 1)` (moderated variances, Smyth 2004), else the one that is small by chance
+//! would decide. Both come from the same runs, so that a fit without bias is nearer than one error. Where the controlled element is
+//! known, a fit agrees when its crossover is within 10 % and its phase margin within 5 deg of those of the describing function: about what two experiments with the same
+//! person differ by; else when its distance is below 10 %. Where the task changes within the run, both are averages over what changes, in different ways, and
+//! nothing is said.
 
 use std::path::Path;
 
-use hoid_ident::describing::{Averaging, DescribingOptions, Excitation, GainLeadDelayOptions, LineSearch, describe};
-use hoid_io::{ColumnKind, ColumnSchema, OutputTable, TableSchema};
+use hoid_ident::describing::{
+    Averaging, DescribingFunction, DescribingOptions, Excitation, GainLeadDelayOptions, Line, LineSearch, describe,
+};
+use hoid_io::OutputTable;
 use hoid_model::{ContinuousTransferFunction, Record, uncertainty::Estimate};
 
 use super::{
     analysis,
     manifest::{ConditionFacts, Manifest},
+    responses::{MedianResponse, ResponseAverages},
+    tables::{real, schema, text},
 };
-use crate::columns::Rows;
+use crate::{columns::Rows, statistics::median};
 
 /// What the describing functions say: a row a line, and a row a subject and condition.
 pub(super) struct Frequencies {
     pub lines: OutputTable,
     pub margins: OutputTable,
+    pub agreement: OutputTable,
 }
 
 const LINE: [&str; 7] = [
@@ -43,31 +57,45 @@ const MARGINS: [&str; 10] = [
     "rms_u",
 ];
 
-fn schema(texts: &[&str], numbers: &[String]) -> TableSchema {
-    let column = |name: &str, kind| ColumnSchema {
-        name: name.to_owned(),
-        kind,
-    };
-    TableSchema {
-        comments: Vec::new(),
-        columns: texts
-            .iter()
-            .map(|n| column(n, ColumnKind::Text))
-            .chain(numbers.iter().map(|n| column(n, ColumnKind::Real)))
-            .collect(),
-    }
+const AGREEMENT: [&str; 6] = [
+    "crossover_rad_s",
+    "phase_margin_deg",
+    "crossover_difference_percent",
+    "phase_margin_difference_deg",
+    "distance_percent",
+    "distance_in_errors",
+];
+
+/// Largest difference of a crossover, of a phase margin, and of a response where there is no crossover, for agreement.
+const AGREES: (f64, f64, f64) = (10.0, 5.0, 10.0);
+
+/// The tables while they are filled.
+struct Tables {
+    lines: Rows,
+    margins: Rows,
+    agreement: Rows,
 }
 
-/// Describing functions of all subjects and conditions with an excitation; none where the manifest names none.
-pub(super) fn frequencies(manifest: &Manifest, base: &Path) -> Option<Frequencies> {
+/// Describing functions of all subjects and conditions with an excitation, and how far the fits are from them; none where the manifest names none.
+pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAverages) -> Option<Frequencies> {
     manifest.conditions.values().find(|facts| facts.excitation.is_some())?;
-    let mut lines = Rows::new(&schema(&["subject", "condition"], &LINE.map(str::to_owned)));
     let with_errors: Vec<String> = MARGINS
         .iter()
         .flat_map(|name| [(*name).to_owned(), format!("{name}_se")])
         .collect();
     let numbers = [vec!["runs".to_owned()], with_errors].concat();
-    let mut margins = Rows::new(&schema(&["subject", "condition", "status", "reason"], &numbers));
+    let keys = ["subject", "condition"];
+    let mut tables = Tables {
+        lines: Rows::new(&schema(text(&keys).chain(real(&LINE)))),
+        margins: Rows::new(&schema(
+            text(&keys).chain(text(&["status", "reason"])).chain(real(&numbers)),
+        )),
+        agreement: Rows::new(&schema(
+            text(&keys)
+                .chain(text(&["estimator", "agrees"]))
+                .chain(real(&AGREEMENT)),
+        )),
+    };
     let mut known: Vec<(&str, &str)> = Vec::new();
     for run in manifest.runs.iter().filter(|run| run.counts) {
         let key = (run.subject.as_str(), run.condition.as_str());
@@ -86,22 +114,27 @@ pub(super) fn frequencies(manifest: &Manifest, base: &Path) -> Option<Frequencie
             .runs
             .iter()
             .filter(|r| r.counts && (r.subject.as_str(), r.condition.as_str()) == key);
-        let records: Vec<Record> = of_cell.filter_map(|r| analysis::read(manifest, base, r).ok()).collect();
+        let records: Vec<Record> = of_cell
+            .filter_map(|r| analysis::read(manifest, base, r).ok())
+            .map(|run| run.record)
+            .collect();
+        let margins = &mut tables.margins;
         margins.begin();
         margins.text("subject", key.0);
         margins.text("condition", key.1);
         margins.real("runs", records.len() as f64);
-        match of_records(&records, facts, key, &mut lines, &mut margins) {
-            Ok(()) => margins.text("status", "ok"),
+        match of_records(&records, facts, key, fits, &mut tables) {
+            Ok(()) => tables.margins.text("status", "ok"),
             Err(reason) => {
-                margins.text("status", "failed");
-                margins.text("reason", &reason);
+                tables.margins.text("status", "failed");
+                tables.margins.text("reason", &reason);
             }
         }
     }
     Some(Frequencies {
-        lines: lines.into_table(Vec::new()),
-        margins: margins.into_table(Vec::new()),
+        lines: tables.lines.into_table(Vec::new()),
+        margins: tables.margins.into_table(Vec::new()),
+        agreement: tables.agreement.into_table(Vec::new()),
     })
 }
 
@@ -109,9 +142,14 @@ fn of_records(
     records: &[Record],
     facts: &ConditionFacts,
     (subject, condition): (&str, &str),
-    lines: &mut Rows,
-    margins: &mut Rows,
+    fits: &ResponseAverages,
+    tables: &mut Tables,
 ) -> Result<(), String> {
+    let Tables {
+        lines,
+        margins,
+        agreement,
+    } = tables;
     let text = |error: hoid_ident::IdentError| error.to_string();
     let first = records.first().ok_or("no run could be read")?;
     let channel = facts.excitation.clone().ok_or("no excitation is named")?;
@@ -165,16 +203,69 @@ fn of_records(
     put("gain", fit.gain);
     put("lead_s", fit.lead_s);
     put("delay_s", fit.delay_s);
-    if let Some(element) = &facts.controlled_element {
-        let at = found.open_loop(&transfer_function(element)?).margins();
-        if let Some(crossover) = at.crossover_rad_s {
+    let element = facts.controlled_element.as_deref().map(transfer_function).transpose()?;
+    let mut margins_of_lines = None;
+    if let Some(element) = &element {
+        let at = found.open_loop(element).margins();
+        if let (Some(crossover), Some(margin)) = (at.crossover_rad_s, at.phase_margin_deg) {
             put("crossover_rad_s", crossover);
-        }
-        if let Some(margin) = at.phase_margin_deg {
             put("phase_margin_deg", margin);
+            margins_of_lines = Some((crossover.value, margin.value));
         }
     }
+    for (estimator, response) in fits.medians(subject, condition) {
+        agreement.begin();
+        agreement.text("subject", subject);
+        agreement.text("condition", condition);
+        agreement.text("estimator", estimator);
+        let (distance, in_errors) = distance(&found, &response);
+        agreement.real("distance_percent", distance);
+        agreement.real("distance_in_errors", in_errors);
+        let mut agrees = distance <= AGREES.2;
+        if let Some((crossover, margin)) = margins_of_lines {
+            agrees = false;
+            if let Some(of_fit) = element.as_ref().and_then(|element| response.crossover(element)) {
+                let by = 100.0 * (of_fit.omega_rad_s / crossover - 1.0);
+                let turn = of_fit.phase_margin_deg - margin;
+                agreement.real("crossover_rad_s", of_fit.omega_rad_s);
+                agreement.real("phase_margin_deg", of_fit.phase_margin_deg);
+                agreement.real("crossover_difference_percent", by);
+                agreement.real("phase_margin_difference_deg", turn);
+                agrees = by.abs() <= AGREES.0 && turn.abs() <= AGREES.1;
+            }
+        }
+        let verdict = if agrees { "yes" } else { "no" };
+        agreement.text("agrees", if facts.change_s.is_some() { "" } else { verdict });
+    }
     Ok(())
+}
+
+/// Distance between a describing function and a fit in percent and in errors; of one run, which has no errors, with equal weights in percent alone.
+fn distance(found: &DescribingFunction, response: &MedianResponse) -> (f64, f64) {
+    const PRIOR: f64 = 4.0;
+    let relative = |line: &Line| line.standard_error.map(|s| s * s / line.response.norm_sqr());
+    let known: Vec<f64> = found.lines.iter().filter_map(relative).collect();
+    let (middle, nu) = (median(&known), 2.0 * (found.runs.len() as f64 - 1.0));
+    let (mut between, mut of_lines, mut count) = (0.0, 0.0, 0.0);
+    for line in &found.lines {
+        let Some(fit) = response.at(line.omega_rad_s) else {
+            continue;
+        };
+        let size = line.response.norm_sqr();
+        let moderated = relative(line).map(|r| (nu * r + PRIOR * middle) / (nu + PRIOR) * size);
+        let weight = moderated.map_or(1.0, |variance| 1.0 / variance);
+        between += weight * (fit - line.response).norm_sqr();
+        of_lines += weight * size;
+        count += 1.0;
+    }
+    (
+        100.0 * (between / of_lines).sqrt(),
+        if known.is_empty() {
+            f64::NAN
+        } else {
+            (between / count).sqrt()
+        },
+    )
 }
 
 /// `numerator/denominator`, coefficients by falling powers of s, separated by commas.

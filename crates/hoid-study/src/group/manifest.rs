@@ -9,6 +9,9 @@
 //! from_s = 5.0
 //! to_s = 45.0
 //!
+//! [prepare]                               # as in hoid identify; see `preparing`
+//! offset = { u = 1 }
+//!
 //! [analysis]
 //! windows_s = [[5.0, 25.0], [25.0, 45.0]] # sub-batches; default: the first and the last three eighths of each record
 //! nd = [1, 4]                             # least and greatest order of the noise model, chosen by BIC; default [1, 1]
@@ -32,12 +35,13 @@ use std::{
 };
 
 use hoid_ident::tracking::Method;
+use hoid_io::Preparation;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::StudyError;
 
-use super::{frequency::transfer_function, pattern::Pattern};
+use super::{frequency::transfer_function, pattern::Pattern, preparing::Preparing};
 
 /// A group of recorded runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -48,6 +52,9 @@ pub struct Manifest {
     /// How the files are read.
     #[serde(default)]
     pub read: Reading,
+    /// What is done to the runs before they are analysed.
+    #[serde(default, skip_serializing_if = "Preparing::is_empty")]
+    pub prepare: Preparing,
     /// What is done with each run.
     #[serde(default)]
     pub analysis: Analysis,
@@ -128,6 +135,9 @@ pub struct Analysis {
     pub trace_every: usize,
     /// Whether the grey box is fitted too.
     pub grey_box: bool,
+    /// Frequencies at which the response of the recursions is kept, rad/s.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub response_at_rad_s: Vec<f64>,
 }
 
 /// A recursion by name.
@@ -161,6 +171,7 @@ impl Default for Analysis {
             methods: vec![MethodName::Rls, MethodName::Rpem, MethodName::Physical],
             trace_every: 16,
             grey_box: false,
+            response_at_rad_s: Vec::new(),
         }
     }
 }
@@ -185,6 +196,9 @@ pub struct ConditionFacts {
     /// Time at which the task changes, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub change_s: Option<f64>,
+    /// What is done to its runs before they are analysed; what it names wins over that of the group.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prepare: Option<Preparing>,
 }
 
 impl Default for ConditionFacts {
@@ -196,6 +210,7 @@ impl Default for ConditionFacts {
             offset_samples: 0.0,
             lead: true,
             change_s: None,
+            prepare: None,
         }
     }
 }
@@ -206,6 +221,9 @@ impl Default for ConditionFacts {
 pub struct RunEntry {
     /// Its file, from the directory of the manifest.
     pub file: PathBuf,
+    /// A second file that is joined behind the first, from the next sample on: what the person controls changes at the seam.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub then: Option<PathBuf>,
     /// Who it is.
     pub subject: String,
     /// What was controlled.
@@ -278,11 +296,28 @@ impl Manifest {
                 return Err(format!("[conditions.{name}]: no run has this condition"));
             }
         }
+        for run in self.runs.iter().filter(|run| run.then.is_some()) {
+            if let Some(facts) = self.conditions.get(&run.condition)
+                && (facts.excitation.is_some() || facts.change_s.is_some())
+            {
+                return Err(format!(
+                    "run {} of {} is joined of two files, but [conditions.{}] names an excitation or change_s: leave them out, the change is at the seam",
+                    run.run, run.subject, run.condition
+                ));
+            }
+        }
         for (name, facts) in &self.conditions {
             if let Some(element) = &facts.controlled_element {
                 transfer_function(element)
                     .map_err(|reason| format!("[conditions.{name}]: controlled_element {reason}"))?;
             }
+        }
+        self.prepare
+            .preparation(None)
+            .map_err(|reason| format!("[prepare]: {reason}"))?;
+        for name in self.conditions.keys() {
+            self.preparation(name)
+                .map_err(|reason| format!("[conditions.{name}.prepare]: {reason}"))?;
         }
         let a = &self.analysis;
         if a.nd.0 == 0 || a.nd.0 > a.nd.1 || a.nd.1 > 20 {
@@ -295,6 +330,15 @@ impl Manifest {
             return Err(format!(
                 "analysis.delay_s is {:?}, expected two times, the smaller first",
                 a.delay_s
+            ));
+        }
+        if let Some(omega) = a
+            .response_at_rad_s
+            .iter()
+            .find(|omega| !(**omega > 0.0 && omega.is_finite()))
+        {
+            return Err(format!(
+                "analysis.response_at_rad_s has {omega}, expected positive frequencies in rad/s"
             ));
         }
         if a.trace_every == 0 {
@@ -322,6 +366,7 @@ impl Manifest {
             match pattern.matches(&name) {
                 Some(found) => runs.push(RunEntry {
                     file: PathBuf::from(&name),
+                    then: None,
                     subject: if found.subject.is_empty() {
                         "1".to_owned()
                     } else {
@@ -347,11 +392,21 @@ impl Manifest {
         let manifest = Self {
             name,
             read: Reading::default(),
+            prepare: Preparing::default(),
             analysis: Analysis::default(),
             conditions: BTreeMap::new(),
             runs,
         };
         Ok((manifest, others))
+    }
+
+    /// What is done to the runs of a condition.
+    ///
+    /// # Errors
+    /// The key that has no meaning, and why.
+    pub fn preparation(&self, condition: &str) -> Result<Preparation, String> {
+        let of_condition = self.conditions.get(condition).and_then(|facts| facts.prepare.as_ref());
+        self.prepare.preparation(of_condition)
     }
 
     /// The manifest as TOML.

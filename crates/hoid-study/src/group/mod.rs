@@ -4,32 +4,46 @@
 //! |---|---|
 //! | [`Manifest`] | which files belong to whom, and what is done with them |
 //! | [`Pattern`] | subject, condition and run from names of files |
+//! | [`Preparing`] | what is done to the runs before they are analysed |
+//! | `reading` | runs from files, and what was done to them |
 //! | `analysis` | what is done with one run |
+//! | `traces` | its recursive estimates as rows |
+//! | `responses` | frequency responses of the fits |
 //! | [`VirtualExperiment`] | the same from simulated people |
-//! | `frequency` | describing functions by subject and condition |
+//! | `frequency` | describing functions by subject and condition, and how far the fits are from them |
+//! | `settling` | how fast the recursions follow a change at a known instant, and how noisy they are |
 //! | `averages` | means over the runs, chosen delays, averages of traces |
+//! | `join` | the tables of the group from those of its runs |
 //!
-//! Each run is a part on disk, as a block of a study is: a group that was stopped goes on, and of a run nothing stays in memory but its kept points of
-//! traces until they are averaged, some 60 kB a run of 90 s.
+//! Each run is a part on disk, as a block of a study is, and so is the fit of all runs of a person in a condition: a group that was stopped goes on, and of a run
+//! nothing stays in memory but its estimates and responses; traces are averaged for one person in one condition after the other.
 
 mod analysis;
 mod averages;
 mod frequency;
+mod join;
 mod manifest;
 mod pattern;
+mod preparing;
+mod reading;
+mod responses;
+mod settling;
+mod tables;
+mod traces;
 mod virtual_people;
 
 use std::{
+    collections::BTreeMap,
     path::{Path, PathBuf},
     sync::atomic::{AtomicU64, Ordering},
 };
 
-use hoid_io::{TableSchema, TableWriter};
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 pub use manifest::{Analysis, ConditionFacts, Detrending, Manifest, MethodName, Reading, RunEntry};
 pub use pattern::{Matched, Pattern};
+pub use preparing::{NumberOrText, Preparing};
 pub use virtual_people::{Trouble, VirtualExperiment, simulate_group};
 
 use crate::{
@@ -37,7 +51,6 @@ use crate::{
     manifest::{Manifest as Record, part},
     run::{Outcome, Progress, remove_parts, sweep, table_path},
 };
-use averages::{Averages, Delays, TraceAverages};
 
 /// Name of the copy of the manifest beside the results.
 const MANIFEST: &str = "group.toml";
@@ -54,14 +67,14 @@ pub fn run_group(
     progress: &(dyn Fn(Progress) + Sync),
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Outcome, StudyError> {
-    let runs: Vec<&RunEntry> = manifest.runs.iter().filter(|run| run.counts).collect();
+    let blocks = blocks(manifest);
     let record = Record {
         hoid: env!("CARGO_PKG_VERSION").to_owned(),
         study: manifest.name.clone(),
         plan_sha256: hash(manifest, base),
         seed: 0,
         replications: 1,
-        blocks: runs.len() as u64,
+        blocks: blocks.len() as u64,
         shard: None,
         complete: false,
     };
@@ -74,17 +87,26 @@ pub fn run_group(
             tables: tables(),
         });
     }
-    let total = runs.len() as u64;
+    let total = blocks.len() as u64;
     let is_there = |i: usize| part(directory, i as u64, "estimates").exists();
-    let open: Vec<usize> = (0..runs.len()).filter(|i| !is_there(*i)).collect();
+    let open: Vec<usize> = (0..blocks.len()).filter(|i| !is_there(*i)).collect();
     let known = total - open.len() as u64;
     let done = AtomicU64::new(known);
     let one = |&i: &usize| -> Result<bool, StudyError> {
         if !go_on() {
             return Ok(false);
         }
-        let found = analysis::analyse(manifest, base, runs[i]);
+        let found = match &blocks[i] {
+            Block::Run(run) => analysis::analyse(manifest, base, run),
+            Block::Together(runs) => analysis::analyse_together(manifest, base, runs),
+        };
         hoid_io::write_table(&part(directory, i as u64, "traces"), &found.traces)?;
+        hoid_io::write_table(&part(directory, i as u64, "responses"), &found.responses)?;
+        if let Block::Run(run) = &blocks[i] {
+            for (table, rows) in reading::account(manifest, base, run) {
+                hoid_io::write_table(&part(directory, i as u64, table), &rows)?;
+            }
+        }
         hoid_io::write_table(&part(directory, i as u64, "estimates"), &found.estimates)?;
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         progress(Progress { done, total, known });
@@ -108,7 +130,7 @@ pub fn run_group(
             tables: Vec::new(),
         });
     }
-    join(manifest, base, runs.len(), directory, options.csv)?;
+    join::join(manifest, base, &blocks, directory, options.csv)?;
     Record {
         complete: true,
         ..record
@@ -122,12 +144,39 @@ pub fn run_group(
     })
 }
 
+/// What is analysed at once and is a part on disk.
+enum Block<'a> {
+    Run(&'a RunEntry),
+    /// All runs of a person in a condition that does not change.
+    Together(Vec<&'a RunEntry>),
+}
+
+/// The runs that count, and then those that are fitted together.
+fn blocks(manifest: &Manifest) -> Vec<Block<'_>> {
+    let runs: Vec<&RunEntry> = manifest.runs.iter().filter(|run| run.counts).collect();
+    let steady = |run: &&&RunEntry| {
+        let facts = manifest.conditions.get(&run.condition);
+        run.then.is_none() && facts.is_none_or(|facts| facts.change_s.is_none())
+    };
+    let mut together: BTreeMap<(&str, &str), Vec<&RunEntry>> = BTreeMap::new();
+    for run in runs.iter().filter(steady) {
+        together.entry((&run.subject, &run.condition)).or_default().push(run);
+    }
+    let together = together.into_values().filter(|runs| runs.len() > 1);
+    runs.into_iter()
+        .map(Block::Run)
+        .chain(together.map(Block::Together))
+        .collect()
+}
+
 /// SHA-256 of the manifest and of the files that count; one that cannot be read is told by its run.
 fn hash(manifest: &Manifest, base: &Path) -> String {
     let mut hasher = Sha256::new();
     hasher.update(manifest.text().as_bytes());
     for run in manifest.runs.iter().filter(|run| run.counts) {
-        hasher.update(hoid_io::read_bytes(&base.join(&run.file)).unwrap_or_default());
+        for file in std::iter::once(&run.file).chain(&run.then) {
+            hasher.update(hoid_io::read_bytes(&base.join(file)).unwrap_or_default());
+        }
     }
     hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
@@ -155,12 +204,18 @@ fn prepare(manifest: &Manifest, directory: &Path, record: &Record, resume: bool)
     Ok(false)
 }
 
-const TABLES: [&str; 7] = [
+const TABLES: [&str; 13] = [
+    "preparation",
+    "trouble",
     "estimates",
     "averages",
     "delays",
+    "settling",
     "describing-functions",
     "frequency-margins",
+    "agreement",
+    "responses",
+    "response-averages",
     "traces",
     "trace-averages",
 ];
@@ -171,52 +226,4 @@ fn tables(directory: &Path) -> Vec<PathBuf> {
         .flat_map(|table| [false, true].map(|csv| table_path(directory, table, csv)))
         .filter(|path| path.exists())
         .collect()
-}
-
-/// Makes the tables from the parts: Parquet, and CSV beside it when it is asked for.
-fn join(manifest: &Manifest, base: &Path, runs: usize, directory: &Path, csv: bool) -> Result<(), StudyError> {
-    let nd = manifest.analysis.nd.1;
-    let (mut averages, mut delays) = (Averages::default(), Delays::default());
-    let names = analysis::trace_names(nd);
-    let with_errors = names
-        .iter()
-        .cloned()
-        .chain(names.iter().map(|name| format!("{name}_se")));
-    let mut of_traces = TraceAverages::new(with_errors.collect());
-    let formats: &[bool] = if csv { &[false, true] } else { &[false] };
-    let writers = |table: &str, schema: &TableSchema| {
-        let writer = |csv: &bool| TableWriter::create(&table_path(directory, table, *csv), schema);
-        formats.iter().map(writer).collect::<Result<Vec<_>, _>>()
-    };
-    let mut estimates = writers("estimates", &analysis::estimates_schema())?;
-    let mut traces = writers("traces", &analysis::traces_schema(nd))?;
-    for run in 0..runs {
-        let found = hoid_io::read_table(&part(directory, run as u64, "estimates"))?;
-        averages.add(&found);
-        delays.add(&found, run);
-        estimates.iter_mut().try_for_each(|writer| writer.append(&found))?;
-        let found = hoid_io::read_table(&part(directory, run as u64, "traces"))?;
-        of_traces.add(&found);
-        traces.iter_mut().try_for_each(|writer| writer.append(&found))?;
-    }
-    for writer in estimates.into_iter().chain(traces) {
-        writer.finish()?;
-    }
-    let mut whole = vec![
-        ("averages", averages.table()),
-        ("delays", delays.table()),
-        ("trace-averages", of_traces.table()),
-    ];
-    if let Some(found) = frequency::frequencies(manifest, base) {
-        whole.extend([
-            ("describing-functions", found.lines),
-            ("frequency-margins", found.margins),
-        ]);
-    }
-    for (name, table) in &whole {
-        for csv in formats {
-            hoid_io::write_table(&table_path(directory, name, *csv), table)?;
-        }
-    }
-    Ok(())
 }

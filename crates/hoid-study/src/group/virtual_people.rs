@@ -16,7 +16,10 @@ use hoid_model::{
 };
 use hoid_sim::{Simulator, Stream};
 
-use super::manifest::{Analysis, ConditionFacts, Manifest, Reading, RunEntry};
+use super::{
+    manifest::{Analysis, ConditionFacts, Manifest, Reading, RunEntry},
+    preparing::Preparing,
+};
 use crate::{
     StudyError,
     columns::{OPERATOR, Rows},
@@ -60,17 +63,20 @@ pub enum Trouble {
     Saturated,
     /// A stick with 8 bits over its range.
     Quantised,
+    /// A recorder that writes the same values for half a second, once.
+    Stalled,
 }
 
 impl Trouble {
     /// All of them.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Jitter,
         Self::Missing,
         Self::Repeated,
         Self::SlowClock,
         Self::Saturated,
         Self::Quantised,
+        Self::Stalled,
     ];
 
     /// Its name.
@@ -82,6 +88,7 @@ impl Trouble {
             Self::SlowClock => "slow-clock",
             Self::Saturated => "saturated",
             Self::Quantised => "quantised",
+            Self::Stalled => "stalled",
         }
     }
 }
@@ -113,6 +120,7 @@ pub fn simulate_group(
                 hoid_io::write_table(&directory.join(&file), &table)?;
                 truth_row(&mut truth, subject, *condition, run, &scenario);
                 runs.push(RunEntry {
+                    then: None,
                     file: file.into(),
                     subject: format!("S{subject}"),
                     condition: condition.to_string(),
@@ -125,11 +133,17 @@ pub fn simulate_group(
     }
     hoid_io::write_table(&directory.join("truth.csv"), &truth.into_table(Vec::new()))?;
     let facts = |condition: &Condition| {
-        let change_s = match Scenario::condition(*condition).schedule {
+        let scenario = Scenario::condition(*condition);
+        let change_s = match scenario.schedule {
             hoid_model::schedule::Schedule::Constant => None,
             hoid_model::schedule::Schedule::Sigmoid { midpoint_s, .. } => Some(midpoint_s),
         };
+        let element = scenario.initial.controlled_element;
         let facts = ConditionFacts {
+            // What is controlled in the whole run.
+            controlled_element: change_s
+                .is_none()
+                .then(|| format!("{}/1,{},0", element.k_c, element.omega_b_rad_s)),
             excitation: Some("f_t".to_owned()),
             change_s,
             ..ConditionFacts::default()
@@ -145,6 +159,7 @@ pub fn simulate_group(
             resample: uneven,
             ..Reading::default()
         },
+        prepare: Preparing::default(),
         analysis: Analysis {
             windows_s: Some([(0.0, 30.72), (51.2, 81.91)]),
             ..Analysis::default()
@@ -260,6 +275,15 @@ impl VirtualExperiment {
             let step = 8.0 * sd / 256.0;
             u.iter_mut().for_each(|u| *u = (*u / step).round() * step);
         }
+        // Where the values of each row come from; the times go on.
+        let held = |k: usize| {
+            let stall = n / 3..n / 3 + (0.5 / ts) as usize;
+            if has(Trouble::Stalled) && stall.contains(&k) {
+                stall.start
+            } else {
+                k
+            }
+        };
         let mut rows: Vec<usize> = (0..n).collect();
         // One in two hundred by a deviate that is anyhow drawn.
         let rare = |k: usize| (noise[k] * 1e6).abs() as u64 % 200;
@@ -274,7 +298,11 @@ impl VirtualExperiment {
         }
         let column = |name: &str, values: &[f64]| OutputColumn {
             name: name.to_owned(),
-            values: ColumnValues::Real(rows.iter().map(|k| values[*k]).collect()),
+            values: ColumnValues::Real(
+                rows.iter()
+                    .map(|k| values[if name == "t" { *k } else { held(*k) }])
+                    .collect(),
+            ),
         };
         OutputTable {
             comments: self

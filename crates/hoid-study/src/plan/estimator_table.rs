@@ -61,6 +61,7 @@ pub(super) enum TaskKey {
     Physical,
     Window,
     Rriv,
+    Adaptive,
     Record,
 }
 
@@ -435,6 +436,7 @@ impl TaskKey {
             Self::Physical => Some(Method::Physical),
             Self::Window => Some(Method::Window),
             Self::Rriv => Some(Method::Refined),
+            Self::Adaptive => Some(Method::Adaptive),
         }
     }
 }

@@ -1,0 +1,184 @@
+//! Describing functions with the fits over them, and where they agree.
+
+use hoid_model::{Complex64, uncertainty::Estimate};
+use minijinja::{Value, context};
+
+use super::{GroupReport, id_of, reals, texts};
+use crate::{
+    figures::{BodeColumn, BodeCurve, BodeGrid, BodePoints, LineKind, Shade, bode_grid},
+    numbers,
+};
+
+/// Estimators whose fits are drawn: as everywhere, ARX blue and Box-Jenkins vermillion.
+const FITS: [(&str, usize); 4] = [("ARX", 0), ("BJ", 1), ("grey box", 3), ("BJ, all runs", 4)];
+
+impl GroupReport<'_> {
+    /// What the describing functions say, with standard errors, a row for each subject and condition.
+    pub(super) fn margins(&self) -> Vec<Value> {
+        let Some(table) = self.tables.frequencies.map(|f| f.margins) else {
+            return Vec::new();
+        };
+        let [subject, condition, reason] = ["subject", "condition", "reason"].map(|name| texts(table, name));
+        let cell = |name: &str, i: usize| {
+            let value = reals(table, name).get(i).copied().filter(|v| v.is_finite());
+            let error = reals(table, &format!("{name}_se"))
+                .get(i)
+                .copied()
+                .filter(|v| v.is_finite());
+            match (value, error) {
+                (None, _) => "\u{2013}".to_owned(),
+                (Some(value), None) => numbers::fixed(value, 3),
+                (Some(value), error) => {
+                    let (value, error) = numbers::with_uncertainty(value, error);
+                    format!("{value} \u{b1} {error}")
+                }
+            }
+        };
+        (0..subject.len())
+            .filter(|i| self.shows(&subject[*i]))
+            .map(|i| {
+                let names = [
+                    "crossover_rad_s",
+                    "phase_margin_deg",
+                    "gain",
+                    "lead_s",
+                    "delay_s",
+                    "coherence",
+                    "off_line_share",
+                ];
+                let cells = names.map(|name| cell(name, i)).to_vec();
+                context! { subject => &subject[i], condition => &condition[i], reason => &reason[i], cells }
+            })
+            .collect()
+    }
+
+    /// Bode points of the describing functions, a figure for each condition with a column for each subject.
+    pub(super) fn describing(&self) -> Vec<Value> {
+        let Some((lines, margins)) = self.tables.frequencies.map(|f| (f.lines, f.margins)) else {
+            return Vec::new();
+        };
+        let (subjects, conditions) = self.names();
+        let column = |condition: &str, subject: &str| {
+            let rows = Self::rows_of(lines, subject, condition);
+            let pick = |name: &str| rows.iter().map(|i| reals(lines, name)[*i]).collect::<Vec<f64>>();
+            let omega = pick("omega_rad_s");
+            let first = Self::rows_of(margins, subject, condition).first().copied();
+            let fit = first.map(|i| ["gain", "lead_s", "delay_s"].map(|name| reals(margins, name)[i]));
+            let mut curves = Vec::new();
+            if let (Some(low), Some(high)) = (omega.first(), omega.last()) {
+                curves = self.fits(subject, condition, (*low, *high));
+                if let Some([gain, lead_s, delay_s]) = fit {
+                    let w: Vec<f64> = (0..=80).map(|k| low * (high / low).powf(f64::from(k) / 80.0)).collect();
+                    let response: Vec<Complex64> = w
+                        .iter()
+                        .map(|w| gain * Complex64::new(1.0, lead_s * w) * Complex64::from_polar(1.0, -delay_s * w))
+                        .collect();
+                    curves.push(BodeCurve::of_response(
+                        "gain, lead and delay",
+                        LineKind::Dashed,
+                        Shade::of_method(5),
+                        &w,
+                        &response,
+                        delay_s,
+                    ));
+                }
+            }
+            let estimates = |name: &str| {
+                let errors = pick(&format!("{name}_se"));
+                let estimate = |(value, error): (f64, f64)| Estimate {
+                    value,
+                    standard_error: Some(error).filter(|e| e.is_finite()),
+                };
+                pick(name)
+                    .into_iter()
+                    .zip(errors)
+                    .map(estimate)
+                    .collect::<Vec<Estimate>>()
+            };
+            let points = BodePoints {
+                name: "describing function".to_owned(),
+                magnitude_db: estimates("magnitude_db"),
+                phase_deg: estimates("phase_deg"),
+                delay_s: fit.map_or(0.0, |[_, _, delay_s]| delay_s),
+                omega_rad_s: omega,
+            };
+            curves.push(BodeCurve::of_points(&points, Shade::of_method(5)));
+            BodeColumn {
+                title: format!("subject {subject}"),
+                curves,
+            }
+        };
+        let shown = |condition: &&&str| texts(lines, "condition").iter().any(|c| c == **condition);
+        conditions
+            .iter()
+            .filter(shown)
+            .map(|condition| {
+                let id = id_of("describing", condition);
+                let columns = subjects.iter().map(|subject| column(condition, subject)).collect();
+                let figure = bode_grid(
+                    &id,
+                    &format!("Describing functions, condition {condition}"),
+                    &BodeGrid { columns },
+                );
+                context! { condition => *condition, figure }
+            })
+            .collect()
+    }
+
+    /// Median responses of the fits over the runs between two frequencies, with the quartiles as bands.
+    fn fits(&self, subject: &str, condition: &str, (low, high): (f64, f64)) -> Vec<BodeCurve> {
+        let table = self.tables.responses;
+        let (estimators, omega) = (texts(table, "estimator"), reals(table, "omega_rad_s"));
+        let rows = Self::rows_of(table, subject, condition);
+        let curve = |(estimator, method): (&str, usize)| {
+            // A point more on either side, so that the curve reaches over the lines.
+            let inside = |i: &&usize| estimators[**i] == estimator && (0.9 * low..=1.1 * high).contains(&omega[**i]);
+            let at: Vec<usize> = rows.iter().filter(inside).copied().collect();
+            let pick = |name: &str| at.iter().map(|i| reals(table, name)[*i]).collect::<Vec<f64>>();
+            let band = |name: &str| {
+                let upper = pick(&format!("{name}_upper_quartile"));
+                pick(&format!("{name}_lower_quartile")).into_iter().zip(upper).collect()
+            };
+            (!at.is_empty()).then(|| BodeCurve {
+                magnitude_db: pick("magnitude_db_median"),
+                phase_deg: pick("phase_deg_median"),
+                magnitude_band: band("magnitude_db"),
+                phase_band: band("phase_deg"),
+                ..BodeCurve::of_response(
+                    estimator,
+                    LineKind::Line,
+                    Shade::of_method(method),
+                    &pick("omega_rad_s"),
+                    &[],
+                    0.0,
+                )
+            })
+        };
+        FITS.into_iter().filter_map(curve).collect()
+    }
+
+    /// Where fits and describing function agree, a row for each subject, condition and estimator.
+    pub(super) fn agreement(&self) -> Vec<Value> {
+        let Some(table) = self.tables.frequencies.map(|f| f.agreement) else {
+            return Vec::new();
+        };
+        let [subject, condition, estimator, agrees] =
+            ["subject", "condition", "estimator", "agrees"].map(|name| texts(table, name));
+        let columns = [
+            ("crossover_rad_s", 2),
+            ("crossover_difference_percent", 1),
+            ("phase_margin_deg", 1),
+            ("phase_margin_difference_deg", 1),
+            ("distance_percent", 0),
+            ("distance_in_errors", 1),
+        ]
+        .map(|(name, digits)| (reals(table, name), digits));
+        (0..subject.len())
+            .filter(|i| self.shows(&subject[*i]))
+            .map(|i| {
+                let cells = columns.map(|(column, digits)| numbers::fixed(column.get(i).copied().unwrap_or(f64::NAN), digits)).to_vec();
+                context! { subject => &subject[i], condition => &condition[i], estimator => &estimator[i], agrees => &agrees[i], cells }
+            })
+            .collect()
+    }
+}

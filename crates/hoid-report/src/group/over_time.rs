@@ -1,0 +1,281 @@
+//! Recursive estimates by condition and subject, and how fast they follow a change.
+
+use minijinja::{Value, context};
+
+use super::{GroupReport, id_of, reals, texts};
+use crate::{
+    figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels},
+    numbers,
+};
+
+/// Recursions in the order of the colours: as everywhere, RLS blue and RPEM vermillion.
+const METHODS: [(&str, &str); 3] = [("RLS", "ARX (RLS)"), ("RPEM", "BJ (RPEM)"), ("PHYSICAL", "physical")];
+
+/// A figure: panels by name and unit, and the columns of RLS and of the others.
+type Row = (&'static str, &'static str, &'static str, &'static str);
+
+const OPERATOR: [Row; 5] = [
+    ("K_e", "deg/deg", "K_e", "K_e"),
+    ("T_L", "s", "T_L", "T_L"),
+    ("K_e_dot", "s", "K_e_dot", "K_e_dot"),
+    ("omega_nm", "rad/s", "omega_nm", "omega_nm"),
+    ("zeta_nm", "", "zeta_nm", "zeta_nm"),
+];
+const DISCRETE: [Row; 4] = [
+    ("a1", "", "a1", "f1"),
+    ("a2", "", "a2", "f2"),
+    ("b0", "", "b0", "b0"),
+    ("b1", "", "b1", "b1"),
+];
+
+/// What is drawn over time.
+#[derive(Clone, Copy, PartialEq)]
+enum Shown {
+    /// Median and quartiles over the runs of all recursions.
+    Estimates,
+    /// Variances of RPEM.
+    Variances,
+    /// Correlations of RPEM.
+    Correlations,
+}
+
+/// One row of panels.
+struct PanelRow {
+    name: String,
+    unit: &'static str,
+    of_rls: String,
+    of_others: String,
+}
+
+impl PanelRow {
+    fn of((name, unit, of_rls, of_others): Row) -> Self {
+        Self {
+            name: name.to_owned(),
+            unit,
+            of_rls: of_rls.to_owned(),
+            of_others: of_others.to_owned(),
+        }
+    }
+}
+
+/// Names of the recursions.
+pub(super) fn methods() -> Vec<&'static str> {
+    METHODS.iter().map(|(_, name)| *name).collect()
+}
+
+fn with_unit(name: &str, unit: &str) -> String {
+    if unit.is_empty() {
+        name.to_owned()
+    } else {
+        format!("{name} ({unit})")
+    }
+}
+
+/// The levels of a recursion are not known better than to three digits.
+fn short(value: f64) -> String {
+    numbers::significant(value, 3)
+}
+
+impl GroupReport<'_> {
+    /// The figures of each condition.
+    pub(super) fn over_time(&self) -> Vec<Value> {
+        let (_, conditions) = self.names();
+        let rows = |rows: &[Row]| rows.iter().map(|row| PanelRow::of(*row)).collect::<Vec<_>>();
+        conditions
+            .iter()
+            .map(|condition| {
+                let figure =
+                    |rows: &[PanelRow], what: &str, shown| self.figure(&id_of(what, condition), condition, rows, shown);
+                let responses = self.response_rows();
+                context! {
+                    condition => if condition.is_empty() { "all runs" } else { condition },
+                    operator => figure(&rows(&OPERATOR), "operator", Shown::Estimates),
+                    discrete => figure(&rows(&DISCRETE), "discrete", Shown::Estimates),
+                    response => (!responses.is_empty()).then(|| figure(&responses, "response", Shown::Estimates)),
+                    variances => figure(&rows(&DISCRETE), "variance", Shown::Variances),
+                    correlations => figure(&self.correlation_rows(), "correlation", Shown::Correlations),
+                }
+            })
+            .collect()
+    }
+
+    /// The columns of the averages of traces whose name begins so, without the figure at their end.
+    fn columns(&self, prefix: &str) -> Vec<&str> {
+        let names = self.tables.traces.columns.iter().map(|column| column.name.as_str());
+        names
+            .filter(|name| name.starts_with(prefix))
+            .filter_map(|name| name.strip_suffix("_median"))
+            .collect()
+    }
+
+    fn response_rows(&self) -> Vec<PanelRow> {
+        let of = |prefix: &str, (left, right): (&str, &str), unit| {
+            let row = |column: &str| PanelRow {
+                name: column.replace(prefix, left) + right,
+                unit,
+                of_rls: column.to_owned(),
+                of_others: column.to_owned(),
+            };
+            self.columns(prefix).into_iter().map(row).collect::<Vec<_>>()
+        };
+        let mut rows = of("magnitude_db_at_", ("|H(", "j)|"), "dB");
+        rows.extend(of("phase_deg_at_", ("arg H(", "j)"), "deg"));
+        rows
+    }
+
+    fn correlation_rows(&self) -> Vec<PanelRow> {
+        let columns = self.columns("correlation_").into_iter();
+        let row = |column: &str| PanelRow {
+            name: column.replace("correlation_", "").replace('_', ", "),
+            unit: "",
+            of_rls: column.to_owned(),
+            of_others: column.to_owned(),
+        };
+        columns.map(row).collect()
+    }
+
+    /// How fast the recursions follow a change and how noisy they are: a row for each subject, condition and parameter, three cells a recursion.
+    pub(super) fn settling(&self) -> Vec<Value> {
+        let table = self.tables.settling;
+        let [subject, condition, estimator, parameter] =
+            ["subject", "condition", "estimator", "parameter"].map(|name| texts(table, name));
+        let [before, after, settled, noise] = ["before", "after", "settle90_s", "noise"].map(|name| reals(table, name));
+        let mut names: Vec<(String, String)> = OPERATOR
+            .iter()
+            .map(|(name, unit, ..)| (with_unit(name, unit), (*name).to_owned()))
+            .collect();
+        names.extend(
+            self.response_rows()
+                .into_iter()
+                .map(|row| (with_unit(&row.name, row.unit), row.of_rls)),
+        );
+        let (subjects, conditions) = self.names();
+        let mut rows = Vec::new();
+        for (condition_of, subject_of) in conditions.iter().flat_map(|c| subjects.iter().map(move |s| (c, s))) {
+            for (shown, name) in &names {
+                let row_of = |method: &str| {
+                    (0..subject.len()).find(|i| {
+                        subject[*i] == *subject_of
+                            && condition[*i] == *condition_of
+                            && parameter[*i] == *name
+                            && estimator[*i] == method
+                    })
+                };
+                let found = METHODS.map(|(method, _)| row_of(method));
+                if found.iter().all(Option::is_none) {
+                    continue;
+                }
+                let cells: Vec<String> = found
+                    .into_iter()
+                    .flat_map(|row| match row {
+                        Some(i) => [
+                            format!("{} \u{2192} {}", short(before[i]), short(after[i])),
+                            short(settled[i]),
+                            short(noise[i]),
+                        ],
+                        None => std::array::from_fn(|_| short(f64::NAN)),
+                    })
+                    .collect();
+                rows.push(context! { subject => *subject_of, condition => *condition_of, parameter => shown, cells });
+            }
+        }
+        rows
+    }
+
+    /// When the task of a condition changes, s: as the manifest says, or at the seam of joined runs.
+    fn change_s(&self, condition: &str) -> Option<f64> {
+        let known = self.manifest.conditions.get(condition).and_then(|facts| facts.change_s);
+        let table = self.tables.settling;
+        let seam = || {
+            let row = texts(table, "condition").iter().position(|c| c == condition)?;
+            reals(table, "change_s").get(row).copied()
+        };
+        known.or_else(seam)
+    }
+
+    /// A column of panels for each subject.
+    fn figure(&self, id: &str, condition: &str, rows: &[PanelRow], shown: Shown) -> String {
+        let (subjects, _) = self.names();
+        let methods = if shown == Shown::Estimates {
+            &METHODS[..]
+        } else {
+            &METHODS[1..2]
+        };
+        let mut panels = Vec::new();
+        for row in rows {
+            for subject in &subjects {
+                let curves = METHODS
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, method)| methods.contains(method));
+                panels.push(TracePanel {
+                    name: match shown {
+                        Shown::Variances => format!("variance of {}", row.name),
+                        _ => row.name.clone(),
+                    },
+                    unit: row.unit.to_owned(),
+                    curves: curves
+                        .filter_map(|(number, (method, _))| {
+                            let parameter = if *method == "RLS" { &row.of_rls } else { &row.of_others };
+                            self.curve((subject, condition, method), number, parameter, shown)
+                        })
+                        .collect(),
+                    ordinate: match shown {
+                        Shown::Variances => Ordinate::Logarithmic,
+                        _ => Ordinate::Robust,
+                    },
+                });
+            }
+        }
+        let grid = TraceGrid {
+            panels,
+            columns: subjects.len(),
+            titles: subjects.iter().map(|subject| format!("subject {subject}")).collect(),
+            methods: METHODS.iter().map(|(_, name)| (*name).to_owned()).collect(),
+            levels: Vec::new(),
+            shaded_s: self.manifest.analysis.windows_s.iter().flatten().copied().collect(),
+            marks_s: self.change_s(condition).into_iter().collect(),
+            shared_ordinates: false,
+        };
+        trace_panels(id, &format!("Estimates over time, condition {condition}"), &grid)
+    }
+
+    /// One recursion of a subject and condition; none where it has no number.
+    fn curve(
+        &self,
+        (subject, condition, method): (&str, &str, &str),
+        number: usize,
+        parameter: &str,
+        shown: Shown,
+    ) -> Option<TraceCurve> {
+        let table = self.tables.traces;
+        let estimators = texts(table, "estimator");
+        let at: Vec<usize> = Self::rows_of(table, subject, condition)
+            .into_iter()
+            .filter(|i| estimators[*i] == method)
+            .collect();
+        let figure = |what: &str| {
+            let column = reals(table, &format!("{parameter}_{what}"));
+            at.iter()
+                .map(|i| column.get(*i).copied().unwrap_or(f64::NAN))
+                .collect::<Vec<f64>>()
+        };
+        let variances = shown == Shown::Variances;
+        let values = figure(if variances { "variance" } else { "median" });
+        values.iter().any(|v| v.is_finite()).then(|| TraceCurve {
+            kind: CurveKind::Estimate,
+            method: number,
+            level: 0,
+            times_s: at.iter().map(|i| reals(table, "t")[*i]).collect(),
+            band: if variances {
+                Vec::new()
+            } else {
+                figure("lower_quartile")
+                    .into_iter()
+                    .zip(figure("upper_quartile"))
+                    .collect()
+            },
+            values,
+        })
+    }
+}

@@ -1,0 +1,140 @@
+//! The tables of a group from those of its runs.
+//!
+//! The traces of 1000 runs do not belong in memory: they are averaged for one person in one condition after the other.
+
+use std::{collections::BTreeMap, path::Path};
+
+use hoid_io::{OutputTable, TableSchema, TableWriter};
+
+use super::{
+    Block, analysis,
+    averages::{Averages, Delays, TraceAverages},
+    frequency,
+    manifest::Manifest,
+    reading,
+    responses::{self, ResponseAverages},
+    settling::Settling,
+    tables::{numbers, texts},
+    traces::TraceColumns,
+};
+use crate::{StudyError, manifest::part, run::table_path};
+
+/// A table in each of its formats.
+struct Writers(Vec<TableWriter>);
+
+impl Writers {
+    fn append(&mut self, table: &OutputTable) -> Result<(), StudyError> {
+        Ok(self.0.iter_mut().try_for_each(|writer| writer.append(table))?)
+    }
+
+    fn finish(self) -> Result<(), StudyError> {
+        Ok(self.0.into_iter().try_for_each(TableWriter::finish)?)
+    }
+}
+
+/// A run among those of a person in a condition.
+struct RunOfCell {
+    block: usize,
+    /// When the task changes, s.
+    change_s: Option<f64>,
+}
+
+/// Makes the tables from the parts: Parquet, and CSV beside it when it is asked for.
+pub(super) fn join(
+    manifest: &Manifest,
+    base: &Path,
+    blocks: &[Block<'_>],
+    directory: &Path,
+    csv: bool,
+) -> Result<(), StudyError> {
+    let formats: &[bool] = if csv { &[false, true] } else { &[false] };
+    let writers = |table: &str, schema: &TableSchema| -> Result<Writers, StudyError> {
+        let writer = |csv: &bool| TableWriter::create(&table_path(directory, table, *csv), schema);
+        Ok(Writers(formats.iter().map(writer).collect::<Result<_, _>>()?))
+    };
+    let read = |block: usize, table: &str| hoid_io::read_table(&part(directory, block as u64, table));
+
+    let (mut averages, mut delays) = (Averages::default(), Delays::default());
+    let mut of_responses = ResponseAverages::default();
+    let mut estimates = writers("estimates", &analysis::estimates_schema())?;
+    let mut responses = writers("responses", &responses::responses_schema())?;
+    // Runs of a person in a condition.
+    let mut cells: BTreeMap<(&str, &str), Vec<RunOfCell>> = BTreeMap::new();
+    for (block, of) in blocks.iter().enumerate() {
+        let found = read(block, "estimates")?;
+        averages.add(&found);
+        delays.add(&found, block);
+        estimates.append(&found)?;
+        if let Block::Run(run) = of {
+            let cell = cells.entry((&run.subject, &run.condition)).or_default();
+            cell.push(RunOfCell {
+                block,
+                change_s: change_s(&found),
+            });
+        }
+        let found = read(block, "responses")?;
+        of_responses.add(&found);
+        responses.append(&found)?;
+    }
+    estimates.finish()?;
+    responses.finish()?;
+
+    for (table, schema) in reading::schemas() {
+        // What a person looks through first: CSV in any case.
+        let writer = |csv: bool| TableWriter::create(&table_path(directory, table, csv), &schema);
+        let mut writers = Writers(vec![writer(false)?, writer(true)?]);
+        for (block, _) in blocks.iter().enumerate().filter(|(_, of)| matches!(of, Block::Run(_))) {
+            writers.append(&read(block, table)?)?;
+        }
+        writers.finish()?;
+    }
+
+    let columns = TraceColumns::of(&manifest.analysis);
+    let names = columns.names();
+    let settle = columns.of_settling();
+    let mut traces = writers("traces", &columns.schema())?;
+    let mut trace_averages = writers("trace-averages", &TraceAverages::schema(&names))?;
+    let mut settlings = writers("settling", &Settling::schema())?;
+    for runs in cells.values() {
+        let (mut of_traces, mut settling) = (TraceAverages::new(names.clone()), Settling::default());
+        for run in runs {
+            let found = read(run.block, "traces")?;
+            of_traces.add(&found);
+            if let Some(change_s) = run.change_s {
+                settling.add(&found, &settle, change_s);
+            }
+            traces.append(&found)?;
+        }
+        trace_averages.append(&of_traces.table())?;
+        settlings.append(&settling.table(&of_traces))?;
+    }
+    for writers in [traces, trace_averages, settlings] {
+        writers.finish()?;
+    }
+
+    let mut whole = vec![
+        ("averages", averages.table()),
+        ("delays", delays.table()),
+        ("response-averages", of_responses.table()),
+    ];
+    if let Some(found) = frequency::frequencies(manifest, base, &of_responses) {
+        whole.extend([
+            ("describing-functions", found.lines),
+            ("frequency-margins", found.margins),
+            ("agreement", found.agreement),
+        ]);
+    }
+    for (name, table) in &whole {
+        for csv in formats {
+            hoid_io::write_table(&table_path(directory, name, *csv), table)?;
+        }
+    }
+    Ok(())
+}
+
+/// When the task of a run changes, s, from its estimates.
+fn change_s(estimates: &OutputTable) -> Option<f64> {
+    let names = texts(estimates, "parameter");
+    let row = names.iter().position(|name| name == "change_s")?;
+    numbers(estimates, "value").get(row).copied()
+}

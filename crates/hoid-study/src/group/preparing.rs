@@ -1,0 +1,120 @@
+//! How the runs of a group are prepared: the keys of `[prepare]` and of `[conditions.NAME.prepare]`, which win one by one.
+//!
+//! ```toml
+//! [prepare]
+//! scale = { stick = "12.5:deg", e = "rad:deg" }   # as hoid identify --scale
+//! offset = { stick = 1 }                          # samples, or "0.0167s"
+//! decimate = 2                                    # or rate_hz = 50.0
+//! run_in_s = 5.0
+//! drop_repeated = true
+//!
+//! [conditions.so.prepare]
+//! offset = { stick = 0 }
+//! ```
+
+use std::collections::BTreeMap;
+
+use hoid_io::{IoError, NewRate, Offset, Preparation, Scaling};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What is done to the runs before they are analysed. What is left out is not done, or as the group says.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Preparing {
+    /// Factor, factor and unit, or two units by channel.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub scale: BTreeMap<String, NumberOrText>,
+    /// By how much a channel was recorded late, in samples, or in s as a text such as "0.0167s".
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub offset: BTreeMap<String, NumberOrText>,
+    /// Every M-th sample; 1 keeps the rate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub decimate: Option<usize>,
+    /// New sampling frequency, Hz.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate_hz: Option<f64>,
+    /// Time from the first sample that is dropped, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub run_in_s: Option<f64>,
+    /// Whether rows that are there twice are dropped.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drop_repeated: Option<bool>,
+}
+
+/// A number, or a text as on the command line.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum NumberOrText {
+    /// A number.
+    Number(f64),
+    /// A text.
+    Text(String),
+}
+
+impl NumberOrText {
+    fn text(&self) -> String {
+        match self {
+            Self::Number(number) => number.to_string(),
+            Self::Text(text) => text.clone(),
+        }
+    }
+}
+
+impl Preparing {
+    /// Whether it says nothing.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// What is done to the runs of a condition: what the condition says, and what the group says of the rest.
+    ///
+    /// # Errors
+    /// The key that has no meaning, and why.
+    pub fn preparation(&self, condition: Option<&Self>) -> Result<Preparation, String> {
+        let of = condition.unwrap_or(self);
+        // The rate is one thing with two keys: a condition that names one of them names the rate.
+        let rate = if of.decimate.is_some() || of.rate_hz.is_some() {
+            of
+        } else {
+            self
+        };
+        let rate = match (rate.decimate, rate.rate_hz) {
+            (Some(_), Some(_)) => return Err("decimate and rate_hz both give the rate: keep one".to_owned()),
+            (Some(0), None) => return Err("decimate is 0, expected 1 or more".to_owned()),
+            (Some(factor), None) => NewRate::Decimated(factor),
+            (None, Some(hz)) if hz > 0.0 && hz.is_finite() => NewRate::Hz(hz),
+            (None, Some(hz)) => return Err(format!("rate_hz is {hz}, expected a positive number")),
+            (None, None) => NewRate::Kept,
+        };
+        let run_in_s = of.run_in_s.or(self.run_in_s).unwrap_or(0.0);
+        if !(run_in_s >= 0.0 && run_in_s.is_finite()) {
+            return Err(format!("run_in_s is {run_in_s}, expected a time of 0 s or more"));
+        }
+        Ok(Preparation {
+            scale: parsed(&self.scale, &of.scale, |text| text.parse::<Scaling>())?,
+            offset: parsed(&self.offset, &of.offset, |text| text.parse::<Offset>())?,
+            rate,
+            run_in_s,
+            drop_repeated: of.drop_repeated.or(self.drop_repeated).unwrap_or(false),
+            ..Preparation::default()
+        })
+    }
+}
+
+/// What is said of each channel; the second list wins.
+fn parsed<T>(
+    group: &BTreeMap<String, NumberOrText>,
+    condition: &BTreeMap<String, NumberOrText>,
+    parse: impl Fn(&str) -> Result<T, IoError>,
+) -> Result<BTreeMap<String, T>, String> {
+    group
+        .iter()
+        .filter(|(name, _)| !condition.contains_key(*name))
+        .chain(condition)
+        .map(|(name, value)| match parse(&value.text()) {
+            Ok(value) => Ok((name.clone(), value)),
+            Err(error) => Err(format!("{name}: {error}")),
+        })
+        .collect()
+}

@@ -1,0 +1,119 @@
+//! Reading the runs of a group as the manifest wants it, with the account of it.
+
+use std::path::Path;
+
+use hoid_io::{
+    ColumnKind, ColumnSchema, OutputTable, Preparation, ReadOptions, ReadRecord, Repair, TableSchema, read_prepared,
+};
+use hoid_model::Detrend;
+
+use super::manifest::{Detrending, Manifest, RunEntry};
+use crate::columns::Rows;
+
+/// The record in a file, and what was done to it; the condition may have a preparation of its own.
+pub(super) fn read_file(manifest: &Manifest, condition: &str, path: &Path) -> Result<ReadRecord, String> {
+    let reading = &manifest.read;
+    let text = |error: hoid_io::IoError| error.to_string();
+    let options = ReadOptions {
+        input: Some(reading.input.parse().map_err(text)?),
+        output: reading.output.parse().map_err(text)?,
+        sampling_hz: reading.sampling_hz,
+        span_s: (reading.from_s, reading.to_s),
+        repair: Repair {
+            resample: reading.resample,
+            fill: reading.fill,
+        },
+    };
+    let preparation = Preparation {
+        detrend: match reading.detrend {
+            Detrending::None => Detrend::None,
+            Detrending::Mean => Detrend::Mean,
+            Detrending::Linear => Detrend::Linear,
+        },
+        ..manifest.preparation(condition)?
+    };
+    read_prepared(path, &options, &preparation).map_err(text)
+}
+
+/// The tables of the account: what was done to the runs, one step a row, and what is wrong with their sampling, one finding a row.
+pub(super) fn schemas() -> [(&'static str, TableSchema); 2] {
+    let schema = |names: &[&str]| {
+        let column = |name: &&str| ColumnSchema {
+            name: (*name).to_owned(),
+            kind: match *name {
+                "rows" | "first_row" | "places" => ColumnKind::Whole,
+                "share" | "from_s" | "size" => ColumnKind::Real,
+                _ => ColumnKind::Text,
+            },
+        };
+        TableSchema {
+            comments: Vec::new(),
+            columns: ["subject", "condition", "run", "file"]
+                .iter()
+                .chain(names)
+                .map(column)
+                .collect(),
+        }
+    };
+    let trouble = [
+        "kind",
+        "channel",
+        "rows",
+        "share",
+        "places",
+        "first_row",
+        "from_s",
+        "size",
+        "unit",
+        "what",
+        "remedy",
+    ];
+    [
+        ("preparation", schema(&["step", "what"])),
+        ("trouble", schema(&trouble)),
+    ]
+}
+
+/// What was done to a run and what is wrong with it; nothing for one that cannot be read, which its estimates say.
+pub(super) fn account(manifest: &Manifest, base: &Path, entry: &RunEntry) -> [(&'static str, OutputTable); 2] {
+    let [(steps_name, steps), (trouble_name, trouble)] = schemas();
+    let (mut steps, mut trouble) = (Rows::new(&steps), Rows::new(&trouble));
+    for file in std::iter::once(&entry.file).chain(&entry.then) {
+        let Ok(read) = read_file(manifest, &entry.condition, &base.join(file)) else {
+            continue;
+        };
+        for step in &read.steps {
+            begin(&mut steps, entry, file);
+            steps.text("step", step.name());
+            steps.text("what", &step.to_string());
+        }
+        for one in &read.trouble {
+            begin(&mut trouble, entry, file);
+            trouble.text("kind", one.kind.name());
+            trouble.text("channel", &one.channel);
+            trouble.whole("rows", one.rows as u64);
+            trouble.real("share", one.share);
+            trouble.whole("places", one.places.len() as u64);
+            if let Some(place) = one.places.first() {
+                trouble.whole("first_row", place.row as u64);
+                trouble.real("from_s", place.from_s.unwrap_or(f64::NAN));
+            }
+            trouble.real("size", one.size);
+            trouble.text("unit", &one.unit);
+            trouble.text("what", &one.text);
+            trouble.text("remedy", one.kind.remedy());
+        }
+    }
+    [
+        (steps_name, steps.into_table(Vec::new())),
+        (trouble_name, trouble.into_table(Vec::new())),
+    ]
+}
+
+fn begin(rows: &mut Rows, entry: &RunEntry, file: &Path) {
+    rows.begin();
+    rows.text("subject", &entry.subject);
+    rows.text("condition", &entry.condition);
+    rows.text("run", &entry.run);
+    rows.text("file", &file.display().to_string());
+}

@@ -1,0 +1,208 @@
+//! How fast the recursions follow a change at a known instant, and how noisy they are, by subject, condition and parameter.
+//!
+//! Of a recorded person the truth is not known: the levels before and after the change are those of the recursion itself, the medians over the second
+//! half of its rows before, and of those after the change, of the median over the runs. The settling times are those when the median has first covered 50 and
+//! 90 % of the step, as in the studies; the noise is the deviation of one run around its own level after the change, `1.4826` times the median
+//! absolute deviation, and its median over the runs. There is no time where the step is smaller than the noise, so that there is nothing to settle to, and none
+//! where the share was covered when the change came: then it was not the change that moved the estimate.
+
+use std::collections::BTreeMap;
+
+use hoid_io::{OutputTable, TableSchema};
+
+use super::{
+    averages::TraceAverages,
+    tables::{numbers, real, schema, text, texts},
+};
+use crate::{columns::Rows, statistics::median};
+
+/// From the median absolute deviation to the standard deviation of a normal distribution.
+const MAD: f64 = 1.4826;
+
+const KEYS: [&str; 4] = ["subject", "condition", "estimator", "parameter"];
+const FIGURES: [&str; 7] = [
+    "runs",
+    "change_s",
+    "before",
+    "after",
+    "settle50_s",
+    "settle90_s",
+    "noise",
+];
+
+/// What single runs say: instants of the change, and the noise of each parameter.
+#[derive(Debug, Clone, Default)]
+struct OfRuns {
+    change_s: Vec<f64>,
+    noise: BTreeMap<String, Vec<f64>>,
+}
+
+/// Collected over the runs with a change.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Settling(BTreeMap<[String; 3], OfRuns>);
+
+/// Rows of a stretch in its second half.
+fn second_half(times: &[f64], from_s: f64, to_s: f64) -> Vec<usize> {
+    let inside: Vec<usize> = (0..times.len())
+        .filter(|i| times[*i] > from_s && times[*i] <= to_s)
+        .collect();
+    inside[inside.len() / 2..].to_vec()
+}
+
+impl Settling {
+    /// Adds the traces of a run whose task changes at `change_s`.
+    pub fn add(&mut self, traces: &OutputTable, names: &[String], change_s: f64) {
+        let keys = ["subject", "condition", "estimator"].map(|name| texts(traces, name));
+        let times = numbers(traces, "t");
+        let mut estimators: Vec<&String> = keys[2].iter().collect();
+        estimators.dedup();
+        for estimator in estimators {
+            let of_estimator: Vec<usize> = (0..times.len()).filter(|i| keys[2][*i] == *estimator).collect();
+            let Some(first) = of_estimator.first() else { continue };
+            let at: Vec<f64> = of_estimator.iter().map(|i| times[*i]).collect();
+            let after = second_half(&at, change_s, f64::INFINITY);
+            let of_runs = self.0.entry(keys.map(|column| column[*first].clone())).or_default();
+            of_runs.change_s.push(change_s);
+            for name in names {
+                let column = numbers(traces, name);
+                let values: Vec<f64> = after.iter().map(|i| column[of_estimator[*i]]).collect();
+                let level = median(&values);
+                let deviations: Vec<f64> = values.iter().map(|v| (v - level).abs()).collect();
+                let noise = MAD * median(&deviations);
+                if noise.is_finite() {
+                    of_runs.noise.entry(name.clone()).or_default().push(noise);
+                }
+            }
+        }
+    }
+
+    /// The columns.
+    pub fn schema() -> TableSchema {
+        schema(text(&KEYS).chain(real(&FIGURES)))
+    }
+
+    /// A row for each parameter that moves.
+    pub fn table(&self, traces: &TraceAverages) -> OutputTable {
+        let mut rows = Rows::new(&Self::schema());
+        for (key, of_runs) in &self.0 {
+            let change_s = median(&of_runs.change_s);
+            for (name, noises) in &of_runs.noise {
+                let (times, medians) = traces.medians(key, name);
+                let noise = median(noises);
+                let step = Step::of(&times, &medians, change_s);
+                rows.begin();
+                for (column, value) in KEYS.iter().zip(key.iter().chain([name])) {
+                    rows.text(column, value);
+                }
+                let settled = |share: f64| {
+                    let moves = (step.after - step.before).abs() > noise;
+                    moves
+                        .then(|| step.settled_s(&times, &medians, change_s, share))
+                        .flatten()
+                };
+                let figures = [
+                    noises.len() as f64,
+                    change_s,
+                    step.before,
+                    step.after,
+                    settled(0.5).unwrap_or(f64::NAN),
+                    settled(0.9).unwrap_or(f64::NAN),
+                    noise,
+                ];
+                for (column, value) in FIGURES.iter().zip(figures) {
+                    rows.real(column, value);
+                }
+            }
+        }
+        rows.into_table(Vec::new())
+    }
+}
+
+/// Levels before and after a change.
+struct Step {
+    before: f64,
+    after: f64,
+}
+
+impl Step {
+    fn of(times: &[f64], values: &[f64], change_s: f64) -> Self {
+        let level = |from_s: f64, to_s: f64| {
+            let inside: Vec<f64> = second_half(times, from_s, to_s).iter().map(|i| values[*i]).collect();
+            median(&inside)
+        };
+        Self {
+            before: level(f64::NEG_INFINITY, change_s),
+            after: level(change_s, f64::INFINITY),
+        }
+    }
+
+    /// Time from the change until a share of the step is covered; none where it was before.
+    fn settled_s(&self, times: &[f64], values: &[f64], change_s: f64, share: f64) -> Option<f64> {
+        let covered = |v: f64| (v - self.before) / (self.after - self.before) >= share;
+        let (before, after): (Vec<_>, Vec<_>) = times.iter().zip(values).partition(|(t, _)| **t <= change_s);
+        if before.last().is_some_and(|(_, v)| covered(**v)) {
+            return None;
+        }
+        let reached = after.into_iter().find(|(_, v)| covered(**v));
+        reached.map(|(t, _)| t - change_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two runs of a first-order step from 1 to 3 at 10 s, with a ripple of known deviation.
+    fn traces(run: usize) -> OutputTable {
+        let mut rows = Rows::new(&schema(
+            text(&["subject", "condition", "run", "estimator"]).chain(real(&["t", "K_e", "flat"])),
+        ));
+        for k in 0..400 {
+            let t = 0.1 * f64::from(k);
+            let covered = if t > 10.0 { 1.0 - (-(t - 10.0) / 2.0).exp() } else { 0.0 };
+            // Absolute deviations 0, 0.1, 0.1, 0.2 in turn: their median is 0.1.
+            let ripple = [0.0, 0.1, -0.1, 0.2][(k as usize + run) % 4];
+            rows.begin();
+            for (name, value) in [("subject", "A"), ("condition", "C"), ("estimator", "RLS")] {
+                rows.text(name, value);
+            }
+            rows.text("run", &run.to_string());
+            rows.real("t", t);
+            rows.real("K_e", 1.0 + 2.0 * covered + ripple);
+            rows.real("flat", 5.0 + ripple);
+        }
+        rows.into_table(Vec::new())
+    }
+
+    #[test]
+    fn a_first_order_step_settles_when_it_must() {
+        let names = ["K_e".to_owned(), "flat".to_owned()];
+        let (mut settling, mut averages) = (Settling::default(), TraceAverages::new(names.to_vec()));
+        // All phases of the ripple: the median over the runs is smooth.
+        for run in 0..4 {
+            averages.add(&traces(run));
+            settling.add(&traces(run), &names, 10.0);
+        }
+        let table = settling.table(&averages);
+        let of = |name: &str| numbers(&table, name);
+        assert_eq!(texts(&table, "parameter"), ["K_e", "flat"]);
+        assert!((of("before")[0] - 1.05).abs() < 1e-9 && (of("after")[0] - 3.05).abs() < 1e-3);
+        // 2 s ln 2 and 2 s ln 10, and up to one row later.
+        for (name, exact) in [("settle50_s", 2.0 * 2f64.ln()), ("settle90_s", 2.0 * 10f64.ln())] {
+            let found = of(name)[0];
+            assert!(
+                found >= exact - 1e-3 && found < exact + 0.1 + 1e-3,
+                "{name}: {found}, {exact}"
+            );
+        }
+        assert!(
+            (of("noise")[1] - MAD * 0.1).abs() < 0.1 * MAD * 0.51,
+            "{:?}",
+            of("noise")
+        );
+        assert!(
+            of("settle90_s")[1].is_nan(),
+            "a parameter that does not change has no settling time"
+        );
+    }
+}

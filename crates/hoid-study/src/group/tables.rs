@@ -1,0 +1,42 @@
+//! Columns of the tables of a group, written and read by name.
+
+use hoid_io::{ColumnKind, ColumnSchema, ColumnValues, OutputTable, TableSchema};
+
+/// Columns of texts.
+pub(super) fn text<S: AsRef<str>>(names: &[S]) -> impl Iterator<Item = (&str, ColumnKind)> {
+    names.iter().map(|name| (name.as_ref(), ColumnKind::Text))
+}
+
+/// Columns of numbers.
+pub(super) fn real<S: AsRef<str>>(names: &[S]) -> impl Iterator<Item = (&str, ColumnKind)> {
+    names.iter().map(|name| (name.as_ref(), ColumnKind::Real))
+}
+
+/// A table with these columns.
+pub(super) fn schema<'a>(columns: impl Iterator<Item = (&'a str, ColumnKind)>) -> TableSchema {
+    TableSchema {
+        comments: Vec::new(),
+        columns: columns
+            .map(|(name, kind)| ColumnSchema {
+                name: name.to_owned(),
+                kind,
+            })
+            .collect(),
+    }
+}
+
+/// Reads a column of texts; empty where there is none.
+pub(super) fn texts<'a>(table: &'a OutputTable, name: &str) -> &'a [String] {
+    match table.column(name) {
+        Some(ColumnValues::Text(values)) => values,
+        _ => &[],
+    }
+}
+
+/// Reads a column of numbers; empty where there is none.
+pub(super) fn numbers<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
+    match table.column(name) {
+        Some(ColumnValues::Real(values)) => values,
+        _ => &[],
+    }
+}

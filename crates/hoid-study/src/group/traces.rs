@@ -1,0 +1,165 @@
+//! Recursive estimates of one run as rows: coefficients and operator with their standard errors, correlations of the coefficients, and the frequency
+//! response where the manifest asks for it.
+//!
+//! The covariance of the errors of two coefficients is their correlation times both standard errors; the figures of appendix I of the reference text show it
+//! for RPEM. The response at a frequency between the lines of the excitation is determined where single parameters are not.
+
+use hoid_ident::tracking::{Method, Trace};
+use hoid_io::TableSchema;
+use hoid_model::PolynomialModel;
+
+use super::{
+    manifest::{Analysis, RunEntry},
+    tables::{real, schema, text},
+};
+use crate::columns::{OPERATOR, Rows};
+
+/// Most coefficients of a polynomial in the tables.
+const MOST_ND: usize = 20;
+
+/// Coefficients of RPEM whose correlations are kept.
+const CORRELATED: [&str; 4] = ["f1", "f2", "b0", "b1"];
+
+/// Which columns the traces have.
+#[derive(Debug, Clone)]
+pub(super) struct TraceColumns {
+    /// Those with a standard error: coefficients of RLS and of Box-Jenkins models, and the operator.
+    pub parameters: Vec<String>,
+    /// Correlations, and the response where it is asked for.
+    pub others: Vec<String>,
+    response_at_rad_s: Vec<f64>,
+}
+
+/// Names of magnitude and phase at a frequency.
+pub(super) fn response_names(omega_rad_s: f64) -> [String; 2] {
+    ["magnitude_db", "phase_deg"].map(|name| format!("{name}_at_{omega_rad_s}"))
+}
+
+impl TraceColumns {
+    pub fn of(analysis: &Analysis) -> Self {
+        let fixed = ["a1", "a2", "b0", "b1", "f1", "f2"].map(str::to_owned);
+        let d = (1..=analysis.nd.1.min(MOST_ND)).map(|i| format!("d{i}"));
+        let correlations = pairs().map(|(i, j)| format!("correlation_{}_{}", CORRELATED[i], CORRELATED[j]));
+        let responses = analysis.response_at_rad_s.iter().flat_map(|w| response_names(*w));
+        Self {
+            parameters: fixed.into_iter().chain(d).chain(OPERATOR.map(str::to_owned)).collect(),
+            others: correlations.chain(responses).collect(),
+            response_at_rad_s: analysis.response_at_rad_s.clone(),
+        }
+    }
+
+    /// All names: parameters, their standard errors, and the others.
+    pub fn names(&self) -> Vec<String> {
+        let errors = self.parameters.iter().map(|name| format!("{name}_se"));
+        self.parameters
+            .iter()
+            .cloned()
+            .chain(errors)
+            .chain(self.others.iter().cloned())
+            .collect()
+    }
+
+    /// Those of which it is told how they settle.
+    pub fn of_settling(&self) -> Vec<String> {
+        let responses = self.others.iter().filter(|name| !name.starts_with("correlation"));
+        self.parameters.iter().chain(responses).cloned().collect()
+    }
+
+    /// The table: one kept point of a recursion a row.
+    pub fn schema(&self) -> TableSchema {
+        let pairs: Vec<String> = self
+            .parameters
+            .iter()
+            .flat_map(|name| [name.clone(), format!("{name}_se")])
+            .collect();
+        schema(
+            text(&["subject", "condition", "run", "estimator"])
+                .chain(real(&["t"]))
+                .chain(real(&pairs))
+                .chain(real(&self.others)),
+        )
+    }
+}
+
+/// Positions of two different coefficients in [`CORRELATED`].
+fn pairs() -> impl Iterator<Item = (usize, usize)> {
+    (0..CORRELATED.len()).flat_map(|i| (i + 1..CORRELATED.len()).map(move |j| (i, j)))
+}
+
+/// Label of a recursion in the tables.
+pub(super) fn label_of(method: Method) -> String {
+    method.name().to_uppercase()
+}
+
+/// The rows of a trace from where it moves: before, it is the fit that it starts from.
+pub(super) fn moving(trace: &Trace) -> impl Iterator<Item = usize> + '_ {
+    let from_s = trace.updated_from_s() - 0.5 * trace.sample_time().s();
+    (0..trace.len()).filter(move |k| trace.times_s()[*k] >= from_s)
+}
+
+/// Writes the moving rows of a trace.
+pub(super) fn write(rows: &mut Rows, columns: &TraceColumns, entry: &RunEntry, trace: &Trace) {
+    let label = label_of(trace.options().method);
+    let names = trace.parameter_names();
+    let correlated = CORRELATED.map(|name| names.iter().position(|n| n == name));
+    for k in moving(trace) {
+        rows.begin();
+        rows.text("subject", &entry.subject);
+        rows.text("condition", &entry.condition);
+        rows.text("run", &entry.run);
+        rows.text("estimator", &label);
+        rows.real("t", trace.times_s()[k]);
+        let operator = trace.operator(k).ok();
+        let of_operator = operator.iter().flat_map(|o| o.rows().into_iter().take(OPERATOR.len()));
+        let parameters = names.iter().map(String::as_str).zip(trace.parameters(k));
+        for (name, estimate) in parameters.chain(of_operator.map(|(name, _, estimate)| (name, estimate))) {
+            rows.real(name, estimate.value);
+            if let Some(se) = estimate.standard_error {
+                rows.real(&format!("{name}_se"), se);
+            }
+        }
+        if let ([Some(_), ..], Some(covariance)) = (correlated, trace.covariance(k)) {
+            let p = names.len();
+            for ((i, j), name) in pairs().zip(&columns.others) {
+                if let (Some(a), Some(b)) = (correlated[i], correlated[j]) {
+                    let of = covariance[a * p + b] / (covariance[a * p + a] * covariance[b * p + b]).sqrt();
+                    rows.real(name, of);
+                }
+            }
+        }
+        write_response(rows, columns, trace, k);
+    }
+}
+
+fn write_response(rows: &mut Rows, columns: &TraceColumns, trace: &Trace, k: usize) {
+    let options = trace.options();
+    let theta = trace.theta(k).to_vec();
+    let Ok(model) = PolynomialModel::new(options.structure, options.orders, trace.sample_time(), theta) else {
+        return;
+    };
+    for omega in &columns.response_at_rad_s {
+        let h = model.response(*omega);
+        let [magnitude, phase] = response_names(*omega);
+        rows.real(&magnitude, 20.0 * h.norm().log10());
+        rows.real(&phase, h.arg().to_degrees());
+    }
+}
+
+/// The values of each coefficient and of the operator in a window, where they move.
+pub(super) fn values_within(trace: &Trace, from_s: f64, to_s: f64) -> Vec<(String, Vec<f64>)> {
+    let names = trace.parameter_names().into_iter().chain(OPERATOR.map(str::to_owned));
+    let mut columns: Vec<(String, Vec<f64>)> = names.map(|name| (name, Vec::new())).collect();
+    for k in moving(trace).filter(|k| (from_s..to_s).contains(&trace.times_s()[*k])) {
+        let operator = trace.operator(k).ok();
+        let of_operator = |i: usize| operator.as_ref().map_or(f64::NAN, |o| o.rows()[i].2.value);
+        let values = trace
+            .theta(k)
+            .iter()
+            .copied()
+            .chain((0..OPERATOR.len()).map(of_operator));
+        for ((_, column), value) in columns.iter_mut().zip(values) {
+            column.push(value);
+        }
+    }
+    columns
+}

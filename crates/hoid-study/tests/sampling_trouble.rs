@@ -1,0 +1,190 @@
+//! Sampling trouble that was planted is found where it is, and none where there is none.
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use hoid_io::{
+    Preparation, ReadOptions, Repair, Step, Trouble as Found, TroubleKind, read_prepared, read_record, read_stretches,
+};
+use hoid_model::{Record, scenario::Condition};
+use hoid_study::group::{Trouble, VirtualExperiment, simulate_group};
+
+fn experiment(trouble: &[Trouble]) -> VirtualExperiment {
+    VirtualExperiment {
+        subjects: 1,
+        conditions: vec![Condition::C1, Condition::C4],
+        runs: 1,
+        between_subjects: 0.1,
+        between_runs: 0.03,
+        remnant_order: 1,
+        noise_level: 0.1,
+        seed: 5,
+        trouble: trouble.to_vec(),
+    }
+}
+
+/// The troubles of each run, and the run itself without any.
+fn found(trouble: &[Trouble], options: &ReadOptions) -> Vec<(Vec<Found>, Record)> {
+    let (clean, troubled) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    simulate_group(&experiment(&[]), clean.path(), &|| ()).unwrap();
+    simulate_group(&experiment(trouble), troubled.path(), &|| ()).unwrap();
+    ["S1_C1_1.csv", "S1_C4_1.csv"]
+        .map(|name| {
+            let read = |directory: &Path, options: &ReadOptions| read_record(&directory.join(name), options).unwrap();
+            let whole = read(clean.path(), &ReadOptions::default());
+            assert_eq!(whole.trouble, []);
+            let preparation = Preparation {
+                drop_repeated: true,
+                ..Preparation::default()
+            };
+            let read = read_prepared(&troubled.path().join(name), options, &preparation).unwrap();
+            (read.trouble, whole.record)
+        })
+        .into()
+}
+
+fn resampled() -> ReadOptions {
+    ReadOptions {
+        repair: Repair {
+            resample: true,
+            fill: false,
+        },
+        ..ReadOptions::default()
+    }
+}
+
+fn only(found: &[Found], kinds: &[TroubleKind]) {
+    assert_eq!(found.iter().map(|one| one.kind).collect::<Vec<_>>(), kinds, "{found:?}");
+}
+
+#[test]
+fn jitter_and_clocks_have_the_size_that_was_planted() {
+    for (found, _) in found(&[Trouble::Jitter], &resampled()) {
+        only(&found, &[TroubleKind::Jitter]);
+        // 0.2 of a sample, clamped at 2.25 standard deviations, which leaves 0.194.
+        assert!((found[0].size / 0.01 - 0.194).abs() < 0.006, "{}", found[0]);
+    }
+    for (found, _) in found(&[Trouble::SlowClock], &ReadOptions::default()) {
+        only(&found, &[TroubleKind::Clock]);
+        assert!((found[0].size - (1.0 / 0.998 - 1.0)).abs() < 1e-6, "{}", found[0]);
+    }
+}
+
+#[test]
+fn missing_and_repeated_rows_are_counted_one_by_one() {
+    for trouble in [vec![Trouble::Missing], vec![Trouble::Missing, Trouble::Jitter]] {
+        for (found, record) in found(&trouble, &resampled()) {
+            let gap = found.iter().find(|one| one.kind == TroubleKind::Gap).unwrap();
+            // One in two hundred of 8192 rows: 41 with a standard deviation of 6.4.
+            assert!((15..70).contains(&gap.rows) && gap.places.len() <= gap.rows, "{gap}");
+            let (first, last) = (record.time_s(0), record.time_s(record.len() - 1));
+            for place in &gap.places {
+                let length = place.to_s.unwrap() - place.from_s.unwrap();
+                let jitter = if trouble.len() > 1 { 0.9 } else { 1e-6 };
+                assert!((length / 0.01 - place.rows as f64 - 1.0).abs() <= jitter, "{place:?}");
+                assert!((first..last).contains(&place.from_s.unwrap()));
+            }
+            assert_eq!(found.len(), trouble.len(), "{found:?}");
+        }
+    }
+    for (found, _) in found(&[Trouble::Repeated], &ReadOptions::default()) {
+        only(&found, &[TroubleKind::Repeated]);
+        assert!((15..70).contains(&found[0].rows), "{}", found[0]);
+    }
+}
+
+#[test]
+fn rails_steps_and_stalls_are_found_where_they_are() {
+    for (found, record) in found(&[Trouble::Saturated], &ReadOptions::default()) {
+        only(&found, &[TroubleKind::Saturated, TroubleKind::Saturated]);
+        let u = record.output();
+        let sd = (u.iter().map(|u| u * u).sum::<f64>() / u.len() as f64).sqrt();
+        let beyond = u.iter().filter(|u| u.abs() > 1.5 * sd).count();
+        assert_eq!(found.iter().map(|one| one.rows).sum::<usize>(), beyond);
+    }
+    for (found, record) in found(&[Trouble::Quantised], &ReadOptions::default()) {
+        only(&found, &[TroubleKind::Quantised]);
+        let sd = (record.output().iter().map(|u| u * u).sum::<f64>() / record.len() as f64).sqrt();
+        assert!((found[0].size / (8.0 * sd / 256.0) - 1.0).abs() < 1e-9, "{}", found[0]);
+    }
+    for (found, record) in found(&[Trouble::Stalled], &ReadOptions::default()) {
+        only(&found, &[TroubleKind::Stalled]);
+        let place = found[0].places[0];
+        // Rows are counted from 1; the first row of a stall still has a value of its own.
+        assert_eq!((place.row, place.rows), (record.len() / 3 + 2, 49));
+    }
+    // Several at once.
+    let all = [
+        Trouble::Saturated,
+        Trouble::Quantised,
+        Trouble::Repeated,
+        Trouble::Missing,
+    ];
+    for (found, _) in found(&all, &resampled()) {
+        use TroubleKind::{Gap, Quantised, Repeated, Saturated};
+        only(&found, &[Repeated, Gap, Saturated, Saturated, Quantised]);
+    }
+}
+
+#[test]
+fn a_record_is_cut_where_it_is_masked() {
+    let directory = tempfile::tempdir().unwrap();
+    simulate_group(
+        &experiment(&[Trouble::Stalled, Trouble::Missing]),
+        directory.path(),
+        &|| (),
+    )
+    .unwrap();
+    let path = directory.path().join("S1_C1_1.csv");
+    let cut = |mask: &[TroubleKind], shortest_s| {
+        read_stretches(
+            &path,
+            &ReadOptions::default(),
+            &Preparation::default(),
+            mask,
+            shortest_s,
+        )
+    };
+    // Without a mask the gaps are an error as ever.
+    assert!(cut(&[], 2.0).unwrap_err().to_string().contains("samples missing"));
+    let stretches = cut(&[TroubleKind::Gap, TroubleKind::Stalled], 1.0).unwrap();
+    assert!(stretches.len() > 10);
+    let mut end = f64::NEG_INFINITY;
+    for stretch in &stretches {
+        let record = &stretch.record;
+        assert!(record.time_s(0) > end && record.sample_time().s() == 0.01 && record.len() > 100);
+        end = record.time_s(record.len() - 1);
+        assert!(matches!(stretch.steps[0], Step::Mask { .. }));
+        assert!(record.output().windows(2).all(|pair| pair[0] != pair[1]));
+    }
+    assert_eq!(stretches[0].trouble.len(), 2);
+    for (mask, shortest, words) in [
+        (&[TroubleKind::Clock][..], 1.0, "some of missing, gap"),
+        (&[TroubleKind::Gap], f64::NAN, "NaN"),
+        (&[TroubleKind::Gap], 1e6, "no stretch of 1000000 s"),
+    ] {
+        assert!(cut(mask, shortest).unwrap_err().to_string().contains(words), "{words}");
+    }
+}
+
+#[test]
+fn two_hundred_clean_runs_raise_no_alarm() {
+    let mut runs = 0;
+    for (noise_level, remnant_order) in [(0.01, 1), (0.1, 2), (0.2, 3), (0.3, 4)] {
+        let clean = VirtualExperiment {
+            subjects: 5,
+            conditions: vec![Condition::C1, Condition::C2],
+            runs: 5,
+            noise_level,
+            remnant_order,
+            ..experiment(&[])
+        };
+        let directory = tempfile::tempdir().unwrap();
+        for run in simulate_group(&clean, directory.path(), &|| ()).unwrap().runs {
+            let read = read_record(&directory.path().join(&run.file), &ReadOptions::default()).unwrap();
+            assert_eq!(read.trouble, [], "{}", run.file.display());
+            runs += 1;
+        }
+    }
+    assert_eq!(runs, 200);
+}
