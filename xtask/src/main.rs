@@ -2,25 +2,29 @@
 //!
 //! | command | does |
 //! |---|---|
-//! | `cargo xtask test` | all tests of the workspace, those of the documentation included |
+//! | `cargo xtask test` | all tests of the workspace, those of the documentation included, then those of the Python package |
+//! | `cargo xtask python [ARGUMENT...]` | the tests of the Python package alone, arguments for pytest |
 //! | `cargo xtask check` | formatting, lints, documentation of the crates and the book, as continuous integration does |
 //! | `cargo xtask book` | the book in `docs/`, into `docs/book/` (needs mdbook) |
 //!
 //! Nothing but the standard library: a chore must start at once on a fresh machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+mod python;
+
 use std::{
     env,
     io::{BufRead, BufReader},
-    process::{Command, ExitCode, Stdio},
+    process::{Command, ExitCode, ExitStatus, Stdio},
 };
 
-const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | check | book";
+const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | book";
 
 fn main() -> ExitCode {
     let mut arguments = env::args().skip(1);
     let outcome = match arguments.next().as_deref() {
         Some("test") => test(&arguments.collect::<Vec<_>>()),
+        Some("python") => python::test(&arguments.collect::<Vec<_>>()).and_then(|counts| counts.verdict()),
         Some("check") => check(),
         Some("book") => book(),
         _ => Err(USAGE.to_owned()),
@@ -34,31 +38,40 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs all tests, passing further arguments on to `cargo test`, and closes with their number over all crates.
+/// Runs all tests, passing further arguments on to `cargo test`, and closes with their number over all crates and the Python package, whose
+/// tests are left out where the arguments choose some tests of Rust.
 fn test(arguments: &[String]) -> Result<(), String> {
     let mut command = cargo_command();
     command.args(["test", "--workspace", "--no-fail-fast"]).args(arguments);
     let shown = format!("{command:?}");
-    let cannot_run = |error: std::io::Error| format!("cannot run {shown}: {error}");
-    let mut child = command.stdout(Stdio::piped()).spawn().map_err(cannot_run)?;
     let mut total = Counts::default();
-    if let Some(output) = child.stdout.take() {
-        for line in BufReader::new(output).lines() {
-            let line = line.map_err(cannot_run)?;
-            println!("{line}");
-            total.add(&line);
-        }
+    let status = each_line(&mut command, |line| total.add(line))?;
+    if arguments.is_empty() {
+        total.join(&python::test(&[])?);
     }
-    let status = child.wait().map_err(cannot_run)?;
     println!(
         "\n{} passed, {} failed, {} skipped",
         total.passed, total.failed, total.ignored
     );
-    if status.success() {
-        Ok(())
-    } else {
-        Err(format!("failed ({status}): {shown}"))
+    if !status.success() {
+        return Err(format!("failed ({status}): {shown}"));
     }
+    total.verdict()
+}
+
+/// Runs a command, and prints and shows each line of its output.
+fn each_line(command: &mut Command, mut show: impl FnMut(&str)) -> Result<ExitStatus, String> {
+    let shown = format!("{command:?}");
+    let cannot_run = |error: std::io::Error| format!("cannot run {shown}: {error}");
+    let mut child = command.stdout(Stdio::piped()).spawn().map_err(cannot_run)?;
+    if let Some(output) = child.stdout.take() {
+        for line in BufReader::new(output).lines() {
+            let line = line.map_err(cannot_run)?;
+            println!("{line}");
+            show(&line);
+        }
+    }
+    child.wait().map_err(cannot_run)
 }
 
 #[derive(Debug, Default, PartialEq)]
@@ -69,6 +82,19 @@ struct Counts {
 }
 
 impl Counts {
+    fn join(&mut self, other: &Self) {
+        self.passed += other.passed;
+        self.failed += other.failed;
+        self.ignored += other.ignored;
+    }
+
+    fn verdict(&self) -> Result<(), String> {
+        match self.failed {
+            0 => Ok(()),
+            failed => Err(format!("{failed} tests failed")),
+        }
+    }
+
     /// Adds a line such as `test result: ok. 7 passed; 0 failed; 0 ignored; ...`; other lines count nothing.
     fn add(&mut self, line: &str) {
         let Some(numbers) = line.strip_prefix("test result: ") else {

@@ -1,0 +1,186 @@
+//! `hoid.describing_function`: what a person answers at the lines of the excitation.
+
+use hoid_ident::describing::{
+    Averaging, DescribingFunction, DescribingOptions, Excitation, GainLeadDelayOptions, LineSearch, LineWeights,
+    Realisation, describe,
+};
+use hoid_model::{ContinuousTransferFunction, uncertainty::Estimate};
+use numpy::{Complex64, PyArray1};
+use pyo3::{prelude::*, types::PyDict};
+
+use crate::{
+    arrays::{self, Wanted, array},
+    errors::{Outcome, bad_option},
+    figures::{error_or_nan, pair},
+    names,
+};
+
+/// The describing function; the package wraps it in `hoid.DescribingFunction`.
+#[pyclass(name = "DescribingFunction", module = "hoid._hoid", frozen)]
+pub struct PyDescribingFunction {
+    found: DescribingFunction,
+}
+
+#[pyfunction]
+#[pyo3(signature = (records, *, harmonics, omega, period, channel, least_amplitude, averaging, reference, realisation, start, stop,
+    offset_samples, detrend, smoothing_bins))]
+#[allow(clippy::too_many_arguments)]
+pub fn describing_function<'py>(
+    py: Python<'py>,
+    records: Vec<Bound<'py, PyAny>>,
+    harmonics: Option<Vec<usize>>,
+    omega: Option<Vec<f64>>,
+    period: Option<f64>,
+    channel: Option<String>,
+    least_amplitude: f64,
+    averaging: &str,
+    reference: Option<String>,
+    realisation: &str,
+    start: Option<f64>,
+    stop: Option<f64>,
+    offset_samples: f64,
+    detrend: &str,
+    smoothing_bins: usize,
+) -> Outcome<PyDescribingFunction> {
+    let wanted: Vec<&str> = channel.iter().chain(&reference).map(String::as_str).collect();
+    let records = arrays::records(&records, Wanted::Only(&wanted))?;
+    let excitation = match (harmonics, omega, channel, period) {
+        (Some(harmonics), None, _, Some(period)) => Excitation::of_harmonics(&harmonics, period)?,
+        (None, Some(omega), _, Some(period)) => Excitation::new(&omega, period)?,
+        (None, None, Some(channel), period_s) => {
+            let search = LineSearch {
+                period_s,
+                least_amplitude,
+            };
+            Excitation::found_in(&records[0], &channel, &search)?
+        }
+        (None, None, None, _) => {
+            return Err(bad_option(
+                "there is no excitation: give the channel that it stands in, or harmonics or omega with the period",
+            ));
+        }
+        (Some(_), Some(_), _, _) => return Err(bad_option("give harmonics or omega, not both")),
+        (_, _, _, None) => return Err(bad_option("harmonics and omega need the period in s")),
+    };
+    let words = [("ratios", 0), ("reference", 1), ("same-excitation", 2)];
+    let averaging = match (names::word("averaging", averaging, &words)?, reference) {
+        (0, _) => Averaging::Ratios,
+        (1, Some(channel)) => Averaging::Reference { channel },
+        (1, None) => return Err(bad_option("averaging=\"reference\" needs the channel of the reference")),
+        _ => Averaging::SameExcitation,
+    };
+    let realisation = [("record", Realisation::Record), ("period", Realisation::Period)]
+        .into_iter()
+        .find(|(name, _)| *name == realisation)
+        .map(|(_, value)| value)
+        .ok_or_else(|| {
+            bad_option(format!(
+                "realisation is {realisation:?}, expected \"record\" or \"period\""
+            ))
+        })?;
+    let options = DescribingOptions {
+        averaging,
+        realisation,
+        from_s: start,
+        to_s: stop,
+        offset_samples,
+        detrend: names::detrend(detrend)?,
+        smoothing_bins,
+        element: None,
+    };
+    let found = py.detach(|| describe(&records, &excitation, &options))?;
+    Ok(PyDescribingFunction { found })
+}
+
+#[pymethods]
+impl PyDescribingFunction {
+    /// Columns over the lines, by name.
+    fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let lines = &self.found.lines;
+        let all = PyDict::new(py);
+        let column = |of: &dyn Fn(&hoid_ident::describing::Line) -> f64| array(py, lines.iter().map(of).collect());
+        all.set_item("omega", column(&|l| l.omega_rad_s))?;
+        all.set_item(
+            "harmonic",
+            PyArray1::from_iter(py, lines.iter().map(|l| l.harmonic as i64)),
+        )?;
+        all.set_item("response", PyArray1::from_iter(py, lines.iter().map(|l| l.response)))?;
+        all.set_item("response_se", column(&|l| l.standard_error.unwrap_or(f64::NAN)))?;
+        all.set_item("coherence", column(&|l| l.coherence.unwrap_or(f64::NAN)))?;
+        type Of = fn(&hoid_ident::describing::Line) -> Estimate;
+        let both: [(&str, Of); 2] = [("magnitude_db", |l| l.magnitude_db()), ("phase_deg", |l| l.phase_deg())];
+        for (name, of) in both {
+            all.set_item(name, column(&|l| of(l).value))?;
+            all.set_item(format!("{name}_se"), column(&|l| error_or_nan(of(l))))?;
+        }
+        Ok(all)
+    }
+
+    /// The response of each run (or period) at each line: runs by rows, real and imaginary part.
+    #[getter]
+    fn per_run<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArray1<Complex64>>>> {
+        let runs = self.found.lines.first().map_or(0, |line| line.per_run.len());
+        let row = |k: usize| PyArray1::from_iter(py, self.found.lines.iter().map(|line| line.per_run[k]));
+        Ok((0..runs).map(row).collect())
+    }
+
+    /// Frequency in rad/s, density, and its standard error.
+    #[getter]
+    fn remnant_spectrum<'py>(&self, py: Python<'py>) -> [Bound<'py, PyArray1<f64>>; 3] {
+        let bands = &self.found.remnant_spectrum;
+        [
+            array(py, bands.iter().map(|b| b.omega_rad_s).collect()),
+            array(py, bands.iter().map(|b| b.density).collect()),
+            array(py, bands.iter().map(|b| b.standard_error()).collect()),
+        ]
+    }
+
+    #[getter]
+    fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (f, all) = (&self.found, PyDict::new(py));
+        all.set_item("runs", f.runs.iter().map(|r| r.label.clone()).collect::<Vec<_>>())?;
+        all.set_item("off_line_share", pair(f.off_line_share))?;
+        all.set_item("noise_ratio", pair(f.noise_ratio))?;
+        all.set_item("rms_e", pair(f.rms_e))?;
+        all.set_item("rms_u", pair(f.rms_u))?;
+        Ok(all)
+    }
+
+    /// Gain, lead (s) and delay (s) of the person, and the misfit.
+    #[pyo3(signature = (*, lead, weights, delay))]
+    fn gain_lead_delay<'py>(
+        &self,
+        py: Python<'py>,
+        lead: bool,
+        weights: &str,
+        delay: (f64, f64),
+    ) -> Outcome<Bound<'py, PyDict>> {
+        let words = [
+            ("coherence", LineWeights::Coherence),
+            ("variance", LineWeights::Variance),
+            ("uniform", LineWeights::Uniform),
+        ];
+        let options = GainLeadDelayOptions {
+            lead,
+            weights: names::word("weights", weights, &words)?,
+            delay_range_s: delay,
+        };
+        let found = self.found.fit_gain_lead_delay(&options)?;
+        let all = PyDict::new(py);
+        all.set_item("gain", pair(found.gain))?;
+        all.set_item("lead_s", pair(found.lead_s))?;
+        all.set_item("delay_s", pair(found.delay_s))?;
+        all.set_item("misfit", found.misfit)?;
+        Ok(all)
+    }
+
+    /// Crossover frequency and phase margin with a controlled element NUM/DEN by descending powers of s.
+    fn margins<'py>(&self, py: Python<'py>, num: Vec<f64>, den: Vec<f64>) -> Outcome<Bound<'py, PyDict>> {
+        let element = ContinuousTransferFunction::new(&num, &den)?;
+        let margins = self.found.open_loop(&element).margins();
+        let all = PyDict::new(py);
+        all.set_item("crossover_rad_s", margins.crossover_rad_s.map(pair))?;
+        all.set_item("phase_margin_deg", margins.phase_margin_deg.map(pair))?;
+        Ok(all)
+    }
+}

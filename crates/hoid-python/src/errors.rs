@@ -1,0 +1,154 @@
+//! Errors of the libraries as exceptions of `hoid.errors`, by kind.
+//!
+//! The messages are those of the libraries; where they name an option of the command line, its keyword here takes its place.
+
+use hoid_ident::IdentError;
+use hoid_io::{IoError, ScenarioFileError};
+use hoid_model::{ModelError, NotConvertible};
+use hoid_sim::SimError;
+use hoid_study::StudyError;
+use pyo3::{PyErr, import_exception};
+
+import_exception!(hoid.errors, Error);
+import_exception!(hoid.errors, DataError);
+import_exception!(hoid.errors, OptionError);
+import_exception!(hoid.errors, EstimationError);
+import_exception!(hoid.errors, NotConvertibleError);
+import_exception!(hoid.errors, FileError);
+import_exception!(hoid.errors, FileMissingError);
+import_exception!(hoid.errors, FormatError);
+import_exception!(hoid.errors, StudyStateError);
+
+/// What a call gives, or why not.
+pub type Outcome<T> = Result<T, Failure>;
+
+/// An exception to be, so that `?` takes every error of the libraries.
+pub struct Failure(PyErr);
+
+impl From<Failure> for PyErr {
+    fn from(failure: Failure) -> Self {
+        failure.0
+    }
+}
+
+impl From<PyErr> for Failure {
+    fn from(error: PyErr) -> Self {
+        Self(error)
+    }
+}
+
+/// A wrong option, in the words of Python.
+pub fn bad_option(message: impl Into<String>) -> Failure {
+    Failure(OptionError::new_err(message.into()))
+}
+
+/// `--out-of-range` to `out_of_range`, and options that are switches to `name=True`.
+fn in_python(message: &str) -> String {
+    let mut text = String::with_capacity(message.len());
+    let mut rest = message;
+    while let Some(at) = rest.find("--") {
+        text.push_str(&rest[..at]);
+        rest = &rest[at + 2..];
+        let end = rest
+            .find(|c: char| !(c.is_ascii_lowercase() || c == '-'))
+            .unwrap_or(rest.len());
+        match &rest[..end] {
+            "" => text.push_str("--"),
+            switch @ ("resume" | "fill" | "resample") => text.push_str(&format!("{switch}=True")),
+            "from" => text.push_str("start"),
+            "to" => text.push_str("stop"),
+            other => text.push_str(&other.replace('-', "_")),
+        }
+        rest = &rest[end..];
+    }
+    text.push_str(rest);
+    text
+}
+
+impl From<ModelError> for Failure {
+    fn from(error: ModelError) -> Self {
+        let text = in_python(&error.to_string());
+        Self(match error {
+            ModelError::NotFinite { .. }
+            | ModelError::LengthMismatch { .. }
+            | ModelError::EmptyRecord { .. }
+            | ModelError::DuplicateChannel { .. }
+            | ModelError::NoSuchChannel { .. }
+            | ModelError::EmptySpan { .. } => DataError::new_err(text),
+            ModelError::NotConvertible(_) => NotConvertibleError::new_err(text),
+            _ => OptionError::new_err(text),
+        })
+    }
+}
+
+impl From<NotConvertible> for Failure {
+    fn from(reason: NotConvertible) -> Self {
+        Self(NotConvertibleError::new_err(reason.to_string()))
+    }
+}
+
+impl From<IdentError> for Failure {
+    fn from(error: IdentError) -> Self {
+        let text = in_python(&error.to_string());
+        Self(match error {
+            IdentError::Model(error) => return error.into(),
+            IdentError::BadStart { .. }
+            | IdentError::UnknownParameter { .. }
+            | IdentError::BadOption { .. }
+            | IdentError::EmptyRange { .. } => OptionError::new_err(text),
+            IdentError::SingularRegressors { .. }
+            | IdentError::SingularInstruments { .. }
+            | IdentError::SingularInformation { .. }
+            | IdentError::NoFiniteLoss
+            | IdentError::NotSettled { .. } => EstimationError::new_err(text),
+            _ => DataError::new_err(text),
+        })
+    }
+}
+
+impl From<IoError> for Failure {
+    fn from(error: IoError) -> Self {
+        let text = in_python(&error.to_string());
+        Self(match error {
+            IoError::Unreadable { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
+                FileMissingError::new_err(text)
+            }
+            IoError::Unreadable { .. } | IoError::Unwritable { .. } | IoError::Directory { .. } => {
+                FileError::new_err(text)
+            }
+            _ => FormatError::new_err(text),
+        })
+    }
+}
+
+impl From<ScenarioFileError> for Failure {
+    fn from(error: ScenarioFileError) -> Self {
+        let text = in_python(&error.to_string());
+        Self(match error {
+            ScenarioFileError::Unreadable { .. } => FileMissingError::new_err(text),
+            _ => FormatError::new_err(text),
+        })
+    }
+}
+
+impl From<SimError> for Failure {
+    fn from(error: SimError) -> Self {
+        match error {
+            SimError::Model(error) => error.into(),
+            other => Self(OptionError::new_err(other.to_string())),
+        }
+    }
+}
+
+impl From<StudyError> for Failure {
+    fn from(error: StudyError) -> Self {
+        let text = in_python(&error.to_string());
+        Self(match error {
+            StudyError::Io(error) => return error.into(),
+            StudyError::Plan { .. } | StudyError::BadShard { .. } | StudyError::Pattern { .. } => {
+                OptionError::new_err(text)
+            }
+            _ => StudyStateError::new_err(text),
+        })
+    }
+}

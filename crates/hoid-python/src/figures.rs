@@ -1,0 +1,125 @@
+//! Small figures as Python has them: estimates as pairs, operators as dictionaries.
+
+use hoid_ident::{
+    MarginEstimates,
+    validation::{LjungBox, Quality},
+};
+use hoid_model::{
+    NotConvertible, Orders,
+    margins::Margins,
+    remnant::RemnantDiscretisation,
+    uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
+};
+use pyo3::{prelude::*, types::PyDict};
+
+/// Value and standard error.
+pub type Pair = (f64, Option<f64>);
+
+pub fn pair(e: Estimate) -> Pair {
+    (e.value, e.standard_error)
+}
+
+/// NaN where there is no standard error, as arrays have it.
+pub fn error_or_nan(e: Estimate) -> f64 {
+    e.standard_error.unwrap_or(f64::NAN)
+}
+
+pub fn orders<'py>(py: Python<'py>, o: &Orders) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    for (name, value) in [
+        ("na", o.na),
+        ("nb", o.nb),
+        ("nc", o.nc),
+        ("nd", o.nd),
+        ("nf", o.nf),
+        ("nk", o.nk),
+    ] {
+        all.set_item(name, value)?;
+    }
+    Ok(all)
+}
+
+/// The operator, the reason why there is none, or None where another order has no meaning as an operator at all.
+pub fn operator<'py>(
+    py: Python<'py>,
+    found: &Result<OperatorEstimate, NotConvertible>,
+) -> PyResult<Option<Bound<'py, PyDict>>> {
+    let all = PyDict::new(py);
+    match found {
+        Ok(o) => {
+            all.set_item("convertible", true)?;
+            all.set_item("stable", o.parameters().is_stable())?;
+            for (name, _, e) in o.rows() {
+                all.set_item(name, pair(e))?;
+            }
+        }
+        Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. }) => return Ok(None),
+        Err(reason) => {
+            all.set_item("convertible", false)?;
+            all.set_item("reason", reason.to_string())?;
+        }
+    }
+    Ok(Some(all))
+}
+
+pub fn remnant<'py>(py: Python<'py>, found: &Result<RemnantEstimate, NotConvertible>) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    match found {
+        Ok(r) => {
+            all.set_item("convertible", true)?;
+            all.set_item("order", r.order)?;
+            let name = match r.discretisation {
+                RemnantDiscretisation::ZeroOrderHold => "zoh",
+                RemnantDiscretisation::BackwardEuler => "backward-euler",
+            };
+            all.set_item("discretisation", name)?;
+            all.set_item("T_n", pair(r.t_n_s))?;
+            all.set_item("K_n", pair(r.k_n))?;
+        }
+        Err(reason) => {
+            all.set_item("convertible", false)?;
+            all.set_item("reason", reason.to_string())?;
+        }
+    }
+    Ok(all)
+}
+
+pub fn margins<'py>(py: Python<'py>, m: &MarginEstimates) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    for (name, estimate) in [
+        ("crossover_rad_s", m.crossover_rad_s),
+        ("phase_margin_deg", m.phase_margin_deg),
+        ("gain_margin_db", m.gain_margin_db),
+        ("phase_crossover_rad_s", m.phase_crossover_rad_s),
+    ] {
+        all.set_item(name, estimate.map(pair))?;
+    }
+    Ok(all)
+}
+
+pub fn plain_margins<'py>(py: Python<'py>, m: &Margins) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    all.set_item("crossover_rad_s", m.crossover_rad_s)?;
+    all.set_item("phase_margin_deg", m.phase_margin_deg)?;
+    all.set_item("gain_margin_db", m.gain_margin_db)?;
+    all.set_item("phase_crossover_rad_s", m.phase_crossover_rad_s)?;
+    Ok(all)
+}
+
+pub fn quality<'py>(py: Python<'py>, q: &Quality) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    all.set_item("vaf_simulation", q.vaf_simulation)?;
+    all.set_item("vaf_prediction", q.vaf_prediction)?;
+    all.set_item("nrmse_simulation", q.nrmse_simulation)?;
+    all.set_item("nrmse_prediction", q.nrmse_prediction)?;
+    Ok(all)
+}
+
+pub fn ljung_box<'py>(py: Python<'py>, test: Option<&LjungBox>) -> PyResult<Option<Bound<'py, PyDict>>> {
+    let Some(test) = test else { return Ok(None) };
+    let all = PyDict::new(py);
+    all.set_item("statistic", test.statistic)?;
+    all.set_item("degrees_of_freedom", test.degrees_of_freedom)?;
+    all.set_item("p_value", test.p_value)?;
+    Ok(Some(all))
+}

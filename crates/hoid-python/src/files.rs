@@ -1,0 +1,116 @@
+//! `hoid.read`, `hoid.write` and tables of results.
+
+use std::{collections::BTreeMap, path::PathBuf, str::FromStr};
+
+use hoid_io::{ColumnValues, IoError, NewRate, Preparation, ReadOptions, Repair, read_prepared, write_record};
+use numpy::PyArray1;
+use pyo3::{prelude::*, types::PyDict};
+
+use crate::{
+    arrays::{self, Wanted, array, parts},
+    errors::{Outcome, bad_option},
+    names,
+};
+
+/// What a record is made of, what was done to the numbers of the file, and the notes of its reading.
+type Read<'py> = (Bound<'py, PyDict>, Vec<String>, Vec<String>);
+
+#[pyfunction]
+#[pyo3(signature = (path, *, input, output, sampling_frequency, start, stop, resample, fill, detrend, drop_repeated, scale, offset, decimate,
+    new_sampling_frequency, run_in))]
+#[allow(clippy::too_many_arguments)]
+pub fn read<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    input: Option<String>,
+    output: &str,
+    sampling_frequency: Option<f64>,
+    start: Option<f64>,
+    stop: Option<f64>,
+    resample: bool,
+    fill: bool,
+    detrend: &str,
+    drop_repeated: bool,
+    scale: BTreeMap<String, String>,
+    offset: BTreeMap<String, String>,
+    decimate: Option<usize>,
+    new_sampling_frequency: Option<f64>,
+    run_in: f64,
+) -> Outcome<Read<'py>> {
+    let options = ReadOptions {
+        input: match input {
+            Some(column) => Some(column.parse()?),
+            None => None,
+        },
+        output: output.parse()?,
+        sampling_hz: sampling_frequency,
+        span_s: (start, stop),
+        repair: Repair { resample, fill },
+    };
+    let preparation = Preparation {
+        scale: parsed(scale)?,
+        offset: parsed(offset)?,
+        rate: match (decimate, new_sampling_frequency) {
+            (Some(_), Some(_)) => return Err(bad_option("give decimate or new_sampling_frequency, not both")),
+            (Some(factor), None) => NewRate::Decimated(factor),
+            (None, Some(hz)) => NewRate::Hz(hz),
+            (None, None) => NewRate::Kept,
+        },
+        run_in_s: run_in,
+        detrend: names::detrend(detrend)?,
+        drop_repeated,
+    };
+    let read = py.detach(|| read_prepared(&path, &options, &preparation))?;
+    let steps = read.steps.iter().map(ToString::to_string).collect();
+    let trouble = read.trouble.iter().map(ToString::to_string);
+    let notes = read.notes.iter().cloned().chain(trouble).collect();
+    Ok((parts(py, read.record)?, steps, notes))
+}
+
+/// Scalings and offsets by channel, as they are written on the command line.
+fn parsed<T: FromStr<Err = IoError>>(texts: BTreeMap<String, String>) -> Result<BTreeMap<String, T>, IoError> {
+    texts
+        .into_iter()
+        .map(|(name, text)| Ok((name, text.parse()?)))
+        .collect()
+}
+
+#[pyfunction]
+#[pyo3(signature = (path, record))]
+pub fn write(py: Python<'_>, path: PathBuf, record: &Bound<'_, PyAny>) -> Outcome<()> {
+    let record = arrays::record(record, Wanted::All)?;
+    py.detach(|| write_record(&path, &record))?;
+    Ok(())
+}
+
+/// Checks what a record of the package is made of.
+#[pyfunction]
+#[pyo3(signature = (record))]
+pub fn check_record(record: &Bound<'_, PyAny>) -> Outcome<()> {
+    arrays::check(record)
+}
+
+/// What is left after the mean or a straight line has been taken out of input and output.
+#[pyfunction]
+#[pyo3(signature = (record, how))]
+pub fn detrended<'py>(py: Python<'py>, record: &Bound<'py, PyAny>, how: &str) -> Outcome<Bound<'py, PyDict>> {
+    let how = names::detrend(how)?;
+    let record = arrays::record(record, Wanted::All)?;
+    Ok(parts(py, record.detrended(how))?)
+}
+
+/// A table that hoid has written, as columns by name: numbers, whole numbers, or text.
+#[pyfunction]
+#[pyo3(signature = (path))]
+pub fn read_table<'py>(py: Python<'py>, path: PathBuf) -> Outcome<Bound<'py, PyDict>> {
+    let table = py.detach(|| hoid_io::read_table(&path))?;
+    let all = PyDict::new(py);
+    for column in table.columns {
+        match column.values {
+            ColumnValues::Real(values) => all.set_item(column.name, array(py, values))?,
+            ColumnValues::Whole(values) => all.set_item(column.name, PyArray1::from_vec(py, values))?,
+            ColumnValues::Text(values) => all.set_item(column.name, values)?,
+        }
+    }
+    Ok(all)
+}

@@ -1,0 +1,323 @@
+//! A fitted model.
+
+use hoid_ident::{Candidate, Choice, Fit, GreyBoxFit, Series, grey_box::OrderCandidate};
+use hoid_model::{ContinuousTransferFunction, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
+use pyo3::{
+    prelude::*,
+    types::{PyComplex, PyDict, PyList},
+};
+
+use crate::{
+    arrays::{self, Wanted, array, matrix},
+    errors::Outcome,
+    figures::{self, Pair, pair},
+    names,
+};
+
+/// A fitted model; the package wraps it in `hoid.Fit`.
+#[pyclass(name = "Fit", module = "hoid._hoid", frozen)]
+pub struct PyFit {
+    fit: Fit,
+    choice: Option<Choice>,
+    grey_box: Option<GreyBoxFit>,
+    /// Number of records that it was fitted to.
+    records: usize,
+}
+
+impl PyFit {
+    pub fn new(fit: Fit, choice: Option<Choice>, grey_box: Option<GreyBoxFit>, records: usize) -> Self {
+        Self {
+            fit,
+            choice,
+            grey_box,
+            records,
+        }
+    }
+
+    /// Runs over a record without the interpreter.
+    fn over<T: Send>(
+        &self,
+        py: Python<'_>,
+        record: &Bound<'_, PyAny>,
+        work: impl FnOnce(&Fit, &Record) -> Result<T, hoid_ident::IdentError> + Send,
+    ) -> Outcome<T> {
+        let record = arrays::record(record, Wanted::Only(&[]))?;
+        let fit = &self.fit;
+        Ok(py.detach(|| work(fit, &record))?)
+    }
+}
+
+type SeriesParts<'py> = (usize, Bound<'py, PyArray1<f64>>);
+
+fn series(py: Python<'_>, found: Series) -> SeriesParts<'_> {
+    (found.first, array(py, found.values))
+}
+
+#[pymethods]
+impl PyFit {
+    #[getter]
+    fn structure(&self) -> &'static str {
+        if self.fit.is_grey_box() {
+            "grey-box"
+        } else {
+            self.fit.model().structure().name()
+        }
+    }
+
+    #[getter]
+    fn title(&self) -> String {
+        self.fit.title()
+    }
+
+    #[getter]
+    fn orders<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        figures::orders(py, &self.fit.orders())
+    }
+
+    #[getter]
+    fn sample_time(&self) -> f64 {
+        self.fit.model().sample_time().s()
+    }
+
+    #[getter]
+    fn parameters(&self) -> Vec<(String, Pair)> {
+        self.fit
+            .parameters()
+            .into_iter()
+            .map(|(name, e)| (name, pair(e)))
+            .collect()
+    }
+
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        let found = match &self.grey_box {
+            Some(grey_box) => grey_box.covariance(),
+            None => self.fit.covariance(),
+        };
+        let Some(c) = found else { return Ok(None) };
+        let columns = (c.len() as f64).sqrt().round() as usize;
+        matrix(py, c.to_vec(), columns).map(Some)
+    }
+
+    /// A, B, C, D and F by ascending powers of q^-1; A, C, D and F begin with 1, B with its delay.
+    #[getter]
+    fn polynomials<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let model = self.fit.model();
+        let all = PyDict::new(py);
+        for (name, coefficients) in [("A", model.a()), ("C", model.c()), ("D", model.d()), ("F", model.f())] {
+            let mut monic = vec![1.0];
+            monic.extend_from_slice(coefficients);
+            all.set_item(name, array(py, monic))?;
+        }
+        let mut b = vec![0.0; if model.b().is_empty() { 0 } else { model.orders().nk }];
+        b.extend_from_slice(model.b());
+        all.set_item("B", array(py, b))?;
+        Ok(all)
+    }
+
+    #[getter]
+    fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (fit, all) = (&self.fit, PyDict::new(py));
+        all.set_item("loss", fit.loss())?;
+        all.set_item("innovation_variance", fit.innovation_variance())?;
+        all.set_item("aic", fit.aic())?;
+        all.set_item("aicc", fit.aicc())?;
+        all.set_item("bic", fit.bic())?;
+        all.set_item("fpe", fit.fpe())?;
+        all.set_item("mdl", fit.mdl())?;
+        all.set_item("yic", fit.yic())?;
+        all.set_item("residuals", fit.residual_count())?;
+        all.set_item("initial_states", fit.state_count())?;
+        Ok(all)
+    }
+
+    #[getter]
+    fn termination<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (found, all) = (self.fit.termination(), PyDict::new(py));
+        all.set_item("reason", found.reason.to_string())?;
+        all.set_item("converged", found.converged())?;
+        all.set_item("iterations", found.iterations)?;
+        all.set_item("start", self.fit.start())?;
+        Ok(all)
+    }
+
+    #[getter]
+    fn stable(&self) -> bool {
+        self.fit.model().is_stable()
+    }
+
+    #[getter]
+    fn operator<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        figures::operator(py, &self.fit.operator())
+    }
+
+    /// The operator of each record of a grey box, nothing for another fit.
+    #[getter]
+    fn operators<'py>(&self, py: Python<'py>) -> PyResult<Vec<Option<Bound<'py, PyDict>>>> {
+        let Some(grey_box) = &self.grey_box else {
+            return Ok(Vec::new());
+        };
+        (0..self.records)
+            .map(|k| figures::operator(py, &grey_box.operator(k)))
+            .collect()
+    }
+
+    fn remnant<'py>(&self, py: Python<'py>, discretisation: &str) -> Outcome<Option<Bound<'py, PyDict>>> {
+        let how = names::remnant_discretisation(discretisation)?;
+        if self.fit.orders().nd == 0 {
+            return Ok(None);
+        }
+        Ok(Some(figures::remnant(py, &self.fit.remnant(how))?))
+    }
+
+    fn quality<'py>(&self, py: Python<'py>, records: Vec<Bound<'py, PyAny>>) -> Outcome<Bound<'py, PyDict>> {
+        let records = arrays::records(&records, Wanted::Only(&[]))?;
+        let fit = &self.fit;
+        let quality = py.detach(|| fit.quality(&records))?;
+        Ok(figures::quality(py, &quality)?)
+    }
+
+    fn predict<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>, horizon: usize) -> Outcome<SeriesParts<'py>> {
+        let found = self.over(py, record, |fit, record| match horizon {
+            1 => fit.predict(record),
+            k => fit.predict_ahead(record, k),
+        })?;
+        Ok(series(py, found))
+    }
+
+    fn simulate<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>) -> Outcome<SeriesParts<'py>> {
+        Ok(series(py, self.over(py, record, Fit::simulate)?))
+    }
+
+    fn residuals<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>) -> Outcome<SeriesParts<'py>> {
+        Ok(series(py, self.over(py, record, Fit::residuals)?))
+    }
+
+    fn validate<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyDict>> {
+        let v = self.over(py, record, Fit::validate)?;
+        let (all, signs) = (PyDict::new(py), v.signs());
+        all.set_item("first", v.first)?;
+        all.set_item("quality", figures::quality(py, &v.quality)?)?;
+        all.set_item("ljung_box", figures::ljung_box(py, v.ljung_box.as_ref())?)?;
+        all.set_item("coloured_residuals", signs.coloured_residuals)?;
+        all.set_item("under_modelled", signs.under_modelled)?;
+        all.set_item("feedback", signs.feedback)?;
+        for (name, correlation) in [
+            ("autocorrelation", v.autocorrelation),
+            ("cross_correlation", v.cross_correlation),
+        ] {
+            let lags = PyArray1::from_vec(py, correlation.lags);
+            all.set_item(name, (lags, array(py, correlation.values), correlation.bound_99))?;
+        }
+        all.set_item("simulated", array(py, v.simulated))?;
+        all.set_item("predicted", array(py, v.predicted))?;
+        Ok(all)
+    }
+
+    /// Magnitude in dB and phase in deg at these frequencies, each with its standard error (NaN where there is none).
+    fn frequency_response<'py>(
+        &self,
+        py: Python<'py>,
+        omega: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<[Bound<'py, PyArray1<f64>>; 4]> {
+        let points = self.fit.frequency_response(omega.as_slice()?);
+        let column = |of: &dyn Fn(&hoid_ident::ResponsePoint) -> f64| array(py, points.iter().map(of).collect());
+        Ok([
+            column(&|p| p.magnitude_db.value),
+            column(&|p| figures::error_or_nan(p.magnitude_db)),
+            column(&|p| p.phase_deg.value),
+            column(&|p| figures::error_or_nan(p.phase_deg)),
+        ])
+    }
+
+    #[getter]
+    fn roots<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let ts = self.fit.model().sample_time().s();
+        let one = |root: hoid_ident::Root| {
+            let all = PyDict::new(py);
+            all.set_item("polynomial", root.polynomial.to_string())?;
+            all.set_item("value", PyComplex::from_doubles(py, root.value.re, root.value.im))?;
+            all.set_item("standard_error", root.standard_error)?;
+            let of_s = root.frequency_and_damping(ts);
+            all.set_item("frequency_rad_s", of_s.map(|s| s.0))?;
+            all.set_item("damping", of_s.map(|s| s.1))?;
+            Ok(all)
+        };
+        self.fit.roots().into_iter().map(one).collect()
+    }
+
+    /// Crossover and margins of the operator in series with a controlled element NUM/DEN by descending powers of s.
+    fn margins<'py>(&self, py: Python<'py>, num: Vec<f64>, den: Vec<f64>) -> Outcome<Bound<'py, PyDict>> {
+        let element = ContinuousTransferFunction::new(&num, &den)?;
+        let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
+        // The sampled model says nothing above half the sampling frequency.
+        let high = high.min(self.fit.model().sample_time().nyquist_rad_s());
+        let found = self.fit.margins(|omega| element.response(omega), (low, high));
+        Ok(figures::margins(py, &found)?)
+    }
+
+    /// The table that the model was chosen from.
+    #[getter]
+    fn candidates<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        let list = PyList::empty(py);
+        for candidate in self.choice.iter().flat_map(|choice| &choice.candidates) {
+            list.append(candidate_row(py, candidate)?)?;
+        }
+        for candidate in self.grey_box.iter().flat_map(GreyBoxFit::candidates) {
+            list.append(order_row(py, candidate)?)?;
+        }
+        Ok(list)
+    }
+
+    #[getter]
+    fn criterion(&self) -> Option<&'static str> {
+        self.choice.as_ref().map(|choice| choice.criterion.name())
+    }
+
+    #[getter]
+    fn delay_interval(&self) -> Option<(usize, usize)> {
+        self.choice.as_ref().and_then(Choice::delay_interval)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<hoid._hoid.Fit {}>", self.fit.title())
+    }
+}
+
+fn candidate_row<'py>(py: Python<'py>, candidate: &Candidate) -> PyResult<Bound<'py, PyDict>> {
+    let row = figures::orders(py, &candidate.orders)?;
+    match &candidate.outcome {
+        Ok(f) => {
+            for (name, value) in [
+                ("loss", f.loss),
+                ("aic", f.aic),
+                ("aicc", f.aicc),
+                ("bic", f.bic),
+                ("fpe", f.fpe),
+                ("mdl", f.mdl),
+            ] {
+                row.set_item(name, value)?;
+            }
+            row.set_item("yic", f.yic)?;
+            row.set_item("converged", f.converged)?;
+        }
+        Err(reason) => row.set_item("error", reason.to_string())?,
+    }
+    Ok(row)
+}
+
+fn order_row<'py>(py: Python<'py>, candidate: &OrderCandidate) -> PyResult<Bound<'py, PyDict>> {
+    let row = PyDict::new(py);
+    row.set_item("remnant_order", candidate.order)?;
+    match &candidate.outcome {
+        Ok(f) => {
+            row.set_item("loss", f.loss)?;
+            row.set_item("aic", f.aic)?;
+            row.set_item("bic", f.bic)?;
+            row.set_item("converged", f.converged)?;
+        }
+        Err(reason) => row.set_item("error", reason.to_string())?,
+    }
+    Ok(row)
+}

@@ -1,0 +1,181 @@
+//! `hoid.identify`: from records and options to a fit.
+
+use std::collections::BTreeMap;
+
+use hoid_ident::{
+    Choice, Estimator, Fit, GreyBox, GreyBoxFit, IdentError, InitialState, InstrumentalVariable, Instruments, Loss,
+    SearchOptions, TimeVarying, TimeVaryingFit,
+    order_search::{default_operator_ranges, fit_or_choose},
+};
+use hoid_model::Record;
+use pyo3::prelude::*;
+
+use crate::{
+    arrays::{self, Wanted},
+    errors::{Failure, Outcome, bad_option},
+    fit::PyFit,
+    interrupt::{self, Standing},
+    names::{self, Kind},
+    time_varying::PyTimeVaryingFit,
+};
+
+/// Samples times models from which a fit takes long enough to be worth a thread that an interrupt can leave.
+const LONG: usize = 50_000;
+
+/// What a fit gave.
+enum Found {
+    Model(Box<(Fit, Option<Choice>, Option<GreyBoxFit>)>),
+    Change(Box<TimeVaryingFit>),
+}
+
+/// Fits a model to records. All options have been brought into their plain form by the package.
+#[pyfunction]
+#[pyo3(signature = (records, structure, *, orders, method, instruments, remnant_order, delay, individual, criterion, initial_state, start, fix,
+    bound, prior, robust, focus, stable, search_method, max_iterations, tolerance, progress))]
+#[allow(clippy::too_many_arguments)]
+pub fn identify<'py>(
+    py: Python<'py>,
+    records: Vec<Bound<'py, PyAny>>,
+    structure: &str,
+    orders: BTreeMap<String, (usize, usize)>,
+    method: &str,
+    instruments: Option<String>,
+    remnant_order: Option<(usize, usize)>,
+    delay: Option<(f64, f64)>,
+    individual: Vec<String>,
+    criterion: &str,
+    initial_state: &str,
+    start: Option<BTreeMap<String, f64>>,
+    fix: BTreeMap<String, f64>,
+    bound: BTreeMap<String, (f64, f64)>,
+    prior: BTreeMap<String, (f64, f64)>,
+    robust: Option<f64>,
+    focus: &str,
+    stable: bool,
+    search_method: &str,
+    max_iterations: usize,
+    tolerance: f64,
+    progress: Option<Bound<'py, PyAny>>,
+) -> Outcome<Bound<'py, PyAny>> {
+    let kind = names::kind(structure)?;
+    let by_instruments = names::fit_method(method)?;
+    let mut channels: Vec<&str> = Vec::new();
+    if by_instruments.is_some() {
+        channels.push(instruments.as_deref().unwrap_or("f_t"));
+    }
+    let records = arrays::records(&records, Wanted::Only(&channels))?;
+    let search = SearchOptions {
+        method: names::search_method(search_method)?,
+        max_iterations,
+        tolerance,
+    };
+    let initial_state = names::initial_state(initial_state)?;
+    let constraints = names::constraints(fix, bound)?;
+    let count = records.len();
+    let samples: usize = records.iter().map(Record::len).sum();
+
+    type Work = Box<dyn FnOnce(&Standing) -> Result<Found, IdentError> + Send>;
+    let (work, models): (Work, usize) = match kind {
+        Kind::Polynomial(structure) => {
+            let usual = default_operator_ranges(structure, records[0].sample_time());
+            let ranges = names::with_orders(usual, &orders)?;
+            let criterion = names::criterion(criterion)?;
+            let combinations = ranges.combinations()?;
+            let mut estimator = Estimator {
+                initial_state,
+                search,
+                constraints,
+                priors: names::priors(prior)?,
+                loss: robust.map_or(Loss::Quadratic, |threshold| Loss::Huber { threshold }),
+                focus: names::focus(focus)?,
+                stable,
+                ..Estimator::new(structure, combinations[0])
+            };
+            estimator.start = match &start {
+                Some(_) if combinations.len() > 1 => {
+                    return Err(bad_option(
+                        "start belongs to one model, but a range of orders or delays is searched; give nk and the orders as single numbers",
+                    ));
+                }
+                Some(start) => Some(names::theta(&combinations[0].parameter_names(), start)?),
+                None => None,
+            };
+            let work: Work = Box::new(move |standing| {
+                let (mut fit, choice) = fit_or_choose(&estimator, &ranges, criterion, &records, &|| standing.inc())?;
+                if let Some(method) = by_instruments {
+                    let instruments = match instruments.as_deref() {
+                        Some("simulated") => Instruments::Simulated,
+                        Some(channel) => Instruments::External(channel.to_owned()),
+                        None => Instruments::usual(&records),
+                    };
+                    fit = InstrumentalVariable {
+                        instruments,
+                        max_iterations,
+                        ..InstrumentalVariable::new(method, fit.orders())
+                    }
+                    .fit(&records)?;
+                }
+                Ok(Found::Model(Box::new((fit, choice, None))))
+            });
+            (work, combinations.len())
+        }
+        Kind::GreyBox => {
+            let (low, high) = remnant_order.unwrap_or((1, 4));
+            let mut estimator = GreyBox {
+                constraints,
+                individual,
+                initial_state: initial_state.unwrap_or_default(),
+                search,
+                ..GreyBox::new(names::range("remnant_order", (low, high))?)
+            };
+            if let Some(delay) = delay {
+                estimator.delay_range_s = delay;
+            }
+            let work: Work = Box::new(move |_| {
+                let found = estimator.fit(&records)?;
+                Ok(Found::Model(Box::new((
+                    found.polynomial_fit(0).clone(),
+                    None,
+                    Some(found),
+                ))))
+            });
+            (work, 10)
+        }
+        Kind::TimeVarying => {
+            if initial_state.is_some_and(|rule| rule != InitialState::Estimate) {
+                return Err(bad_option(
+                    "initial_state: the time-varying fit estimates the initial states; give \"auto\" or \"estimate\"",
+                ));
+            }
+            let usual = TimeVarying::default();
+            let nd = match orders.iter().next() {
+                None => usual.nd,
+                Some((name, (low, high))) if orders.len() == 1 && name == "nd" && low == high => *low,
+                Some(_) => return Err(bad_option("the time-varying fit takes nd alone, as a single number")),
+            };
+            let mut estimator = TimeVarying {
+                nd,
+                constraints,
+                search,
+                ..usual
+            };
+            if let Some(delay) = delay {
+                estimator.delay_range_s = delay;
+            }
+            let work: Work = Box::new(move |_| Ok(Found::Change(Box::new(estimator.fit(&records)?))));
+            (work, 10)
+        }
+    };
+    let found = if samples * models < LONG && progress.is_none() {
+        py.detach(|| work(&Standing::default())).map_err(Failure::from)?
+    } else {
+        interrupt::run(py, models as u64, progress.as_ref(), false, work)?
+    };
+    Ok(match found {
+        Found::Model(found) => {
+            let (fit, choice, grey_box) = *found;
+            Bound::new(py, PyFit::new(fit, choice, grey_box, count))?.into_any()
+        }
+        Found::Change(fit) => Bound::new(py, PyTimeVaryingFit::new(*fit))?.into_any(),
+    })
+}

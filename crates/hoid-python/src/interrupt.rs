@@ -1,0 +1,107 @@
+//! Long work that an interrupt can end: it runs in a thread of its own, while this one asks the interpreter for signals.
+
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+        mpsc::{RecvTimeoutError, channel},
+    },
+    time::Duration,
+};
+
+use pyo3::prelude::*;
+
+use crate::errors::{Failure, Outcome, bad_option};
+
+/// Time between two looks at signals.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// What the work and the waiting thread share.
+#[derive(Debug, Default)]
+pub struct Standing {
+    stopped: AtomicBool,
+    done: AtomicU64,
+    total: AtomicU64,
+}
+
+impl Standing {
+    /// False once the work is to stop.
+    pub fn goes_on(&self) -> bool {
+        !self.stopped.load(Ordering::Relaxed)
+    }
+
+    /// So much of the whole is done.
+    pub fn set(&self, done: u64, total: u64) {
+        self.total.store(total, Ordering::Relaxed);
+        self.done.store(done, Ordering::Relaxed);
+    }
+
+    /// One more is done.
+    pub fn inc(&self) {
+        self.done.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// Runs the work without the interpreter and returns what it gives. `progress` is called with what is done and the whole. An interrupt asks the
+/// work to stop; `patient` says that it listens, and is waited for, so that files are whole. Else the work is left to its end in its thread.
+pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
+    py: Python<'_>,
+    total: u64,
+    progress: Option<&Bound<'_, PyAny>>,
+    patient: bool,
+    work: impl FnOnce(&Standing) -> Result<T, E> + Send + 'static,
+) -> Outcome<T> {
+    let standing = Arc::new(Standing::default());
+    standing.set(0, total);
+    let (send, receive) = channel();
+    let shared = Arc::clone(&standing);
+    let thread = std::thread::Builder::new().name("hoid".to_owned());
+    thread
+        .spawn(move || {
+            // Nobody listens any more when an interrupt came first.
+            let _ = send.send(work(&shared));
+        })
+        .map_err(|error| bad_option(format!("the system gives no thread: {error}")))?;
+    let mut told = u64::MAX;
+    let mut tell = || -> PyResult<()> {
+        let done = standing.done.load(Ordering::Relaxed);
+        if let Some(progress) = progress.filter(|_| done != told) {
+            progress.call1((done, standing.total.load(Ordering::Relaxed)))?;
+            told = done;
+        }
+        py.check_signals()
+    };
+    // mpsc::Receiver is not Sync; it is moved into the wait and back.
+    let mut receive = receive;
+    let mut interrupted: Option<PyErr> = None;
+    loop {
+        let (outcome, back) = py.detach(move || (receive.recv_timeout(LOOK), receive));
+        receive = back;
+        match outcome {
+            Ok(result) => {
+                if let Some(error) = interrupted {
+                    return Err(error.into());
+                }
+                let result = result.map_err(Into::into)?;
+                tell()?;
+                return Ok(result);
+            }
+            Err(RecvTimeoutError::Timeout) => {
+                if interrupted.is_none()
+                    && let Err(error) = tell()
+                {
+                    standing.stopped.store(true, Ordering::Relaxed);
+                    if !patient {
+                        return Err(error.into());
+                    }
+                    interrupted = Some(error);
+                }
+            }
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(bad_option(
+                    "the work ended without a result; this is an error in hoid, please report it",
+                ));
+            }
+        }
+    }
+}

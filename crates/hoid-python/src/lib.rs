@@ -1,0 +1,73 @@
+//! The native module of the Python package `hoid`: conversion only.
+//!
+//! What is computed is computed in the libraries; what a person writes and reads is in `python/src/hoid`, which brings arguments into a plain
+//! form (floats, contiguous arrays, dictionaries) and wraps the results. Long work runs without the interpreter.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | `arrays` | arrays and records in and out |
+//! | `errors` | errors of the libraries as exceptions, by kind |
+//! | `names`, `recursion` | words and options of Python as those of the libraries |
+//! | `figures` | estimates, operators and tests as dictionaries |
+//! | `identify`, `fit`, `time_varying` | batch fits |
+//! | `track`, `tracker` | recursive estimates, over a record and live |
+//! | `simulate` | scenarios, margins, conversions |
+//! | `describing` | describing functions |
+//! | `study` | studies and groups |
+//! | `files` | files of records and tables |
+//! | `interrupt` | long work that an interrupt can end |
+#![allow(
+    missing_docs,
+    reason = "every public item is a Python object; the package and its stubs document them"
+)]
+
+mod arrays;
+mod describing;
+mod errors;
+mod figures;
+mod files;
+mod fit;
+mod identify;
+mod interrupt;
+mod names;
+mod recursion;
+mod simulate;
+mod study;
+mod time_varying;
+mod track;
+mod tracker;
+
+use pyo3::prelude::*;
+
+#[pymodule(gil_used = true)]
+fn _hoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<describing::PyDescribingFunction>()?;
+    module.add_class::<fit::PyFit>()?;
+    module.add_class::<study::PyPlan>()?;
+    module.add_class::<time_varying::PyTimeVaryingFit>()?;
+    module.add_class::<track::PyTrace>()?;
+    module.add_class::<tracker::PyTracker>()?;
+    for function in [
+        wrap_pyfunction!(describing::describing_function, module)?,
+        wrap_pyfunction!(files::check_record, module)?,
+        wrap_pyfunction!(files::detrended, module)?,
+        wrap_pyfunction!(files::read, module)?,
+        wrap_pyfunction!(files::read_table, module)?,
+        wrap_pyfunction!(files::write, module)?,
+        wrap_pyfunction!(identify::identify, module)?,
+        wrap_pyfunction!(simulate::convert_discrete, module)?,
+        wrap_pyfunction!(simulate::convert_operator, module)?,
+        wrap_pyfunction!(simulate::discretise_transfer_function, module)?,
+        wrap_pyfunction!(simulate::margins, module)?,
+        wrap_pyfunction!(simulate::simulate, module)?,
+        wrap_pyfunction!(study::group, module)?,
+        wrap_pyfunction!(study::group_manifest, module)?,
+        wrap_pyfunction!(study::merge_shards, module)?,
+        wrap_pyfunction!(study::plan_names, module)?,
+        wrap_pyfunction!(track::track, module)?,
+    ] {
+        module.add_function(function)?;
+    }
+    Ok(())
+}

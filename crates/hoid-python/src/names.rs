@@ -1,0 +1,277 @@
+//! Words of Python and what they stand for in the libraries: those of the command line.
+
+use std::{collections::BTreeMap, ops::RangeInclusive};
+
+use hoid_ident::{
+    Constraint, Focus, InitialState, IvMethod, OrderRanges, Prior, SearchMethod,
+    order_search::Criterion,
+    tracking::{Method, Stable},
+};
+use hoid_model::{
+    Detrend, Structure, discretise, remnant::RemnantDiscretisation, remnant_gain::NoiseDefinition,
+    scenario::Realisation,
+};
+
+use crate::errors::{Outcome, bad_option};
+
+/// A word out of a list.
+pub fn word<T: Clone>(option: &str, found: &str, words: &[(&str, T)]) -> Outcome<T> {
+    let lower = found.to_ascii_lowercase().replace('_', "-");
+    match words.iter().find(|(word, _)| *word == lower) {
+        Some((_, value)) => Ok(value.clone()),
+        None => {
+            let known: Vec<String> = words.iter().map(|(word, _)| format!("{word:?}")).collect();
+            Err(bad_option(format!(
+                "{option} is {found:?}, expected one of {}",
+                known.join(", ")
+            )))
+        }
+    }
+}
+
+/// What `identify` fits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    Polynomial(Structure),
+    GreyBox,
+    TimeVarying,
+}
+
+const STRUCTURES: [(&str, Structure); 11] = [
+    ("arx", Structure::Arx),
+    ("armax", Structure::Armax),
+    ("oe", Structure::OutputError),
+    ("bj", Structure::BoxJenkins),
+    ("fir", Structure::Fir),
+    ("ar", Structure::Ar),
+    ("ma", Structure::Ma),
+    ("arma", Structure::Arma),
+    ("ararx", Structure::Ararx),
+    ("ararmax", Structure::Ararmax),
+    ("general", Structure::General),
+];
+
+pub fn structure(found: &str) -> Outcome<Structure> {
+    word("structure", found, &STRUCTURES)
+}
+
+pub fn kind(found: &str) -> Outcome<Kind> {
+    let mut all: Vec<(&str, Kind)> = STRUCTURES.iter().map(|(w, s)| (*w, Kind::Polynomial(*s))).collect();
+    all.extend([("grey-box", Kind::GreyBox), ("time-varying", Kind::TimeVarying)]);
+    word("structure", found, &all)
+}
+
+/// None is the prediction error method.
+pub fn fit_method(found: &str) -> Outcome<Option<IvMethod>> {
+    let words = [
+        ("pem", None),
+        ("iv4", Some(IvMethod::Iv4)),
+        ("sriv", Some(IvMethod::Sriv)),
+        ("rivbj", Some(IvMethod::RivBj)),
+    ];
+    word("method", found, &words)
+}
+
+pub fn focus(found: &str) -> Outcome<Focus> {
+    let words = [("prediction", Focus::Prediction), ("simulation", Focus::Simulation)];
+    word("focus", found, &words)
+}
+
+pub fn search_method(found: &str) -> Outcome<SearchMethod> {
+    let words = [
+        ("auto", SearchMethod::Automatic),
+        ("gn", SearchMethod::GaussNewton),
+        ("lm", SearchMethod::LevenbergMarquardt),
+        ("grad", SearchMethod::SteepestDescent),
+    ];
+    word("search_method", found, &words)
+}
+
+pub fn criterion(found: &str) -> Outcome<Criterion> {
+    let words = [
+        ("loss", Criterion::Loss),
+        ("aic", Criterion::Aic),
+        ("aicc", Criterion::Aicc),
+        ("bic", Criterion::Bic),
+        ("fpe", Criterion::Fpe),
+        ("mdl", Criterion::Mdl),
+        ("yic", Criterion::Yic),
+    ];
+    word("criterion", found, &words)
+}
+
+pub fn initial_state(found: &str) -> Outcome<Option<InitialState>> {
+    let words = [
+        ("auto", None),
+        ("zero", Some(InitialState::Zero)),
+        ("estimate", Some(InitialState::Estimate)),
+        ("backcast", Some(InitialState::Backcast)),
+    ];
+    word("initial_state", found, &words)
+}
+
+pub fn detrend(found: &str) -> Outcome<Detrend> {
+    let words = [
+        ("none", Detrend::None),
+        ("mean", Detrend::Mean),
+        ("linear", Detrend::Linear),
+    ];
+    word("detrend", found, &words)
+}
+
+pub fn noise_definition(found: &str) -> Outcome<NoiseDefinition> {
+    let words = [
+        ("response", NoiseDefinition::Response),
+        ("remnant", NoiseDefinition::Remnant),
+    ];
+    word("noise_definition", found, &words)
+}
+
+pub fn realisation(found: &str) -> Outcome<Realisation> {
+    word(
+        "realisation",
+        found,
+        &[("input", Realisation::Input), ("output", Realisation::Output)],
+    )
+}
+
+pub fn remnant_discretisation(found: &str) -> Outcome<RemnantDiscretisation> {
+    let words = [
+        ("zoh", RemnantDiscretisation::ZeroOrderHold),
+        ("backward-euler", RemnantDiscretisation::BackwardEuler),
+    ];
+    word("discretisation", found, &words)
+}
+
+pub fn tracking_method(found: &str) -> Outcome<Method> {
+    let words = [
+        ("rls", Method::Rls),
+        ("rpem", Method::Rpem),
+        ("physical", Method::Physical),
+        ("window", Method::Window),
+        ("rriv", Method::Refined),
+        ("adaptive", Method::Adaptive),
+    ];
+    word("method", found, &words)
+}
+
+pub fn kept_stable(found: &str) -> Outcome<Stable> {
+    let words = [("predictor", Stable::Predictor), ("noise", Stable::PredictorAndNoise)];
+    word("stable", found, &words)
+}
+
+pub fn discretisation(found: &str, prewarp_rad_s: Option<f64>) -> Outcome<discretise::Method> {
+    let words = [
+        ("zoh", discretise::Method::ZeroOrderHold),
+        ("foh", discretise::Method::FirstOrderHold),
+        ("tustin", discretise::Method::Tustin),
+        (
+            "prewarped",
+            discretise::Method::TustinPrewarped {
+                omega_rad_s: prewarp_rad_s.unwrap_or(f64::NAN),
+            },
+        ),
+        ("forward-euler", discretise::Method::ForwardEuler),
+        ("backward-euler", discretise::Method::BackwardEuler),
+        ("matched", discretise::Method::Matched),
+    ];
+    word("method", found, &words)
+}
+
+/// Both ends included.
+pub fn range(option: &str, ends: (usize, usize)) -> Outcome<RangeInclusive<usize>> {
+    if ends.0 > ends.1 {
+        return Err(bad_option(format!(
+            "{option}: the range {} to {} is empty; give the smaller number first",
+            ends.0, ends.1
+        )));
+    }
+    Ok(ends.0..=ends.1)
+}
+
+/// Orders by name, each a range, in the place of the usual ones.
+pub fn with_orders(mut ranges: OrderRanges, orders: &BTreeMap<String, (usize, usize)>) -> Outcome<OrderRanges> {
+    for (name, ends) in orders {
+        let place = match name.as_str() {
+            "na" => &mut ranges.na,
+            "nb" => &mut ranges.nb,
+            "nc" => &mut ranges.nc,
+            "nd" => &mut ranges.nd,
+            "nf" => &mut ranges.nf,
+            "nk" => &mut ranges.nk,
+            _ => {
+                return Err(bad_option(format!(
+                    "there is no order {name}; expected na, nb, nc, nd, nf or nk"
+                )));
+            }
+        };
+        *place = range(name, *ends)?;
+    }
+    Ok(ranges)
+}
+
+/// Values that are held and bounds, by name.
+pub fn constraints(
+    fixed: BTreeMap<String, f64>,
+    bounds: BTreeMap<String, (f64, f64)>,
+) -> Outcome<BTreeMap<String, Constraint>> {
+    let mut all: BTreeMap<String, Constraint> = BTreeMap::new();
+    for (name, value) in fixed {
+        if !value.is_finite() {
+            return Err(bad_option(format!("fix: {name} is {value}, expected a finite number")));
+        }
+        all.insert(name, Constraint::Fixed(value));
+    }
+    for (name, (low, high)) in bounds {
+        if low.is_nan() || high.is_nan() || low > high {
+            return Err(bad_option(format!(
+                "bound: {name} is {low} to {high}, expected a lower and an upper end in this order"
+            )));
+        }
+        if all.insert(name.clone(), Constraint::Between(low, high)).is_some() {
+            return Err(bad_option(format!("{name} is both fixed and bounded; drop one")));
+        }
+    }
+    Ok(all)
+}
+
+/// Guesses with their weights, by name.
+pub fn priors(guesses: BTreeMap<String, (f64, f64)>) -> Outcome<BTreeMap<String, Prior>> {
+    let one = |(name, (value, weight)): (String, (f64, f64))| {
+        if value.is_finite() && weight.is_finite() && weight >= 0.0 {
+            Ok((name, Prior { value, weight }))
+        } else {
+            Err(bad_option(format!(
+                "prior: {name} is {value} with the weight {weight}, expected finite numbers and a weight that is not negative"
+            )))
+        }
+    };
+    guesses.into_iter().map(one).collect()
+}
+
+/// Theta of a model with these names: every coefficient, each once.
+pub fn theta(names: &[String], start: &BTreeMap<String, f64>) -> Outcome<Vec<f64>> {
+    if let Some(unknown) = start.keys().find(|name| !names.contains(name)) {
+        return Err(bad_option(format!(
+            "start: the model has no coefficient {unknown}; it has {}",
+            names.join(", ")
+        )));
+    }
+    let missing: Vec<&str> = names
+        .iter()
+        .filter(|name| !start.contains_key(*name))
+        .map(String::as_str)
+        .collect();
+    if !missing.is_empty() {
+        return Err(bad_option(format!(
+            "start lacks {}; give all coefficients, or none for the program's own starts",
+            missing.join(", ")
+        )));
+    }
+    if let Some((name, value)) = start.iter().find(|(_, v)| !v.is_finite()) {
+        return Err(bad_option(format!(
+            "start: {name} is {value}, expected a finite number"
+        )));
+    }
+    Ok(names.iter().map(|name| start[name]).collect())
+}

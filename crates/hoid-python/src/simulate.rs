@@ -1,0 +1,202 @@
+//! `hoid.simulate`, `hoid.margins` and `hoid.convert`: scenarios and the operator's conversions.
+
+use std::path::PathBuf;
+
+use hoid_io::{parse_scenario, read_scenario};
+use hoid_model::{
+    ContinuousTransferFunction, DiscreteOperator, ModelError, OperatorParameters, SampleTime,
+    discretise::discretise,
+    margins::{MANUAL_CONTROL_RANGE_RAD_S, margins as margins_of},
+    remnant::HIGHEST_ORDER,
+    scenario::{Condition, Scenario},
+    second_order::HeldSecondOrder,
+    uncertainty::OperatorEstimate,
+};
+use hoid_sim::{Simulator, Stream};
+use numpy::PyArray1;
+use pyo3::{
+    prelude::*,
+    types::{PyDict, PyList},
+};
+
+use crate::{
+    arrays::{array, parts},
+    errors::{Outcome, bad_option},
+    figures, names,
+};
+
+/// A condition, a scenario file, or the text of one.
+fn scenario(condition: Option<&str>, file: Option<PathBuf>, text: Option<&str>) -> Outcome<Scenario> {
+    match (condition, file, text) {
+        (Some(condition), None, None) => Ok(Scenario::condition(condition.parse::<Condition>()?)),
+        (None, Some(file), None) => Ok(read_scenario(&file)?),
+        (None, None, Some(text)) => Ok(parse_scenario(text, "(text)", "scenario")?),
+        _ => Err(bad_option("give condition, as \"C4\", or scenario, one of the two")),
+    }
+}
+
+/// One closed-loop run.
+#[pyfunction]
+#[pyo3(signature = (*, condition, scenario_file, scenario_text, remnant_order, noise_level, noise_definition, remnant_time_constant,
+    sample_time, realisation, seed, cell, replication, keep_run_in))]
+#[allow(clippy::too_many_arguments)]
+pub fn simulate<'py>(
+    py: Python<'py>,
+    condition: Option<String>,
+    scenario_file: Option<PathBuf>,
+    scenario_text: Option<String>,
+    remnant_order: Option<usize>,
+    noise_level: Option<f64>,
+    noise_definition: Option<String>,
+    remnant_time_constant: Option<f64>,
+    sample_time: Option<f64>,
+    realisation: Option<String>,
+    seed: u64,
+    cell: u64,
+    replication: u64,
+    keep_run_in: bool,
+) -> Outcome<Bound<'py, PyDict>> {
+    let mut scenario = scenario(condition.as_deref(), scenario_file, scenario_text.as_deref())?;
+    if let Some(order) = remnant_order {
+        scenario.remnant.order = order;
+    }
+    if let Some(time_constant) = remnant_time_constant {
+        scenario.remnant.time_constant_s = time_constant;
+    }
+    if let Some(ts) = sample_time {
+        scenario.sample_time = SampleTime::new(ts)?;
+    }
+    if let Some(where_) = realisation {
+        scenario.realisation = names::realisation(&where_)?;
+    }
+    let definition = noise_definition.as_deref().map(names::noise_definition).transpose()?;
+    scenario.remnant.strength = scenario
+        .remnant
+        .strength
+        .changed(noise_level, definition)
+        .ok_or_else(|| bad_option("noise_definition needs noise_level: the scenario gives the gain K_n itself"))?;
+    let stream = Stream {
+        seed,
+        cell,
+        replication,
+    };
+    let record = py.detach(|| Simulator::new(&scenario)?.run(stream, keep_run_in))?;
+    Ok(parts(py, record)?)
+}
+
+/// Crossover, margins and remnant gains of a scenario.
+#[pyfunction]
+#[pyo3(signature = (*, condition, scenario_file, scenario_text, state, noise_levels, noise_definition))]
+pub fn margins<'py>(
+    py: Python<'py>,
+    condition: Option<String>,
+    scenario_file: Option<PathBuf>,
+    scenario_text: Option<String>,
+    state: &str,
+    noise_levels: Vec<f64>,
+    noise_definition: &str,
+) -> Outcome<Bound<'py, PyDict>> {
+    let scenario = scenario(condition.as_deref(), scenario_file, scenario_text.as_deref())?;
+    let last = names::word("state", state, &[("initial", false), ("last", true)])?;
+    let state = if last { scenario.last } else { scenario.initial };
+    let open_loop = state
+        .operator
+        .transfer_function()?
+        .series(&state.controlled_element.transfer_function()?);
+    let found = margins_of(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S);
+    let definition = names::noise_definition(noise_definition)?;
+    let all = figures::plain_margins(py, &found)?;
+    let gains = PyList::empty(py);
+    for order in 1..=HIGHEST_ORDER {
+        for &level in &noise_levels {
+            let row = PyDict::new(py);
+            row.set_item("remnant_order", order)?;
+            row.set_item("noise_level", level)?;
+            row.set_item("definition", noise_definition)?;
+            // A level that cannot be reached is a row of the table; anything else is wrong for all of them.
+            match scenario.remnant_gain_for(&state, order, level, definition) {
+                Ok(k_n) => row.set_item("K_n", k_n)?,
+                Err(reason @ ModelError::UnreachableNoiseLevel { .. }) => {
+                    row.set_item("K_n", py.None())?;
+                    row.set_item("reason", reason.to_string())?;
+                }
+                Err(error) => return Err(error.into()),
+            }
+            gains.append(row)?;
+        }
+    }
+    all.set_item("remnant_gain", gains)?;
+    Ok(all)
+}
+
+fn conversion<'py>(
+    py: Python<'py>,
+    discrete: DiscreteOperator,
+    operator: Result<OperatorParameters, hoid_model::NotConvertible>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (all, coefficients) = (PyDict::new(py), PyDict::new(py));
+    let held = discrete.held;
+    coefficients.set_item("f", [held.f1, held.f2])?;
+    coefficients.set_item("b", [held.b0, held.b1])?;
+    coefficients.set_item("nk", discrete.nk)?;
+    all.set_item("sample_time", discrete.sample_time.s())?;
+    all.set_item("discrete", coefficients)?;
+    all.set_item(
+        "operator",
+        figures::operator(py, &operator.map(OperatorEstimate::from))?,
+    )?;
+    Ok(all)
+}
+
+/// Operator parameters of discrete coefficients.
+#[pyfunction]
+#[pyo3(signature = (f, b, nk, sample_time))]
+pub fn convert_discrete<'py>(
+    py: Python<'py>,
+    f: [f64; 2],
+    b: [f64; 2],
+    nk: usize,
+    sample_time: f64,
+) -> Outcome<Bound<'py, PyDict>> {
+    let discrete = DiscreteOperator {
+        held: HeldSecondOrder {
+            b0: b[0],
+            b1: b[1],
+            f1: f[0],
+            f2: f[1],
+        },
+        nk,
+        sample_time: SampleTime::new(sample_time)?,
+    };
+    Ok(conversion(py, discrete, discrete.parameters())?)
+}
+
+/// Discrete coefficients of operator parameters.
+#[pyfunction]
+#[pyo3(signature = (operator, sample_time))]
+pub fn convert_operator<'py>(
+    py: Python<'py>,
+    operator: Vec<(String, f64)>,
+    sample_time: f64,
+) -> Outcome<Bound<'py, PyDict>> {
+    let operator = OperatorParameters::of_names(&operator)?;
+    let discrete = operator.discretise(SampleTime::new(sample_time)?)?;
+    Ok(conversion(py, discrete, Ok(operator))?)
+}
+
+/// A transfer function NUM/DEN by descending powers of s in discrete time: both by ascending powers of q^-1.
+#[pyfunction]
+#[pyo3(signature = (num, den, sample_time, method, prewarp))]
+pub fn discretise_transfer_function<'py>(
+    py: Python<'py>,
+    num: Vec<f64>,
+    den: Vec<f64>,
+    sample_time: f64,
+    method: &str,
+    prewarp: Option<f64>,
+) -> Outcome<[Bound<'py, PyArray1<f64>>; 2]> {
+    let h = ContinuousTransferFunction::new(&num, &den)?;
+    let method = names::discretisation(method, prewarp)?;
+    let discrete = discretise(&h, SampleTime::new(sample_time)?, method)?;
+    Ok([array(py, discrete.num().to_vec()), array(py, discrete.den().to_vec())])
+}

@@ -1,0 +1,216 @@
+//! `hoid.study` and `hoid.group`: plans, shards, merged tables.
+
+use std::path::{Path, PathBuf};
+
+use hoid_study::{
+    NAMED_PLANS, NamedPlan, Outcome as StudyOutcome, Plan, RunOptions, StudyError,
+    group::{Manifest, Pattern, run_group},
+    merge, run,
+};
+use pyo3::{prelude::*, types::PyDict};
+
+use crate::{
+    errors::{Outcome, bad_option},
+    interrupt,
+};
+
+/// Finished, estimates made, and the tables.
+type Left = (bool, u64, Vec<PathBuf>);
+
+fn left(outcome: StudyOutcome) -> Left {
+    (outcome.finished, outcome.estimates, outcome.tables)
+}
+
+/// A plan of Monte Carlo runs.
+#[pyclass(name = "Plan", module = "hoid._hoid", frozen)]
+pub struct PyPlan {
+    plan: Plan,
+}
+
+#[pymethods]
+impl PyPlan {
+    /// From a file, the text of one, or the name of a plan that comes with hoid.
+    #[new]
+    #[pyo3(signature = (*, path=None, text=None, name=None, replications=None))]
+    fn new(path: Option<PathBuf>, text: Option<&str>, name: Option<&str>, replications: Option<u64>) -> Outcome<Self> {
+        let mut plan = match (path, text, name) {
+            (Some(path), None, None) => Plan::read(&path)?,
+            (None, Some(text), None) => Plan::parse(text, "(text)")?,
+            (None, None, Some(name)) => match NamedPlan::find(name) {
+                Some(named) => named.plan()?,
+                None => {
+                    let known: Vec<&str> = NAMED_PLANS.iter().map(|p| p.name).collect();
+                    return Err(bad_option(format!(
+                        "there is no file and no plan of the name {name}; the plans are {}",
+                        known.join(", ")
+                    )));
+                }
+            },
+            _ => return Err(bad_option("give one of path, text and name")),
+        };
+        if let Some(replications) = replications {
+            plan = plan.with_replications(replications)?;
+        }
+        Ok(Self { plan })
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.plan.name
+    }
+
+    #[getter]
+    fn title(&self) -> &str {
+        &self.plan.title
+    }
+
+    #[getter]
+    fn description(&self) -> &str {
+        &self.plan.description
+    }
+
+    #[getter]
+    fn seed(&self) -> u64 {
+        self.plan.seed
+    }
+
+    #[getter]
+    fn replications(&self) -> u64 {
+        self.plan.replications
+    }
+
+    #[getter]
+    fn estimates(&self) -> u64 {
+        self.plan.estimates()
+    }
+
+    #[getter]
+    fn text(&self) -> &str {
+        self.plan.text()
+    }
+
+    #[getter]
+    fn sha256(&self) -> String {
+        self.plan.hash()
+    }
+
+    #[getter]
+    fn estimators(&self) -> Vec<String> {
+        self.plan.estimators.iter().map(|e| e.label.clone()).collect()
+    }
+
+    #[getter]
+    fn cells<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let one = |cell: &hoid_study::plan::Cell| {
+            let all = PyDict::new(py);
+            all.set_item("cell", cell.index)?;
+            all.set_item("scenario", &cell.scenario)?;
+            all.set_item("condition", &cell.condition)?;
+            all.set_item("replications", cell.replications)?;
+            for axis in &cell.axes {
+                all.set_item(&axis.key, axis.value.to_string())?;
+            }
+            Ok(all)
+        };
+        self.plan.cells.iter().map(one).collect()
+    }
+
+    fn __repr__(&self) -> String {
+        let p = &self.plan;
+        format!(
+            "<hoid.Plan {}: {} cells, {} estimators, {} replications, {} estimates>",
+            p.name,
+            p.cells.len(),
+            p.estimators.len(),
+            p.replications,
+            p.estimates()
+        )
+    }
+
+    /// Runs it, or a share of it, into a directory.
+    #[pyo3(signature = (directory, *, shard, jobs, resume, csv, progress))]
+    #[allow(clippy::too_many_arguments)]
+    fn run(
+        &self,
+        py: Python<'_>,
+        directory: PathBuf,
+        shard: Option<String>,
+        jobs: Option<usize>,
+        resume: bool,
+        csv: bool,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> Outcome<Left> {
+        let options = RunOptions {
+            shard: shard.map(|s| s.parse()).transpose()?,
+            jobs,
+            resume,
+            csv,
+        };
+        let plan = self.plan.clone();
+        let total = plan.estimates();
+        let outcome = interrupt::run(py, total, progress.as_ref(), true, move |standing| {
+            run(&plan, &directory, &options, &|p| standing.set(p.done, p.total), &|| {
+                standing.goes_on()
+            })
+        })?;
+        Ok(left(outcome))
+    }
+}
+
+/// Names and titles of the plans that come with hoid.
+#[pyfunction]
+pub fn plan_names() -> Outcome<Vec<(String, String)>> {
+    let one = |named: &NamedPlan| -> Result<(String, String), StudyError> {
+        Ok((named.name.to_owned(), named.plan()?.title))
+    };
+    Ok(NAMED_PLANS.iter().map(one).collect::<Result<_, _>>()?)
+}
+
+/// Joins the shards of a study.
+#[pyfunction]
+#[pyo3(signature = (shards, directory, csv))]
+pub fn merge_shards(py: Python<'_>, shards: Vec<PathBuf>, directory: PathBuf, csv: bool) -> Outcome<Left> {
+    Ok(left(py.detach(|| merge(&shards, &directory, csv))?))
+}
+
+/// Analyses the runs of a manifest.
+#[pyfunction]
+#[pyo3(signature = (manifest, directory, *, jobs, resume, csv, progress))]
+pub fn group(
+    py: Python<'_>,
+    manifest: PathBuf,
+    directory: PathBuf,
+    jobs: Option<usize>,
+    resume: bool,
+    csv: bool,
+    progress: Option<Bound<'_, PyAny>>,
+) -> Outcome<Left> {
+    let found = Manifest::read(&manifest)?;
+    let base = manifest.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
+    let options = RunOptions {
+        jobs,
+        resume,
+        csv,
+        ..RunOptions::default()
+    };
+    let runs = found.runs.iter().filter(|run| run.counts).count() as u64;
+    let outcome = interrupt::run(py, runs, progress.as_ref(), true, move |standing| {
+        run_group(
+            &found,
+            &base,
+            &directory,
+            &options,
+            &|p| standing.set(p.done, p.total),
+            &|| standing.goes_on(),
+        )
+    })?;
+    Ok(left(outcome))
+}
+
+/// The manifest of the files of a directory whose names match a pattern, and the files that do not.
+#[pyfunction]
+#[pyo3(signature = (directory, pattern))]
+pub fn group_manifest(directory: PathBuf, pattern: &str) -> Outcome<(String, Vec<String>)> {
+    let (manifest, others) = Manifest::of_directory(&directory, &Pattern::new(pattern)?)?;
+    Ok((manifest.text(), others))
+}

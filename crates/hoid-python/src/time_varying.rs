@@ -1,0 +1,132 @@
+//! The fit of an operator whose gains change once.
+
+use hoid_ident::{GainsAt, TimeVaryingFit, validation::whiteness};
+use hoid_model::uncertainty::Estimate;
+use numpy::{PyArray1, PyArray2};
+use pyo3::{prelude::*, types::PyDict};
+
+use crate::{
+    arrays::{self, Wanted, array, matrix},
+    errors::Outcome,
+    figures::{self, Pair, error_or_nan, pair},
+};
+
+/// The package wraps it in `hoid.TimeVaryingFit`.
+#[pyclass(name = "TimeVaryingFit", module = "hoid._hoid", frozen)]
+pub struct PyTimeVaryingFit {
+    fit: TimeVaryingFit,
+}
+
+impl PyTimeVaryingFit {
+    pub fn new(fit: TimeVaryingFit) -> Self {
+        Self { fit }
+    }
+}
+
+#[pymethods]
+impl PyTimeVaryingFit {
+    /// Name, estimate, unit and remark of each parameter.
+    #[getter]
+    fn parameters(&self) -> Vec<(String, Pair, &'static str, Option<String>)> {
+        let one = |p: hoid_ident::ChangeParameter| (p.name, pair(p.estimate), p.unit, p.remark.map(|r| r.to_string()));
+        self.fit.parameters().into_iter().map(one).collect()
+    }
+
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        let Some(c) = self.fit.covariance() else {
+            return Ok(None);
+        };
+        let columns = (c.len() as f64).sqrt().round() as usize;
+        matrix(py, c, columns).map(Some)
+    }
+
+    #[getter]
+    fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (fit, all) = (&self.fit, PyDict::new(py));
+        all.set_item("loss", fit.loss())?;
+        all.set_item("innovation_variance", fit.innovation_variance())?;
+        all.set_item("residuals", fit.residual_count())?;
+        all.set_item("initial_states", fit.state_count())?;
+        Ok(all)
+    }
+
+    #[getter]
+    fn termination<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (found, all) = (self.fit.termination(), PyDict::new(py));
+        all.set_item("reason", found.reason.to_string())?;
+        all.set_item("converged", found.converged())?;
+        all.set_item("iterations", found.iterations)?;
+        all.set_item("start", self.fit.start())?;
+        Ok(all)
+    }
+
+    /// Whether there is a change, and its comparison with the operator that does not change.
+    #[getter]
+    fn change<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (c, all) = (self.fit.comparison(), PyDict::new(py));
+        all.set_item("found", self.fit.change_found())?;
+        all.set_item("likelihood_ratio", c.likelihood_ratio)?;
+        all.set_item("extra_parameters", c.extra_parameters)?;
+        all.set_item("bic_difference", c.bic_difference)?;
+        all.set_item("t_M_interval", self.fit.midpoint_interval())?;
+        all.set_item("G_interval", self.fit.rate_interval())?;
+        Ok(all)
+    }
+
+    #[getter]
+    fn initial<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        figures::operator(py, &Ok(self.fit.initial_operator()))
+    }
+
+    #[getter]
+    fn last<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        figures::operator(py, &Ok(self.fit.last_operator()))
+    }
+
+    /// `t`, and K_e, T_L and K_e_dot at these times, each with its standard error.
+    fn gains<'py>(&self, py: Python<'py>, times: Vec<f64>) -> PyResult<Bound<'py, PyDict>> {
+        let gains: Vec<GainsAt> = times.iter().map(|t| self.fit.gains_at(*t)).collect();
+        let all = PyDict::new(py);
+        all.set_item("t", array(py, times))?;
+        type Gain = fn(&GainsAt) -> Estimate;
+        let columns: [(&str, Gain); 3] = [("K_e", |g| g.k_e), ("T_L", |g| g.t_l_s), ("K_e_dot", |g| g.k_e_dot)];
+        for (name, of) in columns {
+            all.set_item(name, array(py, gains.iter().map(|g| of(g).value).collect()))?;
+            let errors = gains.iter().map(|g| error_or_nan(of(g))).collect();
+            all.set_item(format!("{name}_se"), array(py, errors))?;
+        }
+        Ok(all)
+    }
+
+    fn residuals<'py>(
+        &self,
+        py: Python<'py>,
+        record: &Bound<'py, PyAny>,
+    ) -> Outcome<(usize, Bound<'py, PyArray1<f64>>)> {
+        let record = arrays::record(record, Wanted::Only(&[]))?;
+        let found = py.detach(|| self.fit.residuals(&record))?;
+        Ok((found.first, array(py, found.values)))
+    }
+
+    fn simulate<'py>(
+        &self,
+        py: Python<'py>,
+        record: &Bound<'py, PyAny>,
+    ) -> Outcome<(usize, Bound<'py, PyArray1<f64>>)> {
+        let record = arrays::record(record, Wanted::Only(&[]))?;
+        let found = py.detach(|| self.fit.simulate(&record))?;
+        Ok((found.first, array(py, found.values)))
+    }
+
+    /// Whiteness of the residuals of a record.
+    fn ljung_box<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>) -> Outcome<Option<Bound<'py, PyDict>>> {
+        let record = arrays::record(record, Wanted::Only(&[]))?;
+        let fit = &self.fit;
+        let test = py.detach(|| {
+            fit.residuals(&record)
+                .map(|found| whiteness(&found.values, fit.d().len()))
+        })?;
+        Ok(figures::ljung_box(py, test.as_ref())?)
+    }
+}

@@ -1,0 +1,206 @@
+//! `hoid.track`: a recursive estimate over a record.
+
+use hoid_ident::{
+    Choice, IdentError,
+    tracking::{StartAt, Trace, TrackOptions, track as track_record},
+};
+use hoid_io::{ColumnValues, OutputColumn, OutputTable};
+use numpy::PyArray1;
+use pyo3::{prelude::*, types::PyDict};
+
+use crate::{
+    arrays::{self, Wanted, array},
+    errors::Outcome,
+    figures,
+    fit::PyFit,
+    interrupt, recursion,
+};
+
+/// Tracks a record; `options` are those of the recursion, all besides concern the record.
+#[pyfunction]
+#[pyo3(signature = (record, options, *, start_span, update_from, moving_average, every, progress))]
+#[allow(clippy::too_many_arguments)]
+pub fn track<'py>(
+    py: Python<'py>,
+    record: &Bound<'py, PyAny>,
+    options: &Bound<'py, PyDict>,
+    start_span: Option<(f64, f64)>,
+    update_from: Option<f64>,
+    moving_average: Option<usize>,
+    every: usize,
+    progress: Option<Bound<'py, PyAny>>,
+) -> Outcome<PyTrace> {
+    let record = arrays::record(record, Wanted::Only(&["f_t"]))?;
+    let plan = recursion::plan(options, record.sample_time())?;
+    let begin = record.time_s(0);
+    let third = begin + record.len() as f64 * record.sample_time().s() / 3.0;
+    let span_s = start_span.unwrap_or((begin, third));
+    let candidates = plan.ranges().combinations()?.len() as u64;
+    let (trace, choice) = interrupt::run(py, candidates, progress.as_ref(), false, move |standing| {
+        let (options, choice) = if plan.is_settled() {
+            (plan.options().clone(), None)
+        } else {
+            plan.choose(&record.span(span_s.0, span_s.1)?, &|| standing.inc())?
+        };
+        let options = TrackOptions {
+            start: match options.start {
+                StartAt::Span(_) => StartAt::Span(Some(span_s)),
+                other => other,
+            },
+            update_from_s: update_from,
+            ..options
+        };
+        let trace = track_record(&record, &options, every)?;
+        Ok::<_, IdentError>((trace.moving_average(moving_average.unwrap_or(1)), choice))
+    })?;
+    Ok(PyTrace { trace, choice })
+}
+
+/// The estimate at every sample that was kept; the package wraps it in `hoid.Trace`.
+#[pyclass(name = "Trace", module = "hoid._hoid", frozen)]
+pub struct PyTrace {
+    trace: Trace,
+    choice: Option<Choice>,
+}
+
+#[pymethods]
+impl PyTrace {
+    fn __len__(&self) -> usize {
+        self.trace.len()
+    }
+
+    #[getter]
+    fn method(&self) -> &'static str {
+        self.trace.options().method.name()
+    }
+
+    #[getter]
+    fn structure(&self) -> &'static str {
+        self.trace.options().structure.name()
+    }
+
+    #[getter]
+    fn orders<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        figures::orders(py, &self.trace.options().orders)
+    }
+
+    #[getter]
+    fn parameter_names(&self) -> Vec<String> {
+        self.trace.parameter_names()
+    }
+
+    #[getter]
+    fn operator_names(&self) -> Vec<&'static str> {
+        self.trace.operator_columns()
+    }
+
+    #[getter]
+    fn updated_from(&self) -> f64 {
+        self.trace.updated_from_s()
+    }
+
+    #[getter]
+    fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (counts, all) = (self.trace.counts(), PyDict::new(py));
+        all.set_item("samples", counts.samples)?;
+        all.set_item("skipped", counts.skipped)?;
+        all.set_item("steps_shortened", counts.shortened)?;
+        Ok(all)
+    }
+
+    /// The changes that were declared, for the method adaptive.
+    #[getter]
+    fn changes<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let one = |(t, c): &(f64, hoid_ident::tracking::Change)| {
+            let all = PyDict::new(py);
+            all.set_item("t", t)?;
+            all.set_item("seconds_ago", c.seconds_ago)?;
+            all.set_item("log_odds", c.odds)?;
+            all.set_item("K_e", c.k_e.map(figures::pair))?;
+            all.set_item("K_e_dot", c.k_e_dot.map(figures::pair))?;
+            all.set_item("T_L", c.t_l_s)?;
+            all.set_item("innovation_variance", c.innovation_variance)?;
+            all.set_item("z", c.z)?;
+            Ok(all)
+        };
+        self.trace.changes().iter().map(one).collect()
+    }
+
+    /// Number of fits that failed, and why the last did, for the method window.
+    #[getter]
+    fn failures(&self) -> Option<(usize, String)> {
+        self.trace.failures().cloned()
+    }
+
+    /// The batch fit that the recursion started from.
+    #[getter]
+    fn start(&self) -> Option<PyFit> {
+        let fit = self.trace.start()?.clone();
+        Some(PyFit::new(fit, self.choice.clone(), None, 1))
+    }
+
+    /// All columns by name, as in the file of a trace: numbers, and whole numbers as such.
+    fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let trace = &self.trace;
+        let (columns, convertible) = py.detach(|| {
+            let operators = trace.operators();
+            let convertible: Vec<u64> = operators.iter().map(|o| u64::from(o.is_ok())).collect();
+            (trace.estimate_columns(&operators), convertible)
+        });
+        let all = PyDict::new(py);
+        for (name, values) in columns {
+            all.set_item(name, array(py, values))?;
+        }
+        all.set_item("convertible", PyArray1::from_vec(py, convertible))?;
+        all.set_item("innovation", PyArray1::from_slice(py, trace.innovation()))?;
+        if !trace.change_odds().is_empty() {
+            all.set_item("change_log_odds", PyArray1::from_slice(py, trace.change_odds()))?;
+        }
+        all.set_item("steps_shortened", PyArray1::from_slice(py, trace.steps_shortened()))?;
+        Ok(all)
+    }
+
+    #[getter]
+    fn innovation_variance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, self.trace.innovation_variance())
+    }
+
+    /// The operator of a row.
+    fn operator<'py>(&self, py: Python<'py>, row: usize) -> PyResult<Option<Bound<'py, PyDict>>> {
+        if row >= self.trace.len() {
+            return Err(pyo3::exceptions::PyIndexError::new_err(format!(
+                "row {row}: the trace has {} rows",
+                self.trace.len()
+            )));
+        }
+        figures::operator(py, &self.trace.operator(row))
+    }
+
+    /// Writes the columns into a file, with comments above them where the format has such.
+    fn write(&self, py: Python<'_>, path: std::path::PathBuf, comments: Vec<String>) -> Outcome<()> {
+        let trace = &self.trace;
+        py.detach(|| {
+            let operators = trace.operators();
+            let column = |name: &str, values: ColumnValues| OutputColumn {
+                name: name.to_owned(),
+                values,
+            };
+            let mut columns: Vec<OutputColumn> = trace
+                .estimate_columns(&operators)
+                .into_iter()
+                .map(|(name, values)| column(&name, ColumnValues::Real(values)))
+                .collect();
+            let convertible = operators.iter().map(|o| u64::from(o.is_ok())).collect();
+            columns.push(column("convertible", ColumnValues::Whole(convertible)));
+            columns.push(column("innovation", ColumnValues::Real(trace.innovation().to_vec())));
+            if !trace.change_odds().is_empty() {
+                let odds = trace.change_odds().to_vec();
+                columns.push(column("change_log_odds", ColumnValues::Real(odds)));
+            }
+            let shortened = trace.steps_shortened().to_vec();
+            columns.push(column("steps_shortened", ColumnValues::Whole(shortened)));
+            hoid_io::write_table(&path, &OutputTable { comments, columns })
+        })?;
+        Ok(())
+    }
+}

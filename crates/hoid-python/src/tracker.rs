@@ -1,0 +1,304 @@
+//! `hoid.Tracker`: a recursive estimate, live.
+
+use hoid_ident::{
+    Choice, IdentError,
+    tracking::{Live, Sample, TrackPlan, Tracker, WarmUp},
+};
+use hoid_model::{Record, SampleTime};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
+use pyo3::{prelude::*, types::PyDict};
+
+use crate::{
+    arrays::{self, Wanted, array, matrix},
+    errors::{Outcome, bad_option},
+    figures,
+    fit::PyFit,
+    recursion,
+};
+
+/// Longest warm-up in samples.
+const LONGEST_WARM_UP: usize = 10_000_000;
+
+/// What a tracker was, to be made again: orders, numbers of the tracker, numbers of the warm-up.
+type Saved<'py> = (Option<Bound<'py, PyDict>>, Bound<'py, PyArray1<f64>>);
+
+/// The package derives `hoid.Tracker` from it.
+#[pyclass(name = "Tracker", module = "hoid._hoid", subclass)]
+pub struct PyTracker {
+    plan: TrackPlan,
+    live: Live,
+    choice: Option<Choice>,
+    sample_time: SampleTime,
+}
+
+/// Searches what is open on the record of the start, and warms the filters with it.
+fn started(plan: &TrackPlan, record: &Record) -> Result<(Tracker, Option<Choice>), IdentError> {
+    let (options, choice) = plan.choose(record, &|| {})?;
+    let mut tracker = Tracker::new(&options, Some(record), record.sample_time())?;
+    let reference = record.channel("f_t");
+    for k in 0..record.len() {
+        let sample = Sample {
+            e: record.input().get(k).copied().unwrap_or(0.0),
+            u: record.output()[k],
+            reference: reference.map(|r| r[k]),
+        };
+        tracker.take(sample, false);
+    }
+    Ok((tracker, choice))
+}
+
+impl PyTracker {
+    fn tracker(&self) -> Outcome<&Tracker> {
+        match &self.live {
+            Live::Tracking(tracker) => Ok(tracker),
+            Live::Collecting(warm_up) => Err(bad_option(format!(
+                "the tracker is warming up: it has {} of {} samples; look at .ready first",
+                warm_up.collected, warm_up.needed
+            ))),
+        }
+    }
+
+    fn take(&mut self, sample: Sample, update: bool) -> f64 {
+        if let (Live::Tracking(tracker), false) = (&mut self.live, update) {
+            return tracker.take(sample, false).innovation.unwrap_or(f64::NAN);
+        }
+        let plan = &self.plan;
+        let taken = self.live.take(sample, &|record| plan.choose(record, &|| {}));
+        if let Some((_, choice)) = taken.started {
+            self.choice = choice;
+        }
+        taken.outcome.and_then(|o| o.innovation).unwrap_or(f64::NAN)
+    }
+}
+
+#[pymethods]
+impl PyTracker {
+    #[new]
+    #[pyo3(signature = (options, sample_time, warm_up, record))]
+    fn new(
+        py: Python<'_>,
+        options: &Bound<'_, PyDict>,
+        sample_time: f64,
+        warm_up: usize,
+        record: Option<Bound<'_, PyAny>>,
+    ) -> Outcome<Self> {
+        let sample_time = SampleTime::new(sample_time)?;
+        let plan = recursion::plan(options, sample_time)?;
+        if !(1..=LONGEST_WARM_UP).contains(&warm_up) {
+            return Err(bad_option(
+                "warm_up: expected a time in s of one sample to 10 million samples",
+            ));
+        }
+        if let Some(record) = record {
+            let record = arrays::record(&record, Wanted::Only(&["f_t"]))?;
+            if !record.sample_time().matches(sample_time) {
+                return Err(bad_option(format!(
+                    "the record of the start has a sample time of {} s, the tracker one of {} s",
+                    record.sample_time().s(),
+                    sample_time.s()
+                )));
+            }
+            let (tracker, choice) = py.detach(|| started(&plan, &record))?;
+            return Ok(Self {
+                plan,
+                live: Live::Tracking(Box::new(tracker)),
+                choice,
+                sample_time,
+            });
+        }
+        Ok(Self {
+            live: Live::new(plan.options(), warm_up, sample_time)?,
+            plan,
+            choice: None,
+            sample_time,
+        })
+    }
+
+    /// Takes one sample; returns the innovation, NaN at a fault and during the warm-up.
+    #[pyo3(signature = (e, u, f_t=None, update=true))]
+    fn step(&mut self, py: Python<'_>, e: f64, u: f64, f_t: Option<f64>, update: bool) -> f64 {
+        let sample = Sample { e, u, reference: f_t };
+        match self.live {
+            Live::Tracking(_) => self.take(sample, update),
+            // The last sample of the warm-up brings the fit.
+            Live::Collecting(_) => py.detach(|| self.take(sample, update)),
+        }
+    }
+
+    /// Takes samples one after the other; returns their innovations.
+    #[pyo3(signature = (e, u, f_t, update))]
+    fn take_all<'py>(
+        &mut self,
+        py: Python<'py>,
+        e: PyReadonlyArray1<'py, f64>,
+        u: PyReadonlyArray1<'py, f64>,
+        f_t: Option<PyReadonlyArray1<'py, f64>>,
+        update: bool,
+    ) -> Outcome<Bound<'py, PyArray1<f64>>> {
+        let slice = |array: &'_ PyReadonlyArray1<'py, f64>| array.as_slice().map(<[f64]>::len);
+        let n = slice(&u).map_err(PyErr::from)?;
+        for (name, other) in [("e", Some(&e)), ("f_t", f_t.as_ref())] {
+            let found = other.map_or(Ok(n), slice).map_err(PyErr::from)?;
+            if found != n {
+                return Err(bad_option(format!(
+                    "{name} has {found} samples, u has {n}; give as many of each"
+                )));
+            }
+        }
+        let (e, u) = (e.as_slice().map_err(PyErr::from)?, u.as_slice().map_err(PyErr::from)?);
+        let f_t = match &f_t {
+            Some(array) => Some(array.as_slice().map_err(PyErr::from)?),
+            None => None,
+        };
+        let innovations = py.detach(|| {
+            (0..n)
+                .map(|k| {
+                    let sample = Sample {
+                        e: e[k],
+                        u: u[k],
+                        reference: f_t.map(|f| f[k]),
+                    };
+                    self.take(sample, update)
+                })
+                .collect()
+        });
+        Ok(array(py, innovations))
+    }
+
+    /// True once there is an estimate.
+    #[getter]
+    fn ready(&self) -> bool {
+        matches!(self.live, Live::Tracking(_))
+    }
+
+    /// Why the last start fit failed, or the warm-up began anew.
+    #[getter]
+    fn trouble(&self) -> Option<String> {
+        match &self.live {
+            Live::Tracking(tracker) => tracker.failures().map(|(_, reason)| reason),
+            Live::Collecting(warm_up) => warm_up.trouble.clone(),
+        }
+    }
+
+    #[getter]
+    fn sample_time(&self) -> f64 {
+        self.sample_time.s()
+    }
+
+    #[getter]
+    fn method(&self) -> &'static str {
+        self.plan.options().method.name()
+    }
+
+    #[getter]
+    fn structure(&self) -> &'static str {
+        self.plan.options().structure.name()
+    }
+
+    #[getter]
+    fn orders<'py>(&self, py: Python<'py>) -> Outcome<Bound<'py, PyDict>> {
+        Ok(figures::orders(py, &self.tracker()?.options().orders)?)
+    }
+
+    #[getter]
+    fn parameter_names(&self) -> Outcome<Vec<String>> {
+        Ok(self.tracker()?.parameter_names())
+    }
+
+    #[getter]
+    fn theta<'py>(&self, py: Python<'py>) -> Outcome<Bound<'py, PyArray1<f64>>> {
+        Ok(PyArray1::from_slice(py, self.tracker()?.theta()))
+    }
+
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> Outcome<Option<Bound<'py, PyArray2<f64>>>> {
+        let tracker = self.tracker()?;
+        let columns = tracker.theta().len();
+        match tracker.covariance() {
+            Some(c) => Ok(Some(matrix(py, c, columns)?)),
+            None => Ok(None),
+        }
+    }
+
+    #[getter]
+    fn parameters(&self) -> Outcome<Vec<(String, figures::Pair)>> {
+        let tracker = self.tracker()?;
+        let estimates = tracker.parameters().into_iter().map(figures::pair);
+        Ok(tracker.parameter_names().into_iter().zip(estimates).collect())
+    }
+
+    #[getter]
+    fn operator<'py>(&self, py: Python<'py>) -> Outcome<Option<Bound<'py, PyDict>>> {
+        Ok(figures::operator(py, &self.tracker()?.operator())?)
+    }
+
+    #[getter]
+    fn innovation_variance(&self) -> Outcome<f64> {
+        Ok(self.tracker()?.innovation_variance())
+    }
+
+    #[getter]
+    fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        let (samples, skipped, shortened) = match &self.live {
+            Live::Tracking(tracker) => {
+                let c = tracker.counts();
+                (c.samples, c.skipped, c.shortened)
+            }
+            Live::Collecting(warm_up) => (warm_up.collected as u64, 0, 0),
+        };
+        all.set_item("samples", samples)?;
+        all.set_item("skipped", skipped)?;
+        all.set_item("steps_shortened", shortened)?;
+        Ok(all)
+    }
+
+    /// The batch fit that it started from; None when it was given a start, or came out of a pickle.
+    #[getter]
+    fn start(&self) -> Option<PyFit> {
+        let Live::Tracking(tracker) = &self.live else {
+            return None;
+        };
+        Some(PyFit::new(tracker.start()?.clone(), self.choice.clone(), None, 1))
+    }
+
+    /// The orders, once there is a tracker, and all that changes as numbers.
+    fn saved<'py>(&mut self, py: Python<'py>) -> PyResult<Saved<'py>> {
+        Ok(match &mut self.live {
+            Live::Tracking(tracker) => {
+                let orders = figures::orders(py, &tracker.options().orders)?;
+                (Some(orders), array(py, tracker.saved()))
+            }
+            Live::Collecting(warm_up) => (None, array(py, warm_up.saved())),
+        })
+    }
+
+    /// Makes it what `saved` was asked of.
+    fn restore(
+        &mut self,
+        orders: Option<std::collections::BTreeMap<String, usize>>,
+        numbers: PyReadonlyArray1<'_, f64>,
+    ) -> Outcome<()> {
+        let numbers = numbers.as_slice().map_err(PyErr::from)?;
+        let wrong = || bad_option("the saved numbers are those of a tracker with other options");
+        self.live = match orders {
+            None => Live::Collecting(WarmUp::restored(self.sample_time, numbers).ok_or_else(wrong)?),
+            Some(orders) => {
+                let mut all = self.plan.options().orders;
+                for (name, place) in [
+                    ("na", &mut all.na),
+                    ("nb", &mut all.nb),
+                    ("nc", &mut all.nc),
+                    ("nd", &mut all.nd),
+                    ("nf", &mut all.nf),
+                    ("nk", &mut all.nk),
+                ] {
+                    *place = *orders.get(name).ok_or_else(wrong)?;
+                }
+                let options = self.plan.with_orders(all);
+                Live::Tracking(Box::new(Tracker::restored(&options, self.sample_time, numbers)?))
+            }
+        };
+        Ok(())
+    }
+}

@@ -1,0 +1,68 @@
+"""What Python adds: a fit and a step, two threads, and the memory of large arrays.
+
+Compare the first lines with those of ``cargo run --release -p hoid --example overhead``, on a machine at rest, with a release build of the
+module (``pip install ./python``).
+"""
+
+from __future__ import annotations
+
+import resource
+import statistics
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+import hoid
+
+
+def median(runs: int, work: Callable[[], object]) -> float:
+    times = []
+    for _ in range(runs):
+        begun = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - begun)
+    return statistics.median(times)
+
+
+def main() -> None:
+    record = hoid.simulate("C1", seed=1)
+    for structure, runs, orders in (("arx", 400, {}), ("bj", 200, {"nd": 1})):
+        seconds = median(runs, lambda: hoid.identify(record, structure, nk=29, **orders))
+        print(f"identify {structure:4}  {seconds * 1e6:9.1f} us")
+    start = hoid.identify(record, nk=29, nd=1).parameters
+    e, u = record.e.tolist(), record.u.tolist()
+    for method in ("rpem", "physical"):
+        tracker = hoid.Tracker(method, nk=29, start=start)
+        step = tracker.step
+
+        def steps() -> None:
+            for x, y in zip(e, u):
+                step(x, y)
+
+        each = median(20, steps) / len(e)
+        many = median(20, lambda: tracker.update(record.e, record.u)) / len(e)
+        print(f"step {method:8}  {each * 1e6:9.3f} us; by update {many * 1e6:.3f} us")
+
+    def fits(_: int) -> None:
+        for _ in range(40):
+            hoid.identify(record, nk=29, nd=1)
+
+    one = median(5, lambda: fits(0))
+    with ThreadPoolExecutor(2) as pool:
+        two = median(5, lambda: list(pool.map(fits, range(2))))
+    print(f"40 fits in one thread {one:.3f} s, 40 in each of two {two:.3f} s: {two / one:.2f} times")
+
+    n = 10_000_000
+    e, u = (np.random.default_rng(k).normal(size=n) for k in (0, 1))
+    tracker = hoid.Tracker("rls", structure="arx", na=1, nb=1, nk=1, start="nothing")
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    hoid.Record(e=e, u=u, sample_time=0.01)
+    made = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    tracker.update(e[: n // 2], u[: n // 2])
+    print(f"arrays of {2 * e.nbytes / 1e6:.0f} MB: resident memory grows by {(made - before) / 1e3:.0f} MB while a record is made (its check)")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,354 @@
+"""The native module. Users find its parts, wrapped, in `hoid`; a test compares these stubs with it."""
+
+from collections.abc import Callable, Sequence
+from os import PathLike
+from typing import Any, final
+
+import numpy as np
+import numpy.typing as npt
+from typing_extensions import disjoint_base
+
+from .record import Record
+
+_Array = npt.NDArray[np.float64]
+_Path = str | PathLike[str]
+_Pair = tuple[float, float | None]
+_Ends = tuple[int, int]
+_Progress = Callable[[int, int], object] | None
+_Left = tuple[bool, int, list[Any]]
+
+__all__ = [
+    "DescribingFunction",
+    "Fit",
+    "Plan",
+    "TimeVaryingFit",
+    "Trace",
+    "Tracker",
+    "__version__",
+    "check_record",
+    "convert_discrete",
+    "convert_operator",
+    "describing_function",
+    "detrended",
+    "discretise_transfer_function",
+    "group",
+    "group_manifest",
+    "identify",
+    "margins",
+    "merge_shards",
+    "plan_names",
+    "read",
+    "read_table",
+    "simulate",
+    "track",
+    "write",
+]
+
+__version__: str
+
+@final
+class DescribingFunction:
+    def columns(self) -> dict[str, npt.NDArray[Any]]: ...
+    @property
+    def per_run(self) -> list[npt.NDArray[np.complex128]]: ...
+    @property
+    def remnant_spectrum(self) -> list[_Array]: ...
+    @property
+    def figures(self) -> dict[str, Any]: ...
+    def gain_lead_delay(self, *, lead: bool, weights: str, delay: tuple[float, float]) -> dict[str, Any]: ...
+    def margins(self, num: list[float], den: list[float]) -> dict[str, Any]: ...
+
+@final
+class Fit:
+    @property
+    def structure(self) -> str: ...
+    @property
+    def title(self) -> str: ...
+    @property
+    def orders(self) -> dict[str, int]: ...
+    @property
+    def sample_time(self) -> float: ...
+    @property
+    def parameters(self) -> list[tuple[str, _Pair]]: ...
+    @property
+    def covariance(self) -> _Array | None: ...
+    @property
+    def polynomials(self) -> dict[str, _Array]: ...
+    @property
+    def figures(self) -> dict[str, Any]: ...
+    @property
+    def termination(self) -> dict[str, Any]: ...
+    @property
+    def stable(self) -> bool: ...
+    @property
+    def operator(self) -> dict[str, Any] | None: ...
+    @property
+    def operators(self) -> list[dict[str, Any] | None]: ...
+    @property
+    def roots(self) -> list[dict[str, Any]]: ...
+    @property
+    def candidates(self) -> list[dict[str, Any]]: ...
+    @property
+    def criterion(self) -> str | None: ...
+    @property
+    def delay_interval(self) -> _Ends | None: ...
+    def remnant(self, discretisation: str) -> dict[str, Any] | None: ...
+    def quality(self, records: Sequence[Record]) -> dict[str, float]: ...
+    def predict(self, record: Record, horizon: int) -> tuple[int, _Array]: ...
+    def simulate(self, record: Record) -> tuple[int, _Array]: ...
+    def residuals(self, record: Record) -> tuple[int, _Array]: ...
+    def validate(self, record: Record) -> dict[str, Any]: ...
+    def frequency_response(self, omega: _Array) -> list[_Array]: ...
+    def margins(self, num: list[float], den: list[float]) -> dict[str, Any]: ...
+
+@final
+class Plan:
+    def __new__(
+        cls,
+        *,
+        path: _Path | None = None,
+        text: str | None = None,
+        name: str | None = None,
+        replications: int | None = None,
+    ) -> Plan: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def title(self) -> str: ...
+    @property
+    def description(self) -> str: ...
+    @property
+    def seed(self) -> int: ...
+    @property
+    def replications(self) -> int: ...
+    @property
+    def estimates(self) -> int: ...
+    @property
+    def text(self) -> str: ...
+    @property
+    def sha256(self) -> str: ...
+    @property
+    def estimators(self) -> list[str]: ...
+    @property
+    def cells(self) -> list[dict[str, Any]]: ...
+    def run(
+        self,
+        directory: _Path,
+        *,
+        shard: str | None,
+        jobs: int | None,
+        resume: bool,
+        csv: bool,
+        progress: _Progress,
+    ) -> _Left: ...
+
+@final
+class TimeVaryingFit:
+    @property
+    def parameters(self) -> list[tuple[str, _Pair, str, str | None]]: ...
+    @property
+    def covariance(self) -> _Array | None: ...
+    @property
+    def figures(self) -> dict[str, Any]: ...
+    @property
+    def termination(self) -> dict[str, Any]: ...
+    @property
+    def change(self) -> dict[str, Any]: ...
+    @property
+    def initial(self) -> dict[str, Any] | None: ...
+    @property
+    def last(self) -> dict[str, Any] | None: ...
+    def gains(self, times: list[float]) -> dict[str, _Array]: ...
+    def residuals(self, record: Record) -> tuple[int, _Array]: ...
+    def simulate(self, record: Record) -> tuple[int, _Array]: ...
+    def ljung_box(self, record: Record) -> dict[str, float] | None: ...
+
+@final
+class Trace:
+    def __len__(self) -> int: ...
+    @property
+    def method(self) -> str: ...
+    @property
+    def structure(self) -> str: ...
+    @property
+    def orders(self) -> dict[str, int]: ...
+    @property
+    def parameter_names(self) -> list[str]: ...
+    @property
+    def operator_names(self) -> list[str]: ...
+    @property
+    def updated_from(self) -> float: ...
+    @property
+    def counts(self) -> dict[str, int]: ...
+    @property
+    def changes(self) -> list[dict[str, Any]]: ...
+    @property
+    def failures(self) -> tuple[int, str] | None: ...
+    @property
+    def start(self) -> Fit | None: ...
+    @property
+    def innovation_variance(self) -> _Array: ...
+    def columns(self) -> dict[str, npt.NDArray[Any]]: ...
+    def operator(self, row: int) -> dict[str, Any] | None: ...
+    def write(self, path: _Path, comments: list[str]) -> None: ...
+
+@disjoint_base
+class Tracker:
+    # `hoid.Tracker` has the keywords that people write.
+    def __new__(cls, options: dict[str, Any], sample_time: float, warm_up: int, record: Record | None) -> Any: ...
+    def step(self, e: float, u: float, f_t: float | None = None, update: bool = True) -> float:
+        """Take one sample; returns the innovation, NaN at a fault and during the warm-up."""
+
+    def take_all(self, e: _Array, u: _Array, f_t: _Array | None, update: bool) -> _Array: ...
+    @property
+    def ready(self) -> bool:
+        """True once there is an estimate."""
+
+    @property
+    def trouble(self) -> str | None:
+        """Why the last start fit failed, or the warm-up began anew."""
+
+    @property
+    def sample_time(self) -> float: ...
+    @property
+    def method(self) -> str: ...
+    @property
+    def structure(self) -> str: ...
+    @property
+    def orders(self) -> dict[str, int]: ...
+    @property
+    def parameter_names(self) -> list[str]: ...
+    @property
+    def theta(self) -> _Array: ...
+    @property
+    def covariance(self) -> _Array | None: ...
+    @property
+    def parameters(self) -> list[tuple[str, _Pair]]: ...
+    @property
+    def operator(self) -> dict[str, Any] | None: ...
+    @property
+    def innovation_variance(self) -> float: ...
+    @property
+    def counts(self) -> dict[str, int]: ...
+    @property
+    def start(self) -> Fit | None: ...
+    def saved(self) -> tuple[dict[str, int] | None, _Array]: ...
+    def restore(self, orders: dict[str, int] | None, numbers: _Array) -> None: ...
+
+def check_record(record: Record) -> None: ...
+def convert_discrete(
+    f: tuple[float, float], b: tuple[float, float], nk: int, sample_time: float
+) -> dict[str, Any]: ...
+def convert_operator(operator: list[tuple[str, float]], sample_time: float) -> dict[str, Any]: ...
+def describing_function(
+    records: Sequence[Record],
+    *,
+    harmonics: list[int] | None,
+    omega: list[float] | None,
+    period: float | None,
+    channel: str | None,
+    least_amplitude: float,
+    averaging: str,
+    reference: str | None,
+    realisation: str,
+    start: float | None,
+    stop: float | None,
+    offset_samples: float,
+    detrend: str,
+    smoothing_bins: int,
+) -> DescribingFunction: ...
+def detrended(record: Record, how: str) -> dict[str, Any]: ...
+def discretise_transfer_function(
+    num: list[float], den: list[float], sample_time: float, method: str, prewarp: float | None
+) -> list[_Array]: ...
+def group(
+    manifest: _Path,
+    directory: _Path,
+    *,
+    jobs: int | None,
+    resume: bool,
+    csv: bool,
+    progress: _Progress,
+) -> _Left: ...
+def group_manifest(directory: _Path, pattern: str) -> tuple[str, list[str]]: ...
+def identify(
+    records: Sequence[Record],
+    structure: str,
+    *,
+    orders: dict[str, _Ends],
+    method: str,
+    instruments: str | None,
+    remnant_order: _Ends | None,
+    delay: tuple[float, float] | None,
+    individual: list[str],
+    criterion: str,
+    initial_state: str,
+    start: dict[str, float] | None,
+    fix: dict[str, float],
+    bound: dict[str, tuple[float, float]],
+    prior: dict[str, tuple[float, float]],
+    robust: float | None,
+    focus: str,
+    stable: bool,
+    search_method: str,
+    max_iterations: int,
+    tolerance: float,
+    progress: _Progress,
+) -> Fit | TimeVaryingFit: ...
+def margins(
+    *,
+    condition: str | None,
+    scenario_file: _Path | None,
+    scenario_text: str | None,
+    state: str,
+    noise_levels: list[float],
+    noise_definition: str,
+) -> dict[str, Any]: ...
+def merge_shards(shards: Sequence[_Path], directory: _Path, csv: bool) -> _Left: ...
+def plan_names() -> list[tuple[str, str]]: ...
+def read(
+    path: _Path,
+    *,
+    input: str | None,
+    output: str,
+    sampling_frequency: float | None,
+    start: float | None,
+    stop: float | None,
+    resample: bool,
+    fill: bool,
+    detrend: str,
+    drop_repeated: bool,
+    scale: dict[str, str],
+    offset: dict[str, str],
+    decimate: int | None,
+    new_sampling_frequency: float | None,
+    run_in: float,
+) -> tuple[dict[str, Any], list[str], list[str]]: ...
+def read_table(path: _Path) -> dict[str, Any]: ...
+def simulate(
+    *,
+    condition: str | None,
+    scenario_file: _Path | None,
+    scenario_text: str | None,
+    remnant_order: int | None,
+    noise_level: float | None,
+    noise_definition: str | None,
+    remnant_time_constant: float | None,
+    sample_time: float | None,
+    realisation: str | None,
+    seed: int,
+    cell: int,
+    replication: int,
+    keep_run_in: bool,
+) -> dict[str, Any]: ...
+def track(
+    record: Record,
+    options: dict[str, Any],
+    *,
+    start_span: tuple[float, float] | None,
+    update_from: float | None,
+    moving_average: int | None,
+    every: int,
+    progress: _Progress,
+) -> Trace: ...
+def write(path: _Path, record: Record) -> None: ...

@@ -1,0 +1,107 @@
+"""Options as people write them, in the plain form that the native module takes."""
+
+from __future__ import annotations
+
+import math
+import operator
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+from .errors import DataError, OptionError
+from .record import Record
+
+__all__ = ["as_records", "bounds", "memory", "numbers", "order", "reporter", "span"]
+
+
+def order(name: str, value: Any) -> tuple[int, int]:
+    """An order, or the ends of a range of orders, both included."""
+    if isinstance(value, range):
+        if value.step != 1 or not len(value):
+            raise OptionError(f"{name} is {value}, expected a range with step 1 that is not empty")
+        return value[0], value[-1]
+    ends = value if isinstance(value, (tuple, list)) else (value, value)
+    if len(ends) != 2:
+        raise OptionError(f"{name} is {value!r}, expected a whole number or a pair (least, greatest)")
+    try:
+        low, high = (operator.index(end) for end in ends)
+    except TypeError:
+        raise OptionError(f"{name} is {value!r}, expected whole numbers") from None
+    if low < 0 or high < low:
+        raise OptionError(f"{name} is {value!r}, expected numbers of zero or more, the smaller first")
+    return low, high
+
+
+def numbers(name: str, values: Mapping[str, Any]) -> dict[str, float]:
+    """Numbers by name."""
+    try:
+        return {str(key): float(value) for key, value in values.items()}
+    except (TypeError, ValueError, AttributeError):
+        raise OptionError(f'{name} is {values!r}, expected numbers by name, as {{"f1": -1.9}}') from None
+
+
+def bounds(values: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+    """Lower and upper ends by name; None leaves one open."""
+    try:
+        return {
+            str(key): (-math.inf if low is None else float(low), math.inf if high is None else float(high))
+            for key, (low, high) in values.items()
+        }
+    except (TypeError, ValueError, AttributeError):
+        raise OptionError(f'bound is {values!r}, expected pairs by name, as {{"b0": (0, 0.2)}}') from None
+
+
+def span(name: str, value: Any) -> tuple[float, float] | None:
+    """Two finite numbers in order."""
+    if value is None:
+        return None
+    try:
+        low, high = (float(end) for end in value)
+    except (TypeError, ValueError):
+        raise OptionError(f"{name} is {value!r}, expected a pair of numbers") from None
+    if not (math.isfinite(low) and math.isfinite(high) and low <= high):
+        raise OptionError(f"{name} is {value!r}, expected two finite numbers, the smaller first")
+    return low, high
+
+
+def memory(value: Any) -> str:
+    """A memory as text: a number of samples, ``"2.56s"`` seconds, or inf."""
+    if isinstance(value, str):
+        return value
+    try:
+        return "inf" if math.isinf(float(value)) else repr(float(value))
+    except (TypeError, ValueError):
+        raise OptionError(f'a memory is {value!r}, expected samples (256), seconds ("2.56s") or "inf"') from None
+
+
+def as_records(records: Record | Sequence[Record]) -> list[Record]:
+    """One record or several, as a list."""
+    several = [records] if isinstance(records, Record) else records
+    if not isinstance(several, Iterable) or isinstance(several, (str, bytes)):
+        raise DataError(f"expected a hoid.Record or a sequence of them, found {type(records).__name__}; make one by hoid.Record(e=, u=, sample_time=)")
+    several = list(several)
+    for one in several:
+        if not isinstance(one, Record):
+            raise DataError(f"expected a hoid.Record, found {type(one).__name__}; make one by hoid.Record(e=, u=, sample_time=)")
+    if not several:
+        raise DataError("there is no record; give one or several")
+    return several
+
+
+def reporter(progress: Any, what: str) -> Callable[[int, int], object] | None:
+    """What is called with the work that is done and the whole."""
+    if progress is None or progress is False:
+        return None
+    if progress is not True:
+        if not callable(progress):
+            raise OptionError(f"progress is {progress!r}, expected True, False or a callable (done, total)")
+        return progress  # type: ignore[no-any-return]
+
+    def show(done: int, total: int) -> None:
+        # One line that is written over on a terminal, the end alone elsewhere.
+        end = "\n" if done >= total else "\r"
+        if sys.stderr.isatty() or end == "\n":
+            sys.stderr.write(f"{done} of {total} {what}{end}")
+            sys.stderr.flush()
+
+    return show

@@ -1,0 +1,48 @@
+"""Models of python-control as those of hoid."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .conversion import Conversion, convert
+from .errors import NotConvertibleError
+
+if TYPE_CHECKING:
+    import control
+
+__all__ = ["from_control"]
+
+
+def from_control(system: control.TransferFunction | Any) -> Conversion:
+    """The operator that a discrete transfer function of python-control stands for: ``(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)``.
+
+    Parameters
+    ----------
+    system : control.TransferFunction
+        With one input, one output, and a sample time, as `Fit.to_control` gives it.
+
+    Raises
+    ------
+    NotConvertibleError
+        For another form.
+    """
+    if not system.isdtime(strict=True) or not isinstance(system.dt, float) or system.dt <= 0:
+        raise NotConvertibleError("the system has no sample time; discretise it first, by hoid.discretise or control.sample_system")
+    num = np.asarray(system.num[0][0], dtype=float)
+    den = np.asarray(system.den[0][0], dtype=float)
+    # By powers of z, the highest first: z^n over the denominator's order is q^-delay.
+    relative = len(den) - len(num)
+    den, num = den / den[0], num / den[0]
+    coefficients = np.trim_zeros(num, "b")
+    lead = len(coefficients) - len(np.trim_zeros(coefficients, "f"))
+    b = np.trim_zeros(coefficients, "f")
+    f = np.trim_zeros(den, "b")
+    if len(f) > 3 or len(b) > 2 or relative + lead < 0:
+        raise NotConvertibleError(
+            f"the system has {len(b)} coefficients in the numerator and {len(f) - 1} poles off the origin, expected up to two of each"
+        )
+    f = np.pad(f, (0, 3 - len(f)))
+    b = np.pad(b, (0, 2 - len(b)))
+    return convert(f=f[1:].tolist(), b=b.tolist(), nk=relative + lead, sample_time=float(system.dt))

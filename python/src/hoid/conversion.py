@@ -1,0 +1,121 @@
+"""Discrete coefficients to operator parameters and back, and any transfer function to discrete time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from . import _hoid
+from ._arrays import FloatArray
+from .errors import OptionError
+from .estimates import Operator
+
+__all__ = ["Conversion", "DiscreteTransferFunction", "convert", "discretise"]
+
+
+class Conversion(NamedTuple):
+    """An operator in both forms: ``B q^-nk / F`` with ``B = b0 + b1 q^-1``, ``F = 1 + f1 q^-1 + f2 q^-2``."""
+
+    f: tuple[float, float]
+    b: tuple[float, float]
+    nk: int
+    sample_time: float
+    operator: Operator
+
+
+class DiscreteTransferFunction(NamedTuple):
+    """Numerator and denominator by ascending powers of q^-1."""
+
+    num: FloatArray
+    den: FloatArray
+    sample_time: float
+
+
+def _two(values: Sequence[float], name: str) -> tuple[float, float]:
+    numbers = [float(value) for value in values]
+    if len(numbers) != 2:
+        raise OptionError(f"the operator model has two coefficients in {name}, found {len(numbers)}")
+    return numbers[0], numbers[1]
+
+
+def convert(
+    *,
+    f: Sequence[float] | None = None,
+    b: Sequence[float] | None = None,
+    nk: int = 1,
+    operator: Mapping[str, Any] | None = None,
+    sample_time: float = 0.01,
+) -> Conversion:
+    """Operator parameters of discrete coefficients, or the other way round.
+
+    Parameters
+    ----------
+    f, b : sequence of two floats
+        ``f1, f2`` and ``b0, b1`` of the discrete operator.
+    nk : int
+        Delay of b0 in samples.
+    operator : mapping
+        ``K_e``, ``T_L`` (or ``K_e_dot``), ``omega_nm``, ``zeta_nm`` and ``tau_e`` (0 where it is left out), as numbers or estimates; an
+        `Operator` as well.
+    sample_time : float
+        Ts in s.
+
+    Returns
+    -------
+    Conversion
+
+    Raises
+    ------
+    OptionError
+        When both or neither are given, or a parameter is lacking.
+    """
+    if operator is not None:
+        if f is not None or b is not None:
+            raise OptionError("give f and b, or operator, not both")
+        pairs = [(str(name), float(getattr(value, "value", value))) for name, value in operator.items()]
+        if isinstance(operator, Operator):
+            pairs = [(name, value) for name, value in pairs if name != "K_e_dot"]
+        found = _hoid.convert_operator(pairs, sample_time)
+    elif f is not None and b is not None:
+        found = _hoid.convert_discrete(_two(f, "F"), _two(b, "B"), nk, sample_time)
+    else:
+        raise OptionError("give f and b, or operator")
+    discrete = found["discrete"]
+    return Conversion(
+        f=_two(discrete["f"], "F"),
+        b=_two(discrete["b"], "B"),
+        nk=discrete["nk"],
+        sample_time=found["sample_time"],
+        operator=Operator(found["operator"]),
+    )
+
+
+def discretise(
+    num: Sequence[float],
+    den: Sequence[float],
+    *,
+    sample_time: float = 0.01,
+    method: str = "zoh",
+    prewarp: float | None = None,
+) -> DiscreteTransferFunction:
+    """A continuous transfer function in discrete time.
+
+    Parameters
+    ----------
+    num, den : sequence of float
+        By descending powers of s.
+    sample_time : float
+        Ts in s.
+    method : {"zoh", "foh", "tustin", "prewarped", "forward-euler", "backward-euler", "matched"}
+    prewarp : float, optional
+        Frequency in rad/s for ``"prewarped"``.
+
+    Returns
+    -------
+    DiscreteTransferFunction
+        Both by ascending powers of q^-1.
+    """
+    if method == "prewarped" and prewarp is None:
+        raise OptionError('method="prewarped" needs prewarp, a frequency in rad/s')
+    found = _hoid.discretise_transfer_function([float(v) for v in num], [float(v) for v in den], sample_time, method, prewarp)
+    return DiscreteTransferFunction(found[0], found[1], sample_time)

@@ -1,0 +1,185 @@
+"""Describing functions: what a person answers at the lines of the excitation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _hoid, _options, _text
+from ._arrays import FloatArray
+from .estimates import Estimate, estimates
+from .record import Record
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["DescribingFunction", "describing_function"]
+
+
+class DescribingFunction:
+    """The response of a person at the lines of the excitation. `describing_function` makes it.
+
+    Columns are read by name; all have one value a line: ``omega`` (rad/s), ``harmonic``, ``response`` (complex), ``response_se``,
+    ``coherence``, ``magnitude_db``, ``phase_deg``, with ``_se`` for standard errors (NaN where one run gives none).
+    """
+
+    def __init__(self, native: _hoid.DescribingFunction) -> None:
+        self._native = native
+        self.columns: dict[str, npt.NDArray[Any]] = native.columns()
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        return self.columns[name]
+
+    def __len__(self) -> int:
+        return len(self.columns["omega"])
+
+    @property
+    def omega(self) -> FloatArray:
+        """Frequencies of the lines, rad/s."""
+        return self.columns["omega"]
+
+    @property
+    def response(self) -> npt.NDArray[np.complex128]:
+        """The response at the lines."""
+        return self.columns["response"]
+
+    @property
+    def per_run(self) -> npt.NDArray[np.complex128]:
+        """The response of each run (or period), shape (runs, lines)."""
+        return np.array(self._native.per_run)
+
+    @property
+    def remnant_spectrum(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Frequency (rad/s), density of the remnant, and its standard error."""
+        omega, density, error = self._native.remnant_spectrum
+        return omega, density, error
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """Runs, and estimates of off_line_share, noise_ratio, rms_e and rms_u."""
+        found = dict(self._native.figures)
+        runs = found.pop("runs")
+        return {"runs": runs, **estimates(found)}
+
+    def gain_lead_delay(
+        self, *, lead: bool = True, weights: str = "coherence", delay: tuple[float, float] = (0.0, 1.0)
+    ) -> dict[str, Any]:
+        """Gain, lead (s) and delay (s) of ``K (1 + T_L s) exp(-tau s)`` through the lines, and the misfit.
+
+        Parameters
+        ----------
+        lead : bool
+            False holds T_L at 0.
+        weights : {"coherence", "variance", "uniform"}
+        delay : (float, float)
+            Shortest and longest tau in s.
+        """
+        found = self._native.gain_lead_delay(lead=lead, weights=weights, delay=delay)
+        return {name: Estimate(*pair) if isinstance(pair, tuple) else pair for name, pair in found.items()}
+
+    def margins(self, num: Sequence[float], den: Sequence[float]) -> dict[str, Estimate | None]:
+        """Crossover frequency and phase margin with a controlled element NUM/DEN by descending powers of s."""
+        return estimates(self._native.margins([float(v) for v in num], [float(v) for v in den]))
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The lines as a table."""
+        import pandas as pd
+
+        return pd.DataFrame(self.columns)
+
+    def _rows(self) -> list[list[str]]:
+        return [
+            [
+                _text.number(float(self["omega"][k]), 4),
+                repr(Estimate(float(self["magnitude_db"][k]), float(self["magnitude_db_se"][k]))),
+                repr(Estimate(float(self["phase_deg"][k]), float(self["phase_deg_se"][k]))),
+                _text.number(float(self["coherence"][k]), 3),
+            ]
+            for k in range(len(self))
+        ]
+
+    def __repr__(self) -> str:
+        header = ["omega (rad/s)", "magnitude (dB)", "phase (deg)", "coherence"]
+        return f"Describing function at {len(self)} lines\n{_text.plain_table(header, self._rows())}"
+
+    def _repr_html_(self) -> str:
+        header = ["omega (rad/s)", "magnitude (dB)", "phase (deg)", "coherence"]
+        return _text.html_table(f"Describing function at {len(self)} lines", header, self._rows())
+
+
+def describing_function(
+    records: Record | Sequence[Record],
+    *,
+    channel: str | None = "f_t",
+    harmonics: Sequence[int] | None = None,
+    omega: Sequence[float] | None = None,
+    period: float | None = None,
+    least_amplitude: float = 0.05,
+    averaging: str = "ratios",
+    reference: str | None = None,
+    realisation: str = "record",
+    start: float | None = None,
+    stop: float | None = None,
+    offset_samples: float = 0.0,
+    detrend: str = "none",
+    smoothing_bins: int = 8,
+) -> DescribingFunction:
+    """The describing function from e to u by Fourier coefficients at the lines of the excitation.
+
+    Parameters
+    ----------
+    records : Record or sequence of Record
+        Runs with the same excitation.
+    channel : str, optional
+        Channel in whose spectrum the lines are found; not looked at when they are given.
+    harmonics, omega : sequence, optional
+        The lines, as multiples of the fundamental or in rad/s; both need `period`.
+    period : float, optional
+        Period of the excitation in s.
+    least_amplitude : float
+        Amplitude of a line, as a share of the largest.
+    averaging : {"ratios", "reference", "same-excitation"}
+        Mean of U/E over runs; cross spectra with the channel `reference`; cross spectra of runs with the same phases.
+    reference : str, optional
+        Channel for ``"reference"``.
+    realisation : {"record", "period"}
+        What counts as one run.
+    start, stop : float, optional
+        Span in s.
+    offset_samples : float
+        ``e[k]`` belongs to ``u[k + offset_samples]``.
+    detrend : {"none", "mean", "linear"}
+    smoothing_bins : int
+        Bins that are averaged into one value of the remnant spectrum.
+
+    Returns
+    -------
+    DescribingFunction
+
+    Raises
+    ------
+    DataError
+        When the span does not hold whole periods, or a line has no power.
+    """
+    given = harmonics is not None or omega is not None
+    return DescribingFunction(
+        _hoid.describing_function(
+            _options.as_records(records),
+            harmonics=None if harmonics is None else [int(h) for h in harmonics],
+            omega=None if omega is None else [float(w) for w in omega],
+            period=period,
+            channel=None if given else channel,
+            least_amplitude=least_amplitude,
+            averaging=averaging,
+            reference=reference,
+            realisation=realisation,
+            start=start,
+            stop=stop,
+            offset_samples=offset_samples,
+            detrend=detrend,
+            smoothing_bins=smoothing_bins,
+        )
+    )

@@ -1,0 +1,138 @@
+"""Estimates with their standard errors, and what they make together: operator, remnant, margins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+from . import _text
+from .errors import NotConvertibleError
+
+__all__ = ["Estimate", "Operator", "Remnant"]
+
+#: Units of parameters that have one.
+UNITS: Mapping[str, str] = {
+    "K_e": "deg/deg",
+    "T_L": "s",
+    "K_e_dot": "s",
+    "omega_nm": "rad/s",
+    "zeta_nm": "",
+    "tau_e": "s",
+    "T_n": "s",
+    "K_n": "",
+    "crossover_rad_s": "rad/s",
+    "phase_crossover_rad_s": "rad/s",
+    "phase_margin_deg": "deg",
+    "gain_margin_db": "dB",
+}
+
+
+class Estimate(NamedTuple):
+    """A value and its standard error, which is None where there is none (a delay of whole samples, an exact fit)."""
+
+    value: float
+    standard_error: float | None
+
+    def __repr__(self) -> str:
+        value, error = _text.with_uncertainty(self.value, self.standard_error)
+        return value if error == _text.DASH else f"{value} ± {error}"
+
+    def __float__(self) -> float:
+        return float(self.value)
+
+
+def estimates(found: Mapping[str, Any]) -> dict[str, Estimate | None]:
+    """Pairs of the native module as estimates."""
+    return {name: None if pair is None else Estimate(*pair) for name, pair in found.items()}
+
+
+class _Converted(Mapping[str, Estimate]):
+    """Estimates by name, or the reason why there are none."""
+
+    _what = "the model"
+
+    def __init__(self, found: Mapping[str, Any]) -> None:
+        self.convertible: bool = bool(found["convertible"])
+        self.reason: str | None = found.get("reason")
+        self._all: dict[str, Estimate] = {
+            name: Estimate(*pair) for name, pair in found.items() if isinstance(pair, tuple)
+        }
+
+    def _need(self) -> None:
+        if not self.convertible:
+            raise NotConvertibleError(f"{self._what} is not convertible: {self.reason}")
+
+    def __getitem__(self, name: str) -> Estimate:
+        self._need()
+        return self._all[name]
+
+    def __getattr__(self, name: str) -> Estimate:
+        if name.startswith("_") or "_all" not in self.__dict__:
+            raise AttributeError(name)
+        if name in UNITS and not self.convertible:
+            self._need()
+        try:
+            return self._all[name]
+        except KeyError:
+            raise AttributeError(f"{type(self).__name__} has no parameter {name}; it has {', '.join(self._all)}") from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._all)
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+    def _rows(self) -> list[list[str]]:
+        return [
+            [name, *_text.with_uncertainty(estimate.value, estimate.standard_error), UNITS.get(name, "")]
+            for name, estimate in self._all.items()
+        ]
+
+    def __repr__(self) -> str:
+        if not self.convertible:
+            return f"{type(self).__name__}: not convertible: {self.reason}"
+        return _text.plain_table([type(self).__name__.lower(), "value", "standard error", "unit"], self._rows())
+
+    def _repr_html_(self) -> str:
+        if not self.convertible:
+            return f"<p>{type(self).__name__}: not convertible: {self.reason}</p>"
+        return _text.html_table(type(self).__name__, ["", "value", "standard error", "unit"], self._rows())
+
+
+class Operator(_Converted):
+    """The human operator of a model: K_e (deg/deg), T_L (s), K_e_dot (s), omega_nm (rad/s), zeta_nm, tau_e (s).
+
+    A mapping from names to `Estimate`, whose entries are attributes too (``operator.K_e.value``). Where the coefficients stand for no
+    continuous operator, `convertible` is False, `reason` says why, and a look at a parameter raises `NotConvertibleError`.
+
+    Attributes
+    ----------
+    convertible : bool
+    reason : str or None
+    stable : bool
+        Whether zeta_nm is positive.
+    """
+
+    _what = "the operator"
+
+    def __init__(self, found: Mapping[str, Any]) -> None:
+        super().__init__(found)
+        self.stable: bool = bool(found.get("stable", False))
+
+
+class Remnant(_Converted):
+    """The remnant of a noise model: T_n (s) and K_n, with the order m of its filter.
+
+    Attributes
+    ----------
+    order : int
+    discretisation : str
+        The discretisation that was inverted, ``"zoh"`` or ``"backward-euler"``.
+    """
+
+    _what = "the remnant"
+
+    def __init__(self, found: Mapping[str, Any]) -> None:
+        super().__init__(found)
+        self.order: int = int(found.get("order", 0))
+        self.discretisation: str = str(found.get("discretisation", ""))

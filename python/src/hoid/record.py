@@ -1,0 +1,354 @@
+"""Records: evenly sampled signals of one run."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _hoid, _text
+from ._arrays import FloatArray, signal
+from .errors import DataError, OptionError
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+__all__ = ["Record", "read", "write"]
+
+
+def _read_only(array: FloatArray) -> FloatArray:
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+class Record:
+    """The signals of one run, with one value a sample.
+
+    Arrays of float64 that are contiguous are not copied: do not change them afterwards.
+
+    Parameters
+    ----------
+    e : array_like, shape (N,), optional
+        Input, the tracking error. Left out for structures without an input (ar, ma, arma).
+    u : array_like, shape (N,)
+        Output, the control.
+    sample_time : float
+        Sample time Ts in s.
+    start_time : float, default 0
+        Time of the first sample in s.
+    label : str, optional
+        Name for messages and reports.
+    units : mapping of str to str, optional
+        Units of channels.
+    **channels : array_like, shape (N,)
+        Other channels by name, such as ``f_t`` for the forcing function.
+
+    Raises
+    ------
+    DataError
+        For values that are not finite or masked, unequal lengths, and arrays with more than one dimension. It is a `ValueError`.
+
+    Examples
+    --------
+    >>> record = hoid.Record(e=error, u=control, sample_time=0.01)
+    >>> fit = hoid.identify(record)
+    """
+
+    def __init__(
+        self,
+        *,
+        u: Any,
+        sample_time: float,
+        e: Any = None,
+        start_time: float = 0.0,
+        label: str = "",
+        units: Mapping[str, str] | None = None,
+        **channels: Any,
+    ) -> None:
+        self._fill(
+            e=None if e is None else signal(e, "e"),
+            u=signal(u, "u"),
+            sample_time=float(sample_time),
+            start_time=float(start_time),
+            label=label,
+            units=dict(units or {}),
+            channels={name: signal(values, name) for name, values in channels.items()},
+        )
+        _hoid.check_record(self)
+
+    def _fill(
+        self,
+        *,
+        e: FloatArray | None,
+        u: FloatArray,
+        sample_time: float,
+        start_time: float,
+        label: str,
+        units: dict[str, str],
+        channels: dict[str, FloatArray],
+        input_name: str = "e",
+        output_name: str = "u",
+    ) -> None:
+        self.e: FloatArray | None = None if e is None else _read_only(e)
+        self.u: FloatArray = _read_only(u)
+        self.sample_time: float = sample_time
+        self.start_time: float = start_time
+        self.label: str = label
+        self.units: dict[str, str] = units
+        self.channels: dict[str, FloatArray] = {name: _read_only(values) for name, values in channels.items()}
+        self.input_name: str = input_name
+        self.output_name: str = output_name
+        #: What was done to the numbers of the file that it was read from.
+        self.steps: list[str] = []
+
+    @classmethod
+    def _of(cls, parts: Mapping[str, Any]) -> Record:
+        record = cls.__new__(cls)
+        record._fill(**parts)
+        return record
+
+    @classmethod
+    def from_pandas(cls, frame: pd.DataFrame, *, input: str | None = "e", output: str = "u", sample_time: float | None = None) -> Record:
+        """A record of a table: its other columns of numbers become channels.
+
+        The sampling is `sample_time`, or that of a column ``t`` or an index of times in s, which must be even.
+        """
+        columns = {str(name): frame[name].to_numpy() for name in frame.columns}
+        for name in (input, output):
+            if name is not None and name not in columns:
+                raise DataError(f"the table has no column {name}; it has {', '.join(columns)}")
+        times = columns.pop("t", None)
+        if times is None and sample_time is None:
+            index = np.asarray(frame.index)
+            times = index if index.dtype.kind == "f" else None
+        start = 0.0
+        if sample_time is None:
+            if times is None or len(times) < 2:
+                raise OptionError("the table has no times: give sample_time in s, or a column t")
+            steps = np.diff(times)
+            sample_time = float((times[-1] - times[0]) / (len(times) - 1))
+            if not np.allclose(steps, sample_time, rtol=1e-3, atol=0):
+                row = int(np.argmax(np.abs(steps - sample_time)))
+                raise DataError(
+                    f"the sampling is uneven: row {row + 1} comes {steps[row]:g} s after the one before, expected {sample_time:g} s;"
+                    " write the table to a file and read it with resample=True, or give sample_time"
+                )
+            sample_time = float(f"{sample_time:.9g}")
+        if times is not None:
+            start = float(times[0])
+        named = {name: values for name, values in columns.items() if name not in (input, output) and values.dtype.kind in "fiu"}
+        e = None if input is None else columns[input]
+        return cls(e=e, u=columns[output], sample_time=sample_time, start_time=start, **named)
+
+    @property
+    def time(self) -> FloatArray:
+        """Times of the samples in s, shape (N,)."""
+        return self.start_time + self.sample_time * np.arange(len(self), dtype=np.float64)
+
+    def __len__(self) -> int:
+        return len(self.u)
+
+    def __getitem__(self, name: str) -> FloatArray:
+        if name == self.output_name:
+            return self.u
+        if name == self.input_name and self.e is not None:
+            return self.e
+        try:
+            return self.channels[name]
+        except KeyError:
+            raise KeyError(f"there is no channel {name}; the record has {', '.join(self.names)}") from None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the channels: input, output, others."""
+        first = [] if self.e is None else [self.input_name]
+        return [*first, self.output_name, *self.channels]
+
+    def span(self, start: float | None = None, stop: float | None = None) -> Record:
+        """The samples with ``start <= t < stop`` (s), as views of the same arrays.
+
+        Raises
+        ------
+        DataError
+            When there are none.
+        """
+        # A bound that falls on a sample, up to rounding, takes that sample.
+        def index(time: float | None, usual: int) -> int:
+            if time is None:
+                return usual
+            return max(int(np.ceil((time - self.start_time) / self.sample_time - 1e-6)), 0)
+
+        first, end = index(start, 0), min(index(stop, len(self)), len(self))
+        if first >= end:
+            raise DataError(
+                f"there are no samples from {start} to {stop} s; the record runs from {self.start_time:g} to {self.time[-1]:g} s"
+            )
+        record = Record.__new__(Record)
+        record._fill(
+            e=None if self.e is None else self.e[first:end],
+            u=self.u[first:end],
+            sample_time=self.sample_time,
+            start_time=self.start_time + first * self.sample_time,
+            label=self.label,
+            units=self.units,
+            channels={name: values[first:end] for name, values in self.channels.items()},
+            input_name=self.input_name,
+            output_name=self.output_name,
+        )
+        return record
+
+    def detrended(self, how: str = "mean") -> Record:
+        """The same record with the ``"mean"`` or the ``"linear"`` trend taken out of input and output."""
+        return Record._of(_hoid.detrended(self, how))
+
+    def to_pandas(self) -> pd.DataFrame:
+        """All channels as a table with the time in s as index."""
+        import pandas as pd
+
+        return pd.DataFrame({name: self[name] for name in self.names}, index=pd.Index(self.time, name="t"), copy=False)
+
+    def to_xarray(self) -> xr.Dataset:
+        """All channels over the coordinate ``t`` (s), with their units."""
+        import xarray as xr
+
+        variables = {name: ("t", self[name], {"units": self.units.get(name, "")}) for name in self.names}
+        return xr.Dataset(variables, coords={"t": ("t", self.time, {"units": "s"})}, attrs={"sample_time": self.sample_time})
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        keys = ("e", "u", "sample_time", "start_time", "label", "units", "channels", "input_name", "output_name")
+        return (_record_of, ({key: getattr(self, key) for key in keys},))
+
+    def _rows(self) -> list[list[str]]:
+        rows = []
+        for name in self.names:
+            values = self[name]
+            figures = (values.min(), values.max(), values.mean(), values.std())
+            rows.append([name, *(_text.number(float(v), 4) for v in figures), self.units.get(name, "")])
+        return rows
+
+    def _title(self) -> str:
+        label = f" {self.label}" if self.label else ""
+        return f"Record{label}: {len(self)} samples of {self.sample_time:g} s, from {self.start_time:g} s"
+
+    def __repr__(self) -> str:
+        header = ["channel", "least", "greatest", "mean", "sd", "unit"]
+        return f"{self._title()}\n{_text.plain_table(header, self._rows())}"
+
+    def _repr_html_(self) -> str:
+        return _text.html_table(self._title(), ["", "least", "greatest", "mean", "sd", "unit"], self._rows())
+
+
+def _record_of(parts: Mapping[str, Any]) -> Record:
+    return Record._of(parts)
+
+
+def read(
+    path: str | PathLike[str],
+    *,
+    input: str | None = "e",
+    output: str = "u",
+    sampling_frequency: float | None = None,
+    start: float | None = None,
+    stop: float | None = None,
+    resample: bool = False,
+    fill: bool = False,
+    drop_repeated: bool = False,
+    scale: Mapping[str, float | str] | None = None,
+    offset: Mapping[str, float | str] | None = None,
+    decimate: int | None = None,
+    new_sampling_frequency: float | None = None,
+    run_in: float = 0.0,
+    detrend: str = "none",
+) -> Record:
+    """Read a record from a CSV, Parquet, NPZ, NPY, MATLAB .mat or XDF file.
+
+    Parameters
+    ----------
+    path : path
+    input, output : str
+        Columns: a name, ``-name``, or a difference such as ``"r-y"``. ``input=None`` reads an output alone.
+    sampling_frequency : float, optional
+        Hz; without it the column ``t`` (s) gives the sampling.
+    start, stop : float, optional
+        Span to use, s; `stop` is not part of it.
+    resample : bool
+        Bring unevenly sampled data onto an even grid by linear interpolation.
+    fill : bool
+        Bridge missing values by linear interpolation.
+    drop_repeated : bool
+        Drop rows that are there twice, time included.
+    scale : mapping, optional
+        Factors by channel (``e`` and ``u`` are input and output): ``{"u": 12.5}``, into a unit ``{"u": "12.5:deg"}``, or from unit to
+        unit ``{"e": "rad:deg"}``.
+    offset : mapping, optional
+        By how much channels were recorded late: samples ``{"u": 1}`` or seconds ``{"u": "0.0167s"}``.
+    decimate : int, optional
+        Take every M-th sample, behind a low-pass filter.
+    new_sampling_frequency : float, optional
+        Another sampling frequency in Hz, behind a low-pass filter.
+    run_in : float
+        Seconds that are dropped at the beginning.
+    detrend : {"none", "mean", "linear"}
+        What is taken out of input and output, last.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    FileError
+        When the file is not there (`FileNotFoundError`) or cannot be read (`OSError`).
+    FormatError
+        When its content is not what was expected; the message names the row.
+
+    Warns
+    -----
+    UserWarning
+        What a person should know of the reading: columns left out, trouble with the sampling. What was done to the numbers stands in
+        `Record.steps`.
+    """
+    parts, steps, notes = _hoid.read(
+        path,
+        input=input,
+        output=output,
+        sampling_frequency=sampling_frequency,
+        start=start,
+        stop=stop,
+        resample=resample,
+        fill=fill,
+        detrend=detrend,
+        drop_repeated=drop_repeated,
+        scale={name: _written(value) for name, value in (scale or {}).items()},
+        offset={name: _written(value) for name, value in (offset or {}).items()},
+        decimate=decimate,
+        new_sampling_frequency=new_sampling_frequency,
+        run_in=float(run_in),
+    )
+    for note in notes:
+        warnings.warn(f"{path}: {note}", UserWarning, stacklevel=2)
+    record = Record._of(parts)
+    record.steps = steps
+    return record
+
+
+def _written(value: float | str) -> str:
+    return value if isinstance(value, str) else repr(float(value))
+
+
+def write(path: str | PathLike[str], record: Record) -> None:
+    """Write a record as CSV, Parquet, NPZ or .mat, with the digits that give the same numbers back.
+
+    Raises
+    ------
+    FileError, FormatError
+    """
+    _hoid.write(path, record)

@@ -1,0 +1,124 @@
+"""Closed-loop runs of a scenario, and what its loop is like."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from typing import Any
+
+from . import _hoid
+from .errors import OptionError
+from .record import Record
+
+__all__ = ["margins", "simulate"]
+
+
+def _base(condition: str | None, scenario: str | PathLike[str] | None) -> dict[str, Any]:
+    if (condition is None) == (scenario is None):
+        raise OptionError('give condition, as "C4", or scenario, one of the two')
+    # A text with lines is a scenario itself, anything else the name of its file.
+    text = scenario if isinstance(scenario, str) and "\n" in scenario else None
+    return {
+        "condition": condition,
+        "scenario_file": None if text is not None else scenario,
+        "scenario_text": text,
+    }
+
+
+def simulate(
+    condition: str | None = None,
+    *,
+    scenario: str | PathLike[str] | None = None,
+    remnant_order: int | None = None,
+    noise_level: float | None = None,
+    noise_definition: str | None = None,
+    remnant_time_constant: float | None = None,
+    sample_time: float | None = None,
+    realisation: str | None = None,
+    seed: int = 0,
+    cell: int = 0,
+    replication: int = 0,
+    keep_run_in: bool = False,
+) -> Record:
+    """Simulate one closed-loop run of a human operator.
+
+    Parameters
+    ----------
+    condition : {"C1", ..., "C6"}, optional
+        A condition of the reference text (Ortiz Moya 2023, Table 4.4).
+    scenario : path or str, optional
+        A scenario file (TOML), or the text of one.
+    remnant_order : int, optional
+        Order m of the remnant filter, 1 to 4; default 1 or the scenario's.
+    noise_level : float, optional
+        Noise level P_n; 0 is a run without remnant. Default 0.1 or the scenario's.
+    noise_definition : {"response", "remnant"}, optional
+        What P_n is a share of: var(u_n)/var(u) or var(n)/var(u).
+    remnant_time_constant : float, optional
+        T_n in s; default 0.06.
+    sample_time : float, optional
+        Ts in s; default 0.01.
+    realisation : {"input", "output"}, optional
+        Where K_c stands when it changes.
+    seed, cell, replication : int
+        They name the random stream; runs with another replication are independent.
+    keep_run_in : bool
+        Keep the samples with t < 0.
+
+    Returns
+    -------
+    Record
+        e, u, x, n, f_t and the true parameters at every sample.
+
+    Raises
+    ------
+    OptionError
+    """
+    parts = _hoid.simulate(
+        **_base(condition, scenario),
+        remnant_order=remnant_order,
+        noise_level=noise_level,
+        noise_definition=noise_definition,
+        remnant_time_constant=remnant_time_constant,
+        sample_time=sample_time,
+        realisation=realisation,
+        seed=seed,
+        cell=cell,
+        replication=replication,
+        keep_run_in=keep_run_in,
+    )
+    return Record._of(parts)
+
+
+def margins(
+    condition: str | None = None,
+    *,
+    scenario: str | PathLike[str] | None = None,
+    state: str = "initial",
+    noise_levels: Sequence[float] = (0.01, 0.1, 0.2, 0.3),
+    noise_definition: str = "response",
+) -> dict[str, Any]:
+    """Crossover frequency, margins and remnant gains of a scenario.
+
+    Parameters
+    ----------
+    condition, scenario
+        As in `simulate`.
+    state : {"initial", "last"}
+        Which state of a scenario that changes.
+    noise_levels : sequence of float
+        Noise levels P_n for the remnant gains.
+    noise_definition : {"response", "remnant"}
+
+    Returns
+    -------
+    dict
+        ``crossover_rad_s``, ``phase_margin_deg``, ``gain_margin_db``, ``phase_crossover_rad_s`` (None where there is none), and
+        ``remnant_gain``, a list of dicts with ``remnant_order``, ``noise_level``, ``definition`` and ``K_n``.
+    """
+    return _hoid.margins(
+        **_base(condition, scenario),
+        state=state,
+        noise_levels=[float(level) for level in noise_levels],
+        noise_definition=noise_definition,
+    )

@@ -1,0 +1,288 @@
+"""Monte Carlo studies: plans, shards, merged tables; groups of recorded runs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _hoid, _options
+from .errors import StudyStateError
+from .identification import Progress
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import polars as pl
+    import pyarrow as pa
+
+__all__ = ["Plan", "Results", "Table", "group", "group_manifest", "merge", "plan", "plans", "results", "study"]
+
+Plan = _hoid.Plan
+
+
+class Table(Mapping[str, Any]):
+    """A table of results: columns by name, as arrays, or lists of text.
+
+    Parameters
+    ----------
+    path : path
+        The file; it is read at the first look.
+    """
+
+    def __init__(self, path: str | PathLike[str]) -> None:
+        self.path = Path(path)
+        self._columns: dict[str, Any] | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """All columns."""
+        if self._columns is None:
+            self._columns = {
+                name: np.asarray(values, dtype=object) if isinstance(values, list) else values
+                for name, values in _hoid.read_table(self.path).items()
+            }
+        return self._columns
+
+    def to_pandas(self) -> pd.DataFrame:
+        """As a table of pandas."""
+        import pandas as pd
+
+        return pd.DataFrame(self.to_dict())
+
+    def to_polars(self) -> pl.DataFrame:
+        """As a table of polars."""
+        import polars as pl
+
+        return pl.DataFrame({name: _listed(values) for name, values in self.to_dict().items()})
+
+    def to_arrow(self) -> pa.Table:
+        """As a table of Arrow."""
+        import pyarrow as pa
+
+        return pa.table({name: _listed(values) for name, values in self.to_dict().items()})
+
+    def __getitem__(self, name: str) -> Any:
+        try:
+            return self.to_dict()[name]
+        except KeyError:
+            raise KeyError(f"there is no column {name}; the table has {', '.join(self.to_dict())}") from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.to_dict())
+
+    def __len__(self) -> int:
+        return len(self.to_dict())
+
+    def __repr__(self) -> str:
+        columns = self.to_dict()
+        rows = len(next(iter(columns.values()))) if columns else 0
+        return f"<hoid.Table {self.path.name}: {rows} rows, columns {', '.join(columns)}>"
+
+
+def _listed(values: Any) -> Any:
+    return list(values) if getattr(values, "dtype", None) == object else values
+
+
+class Results(Mapping[str, Table]):
+    """The tables of a directory by name: ``results["fits"]``, or ``results.fits``.
+
+    Attributes
+    ----------
+    directory : Path
+    finished : bool
+        False for a shard, which waits to be merged.
+    estimates : int
+        Estimates that this run made.
+    """
+
+    def __init__(self, directory: str | PathLike[str], *, finished: bool = True, estimates: int = 0) -> None:
+        self.directory = Path(directory)
+        self.finished = finished
+        self.estimates = estimates
+        files = sorted([*self.directory.glob("*.parquet"), *self.directory.glob("*.csv")])
+        self._tables = {file.stem: Table(file) for file in files}
+
+    def __getitem__(self, name: str) -> Table:
+        try:
+            return self._tables[name]
+        except KeyError:
+            raise KeyError(f"there is no table {name}; the directory has {', '.join(self._tables) or 'none'}") from None
+
+    def __getattr__(self, name: str) -> Table:
+        tables = self.__dict__.get("_tables", {})
+        if name in tables:
+            return tables[name]  # type: ignore[no-any-return]
+        raise AttributeError(f"there is no table {name}; the directory has {', '.join(tables) or 'none'}")
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._tables)
+
+    def __len__(self) -> int:
+        return len(self._tables)
+
+    def __repr__(self) -> str:
+        return f"<hoid.Results {self.directory}: tables {', '.join(self._tables) or 'none yet'}>"
+
+
+def plan(source: str | PathLike[str] | Plan, *, replications: int | None = None) -> Plan:
+    """A plan of Monte Carlo runs.
+
+    Parameters
+    ----------
+    source : path, str or Plan
+        A file (TOML), the text of one, or the name of a plan that comes with hoid (see `plans`).
+    replications : int, optional
+        In place of those of the plan.
+
+    Raises
+    ------
+    OptionError
+        For a plan without meaning; the message names the line.
+    """
+    if isinstance(source, Plan):
+        return source if replications is None else Plan(text=source.text, replications=replications)
+    text = os.fspath(source)
+    if "\n" in text:
+        return Plan(text=text, replications=replications)
+    if Path(text).exists():
+        return Plan(path=Path(text), replications=replications)
+    if text.endswith(".toml"):
+        return Plan(path=Path(text), replications=replications)
+    return Plan(name=text, replications=replications)
+
+
+def plans() -> dict[str, str]:
+    """Names and titles of the plans that come with hoid."""
+    return dict(_hoid.plan_names())
+
+
+def study(
+    source: str | PathLike[str] | Plan,
+    directory: str | PathLike[str],
+    *,
+    shard: str | tuple[int, int] | None = None,
+    jobs: int | None = None,
+    replications: int | None = None,
+    resume: bool = False,
+    csv: bool = False,
+    progress: Progress = False,
+) -> Results:
+    """Run a study, or a share of it, into a directory.
+
+    An interrupt stops it within a second; ``resume=True`` then goes on with nothing lost or repeated.
+
+    Parameters
+    ----------
+    source : path, str or Plan
+        As in `plan`.
+    directory : path
+    shard : str or (int, int), optional
+        ``"2/7"`` or ``(2, 7)`` runs the second of seven shares; `merge` joins them.
+    jobs : int, optional
+        Threads; default one a core.
+    replications : int, optional
+        In place of those of the plan.
+    resume : bool
+        Go on with a study that was stopped.
+    csv : bool
+        Write tables as CSV in place of Parquet.
+    progress : bool or callable
+
+    Returns
+    -------
+    Results
+
+    Raises
+    ------
+    OptionError
+        For a plan without meaning.
+    StudyStateError
+        When the directory holds a study, and `resume` is not asked for.
+    """
+    found = plan(source, replications=replications)
+    share = f"{shard[0]}/{shard[1]}" if isinstance(shard, tuple) else shard
+    target = Path(directory)
+    finished, estimates, tables = found.run(
+        target,
+        shard=share,
+        jobs=jobs,
+        resume=resume,
+        csv=csv,
+        progress=_options.reporter(progress, "estimates"),
+    )
+    if not finished:
+        raise StudyStateError(f"{found.name} was stopped; what is done is in {target}, go on with resume=True")
+    return Results(target, finished=bool(tables), estimates=estimates)
+
+
+def merge(shards: Sequence[str | PathLike[str]], directory: str | PathLike[str], *, csv: bool = False) -> Results:
+    """Join the shards of a study.
+
+    Raises
+    ------
+    StudyStateError
+        For shards of different plans, or when some are missing or there twice.
+    """
+    finished, estimates, _ = _hoid.merge_shards([Path(shard) for shard in shards], Path(directory), csv)
+    return Results(directory, finished=finished, estimates=estimates)
+
+
+def results(directory: str | PathLike[str]) -> Results:
+    """The tables of a directory that a study or a group was written to.
+
+    Raises
+    ------
+    StudyStateError
+        When there are none.
+    """
+    found = Results(directory)
+    if not found:
+        raise StudyStateError(f"{directory} holds no tables: expected the directory of a finished study or group")
+    return found
+
+
+def group(
+    manifest: str | PathLike[str],
+    directory: str | PathLike[str],
+    *,
+    jobs: int | None = None,
+    resume: bool = False,
+    csv: bool = False,
+    progress: Progress = False,
+) -> Results:
+    """Analyse many recorded runs by subject and condition.
+
+    Parameters
+    ----------
+    manifest : path
+        The file ``group.toml``, or the directory with it; `group_manifest` writes one.
+    directory : path
+        Where the tables are written.
+    jobs, resume, csv, progress
+        As in `study`.
+
+    Returns
+    -------
+    Results
+        ``estimates``, ``averages``, ``delays``, ``trace-averages``, ...
+
+    Raises
+    ------
+    FileError, OptionError, StudyStateError
+    """
+    file = Path(manifest)
+    file = file / "group.toml" if file.is_dir() else file
+    finished, estimates, _ = _hoid.group(
+        file, Path(directory), jobs=jobs, resume=resume, csv=csv, progress=_options.reporter(progress, "runs")
+    )
+    if not finished:
+        raise StudyStateError(f"the group was stopped; what is done is in {directory}, go on with resume=True")
+    return Results(directory, finished=finished, estimates=estimates)
+
+
+def group_manifest(directory: str | PathLike[str], pattern: str = "{subject}_{condition}_{run}.csv") -> tuple[str, list[str]]:
+    """The manifest (TOML text) of the files of a directory whose names match a pattern, and the files that do not."""
+    return _hoid.group_manifest(Path(directory), pattern)

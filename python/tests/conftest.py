@@ -1,0 +1,55 @@
+"""What the tests share: runs that are simulated once, and the command line to compare with."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import hoid
+
+os.environ.setdefault("MPLBACKEND", "Agg")
+
+
+@pytest.fixture(scope="session")
+def c1() -> hoid.Record:
+    return hoid.simulate("C1", seed=1)
+
+
+@pytest.fixture(scope="session")
+def c4() -> hoid.Record:
+    return hoid.simulate("C4", seed=1)
+
+
+@pytest.fixture(scope="session")
+def fit(c1: hoid.Record) -> hoid.Fit:
+    return hoid.identify(c1, "bj", nb=2, nd=1, nf=2, nk=29)
+
+
+class CommandLine:
+    """The binary of the same sources; `cargo xtask test` names it in HOID_BINARY."""
+
+    def __init__(self, binary: str) -> None:
+        self.binary = binary
+
+    def run(self, *arguments: Any) -> str:
+        done = subprocess.run([self.binary, *map(str, arguments)], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    def json(self, *arguments: Any) -> Any:
+        return json.loads(self.run(*arguments, "--json"))
+
+
+@pytest.fixture(scope="session")
+def cli() -> CommandLine:
+    built = Path(__file__).parents[2] / "target" / "debug" / "hoid"
+    binary = os.environ.get("HOID_BINARY") or (str(built) if built.exists() else shutil.which("hoid"))
+    if not binary:
+        pytest.skip("no hoid binary: build it by cargo build -p hoid-cli, or name it in HOID_BINARY")
+    return CommandLine(binary)

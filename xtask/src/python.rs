@@ -1,0 +1,175 @@
+//! The tests of the Python package: a fresh virtual environment, the wheel, pytest.
+//!
+//! The wheel is built with the profile of the tests and in their target folder, so that what they have compiled is not compiled again; the test
+//! requirements come from PyPI. `HOID_PYTHON` names another interpreter than `python3`.
+
+use std::{
+    env, fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use crate::{Counts, cargo, each_line, run};
+
+/// Oldest Python that the package supports.
+const OLDEST: (u32, u32) = (3, 10);
+
+/// Builds and installs the wheel, and runs pytest with these arguments.
+pub fn test(arguments: &[String]) -> Result<Counts, String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .ok_or("the folder of xtask has no parent")?;
+    let (package, target) = (root.join("python"), target_directory(root));
+    let work = target.join("python");
+    let environment = work.join("venv");
+    let python = fresh_environment(&environment)?;
+    let wheels = work.join("wheels");
+    let _ = fs::remove_dir_all(&wheels);
+    pip(&python, &["maturin>=1.9.4,<2"])?;
+    // The same command line as the tests', to compare with; with the tests, because alone it has other features and would be compiled again.
+    cargo(&["build", "--quiet", "--workspace", "--bins", "--tests"], &[])?;
+    run(Command::new(&python)
+        .args(["-m", "maturin", "build", "--profile", "dev"])
+        .args(["--features", "as-in-workspace", "--out"])
+        .arg(&wheels)
+        .current_dir(&package)
+        .env("CARGO_TARGET_DIR", &target))?;
+    let wheel = fs::read_dir(&wheels)
+        .map_err(|e| format!("{}: {e}", wheels.display()))?
+        .filter_map(Result::ok)
+        .map(|entry| entry.path())
+        .find(|path| path.extension().is_some_and(|e| e == "whl"))
+        .ok_or_else(|| format!("maturin has left no wheel in {}", wheels.display()))?;
+    pip(&python, &[&format!("{}[test]", wheel.display())])?;
+    let mut counts = Counts::default();
+    let mut command = Command::new(&python);
+    command
+        .args(["-W", "error", "-m", "pytest", "--color=no", "--durations=5"])
+        .args(arguments)
+        .current_dir(&package)
+        .env("MPLBACKEND", "Agg")
+        .env(
+            "HOID_BINARY",
+            target.join("debug").join(format!("hoid{}", env::consts::EXE_SUFFIX)),
+        );
+    let shown = format!("{command:?}");
+    let status = each_line(&mut command, |line| counts.add_pytest(line))?;
+    if !status.success() && counts.failed == 0 {
+        return Err(format!("failed ({status}): {shown}"));
+    }
+    Ok(counts)
+}
+
+fn target_directory(root: &Path) -> PathBuf {
+    match env::var_os("CARGO_TARGET_DIR") {
+        Some(named) => root.join(named),
+        None => root.join("target"),
+    }
+}
+
+/// A virtual environment with nothing in it; returns its interpreter.
+fn fresh_environment(directory: &Path) -> Result<PathBuf, String> {
+    let base = interpreter()?;
+    let _ = fs::remove_dir_all(directory);
+    run(Command::new(&base).args(["-m", "venv"]).arg(directory)).map_err(|e| {
+        format!(
+            "{e}\nthe tests of the Python package need the module venv; on Debian and Ubuntu: apt install python3-venv"
+        )
+    })?;
+    Ok(if cfg!(windows) {
+        directory.join("Scripts").join("python.exe")
+    } else {
+        directory.join("bin").join("python")
+    })
+}
+
+/// An interpreter that is not too old.
+fn interpreter() -> Result<String, String> {
+    let named = env::var("HOID_PYTHON").ok();
+    let names: Vec<String> = match named {
+        Some(name) => vec![name],
+        None => [
+            "python3",
+            "python",
+            "python3.13",
+            "python3.12",
+            "python3.11",
+            "python3.10",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
+    };
+    let mut found = Vec::new();
+    for name in names {
+        let asked = Command::new(&name)
+            .args(["-c", "import sys; print(*sys.version_info[:2])"])
+            .output();
+        let Ok(output) = asked else { continue };
+        let text = String::from_utf8_lossy(&output.stdout).trim().to_owned();
+        let mut parts = text.split(' ').map(str::parse::<u32>);
+        if let (Some(Ok(major)), Some(Ok(minor))) = (parts.next(), parts.next()) {
+            if (major, minor) >= OLDEST {
+                return Ok(name);
+            }
+            found.push(format!("{name} is {major}.{minor}"));
+        }
+    }
+    Err(format!(
+        "the tests of the Python package need Python {}.{} or newer{}; install it, or name it in HOID_PYTHON",
+        OLDEST.0,
+        OLDEST.1,
+        if found.is_empty() {
+            ", and none was found".to_owned()
+        } else {
+            format!(" ({})", found.join(", "))
+        }
+    ))
+}
+
+fn pip(python: &Path, packages: &[&str]) -> Result<(), String> {
+    run(Command::new(python)
+        .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"])
+        .args(packages))
+}
+
+impl Counts {
+    /// Adds the last line of pytest, as `=== 2 failed, 85 passed, 1 skipped in 61.20s (0:01:01) ===`.
+    pub fn add_pytest(&mut self, line: &str) {
+        let Some((numbers, time)) = line.trim_matches(['=', ' ']).rsplit_once(" in ") else {
+            return;
+        };
+        if !time.starts_with(|c: char| c.is_ascii_digit()) {
+            return;
+        }
+        for part in numbers.split(", ") {
+            let mut words = part.split_whitespace();
+            let (Some(Ok(n)), Some(what)) = (words.next().map(str::parse::<usize>), words.next()) else {
+                return;
+            };
+            match what {
+                "passed" => self.passed += n,
+                "failed" | "error" | "errors" => self.failed += n,
+                "skipped" | "deselected" | "xfailed" => self.ignored += n,
+                _ => {}
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_line_of_pytest_counts() {
+        let mut counts = Counts::default();
+        for line in [
+            "tests/test_core.py .......",
+            "3.19s call     tests/test_command_line.py::test_identify in 5 steps",
+            "============ 2 failed, 85 passed, 1 skipped, 1 error in 61.20s (0:01:01) ============",
+        ] {
+            counts.add_pytest(line);
+        }
+        assert_eq!((counts.passed, counts.failed, counts.ignored), (85, 3, 1));
+    }
+}
