@@ -116,35 +116,6 @@ pub struct SimulateArgs {
     pub out: PathBuf,
 }
 
-/// How record files are read.
-#[derive(Debug, Args)]
-pub struct ReadArgs {
-    /// Column of the input (tracking error): a name, -name, or a difference such as r-y
-    #[arg(long, value_name = "COLUMN", default_value = "e", allow_hyphen_values = true)]
-    pub input: String,
-    /// Column of the output (control): a name, -name, or a difference
-    #[arg(long, value_name = "COLUMN", default_value = "u", allow_hyphen_values = true)]
-    pub output: String,
-    /// Sampling frequency in Hz; without it column t (in s) gives the sampling
-    #[arg(long, value_name = "HZ")]
-    pub fs: Option<f64>,
-    /// Start of the span to use, s
-    #[arg(long, value_name = "S", allow_hyphen_values = true)]
-    pub from: Option<f64>,
-    /// End of the span to use (not included), s
-    #[arg(long, value_name = "S", allow_hyphen_values = true)]
-    pub to: Option<f64>,
-    /// Bring unevenly sampled data onto an even grid by linear interpolation
-    #[arg(long)]
-    pub resample: bool,
-    /// Bridge missing values (empty, NaN) by linear interpolation
-    #[arg(long)]
-    pub fill: bool,
-    /// Take out the mean or the straight line of input and output
-    #[arg(long, value_name = "HOW", default_value = "none")]
-    pub detrend: DetrendName,
-}
-
 #[derive(Debug, Args)]
 pub struct IdentifyArgs {
     /// Record files (CSV, Parquet, NPZ, MATLAB .mat, XDF); several share one model and have initial states of their own
@@ -152,6 +123,8 @@ pub struct IdentifyArgs {
     pub records: Vec<PathBuf>,
     #[command(flatten)]
     pub read: ReadArgs,
+    #[command(flatten)]
+    pub mask: MaskArgs,
     /// What is fitted: a polynomial structure, grey-box (operator and remnant in physical parameters, with a real delay), or
     /// time-varying (the operator's gains change once, by a sigmoid) [default: bj, or that of --method]
     #[arg(long, value_name = "NAME")]
@@ -350,10 +323,12 @@ macro_rules! names {
 }
 
 mod group;
+mod reading;
 mod recursion;
 mod study;
 
 pub use group::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs};
+pub use reading::{MaskArgs, ReadArgs};
 pub use recursion::{ForgettingName, RecursionArgs, StreamArgs, TrackArgs};
 pub use study::{ReproduceArgs, StudyCommand, StudyMergeArgs, StudyRunArgs};
 

@@ -3,6 +3,7 @@
 use hoid_ident::{
     Choice, Fit, GreyBoxFit, IdentError, MarginEstimates, Root,
     grey_box::OrderCandidate,
+    tracking::Change,
     validation::{LjungBox, Quality, Validation},
 };
 use hoid_model::{
@@ -10,9 +11,10 @@ use hoid_model::{
     margins::Margins,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
+use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::output;
+use crate::{commands::reading::Account, output};
 
 /// A number, or null where there is none: JSON has no NaN.
 pub fn number(value: f64) -> Value {
@@ -25,6 +27,24 @@ pub fn optional(value: Option<f64>) -> Value {
 
 pub fn estimate(e: &Estimate) -> Value {
     json!({"value": number(e.value), "standard_error": optional(e.standard_error)})
+}
+
+/// A change of the person, declared at a time in s.
+pub fn change(declared_at: Option<f64>, c: &Change) -> Value {
+    let before_and_after = |pair: &[Estimate; 2]| json!({"before": estimate(&pair[0]), "after": estimate(&pair[1])});
+    let numbers = |pair: &[f64; 2]| json!({"before": number(pair[0]), "after": number(pair[1])});
+    json!({
+        "t": optional(declared_at),
+        "since": optional(declared_at.map(|t| t - c.seconds_ago)),
+        "probability": number(c.probability()),
+        "log_odds": number(c.odds),
+        "changed": c.changed(),
+        "K_e": before_and_after(&c.k_e),
+        "K_e_dot": before_and_after(&c.k_e_dot),
+        "T_L": numbers(&c.t_l_s),
+        "innovation_variance": numbers(&c.innovation_variance),
+        "z": {"K_e": number(c.z[0]), "K_e_dot": number(c.z[1]), "remnant": number(c.z[2])},
+    })
 }
 
 pub fn orders(o: &Orders) -> Value {
@@ -133,6 +153,7 @@ fn quality(q: &Quality, fit: &Fit) -> Value {
 pub struct Identified<'a> {
     pub files: &'a [String],
     pub records: &'a [Record],
+    pub accounts: &'a [Account],
     pub fit: &'a Fit,
     pub choice: Option<&'a Choice>,
     pub grey_box: Option<&'a GreyBoxFit>,
@@ -162,7 +183,8 @@ impl Identified<'_> {
         let mut map = Map::new();
         let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
         set("hoid", json!(env!("CARGO_PKG_VERSION")));
-        set("records", records(self.files, self.records));
+        set("records", records(self.files, self.records, self.accounts));
+        set("warnings", warnings(self.files, self.accounts));
         let structure = fit.model().structure().name();
         set(
             "structure",
@@ -240,10 +262,31 @@ impl Identified<'_> {
     }
 }
 
-/// Files and sampling of the records.
-pub fn records(files: &[String], records: &[Record]) -> Value {
-    let record = |(file, r): (&String, &Record)| json!({"file": file, "samples": r.len(), "sample_time": number(r.sample_time().s())});
-    files.iter().zip(records).map(record).collect()
+/// Files and sampling of the records, and what was done to them.
+pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> Value {
+    let record = |((file, r), account): ((&String, &Record), &Account)| {
+        json!({
+            "file": file,
+            "samples": r.len(),
+            "sample_time": number(r.sample_time().s()),
+            "preparation": list(&account.steps),
+            "trouble": list(&account.trouble),
+        })
+    };
+    files.iter().zip(records).zip(accounts).map(record).collect()
+}
+
+/// What is wrong with the sampling, in words.
+pub fn warnings(files: &[String], accounts: &[Account]) -> Value {
+    let all = files.iter().zip(accounts);
+    all.flat_map(|(file, account)| account.trouble.iter().map(move |one| json!(format!("{file}: {one}"))))
+        .collect()
+}
+
+/// What the library writes about itself, one object each.
+pub fn list<T: Serialize>(items: &[T]) -> Value {
+    // Numbers that JSON does not have become null; nothing else can fail.
+    serde_json::to_value(items).unwrap_or(Value::Null)
 }
 
 /// Orders m of the remnant that a grey box tried.

@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use hoid_ident::{
-    Choice, Estimator, IdentError, OrderRanges,
-    order_search::{Criterion, choose_orders_with},
-    tracking::{ForgettingRule, Memory, Method, Regressor, Stable, StartAt, StartCovariance, TrackOptions},
+    Choice, IdentError, OrderRanges,
+    tracking::{
+        ForgettingRule, Memory, Method, Regressor, Stable, StartAt, StartCovariance, TrackOptions, TrackPlan, narrowed,
+    },
 };
-use hoid_model::{Orders, Record, SampleTime, Structure};
+use hoid_model::{Record, SampleTime, Structure};
 
 use crate::{
     args::{ForgettingName, RecursionArgs},
@@ -20,9 +21,7 @@ const USUAL_RATE: f64 = 0.1;
 
 /// A recursion as it was typed, its options checked against each other; of the orders some may still be ranges.
 pub struct Plan {
-    options: TrackOptions,
-    ranges: OrderRanges,
-    criterion: Criterion,
+    plan: TrackPlan,
     sample_time: SampleTime,
 }
 
@@ -76,26 +75,23 @@ impl Plan {
         };
         let options = TrackOptions {
             window: args.window.unwrap_or(options.window),
+            alarm: args.alarm.unwrap_or(options.alarm),
             every: args.refit.unwrap_or(options.every),
             ..options
         };
-        check(&options, sample_time).map_err(|e| CliError::Usage(e.to_string()))?;
-        Ok(Self {
-            options,
-            ranges,
-            criterion: args.criterion.into(),
-            sample_time,
-        })
+        let plan = TrackPlan::new(options, ranges, args.criterion.into(), sample_time)
+            .map_err(|e| CliError::Usage(e.to_string()))?;
+        Ok(Self { plan, sample_time })
     }
 
     /// True when no order is left to be searched.
     pub fn is_settled(&self) -> bool {
-        self.ranges.combinations().is_ok_and(|all| all.len() == 1)
+        self.plan.is_settled()
     }
 
     /// The options; until [`Plan::choose`] with the largest orders of the ranges.
     pub fn options(&self) -> &TrackOptions {
-        &self.options
+        self.plan.options()
     }
 
     /// Searches what is left open on a record, nothing when all is settled.
@@ -104,34 +100,13 @@ impl Plan {
     /// Those of the search.
     pub fn choose(&self, span: &Record) -> Result<(TrackOptions, Option<Choice>), IdentError> {
         if self.is_settled() {
-            return Ok((self.options.clone(), None));
+            return Ok((self.options().clone(), None));
         }
-        let combinations = self.ranges.combinations()?;
-        let template = Estimator {
-            search: self.options.search,
-            ..Estimator::new(self.options.structure, combinations[0])
-        };
-        let bar = output::progress(combinations.len(), "candidates");
-        let records = std::slice::from_ref(span);
-        let choice = choose_orders_with(&template, &self.ranges, self.criterion, records, &|| bar.inc(1));
+        let candidates = self.plan.ranges().combinations()?.len();
+        let bar = output::progress(candidates, "candidates");
+        let chosen = self.plan.choose(span, &|| bar.inc(1));
         bar.finish_and_clear();
-        let choice = choice?;
-        Ok((self.with_orders(choice.fit.orders()), Some(choice)))
-    }
-
-    /// The options for orders within the ranges; what was said of coefficients that these orders do not have is left out.
-    fn with_orders(&self, orders: Orders) -> TrackOptions {
-        let mut options = TrackOptions {
-            orders,
-            ..self.options.clone()
-        };
-        let names = options.parameter_names();
-        options.memory_of.retain(|key, _| is_known(&names, key));
-        options.bounds.retain(|key, _| is_known(&names, key));
-        if let ForgettingRule::RandomWalk(drift) = &mut options.forgetting {
-            drift.retain(|key, _| is_known(&names, key));
-        }
-        options
+        chosen
     }
 
     /// Every option that shapes the result, defaults included, with units.
@@ -142,7 +117,7 @@ impl Plan {
         if let Some(choice) = choice {
             orders.push_str(&format!(
                 " (chosen from {} by {})",
-                self.ranges,
+                self.plan.ranges(),
                 choice.criterion.name()
             ));
         }
@@ -154,6 +129,15 @@ impl Plan {
         if options.method == Method::Window {
             list.push(setting("window", memory_text(options.window, ts)));
             list.push(setting("fit again every", format!("{} samples", options.every)));
+        } else if options.method == Method::Adaptive {
+            list.push(setting(
+                "memory",
+                "since the last change, by a bank of hypotheses".to_owned(),
+            ));
+            list.push(setting(
+                "a change is declared at",
+                format!("log odds of {}", options.alarm),
+            ));
         } else {
             list.push(setting("memory", memories_text(options, ts)));
             list.push(setting("forgetting", forgetting_text(&options.forgetting)));
@@ -198,57 +182,31 @@ impl Plan {
     }
 }
 
-/// What the library checks when it starts, before anything is read or searched.
-fn check(options: &TrackOptions, sample_time: SampleTime) -> Result<(), IdentError> {
-    options.check()?;
-    for memory in options.memories()? {
-        memory.lambda(sample_time)?;
-    }
-    options.window.lambda(sample_time)?;
-    let names = options.parameter_names();
-    let drift = match &options.forgetting {
-        ForgettingRule::RandomWalk(drift) => Some(drift),
-        _ => None,
-    };
-    let named = drift.into_iter().flat_map(BTreeMap::keys).chain(options.bounds.keys());
-    for name in named {
-        if !names.contains(name) {
-            return Err(IdentError::UnknownParameter {
-                name: name.clone(),
-                available: names.join(", "),
-            });
-        }
-    }
-    if options.window == Memory::Infinite {
-        return Err(IdentError::BadOption {
-            option: "--window".to_owned(),
-            found: "inf".to_owned(),
-            expected: "samples or seconds".to_owned(),
-        });
-    }
-    Ok(())
-}
-
 /// Options that have no meaning beside the others.
 fn misplaced(args: &RecursionArgs, method: Method) -> Result<(), CliError> {
-    let (windowed, physical) = (method == Method::Window, method == Method::Physical);
-    let remembers = !windowed && args.forgetting != ForgettingName::Gradient;
+    let (windowed, adaptive) = (method == Method::Window, method == Method::Adaptive);
+    let remembers = !windowed && !adaptive && args.forgetting != ForgettingName::Gradient;
     let options = [
         (args.window.is_some() && !windowed, "--window", "--method window"),
         (args.refit.is_some() && !windowed, "--refit", "--method window"),
         (
             (args.memory.is_some() || args.lambda.is_some()) && !remembers,
             "--memory",
-            "a recursion that forgets; --method window has --window, --forgetting gradient has --rate",
+            "a recursion that forgets; window has --window, --forgetting gradient has --rate, adaptive finds its memory",
         ),
         (
             args.memory_of.is_some() && !remembers,
             "--memory-of",
-            "a recursion that forgets; --method window has --window, --forgetting gradient has --rate",
+            "a recursion that forgets; window has --window, --forgetting gradient has --rate, adaptive finds its memory",
         ),
-        (args.bound.is_some() && !physical, "--bound", "--method physical"),
         (
-            args.track_delay.is_some() && !physical,
+            args.bound.is_some() && !method.is_physical(),
+            "--bound",
+            "--method physical or adaptive",
+        ),
+        (args.alarm.is_some() && !adaptive, "--alarm", "--method adaptive"),
+        (
+            args.track_delay.is_some() && method != Method::Physical,
             "--track-delay",
             "--method physical",
         ),
@@ -272,28 +230,23 @@ fn misplaced(args: &RecursionArgs, method: Method) -> Result<(), CliError> {
 /// Orders as typed; what would be searched is that of the start where one was typed, and the delay lies within the range that is tracked.
 fn ranges(args: &RecursionArgs, structure: Structure, sample_time: SampleTime) -> Result<OrderRanges, CliError> {
     let mut ranges = orders::ranges(structure, args.orders.as_deref(), args.nk.as_ref(), sample_time)?;
+    let method = Method::from(args.method);
+    if method == Method::Adaptive && !args.orders.as_deref().is_some_and(|o| o.contains("nd")) {
+        let nd = method.usual_orders(1).nd;
+        ranges.nd = nd..=nd;
+    }
     let typed_nk = args.nk.is_some() || args.orders.as_deref().is_some_and(|o| o.contains("nk"));
-    if let (Some((low, high)), false) = (args.track_delay, typed_nk) {
-        let samples = |delay_s: f64| (delay_s.max(0.0) / sample_time.s()).round() as usize + 1;
-        ranges.nk = samples(low)..=samples(high);
-    }
     let start = args.start.as_deref().filter(|text| text.trim() != "nothing");
-    if let (Some(text), None) = (start, &args.orders) {
-        let all = orders::parse_pairs(text).map_err(|e| CliError::Usage(format!("--start: {e}")))?;
-        let count = |letter: char| all.iter().filter(|(name, _)| name.starts_with(letter)).count();
-        for (range, letter) in [
-            (&mut ranges.na, 'a'),
-            (&mut ranges.nb, 'b'),
-            (&mut ranges.nc, 'c'),
-            (&mut ranges.nd, 'd'),
-            (&mut ranges.nf, 'f'),
-        ] {
-            if range.start() != range.end() {
-                *range = count(letter)..=count(letter);
-            }
-        }
-    }
-    Ok(ranges)
+    let names: Vec<String> = match (start, &args.orders) {
+        (Some(text), None) => orders::parse_pairs(text)
+            .map_err(|e| CliError::Usage(format!("--start: {e}")))?
+            .into_iter()
+            .map(|(name, _)| name)
+            .collect(),
+        _ => Vec::new(),
+    };
+    let delay = args.track_delay.filter(|_| !typed_nk);
+    Ok(narrowed(ranges, delay, &names, sample_time))
 }
 
 fn forgetting(args: &RecursionArgs) -> Result<ForgettingRule, CliError> {
@@ -324,12 +277,6 @@ fn unique<T: Copy>(option: &str, list: Option<&[(String, T)]>) -> Result<BTreeMa
         }
     }
     Ok(all)
-}
-
-/// True for the name of a parameter, or the letter of its polynomial.
-fn is_known(names: &[String], key: &str) -> bool {
-    let is = |rest: &str| rest.bytes().all(|b| b.is_ascii_digit());
-    names.iter().any(|n| n.strip_prefix(key).is_some_and(is))
 }
 
 fn memory_text(memory: Memory, sample_time: SampleTime) -> String {
@@ -370,21 +317,5 @@ fn forgetting_text(rule: &ForgettingRule) -> String {
         ForgettingRule::Variable => "variable, with the shortest memory".to_owned(),
         ForgettingRule::Directional => "directional, with the shortest memory".to_owned(),
         ForgettingRule::Gradient(rate) => format!("normalised gradient of rate {rate}"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_and_letters() {
-        let names: Vec<String> = ["K_e", "K_e_dot", "b0", "b1", "f2"].map(str::to_owned).to_vec();
-        for known in ["K_e", "K_e_dot", "b", "b1", "f"] {
-            assert!(is_known(&names, known), "{known}");
-        }
-        for unknown in ["K", "d", "b2", "f1", "x"] {
-            assert!(!is_known(&names, unknown), "{unknown}");
-        }
     }
 }

@@ -13,6 +13,8 @@ use hoid_model::{
 };
 use hoid_report::numbers;
 
+use crate::commands::reading::Account;
+
 /// Rows of a search that are printed; all of them are in the JSON.
 const CANDIDATES_SHOWN: usize = 8;
 
@@ -49,17 +51,21 @@ pub fn remnant_discretisation(how: RemnantDiscretisation) -> &'static str {
     }
 }
 
-/// The records in use.
-pub fn records(files: &[String], records: &[Record]) -> String {
-    let line = |(file, record): (&String, &Record)| {
-        format!(
+/// The records in use, and what was done to them.
+pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> String {
+    let line = |((file, record), account): ((&String, &Record), &Account)| {
+        let mut lines = format!(
             "{file}: {} samples of {} s from t = {:.4} s\n",
             record.len(),
             numbers::plain(record.sample_time().s()),
             record.time_s(0)
-        )
+        );
+        for step in &account.steps {
+            lines.push_str(&format!("  {step}\n"));
+        }
+        lines
     };
-    files.iter().zip(records).map(line).collect()
+    files.iter().zip(records).zip(accounts).map(line).collect()
 }
 
 /// Every option that shaped the result.

@@ -239,7 +239,10 @@ fn what_does_not_fit_together_ends_with_two() {
         (&["--method", "rls", "--structure", "arx", "--orders", "nd=1"], "nd"),
         (&["--memory-of", "x=256"], "K_e, K_e_dot, omega_nm, zeta_nm"),
         (&["--memory-of", "b0=256"], "K_e, K_e_dot, omega_nm, zeta_nm"),
-        (&["--memory-of", "K_e=0"], "no memory"),
+        (
+            &["--memory-of", "K_e=0"],
+            "K_e: the memory: found 0; expected more than 1 sample",
+        ),
         (&["--memory-of", "K_e=5,K_e=6"], "twice"),
         (&["--memory", "0"], "more than 1 sample"),
         (&["--memory", "0.001s"], "memory"),

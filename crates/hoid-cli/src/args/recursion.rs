@@ -4,6 +4,7 @@ use std::{ops::RangeInclusive, path::PathBuf};
 
 use clap::{Args, ValueEnum};
 use hoid_ident::tracking::{Memory, Method, Stable};
+use hoid_io::Scaling;
 use hoid_model::Structure;
 
 use super::{CriterionName, ReadArgs, parse_span};
@@ -15,6 +16,7 @@ names!(RecursiveMethodName for Method {
     Physical = Method::Physical,
     Window = Method::Window,
     Rriv = Method::Refined,
+    Adaptive = Method::Adaptive,
 });
 names!(PolynomialStructureName for Structure {
     Arx = Structure::Arx,
@@ -46,14 +48,15 @@ pub enum ForgettingName {
 #[derive(Debug, Args)]
 pub struct RecursionArgs {
     /// The recursion: rls least squares (arx, fir); rpem prediction error method (every structure); physical the same in the
-    /// operator's parameters; window a batch fit of the last seconds, again and again; rriv refined instrumental variable
+    /// operator's parameters; window a batch fit of the last seconds, again and again; rriv refined instrumental variable; adaptive a bank of
+    /// hypotheses of when the person changed, which sets its memory itself and tells of changes
     #[arg(long, value_name = "NAME", default_value = "physical")]
     pub method: RecursiveMethodName,
     /// Polynomial structure [default: arx for rls, else bj]
     #[arg(long, value_name = "NAME")]
     pub structure: Option<PolynomialStructureName>,
     /// Orders, each a number or a range to search on the start span, as nb=2,nc=0,nd=1..4,nf=2
-    /// [default: the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2]
+    /// [default: the operator's: bj nb=2,nd=1..4,nf=2, for adaptive nd=6; arx na=2,nb=2]
     #[arg(long, value_name = "LIST")]
     pub orders: Option<String>,
     /// Delay of b0 in samples, a number or a range to search on the start span [default: 0.05 to 0.6 s]
@@ -95,7 +98,7 @@ pub struct RecursionArgs {
     /// Polynomials kept stable: predictor (C and F), or noise (D too)
     #[arg(long, value_name = "WHICH", default_value = "predictor")]
     pub stable: StableName,
-    /// Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1.., for physical
+    /// Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1.., for physical and adaptive
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     pub bound: Option<String>,
     /// Track the delay tau_e too, within this range in s, for physical
@@ -107,10 +110,13 @@ pub struct RecursionArgs {
     /// Samples between two fits for --method window [default: 25]
     #[arg(long, value_name = "N")]
     pub refit: Option<usize>,
-    /// Standard deviations beyond which an innovation moves the estimate no further: a number or inf [default: 5 for rpem and
-    /// physical, inf for rls]
+    /// Standard deviations beyond which an innovation moves the estimate no further: a number or inf [default: 5 for rpem,
+    /// physical and adaptive, inf for rls]
     #[arg(long, value_name = "K")]
     pub limit: Option<f64>,
+    /// For --method adaptive: logarithm of the odds from which a change is declared [default: 6]
+    #[arg(long, value_name = "X", allow_hyphen_values = true)]
+    pub alarm: Option<f64>,
     /// Magnitude of e or u beyond which a sample is taken for a fault and skipped
     #[arg(long, value_name = "X", default_value = "1e6")]
     pub largest: f64,
@@ -174,6 +180,9 @@ pub struct StreamArgs {
     /// Column of the output (control) in the header line, where there is one
     #[arg(long, value_name = "NAME", default_value = "u")]
     pub output: String,
+    /// Multiply e or u: by a factor (u=12.5) or from unit to unit (e=rad:deg). May be repeated
+    #[arg(long, value_name = "e|u=FACTOR", value_parser = super::reading::parse_scale)]
+    pub scale: Vec<(String, Scaling)>,
 }
 
 fn parse_lambda(text: &str) -> Result<Memory, String> {

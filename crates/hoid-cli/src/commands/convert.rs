@@ -24,7 +24,8 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
             (discrete, discrete.parameters())
         }
         (_, _, Some(pairs)) => {
-            let operator = operator_from(pairs)?;
+            let operator =
+                OperatorParameters::of_names(pairs).map_err(|e| CliError::Usage(format!("--operator: {e}")))?;
             (operator.discretise(sample_time)?, Ok(operator))
         }
         _ => {
@@ -89,37 +90,6 @@ fn held(f: &[f64], b: &[f64]) -> Result<HeldSecondOrder, CliError> {
             b.len()
         ))),
     }
-}
-
-fn operator_from(pairs: &[(String, f64)]) -> Result<OperatorParameters, CliError> {
-    const NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
-    if let Some((name, _)) = pairs.iter().find(|(name, _)| !NAMES.contains(&name.as_str())) {
-        return Err(CliError::Usage(format!(
-            "--operator: there is no parameter {name}; expected {}",
-            NAMES.join(", ")
-        )));
-    }
-    let find = |name: &str| pairs.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
-    let need = |name: &str| find(name).ok_or_else(|| CliError::Usage(format!("--operator lacks {name}")));
-    let k_e = need("K_e")?;
-    let t_l_s = match (find("T_L"), find("K_e_dot")) {
-        (Some(t_l), None) => t_l,
-        (None, Some(k_e_dot)) if k_e != 0.0 => k_e_dot / k_e,
-        (None, Some(_)) => {
-            return Err(CliError::Usage(
-                "--operator: K_e = 0 has no T_L = K_e_dot/K_e".to_owned(),
-            ));
-        }
-        (Some(_), Some(_)) => return Err(CliError::Usage("--operator: give T_L or K_e_dot, not both".to_owned())),
-        (None, None) => return Err(CliError::Usage("--operator lacks T_L (or K_e_dot)".to_owned())),
-    };
-    Ok(OperatorParameters {
-        k_e,
-        t_l_s,
-        omega_nm_rad_s: need("omega_nm")?,
-        zeta_nm: need("zeta_nm")?,
-        tau_e_s: find("tau_e").unwrap_or(0.0),
-    })
 }
 
 fn discretised(args: &ConvertArgs, h: &ContinuousTransferFunction, sample_time: SampleTime) -> Result<(), CliError> {

@@ -5,7 +5,8 @@ use std::{
     sync::atomic::Ordering,
 };
 
-use hoid_report::{GroupReport, GroupTables};
+use hoid_io::{ColumnValues, OutputTable};
+use hoid_report::{FrequencyTables, GroupReport, GroupTables};
 use hoid_study::{
     RunOptions,
     group::{Manifest, Pattern, VirtualExperiment, run_group, simulate_group},
@@ -21,6 +22,8 @@ use crate::{
 
 /// Name of the manifest in a directory.
 const MANIFEST: &str = "group.toml";
+/// Runs whose preparation and trouble the pages list.
+const MOST_TOLD: usize = 24;
 
 pub fn run(args: &GroupArgs) -> Result<(), CliError> {
     match (&args.command, &args.run.manifest, &args.run.out) {
@@ -130,7 +133,10 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
         &base,
         out,
         &options,
-        &|progress| bar.set_position(progress.done),
+        &|progress| {
+            bar.set_length(progress.total);
+            bar.set_position(progress.done);
+        },
         &|| !stopped.load(Ordering::Relaxed),
     );
     bar.finish_and_clear();
@@ -163,23 +169,29 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
 /// The page of the group and one for each subject.
 fn write_pages(manifest: &Manifest, out: &Path, path: &Path) -> Result<Vec<String>, CliError> {
     let read = |name: &str| hoid_io::read_table(&out.join(format!("{name}.parquet")));
-    let (estimates, averages, delays, traces) = (
-        read("estimates")?,
-        read("averages")?,
-        read("delays")?,
-        read("trace-averages")?,
-    );
+    let (estimates, averages, delays) = (read("estimates")?, read("averages")?, read("delays")?);
+    let (traces, settling, responses) = (read("trace-averages")?, read("settling")?, read("response-averages")?);
     let frequencies = if out.join("frequency-margins.parquet").exists() {
-        Some((read("describing-functions")?, read("frequency-margins")?))
+        Some([
+            read("describing-functions")?,
+            read("frequency-margins")?,
+            read("agreement")?,
+        ])
     } else {
         None
     };
     let tables = GroupTables {
-        frequencies: frequencies.as_ref().map(|(lines, margins)| (lines, margins)),
         estimates: &estimates,
         averages: &averages,
         delays: &delays,
         traces: &traces,
+        settling: &settling,
+        responses: &responses,
+        frequencies: frequencies.as_ref().map(|[lines, margins, agreement]| FrequencyTables {
+            lines,
+            margins,
+            agreement,
+        }),
     };
     let counting: Vec<_> = manifest.runs.iter().filter(|run| run.counts).collect();
     let mut subjects: Vec<&str> = Vec::new();
@@ -188,7 +200,7 @@ fn write_pages(manifest: &Manifest, out: &Path, path: &Path) -> Result<Vec<Strin
             subjects.push(&run.subject);
         }
     }
-    let settings = vec![
+    let mut settings = vec![
         ("made by".to_owned(), format!("hoid {}", env!("CARGO_PKG_VERSION"))),
         ("manifest".to_owned(), path.display().to_string()),
         ("runs".to_owned(), counting.len().to_string()),
@@ -205,6 +217,7 @@ fn write_pages(manifest: &Manifest, out: &Path, path: &Path) -> Result<Vec<Strin
             format!("{} to {}", manifest.analysis.nd.0, manifest.analysis.nd.1),
         ),
     ];
+    settings.extend(account(&read("preparation")?, &read("trouble")?));
     let mut pages = Vec::new();
     for subject in std::iter::once(None).chain(subjects.iter().map(|s| Some(*s))) {
         let page = GroupReport {
@@ -223,4 +236,32 @@ fn write_pages(manifest: &Manifest, out: &Path, path: &Path) -> Result<Vec<Strin
         pages.push(path.display().to_string());
     }
     Ok(pages)
+}
+
+/// What was done to the runs and what is wrong with their sampling, one row a run.
+fn account(preparation: &OutputTable, trouble: &OutputTable) -> Vec<(String, String)> {
+    let mut rows: Vec<(String, String)> = Vec::new();
+    for (table, what) in [(preparation, "preparation"), (trouble, "sampling trouble")] {
+        let text = |name: &str| match table.column(name) {
+            Some(ColumnValues::Text(values)) => values.as_slice(),
+            _ => &[],
+        };
+        for (file, words) in text("file").iter().zip(text("what")) {
+            let name = format!("{what} of {file}");
+            match rows.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, all)) => all.push_str(&format!("; {words}")),
+                None => rows.push((name, words.clone())),
+            }
+        }
+    }
+    // Long lists are in the tables.
+    let more = rows.len().saturating_sub(MOST_TOLD);
+    rows.truncate(MOST_TOLD);
+    if more > 0 {
+        rows.push((
+            "more runs".to_owned(),
+            format!("{more}; all of them are in preparation.csv and trouble.csv"),
+        ));
+    }
+    rows
 }

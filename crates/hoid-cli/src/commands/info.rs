@@ -47,6 +47,12 @@ fn words(file: &str, found: &FileSurvey) -> String {
         let line = format!("{:width$}  {}  {remarks}", column.path, values.sketch);
         text.push_str(&format!("{}\n", line.trim_end()));
     }
+    if !found.trouble.is_empty() {
+        text.push_str("\nTrouble:\n");
+    }
+    for trouble in &found.trouble {
+        text.push_str(&format!("  {trouble}\n    remedy: {}\n", trouble.kind.remedy()));
+    }
     for note in &found.notes {
         text.push_str(&format!("Note: {note}.\n"));
     }
@@ -139,6 +145,7 @@ fn object(found: &FileSurvey) -> Value {
         "format": found.format,
         "samplings": found.samplings.iter().map(sampling).collect::<Vec<_>>(),
         "columns": found.columns.iter().map(column).collect::<Vec<_>>(),
+        "trouble": json::list(&found.trouble),
         "notes": found.notes,
     })
 }

@@ -5,7 +5,6 @@ use hoid_model::{
     margins::{MANUAL_CONTROL_RANGE_RAD_S, margins},
     remnant::HIGHEST_ORDER,
     remnant_gain::NoiseDefinition,
-    scenario::{RemnantStrength, Scenario},
 };
 use serde_json::{Value, json};
 
@@ -39,7 +38,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
         .map(|(order, level)| Gain {
             order,
             level,
-            k_n: gain(&scenario, &state, order, level, definition),
+            k_n: scenario.remnant_gain_for(&state, order, level, definition),
         })
         .collect();
     // A level that cannot be reached is a row of the table; anything else is wrong for all of them.
@@ -96,17 +95,4 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
         scenario.sample_time.s(),
     ));
     Ok(())
-}
-
-fn gain(
-    scenario: &Scenario,
-    state: &hoid_model::scenario::OperatingState,
-    order: usize,
-    level: f64,
-    definition: NoiseDefinition,
-) -> Result<f64, ModelError> {
-    let mut scenario = scenario.clone();
-    scenario.remnant.order = order;
-    scenario.remnant.strength = RemnantStrength::Level { level, definition };
-    scenario.remnant_gain_of(state, 0.0)
 }

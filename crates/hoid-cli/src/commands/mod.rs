@@ -6,6 +6,7 @@ pub mod group;
 pub mod identify;
 pub mod info;
 pub mod margins;
+pub mod reading;
 pub mod reproduce;
 pub mod simulate;
 pub mod stream;

@@ -1,10 +1,7 @@
 //! `hoid simulate`: one closed-loop run into a file.
 
 use hoid_io::{write_record, write_record_csv};
-use hoid_model::{
-    Record, SampleTime,
-    scenario::{RemnantStrength, Scenario},
-};
+use hoid_model::{Record, SampleTime, scenario::Scenario};
 use hoid_report::numbers;
 use hoid_sim::{Simulator, Stream};
 
@@ -70,23 +67,12 @@ fn with_changes(mut scenario: Scenario, args: &SimulateArgs) -> Result<Scenario,
     if let Some(realisation) = args.realisation {
         scenario.realisation = realisation.into();
     }
-    match (&mut scenario.remnant.strength, args.noise_level, args.noise_definition) {
-        (_, None, None) => {}
-        (RemnantStrength::Level { level, definition }, new_level, new_definition) => {
-            *level = new_level.unwrap_or(*level);
-            *definition = new_definition.map_or(*definition, Into::into);
-        }
-        (strength @ RemnantStrength::Gain { .. }, Some(level), definition) => {
-            *strength = RemnantStrength::Level {
-                level,
-                definition: definition.map(Into::into).unwrap_or_default(),
-            };
-        }
-        (RemnantStrength::Gain { .. }, None, Some(_)) => {
-            return Err(CliError::Usage(
-                "--noise-definition needs --noise-level: the scenario gives the gain K_n itself".to_owned(),
-            ));
-        }
-    }
+    let definition = args.noise_definition.map(Into::into);
+    let Some(strength) = scenario.remnant.strength.changed(args.noise_level, definition) else {
+        return Err(CliError::Usage(
+            "--noise-definition needs --noise-level: the scenario gives the gain K_n itself".to_owned(),
+        ));
+    };
+    scenario.remnant.strength = strength;
     Ok(scenario)
 }

@@ -8,7 +8,7 @@ use std::{
     },
 };
 
-use hoid_study::{NAMED_PLANS, NamedPlan, Outcome, Plan, RunOptions, merge, plan_schema, run};
+use hoid_study::{FURTHER_PLANS, NAMED_PLANS, NamedPlan, Outcome, Plan, RunOptions, merge, plan_schema, run};
 use serde_json::json;
 
 use crate::{
@@ -187,7 +187,7 @@ fn description(plan: &Plan) -> String {
 fn list(name: Option<&str>) -> Result<(), CliError> {
     let Some(name) = name else {
         let mut text = String::new();
-        for named in NAMED_PLANS {
+        for named in NAMED_PLANS.iter().chain(FURTHER_PLANS) {
             let plan = named.plan()?;
             text.push_str(&format!(
                 "{:22} {} ({} estimates)\n",
@@ -200,7 +200,7 @@ fn list(name: Option<&str>) -> Result<(), CliError> {
         return Ok(());
     };
     let named = NamedPlan::find(name).ok_or_else(|| {
-        let known: Vec<&str> = NAMED_PLANS.iter().map(|p| p.name).collect();
+        let known: Vec<&str> = NAMED_PLANS.iter().chain(FURTHER_PLANS).map(|p| p.name).collect();
         CliError::Usage(format!(
             "no plan is called {name}; expected one of {}",
             known.join(", ")

@@ -11,12 +11,13 @@ use serde_json::{Map, Value, json};
 
 use crate::{
     args::IdentifyArgs,
+    commands::reading::Account,
     error::CliError,
     json::{self, number},
     orders, output, text,
 };
 
-pub fn run(args: &IdentifyArgs, records: &[Record]) -> Result<(), CliError> {
+pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: &[Account]) -> Result<(), CliError> {
     if Option::<InitialState>::from(args.initial_state).is_some_and(|rule| rule != InitialState::Estimate) {
         return Err(CliError::Usage(
             "--initial-state: the time-varying fit estimates the initial states; give auto or estimate".to_owned(),
@@ -43,7 +44,6 @@ pub fn run(args: &IdentifyArgs, records: &[Record]) -> Result<(), CliError> {
         write_record(path, &trace(&fit, &records[0])?)?;
         output::complain(&format!("trace of {}: {}", args.records[0].display(), path.display()));
     }
-    let files: Vec<String> = args.records.iter().map(|p| p.display().to_string()).collect();
     let test = |record: &Record| Ok(whiteness(&fit.residuals(record)?.values, estimator.nd));
     let tests = records
         .iter()
@@ -51,8 +51,9 @@ pub fn run(args: &IdentifyArgs, records: &[Record]) -> Result<(), CliError> {
         .collect::<Result<Vec<Option<LjungBox>>, CliError>>()?;
     let found = Found {
         fit: &fit,
-        files: &files,
+        files,
         records,
+        accounts,
         tests: &tests,
         settings: &settings,
     };
@@ -107,6 +108,7 @@ struct Found<'a> {
     fit: &'a TimeVaryingFit,
     files: &'a [String],
     records: &'a [Record],
+    accounts: &'a [Account],
     /// Whiteness of the residuals of each record.
     tests: &'a [Option<LjungBox>],
     settings: &'a [(String, String)],
@@ -118,10 +120,11 @@ impl Found<'_> {
             fit,
             files,
             records,
+            accounts,
             tests,
             settings,
         } = *self;
-        let mut page = text::records(files, records);
+        let mut page = text::records(files, records, accounts);
         let mut rows = text::table(&["parameter", "value", "standard error", "unit", ""]);
         for p in fit.parameters() {
             let (value, error) = text::with_uncertainty(&p.estimate);
@@ -186,6 +189,7 @@ impl Found<'_> {
             fit,
             files,
             records,
+            accounts,
             tests,
             settings,
         } = *self;
@@ -208,7 +212,8 @@ impl Found<'_> {
         let settings: Map<String, Value> = settings.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
         json!({
             "hoid": env!("CARGO_PKG_VERSION"),
-            "records": json::records(files, records),
+            "records": json::records(files, records, accounts),
+            "warnings": json::warnings(files, accounts),
             "structure": "time-varying",
             "parameters": parameters,
             "loss": number(fit.loss()),

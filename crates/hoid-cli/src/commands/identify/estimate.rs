@@ -3,7 +3,7 @@
 use hoid_ident::{
     Choice, Estimator, Fit, GreyBox, GreyBoxFit, InitialState, InstrumentalVariable, Instruments, IvMethod, Loss,
     SearchOptions,
-    order_search::{Criterion, OrderRanges, choose_orders_with},
+    order_search::{OrderRanges, fit_or_choose},
 };
 use hoid_model::{Record, Structure};
 
@@ -188,13 +188,11 @@ fn polynomial(args: &IdentifyArgs, structure: Structure, records: &[Record]) -> 
     })
 }
 
-/// The forcing function where all records have it: in a closed loop it is the signal that the noise does not reach.
 fn instruments(args: &IdentifyArgs, records: &[Record]) -> Instruments {
     match args.instruments.as_deref() {
         Some("simulated") => Instruments::Simulated,
         Some(channel) => Instruments::External(channel.to_owned()),
-        None if records.iter().all(|r| r.channel("f_t").is_some()) => Instruments::External("f_t".to_owned()),
-        None => Instruments::Simulated,
+        None => Instruments::usual(records),
     }
 }
 
@@ -233,12 +231,9 @@ fn prediction_error(
         ));
     }
     let bar = output::progress(combinations.len(), "candidates");
-    let choice = choose_orders_with(&estimator, ranges, Criterion::from(args.criterion), records, &|| {
-        bar.inc(1)
-    });
+    let found = fit_or_choose(&estimator, ranges, args.criterion.into(), records, &|| bar.inc(1));
     bar.finish_and_clear();
-    let choice = choice?;
-    Ok((choice.fit.clone(), Some(choice)))
+    Ok(found?)
 }
 
 fn grey_box(args: &IdentifyArgs, records: &[Record]) -> Result<Estimated, CliError> {

@@ -9,12 +9,13 @@ use hoid_ident::{
     Fit, MarginEstimates,
     validation::{nrmse_fit, vaf},
 };
-use hoid_io::{ReadOptions, Repair, make_directory, read_record, write_atomically};
-use hoid_model::{ContinuousTransferFunction, Detrend, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
+use hoid_io::{make_directory, write_atomically};
+use hoid_model::{ContinuousTransferFunction, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
 use hoid_report::{ModelSection, Report};
 
 use crate::{
-    args::{IdentifyArgs, Kind, ReadArgs},
+    args::{IdentifyArgs, Kind},
+    commands::reading::{self, ReadAll},
     error::CliError,
     json::{self, Identified},
     output, text,
@@ -27,10 +28,13 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         Kind::Polynomial(structure) => structure.has_input(),
         Kind::GreyBox | Kind::TimeVarying => true,
     };
-    let read = |path: &PathBuf| read(path, &args.read, with_input);
-    let records = args.records.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+    let ReadAll {
+        files,
+        records,
+        accounts,
+    } = reading::read_all(&args.records, &args.read, &args.mask, with_input)?;
     if kind == Kind::TimeVarying {
-        return change::run(args, &records);
+        return change::run(args, &files, &records, &accounts);
     }
     let Estimated {
         fit,
@@ -40,10 +44,12 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     } = estimate::fit(args, kind, &records)?;
     // Read before anything is written: a bad validation file leaves nothing behind.
     let validation = match &args.validate {
-        Some(path) => Some((path.display().to_string(), fit.quality(&[read(path)?])?)),
+        Some(path) => Some((
+            path.display().to_string(),
+            fit.quality(&[reading::read(path, &args.read, with_input)?.0])?,
+        )),
         None => None,
     };
-    let files: Vec<String> = args.records.iter().map(|p| p.display().to_string()).collect();
     let mut settings = chosen;
     settings.extend(common_settings(args, with_input));
     let operator = fit.operator();
@@ -57,6 +63,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let identified = Identified {
         files: &files,
         records: &records,
+        accounts: &accounts,
         quality: fit.quality(&records)?,
         fit: &fit,
         choice: choice.as_ref(),
@@ -79,6 +86,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
             ("records".to_owned(), files.join(", ")),
         ];
         facts.extend(settings.iter().cloned());
+        facts.extend(reading::accounts(&files, &accounts));
         let report = Report {
             title,
             settings: facts,
@@ -103,26 +111,6 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Reads a record as the options say; what was repaired or left out goes to standard error.
-pub fn read(path: &Path, args: &ReadArgs, with_input: bool) -> Result<Record, CliError> {
-    let column = |text: &str| text.parse().map_err(CliError::from);
-    let options = ReadOptions {
-        input: if with_input { Some(column(&args.input)?) } else { None },
-        output: column(&args.output)?,
-        sampling_hz: args.fs,
-        span_s: (args.from, args.to),
-        repair: Repair {
-            resample: args.resample,
-            fill: args.fill,
-        },
-    };
-    let read = read_record(path, &options)?;
-    for note in &read.notes {
-        output::complain(&format!("{}: {note}", path.display()));
-    }
-    Ok(read.record.detrended(Detrend::from(args.detrend)))
-}
-
 /// VAF and NRMSE of the prediction k samples ahead, over all records together.
 fn prediction_ahead(fit: &Fit, records: &[Record], k: usize) -> Result<(usize, f64, f64), CliError> {
     let (mut measured, mut predicted) = (Vec::new(), Vec::new());
@@ -141,40 +129,25 @@ fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> MarginEstima
     fit.margins(|omega| element.response(omega), (low, high))
 }
 
-/// How the records were read, defaults included.
-pub fn reading(read: &ReadArgs, with_input: bool) -> Vec<(String, String)> {
-    let or_all = |bound: Option<f64>, all: &str| bound.map_or(all.to_owned(), |v| v.to_string());
-    let mut list = vec![
-        ("output".to_owned(), read.output.clone()),
-        (
-            "sampling".to_owned(),
-            read.fs.map_or("column t".to_owned(), |fs| format!("{fs} Hz")),
-        ),
-        (
-            "span in s".to_owned(),
-            format!("{} to {}", or_all(read.from, "start"), or_all(read.to, "end")),
-        ),
-        ("detrend".to_owned(), format!("{:?}", read.detrend).to_lowercase()),
-    ];
-    if with_input {
-        list.insert(0, ("input".to_owned(), read.input.clone()));
-    }
-    if read.resample || read.fill {
-        list.push((
-            "repair".to_owned(),
-            format!("resample {}, fill {}", read.resample, read.fill),
-        ));
-    }
-    list
-}
-
 /// The options that every kind of fit shares, defaults included.
 fn common_settings(args: &IdentifyArgs, with_input: bool) -> Vec<(String, String)> {
     let mut list = vec![(
         "initial state".to_owned(),
         format!("{:?}", args.initial_state).to_lowercase(),
     )];
-    list.extend(reading(&args.read, with_input));
+    list.extend(reading::settings(&args.read, with_input));
+    if !args.mask.mask.is_empty() {
+        let kinds: Vec<String> = args
+            .mask
+            .mask
+            .iter()
+            .map(|kind| format!("{kind:?}").to_lowercase())
+            .collect();
+        list.push((
+            "masked".to_owned(),
+            format!("{}, stretches of {} s or more", kinds.join(", "), args.mask.shortest),
+        ));
+    }
     list.extend([
         (
             "search".to_owned(),
@@ -202,7 +175,7 @@ fn common_settings(args: &IdentifyArgs, with_input: bool) -> Vec<(String, String
 
 fn page(found: &Identified<'_>) -> String {
     let fit = found.fit;
-    let mut page = text::records(found.files, found.records);
+    let mut page = text::records(found.files, found.records, found.accounts);
     page.push('\n');
     if let Some(choice) = found.choice {
         page.push_str(&text::candidates(choice));

@@ -1,13 +1,14 @@
 //! One line of the output.
 
-use hoid_ident::tracking::Tracker;
+use hoid_ident::tracking::{Change, Live, Tracker};
 use hoid_model::{
     NotConvertible,
     uncertainty::{Estimate, OperatorEstimate},
 };
 use serde::{Serialize, Serializer, ser::SerializeMap};
+use serde_json::Value;
 
-use super::live::Live;
+use crate::json;
 
 /// Counts since the beginning.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
@@ -32,12 +33,22 @@ struct Line<'a> {
     parameters: Option<Parameters<'a>>,
     operator: Option<Operator>,
     innovation: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    change: Option<ChangeLine>,
     #[serde(flatten)]
     counts: Counts,
     #[serde(skip_serializing_if = "Option::is_none")]
     fault: Option<&'a str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     warm_up: Option<WarmUp<'a>>,
+}
+
+/// What is known of a change: the odds at every line, the rest at the first line after one was declared.
+#[derive(Serialize)]
+struct ChangeLine {
+    log_odds: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    declared: Option<Value>,
 }
 
 #[derive(Serialize)]
@@ -105,6 +116,8 @@ pub struct Standing<'a> {
     /// Names of the coefficients; empty during the warm-up.
     pub names: &'a [String],
     pub innovation: Option<f64>,
+    /// The last change since the last line, with the time at which it was declared, s.
+    pub change: Option<(Option<f64>, Change)>,
     pub counts: Counts,
     /// Faults since the last line.
     pub fault: Option<String>,
@@ -132,6 +145,11 @@ impl Standing<'_> {
                 other => Some(Operator(other)),
             }),
             innovation: self.innovation,
+            change: tracker.and_then(Tracker::change_odds).map(|odds| ChangeLine {
+                // Before the first birth there are no odds.
+                log_odds: odds.is_finite().then_some(odds),
+                declared: self.change.as_ref().map(|(t, change)| json::change(*t, change)),
+            }),
             counts: self.counts,
             fault: self.fault.as_deref(),
             warm_up: match self.live {

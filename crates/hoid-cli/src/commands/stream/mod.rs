@@ -4,7 +4,6 @@
 mod clock;
 mod line;
 mod lines;
-mod live;
 
 use std::{
     collections::VecDeque,
@@ -17,7 +16,7 @@ use std::{
 
 use hoid_ident::{
     Choice,
-    tracking::{Sample, TrackOptions},
+    tracking::{Change, Live, LiveOutcome, Sample, TrackOptions},
 };
 use hoid_model::SampleTime;
 
@@ -30,7 +29,6 @@ use crate::{
 use clock::{Arrival, Clock, LONGEST_GAP_S};
 use line::{Counts, Standing};
 use lines::{Columns, Lines, Meaning, Read};
-use live::{Live, Taken};
 
 /// Length of the warm-up when none is typed, s.
 const USUAL_WARM_UP_S: f64 = 20.0;
@@ -79,6 +77,8 @@ struct Session {
     clock: Clock,
     live: Live,
     sample_time: SampleTime,
+    /// What e and u are multiplied by.
+    scale: (f64, f64),
     every: u64,
     /// Lines that count for `every`.
     lines: u64,
@@ -86,6 +86,8 @@ struct Session {
     /// Time of the last sample, s.
     t: Option<f64>,
     innovation: Option<f64>,
+    /// A change that no line has told of yet, and when it was declared, s.
+    change: Option<(Option<f64>, Change)>,
     names: Vec<String>,
     faults: VecDeque<String>,
 }
@@ -102,16 +104,18 @@ impl Session {
         let with_input = recursion::structure(&args.recursion).has_input();
         let largest = plan.options().largest;
         let mut session = Self {
-            live: Live::new(&plan, samples as usize, sample_time)?,
+            live: Live::new(plan.options(), samples as usize, sample_time)?,
             plan,
             columns: Columns::new(&args.input, &args.output, with_input, largest),
             clock: Clock::new(sample_time.s()),
             sample_time,
+            scale: scale(args)?,
             every: args.every as u64,
             lines: 0,
             counts: Counts::default(),
             t: None,
             innovation: None,
+            change: None,
             names: Vec::new(),
             faults: VecDeque::new(),
         };
@@ -127,7 +131,11 @@ impl Session {
         if let Live::Tracking(tracker) = &self.live {
             self.names = tracker.parameter_names();
         }
-        let settings = self.plan.settings(options, choice);
+        let mut settings = self.plan.settings(options, choice);
+        if self.scale != (1.0, 1.0) {
+            let (e, u) = self.scale;
+            settings.push(("scale".to_owned(), format!("e times {e}, u times {u}")));
+        }
         let each: Vec<String> = settings.iter().map(|(k, v)| format!("{k}: {v}")).collect();
         output::complain(&format!("{when}; {}.", each.join("; ")));
     }
@@ -188,7 +196,7 @@ impl Session {
         if let Some(fault) = read.fault {
             self.fault(fault);
         }
-        self.sample(read.e, read.u, read.reference);
+        self.sample(self.scale.0 * read.e, self.scale.1 * read.u, read.reference);
     }
 
     fn sample(&mut self, e: f64, u: f64, reference: Option<f64>) {
@@ -197,10 +205,17 @@ impl Session {
         if !self.columns.have_time() {
             self.t = Some((self.counts.samples - 1) as f64 * self.sample_time.s());
         }
-        let Taken { outcome, started } = self.live.take(Sample { e, u, reference }, &self.plan);
+        let plan = &self.plan;
+        let sample = Sample { e, u, reference };
+        let LiveOutcome { outcome, started } = self.live.take(sample, &|record| plan.choose(record));
         if let Some(outcome) = outcome {
             self.innovation = outcome.innovation;
             self.counts.shortened += u64::from(outcome.shortened);
+            if let Live::Tracking(tracker) = &self.live
+                && let Some(change) = tracker.change()
+            {
+                self.change = Some((self.t, change));
+            }
         }
         if let Some((options, choice)) = started {
             let when = format!("started after {} samples", self.counts.samples);
@@ -229,6 +244,7 @@ impl Session {
             live: &self.live,
             names: &self.names,
             innovation: self.innovation,
+            change: self.change.take(),
             counts: self.counts,
             fault,
         };
@@ -252,6 +268,19 @@ impl Session {
             ));
         }
         text
+    }
+}
+
+/// What e and u are multiplied by.
+fn scale(args: &StreamArgs) -> Result<(f64, f64), CliError> {
+    let mut all = super::reading::by_channel("--scale", &args.scale)?;
+    let mut take = |name: &str| all.remove(name).map_or(1.0, |scaling| scaling.factor());
+    let factors = (take("e"), take("u"));
+    match all.keys().next() {
+        None => Ok(factors),
+        Some(name) => Err(CliError::Usage(format!(
+            "--scale names {name}; in a stream it is e or u, the input or the output"
+        ))),
     }
 }
 

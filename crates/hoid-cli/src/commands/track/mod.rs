@@ -18,7 +18,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         return Err(CliError::Usage("--batch belongs to --report".to_owned()));
     }
     let with_input = recursion::structure(&args.recursion).has_input();
-    let record = super::identify::read(&args.record, &args.read, with_input)?;
+    let (record, account) = super::reading::read(&args.record, &args.read, with_input)?;
     let plan = Plan::new(&args.recursion, record.sample_time())?;
     let span_s = start_span(args, &plan, &record)?;
     let span = record.span(span_s.0, span_s.1);
@@ -58,15 +58,16 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         let lag = (rows - 1) as f64 / 2.0 * args.every as f64 * record.sample_time().s();
         settings.push(("moving average".to_owned(), format!("{rows} rows, lags by {lag:.3} s")));
     }
-    settings.extend(super::identify::reading(&args.read, with_input));
+    settings.extend(super::reading::settings(&args.read, with_input));
     settings.push(("rows of the trace".to_owned(), format!("every {} samples", args.every)));
 
     let tracked = Tracked {
         file: args.record.display().to_string(),
         span: span.ok().filter(|_| trace.start().is_some()),
-        operators: (0..trace.len()).map(|row| trace.operator(row)).collect(),
+        operators: trace.operators(),
         out: args.out.display().to_string(),
         record: &record,
+        account: &account,
         trace: &trace,
         choice: choice.as_ref(),
         settings: &settings,

@@ -6,7 +6,12 @@ use hoid_ident::{Estimator, Fit, IdentError};
 use hoid_report::{BatchLine, TraceSection, TrackReport};
 
 use super::result::Tracked;
-use crate::{args::TrackArgs, commands::identify::write_page, error::CliError, output};
+use crate::{
+    args::TrackArgs,
+    commands::{identify::write_page, reading::accounts},
+    error::CliError,
+    output,
+};
 
 /// A batch fit and its span, s.
 type Batch = ((f64, f64), Fit);
@@ -23,6 +28,10 @@ pub fn write(args: &TrackArgs, tracked: &Tracked<'_>, batch: &[Batch]) -> Result
         ("record".to_owned(), tracked.file.clone()),
     ];
     settings.extend(tracked.settings.iter().cloned());
+    settings.extend(accounts(
+        std::slice::from_ref(&tracked.file),
+        std::slice::from_ref(tracked.account),
+    ));
     let options = tracked.trace.options();
     let report = TrackReport {
         title: format!("{} tracked by {}", tracked.record.label(), options.method.name()),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use hoid_ident::{
     Choice, Fit,
-    tracking::{OPERATOR_COLUMNS, Trace},
+    tracking::{Trace, value_of},
 };
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 use hoid_model::{
@@ -16,6 +16,7 @@ use hoid_report::numbers;
 use serde_json::{Map, Value, json};
 
 use crate::{
+    commands::reading::Account,
     error::CliError,
     json::{self, Identified, number},
     text,
@@ -30,6 +31,7 @@ const COEFFICIENTS_SHOWN: usize = 6;
 pub struct Tracked<'a> {
     pub file: String,
     pub record: &'a Record,
+    pub account: &'a Account,
     /// The span of the start fit, where there was one.
     pub span: Option<Record>,
     pub trace: &'a Trace,
@@ -51,34 +53,20 @@ impl Tracked<'_> {
     /// The columns of the trace.
     pub fn table(&self) -> OutputTable {
         let trace = self.trace;
-        let rows = trace.len();
         let mut columns = Vec::new();
         let mut add = |name: String, values: ColumnValues| columns.push(OutputColumn { name, values });
-        add("t".to_owned(), ColumnValues::Real(trace.times_s().to_vec()));
-        let coefficients: Vec<Vec<Estimate>> = (0..rows).map(|row| trace.parameters(row)).collect();
-        for (i, name) in trace.parameter_names().into_iter().enumerate() {
-            let each = coefficients.iter().map(|c| c[i]);
-            let error = |e: Estimate| e.standard_error.unwrap_or(f64::NAN);
-            add(
-                name.clone(),
-                ColumnValues::Real(each.clone().map(|e| e.value).collect()),
-            );
-            add(format!("{name}_se"), ColumnValues::Real(each.map(error).collect()));
-        }
-        for name in self.operator_columns() {
-            let each = self.operators.iter().map(|o| value_of(o, name));
-            let value = |e: &Option<Estimate>| e.map_or(f64::NAN, |e| e.value);
-            let error = |e: &Option<Estimate>| e.and_then(|e| e.standard_error).unwrap_or(f64::NAN);
-            let all: Vec<Option<Estimate>> = each.collect();
-            add(name.to_owned(), ColumnValues::Real(all.iter().map(value).collect()));
-            add(
-                format!("{name}_se"),
-                ColumnValues::Real(all.iter().map(error).collect()),
-            );
+        for (name, values) in trace.estimate_columns(&self.operators) {
+            add(name, ColumnValues::Real(values));
         }
         let convertible = self.operators.iter().map(|o| u64::from(o.is_ok())).collect();
         add("convertible".to_owned(), ColumnValues::Whole(convertible));
         add("innovation".to_owned(), ColumnValues::Real(trace.innovation().to_vec()));
+        if !trace.change_odds().is_empty() {
+            add(
+                "change_log_odds".to_owned(),
+                ColumnValues::Real(trace.change_odds().to_vec()),
+            );
+        }
         add(
             "steps_shortened".to_owned(),
             ColumnValues::Whole(trace.steps_shortened().to_vec()),
@@ -88,19 +76,17 @@ impl Tracked<'_> {
             "units: t s, K_e deg/deg, T_L s, K_e_dot s, omega_nm rad/s; _se are standard errors".to_owned(),
         ];
         comments.extend(self.settings.iter().map(|(k, v)| format!("{k}: {v}")));
+        comments.extend(
+            self.account
+                .trouble
+                .iter()
+                .map(|one| format!("sampling trouble: {one}")),
+        );
+        comments.extend(self.account.steps.iter().map(|step| format!("preparation: {step}")));
         if let Some(fit) = trace.start() {
             comments.push(format!("start fit: {}", coefficients_text(fit)));
         }
         OutputTable { comments, columns }
-    }
-
-    /// The operator's columns: those of every trace, and the delay where it is tracked.
-    fn operator_columns(&self) -> Vec<&'static str> {
-        let mut names = OPERATOR_COLUMNS.to_vec();
-        if self.trace.options().track_delay_s.is_some() {
-            names.push("tau_e");
-        }
-        names
     }
 
     /// True where the coefficients stand for an operator at all.
@@ -148,7 +134,7 @@ impl Tracked<'_> {
             self.trace,
             &self.operators,
             self.first_moved_row(),
-            &self.operator_columns(),
+            &self.trace.operator_columns(),
         )
     }
 
@@ -157,7 +143,11 @@ impl Tracked<'_> {
     /// # Errors
     /// Those of the quality of the start fit.
     pub fn page(&self) -> Result<String, CliError> {
-        let mut page = text::records(std::slice::from_ref(&self.file), std::slice::from_ref(self.record));
+        let mut page = text::records(
+            std::slice::from_ref(&self.file),
+            std::slice::from_ref(self.record),
+            std::slice::from_ref(self.account),
+        );
         if let Some(choice) = self.choice {
             page.push('\n');
             page.push_str(&text::candidates(choice));
@@ -186,6 +176,7 @@ impl Tracked<'_> {
                 each.join(", ")
             ));
         }
+        page.push_str(&self.changes());
         page.push_str(&self.counts());
         page.push_str(&text::settings(self.settings));
         page.push_str(&format!("Trace: {}\n", self.out));
@@ -208,7 +199,7 @@ impl Tracked<'_> {
         let units = ["deg/deg", "s", "s", "rad/s", "", "s"];
         let mut header = vec!["t in s".to_owned()];
         if with_operator {
-            let named = self.operator_columns().into_iter().zip(units);
+            let named = self.trace.operator_columns().into_iter().zip(units);
             header.extend(named.map(|(n, u)| {
                 if u.is_empty() {
                     n.to_owned()
@@ -224,7 +215,7 @@ impl Tracked<'_> {
             let mut cells = vec![format!("{:.2}", trace.times_s()[row])];
             if with_operator {
                 let of = |name| value_of(&self.operators[row], name);
-                cells.extend(self.operator_columns().into_iter().map(|n| plus_minus(of(n))));
+                cells.extend(self.trace.operator_columns().into_iter().map(|n| plus_minus(of(n))));
             } else {
                 let all = trace.parameters(row);
                 cells.extend(all.into_iter().take(COEFFICIENTS_SHOWN).map(|e| plus_minus(Some(e))));
@@ -236,6 +227,32 @@ impl Tracked<'_> {
             trace.options().method.name(),
             trace.len()
         )
+    }
+
+    /// The changes that were declared.
+    fn changes(&self) -> String {
+        let trace = self.trace;
+        if trace.change_odds().is_empty() {
+            return String::new();
+        }
+        if trace.changes().is_empty() {
+            return "No change was declared.\n".to_owned();
+        }
+        let mut lines = String::new();
+        for (t, c) in trace.changes() {
+            let changed = c.changed();
+            lines.push_str(&format!(
+                "Change declared at {t:.2} s, of {:.2} s before: {}; log odds {:.1}.\n",
+                c.seconds_ago,
+                if changed.is_empty() {
+                    "no single quantity by two standard errors".to_owned()
+                } else {
+                    changed.join(", ")
+                },
+                c.odds
+            ));
+        }
+        lines
     }
 
     fn counts(&self) -> String {
@@ -269,7 +286,15 @@ impl Tracked<'_> {
         set("hoid", json!(env!("CARGO_PKG_VERSION")));
         set(
             "records",
-            json::records(std::slice::from_ref(&self.file), std::slice::from_ref(self.record)),
+            json::records(
+                std::slice::from_ref(&self.file),
+                std::slice::from_ref(self.record),
+                std::slice::from_ref(self.account),
+            ),
+        );
+        set(
+            "warnings",
+            json::warnings(std::slice::from_ref(&self.file), std::slice::from_ref(self.account)),
         );
         set("method", json!(trace.options().method.name()));
         set("structure", json!(trace.options().structure.name()));
@@ -284,6 +309,10 @@ impl Tracked<'_> {
         set("samples", json!(counts.samples));
         set("skipped", json!(counts.skipped));
         set("steps_shortened", json!(counts.shortened));
+        if !trace.change_odds().is_empty() {
+            let each = trace.changes().iter().map(|(t, c)| json::change(Some(*t), c));
+            set("changes", Value::Array(each.collect()));
+        }
         set("rows", json!(trace.len()));
         let none = self.not_converted();
         set("rows_not_convertible", json!(none.rows));
@@ -308,6 +337,7 @@ impl Tracked<'_> {
         Ok(Identified {
             files: std::slice::from_ref(&self.file),
             records,
+            accounts: std::slice::from_ref(self.account),
             fit,
             choice: self.choice,
             grey_box: None,
@@ -347,7 +377,6 @@ impl Tracked<'_> {
     }
 }
 
-/// A parameter of the operator by its name.
 /// Root of the mean square of the relative error, of the rows from `first` on that converted, for each parameter whose truth the record
 /// holds.
 pub fn relative_errors(
@@ -372,11 +401,6 @@ pub fn relative_errors(
         (!squares.is_empty()).then(|| (name, mean.sqrt()))
     };
     columns.iter().copied().filter_map(of).collect()
-}
-
-fn value_of(operator: &Result<OperatorEstimate, NotConvertible>, name: &str) -> Option<Estimate> {
-    let rows = operator.as_ref().ok()?.rows();
-    rows.into_iter().find(|(n, _, _)| *n == name).map(|(_, _, e)| e)
 }
 
 fn plus_minus(e: Option<Estimate>) -> String {

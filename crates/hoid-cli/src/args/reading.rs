@@ -1,0 +1,115 @@
+//! The options by which `hoid identify` and `hoid track` read records and prepare them.
+
+use clap::{Args, ValueEnum};
+use hoid_io::{Offset, Scaling, TroubleKind};
+
+use super::DetrendName;
+
+/// How record files are read.
+#[derive(Debug, Args)]
+pub struct ReadArgs {
+    /// Column of the input (tracking error): a name, -name, or a difference such as r-y
+    #[arg(long, value_name = "COLUMN", default_value = "e", allow_hyphen_values = true)]
+    pub input: String,
+    /// Column of the output (control): a name, -name, or a difference
+    #[arg(long, value_name = "COLUMN", default_value = "u", allow_hyphen_values = true)]
+    pub output: String,
+    /// Sampling frequency in Hz; without it column t (in s) gives the sampling
+    #[arg(long, value_name = "HZ")]
+    pub fs: Option<f64>,
+    /// Start of the span to use, s
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    pub from: Option<f64>,
+    /// End of the span to use (not included), s
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    pub to: Option<f64>,
+    /// Bring unevenly sampled data onto an even grid by linear interpolation
+    #[arg(long)]
+    pub resample: bool,
+    /// Bridge missing values (empty, NaN) by linear interpolation
+    #[arg(long)]
+    pub fill: bool,
+    #[command(flatten)]
+    pub prepare: PrepareArgs,
+    /// Take out the mean or the straight line of input and output, last
+    #[arg(long, value_name = "HOW", default_value = "none")]
+    pub detrend: DetrendName,
+}
+
+/// What is done to a record before it is used, in this order.
+#[derive(Debug, Args)]
+pub struct PrepareArgs {
+    /// Drop rows that are there twice, time included
+    #[arg(long)]
+    pub drop_repeated: bool,
+    /// Multiply a channel: by a factor (u=12.5), into a unit (u=12.5:deg), or from unit to unit (e=rad:deg). A channel is a
+    /// column, or e and u for input and output. May be repeated
+    #[arg(long, value_name = "CHANNEL=FACTOR", value_parser = parse_scale, allow_hyphen_values = true)]
+    pub scale: Vec<(String, Scaling)>,
+    /// A channel that was recorded late, by samples (u=1) or seconds (u=0.0167s); parts of a sample by band-limited
+    /// interpolation. May be repeated
+    #[arg(long, value_name = "CHANNEL=N|Ss", value_parser = parse_offset, allow_hyphen_values = true)]
+    pub offset: Vec<(String, Offset)>,
+    /// Take every M-th sample, behind a low-pass filter on all channels alike (0.8 of the new Nyquist frequency pass)
+    #[arg(long, value_name = "M", conflicts_with = "new_fs")]
+    pub decimate: Option<usize>,
+    /// Bring evenly sampled data to another sampling frequency in Hz, behind a low-pass filter on all channels alike
+    #[arg(long, value_name = "HZ")]
+    pub new_fs: Option<f64>,
+    /// Drop the first seconds of what is read
+    #[arg(long, value_name = "S")]
+    pub run_in: Option<f64>,
+}
+
+names!(MaskName for TroubleKind {
+    Missing = TroubleKind::Missing,
+    Gap = TroubleKind::Gap,
+    Stalled = TroubleKind::Stalled,
+    Saturated = TroubleKind::Saturated,
+});
+
+/// What is left out of a record.
+#[derive(Debug, Args)]
+pub struct MaskArgs {
+    /// Leave out what is wrong with the sampling (see `hoid info`): the record is cut there, and each stretch has initial states of its
+    /// own
+    #[arg(long, value_name = "KINDS", value_delimiter = ',')]
+    pub mask: Vec<MaskName>,
+    /// Shortest stretch between masked samples that is used, s
+    #[arg(long, value_name = "S", default_value_t = 2.0)]
+    pub shortest: f64,
+}
+
+/// `NAME=VALUE`; the name may hold `=` no more than a column may.
+fn pair(text: &str) -> Result<(String, &str), String> {
+    let (name, value) = text
+        .rsplit_once('=')
+        .filter(|(name, _)| !name.trim().is_empty())
+        .ok_or_else(|| format!("{text:?} names no channel; write CHANNEL=VALUE"))?;
+    Ok((name.trim().to_owned(), value))
+}
+
+pub fn parse_scale(text: &str) -> Result<(String, Scaling), String> {
+    let (name, value) = pair(text)?;
+    Ok((name, value.parse().map_err(|e: hoid_io::IoError| e.to_string())?))
+}
+
+fn parse_offset(text: &str) -> Result<(String, Offset), String> {
+    let (name, value) = pair(text)?;
+    Ok((name, value.parse().map_err(|e: hoid_io::IoError| e.to_string())?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn channels_as_typed() {
+        assert_eq!(parse_scale("x(:,2)=-2").unwrap().1.factor(), -2.0);
+        assert_eq!(parse_offset(" u =0.5").unwrap(), ("u".to_owned(), Offset::Samples(0.5)));
+        for bad in ["", "u", "=2", "u=", "u=0", "u=x"] {
+            assert!(parse_scale(bad).is_err(), "{bad}");
+        }
+        assert!(parse_offset("u=1 sample").is_err());
+    }
+}

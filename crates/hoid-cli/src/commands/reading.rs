@@ -1,0 +1,169 @@
+//! Reading records as `identify` and `track` do, with the account of what was done to them.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+use hoid_io::{
+    NewRate, Preparation, ReadOptions, ReadRecord, Repair, Step, Trouble, TroubleKind, read_prepared, read_stretches,
+};
+use hoid_model::{Detrend, Record};
+
+use crate::{
+    args::{MaskArgs, ReadArgs},
+    error::CliError,
+    output,
+};
+
+/// What was done to a record, and what is wrong with the sampling of its file.
+#[derive(Debug, Clone, Default)]
+pub struct Account {
+    pub steps: Vec<Step>,
+    pub trouble: Vec<Trouble>,
+}
+
+/// Records with the files that they come from; a file that is cut gives several.
+#[derive(Debug, Default)]
+pub struct ReadAll {
+    pub files: Vec<String>,
+    pub records: Vec<Record>,
+    pub accounts: Vec<Account>,
+}
+
+/// Reads a record as the options say; what was left out and what is wrong goes to standard error.
+///
+/// # Errors
+/// Those of reading, and [`CliError::Usage`].
+pub fn read(path: &Path, args: &ReadArgs, with_input: bool) -> Result<(Record, Account), CliError> {
+    let read = read_prepared(path, &options(args, with_input)?, &preparation(args)?)?;
+    Ok(told(path, read))
+}
+
+/// As [`read`], for the stretches between what is masked.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_all(paths: &[PathBuf], args: &ReadArgs, mask: &MaskArgs, with_input: bool) -> Result<ReadAll, CliError> {
+    let kinds: Vec<TroubleKind> = mask.mask.iter().map(|name| TroubleKind::from(*name)).collect();
+    let (options, preparation) = (options(args, with_input)?, preparation(args)?);
+    let mut all = ReadAll::default();
+    for path in paths {
+        for read in read_stretches(path, &options, &preparation, &kinds, mask.shortest)? {
+            let (record, account) = told(path, read);
+            // The label of a stretch ends in its span.
+            let span = record.label().rfind(" (").filter(|_| !kinds.is_empty());
+            let span = span.map_or("", |at| &record.label()[at..]);
+            all.files.push(format!("{}{span}", path.display()));
+            all.records.push(record);
+            all.accounts.push(account);
+        }
+    }
+    Ok(all)
+}
+
+fn told(path: &Path, read: ReadRecord) -> (Record, Account) {
+    for note in &read.notes {
+        output::complain(&format!("{}: {note}", path.display()));
+    }
+    for trouble in &read.trouble {
+        output::complain(&format!("warning: {}: {trouble}", path.display()));
+    }
+    let account = Account {
+        steps: read.steps,
+        trouble: read.trouble,
+    };
+    (read.record, account)
+}
+
+fn options(args: &ReadArgs, with_input: bool) -> Result<ReadOptions, CliError> {
+    let column = |text: &str| text.parse().map_err(CliError::from);
+    Ok(ReadOptions {
+        input: if with_input { Some(column(&args.input)?) } else { None },
+        output: column(&args.output)?,
+        sampling_hz: args.fs,
+        span_s: (args.from, args.to),
+        repair: Repair {
+            resample: args.resample,
+            fill: args.fill,
+        },
+    })
+}
+
+fn preparation(args: &ReadArgs) -> Result<Preparation, CliError> {
+    let prepare = &args.prepare;
+    Ok(Preparation {
+        scale: by_channel("--scale", &prepare.scale)?,
+        offset: by_channel("--offset", &prepare.offset)?,
+        rate: match (prepare.decimate, prepare.new_fs) {
+            (Some(factor), _) => NewRate::Decimated(factor),
+            (None, Some(hz)) => NewRate::Hz(hz),
+            (None, None) => NewRate::Kept,
+        },
+        run_in_s: prepare.run_in.unwrap_or(0.0),
+        detrend: Detrend::from(args.detrend),
+        drop_repeated: prepare.drop_repeated,
+    })
+}
+
+/// What was typed for each channel; one that is named twice contradicts itself.
+pub fn by_channel<T: Clone>(option: &str, typed: &[(String, T)]) -> Result<BTreeMap<String, T>, CliError> {
+    let mut all = BTreeMap::new();
+    for (name, value) in typed {
+        if all.insert(name.clone(), value.clone()).is_some() {
+            return Err(CliError::Usage(format!(
+                "{option} names {name} twice; give each channel once"
+            )));
+        }
+    }
+    Ok(all)
+}
+
+/// How the records were read, defaults included.
+pub fn settings(read: &ReadArgs, with_input: bool) -> Vec<(String, String)> {
+    let or_all = |bound: Option<f64>, all: &str| bound.map_or(all.to_owned(), |v| v.to_string());
+    let mut list = vec![
+        ("output".to_owned(), read.output.clone()),
+        (
+            "sampling".to_owned(),
+            read.fs.map_or("column t".to_owned(), |fs| format!("{fs} Hz")),
+        ),
+        (
+            "span in s".to_owned(),
+            format!("{} to {}", or_all(read.from, "start"), or_all(read.to, "end")),
+        ),
+        ("detrend".to_owned(), format!("{:?}", read.detrend).to_lowercase()),
+    ];
+    if with_input {
+        list.insert(0, ("input".to_owned(), read.input.clone()));
+    }
+    if read.resample || read.fill {
+        list.push((
+            "repair".to_owned(),
+            format!("resample {}, fill {}", read.resample, read.fill),
+        ));
+    }
+    list
+}
+
+/// What was done to the records and what is wrong with their files, as rows of a table of settings.
+pub fn accounts(files: &[String], accounts: &[Account]) -> Vec<(String, String)> {
+    let name = |what: &str, file: &str| {
+        if files.len() == 1 {
+            what.to_owned()
+        } else {
+            format!("{what} of {file}")
+        }
+    };
+    let mut rows = Vec::new();
+    for (file, account) in files.iter().zip(accounts) {
+        let steps: Vec<String> = account.steps.iter().map(Step::to_string).collect();
+        let trouble: Vec<String> = account.trouble.iter().map(Trouble::to_string).collect();
+        for (what, parts) in [("preparation", steps), ("sampling trouble", trouble)] {
+            if !parts.is_empty() {
+                rows.push((name(what, file), parts.join("; ")));
+            }
+        }
+    }
+    rows
+}

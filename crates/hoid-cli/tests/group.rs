@@ -1,0 +1,190 @@
+//! A virtual experiment and its analysis, as a user runs them.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Stdio},
+    time::Duration,
+};
+
+use tempfile::TempDir;
+
+use common::{bad, good, json};
+
+/// Two people, C1 and C3, two runs each.
+fn experiment() -> TempDir {
+    let directory = TempDir::new().unwrap();
+    let arguments = [
+        "simulate-group",
+        "--subjects",
+        "2",
+        "--conditions",
+        "C1,C3",
+        "--runs",
+        "2",
+        "--noise-level",
+        "0.05",
+        "--out",
+        "people",
+    ];
+    let said = good(directory.path(), &arguments);
+    assert!(said.contains("8 runs") && said.contains("truth.csv"), "{said}");
+    // A short range of the delay keeps the test short.
+    let manifest = directory.path().join("people/group.toml");
+    let text = fs::read_to_string(&manifest).unwrap();
+    assert!(text.contains("[analysis]\n"), "{text}");
+    let lines = text
+        .lines()
+        .filter(|line| !line.starts_with("trace_every"))
+        .collect::<Vec<_>>()
+        .join("\n");
+    let shorter = lines.replace(
+        "[analysis]\n",
+        "[analysis]\ntrace_every = 64\nresponse_at_rad_s = [3.0]\n",
+    );
+    fs::write(&manifest, shorter).unwrap();
+    directory
+}
+
+fn files(directory: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut found: Vec<_> = fs::read_dir(directory)
+        .unwrap()
+        .map(|entry| entry.unwrap())
+        .filter(|entry| entry.path().is_file())
+        .map(|entry| {
+            (
+                entry.file_name().to_string_lossy().into_owned(),
+                fs::read(entry.path()).unwrap(),
+            )
+        })
+        .collect();
+    found.sort();
+    found
+}
+
+#[test]
+fn a_virtual_experiment_is_analysed_and_reported() {
+    let directory = experiment();
+    let at = directory.path();
+    let said = good(at, &["group", "people", "--out", "out", "--csv"]);
+    for name in [
+        "estimates.parquet",
+        "averages.csv",
+        "delays.csv",
+        "settling.csv",
+        "response-averages.csv",
+        "report.html",
+    ] {
+        assert!(said.contains(name), "{name}: {said}");
+    }
+    let page = fs::read_to_string(at.join("out/report.html")).unwrap();
+    for part in [
+        "How fast the recursions follow",
+        "|H(3j)|",
+        "variance of a1",
+        "ARX (RLS)",
+        "subject ",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    let subjects: Vec<String> = files(&at.join("out"))
+        .into_iter()
+        .map(|(name, _)| name)
+        .filter(|name| name.starts_with("subject-"))
+        .collect();
+    assert_eq!(subjects.len(), 2);
+    // K_e_dot of C3 moves and settles in the table; that of C1 has no change.
+    let settling = fs::read_to_string(at.join("out/settling.csv")).unwrap();
+    let of = |condition: &str| {
+        settling
+            .lines()
+            .filter(|line| line.contains(&format!(",{condition},")))
+            .count()
+    };
+    assert!(of("C3") > 0 && of("C1") == 0, "{settling}");
+    // Again: refused, and with --resume nothing is done twice.
+    let (code, message) = bad(at, &["group", "people", "--out", "out"]);
+    assert!(code == 1 && message.contains("--resume"), "{message}");
+    let found = json(at, &["group", "people", "--out", "out", "--csv", "--resume", "--json"]);
+    assert_eq!(found["runs"], 8);
+    // A file that has changed is another group.
+    fs::write(
+        at.join("people/group.toml"),
+        fs::read_to_string(at.join("people/group.toml")).unwrap() + "\n# looked through\n",
+    )
+    .unwrap();
+    good(at, &["group", "people", "--out", "out", "--resume"]);
+    let text = fs::read_to_string(at.join("people/group.toml"))
+        .unwrap()
+        .replace("trace_every = 64", "trace_every = 32");
+    fs::write(at.join("people/group.toml"), text).unwrap();
+    let (code, message) = bad(at, &["group", "people", "--out", "out", "--resume"]);
+    assert!(code == 1 && message.contains("holds another"), "{message}");
+}
+
+#[test]
+fn a_group_that_was_killed_goes_on_to_the_same_bytes() {
+    let directory = experiment();
+    let at = directory.path();
+    good(at, &["group", "people", "--out", "whole"]);
+    for wait_ms in [150, 400] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))
+            .args(["group", "people", "--out", "pieces", "--resume", "--jobs", "1"])
+            .current_dir(at)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(wait_ms));
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    good(at, &["group", "people", "--out", "pieces", "--resume"]);
+    assert!(files(&at.join("whole")) == files(&at.join("pieces")));
+}
+
+#[test]
+fn a_manifest_is_made_from_names_and_mistakes_are_named() {
+    let directory = TempDir::new().unwrap();
+    let at = directory.path();
+    good(at, &["simulate", "--condition", "C1", "--out", "anna_C1_1.csv"]);
+    fs::write(at.join("notes.txt"), "nothing").unwrap();
+    let said = good(
+        at,
+        &["group", "init", ".", "--pattern", "{subject}_{condition}_{run}.csv"],
+    );
+    assert!(said.contains("1 runs") && said.contains("notes.txt"), "{said}");
+    let (code, message) = bad(
+        at,
+        &["group", "init", ".", "--pattern", "{subject}_{condition}_{run}.csv"],
+    );
+    assert!(code == 2 && message.contains("there already"), "{message}");
+    let (code, message) = bad(at, &["group", "init", ".", "--pattern", "{who}.csv", "--out", "x.toml"]);
+    assert!(code == 2 && message.contains("{subject}"), "{message}");
+    let (code, message) = bad(at, &["group", "nowhere", "--out", "x"]);
+    assert!(code == 2 && message.contains("hoid group init"), "{message}");
+    let text = fs::read_to_string(at.join("group.toml")).unwrap();
+    for (wrong, expected) in [
+        ("[conditions.C9]\nlead = true\n", "no run has this condition"),
+        ("[conditions.C1]\ncontrolled_element = \"1\"\n", "has no slash"),
+        ("[conditions.C1]\nmystery = 1\n", "mystery"),
+    ] {
+        fs::write(at.join("wrong.toml"), format!("{text}\n{wrong}")).unwrap();
+        let (code, message) = bad(at, &["group", "wrong.toml", "--out", "x"]);
+        assert!(
+            code == 2 && message.contains(expected) && message.contains("wrong.toml"),
+            "{expected}: {message}"
+        );
+    }
+    let joined = text.replace("subject = \"anna\"", "then = \"nothing.csv\"\nsubject = \"anna\"");
+    fs::write(at.join("joined.toml"), joined).unwrap();
+    good(at, &["group", "joined.toml", "--out", "joined", "--csv"]);
+    let estimates = fs::read_to_string(at.join("joined/estimates.csv")).unwrap();
+    assert!(
+        estimates.contains("nothing.csv") && estimates.contains("failed"),
+        "{estimates}"
+    );
+}
