@@ -109,16 +109,7 @@ pub fn run(
         hoid_io::write_table(&part(directory, block.index, "fits"), &tables.fits)?;
         Ok(true)
     };
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(options.jobs.unwrap_or(0))
-        .build()
-        .map_err(|error| StudyError::Threads {
-            reason: error.to_string(),
-        })?;
-    let finished = pool
-        .install(|| open.par_iter().map(one).collect::<Result<Vec<bool>, StudyError>>())?
-        .into_iter()
-        .all(|finished| finished);
+    let finished = on_threads(options.jobs, &open, one)?;
     let estimates = done.load(Ordering::Relaxed) - known;
     if !finished || options.shard.is_some() {
         return Ok(Outcome {
@@ -341,4 +332,20 @@ fn join(plan: &Plan, schemas: &Schemas, parts: &[(&Path, u64)], directory: &Path
         writer.finish()?;
     }
     Ok(())
+}
+
+/// Does what is open on so many threads, or on all; true when each was finished.
+pub(crate) fn on_threads<T: Sync>(
+    jobs: Option<usize>,
+    open: &[T],
+    one: impl Fn(&T) -> Result<bool, StudyError> + Sync + Send,
+) -> Result<bool, StudyError> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(jobs.unwrap_or(0))
+        .build()
+        .map_err(|error| StudyError::Threads {
+            reason: error.to_string(),
+        })?;
+    let finished = pool.install(|| open.par_iter().map(one).collect::<Result<Vec<bool>, StudyError>>())?;
+    Ok(finished.into_iter().all(|finished| finished))
 }

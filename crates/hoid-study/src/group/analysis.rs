@@ -24,7 +24,7 @@ use hoid_model::{
 use super::{
     frequency::transfer_function,
     manifest::{ConditionFacts, Manifest, RunEntry},
-    reading::read_file,
+    reading::{ReadFile, account, read_files},
     responses::{followed_phases_deg, grid, responses_schema},
     tables::{real, schema, text},
     traces::{self, TraceColumns},
@@ -36,6 +36,8 @@ pub(super) struct RunTables {
     pub estimates: OutputTable,
     pub responses: OutputTable,
     pub traces: OutputTable,
+    /// What was done to its files and what is wrong with their sampling, by the name of the table; none of all runs at once.
+    pub account: Vec<(&'static str, OutputTable)>,
 }
 
 /// One estimate a row, in long form.
@@ -75,11 +77,16 @@ struct Bench<'a> {
 /// Analyses a run; `base` is the directory of the manifest.
 pub(super) fn analyse(manifest: &Manifest, base: &Path, entry: &RunEntry) -> RunTables {
     let mut bench = Bench::new(manifest, entry);
-    match read(manifest, base, entry) {
+    let files = read_files(manifest, base, entry);
+    let account = account(entry, &files);
+    match run_of(files) {
         Ok(run) => bench.analyse(&run),
         Err(reason) => bench.failed(None, "read", &reason),
     }
-    bench.tables()
+    RunTables {
+        account: account.into(),
+        ..bench.tables()
+    }
 }
 
 /// Name of the run that is all of them.
@@ -118,18 +125,23 @@ pub(super) struct Run {
 
 /// Reads a run.
 pub(super) fn read(manifest: &Manifest, base: &Path, entry: &RunEntry) -> Result<Run, String> {
-    let read = |file: &Path| read_file(manifest, &entry.condition, &base.join(file)).map(|read| read.record);
-    let record = read(&entry.file)?;
-    let Some(then) = &entry.then else {
-        return Ok(Run { record, seam_s: None });
-    };
-    let seam_s = record.time_s(record.len());
-    let next = read(then)?;
-    let record = record.joined(&next).map_err(|error| error.to_string())?;
-    Ok(Run {
-        record,
-        seam_s: Some(seam_s),
-    })
+    run_of(read_files(manifest, base, entry))
+}
+
+/// The run in one file, or joined of two.
+fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
+    let mut run: Option<Run> = None;
+    for (_, read) in files {
+        let record = read?.record;
+        run = Some(match run {
+            None => Run { record, seam_s: None },
+            Some(first) => Run {
+                seam_s: Some(first.record.time_s(first.record.len())),
+                record: first.record.joined(&record).map_err(|error| error.to_string())?,
+            },
+        });
+    }
+    run.ok_or_else(|| "no file is named".to_owned())
 }
 
 impl<'a> Bench<'a> {
@@ -156,6 +168,7 @@ impl<'a> Bench<'a> {
             estimates: self.rows.into_table(Vec::new()),
             responses: self.responses.into_table(Vec::new()),
             traces: self.traces.into_table(Vec::new()),
+            account: Vec::new(),
         }
     }
 

@@ -38,7 +38,6 @@ use std::{
     sync::atomic::{AtomicU64, Ordering},
 };
 
-use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 pub use manifest::{Analysis, ConditionFacts, Detrending, Manifest, MethodName, Reading, RunEntry};
@@ -49,7 +48,7 @@ pub use virtual_people::{Trouble, VirtualExperiment, simulate_group};
 use crate::{
     RunOptions, StudyError,
     manifest::{Manifest as Record, part},
-    run::{Outcome, Progress, remove_parts, sweep, table_path},
+    run::{Outcome, Progress, on_threads, remove_parts, sweep, table_path},
 };
 
 /// Name of the copy of the manifest beside the results.
@@ -102,26 +101,15 @@ pub fn run_group(
         };
         hoid_io::write_table(&part(directory, i as u64, "traces"), &found.traces)?;
         hoid_io::write_table(&part(directory, i as u64, "responses"), &found.responses)?;
-        if let Block::Run(run) = &blocks[i] {
-            for (table, rows) in reading::account(manifest, base, run) {
-                hoid_io::write_table(&part(directory, i as u64, table), &rows)?;
-            }
+        for (table, rows) in &found.account {
+            hoid_io::write_table(&part(directory, i as u64, table), rows)?;
         }
         hoid_io::write_table(&part(directory, i as u64, "estimates"), &found.estimates)?;
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         progress(Progress { done, total, known });
         Ok(true)
     };
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(options.jobs.unwrap_or(0))
-        .build()
-        .map_err(|error| StudyError::Threads {
-            reason: error.to_string(),
-        })?;
-    let finished = pool
-        .install(|| open.par_iter().map(one).collect::<Result<Vec<bool>, StudyError>>())?
-        .into_iter()
-        .all(|finished| finished);
+    let finished = on_threads(options.jobs, &open, one)?;
     let estimates = done.load(Ordering::Relaxed) - known;
     if !finished {
         return Ok(Outcome {

@@ -11,7 +11,7 @@ use super::manifest::{Detrending, Manifest, RunEntry};
 use crate::columns::Rows;
 
 /// The record in a file, and what was done to it; the condition may have a preparation of its own.
-pub(super) fn read_file(manifest: &Manifest, condition: &str, path: &Path) -> Result<ReadRecord, String> {
+fn read_file(manifest: &Manifest, condition: &str, path: &Path) -> Result<ReadRecord, String> {
     let reading = &manifest.read;
     let text = |error: hoid_io::IoError| error.to_string();
     let options = ReadOptions {
@@ -74,14 +74,23 @@ pub(super) fn schemas() -> [(&'static str, TableSchema); 2] {
     ]
 }
 
-/// What was done to a run and what is wrong with it; nothing for one that cannot be read, which its estimates say.
-pub(super) fn account(manifest: &Manifest, base: &Path, entry: &RunEntry) -> [(&'static str, OutputTable); 2] {
+/// A file by its name in the manifest, and what was read of it.
+pub(super) type ReadFile<'a> = (&'a Path, Result<ReadRecord, String>);
+
+/// The file of a run, and the one that is joined behind it.
+pub(super) fn read_files<'a>(manifest: &Manifest, base: &Path, entry: &'a RunEntry) -> Vec<ReadFile<'a>> {
+    let files = std::iter::once(&entry.file).chain(&entry.then);
+    files
+        .map(|file| (file.as_path(), read_file(manifest, &entry.condition, &base.join(file))))
+        .collect()
+}
+
+/// What was done to the files of a run and what is wrong with them; nothing for one that cannot be read, which its estimates say.
+pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static str, OutputTable); 2] {
     let [(steps_name, steps), (trouble_name, trouble)] = schemas();
     let (mut steps, mut trouble) = (Rows::new(&steps), Rows::new(&trouble));
-    for file in std::iter::once(&entry.file).chain(&entry.then) {
-        let Ok(read) = read_file(manifest, &entry.condition, &base.join(file)) else {
-            continue;
-        };
+    for (file, read) in files {
+        let Ok(read) = read else { continue };
         for step in &read.steps {
             begin(&mut steps, entry, file);
             steps.text("step", step.name());
