@@ -8,7 +8,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use hoid_core::{
     adaptation::{Covariance, Forgetting},
-    error_bars::{ErrorBars, Level},
+    error_bars::{ErrorBars, Level, NoBars},
     factored::Factored,
     physical::{Physical, PhysicalModel},
     predictor::{AnyShape, FixedShape, Regressor, Shape},
@@ -104,6 +104,35 @@ fn rpem<S: Shape, const N: usize, const K: usize>(
     }
 }
 
+/// As a user without error bars would have it, for the comparison with peers that have none: no guard, no limit on outliers.
+fn bare_rls(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
+    history.clear();
+    let adaptation = Covariance::new(Factored::diagonal([0.1; 4]), scalar(), [f64::INFINITY; 4]);
+    let mut recursion = Rls::new(FixedShape::<2, 2, 0, 0, 0>, [0.0; 4], adaptation, NoBars).unwrap();
+    for &(x, u) in data {
+        recursion.step(x, u);
+        history.push(*recursion.theta());
+    }
+}
+
+/// The same for the prediction-error method.
+fn bare_rpem(data: &[(f64, f64)], history: &mut Vec<[f64; 5]>) {
+    history.clear();
+    let mut recursion = Rpem::<_, 5, 0, _, _>::new(
+        FixedShape::<0, 2, 0, 1, 2>,
+        Regressor::Gradient,
+        Stable::Predictor,
+        [0.04, -0.04, -0.8, -1.9, 0.92],
+        Covariance::new(Factored::diagonal([0.1; 5]), scalar(), [f64::INFINITY; 5]),
+        NoBars,
+    )
+    .unwrap();
+    for &(x, u) in data {
+        recursion.step(x, u);
+        history.push(*recursion.theta());
+    }
+}
+
 fn physical<S: Shape, const N: usize, const K: usize, const L: usize>(
     shape: S,
     tracked_from: Option<usize>,
@@ -174,6 +203,7 @@ fn bench(c: &mut Criterion) {
     group.bench_function("rls 4, plain yardstick", |b| b.iter(|| plain(data, &mut h4)));
     let arx = FixedShape::<2, 2, 0, 0, 0>;
     group.bench_function("rls 4", |b| b.iter(|| rls(arx, scalar(), data, &mut h4)));
+    group.bench_function("rls 4, no error bars", |b| b.iter(|| bare_rls(data, &mut h4)));
     group.bench_function("rls 4, matrix", |b| b.iter(|| rls(arx, matrix(), data, &mut h4)));
     group.bench_function("rls 4, any shape", |b| {
         b.iter(|| rls(any(2, 2, 0, 0), scalar(), data, &mut h4))
@@ -184,6 +214,7 @@ fn bench(c: &mut Criterion) {
     group.bench_function("rpem 5, usual error bars", |b| {
         b.iter(|| rpem::<_, 5, 0>(bj, scalar(), data, &mut h5))
     });
+    group.bench_function("rpem 5, no error bars", |b| b.iter(|| bare_rpem(data, &mut h5)));
     group.bench_function("rpem 5, matrix", |b| {
         b.iter(|| rpem::<_, 5, 2>(bj, matrix(), data, &mut h5))
     });

@@ -21,7 +21,10 @@
 //!
 //! What an estimate is worth that was made with such a gain: [`crate::error_bars`].
 
-use crate::{error_bars::ErrorBars, factored::Factored};
+use crate::{
+    error_bars::{Bars, ErrorBars},
+    factored::Factored,
+};
 
 /// How old information loses its weight.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,7 +76,11 @@ pub trait Adaptation<const N: usize> {
         None
     }
     /// Adds to the error bars what parameters drift in a sample.
-    fn drift_into<const K: usize>(&self, _bars: &mut ErrorBars<N, K>) {}
+    fn drift_into<const K: usize, B: Bars<N, K>>(&self, _bars: &mut B) {}
+    /// True when the variance that [`Adaptation::advance`] is given has a part in the step.
+    fn needs_variance(&self) -> bool {
+        false
+    }
     /// The covariance of theta over the innovation variance.
     fn spread_or<const K: usize>(&self, bars: &ErrorBars<N, K>) -> [[f64; N]; N] {
         self.spread().unwrap_or_else(|| bars.spread())
@@ -128,6 +135,11 @@ const FORGOTTEN: f64 = 1e-9;
 /// Longest period of the guard in samples.
 const LONGEST_PERIOD: f64 = 64.0;
 
+/// Samples between two turns of the guard, for the shortest memory and the number of parameters.
+pub(crate) fn guard_period(shortest: f64, parameters: usize) -> u32 {
+    (shortest / (TURNS_IN_A_MEMORY * parameters as f64)).clamp(1.0, LONGEST_PERIOD) as u32
+}
+
 /// The step `g eps`.
 #[inline(always)]
 fn along<const N: usize>(gain: [f64; N], eps: f64) -> Move<N> {
@@ -155,7 +167,7 @@ impl<const N: usize> Covariance<N> {
             Forgetting::Directional { lambda } => shortest = 1.0 / (1.0 - lambda),
             Forgetting::RandomWalk { .. } | Forgetting::Gradient { .. } => {}
         }
-        let period = (shortest / (TURNS_IN_A_MEMORY * N as f64)).clamp(1.0, LONGEST_PERIOD) as u32;
+        let period = guard_period(shortest, N);
         let guard = core::array::from_fn(|i| {
             let information = if bound[i] > 0.0 { 1.0 / bound[i] } else { 0.0 };
             match &forgetting {
@@ -197,6 +209,45 @@ impl<const N: usize> Covariance<N> {
     /// P itself.
     pub fn matrix(&self) -> [[f64; N]; N] {
         self.factors.matrix()
+    }
+
+    /// The step where it is not that of a recursion in its stride with an exponential memory.
+    #[inline(never)]
+    fn advance_otherwise(&mut self, psi: &[f64; N], eps: f64, variance: f64) -> Move<N> {
+        if self.early > FORGOTTEN {
+            self.factors.scale_all(1.0 / (1.0 - self.early));
+            self.hold(self.early);
+            self.early *= self.early_share;
+        }
+        let mut growth = 1.0;
+        match &self.forgetting {
+            Forgetting::Exponential { .. } => {
+                if self.uniform != 1.0 {
+                    if self.uniform > 0.0 {
+                        growth = self.uniform;
+                    } else {
+                        self.factors.scale(&self.scales[0], &self.scales[1]);
+                    }
+                    self.hold(1.0);
+                }
+            }
+            Forgetting::RandomWalk { drift } => {
+                for (i, q) in drift.iter().enumerate() {
+                    if *q > 0.0 {
+                        let mut unit = [0.0; N];
+                        unit[i] = 1.0;
+                        self.factors.add(*q, unit);
+                    }
+                }
+                self.hold(1.0);
+            }
+            Forgetting::Variable { memory, smallest } => {
+                return self.advance_variable(psi, eps, *memory * variance, *smallest);
+            }
+            Forgetting::Directional { lambda } => return self.advance_directional(psi, eps, *lambda),
+            Forgetting::Gradient { rate } => return self.advance_gradient(psi, eps, *rate),
+        }
+        along(self.factors.grow_and_measure(growth, psi, 1.0), eps)
     }
 
     /// `level` is N_0 sigma^2.
@@ -268,50 +319,36 @@ impl<const N: usize> Covariance<N> {
 impl<const N: usize> Adaptation<N> for Covariance<N> {
     #[inline(always)]
     fn advance(&mut self, psi: &[f64; N], eps: f64, _theta: &[f64; N], variance: f64) -> Move<N> {
-        let mut growth = 1.0;
-        if self.early > FORGOTTEN {
-            self.factors.scale_all(1.0 / (1.0 - self.early));
-            self.hold(self.early);
-            self.early *= self.early_share;
+        let exponential = matches!(self.forgetting, Forgetting::Exponential { .. });
+        if !exponential || self.early > FORGOTTEN {
+            // A copy, so that psi can stay in registers where it is not called.
+            let psi = *psi;
+            return self.advance_otherwise(&psi, eps, variance);
         }
-        match &self.forgetting {
-            Forgetting::Exponential { .. } => {
-                // At 1 nothing is forgotten.
-                if self.uniform != 1.0 {
-                    if self.uniform > 0.0 {
-                        growth = self.uniform;
-                    } else {
-                        self.factors.scale(&self.scales[0], &self.scales[1]);
-                    }
-                    self.hold(1.0);
-                }
+        let mut growth = 1.0;
+        // At 1 nothing is forgotten.
+        if self.uniform != 1.0 {
+            if self.uniform > 0.0 {
+                growth = self.uniform;
+            } else {
+                self.factors.scale(&self.scales[0], &self.scales[1]);
             }
-            Forgetting::RandomWalk { drift } => {
-                for (i, q) in drift.iter().enumerate() {
-                    if *q > 0.0 {
-                        let mut unit = [0.0; N];
-                        unit[i] = 1.0;
-                        self.factors.add(*q, unit);
-                    }
-                }
-                self.hold(1.0);
-            }
-            Forgetting::Variable { memory, smallest } => {
-                return self.advance_variable(psi, eps, *memory * variance, *smallest);
-            }
-            Forgetting::Directional { lambda } => return self.advance_directional(psi, eps, *lambda),
-            Forgetting::Gradient { rate } => return self.advance_gradient(psi, eps, *rate),
+            self.hold(1.0);
         }
         along(self.factors.grow_and_measure(growth, psi, 1.0), eps)
     }
 
     #[inline(always)]
-    fn drift_into<const K: usize>(&self, bars: &mut ErrorBars<N, K>) {
+    fn drift_into<const K: usize, B: Bars<N, K>>(&self, bars: &mut B) {
         if let Forgetting::RandomWalk { drift } = &self.forgetting {
             for (i, (variance, bound)) in drift.iter().zip(&self.bound).enumerate() {
                 bars.drift(i, *variance, *bound);
             }
         }
+    }
+
+    fn needs_variance(&self) -> bool {
+        matches!(self.forgetting, Forgetting::Variable { .. })
     }
 
     fn is_sound(&self) -> bool {

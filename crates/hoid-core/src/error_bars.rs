@@ -27,7 +27,7 @@
 //!
 //! The innovation variance sigma^2 is the mean of `eps^2/(1 + h' Sigma h)`, each term of which has the expectation sigma^2.
 
-use crate::predictor::Shape;
+use crate::{predictor::Shape, state::State};
 
 /// Mean of the squared innovations, each over what it is expected to be, with an exponential memory.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -190,6 +190,49 @@ pub const NOTHING_KNOWN: f64 = 1e6;
 /// Samples between two looks whether that is so.
 const LOOK: u32 = 64;
 
+/// What follows the error of an estimate through its recursion: [`ErrorBars`], or [`NoBars`] where nobody asks.
+pub trait Bars<const N: usize, const K: usize>: State {
+    /// The innovation as far as it may move the estimate.
+    fn limited(&self, eps: f64) -> f64;
+    /// Takes the innovation of a sample with the gain that was used, and the errors that the sample leaves in the filters.
+    fn take(&mut self, places: &Places, rows: &Sensitivities<N, K>, gain: &[f64; N], eps: f64);
+    /// The errors that a sample leaves in the filters, without a step of the estimate.
+    fn follow(&mut self, places: &Places, rows: &Sensitivities<N, K>);
+    /// Adds the variance by which parameter i drifts in a sample, until `bound`.
+    fn drift(&mut self, i: usize, variance: f64, bound: f64);
+    /// Innovation variance sigma^2; `None` where it is not followed.
+    fn variance(&self) -> Option<f64>;
+}
+
+/// No error bars, no innovation variance and no limit on outliers: a recursion that is its estimate alone, at no cost besides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct NoBars;
+
+impl State for NoBars {
+    fn visit(&mut self, _each: &mut dyn FnMut(&mut f64)) {}
+}
+
+impl<const N: usize> Bars<N, 0> for NoBars {
+    #[inline(always)]
+    fn limited(&self, eps: f64) -> f64 {
+        eps
+    }
+
+    #[inline(always)]
+    fn take(&mut self, _places: &Places, _rows: &Sensitivities<N, 0>, _gain: &[f64; N], _eps: f64) {}
+
+    #[inline(always)]
+    fn follow(&mut self, _places: &Places, _rows: &Sensitivities<N, 0>) {}
+
+    #[inline(always)]
+    fn drift(&mut self, _i: usize, _variance: f64, _bound: f64) {}
+
+    #[inline(always)]
+    fn variance(&self) -> Option<f64> {
+        None
+    }
+}
+
 impl<const N: usize, const K: usize> ErrorBars<N, K> {
     /// From the covariance of theta at the start over the innovation variance, with filters whose past is right. Innovations move the
     /// estimate as if they were no larger than `limit` times sigma; infinite for no limit.
@@ -202,80 +245,6 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
             level,
             limit,
             wait: LOOK,
-        }
-    }
-
-    /// The innovation as far as it may move the estimate.
-    #[inline(always)]
-    pub fn limited(&self, eps: f64) -> f64 {
-        let limit = self.limit * libm::sqrt(self.level.variance());
-        // Before anything is known of sigma there is no limit.
-        if limit > 0.0 && eps.abs() > limit {
-            libm::copysign(limit, eps)
-        } else {
-            eps
-        }
-    }
-
-    /// Takes the innovation of a sample with the gain that was used, and the errors that the sample leaves in the filters.
-    #[inline(always)]
-    pub fn take(&mut self, places: &Places, rows: &Sensitivities<N, K>, gain: &[f64; N], eps: f64) {
-        let count = places.filters();
-        let (mut z, z_filters) = self.times(count, &rows.e);
-        let mut along = 0.0;
-        for i in 0..N {
-            along += rows.e.theta[i] * z[i];
-        }
-        for i in 0..count {
-            along += rows.e.filters[i] * z_filters[i];
-        }
-        self.level.take(eps * eps / (1.0 + along.max(0.0)));
-        let half = 0.5 * (1.0 + along);
-        let mut k = z;
-        for i in 0..N {
-            k[i] -= half * gain[i];
-        }
-        // Exactly symmetric: the two products are exchanged with i and j.
-        for i in 0..N {
-            for j in 0..N {
-                self.theta[i][j] -= gain[i] * k[j] + k[i] * gain[j];
-            }
-        }
-        for c in 0..count {
-            for i in 0..N {
-                self.cross[c][i] -= gain[i] * z_filters[c];
-            }
-        }
-        if count > 0 {
-            // Sigma h after the update: z - g (k' h) - k (g' h).
-            let (mut k_h, mut g_h) = (0.0, 0.0);
-            for i in 0..N {
-                k_h += k[i] * rows.e.theta[i];
-                g_h += gain[i] * rows.e.theta[i];
-            }
-            for i in 0..count {
-                k_h += z_filters[i] * rows.e.filters[i];
-            }
-            for i in 0..N {
-                z[i] -= gain[i] * k_h + k[i] * g_h;
-            }
-            let z_filters = core::array::from_fn(|c| z_filters[c] * (1.0 - g_h));
-            self.insert(places, rows, z, z_filters);
-        }
-        self.wait -= 1;
-        if self.wait == 0 {
-            self.wait = LOOK;
-            self.confine();
-        }
-    }
-
-    /// The errors that a sample leaves in the filters, without a step of the estimate.
-    #[inline]
-    pub fn follow(&mut self, places: &Places, rows: &Sensitivities<N, K>) {
-        let count = places.filters();
-        if count > 0 {
-            let (z, z_filters) = self.times(count, &rows.e);
-            self.insert(places, rows, z, z_filters);
         }
     }
 
@@ -416,15 +385,6 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         }
     }
 
-    /// Adds the variance by which parameter i drifts in a sample, until `bound`.
-    #[inline]
-    pub fn drift(&mut self, i: usize, variance: f64, bound: f64) {
-        // Beyond the bound nothing is known that could be forgotten.
-        if self.theta[i][i] < bound {
-            self.theta[i][i] += variance;
-        }
-    }
-
     /// Covariance of theta over sigma^2.
     pub fn spread(&self) -> [[f64; N]; N] {
         self.theta
@@ -432,7 +392,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
 
     /// Innovation variance sigma^2.
     #[inline(always)]
-    pub fn variance(&self) -> f64 {
+    pub fn innovation_variance(&self) -> f64 {
         self.level.variance()
     }
 
@@ -441,5 +401,90 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         let all = self.theta.iter().chain(&self.cross).flatten();
         let mut all = all.chain(self.filters.iter().flatten());
         all.all(|s| s.is_finite()) && self.level.variance().is_finite()
+    }
+}
+
+impl<const N: usize, const K: usize> Bars<N, K> for ErrorBars<N, K> {
+    #[inline(always)]
+    fn limited(&self, eps: f64) -> f64 {
+        // Before anything is known of sigma there is no limit. Most innovations are within it, and need no root to know it.
+        if self.level.sum > 0.0 && eps * eps * self.level.weight > self.limit * self.limit * self.level.sum {
+            libm::copysign(self.limit * libm::sqrt(self.level.variance()), eps)
+        } else {
+            eps
+        }
+    }
+
+    #[inline(always)]
+    fn take(&mut self, places: &Places, rows: &Sensitivities<N, K>, gain: &[f64; N], eps: f64) {
+        let count = places.filters();
+        let (mut z, z_filters) = self.times(count, &rows.e);
+        let mut along = 0.0;
+        for i in 0..N {
+            along += rows.e.theta[i] * z[i];
+        }
+        for i in 0..count {
+            along += rows.e.filters[i] * z_filters[i];
+        }
+        self.level.take(eps * eps / (1.0 + along.max(0.0)));
+        let half = 0.5 * (1.0 + along);
+        let mut k = z;
+        for i in 0..N {
+            k[i] -= half * gain[i];
+        }
+        // Exactly symmetric: the two products are exchanged with i and j.
+        for i in 0..N {
+            for j in 0..N {
+                self.theta[i][j] -= gain[i] * k[j] + k[i] * gain[j];
+            }
+        }
+        for c in 0..count {
+            for i in 0..N {
+                self.cross[c][i] -= gain[i] * z_filters[c];
+            }
+        }
+        if count > 0 {
+            // Sigma h after the update: z - g (k' h) - k (g' h).
+            let (mut k_h, mut g_h) = (0.0, 0.0);
+            for i in 0..N {
+                k_h += k[i] * rows.e.theta[i];
+                g_h += gain[i] * rows.e.theta[i];
+            }
+            for i in 0..count {
+                k_h += z_filters[i] * rows.e.filters[i];
+            }
+            for i in 0..N {
+                z[i] -= gain[i] * k_h + k[i] * g_h;
+            }
+            let z_filters = core::array::from_fn(|c| z_filters[c] * (1.0 - g_h));
+            self.insert(places, rows, z, z_filters);
+        }
+        self.wait -= 1;
+        if self.wait == 0 {
+            self.wait = LOOK;
+            self.confine();
+        }
+    }
+
+    #[inline]
+    fn follow(&mut self, places: &Places, rows: &Sensitivities<N, K>) {
+        let count = places.filters();
+        if count > 0 {
+            let (z, z_filters) = self.times(count, &rows.e);
+            self.insert(places, rows, z, z_filters);
+        }
+    }
+
+    #[inline]
+    fn drift(&mut self, i: usize, variance: f64, bound: f64) {
+        // Beyond the bound nothing is known that could be forgotten.
+        if self.theta[i][i] < bound {
+            self.theta[i][i] += variance;
+        }
+    }
+
+    #[inline(always)]
+    fn variance(&self) -> Option<f64> {
+        Some(self.level.variance())
     }
 }

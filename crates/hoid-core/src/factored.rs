@@ -12,22 +12,107 @@
 //!
 //! N is the room for parameters. Where there are fewer, their d is zero and nothing happens to them.
 
-/// `U D U'` of an N x N matrix.
+use crate::number::Number;
+
+/// The smallest number above zero.
+const SMALLEST: f64 = 5e-324;
+
+/// `U D U'` of an N x N matrix, or of several side by side.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Factored<const N: usize> {
-    /// Column j holds `U_ij`, i < j; the rest is not used.
-    u: [[f64; N]; N],
-    d: [f64; N],
+#[repr(align(64))]
+pub struct Factored<const N: usize, R = f64> {
+    /// Column j holds `U_ij`, i < j, and `d_j` in the place of the 1; the rest is not used. The d stand apart, so that no compiler makes a
+    /// vector of them: the first would wait for the last.
+    u: [[R; N]; N],
 }
 
-crate::state!([const N: usize] Factored<N> { u, d });
+crate::state!([const N: usize] Factored<N> { u });
 
-impl<const N: usize> Factored<N> {
-    /// A diagonal matrix.
-    pub fn diagonal(d: [f64; N]) -> Self {
-        Self { u: [[0.0; N]; N], d }
+impl<const N: usize, R: Number> Factored<N, R> {
+    /// A diagonal matrix; N is not zero.
+    pub fn diagonal(d: [R; N]) -> Self {
+        let mut u = [d.map(|d| d.like(0.0)); N];
+        for j in 0..N {
+            u[j][j] = d[j];
+        }
+        Self { u }
     }
 
+    /// True when in every lane all numbers are finite and no variance negative.
+    #[inline(always)]
+    pub fn all_sound(&self) -> bool {
+        let (zero, one) = (self.u[0][0].like(0.0), self.u[0][0].like(1.0));
+        let mut sum = zero;
+        let mut positive = true;
+        for j in 0..N {
+            positive &= (-self.u[j][j]).all_below(zero.like(SMALLEST));
+            // Zero times what is not finite is not a number.
+            for i in 0..=j {
+                sum = sum + zero * self.u[j][i];
+            }
+        }
+        positive && sum.all_below(one)
+    }
+
+    /// The factors of one lane.
+    pub fn lane(&self, lane: usize) -> Factored<N> {
+        Factored {
+            u: self.u.map(|column| column.map(|u| u.lane(lane))),
+        }
+    }
+
+    /// Puts the factors of one run into a lane.
+    pub fn set_lane(&mut self, lane: usize, factors: &Factored<N>) {
+        for j in 0..N {
+            for i in 0..N {
+                self.u[j][i].set_lane(lane, factors.u[j][i]);
+            }
+        }
+    }
+
+    /// The measurement of the module: the gain g; P moves on.
+    #[inline]
+    pub fn measure(&mut self, psi: &[R; N], variance: R) -> [R; N] {
+        self.grow_and_measure(variance.like(1.0), psi, variance)
+    }
+
+    /// `P <- growth P`, then the measurement, in one pass.
+    #[inline(always)]
+    pub fn grow_and_measure(&mut self, growth: R, psi: &[R; N], variance: R) -> [R; N] {
+        let (zero, one) = (variance.like(0.0), variance.like(1.0));
+        let (mut f, mut v, mut grown) = ([zero; N], [zero; N], [zero; N]);
+        for j in 0..N {
+            let mut sum = psi[j];
+            for i in 0..j {
+                sum = sum + self.u[j][i] * psi[i];
+            }
+            grown[j] = self.u[j][j] * growth;
+            f[j] = sum;
+            v[j] = grown[j] * sum;
+        }
+        let mut gain = [zero; N];
+        let (mut before, mut inverse_before) = (variance, one / variance);
+        for j in 0..N {
+            let alpha = before + f[j] * v[j];
+            let inverse = one / alpha;
+            self.u[j][j] = grown[j] * (before * inverse);
+            let along = -f[j] * inverse_before;
+            for i in 0..j {
+                let old = self.u[j][i];
+                self.u[j][i] = old + gain[i] * along;
+                gain[i] = gain[i] + old * v[j];
+            }
+            gain[j] = v[j];
+            (before, inverse_before) = (alpha, inverse);
+        }
+        for g in &mut gain {
+            *g = *g * inverse_before;
+        }
+        gain
+    }
+}
+
+impl<const N: usize> Factored<N> {
     /// The factors of a symmetric matrix; `None` unless it is positive semidefinite up to rounding. Rows and columns of zeros
     /// are parameters that do not move.
     pub fn of(p: &[[f64; N]; N]) -> Option<Self> {
@@ -38,7 +123,7 @@ impl<const N: usize> Factored<N> {
             if !(d >= 0.0 && d.is_finite()) {
                 return None;
             }
-            factored.d[j] = d;
+            factored.u[j][j] = d;
             if d == 0.0 {
                 // Nothing can be correlated with what does not vary.
                 if (0..j).any(|i| rest[i][j] != 0.0) {
@@ -59,44 +144,6 @@ impl<const N: usize> Factored<N> {
         Some(factored)
     }
 
-    /// The measurement of the module: the gain g; P moves on.
-    #[inline]
-    pub fn measure(&mut self, psi: &[f64; N], variance: f64) -> [f64; N] {
-        self.grow_and_measure(1.0, psi, variance)
-    }
-
-    /// `P <- growth P`, then the measurement, in one pass.
-    #[inline(always)]
-    pub fn grow_and_measure(&mut self, growth: f64, psi: &[f64; N], variance: f64) -> [f64; N] {
-        let (mut f, mut v, mut grown) = ([0.0; N], [0.0; N], [0.0; N]);
-        for j in 0..N {
-            let mut sum = psi[j];
-            for i in 0..j {
-                sum += self.u[j][i] * psi[i];
-            }
-            grown[j] = self.d[j] * growth;
-            f[j] = sum;
-            v[j] = grown[j] * sum;
-        }
-        let mut gain = [0.0; N];
-        let (mut before, mut inverse_before) = (variance, 1.0 / variance);
-        for j in 0..N {
-            let alpha = before + f[j] * v[j];
-            let inverse = 1.0 / alpha;
-            self.d[j] = grown[j] * (before * inverse);
-            let along = -f[j] * inverse_before;
-            let column = &mut self.u[j];
-            for i in 0..j {
-                let old = column[i];
-                column[i] = old + gain[i] * along;
-                gain[i] += old * v[j];
-            }
-            gain[j] = v[j];
-            (before, inverse_before) = (alpha, inverse);
-        }
-        gain.map(|g| g * inverse_before)
-    }
-
     /// `psi' P psi`.
     #[inline]
     pub fn along(&self, psi: &[f64; N]) -> f64 {
@@ -114,7 +161,7 @@ impl<const N: usize> Factored<N> {
                 sum += self.u[j][i] * psi[i];
             }
             f[j] = sum;
-            v[j] = self.d[j] * sum;
+            v[j] = self.u[j][j] * sum;
         }
         (f, v)
     }
@@ -135,8 +182,8 @@ impl<const N: usize> Factored<N> {
     /// `P <- s^2 P`.
     #[inline]
     pub fn scale_all(&mut self, squared: f64) {
-        for d in &mut self.d {
-            *d *= squared;
+        for j in 0..N {
+            self.u[j][j] *= squared;
         }
     }
 
@@ -144,7 +191,7 @@ impl<const N: usize> Factored<N> {
     #[inline]
     pub fn scale(&mut self, s: &[f64; N], inverse: &[f64; N]) {
         for j in 0..N {
-            self.d[j] *= s[j] * s[j];
+            self.u[j][j] *= s[j] * s[j];
             for i in 0..j {
                 self.u[j][i] *= s[i] * inverse[j];
             }
@@ -156,12 +203,12 @@ impl<const N: usize> Factored<N> {
     pub fn add(&mut self, mut c: f64, mut a: [f64; N]) {
         for j in (0..N).rev() {
             let s = a[j];
-            let d = self.d[j] + c * s * s;
+            let d = self.u[j][j] + c * s * s;
             // Zero only where both terms are: the direction is not there yet, and nothing is added to it.
             if d > 0.0 {
                 let share = c / d;
-                c = share * self.d[j];
-                self.d[j] = d;
+                c = share * self.u[j][j];
+                self.u[j][j] = d;
                 let along = s * share;
                 for i in 0..j {
                     a[i] -= s * self.u[j][i];
@@ -174,7 +221,7 @@ impl<const N: usize> Factored<N> {
     /// Element (i, j) of P.
     pub fn element(&self, i: usize, j: usize) -> f64 {
         let of = |row: usize, column: usize| if row == column { 1.0 } else { self.u[column][row] };
-        (i.max(j)..N).map(|k| of(i, k) * self.d[k] * of(j, k)).sum()
+        (i.max(j)..N).map(|k| of(i, k) * self.u[k][k] * of(j, k)).sum()
     }
 
     /// P itself.
@@ -184,6 +231,6 @@ impl<const N: usize> Factored<N> {
 
     /// True when every number is finite and no variance negative.
     pub fn is_sound(&self) -> bool {
-        self.d.iter().all(|d| *d >= 0.0 && d.is_finite()) && self.u.iter().flatten().all(|u| u.is_finite())
+        self.all_sound()
     }
 }

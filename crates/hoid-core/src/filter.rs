@@ -3,6 +3,19 @@
 //! A monic polynomial `D(q^-1) = 1 + d_1 q^-1 + ... + d_n q^-n` is given by its coefficients `[d_1, ..., d_n]`; the leading
 //! one is never stored. All filters start at rest (zeros before the first sample).
 
+/// All-pole filter into another slice: `y = x / D(q^-1)`.
+///
+/// # Panics
+/// If `x` and `y` differ in length.
+pub fn divide(d: &[f64], x: &[f64], y: &mut [f64]) {
+    assert_eq!(x.len(), y.len(), "input and output of a filter have the same length");
+    if let [d1, d2] = *d {
+        return divide_by_second_order(d1, d2, x, y);
+    }
+    y.copy_from_slice(x);
+    divide_in_place(d, y);
+}
+
 /// All-pole filter in place: `x <- x / D(q^-1)`, that is `y(t) = x(t) - d_1 y(t-1) - ... - d_n y(t-n)`.
 pub fn divide_in_place(d: &[f64], x: &mut [f64]) {
     match *d {
@@ -14,7 +27,7 @@ pub fn divide_in_place(d: &[f64], x: &mut [f64]) {
                 *value = y1;
             }
         }
-        [d1, d2] => divide_by_second_order(d1, d2, x),
+        [d1, d2] => divide_by_second_order_in_place(d1, d2, x),
         _ => {
             for t in 0..x.len() {
                 let mut y = x[t];
@@ -27,32 +40,80 @@ pub fn divide_in_place(d: &[f64], x: &mut [f64]) {
     }
 }
 
-/// `x <- x / (1 + d_1 q^-1 + d_2 q^-2)`, four samples at a time.
+/// `y = x / (1 + d_1 q^-1 + d_2 q^-2)` from rest, four samples at a time.
 ///
 /// Sample by sample each value waits for the one before it. Written out over four samples with the impulse response h,
-/// `y(t+k) = sum_{i<=k} h_i x(t+k-i) + h_{k+1} y(t-1) - d_2 h_k y(t-2)`, all four wait for y(t-1) and y(t-2) alone.
-fn divide_by_second_order(d1: f64, d2: f64, x: &mut [f64]) {
-    let h1 = -d1;
-    let h2 = -d1 * h1 - d2;
-    let h3 = -d1 * h2 - d2 * h1;
-    let h4 = -d1 * h3 - d2 * h2;
-    let (mut y1, mut y2) = (0.0, 0.0);
-    let mut blocks = x.chunks_exact_mut(4);
-    for block in &mut blocks {
-        let [x0, x1, x2, x3] = [block[0], block[1], block[2], block[3]];
-        let z = -d2 * y2;
-        // The own share of the inputs first: only the last sums wait for the block before.
-        block[0] = (x0 + z) + h1 * y1;
-        block[1] = (x1 + h1 * x0 + h1 * z) + h2 * y1;
-        let third = (x2 + h1 * x1 + h2 * x0 + h2 * z) + h3 * y1;
-        let fourth = (x3 + h1 * x2 + h2 * x1 + h3 * x0 + h3 * z) + h4 * y1;
-        (block[2], block[3]) = (third, fourth);
-        (y1, y2) = (fourth, third);
+/// `y(t+k) = sum_{i<=k} h_i x(t+k-i) + h_{k+1} y(t-1) - d_2 h_k y(t-2)`, all four wait for y(t-1) and y(t-2) alone, and only for a
+/// product and two sums.
+#[derive(Debug, Clone, Copy)]
+pub struct SecondOrder {
+    /// h_1 to h_4; h_0 is one.
+    h: [f64; 4],
+    /// -d_2 h_0 to -d_2 h_3.
+    g: [f64; 4],
+    y1: f64,
+    y2: f64,
+}
+
+impl SecondOrder {
+    /// At rest.
+    pub fn new(d1: f64, d2: f64) -> Self {
+        let h1 = -d1;
+        let h2 = -d1 * h1 - d2;
+        let h3 = -d1 * h2 - d2 * h1;
+        let h4 = -d1 * h3 - d2 * h2;
+        Self {
+            h: [h1, h2, h3, h4],
+            g: [-d2, -d2 * h1, -d2 * h2, -d2 * h3],
+            y1: 0.0,
+            y2: 0.0,
+        }
     }
-    for value in blocks.into_remainder() {
-        let y = (*value - d2 * y2) - d1 * y1;
-        (y2, y1) = (y1, y);
-        *value = y;
+
+    /// Four samples.
+    #[inline(always)]
+    pub fn four(&mut self, [x0, x1, x2, x3]: [f64; 4]) -> [f64; 4] {
+        let Self { h, g, y1, y2 } = *self;
+        // The own share of the inputs first: only the last sums wait for the block before.
+        let y = [
+            (x0 + g[0] * y2) + h[0] * y1,
+            ((x1 + h[0] * x0) + g[1] * y2) + h[1] * y1,
+            ((x2 + h[0] * x1 + h[1] * x0) + g[2] * y2) + h[2] * y1,
+            ((x3 + h[0] * x2 + h[1] * x1 + h[2] * x0) + g[3] * y2) + h[3] * y1,
+        ];
+        (self.y1, self.y2) = (y[3], y[2]);
+        y
+    }
+
+    /// One sample.
+    #[inline(always)]
+    pub fn one(&mut self, x: f64) -> f64 {
+        let y = (x + self.g[0] * self.y2) + self.h[0] * self.y1;
+        (self.y2, self.y1) = (self.y1, y);
+        y
+    }
+}
+
+fn divide_by_second_order(d1: f64, d2: f64, x: &[f64], y: &mut [f64]) {
+    let mut filter = SecondOrder::new(d1, d2);
+    let (x_blocks, x_rest) = x.as_chunks::<4>();
+    let (y_blocks, y_rest) = y.as_chunks_mut::<4>();
+    for (y, x) in y_blocks.iter_mut().zip(x_blocks) {
+        *y = filter.four(*x);
+    }
+    for (y, x) in y_rest.iter_mut().zip(x_rest) {
+        *y = filter.one(*x);
+    }
+}
+
+fn divide_by_second_order_in_place(d1: f64, d2: f64, x: &mut [f64]) {
+    let mut filter = SecondOrder::new(d1, d2);
+    let (blocks, rest) = x.as_chunks_mut::<4>();
+    for block in blocks {
+        *block = filter.four(*block);
+    }
+    for value in rest {
+        *value = filter.one(*value);
     }
 }
 
@@ -112,7 +173,10 @@ mod tests {
         for n in 0..=d.len() {
             let mut y = vec![0.0; x.len()];
             multiply(&d[..n], &x, &mut y);
+            let mut apart = vec![0.0; y.len()];
+            divide(&d[..n], &y, &mut apart);
             divide_in_place(&d[..n], &mut y);
+            assert_eq!(apart, y);
             for (a, b) in x.iter().zip(&y) {
                 assert!((a - b).abs() < 1e-12, "order {n}: {a} and {b}");
             }

@@ -13,7 +13,7 @@
 
 use crate::{
     adaptation::Adaptation,
-    error_bars::{ErrorBars, Places, Row, Sensitivities},
+    error_bars::{Bars, ErrorBars, Places, Row, Sensitivities},
     held_operator::{held_operator, held_operator_delayed},
     predictor::{Predictor, Regressor, Shape},
     recursion::{Stable, Step, allowed_share, share},
@@ -159,8 +159,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
 
     #[inline(always)]
     fn predict(&mut self, x: f64, u: f64) -> f64 {
-        let mut of_theta = [0.0; N];
-        let innovation = self.predictor.predict(&self.polynomials.theta, x, u, &mut of_theta);
+        let (of_theta, innovation) = self.predictor.predict(&self.polynomials.theta, x, u);
         self.psi = self.by_eta(of_theta);
         innovation
     }
@@ -196,7 +195,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         let used = share(limited, innovation);
         let moved = self
             .adaptation
-            .advance(&self.psi, limited, &self.eta, self.bars.variance());
+            .advance(&self.psi, limited, &self.eta, self.bars.innovation_variance());
         let (operator, noise) = (self.model.operator(), self.model.shape.nc() + self.model.shape.nd());
         let (shape, stable) = (self.model.shape, self.model.stable);
         // The operator's part of theta is stable by its bounds; only the noise model has to be tested.
@@ -318,7 +317,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
 
     /// Innovation variance sigma^2.
     pub fn innovation_variance(&self) -> f64 {
-        self.bars.variance()
+        self.bars.innovation_variance()
     }
 
     /// How often a signal overflowed and the filters were brought to rest.

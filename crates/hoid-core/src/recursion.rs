@@ -39,6 +39,13 @@ pub fn share(part: f64, whole: f64) -> f64 {
     if part == whole { 1.0 } else { part / whole }
 }
 
+/// True when every number is finite. In the registers where the numbers are: no way through integers, and no branch for each.
+#[inline(always)]
+pub(crate) fn all_finite<const N: usize>(values: &[f64; N]) -> bool {
+    // Zero times what is not finite is not a number.
+    values.iter().fold(0.0, |sum, v| sum + 0.0 * v) == 0.0
+}
+
 /// The largest of the shares 1, 1/2, 1/4 ... of a step that is allowed; 0 when none is.
 #[inline]
 pub fn allowed_share<const N: usize>(
@@ -46,8 +53,24 @@ pub fn allowed_share<const N: usize>(
     step: &[f64; N],
     allowed: impl Fn(&[f64; N]) -> bool,
 ) -> (f64, [f64; N]) {
-    let mut share = 1.0;
-    for _ in 0..=HALVINGS {
+    let whole: [f64; N] = core::array::from_fn(|i| theta[i] + step[i]);
+    if all_finite(&whole) && allowed(&whole) {
+        return (1.0, whole);
+    }
+    let (theta, step) = (*theta, *step);
+    shortened(&theta, &step, allowed)
+}
+
+/// Where the whole step is not allowed.
+#[cold]
+#[inline(never)]
+fn shortened<const N: usize>(
+    theta: &[f64; N],
+    step: &[f64; N],
+    allowed: impl Fn(&[f64; N]) -> bool,
+) -> (f64, [f64; N]) {
+    let mut share = 0.5;
+    for _ in 0..HALVINGS {
         let moved: [f64; N] = core::array::from_fn(|i| theta[i] + share * step[i]);
         if moved.iter().all(|t| t.is_finite()) && allowed(&moved) {
             return (share, moved);

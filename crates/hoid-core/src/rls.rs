@@ -5,30 +5,32 @@
 
 use crate::{
     adaptation::Adaptation,
-    error_bars::{ErrorBars, Places, Sensitivities},
-    predictor::Shape,
-    recursion::{Step, share},
+    error_bars::{Bars, ErrorBars, Places, Sensitivities},
+    predictor::{Shape, dot},
+    recursion::{Step, all_finite, share},
 };
 
-/// The recursion. N is the room for parameters.
+/// The recursion. N is the room for parameters; B is [`NoBars`](crate::error_bars::NoBars) where no error bars are asked for.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Rls<S, const N: usize, A> {
+#[repr(align(64))]
+pub struct Rls<S, const N: usize, A, B = ErrorBars<N, 0>> {
     shape: S,
     theta: [f64; N],
     psi: [f64; N],
     adaptation: A,
-    bars: ErrorBars<N, 0>,
+    bars: B,
     restarts: u64,
 }
 
-crate::state!([S, const N: usize, A: crate::state::State] Rls<S, N, A> { theta, psi, adaptation, bars, restarts });
+crate::state!([S, const N: usize, A: crate::state::State, B: crate::state::State] Rls<S, N, A, B> { theta, psi, adaptation, bars, restarts });
 
-impl<S: Shape, const N: usize, A: Adaptation<N>> Rls<S, N, A> {
+impl<S: Shape, const N: usize, A: Adaptation<N>, B: Bars<N, 0>> Rls<S, N, A, B> {
     /// Starts from theta `[a.., b..]` with zeros before the first sample. `None` when there is no parameter, more than N, or one of
-    /// C, D or F.
-    pub fn new(shape: S, theta: [f64; N], adaptation: A, bars: ErrorBars<N, 0>) -> Option<Self> {
+    /// C, D or F; or when the way of forgetting needs the innovation variance and `bars` do not follow it.
+    pub fn new(shape: S, theta: [f64; N], adaptation: A, bars: B) -> Option<Self> {
         let linear = (shape.nc(), shape.nd(), shape.nf()) == (0, 0, 0);
-        (linear && (1..=N).contains(&shape.parameters())).then_some(Self {
+        let known = bars.variance().is_some() || !adaptation.needs_variance();
+        (linear && known && (1..=N).contains(&shape.parameters())).then_some(Self {
             shape,
             theta,
             psi: [0.0; N],
@@ -41,21 +43,23 @@ impl<S: Shape, const N: usize, A: Adaptation<N>> Rls<S, N, A> {
     /// Takes a sample `x(t) = e(t - nk)`, `u(t)`. Both must be finite.
     #[inline]
     pub fn step(&mut self, x: f64, u: f64) -> Step {
-        let innovation = self.innovation(x, u);
+        // State is read once, worked on in locals and written once.
+        let theta = self.theta;
+        let (psi, innovation) = self.innovation(&theta, x, u);
         let limited = self.bars.limited(innovation);
         let moved = self
             .adaptation
-            .advance(&self.psi, limited, &self.theta, self.bars.variance());
-        let theta: [f64; N] = core::array::from_fn(|i| self.theta[i] + moved.step[i]);
-        let sound = theta.iter().all(|t| t.is_finite());
+            .advance(&psi, limited, &theta, self.bars.variance().unwrap_or(0.0));
+        let theta: [f64; N] = core::array::from_fn(|i| theta[i] + moved.step[i]);
+        let sound = all_finite(&theta);
         if sound {
             self.theta = theta;
             let used = share(limited, innovation);
             let gain = moved.gain.map(|g| used * g);
             self.bars
-                .take(&Places::NONE, &Sensitivities::of_gradient(&self.psi), &gain, innovation);
+                .take(&Places::NONE, &Sensitivities::of_gradient(&psi), &gain, innovation);
             self.adaptation.drift_into(&mut self.bars);
-            self.shift(u);
+            self.shift(psi, u);
         } else {
             self.psi = [0.0; N];
             self.restarts += 1;
@@ -68,8 +72,8 @@ impl<S: Shape, const N: usize, A: Adaptation<N>> Rls<S, N, A> {
 
     /// Takes a sample into the regressor alone; the estimate stays.
     pub fn follow(&mut self, x: f64, u: f64) -> Step {
-        let innovation = self.innovation(x, u);
-        self.shift(u);
+        let (psi, innovation) = self.innovation(&self.theta, x, u);
+        self.shift(psi, u);
         Step {
             innovation,
             shortened: false,
@@ -78,42 +82,38 @@ impl<S: Shape, const N: usize, A: Adaptation<N>> Rls<S, N, A> {
 
     /// As [`Rls::follow`] where the output is missing: the one-step prediction takes its place.
     pub fn bridge(&mut self, x: f64) {
-        let prediction = -self.innovation(x, 0.0);
-        self.shift(prediction);
+        let (psi, innovation) = self.innovation(&self.theta, x, 0.0);
+        self.shift(psi, -innovation);
     }
 
+    /// psi with x and the innovation.
     #[inline(always)]
-    fn innovation(&mut self, x: f64, u: f64) -> f64 {
+    fn innovation(&self, theta: &[f64; N], x: f64, u: f64) -> ([f64; N], f64) {
         let (na, nb) = (self.shape.na(), self.shape.nb());
-        // Through a copy: psi is then written as a whole, as it will be read.
-        let mut psi = self.psi;
+        // Each number by itself: a wide load right after the narrow stores of the sample before would wait for memory.
+        let mut psi = self.psi.map(core::hint::black_box);
+        for j in (1..nb).rev() {
+            psi[na + j] = psi[na + j - 1];
+        }
         if nb > 0 {
-            psi[na..na + nb].copy_within(0..nb - 1, 1);
             psi[na] = x;
         }
-        self.psi = psi;
-        let (of_a, of_b) = psi.split_at(na);
-        let (a, b) = self.theta.split_at(na);
-        let mut w = 0.0;
-        for (b, x) in b[..nb].iter().zip(of_b) {
-            w += b * x;
-        }
-        let mut from_past = 0.0;
-        for (a, minus_u) in a.iter().zip(of_a) {
-            from_past += a * -minus_u;
-        }
-        u + from_past - w
+        let w = dot(0.0, &theta[na..na + nb], &psi[na..]);
+        // As the predictor of the general model has it, which keeps u itself.
+        let from_past = dot(0.0, &theta[..na], &psi.map(|p| -p));
+        (psi, u + from_past - w)
     }
 
     #[inline(always)]
-    fn shift(&mut self, u: f64) {
+    fn shift(&mut self, mut psi: [f64; N], u: f64) {
         let na = self.shape.na();
-        if na > 0 {
-            let mut psi = self.psi;
-            psi[..na].copy_within(0..na - 1, 1);
-            psi[0] = -u;
-            self.psi = psi;
+        for j in (1..na).rev() {
+            psi[j] = psi[j - 1];
         }
+        if na > 0 {
+            psi[0] = -u;
+        }
+        self.psi = psi;
     }
 
     /// theta.
@@ -126,6 +126,13 @@ impl<S: Shape, const N: usize, A: Adaptation<N>> Rls<S, N, A> {
         &self.adaptation
     }
 
+    /// How often a step was not finite and the regressor was brought to rest.
+    pub fn restarts(&self) -> u64 {
+        self.restarts
+    }
+}
+
+impl<S: Shape, const N: usize, A: Adaptation<N>> Rls<S, N, A> {
     /// Covariance of theta over sigma^2.
     pub fn spread(&self) -> [[f64; N]; N] {
         self.adaptation.spread_or(&self.bars)
@@ -133,11 +140,6 @@ impl<S: Shape, const N: usize, A: Adaptation<N>> Rls<S, N, A> {
 
     /// Innovation variance sigma^2.
     pub fn innovation_variance(&self) -> f64 {
-        self.bars.variance()
-    }
-
-    /// How often a step was not finite and the regressor was brought to rest.
-    pub fn restarts(&self) -> u64 {
-        self.restarts
+        self.bars.innovation_variance()
     }
 }

@@ -6,41 +6,43 @@
 
 use crate::{
     adaptation::Adaptation,
-    error_bars::{ErrorBars, Places, Sensitivities},
+    error_bars::{Bars, ErrorBars, Places, Sensitivities},
     predictor::{Predictor, Regressor, Shape},
     recursion::{Stable, Step, allowed_share, share},
 };
 
 /// The recursion. N is the room for parameters, K that for the errors of its filters ([`Places::filters`]), or 0
-/// for the usual error bars.
+/// for the usual error bars and for none, B = [`NoBars`](crate::error_bars::NoBars).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Rpem<S, const N: usize, const K: usize, A> {
+#[repr(align(64))]
+pub struct Rpem<S, const N: usize, const K: usize, A, B = ErrorBars<N, K>> {
     predictor: Predictor<S, N, N>,
     theta: [f64; N],
     psi: [f64; N],
     adaptation: A,
-    bars: ErrorBars<N, K>,
+    bars: B,
     stable: Stable,
     restarts: u64,
 }
 
-crate::state!([S, const N: usize, const K: usize, A: crate::state::State] Rpem<S, N, K, A> {
+crate::state!([S, const N: usize, const K: usize, A: crate::state::State, B: crate::state::State] Rpem<S, N, K, A, B> {
     predictor, theta, psi, adaptation, bars, restarts,
 });
 
-impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>> Rpem<S, N, K, A> {
-    /// Starts from `theta = [a.. b.. c.. d.. f..]` with filters at rest. `None` when the shape does not fit in N and K, or
-    /// theta is not stable.
+impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: Bars<N, K>> Rpem<S, N, K, A, B> {
+    /// Starts from `theta = [a.. b.. c.. d.. f..]` with filters at rest. `None` when the shape does not fit in N and K, theta is not
+    /// stable, or the way of forgetting needs the innovation variance and `bars` do not follow it.
     pub fn new(
         shape: S,
         regressor: Regressor,
         stable: Stable,
         theta: [f64; N],
         adaptation: A,
-        bars: ErrorBars<N, K>,
+        bars: B,
     ) -> Option<Self> {
         let predictor = Predictor::new(shape, regressor)?;
-        let usable = stable.holds(&shape, &theta) && Places::within::<S, K>(&shape).filters() <= K;
+        let known = bars.variance().is_some() || !adaptation.needs_variance();
+        let usable = known && stable.holds(&shape, &theta) && Places::within::<S, K>(&shape).filters() <= K;
         usable.then_some(Self {
             predictor,
             theta,
@@ -56,19 +58,22 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>> Rpem<S, N, K, A
     #[inline]
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         let shape = self.predictor.shape();
-        let innovation = self.predictor.predict(&self.theta, x, u, &mut self.psi);
-        let (places, rows) = self.sensitivities();
+        // State is read once, worked on in locals and written once.
+        let theta = self.theta;
+        let (psi, innovation) = self.predictor.predict(&theta, x, u);
+        let (places, rows) = self.sensitivities(&theta, &psi);
         let limited = self.bars.limited(innovation);
         let used = share(limited, innovation);
         let moved = self
             .adaptation
-            .advance(&self.psi, limited, &self.theta, self.bars.variance());
-        let (allowed, theta) = allowed_share(&self.theta, &moved.step, |theta| self.stable.holds(&shape, theta));
-        self.theta = theta;
+            .advance(&psi, limited, &theta, self.bars.variance().unwrap_or(0.0));
+        let stable = self.stable;
+        let (allowed, theta) = allowed_share(&theta, &moved.step, |theta| stable.holds(&shape, theta));
+        self.correct(&theta);
+        (self.theta, self.psi) = (theta, psi);
         let gain = moved.gain.map(|g| allowed * used * g);
         self.bars.take(&places, &rows, &gain, innovation);
         self.adaptation.drift_into(&mut self.bars);
-        self.correct();
         Step {
             innovation,
             shortened: allowed < 1.0,
@@ -77,9 +82,11 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>> Rpem<S, N, K, A
 
     /// Takes a sample into the filters alone; the estimate stays.
     pub fn follow(&mut self, x: f64, u: f64) -> Step {
-        let innovation = self.predictor.predict(&self.theta, x, u, &mut self.psi);
+        let theta = self.theta;
+        let (psi, innovation) = self.predictor.predict(&theta, x, u);
+        self.psi = psi;
         self.follow_bars();
-        self.correct();
+        self.correct(&theta);
         Step {
             innovation,
             shortened: false,
@@ -88,31 +95,32 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>> Rpem<S, N, K, A
 
     /// As [`Rpem::follow`] where the output is missing: the one-step prediction takes its place.
     pub fn bridge(&mut self, x: f64) {
-        self.predictor.predict(&self.theta, x, 0.0, &mut self.psi);
-        self.predictor.bridge(&self.theta);
+        let theta = self.theta;
+        (self.psi, _) = self.predictor.predict(&theta, x, 0.0);
+        self.predictor.bridge(&theta);
         self.follow_bars();
-        self.correct();
+        self.correct(&theta);
     }
 
     fn follow_bars(&mut self) {
-        let (places, rows) = self.sensitivities();
+        let (places, rows) = self.sensitivities(&self.theta, &self.psi);
         self.bars.follow(&places, &rows);
     }
 
     #[inline(always)]
-    fn sensitivities(&self) -> (Places, Sensitivities<N, K>) {
+    fn sensitivities(&self, theta: &[f64; N], psi: &[f64; N]) -> (Places, Sensitivities<N, K>) {
         let places = Places::within::<S, K>(&self.predictor.shape());
         let rows = if K == 0 {
-            Sensitivities::of_gradient(&self.psi)
+            Sensitivities::of_gradient(psi)
         } else {
-            self.predictor.sensitivities(&self.theta, &places)
+            self.predictor.sensitivities(theta, &places)
         };
         (places, rows)
     }
 
     #[inline(always)]
-    fn correct(&mut self) {
-        if !self.predictor.correct(&self.theta).is_finite() {
+    fn correct(&mut self, theta: &[f64; N]) {
+        if !self.predictor.correct(theta).is_finite() {
             self.predictor.rest();
             self.restarts += 1;
         }
@@ -133,6 +141,13 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>> Rpem<S, N, K, A
         &self.adaptation
     }
 
+    /// How often a signal overflowed and the filters were brought to rest.
+    pub fn restarts(&self) -> u64 {
+        self.restarts
+    }
+}
+
+impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>> Rpem<S, N, K, A> {
     /// Covariance of theta over sigma^2.
     pub fn spread(&self) -> [[f64; N]; N] {
         self.adaptation.spread_or(&self.bars)
@@ -140,11 +155,6 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>> Rpem<S, N, K, A
 
     /// Innovation variance sigma^2.
     pub fn innovation_variance(&self) -> f64 {
-        self.bars.variance()
-    }
-
-    /// How often a signal overflowed and the filters were brought to rest.
-    pub fn restarts(&self) -> u64 {
-        self.restarts
+        self.bars.innovation_variance()
     }
 }

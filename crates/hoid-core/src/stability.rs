@@ -11,15 +11,21 @@ pub const MAX_ORDER: usize = 64;
 /// True when all roots of `z^n + d_1 z^{n-1} + ... + d_n` lie strictly inside the circle of the given radius.
 ///
 /// Coefficients that are not finite give `false`, and so does an order above [`MAX_ORDER`]: no claim of stability without proof.
+#[inline]
 pub fn roots_inside(d: &[f64], radius: f64) -> bool {
-    let order = d.len();
     // Most polynomials of an operator are short, and a recursion tests them at every sample.
     match *d {
-        [] if radius > 0.0 => return true,
-        [d1] if radius > 0.0 => return d1.abs() < radius,
-        [d1, d2] if radius == 1.0 => return d2.abs() < 1.0 && d1.abs() < 1.0 + d2,
-        _ => {}
+        [] if radius > 0.0 => true,
+        [d1] if radius > 0.0 => d1.abs() < radius,
+        [d1, d2] if radius == 1.0 => d2.abs() < 1.0 && d1.abs() < 1.0 + d2,
+        _ => step_down(d, radius),
     }
+}
+
+/// The test for any order.
+#[inline(never)]
+fn step_down(d: &[f64], radius: f64) -> bool {
+    let order = d.len();
     if order > MAX_ORDER || radius.is_nan() || radius <= 0.0 {
         return false;
     }

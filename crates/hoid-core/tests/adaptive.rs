@@ -191,15 +191,15 @@ fn one_hypothesis_with_a_known_neuromuscular_system_is_least_squares() {
         (matrix[1][1] * right[0] - matrix[0][1] * right[1]) / determinant,
         (matrix[0][0] * right[1] - matrix[1][0] * right[0]) / determinant,
     ];
-    let covariance = bank.covariance();
+    let covariance = bank.bank().covariance();
     for i in 0..2 {
-        let eta = bank.mixture().eta[i];
+        let eta = bank.bank().mixture().eta[i];
         assert!((eta / solution[i] - 1.0).abs() < 1e-9, "{i}: {eta} {}", solution[i]);
         let variance = matrix[1 - i][1 - i] / determinant;
         assert!((covariance[i][i] / variance - 1.0).abs() < 1e-9);
     }
-    assert_eq!(bank.mixture().eta[2], S1[2]);
-    assert_eq!(bank.hypotheses().count(), 1);
+    assert_eq!(bank.bank().mixture().eta[2], S1[2]);
+    assert_eq!(bank.bank().hypotheses().count(), 1);
 }
 
 #[test]
@@ -210,9 +210,9 @@ fn the_neuromuscular_system_is_found_from_a_quarter_away() {
     for &(x, u) in &data {
         bank.step(x, u);
     }
-    let covariance = bank.covariance();
+    let covariance = bank.bank().covariance();
     for i in 0..4 {
-        let error = bank.mixture().eta[i] - S1[i];
+        let error = bank.bank().mixture().eta[i] - S1[i];
         // Five standard errors, and what the linearisation at the far start leaves: a hundredth.
         let allowed = 5.0 * covariance[i][i].sqrt() + 0.01 * S1[i];
         assert!(error.abs() < allowed, "{i}: {error} {allowed}");
@@ -227,9 +227,9 @@ fn a_change_is_declared_once_with_its_time_and_its_gains() {
     let mut declared = Vec::new();
     for (k, &(x, u)) in data.iter().enumerate() {
         bank.step(x, u);
-        let total: f64 = bank.hypotheses().map(|h| h.weight).sum();
+        let total: f64 = bank.bank().hypotheses().map(|h| h.weight).sum();
         assert!((total - 1.0).abs() < 1e-12);
-        declared.extend(bank.change().map(|c| (k, c)));
+        declared.extend(bank.bank().change().map(|c| (k, c)));
     }
     assert_eq!(declared.len(), 1, "{declared:?}");
     let (k, change) = declared[0];
@@ -239,9 +239,9 @@ fn a_change_is_declared_once_with_its_time_and_its_gains() {
     assert!((since - change_at as f64).abs() <= 64.0, "{since}");
     assert!(change.odds > 4.0 && change.z[1] > 2.0, "{change:?}");
     assert!((change.before.eta[1] - S1[1]).abs() < 0.01);
-    let covariance = bank.covariance();
+    let covariance = bank.bank().covariance();
     for i in 0..2 {
-        let error = bank.mixture().eta[i] - S2[i];
+        let error = bank.bank().mixture().eta[i] - S2[i];
         assert!(error.abs() < 4.0 * covariance[i][i].sqrt(), "{i}: {error}");
     }
 }
@@ -253,9 +253,9 @@ fn a_steady_person_raises_no_alarm_and_memory_grows() {
     let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], suppositions());
     for &(x, u) in &data {
         bank.step(x, u);
-        assert!(bank.change().is_none());
+        assert!(bank.bank().change().is_none());
     }
-    assert!(bank.hypotheses().any(|h| h.born == 0 && h.weight > 0.5));
+    assert!(bank.bank().hypotheses().any(|h| h.born == 0 && h.weight > 0.5));
 }
 
 #[test]
@@ -265,7 +265,7 @@ fn the_variance_of_the_remnant_alone_is_a_change_too() {
     let mut declared = Vec::new();
     for (k, &(x, u)) in data.iter().enumerate() {
         bank.step(x, u);
-        declared.extend(bank.change().map(|c| (k, c)));
+        declared.extend(bank.bank().change().map(|c| (k, c)));
     }
     let (k, change) = declared[0];
     assert!((4000..4150).contains(&k), "{k}");
@@ -281,11 +281,11 @@ fn outliers_are_no_change() {
     let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], suppositions());
     for &(x, u) in &data {
         bank.step(x, u);
-        assert!(bank.change().is_none());
+        assert!(bank.bank().change().is_none());
     }
-    let covariance = bank.covariance();
+    let covariance = bank.bank().covariance();
     for i in 0..4 {
-        let error = bank.mixture().eta[i] - S1[i];
+        let error = bank.bank().mixture().eta[i] - S1[i];
         assert!(error.abs() < 4.0 * covariance[i][i].sqrt(), "{i}: {error}");
     }
 }
@@ -296,10 +296,10 @@ fn silence_constants_saturation_and_overflow_leave_everything_finite() {
     let mut bank = bank(S1, WIDE, level(0.02), &[-1.6, 0.7], suppositions());
     let finite = |bank: &mut Adaptive<8, 4>, x: f64, u: f64| {
         bank.step(x, u);
-        assert!(bank.mixture().eta.iter().all(|e| e.is_finite()));
-        assert!(bank.covariance().iter().flatten().all(|c| c.is_finite()));
-        assert!(bank.mixture().variance.is_finite() && bank.odds().is_finite());
-        assert!(bank.hypotheses().all(Hypothesis::is_sound));
+        assert!(bank.bank().mixture().eta.iter().all(|e| e.is_finite()));
+        assert!(bank.bank().covariance().iter().flatten().all(|c| c.is_finite()));
+        assert!(bank.bank().mixture().variance.is_finite() && bank.bank().odds().is_finite());
+        assert!(bank.bank().hypotheses().all(Hypothesis::is_sound));
     };
     for round in 0..3 {
         for k in 0..8000 {
@@ -330,12 +330,12 @@ fn a_gap_in_the_output_is_bridged() {
             bank.bridge(x);
         } else {
             bank.step(x, u);
-            assert!(bank.change().is_none(), "{k}");
+            assert!(bank.bank().change().is_none(), "{k}");
         }
     }
-    let covariance = bank.covariance();
+    let covariance = bank.bank().covariance();
     for i in 0..4 {
-        let error = bank.mixture().eta[i] - S1[i];
+        let error = bank.bank().mixture().eta[i] - S1[i];
         assert!(error.abs() < 4.0 * covariance[i][i].sqrt(), "{i}: {error}");
     }
 }
@@ -346,8 +346,8 @@ fn t_l_stays_finite_as_k_e_becomes_zero() {
     let mut bank = bank([0.0, 0.05, S1[2], S1[3]], WIDE, level(0.02), &[-0.85], suppositions());
     for &(x, u) in &data {
         bank.step(x, u);
-        let covariance = bank.covariance();
-        let [lead, variance] = bank.lead(&covariance);
+        let covariance = bank.bank().covariance();
+        let [lead, variance] = bank.bank().lead(&covariance);
         // |E[xy]| <= sqrt(E[x^2] E[y^2]), so that |T| <= sqrt(E[y^2]/E[x^2]).
         let largest = ((0.06_f64.powi(2) + covariance[1][1]) / covariance[0][0]).sqrt();
         assert!(lead.abs() < largest && variance.is_finite(), "{lead} {largest}");

@@ -7,7 +7,7 @@ mod common;
 use common::{Noise, Plain, box_jenkins, relative_difference};
 use hoid_core::{
     adaptation::{Adaptation, Covariance, Forgetting},
-    error_bars::{ErrorBars, Level, Places, Sensitivities},
+    error_bars::{Bars, ErrorBars, Level, NoBars, Places, Sensitivities},
     factored::Factored,
     physical::{Physical, PhysicalModel},
     predictor::{AnyShape, FixedShape, Predictor, Regressor, Shape},
@@ -168,6 +168,42 @@ fn without_c_d_and_f_the_prediction_error_method_is_least_squares_to_the_last_bi
 }
 
 #[test]
+fn without_error_bars_the_estimate_is_the_same_to_the_last_bit() {
+    let data = box_jenkins(3000, 21, 0.02);
+    let (arx, bj) = (shapes()[0], shapes()[4]);
+    let unlimited = |p0: f64| ErrorBars::new(&diagonal::<5>(p0), Level::new(0.0, 0.0, 1.0), f64::INFINITY);
+    for forgetting in ways::<5>() {
+        let needs_variance = matches!(forgetting, Forgetting::Variable { .. });
+        let adaptation = || covariance::<5>(0.1, forgetting.clone());
+        let rpem = |adaptation| {
+            let (regressor, stable) = (Regressor::Gradient, Stable::Predictor);
+            Rpem::<_, 5, 0, _, _>::new(bj, regressor, stable, start(&bj), adaptation, NoBars)
+        };
+        // What needs the innovation variance is refused, and not given another one.
+        assert_eq!(rpem(adaptation()).is_none(), needs_variance);
+        assert_eq!(
+            Rls::new(arx, start(&arx), adaptation(), NoBars).is_none(),
+            needs_variance
+        );
+        if needs_variance {
+            continue;
+        }
+        let mut bare = rpem(adaptation()).unwrap();
+        let (regressor, stable) = (Regressor::Gradient, Stable::Predictor);
+        let mut full =
+            Rpem::<_, 5, 0, _>::new(bj, regressor, stable, start(&bj), adaptation(), unlimited(0.1)).unwrap();
+        let mut bare_rls = Rls::new(arx, start(&arx), adaptation(), NoBars).unwrap();
+        let mut full_rls = Rls::new(arx, start(&arx), adaptation(), unlimited(0.1)).unwrap();
+        for &(x, u) in &data {
+            assert_eq!(bare.step(x, u), full.step(x, u));
+            assert_eq!(bare.theta(), full.theta());
+            assert_eq!(bare_rls.step(x, u), full_rls.step(x, u));
+            assert_eq!(bare_rls.theta(), full_rls.theta());
+        }
+    }
+}
+
+#[test]
 fn orders_in_the_type_are_the_same_recursion_to_the_last_bit() {
     let data = box_jenkins(3000, 13, 0.02);
     let shape = shapes()[4];
@@ -303,10 +339,9 @@ fn psi_is_the_negative_gradient_of_the_frozen_predictor() {
         let theta: [f64; N] = start(&shape);
         let run = |theta: [f64; N]| {
             let mut predictor = Predictor::<AnyShape, N, N>::new(shape, Regressor::Gradient).unwrap();
-            let mut psi = [0.0; N];
             let mut all = Vec::new();
             for &(x, u) in &data {
-                let eps = predictor.predict(&theta, x, u, &mut psi);
+                let (psi, eps) = predictor.predict(&theta, x, u);
                 predictor.correct(&theta);
                 all.push((eps, psi));
             }
@@ -490,7 +525,7 @@ fn the_guard_holds_every_variance_within_its_bound() {
                 _ => std::array::from_fn(|_| noise.next()),
             };
             let eps = noise.next();
-            let moved = adaptation.advance(&psi, eps, &[0.0; 5], bars.variance());
+            let moved = adaptation.advance(&psi, eps, &[0.0; 5], bars.innovation_variance());
             bars.take(&Places::NONE, &Sensitivities::of_gradient(&psi), &moved.gain, eps);
             adaptation.drift_into(&mut bars);
             let (p, spread) = (adaptation.matrix(), bars.spread());

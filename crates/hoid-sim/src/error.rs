@@ -30,6 +30,9 @@ pub enum SimError {
         /// Samples needed.
         expected: usize,
     },
+    /// Registers that this processor does not have.
+    #[error("this processor has no registers for the path that was asked for; use Path::Best")]
+    NoSuchPath,
     /// Noise that is no number.
     #[error("the noise at sample {index} is {value}, expected a finite number")]
     NoiseNotFinite {

@@ -13,7 +13,10 @@
 //! gains stand in its output matrix; those of the controlled element where [`Realisation`] says. When parameters change,
 //! the matrices of each sample are those of the continuous model with the values at that sample.
 
-use hoid_core::delay::DelayLine;
+use std::ops::Range;
+
+use hoid_core::number::Number;
+use hoid_lanes::{Path, SideBySide};
 use hoid_model::{
     Channel, Record,
     scenario::{Realisation, ResolvedScenario, Scenario, TrueParameters},
@@ -72,7 +75,7 @@ impl Simulator {
         let start_s = -(resolved.run_in_samples() as f64) * ts.s();
         let entries = match scenario.schedule {
             Schedule::Constant => 1,
-            Schedule::Sigmoid { .. } => samples,
+            Schedule::Sigmoid { .. } | Schedule::Alternating { .. } => samples,
         };
         let parameters: Vec<TrueParameters> = (0..entries)
             .map(|k| resolved.parameters_at(start_s + k as f64 * ts.s()))
@@ -103,7 +106,7 @@ impl Simulator {
     /// [`SimError::Diverged`].
     pub fn run(&self, stream: Stream, keep_run_in: bool) -> Result<Record, SimError> {
         let signals = self.signals(&stream.white_noise(self.samples()))?;
-        self.record(&signals, keep_run_in)
+        self.record(signals, keep_run_in)
     }
 
     /// The signals of a run driven by given white noise of unit variance, one value a sample.
@@ -111,68 +114,159 @@ impl Simulator {
     /// # Errors
     /// [`SimError::NoiseLength`], [`SimError::NoiseNotFinite`], [`SimError::Diverged`].
     pub fn signals(&self, noise: &[f64]) -> Result<Signals, SimError> {
+        self.check_noise(noise)?;
         let samples = self.samples();
-        if noise.len() != samples {
-            return Err(SimError::NoiseLength {
-                found: noise.len(),
-                expected: samples,
-            });
-        }
-        if let Some(index) = noise.iter().position(|v| !v.is_finite()) {
-            return Err(SimError::NoiseNotFinite {
-                index,
-                value: noise[index],
-            });
-        }
-        let mut signals = Signals {
-            e: Vec::with_capacity(samples),
-            u: Vec::with_capacity(samples),
-            x: Vec::with_capacity(samples),
-            n: Vec::with_capacity(samples),
-        };
-        let mut memory = vec![0.0; self.scenario.delay_samples()];
-        let mut delay = DelayLine::new(&mut memory);
-        let (mut operator, mut element, mut remnant) = ([0.0; 2], [0.0; 2], [0.0; MOST]);
-        let constant = self.matrices.len() == 1;
-        for (k, (&f, &eps)) in self.forcing_deg.iter().zip(noise).enumerate() {
-            let m = &self.matrices[if constant { 0 } else { k }];
-            let x = m.element_output * element[0];
-            let e = f - x;
-            let response = delay.step(m.operator_output[0] * operator[0] + m.operator_output[1] * operator[1]);
-            let n = m.k_n * self.cascade.output(&remnant);
-            let u = response + n;
-            operator = m.operator.step(operator, e);
-            element = m.element.step(element, m.element_input * u);
-            remnant = self.cascade.step(&remnant, eps);
-            signals.e.push(e);
-            signals.u.push(u);
-            signals.x.push(x);
-            signals.n.push(n);
-        }
+        let mut signals = Signals::zeros(samples);
+        let mut state = LoopState::at_rest(0.0, self.scenario.delay_samples());
+        let Signals { e, u, x, n } = &mut signals;
+        self.pass(&mut state, 0..samples, noise, [e, u, x, n]);
         self.check_finite(&signals)?;
         Ok(signals)
     }
 
+    /// The signals of several runs, each driven by its own white noise, side by side in the lanes of vector registers: the bits of
+    /// [`Simulator::signals`] for each alone, on every path.
+    ///
+    /// # Errors
+    /// As [`Simulator::signals`], for the first run that has one; [`SimError::NoSuchPath`].
+    pub fn signals_of_many(&self, noises: &[Vec<f64>], path: Path) -> Result<Vec<Signals>, SimError> {
+        let mut all = Vec::new();
+        self.signals_of_many_into(noises, path, &mut all)?;
+        Ok(all)
+    }
+
+    /// As [`Simulator::signals_of_many`], into memory that was used before: new memory costs more than the runs.
+    ///
+    /// # Errors
+    /// As [`Simulator::signals_of_many`].
+    pub fn signals_of_many_into(
+        &self,
+        noises: &[Vec<f64>],
+        path: Path,
+        into: &mut Vec<Signals>,
+    ) -> Result<(), SimError> {
+        for noise in noises {
+            self.check_noise(noise)?;
+        }
+        into.resize_with(noises.len(), || Signals::zeros(0));
+        for signals in into.iter_mut() {
+            let Signals { e, u, x, n } = signals;
+            for values in [e, u, x, n] {
+                values.resize(self.samples(), 0.0);
+            }
+        }
+        let many = Many {
+            simulator: self,
+            noises,
+            into,
+        };
+        path.do_with(many).ok_or(SimError::NoSuchPath)?;
+        into.iter().try_for_each(|signals| self.check_finite(signals))
+    }
+
+    fn check_noise(&self, noise: &[f64]) -> Result<(), SimError> {
+        if noise.len() != self.samples() {
+            return Err(SimError::NoiseLength {
+                found: noise.len(),
+                expected: self.samples(),
+            });
+        }
+        match first_not_finite(noise) {
+            None => Ok(()),
+            Some(index) => Err(SimError::NoiseNotFinite {
+                index,
+                value: noise[index],
+            }),
+        }
+    }
+
+    /// The samples of `range`, from noise into e, u, x and n that hold the lanes of each sample beside each other.
+    #[inline(always)]
+    fn pass<R: Number>(&self, state: &mut LoopState<R>, range: Range<usize>, noise: &[f64], out: [&mut [f64]; 4]) {
+        match self.cascade.order() {
+            1 => self.pass_of_order::<R, 1>(state, range, noise, out),
+            2 => self.pass_of_order::<R, 2>(state, range, noise, out),
+            3 => self.pass_of_order::<R, 3>(state, range, noise, out),
+            _ => self.pass_of_order::<R, MOST>(state, range, noise, out),
+        }
+    }
+
+    #[inline(always)]
+    fn pass_of_order<R: Number, const M: usize>(
+        &self,
+        state: &mut LoopState<R>,
+        range: Range<usize>,
+        noise: &[f64],
+        [e_out, u_out, x_out, n_out]: [&mut [f64]; 4],
+    ) {
+        let zero = state.operator[0].like(0.0);
+        let width = zero.lanes();
+        let constant = self.matrices.len() == 1;
+        let mut m = self.matrices[0];
+        let (mut operator, mut element) = (state.operator, state.element);
+        let mut remnant: [R; M] = [zero; M];
+        remnant.copy_from_slice(&state.remnant[..M]);
+        let count = range.len();
+        let (noise, e_out, u_out, x_out, n_out) = (
+            &noise[..count * width],
+            &mut e_out[..count * width],
+            &mut u_out[..count * width],
+            &mut x_out[..count * width],
+            &mut n_out[..count * width],
+        );
+        for (i, k) in range.enumerate() {
+            if !constant {
+                m = self.matrices[k];
+            }
+            let at = i * width;
+            let x = zero.like(m.element_output) * element[0];
+            let e = zero.like(self.forcing_deg[k]) - x;
+            let [of_output, of_rate] = m.operator_output;
+            let mut response = zero.like(of_output) * operator[0] + zero.like(of_rate) * operator[1];
+            if !state.memory.is_empty() {
+                std::mem::swap(&mut state.memory[state.oldest], &mut response);
+                state.oldest += 1;
+                if state.oldest == state.memory.len() {
+                    state.oldest = 0;
+                }
+            }
+            let n = zero.like(m.k_n) * remnant[M - 1];
+            let u = response + n;
+            operator = held(&m.operator, operator, e);
+            element = held(&m.element, element, zero.like(m.element_input) * u);
+            remnant = self.cascade.step(remnant, zero.load(&noise[at..]));
+            e.store(&mut e_out[at..]);
+            u.store(&mut u_out[at..]);
+            x.store(&mut x_out[at..]);
+            n.store(&mut n_out[at..]);
+        }
+        (state.operator, state.element) = (operator, element);
+        state.remnant[..M].copy_from_slice(&remnant);
+    }
+
     /// Signals of a whole run with time, units and truth.
-    fn record(&self, signals: &Signals, keep_run_in: bool) -> Result<Record, SimError> {
+    fn record(&self, signals: Signals, keep_run_in: bool) -> Result<Record, SimError> {
         let run_in = self.scenario.run_in_samples();
         let first = if keep_run_in { 0 } else { run_in };
         let ts = self.scenario.scenario().sample_time;
-        let cut = |values: &[f64]| values[first..].to_vec();
+        let cut = |mut values: Vec<f64>| {
+            values.drain(..first);
+            values
+        };
         let truth = |get: &dyn Fn(&TrueParameters) -> f64| match self.parameters.as_slice() {
             [only] => vec![get(only); self.samples() - first],
             all => all[first..].iter().map(get).collect(),
         };
         let mut record = Record::new(
             ts,
-            Channel::new("e", "deg", cut(&signals.e)),
-            Channel::new("u", "deg", cut(&signals.u)),
+            Channel::new("e", "deg", cut(signals.e)),
+            Channel::new("u", "deg", cut(signals.u)),
         )?
         .labelled(self.scenario.scenario().name.clone())
         .starting_at((first as f64 - run_in as f64) * ts.s())
-        .with_channel(Channel::new("f_t", "deg", cut(&self.forcing_deg)))?
-        .with_channel(Channel::new("x", "deg", cut(&signals.x)))?
-        .with_channel(Channel::new("n", "deg", cut(&signals.n)))?;
+        .with_channel(Channel::new("f_t", "deg", self.forcing_deg[first..].to_vec()))?
+        .with_channel(Channel::new("x", "deg", cut(signals.x)))?
+        .with_channel(Channel::new("n", "deg", cut(signals.n)))?;
         for (name, unit, values) in [
             ("K_e", "deg/deg", truth(&|p| p.operator.k_e)),
             ("T_L", "s", truth(&|p| p.operator.t_l_s)),
@@ -192,7 +286,7 @@ impl Simulator {
 
     fn check_finite(&self, signals: &Signals) -> Result<(), SimError> {
         for (signal, values) in [("e", &signals.e), ("u", &signals.u)] {
-            if let Some(k) = values.iter().position(|v| !v.is_finite()) {
+            if let Some(k) = first_not_finite(values) {
                 let ts = self.scenario.scenario().sample_time.s();
                 return Err(SimError::Diverged {
                     signal,
@@ -202,6 +296,105 @@ impl Simulator {
             }
         }
         Ok(())
+    }
+}
+
+/// Index of the first value that is not finite. Mostly there is none, which is known without a branch for each.
+fn first_not_finite(values: &[f64]) -> Option<usize> {
+    if values.iter().fold(true, |sound, v| sound & v.is_finite()) {
+        return None;
+    }
+    values.iter().position(|v| !v.is_finite())
+}
+
+/// One sample of a held system on, as [`HeldStates::step`].
+#[inline(always)]
+fn held<R: Number>(system: &HeldStates, x: [R; 2], u: R) -> [R; 2] {
+    let [[a, b], [c, d]] = system.transition;
+    let [g, h] = system.input;
+    [
+        u.like(a) * x[0] + u.like(b) * x[1] + u.like(g) * u,
+        u.like(c) * x[0] + u.like(d) * x[1] + u.like(h) * u,
+    ]
+}
+
+/// Where the loop stands between two samples.
+struct LoopState<R> {
+    operator: [R; 2],
+    element: [R; 2],
+    remnant: [R; MOST],
+    /// Responses that the delay holds back, and the place of the oldest.
+    memory: Vec<R>,
+    oldest: usize,
+}
+
+impl<R: Number> LoopState<R> {
+    fn at_rest(zero: R, delay: usize) -> Self {
+        Self {
+            operator: [zero; 2],
+            element: [zero; 2],
+            remnant: [zero; MOST],
+            memory: vec![zero; delay],
+            oldest: 0,
+        }
+    }
+}
+
+impl Signals {
+    fn zeros(samples: usize) -> Self {
+        let zeros = || vec![0.0; samples];
+        Self {
+            e: zeros(),
+            u: zeros(),
+            x: zeros(),
+            n: zeros(),
+        }
+    }
+}
+
+/// Samples that are laid side by side at a time.
+const BLOCK: usize = 64;
+
+/// Runs side by side.
+struct Many<'a> {
+    simulator: &'a Simulator,
+    noises: &'a [Vec<f64>],
+    /// As many signals, as long as the runs.
+    into: &'a mut [Signals],
+}
+
+impl SideBySide for Many<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<R: Number>(self, zero: R) {
+        let (width, samples) = (zero.lanes(), self.simulator.samples());
+        let mut noise = vec![0.0; width * BLOCK];
+        let mut out: [Vec<f64>; 4] = std::array::from_fn(|_| vec![0.0; width * BLOCK]);
+        for (noises, into) in self.noises.chunks(width).zip(self.into.chunks_mut(width)) {
+            let mut state = LoopState::at_rest(zero, self.simulator.scenario.delay_samples());
+            // Lanes that are left over run without remnant.
+            noise.fill(0.0);
+            for begin in (0..samples).step_by(BLOCK) {
+                let range = begin..(begin + BLOCK).min(samples);
+                for (lane, values) in noises.iter().enumerate() {
+                    for (i, value) in values[range.clone()].iter().enumerate() {
+                        noise[i * width + lane] = *value;
+                    }
+                }
+                let [e, u, x, n] = &mut out;
+                self.simulator.pass(&mut state, range.clone(), &noise, [e, u, x, n]);
+                for (lane, signals) in into.iter_mut().enumerate() {
+                    let Signals { e, u, x, n } = signals;
+                    for (to, from) in [e, u, x, n].into_iter().zip(&out) {
+                        let from = from[lane..].iter().step_by(width);
+                        for (value, from) in to[range.clone()].iter_mut().zip(from) {
+                            *value = *from;
+                        }
+                    }
+                }
+            }
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+use hoid_lanes::Path;
 use hoid_model::{
     SampleTime,
     remnant::{RemnantDiscretisation, RemnantFilter},
@@ -337,4 +338,52 @@ fn a_diverging_loop_is_an_error_and_not_a_row_of_nan() {
         good.signals(&[0.0; 3]),
         Err(SimError::NoiseLength { found: 3, .. })
     ));
+}
+
+#[test]
+fn runs_side_by_side_have_the_bits_of_each_alone() {
+    for (condition, order, runs) in [
+        (Condition::C1, 1, 19),
+        (Condition::C1, 2, 3),
+        (Condition::C3, 3, 9),
+        (Condition::C5, 4, 8),
+    ] {
+        let mut scenario = Scenario::condition(condition);
+        scenario.remnant.order = order;
+        scenario.measurement_s = 20.0;
+        let simulator = Simulator::new(&scenario).unwrap();
+        let noises: Vec<Vec<f64>> = (0..runs)
+            .map(|replication| {
+                let stream = Stream {
+                    replication,
+                    ..Stream::default()
+                };
+                stream.white_noise(simulator.samples())
+            })
+            .collect();
+        let alone: Vec<Signals> = noises.iter().map(|noise| simulator.signals(noise).unwrap()).collect();
+        for path in Path::available() {
+            assert_eq!(
+                simulator.signals_of_many(&noises, path).unwrap(),
+                alone,
+                "{path:?} {condition:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_run_that_is_wrong_is_refused_among_many() {
+    let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+    let good = vec![0.0; simulator.samples()];
+    let mut bad = good.clone();
+    bad[3] = f64::NAN;
+    let short = good[1..].to_vec();
+    let of = |noises: &[Vec<f64>]| simulator.signals_of_many(noises, Path::Best);
+    assert!(matches!(
+        of(&[good.clone(), bad]),
+        Err(SimError::NoiseNotFinite { index: 3, .. })
+    ));
+    assert!(matches!(of(&[good, short]), Err(SimError::NoiseLength { .. })));
+    assert_eq!(of(&[]).unwrap(), Vec::new());
 }

@@ -22,6 +22,7 @@
 pub use hoid_core as core;
 pub use hoid_ident as ident;
 pub use hoid_io as io;
+pub use hoid_lanes as lanes;
 pub use hoid_model as model;
 pub use hoid_report as report;
 pub use hoid_sim as sim;

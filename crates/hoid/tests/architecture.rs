@@ -6,11 +6,12 @@ use std::{collections::BTreeMap, process::Command};
 use serde_json::Value;
 
 /// What each crate may depend on within the workspace.
-const ALLOWED: [(&str, &[&str]); 11] = [
+const ALLOWED: [(&str, &[&str]); 12] = [
     ("hoid-core", &[]),
     ("hoid-model", &["hoid-core"]),
     ("hoid-ident", &["hoid-core", "hoid-model"]),
-    ("hoid-sim", &["hoid-core", "hoid-model"]),
+    ("hoid-lanes", &["hoid-core"]),
+    ("hoid-sim", &["hoid-core", "hoid-lanes", "hoid-model"]),
     ("hoid-io", &["hoid-model"]),
     ("hoid-study", &["hoid-model", "hoid-ident", "hoid-sim", "hoid-io"]),
     ("hoid-report", &["hoid-model", "hoid-ident", "hoid-io", "hoid-study"]),
@@ -20,6 +21,7 @@ const ALLOWED: [(&str, &[&str]); 11] = [
             "hoid-core",
             "hoid-model",
             "hoid-ident",
+            "hoid-lanes",
             "hoid-sim",
             "hoid-io",
             "hoid-study",

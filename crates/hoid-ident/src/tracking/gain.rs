@@ -2,7 +2,7 @@
 
 use hoid_core::{
     adaptation::{Adaptation, Covariance, Forgetting, Move},
-    error_bars::{ErrorBars, Level},
+    error_bars::{Bars, ErrorBars, Level},
     factored::Factored,
     state::State,
     window::Window,
@@ -150,10 +150,17 @@ impl<const N: usize> Adaptation<N> for Gain<N> {
     }
 
     #[inline]
-    fn drift_into<const K: usize>(&self, bars: &mut ErrorBars<N, K>) {
+    fn drift_into<const K: usize, B: Bars<N, K>>(&self, bars: &mut B) {
         match self {
             Self::Covariance(c) => c.drift_into(bars),
             Self::Window(w) => w.drift_into(bars),
+        }
+    }
+
+    fn needs_variance(&self) -> bool {
+        match self {
+            Self::Covariance(c) => c.needs_variance(),
+            Self::Window(w) => w.needs_variance(),
         }
     }
 

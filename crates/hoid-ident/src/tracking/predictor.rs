@@ -66,7 +66,7 @@ impl Predictor {
 
     fn predict(&mut self, theta: &[f64; ROOM], e: f64, u: f64) -> f64 {
         let x = self.delay.step(e);
-        bounded(self.kernel.predict(theta, x, u, &mut [0.0; ROOM]))
+        bounded(self.kernel.predict(theta, x, u).1)
     }
 
     fn correct(&mut self, theta: &[f64; ROOM]) {

@@ -1,0 +1,222 @@
+//! The hypotheses with their probabilities, for output and signals behind the whitening filter.
+
+use super::{
+    Suppositions,
+    change::{Change, Watch},
+    hypothesis::{Hypothesis, OPERATOR},
+    response::Signals,
+};
+
+/// The hypotheses. M is the room for them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bank<const M: usize> {
+    suppositions: Suppositions,
+    hypotheses: [Option<Hypothesis>; M],
+    samples: u64,
+    wait: u32,
+    watch: Watch,
+    mixture: Mixture,
+}
+
+crate::state!([const M: usize] Bank<M> { hypotheses, samples, wait, watch, mixture });
+
+/// Mean of the mixture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mixture {
+    /// `[K_e, K_e_dot, omega_nm, zeta_nm]`.
+    pub eta: [f64; OPERATOR],
+    /// Innovation variance.
+    pub variance: f64,
+}
+
+crate::state!([] Mixture { eta, variance });
+
+/// Least probability of a hypothesis.
+const LEAST: f64 = 1e-12;
+
+impl<const M: usize> Bank<M> {
+    /// Starts from one hypothesis. `None` without room for two, for a start that is not within the bounds or not finite, or for bounds that let omega_nm or
+    /// zeta_nm become zero.
+    pub fn new(first: Hypothesis, suppositions: Suppositions) -> Option<Self> {
+        let s = &suppositions;
+        let eta = first.eta;
+        let inside = eta.iter().zip(&s.bounds).all(|(e, [low, high])| low <= e && e <= high);
+        let sound = M >= 2
+            && inside
+            && s.bounds[2][0] > 0.0
+            && s.bounds[3][0] > 0.0
+            && s.sample_time > 0.0
+            && s.spacing > 0
+            && (0.0..1.0).contains(&(s.hazard * f64::from(s.spacing)))
+            && first.is_sound();
+        if !sound {
+            return None;
+        }
+        let mut hypotheses = core::array::from_fn(|_| None);
+        hypotheses[0] = Some(first);
+        Some(Self {
+            hypotheses,
+            samples: 0,
+            wait: s.spacing,
+            watch: Watch::default(),
+            mixture: Mixture {
+                eta,
+                variance: first.level.variance(),
+            },
+            suppositions,
+        })
+    }
+
+    /// Takes output and signals of a sample behind the whitening filter, `None` where they are not known; returns the innovation.
+    pub fn take(&mut self, seen: Option<(f64, &Signals)>, about: [f64; 2]) -> f64 {
+        self.samples += 1;
+        let mut innovation = 0.0;
+        if let Some((y, r)) = seen {
+            let mut logs = [f64::NEG_INFINITY; M];
+            let mut most = f64::NEG_INFINITY;
+            for (h, log) in self.hypotheses.iter_mut().zip(&mut logs) {
+                let Some(h) = h else { continue };
+                let before = h.weight;
+                let (eps, density) = h.step(y, r, about, &self.suppositions);
+                innovation += before * eps;
+                *log = libm::log(before) + density;
+                if *log > most {
+                    most = *log;
+                }
+            }
+            self.weigh(&logs, most);
+        }
+        self.wait -= 1;
+        if self.wait == 0 {
+            self.wait = self.suppositions.spacing;
+            self.drift();
+            self.bear();
+        }
+        self.mix();
+        self.watch.look(&self.hypotheses, self.samples, &self.suppositions);
+        innovation
+    }
+
+    /// Counts a sample; the estimate stays.
+    pub fn pass(&mut self) {
+        self.samples += 1;
+    }
+
+    /// Probabilities from their logarithms. What has become impossible, or not finite, is nearly so.
+    fn weigh(&mut self, logs: &[f64; M], most: f64) {
+        let mut sum = 0.0;
+        for (h, log) in self.hypotheses.iter_mut().zip(logs) {
+            let Some(h) = h else { continue };
+            let weight = libm::exp(log - most);
+            h.weight = if weight > LEAST { weight } else { LEAST };
+            sum += h.weight;
+        }
+        for h in self.hypotheses.iter_mut().flatten() {
+            h.weight /= sum;
+        }
+    }
+
+    fn drift(&mut self) {
+        for h in self.hypotheses.iter_mut().flatten() {
+            h.drift(&self.suppositions);
+        }
+    }
+
+    /// A hypothesis that the person changes now.
+    fn bear(&mut self) {
+        let (mut likeliest, mut place) = (None, None);
+        let (mut highest, mut lowest) = (0.0, f64::INFINITY);
+        for (i, h) in self.hypotheses.iter().enumerate() {
+            let Some(h) = h else {
+                (place, lowest) = (Some(i), f64::NEG_INFINITY);
+                continue;
+            };
+            if h.weight > highest {
+                (likeliest, highest) = (Some(h), h.weight);
+            }
+            if self.samples - h.born >= self.suppositions.protected && h.weight < lowest {
+                (place, lowest) = (Some(i), h.weight);
+            }
+        }
+        let (Some(parent), Some(place)) = (likeliest, place) else {
+            return;
+        };
+        if highest == lowest {
+            return;
+        }
+        let mut child = parent.opened(self.samples, &self.suppositions);
+        let share = self.suppositions.hazard * f64::from(self.suppositions.spacing);
+        self.hypotheses[place] = None;
+        let rest: f64 = self.hypotheses.iter().flatten().map(|h| h.weight).sum();
+        for h in self.hypotheses.iter_mut().flatten() {
+            h.weight *= (1.0 - share) / rest;
+        }
+        child.weight = share;
+        self.hypotheses[place] = Some(child);
+    }
+
+    fn mix(&mut self) {
+        let mut mixture = Mixture {
+            eta: [0.0; OPERATOR],
+            variance: 0.0,
+        };
+        for h in self.hypotheses.iter().flatten() {
+            for i in 0..OPERATOR {
+                mixture.eta[i] += h.weight * h.eta[i];
+            }
+            mixture.variance += h.weight * h.level.variance();
+        }
+        self.mixture = mixture;
+    }
+
+    /// Mean of the mixture.
+    pub fn mixture(&self) -> &Mixture {
+        &self.mixture
+    }
+
+    /// Covariance of eta.
+    pub fn covariance(&self) -> [[f64; OPERATOR]; OPERATOR] {
+        let mut covariance = [[0.0; OPERATOR]; OPERATOR];
+        for h in self.hypotheses.iter().flatten() {
+            let p = h.covariance.matrix();
+            for i in 0..OPERATOR {
+                let a = h.eta[i] - self.mixture.eta[i];
+                for j in 0..OPERATOR {
+                    let b = h.eta[j] - self.mixture.eta[j];
+                    covariance[i][j] += h.weight * (p[i][j] + a * b);
+                }
+            }
+        }
+        covariance
+    }
+
+    /// T_L in s and its variance, from `E[K_e K_e_dot]/E[K_e^2]`.
+    pub fn lead(&self, covariance: &[[f64; OPERATOR]; OPERATOR]) -> [f64; 2] {
+        let [k_e, k_e_dot, ..] = self.mixture.eta;
+        let square = k_e * k_e + covariance[0][0];
+        let lead = (k_e * k_e_dot + covariance[0][1]) / square;
+        // d T_L = (d K_e_dot - T_L d K_e)/K_e.
+        let of_ratio = covariance[1][1] - 2.0 * lead * covariance[0][1] + lead * lead * covariance[0][0];
+        [lead, of_ratio.max(0.0) / square]
+    }
+
+    /// The hypotheses that there are.
+    pub fn hypotheses(&self) -> impl Iterator<Item = &Hypothesis> {
+        self.hypotheses.iter().flatten()
+    }
+
+    /// Logarithm of the odds that the person changed within the last `recent` samples.
+    pub fn odds(&self) -> f64 {
+        self.watch.odds()
+    }
+
+    /// The change that was declared at the last sample, if it was then.
+    pub fn change(&self) -> Option<Change> {
+        self.watch.change()
+    }
+
+    /// Samples so far.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+}
