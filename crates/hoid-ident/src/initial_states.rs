@@ -9,7 +9,7 @@
 //! With a stationary past ([`crate::stationary_past`]) the states of the noise model have a known covariance `sigma^2 L L'`:
 //! they are `L z` with z of variance sigma^2, and z counts as further residuals. G then has the rows `[I; G L]` for them.
 
-use hoid_core::filter::divide_in_place;
+use hoid_core::filter::{SecondOrder, divide_in_place};
 
 use crate::{
     least_squares::{add_scaled, dot},
@@ -57,12 +57,10 @@ impl FreeResponses {
         let mut h = Vec::new();
         if !f.is_empty() {
             h = impulse_response(f, rows + lead);
-            let mut s = vec![0.0; (h.len() + d.len()).min(rows + lead)];
-            for (t, st) in s.iter_mut().enumerate() {
-                *st = h.get(t).copied().unwrap_or(0.0);
-                for (i, di) in d.iter().enumerate().take(t) {
-                    *st += di * h.get(t - 1 - i).copied().unwrap_or(0.0);
-                }
+            let mut s = h.clone();
+            s.resize((h.len() + d.len()).min(rows + lead), 0.0);
+            for (i, di) in d.iter().enumerate() {
+                add_scaled(s.get_mut(i + 1..).unwrap_or_default(), *di, &h);
             }
             if !c.is_empty() {
                 s.resize(rows + lead, 0.0);
@@ -184,16 +182,20 @@ fn impulse_response(d: &[f64], longest: usize) -> Vec<f64> {
     let mut h = vec![0.0; order];
     h.reserve(longest.min(4096));
     let mut largest = 1.0_f64;
+    let mut second = SecondOrder::new(d.first().copied().unwrap_or(0.0), d.get(1).copied().unwrap_or(0.0));
+    let mut impulse = 1.0;
     while h.len() < order + longest {
         let from = h.len();
         let to = (from + BLOCK).min(order + longest);
-        match *d {
-            [d1, d2] => {
-                let (mut y1, mut y2) = (h[from - 1], h[from - 2]);
-                for t in from..to {
-                    let y = (f64::from(u8::from(t == order)) - d2 * y2) - d1 * y1;
-                    (y2, y1) = (y1, y);
-                    h.push(y);
+        match order {
+            2 => {
+                h.resize(to, 0.0);
+                let (blocks, rest) = h[from..].as_chunks_mut::<4>();
+                for block in blocks {
+                    *block = second.four([std::mem::take(&mut impulse), 0.0, 0.0, 0.0]);
+                }
+                for value in rest {
+                    *value = second.one(std::mem::take(&mut impulse));
                 }
             }
             _ => {

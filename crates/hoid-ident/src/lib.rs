@@ -37,6 +37,7 @@ mod least_squares;
 mod objective;
 pub mod order_search;
 mod prediction_error;
+mod products;
 mod robust;
 mod search;
 mod shared_poles;

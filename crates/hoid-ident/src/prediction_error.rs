@@ -37,13 +37,17 @@ use std::{
     ops::{Deref, DerefMut, Range},
 };
 
-use hoid_core::{filter::divide_in_place, stability::roots_inside};
+use hoid_core::{
+    filter::{SecondOrder, divide, divide_in_place},
+    stability::roots_inside,
+};
 use hoid_model::{Orders, Record};
 
 use crate::{
     initial_states::FreeResponses,
     initial_states::Past,
     least_squares::{add_scaled, dot, solve_symmetric},
+    products::{Lagged, gram, variance},
     search::Objective,
     stationary_past::StationaryPast,
 };
@@ -104,10 +108,8 @@ pub(crate) fn first_residual(orders: &Orders, initial: InitialState) -> usize {
 
 /// Variance of the output around its mean, from sample `first` of each record on.
 pub(crate) fn output_variance(data: &[Data<'_>], first: usize) -> f64 {
-    let outputs = || data.iter().flat_map(|d| &d.u[first..]);
-    let n = outputs().count() as f64;
-    let mean = outputs().sum::<f64>() / n;
-    outputs().map(|u| (u - mean) * (u - mean)).sum::<f64>() / n
+    let outputs: Vec<&[f64]> = data.iter().map(|d| &d.u[first..]).collect();
+    variance(&outputs)
 }
 
 /// Sum of squares, `psi' eps` and the projected `psi' psi` (by rows).
@@ -304,8 +306,8 @@ impl Criterion<'_> {
         let data = self.data[record];
         let n = data.u.len();
         let o = &self.orders;
-        let pad = o.na.max(o.nb).max(o.nc).max(o.nd).max(o.nf);
-        ws.make_room(pad, n);
+        ws.make_room(o, n);
+        let pad = ws.pad;
         let regressed = self.first_regressed();
         let start = match self.initial {
             InitialState::Zero => 0,
@@ -313,19 +315,28 @@ impl Criterion<'_> {
         };
 
         self.filter_input(&parts, data, ws);
-        ws.w.fill(0.0);
-        for (j, &bj) in parts.b.iter().enumerate() {
-            let (from, to) = (pad + regressed, pad + n);
-            add_scaled(&mut ws.w[from..], bj, &ws.s[from - j..to - j]);
-        }
-
-        ws.v[..pad + regressed].fill(0.0);
-        for ((v, w), u) in ws.v[pad + regressed..]
-            .iter_mut()
-            .zip(&ws.w[pad + regressed..])
-            .zip(&data.u[regressed..])
-        {
-            *v = u - w;
+        let (from, to) = (pad + regressed, pad + n);
+        ws.w[..from].fill(0.0);
+        ws.v[..from].fill(0.0);
+        match *parts.b {
+            // The orders of the operator in one pass.
+            [b0, b1] => {
+                let (s0, s1) = (&ws.s[from..to], &ws.s[from - 1..to - 1]);
+                let inputs = s0.iter().zip(s1).zip(&data.u[regressed..]);
+                for ((w, v), ((s0, s1), u)) in ws.w[from..].iter_mut().zip(&mut ws.v[from..]).zip(inputs) {
+                    *w = b0 * s0 + b1 * s1;
+                    *v = u - *w;
+                }
+            }
+            _ => {
+                ws.w[from..].fill(0.0);
+                for (j, &bj) in parts.b.iter().enumerate() {
+                    add_scaled(&mut ws.w[from..], bj, &ws.s[from - j..to - j]);
+                }
+                for ((v, w), u) in ws.v[from..].iter_mut().zip(&ws.w[from..]).zip(&data.u[regressed..]) {
+                    *v = u - w;
+                }
+            }
         }
         for (i, &ai) in parts.a.iter().enumerate() {
             let from = regressed.max(i + 1);
@@ -377,18 +388,26 @@ impl Criterion<'_> {
         self.whiten_input(&parts, ws);
         let [_, _, xc, xd, xf] = &mut ws.filtered;
         if o.nc > 0 {
-            xc.copy_from_slice(&ws.eps);
-            divide_in_place(parts.c, &mut xc[pad..]);
+            xc[..pad].fill(0.0);
+            divide(parts.c, &ws.eps[pad..], &mut xc[pad..]);
         }
         // Without C the signal of D is v itself.
         if o.nd > 0 && o.nc > 0 {
-            xd.copy_from_slice(&ws.v);
-            divide_in_place(parts.c, &mut xd[pad..]);
+            xd[..pad].fill(0.0);
+            divide(parts.c, &ws.v[pad..], &mut xd[pad..]);
         }
         if o.nf > 0 {
-            ws.scratch.copy_from_slice(&ws.w);
-            divide_in_place(parts.f, &mut ws.scratch[pad + regressed..]);
-            whiten(parts.c, parts.d, &ws.scratch, xf, pad + regressed);
+            let from = pad + regressed;
+            if passes_once(o) {
+                // w is zero before.
+                let d1 = parts.d.first().copied().unwrap_or(0.0);
+                xf[..from].fill(0.0);
+                divide_and_whiten([parts.f[0], parts.f[1]], d1, &ws.w[from..], &mut xf[from..]);
+            } else {
+                ws.scratch[..from].copy_from_slice(&ws.w[..from]);
+                divide(parts.f, &ws.w[from..], &mut ws.scratch[from..]);
+                whiten(parts.c, parts.d, &ws.scratch, xf, from);
+            }
         }
     }
 
@@ -417,8 +436,7 @@ impl Criterion<'_> {
         }
         let from = pad + self.orders.nk.min(n);
         ws.s[..from].fill(0.0);
-        ws.s[from..].copy_from_slice(&data.e[..pad + n - from]);
-        divide_in_place(parts.f, &mut ws.s[from..]);
+        divide(parts.f, &data.e[..pad + n - from], &mut ws.s[from..]);
     }
 
     /// `(D/C) s`; with a stationary past s.
@@ -506,30 +524,29 @@ impl Criterion<'_> {
 }
 
 /// Products of the residuals and the columns of psi, with the initial states projected out.
-///
-/// Two columns that are the ones before them, a sample later, have the product of those up to the samples at both ends, so that
-/// each pair of signals costs one pass a shift instead of one a pair of shifts.
 fn add_products(passed: &Passed, columns: &[Column<'_>], eps: &[f64], total: &mut Linearisation) {
-    total.sum_of_squares += dot(eps, eps);
-    let (p, last) = (columns.len(), eps.len() - 1);
+    let p = columns.len();
     // Components of each column in the space of the initial states, one row a column.
     let states = passed.free.basis().count();
     let mut inside = Vec::with_capacity(p * states);
     for column in columns {
         inside.extend(passed.free.basis().map(|q| dot(q, &column.values[..q.len()])));
     }
-    let mut raw = vec![0.0; p * p];
+    let residuals = Lagged {
+        values: eps,
+        follows: false,
+    };
+    let lagged = columns.iter().map(|column| Lagged {
+        values: &column.values,
+        follows: column.follows,
+    });
+    let all: Vec<Lagged<'_>> = std::iter::once(residuals).chain(lagged).collect();
+    let (raw, q) = (gram(&all), p + 1);
+    total.sum_of_squares += raw[0];
     for (i, column) in columns.iter().enumerate() {
-        total.descent[i] += column.sign * dot(&column.values, eps);
+        total.descent[i] += column.sign * raw[i + 1];
         for (j, other) in columns[..=i].iter().enumerate() {
-            let product = if column.follows && other.follows {
-                let (x, y) = (&columns[i - 1].values, &columns[j - 1].values);
-                raw[(i - 1) * p + j - 1] + column.values[0] * other.values[0] - x[last] * y[last]
-            } else {
-                dot(&column.values, &other.values)
-            };
-            raw[i * p + j] = product;
-            let projected = product
+            let projected = raw[(i + 1) * q + j + 1]
                 - dot(
                     &inside[i * states..(i + 1) * states],
                     &inside[j * states..(j + 1) * states],
@@ -613,15 +630,49 @@ impl Block {
 }
 
 impl Workspace {
-    /// Makes room for a record; every pass writes all of a signal before it reads it, zeros in front included.
-    fn make_room(&mut self, pad: usize, n: usize) {
+    /// Makes room for a record, for the signals that these orders have; every pass writes all of a signal before it reads it, zeros in
+    /// front included.
+    fn make_room(&mut self, o: &Orders, n: usize) {
+        let pad = o.na.max(o.nb).max(o.nc).max(o.nd).max(o.nf);
         self.pad = pad;
-        for signal in [&mut self.s, &mut self.w, &mut self.v, &mut self.eps, &mut self.scratch]
-            .into_iter()
-            .chain(&mut self.filtered)
-        {
-            signal.resize(pad + n, 0.0);
+        let [a, b, c, d, f] = &mut self.filtered;
+        for (signal, needed) in [
+            (&mut self.s, o.nb > 0),
+            (&mut self.w, true),
+            (&mut self.v, true),
+            (&mut self.eps, true),
+            (&mut self.scratch, o.na > 0 || (o.nf > 0 && !passes_once(o))),
+            (a, o.na > 0),
+            (b, o.nb > 0),
+            (c, o.nc > 0),
+            (d, o.nd > 0 && o.nc > 0),
+            (f, o.nf > 0),
+        ] {
+            signal.resize(if needed { pad + n } else { 0 }, 0.0);
         }
+    }
+}
+
+/// True for the poles of the operator with a noise model of first order or none, whose signal of F comes from one pass.
+fn passes_once(o: &Orders) -> bool {
+    (o.nc, o.nf) == (0, 2) && o.nd <= 1
+}
+
+/// `y = (1 + d1 q^-1) / (1 + f1 q^-1 + f2 q^-2) x` from rest.
+fn divide_and_whiten([f1, f2]: [f64; 2], d1: f64, x: &[f64], y: &mut [f64]) {
+    let mut filter = SecondOrder::new(f1, f2);
+    let mut before = 0.0;
+    let (x_blocks, x_rest) = x.as_chunks::<4>();
+    let (y_blocks, y_rest) = y.as_chunks_mut::<4>();
+    for (y, x) in y_blocks.iter_mut().zip(x_blocks) {
+        let s = filter.four(*x);
+        *y = [s[0] + d1 * before, s[1] + d1 * s[0], s[2] + d1 * s[1], s[3] + d1 * s[2]];
+        before = s[3];
+    }
+    for (y, x) in y_rest.iter_mut().zip(x_rest) {
+        let s = filter.one(*x);
+        *y = s + d1 * before;
+        before = s;
     }
 }
 
