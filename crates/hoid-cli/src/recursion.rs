@@ -138,6 +138,8 @@ impl Plan {
                 "a change is declared at",
                 format!("log odds of {}", options.alarm),
             ));
+        } else if options.method.is_model_of_change() {
+            list.push(setting("memory", "by a random walk of the parameters".to_owned()));
         } else {
             list.push(setting("memory", memories_text(options, ts)));
             list.push(setting("forgetting", forgetting_text(&options.forgetting)));
@@ -185,24 +187,24 @@ impl Plan {
 /// Options that have no meaning beside the others.
 fn misplaced(args: &RecursionArgs, method: Method) -> Result<(), CliError> {
     let (windowed, adaptive) = (method == Method::Window, method == Method::Adaptive);
-    let remembers = !windowed && !adaptive && args.forgetting != ForgettingName::Gradient;
+    let remembers = !windowed && !method.is_model_of_change() && args.forgetting != ForgettingName::Gradient;
     let options = [
         (args.window.is_some() && !windowed, "--window", "--method window"),
         (args.refit.is_some() && !windowed, "--refit", "--method window"),
         (
             (args.memory.is_some() || args.lambda.is_some()) && !remembers,
             "--memory",
-            "a recursion that forgets; window has --window, --forgetting gradient has --rate, adaptive finds its memory",
+            "a recursion that forgets; window has --window, --forgetting gradient has --rate, adaptive, ekf and ukf a model of the change",
         ),
         (
             args.memory_of.is_some() && !remembers,
             "--memory-of",
-            "a recursion that forgets; window has --window, --forgetting gradient has --rate, adaptive finds its memory",
+            "a recursion that forgets; window has --window, --forgetting gradient has --rate, adaptive, ekf and ukf a model of the change",
         ),
         (
             args.bound.is_some() && !method.is_physical(),
             "--bound",
-            "--method physical or adaptive",
+            "--method physical, adaptive, ekf or ukf",
         ),
         (args.alarm.is_some() && !adaptive, "--alarm", "--method adaptive"),
         (

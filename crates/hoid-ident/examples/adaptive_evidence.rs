@@ -1,10 +1,10 @@
 //! The numbers of the page "A person who changes" of the book that take too long for a test.
 //!
-//! `cargo run --release -p hoid-ident --example adaptive_evidence -- table|detection [RUNS]`
+//! `cargo run --release -p hoid-ident --example adaptive_evidence -- table|detection|smooth|tune|cost [RUNS]`
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid_ident::tracking::{
-    ErrorThreshold, Memory, Method, Sample, Stable, StartAt, StartCovariance, TrackOptions, Tracker,
+    ErrorThreshold, Memory, Method, Sample, Stable, StartAt, StartCovariance, TrackOptions, Tracker, track,
 };
 use hoid_model::{
     Record,
@@ -29,7 +29,10 @@ fn main() {
     match arguments.first().map(String::as_str) {
         Some("table") => table(runs),
         Some("detection") => detection(runs),
-        _ => println!("table or detection, and a number of runs"),
+        Some("smooth") => smoothed(runs),
+        Some("tune") => tune(runs),
+        Some("cost") => cost(runs),
+        _ => println!("table, detection, smooth, tune or cost, and a number of runs"),
     }
 }
 
@@ -342,5 +345,168 @@ fn detection(runs: usize) {
                 cells.join(" | ")
             );
         }
+    }
+}
+
+/// RMS relative error in per cent of a trace after the start fit, share of covered samples, and the same within 5 s of the change.
+fn after_start(record: &Record, options: &TrackOptions) -> [[f64; 5]; 3] {
+    let truth = COLUMNS.map(|c| record.channel(c).unwrap());
+    let trace = track(record, options, 4).unwrap();
+    let (mut squares, mut covered, mut through) = ([0.0; 5], [0.0; 5], [0.0; 5]);
+    let mut counts = [0.0; 2];
+    for (row, t) in trace.times_s().iter().enumerate().filter(|(_, t)| **t > START_S) {
+        let k = 4 * row + 3;
+        let changing = (CHANGE_S - 5.0..FOUND_UNTIL_S).contains(t);
+        counts[0] += 1.0;
+        counts[1] += f64::from(changing);
+        for (i, (_, _, e)) in trace.operator(row).unwrap().rows()[..5].iter().enumerate() {
+            let error = e.value - truth[i][k];
+            let inside = f64::from(error.abs() <= 1.96 * e.standard_error.unwrap());
+            squares[i] += (error / truth[i][k]).powi(2);
+            covered[i] += inside;
+            through[i] += if changing { inside } else { 0.0 };
+        }
+    }
+    [
+        squares.map(|s: f64| 100.0 * (s / counts[0]).sqrt()),
+        covered.map(|c| 100.0 * c / counts[0]),
+        through.map(|c| 100.0 * c / counts[1]),
+    ]
+}
+
+/// The causal estimate against the two-sided one.
+fn smoothed(runs: usize) {
+    println!(
+        "RMS relative error in % over t in [{START_S}, 81.92] s, {}, median of {runs} runs; covered: mean",
+        COLUMNS.join(" / ")
+    );
+    println!(
+        "| cell | causal | two-sided | causal: covered, % | two-sided: covered, % | causal: within 5 s of the change, % | two-sided |"
+    );
+    println!("|---|---|---|---|---|---|---|");
+    let methods = [false, true].map(|smooth| TrackOptions {
+        smooth,
+        ..options(Method::Adaptive)
+    });
+    let mut ratios: [Vec<[f64; 5]>; 2] = [Vec::new(), Vec::new()];
+    let mut coverage: [[Vec<[f64; 5]>; 2]; 2] = Default::default();
+    for condition in Condition::ALL {
+        let steady = matches!(condition, Condition::C1 | Condition::C2);
+        for order in 1..=4 {
+            for (l, level) in LEVELS.into_iter().enumerate() {
+                let simulator = simulator(condition, order, level);
+                let found = on_all_cores(runs, |r| {
+                    let record = run(&simulator, condition, order, l, r);
+                    methods.each_ref().map(|options| after_start(&record, options))
+                });
+                let all = |m: usize, q: usize, i: usize| found.iter().map(move |f| f[m][q][i]);
+                let errors = [0, 1].map(|m| [0, 1, 2, 3, 4].map(|i| median(all(m, 0, i))));
+                let mean = |m: usize, q: usize| [0, 1, 2, 3, 4].map(|i| all(m, q, i).sum::<f64>() / runs as f64);
+                println!(
+                    "| {condition} m0={order} P_n={level} | {} | {} | {} | {} | {} | {} |",
+                    row(errors[0], 1),
+                    row(errors[1], 1),
+                    row(mean(0, 1), 0),
+                    row(mean(1, 1), 0),
+                    row(mean(0, 2), 0),
+                    row(mean(1, 2), 0),
+                );
+                ratios[usize::from(steady)].push([0, 1, 2, 3, 4].map(|i| errors[1][i] / errors[0][i]));
+                coverage[usize::from(steady)][0].push(mean(1, 1));
+                coverage[usize::from(steady)][1].push(mean(1, 2));
+            }
+        }
+    }
+    for (name, (ratios, coverage)) in ["C3 to C6", "C1 and C2"].into_iter().zip(ratios.iter().zip(&coverage)) {
+        let all = |i: usize| ratios.iter().map(move |r| r[i]);
+        println!(
+            "{name}, two-sided over causal: median cell {}, worst {}; cells above 1: {}",
+            row([0, 1, 2, 3, 4].map(|i| median(all(i))), 2),
+            row([0, 1, 2, 3, 4].map(|i| all(i).fold(0.0, f64::max)), 2),
+            row([0, 1, 2, 3, 4].map(|i| all(i).filter(|r| *r > 1.0).count() as f64), 0),
+        );
+        for (what, cells) in ["covered", "within 5 s of the change"].into_iter().zip(coverage) {
+            let all = |i: usize| cells.iter().map(move |c| c[i]);
+            println!(
+                "{name}, two-sided, {what}, %: least {}, median {}",
+                row([0, 1, 2, 3, 4].map(|i| all(i).fold(100.0, f64::min)), 0),
+                row([0, 1, 2, 3, 4].map(|i| median(all(i))), 0),
+            );
+        }
+    }
+}
+
+/// Errors over the better of RLS and RPEM on the cells on which methods are set: C3 and C5, m0 = 2 and 3, seed 9000.
+fn tune(runs: usize) {
+    let methods = [
+        of_the_text(Method::Rls),
+        of_the_text(Method::Rpem),
+        options(Method::Fused),
+        options(Method::Ekf),
+        options(Method::Ukf),
+    ];
+    let mut ratios: Vec<Vec<[f64; 5]>> = vec![Vec::new(); methods.len()];
+    let mut covered: Vec<Vec<[f64; 5]>> = vec![Vec::new(); methods.len()];
+    for condition in [Condition::C3, Condition::C5] {
+        for order in [2, 3] {
+            for level in LEVELS {
+                let simulator = simulator(condition, order, level);
+                let found = on_all_cores(runs, |r| {
+                    let stream = Stream {
+                        seed: 9000,
+                        cell: condition as u64 * 16 + order as u64 * 4,
+                        replication: r,
+                    };
+                    let record = simulator.run(stream, false).unwrap();
+                    methods.each_ref().map(|options| follow(&record, options))
+                });
+                let errors = [0, 1, 2, 3, 4]
+                    .map(|m: usize| [0, 1, 2, 3, 4].map(|i: usize| median(found.iter().map(|f| f[m].errors[i]))));
+                for m in 0..methods.len() {
+                    ratios[m].push([0, 1, 2, 3, 4].map(|i| errors[m][i] / errors[0][i].min(errors[1][i])));
+                    covered[m].push(
+                        [0, 1, 2, 3, 4]
+                            .map(|i| 100.0 * found.iter().map(|f| f[m].covered[i]).sum::<f64>() / runs as f64),
+                    );
+                }
+            }
+        }
+    }
+    for m in 2..methods.len() {
+        let all = |i: usize| ratios[m].iter().map(move |r| r[i]);
+        println!(
+            "{}: median {}, worst {}; covered {}",
+            methods[m].method.name(),
+            row([0, 1, 2, 3, 4].map(|i| median(all(i))), 2),
+            row([0, 1, 2, 3, 4].map(|i| all(i).fold(0.0, f64::max)), 2),
+            row([0, 1, 2, 3, 4].map(|i| median(covered[m].iter().map(|c| c[i]))), 0),
+        );
+    }
+}
+
+/// Time of a step with its estimate, the least mean of so many runs, ns.
+fn cost(runs: usize) {
+    let simulator = simulator(Condition::C4, 2, 0.1);
+    let record = run(&simulator, Condition::C4, 2, 1, 0);
+    let span = record.span(0.0, START_S).unwrap();
+    for method in [
+        Method::Rls,
+        Method::Rpem,
+        Method::Fused,
+        Method::Physical,
+        Method::Ekf,
+        Method::Ukf,
+        Method::Adaptive,
+    ] {
+        let mut least = f64::INFINITY;
+        for _ in 0..runs {
+            let mut tracker = Tracker::new(&options(method), Some(&span), record.sample_time()).unwrap();
+            let begin = std::time::Instant::now();
+            for (e, u) in record.input().iter().zip(record.output()) {
+                tracker.step(*e, *u);
+            }
+            least = least.min(begin.elapsed().as_secs_f64() / record.len() as f64);
+        }
+        println!("{}: {:.0} ns", method.name(), 1e9 * least);
     }
 }

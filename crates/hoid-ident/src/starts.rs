@@ -291,7 +291,7 @@ pub(crate) fn with_c_drawn_inside(o: &Orders, theta: &[f64]) -> Vec<Vec<f64>> {
 }
 
 /// Factors by which roots on the circle are drawn inside.
-const DRAWN: [f64; 2] = [0.95, 0.8];
+const DRAWN: [f64; 5] = [0.98, 0.95, 0.9, 0.8, 0.6];
 
 /// The same polynomial with each root outside the circle replaced by the inverse of its conjugate.
 pub(crate) fn reflected_inside(coefficients: &[f64]) -> Option<Vec<f64>> {

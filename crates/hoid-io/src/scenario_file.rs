@@ -24,7 +24,7 @@
 //! |---|---|
 //! | (top) | `condition`, `name`, `sample_time_s`, `measurement_s`, `run_in_s`, `tau_e_s`, `realisation` |
 //! | `[initial]`, `[last]` | `K_e`, `T_L_s`, `omega_nm_rad_s`, `zeta_nm`, `K_c`, `omega_b_rad_s` |
-//! | `[schedule]` | `rate_per_s` (G), `midpoint_s` (t_M) |
+//! | `[schedule]` | `rate_per_s` (G), `midpoint_s` (t_M), `interval_s` (T, for changes there and back again) |
 //! | `[remnant]` | `order`, `T_n_s`; `noise_level` and `noise_definition` ("response", "remnant"), or `K_n_initial_deg` and `K_n_last_deg` |
 //! | `[[forcing]]` | `amplitude_deg`, `phase_rad`, and `omega_rad_s` or `cycles` (within `measurement_s`); `forcing = []` is a target at rest |
 //!
@@ -166,6 +166,9 @@ struct ScheduleTable {
     rate_per_s: Option<Number>,
     #[schemars(with = "Option<f64>")]
     midpoint_s: Option<Number>,
+    /// Time from one change to the next, for a person who changes there and back again.
+    #[schemars(with = "Option<f64>")]
+    interval_s: Option<Number>,
 }
 
 #[derive(Deserialize, JsonSchema, Default)]
@@ -367,14 +370,17 @@ impl Source<'_> {
         let Some(given) = given else { return Ok(base) };
         let rate = self.positive("schedule.rate_per_s", given.rate_per_s)?;
         let midpoint = self.finite("schedule.midpoint_s", given.midpoint_s)?;
-        let (of_base, at_base) = match base {
-            Schedule::Constant => (None, None),
-            Schedule::Sigmoid { rate_per_s, midpoint_s } => (Some(rate_per_s), Some(midpoint_s)),
-        };
+        let (of_base, at_base) = (base.rate_per_s(), base.change_s());
         let missing = |key: &str| self.keys(&format!("[schedule] lacks {key}: there is no change to take it from"));
-        Ok(Schedule::Sigmoid {
-            rate_per_s: rate.or(of_base).ok_or_else(|| missing("rate_per_s"))?,
-            midpoint_s: midpoint.or(at_base).ok_or_else(|| missing("midpoint_s"))?,
+        let rate_per_s = rate.or(of_base).ok_or_else(|| missing("rate_per_s"))?;
+        let midpoint_s = midpoint.or(at_base).ok_or_else(|| missing("midpoint_s"))?;
+        Ok(match self.positive("schedule.interval_s", given.interval_s)? {
+            Some(interval_s) => Schedule::Alternating {
+                rate_per_s,
+                midpoint_s,
+                interval_s,
+            },
+            None => Schedule::Sigmoid { rate_per_s, midpoint_s },
         })
     }
 
@@ -585,6 +591,18 @@ mod tests {
             definition: NoiseDefinition::Response,
         };
         assert_eq!(parse(&example), Ok(expected));
+    }
+
+    #[test]
+    fn an_interval_is_there_and_back_again() {
+        let mut expected = named(Condition::C4);
+        expected.schedule = Schedule::Alternating {
+            rate_per_s: 100.0,
+            midpoint_s: 40.96,
+            interval_s: 10.0,
+        };
+        assert_eq!(parse("condition = \"C4\"\n[schedule]\ninterval_s = 10"), Ok(expected));
+        assert!(parse("condition = \"C4\"\n[schedule]\ninterval_s = -1").is_err());
     }
 
     #[test]

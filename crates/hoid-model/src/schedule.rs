@@ -1,6 +1,9 @@
 //! How parameters change over time.
 //!
 //! `p(t) = p_i + (p_f - p_i) / (1 + e^{-G (t - t_M)})`   (eq. 5)
+//!
+//! A person who changes again and again has a sigmoid of alternating sign every T seconds,
+//! `p(t) = p_i + (p_f - p_i) sum over k of (-1)^k / (1 + e^{-G (t - t_M - k T)})`.
 
 use crate::ModelError;
 
@@ -17,7 +20,21 @@ pub enum Schedule {
         /// Time of the largest rate of change t_M, s from the start of the measurement.
         midpoint_s: f64,
     },
+    /// There and back again, for as long as the run lasts.
+    Alternating {
+        /// Transition rate G of each change, 1/s.
+        rate_per_s: f64,
+        /// Time of the first change t_M, s from the start of the measurement.
+        midpoint_s: f64,
+        /// Time T from one change to the next, s.
+        interval_s: f64,
+    },
 }
+
+/// Transitions are as good as over after so many of their time constants 1/G: e^-40 is below half a last digit.
+const OVER: f64 = 40.0;
+/// Least interval between two changes, in time constants 1/G.
+const SHORTEST: f64 = 1.0;
 
 impl Schedule {
     /// Checks rate and midpoint.
@@ -25,8 +42,14 @@ impl Schedule {
     /// # Errors
     /// [`ModelError::OutOfRange`] unless the rate is positive and both are finite.
     pub fn check(&self) -> Result<(), ModelError> {
-        let Self::Sigmoid { rate_per_s, midpoint_s } = *self else {
-            return Ok(());
+        let (rate_per_s, midpoint_s, interval_s) = match *self {
+            Self::Constant => return Ok(()),
+            Self::Sigmoid { rate_per_s, midpoint_s } => (rate_per_s, midpoint_s, f64::INFINITY),
+            Self::Alternating {
+                rate_per_s,
+                midpoint_s,
+                interval_s,
+            } => (rate_per_s, midpoint_s, interval_s),
         };
         if !(rate_per_s.is_finite() && rate_per_s > 0.0) {
             return Err(ModelError::OutOfRange {
@@ -42,7 +65,46 @@ impl Schedule {
                 expected: "a finite number",
             });
         }
+        let is_single = matches!(self, Self::Sigmoid { .. });
+        let has_time = interval_s.is_finite() && interval_s * rate_per_s >= SHORTEST;
+        if !(is_single || has_time) {
+            return Err(ModelError::OutOfRange {
+                quantity: "time from one change to the next in s",
+                found: interval_s,
+                expected: "a finite number of at least 1/G: a change needs time to take place",
+            });
+        }
         Ok(())
+    }
+
+    /// Time of the first change t_M in s, where there is one.
+    pub fn change_s(&self) -> Option<f64> {
+        match *self {
+            Self::Constant => None,
+            Self::Sigmoid { midpoint_s, .. } | Self::Alternating { midpoint_s, .. } => Some(midpoint_s),
+        }
+    }
+
+    /// Transition rate G in 1/s, where there is a change.
+    pub fn rate_per_s(&self) -> Option<f64> {
+        match *self {
+            Self::Constant => None,
+            Self::Sigmoid { rate_per_s, .. } | Self::Alternating { rate_per_s, .. } => Some(rate_per_s),
+        }
+    }
+
+    /// The times t_M + k T of all changes up to `end_s`.
+    pub fn changes_s(&self, end_s: f64) -> Vec<f64> {
+        match *self {
+            Self::Constant => Vec::new(),
+            Self::Sigmoid { midpoint_s, .. } => vec![midpoint_s],
+            Self::Alternating {
+                midpoint_s, interval_s, ..
+            } => (0..)
+                .map(|k| midpoint_s + f64::from(k) * interval_s)
+                .take_while(|t| *t < end_s)
+                .collect(),
+        }
     }
 
     /// p(t) between `initial` and `finally`. Far from t_M it is either of them to the last bit.
@@ -55,6 +117,24 @@ impl Schedule {
                 let far = (-x.abs()).exp();
                 let part = (finally - initial) * (far / (1.0 + far));
                 if x < 0.0 { initial + part } else { finally - part }
+            }
+            Self::Alternating {
+                rate_per_s,
+                midpoint_s,
+                interval_s,
+            } => {
+                let (since, reach) = ((t_s - midpoint_s) / interval_s, OVER / (rate_per_s * interval_s));
+                // Changes before the first of these are over: two by two they cancel.
+                let first = 2.0 * ((since - reach).max(0.0) / 2.0).floor();
+                let last = (since + reach).ceil();
+                let (mut covered, mut k) = (0.0, first);
+                while k <= last {
+                    let x = rate_per_s * (t_s - midpoint_s - k * interval_s);
+                    let sign = if k % 2.0 == 0.0 { 1.0 } else { -1.0 };
+                    covered += sign / (1.0 + (-x).exp());
+                    k += 1.0;
+                }
+                initial + (finally - initial) * covered
             }
         }
     }
@@ -98,6 +178,52 @@ mod tests {
         let slope = (SLOW.value(0.0, 1.0, 40.961) - SLOW.value(0.0, 1.0, 40.959)) / 0.002;
         // The third derivative, G^3/8, leaves 2e-9.
         assert!((slope - 0.125).abs() < 1e-8);
+    }
+
+    #[test]
+    fn there_and_back_again() {
+        let often = Schedule::Alternating {
+            rate_per_s: 5.0,
+            midpoint_s: 20.0,
+            interval_s: 10.0,
+        };
+        // Midway between two changes e^-25 of each is left.
+        for (t, expected) in [
+            (-5.0, 2.0),
+            (15.0, 2.0),
+            (25.0, 3.0),
+            (35.0, 2.0),
+            (45.0, 3.0),
+            (1e4 + 5.0, 3.0),
+        ] {
+            assert!((often.value(2.0, 3.0, t) - expected).abs() < 1e-10, "{t}");
+        }
+        let single = Schedule::Sigmoid {
+            rate_per_s: 5.0,
+            midpoint_s: 20.0,
+        };
+        for t in [18.0, 19.7, 20.0, 20.4, 24.0] {
+            assert!(
+                (often.value(2.0, 3.0, t) - single.value(2.0, 3.0, t)).abs() < 1e-10,
+                "{t}"
+            );
+            // The next is its mirror image.
+            assert!(
+                (often.value(2.0, 3.0, t + 10.0) + often.value(2.0, 3.0, t) - 5.0).abs() < 1e-10,
+                "{t}"
+            );
+        }
+        assert_eq!(often.changes_s(45.0), [20.0, 30.0, 40.0]);
+        assert_eq!((often.change_s(), often.rate_per_s()), (Some(20.0), Some(5.0)));
+        assert!(often.check().is_ok());
+        for interval_s in [0.0, 0.1, -3.0, f64::NAN, f64::INFINITY] {
+            let bad = Schedule::Alternating {
+                rate_per_s: 5.0,
+                midpoint_s: 20.0,
+                interval_s,
+            };
+            assert!(bad.check().is_err(), "{interval_s}");
+        }
     }
 
     #[test]

@@ -244,6 +244,13 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
                 ],
             );
         }
+        if plan.changes {
+            for name in OPERATOR {
+                let of = ["before", "after", "covered", "covered_through"].map(|what| format!("{what}_{name}"));
+                c.add(Real, &of.each_ref().map(String::as_str));
+            }
+            c.add(Real, &["false_alarms", "hours", "found", "lag"]);
+        }
         c.add(Whole, &["diverged", "steps_shortened"]);
         c.add(Real, &["share_not_convertible"]);
     }

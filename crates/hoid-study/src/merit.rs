@@ -6,14 +6,20 @@
 //!   as it is held at the sample time of the simulation. It needs no conversion, so that models of any order can be compared.
 //! - `rms_<p>`, %: root mean square of the relative error of a trace from 10 s after the start on, over what converts.
 //! - `settle50_<p>`, `settle90_<p>`, s: time after t_M at which the trace has first covered 50 or 90 % of the step of a parameter.
+//! - `before_<p>`, `after_<p>`, %: mean relative error of a trace from 10 s after the start to t_M, and over the last 10 s: their spread over the replications is that of
+//!   the summary. `covered_<p>`, `covered_through_<p>`, %: points of a trace, after its start fit and within 5 s after a change, in which 1.96 standard errors
+//!   cover the truth.
+//! - `false_alarms`: changes declared more than 5 s after a true one, or before the first; `hours`: the time in which they could be.
+//!   `found`, %: true changes after the start fit that were declared within 5 s; `lag`, s: mean time to the declaration of those.
 //! - `diverged`: a coefficient is no number, or its magnitude is beyond 10.
 //! - `noise_level_obtained`: `(var u - var u0) / var u` with u0 of the run without remnant (A.4), `noise_level_response`:
 //!   `var(u - u0) / var u`, which lacks the chance correlation of the two, and `noise_level_remnant`: `var n / var u`.
 
-use hoid_ident::{Fit, tracking::Trace};
-use hoid_model::{
-    Complex64, Orders, PolynomialModel, Record, Structure, schedule::Schedule, uncertainty::OperatorEstimate,
+use hoid_ident::{
+    Fit,
+    tracking::{StartAt, Trace},
 };
+use hoid_model::{Complex64, Orders, PolynomialModel, Record, Structure, uncertainty::OperatorEstimate};
 
 use crate::{columns::OPERATOR, plan::Cell};
 
@@ -74,10 +80,7 @@ impl TraceErrors {
             [0, 1, 2, 3, 4].map(|i| o[i].2.value)
         };
         let (from, to) = (values(&scenario.initial), values(&scenario.last));
-        let change_s = match scenario.schedule {
-            Schedule::Constant => f64::INFINITY,
-            Schedule::Sigmoid { midpoint_s, .. } => midpoint_s,
-        };
+        let change_s = scenario.schedule.change_s().unwrap_or(f64::INFINITY);
         let (mut sums, mut converted, mut counted) = ([0.0; 5], 0usize, 0usize);
         let mut settled_s = [[f64::NAN; 5]; 2];
         let mut diverged = false;
@@ -110,6 +113,100 @@ impl TraceErrors {
             settled_s,
             diverged,
             share_not_convertible: 1.0 - converted as f64 / counted.max(1) as f64,
+        }
+    }
+}
+
+/// Time within which a change is to be declared, and during which bands are looked at apart, s.
+const THROUGH_S: f64 = 5.0;
+/// Length of the end of a trace whose mean error is taken, s.
+const END_S: f64 = 10.0;
+/// Standard errors of a band of 95 %.
+const BAND: f64 = 1.96;
+
+/// How a trace follows a change, its bands, and what it declares.
+pub(crate) struct ChangeMeasures {
+    /// Mean relative error before the change and at the end, %.
+    pub before_percent: [f64; 5],
+    pub after_percent: [f64; 5],
+    /// Covered after the start fit, and within 5 s after a change, %.
+    pub covered_percent: [f64; 5],
+    pub covered_through_percent: [f64; 5],
+    pub false_alarms: f64,
+    pub hours: f64,
+    pub found_percent: f64,
+    pub lag_s: f64,
+}
+
+/// Sums for the mean of something over points.
+#[derive(Clone, Copy, Default)]
+struct Mean(f64, f64);
+
+impl Mean {
+    fn take(&mut self, value: f64) {
+        self.0 += value;
+        self.1 += 1.0;
+    }
+
+    fn percent(self) -> f64 {
+        100.0 * self.0 / self.1
+    }
+}
+
+impl ChangeMeasures {
+    pub fn of(trace: &Trace, record: &Record, cell: &Cell) -> Self {
+        let scenario = cell.resolved.scenario();
+        let truth = OPERATOR.map(|name| record.channel(name).unwrap_or_default());
+        let end_s = record.time_s(record.len());
+        let changes_s = scenario.schedule.changes_s(end_s);
+        let first_s = changes_s.first().copied().unwrap_or(f64::INFINITY);
+        // A two-sided estimate moves from the beginning on; its alarms are those of the causal one.
+        let fitted_s = match trace.options().start {
+            StartAt::Span(Some((_, to))) => to,
+            _ => trace.updated_from_s(),
+        };
+        let within = |t: f64| changes_s.iter().any(|c| (*c..*c + THROUGH_S).contains(&t));
+        let [mut before, mut after, mut covered, mut through] = [[Mean::default(); 5]; 4];
+        for (row, t) in trace.times_s().iter().enumerate() {
+            let Ok(found) = trace.operator(row) else { continue };
+            let k = ((t - record.time_s(0)) / record.sample_time().s()).round() as usize;
+            for (i, (_, _, estimate)) in found.rows()[..5].iter().enumerate() {
+                let true_value = truth[i].get(k).copied().unwrap_or(f64::NAN);
+                let error = estimate.value - true_value;
+                let inside = estimate
+                    .standard_error
+                    .map(|se| f64::from(u8::from(error.abs() <= BAND * se)));
+                if (ERRORS_FROM_S - 1e-9..first_s).contains(t) {
+                    before[i].take(error / true_value);
+                } else if *t >= end_s - END_S {
+                    after[i].take(error / true_value);
+                }
+                if let Some(inside) = inside.filter(|_| *t > fitted_s) {
+                    covered[i].take(inside);
+                    if within(*t) {
+                        through[i].take(inside);
+                    }
+                }
+            }
+        }
+        let declared: Vec<f64> = trace.changes().iter().map(|(t, _)| *t).collect();
+        let to_be_found: Vec<f64> = changes_s.iter().copied().filter(|c| *c > fitted_s).collect();
+        let lag = |change: &f64| {
+            let first = declared.iter().find(|t| (*change..change + THROUGH_S).contains(*t));
+            first.map(|t| t - change)
+        };
+        let lags: Vec<f64> = to_be_found.iter().filter_map(lag).collect();
+        let has_alarms = !trace.change_odds().is_empty();
+        let known = |value: f64| if has_alarms { value } else { f64::NAN };
+        Self {
+            before_percent: before.map(Mean::percent),
+            after_percent: after.map(Mean::percent),
+            covered_percent: covered.map(Mean::percent),
+            covered_through_percent: through.map(Mean::percent),
+            false_alarms: known(declared.iter().filter(|t| !within(**t)).count() as f64),
+            hours: known((end_s - fitted_s - THROUGH_S * to_be_found.len() as f64).max(0.0) / 3600.0),
+            found_percent: known(100.0 * lags.len() as f64 / to_be_found.len() as f64),
+            lag_s: known(lags.iter().sum::<f64>() / lags.len() as f64),
         }
     }
 }

@@ -60,10 +60,7 @@ impl Results {
                 continue;
             };
             let scenario = cell.resolved.scenario();
-            let change_s = match scenario.schedule {
-                hoid_model::schedule::Schedule::Constant => 0.0,
-                hoid_model::schedule::Schedule::Sigmoid { midpoint_s, .. } => midpoint_s,
-            };
+            let change_s = scenario.schedule.change_s().unwrap_or(0.0);
             let step = every as f64 * scenario.sample_time.s();
             let times_s: Vec<f64> = (1..)
                 .map(|k| f64::from(k) * step - 0.01)

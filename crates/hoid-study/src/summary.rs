@@ -474,7 +474,7 @@ impl Series {
 
 /// When the median traces have covered 50 and 90 % of the steps of the operator's parameters.
 fn settled(cell: &Cell, names: &[&str], medians: &[(f64, Vec<f64>)]) -> Vec<(String, f64)> {
-    let hoid_model::schedule::Schedule::Sigmoid { midpoint_s, .. } = cell.resolved.scenario().schedule else {
+    let Some(midpoint_s) = cell.resolved.scenario().schedule.change_s() else {
         return Vec::new();
     };
     let [before, after] = cell.truth();

@@ -27,13 +27,17 @@ impl Cell {
     /// True parameters before and after the change; the same where nothing changes.
     pub fn truth(&self) -> [TrueState; 2] {
         let scenario = self.resolved.scenario();
-        let ends = [f64::NEG_INFINITY, f64::INFINITY];
+        // Long before the change, and long after it or in the middle of the time until the person changes back.
+        let ends = match scenario.schedule {
+            Schedule::Constant => [0.0; 2],
+            Schedule::Sigmoid { .. } => [-1e9, 1e9],
+            Schedule::Alternating {
+                midpoint_s, interval_s, ..
+            } => [-1e9, midpoint_s + interval_s / 2.0],
+        };
         let states = [&scenario.initial, &scenario.last];
         [0, 1].map(|i| {
-            let at = self.resolved.parameters_at(match scenario.schedule {
-                Schedule::Constant => 0.0,
-                Schedule::Sigmoid { .. } => ends[i].clamp(-1e9, 1e9),
-            });
+            let at = self.resolved.parameters_at(ends[i]);
             state(states[i], at.k_n, scenario.sample_time)
         })
     }
@@ -100,8 +104,8 @@ pub(crate) fn cells_table(plan: &Plan) -> OutputTable {
         rows.real("sample_time_s", scenario.sample_time.s());
         rows.real("measurement_s", scenario.measurement_s);
         rows.real("tau_e", scenario.initial.operator.tau_e_s);
-        if let Schedule::Sigmoid { rate_per_s, midpoint_s } = scenario.schedule {
-            rows.real("change_s", midpoint_s);
+        if let (Some(change_s), Some(rate_per_s)) = (scenario.schedule.change_s(), scenario.schedule.rate_per_s()) {
+            rows.real("change_s", change_s);
             rows.real("rate_per_s", rate_per_s);
         }
         for (state, when) in cell.truth().iter().zip(["initial", "last"]) {

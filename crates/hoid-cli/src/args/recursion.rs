@@ -17,6 +17,9 @@ names!(RecursiveMethodName for Method {
     Window = Method::Window,
     Rriv = Method::Refined,
     Adaptive = Method::Adaptive,
+    Fused = Method::Fused,
+    Ekf = Method::Ekf,
+    Ukf = Method::Ukf,
 });
 names!(PolynomialStructureName for Structure {
     Arx = Structure::Arx,
@@ -49,7 +52,8 @@ pub enum ForgettingName {
 pub struct RecursionArgs {
     /// The recursion: rls least squares (arx, fir); rpem prediction error method (every structure); physical the same in the
     /// operator's parameters; window a batch fit of the last seconds, again and again; rriv refined instrumental variable; adaptive a bank of
-    /// hypotheses of when the person changed, which sets its memory itself and tells of changes
+    /// hypotheses of when the person changed, which sets its memory itself and tells of changes; for comparison: fused (least squares with the poles of rpem),
+    /// ekf and ukf (Kalman filters of state and parameters, extended and unscented)
     #[arg(long, value_name = "NAME", default_value = "physical")]
     pub method: RecursiveMethodName,
     /// Polynomial structure [default: arx for rls, else bj]
@@ -70,7 +74,7 @@ pub struct RecursionArgs {
     #[arg(long, value_name = "LIST|nothing", allow_hyphen_values = true)]
     pub start: Option<String>,
     /// Memory of all parameters, in which the weight of a sample falls to 1/e: samples (256), seconds (2.56s) or inf
-    /// [default: rls 2.56s; rpem, rriv 2.56s for b, 20.48s for the others; physical 5s for K_e, 1.5s for K_e_dot, inf for the others]
+    /// [default: rls 2.56s; rpem, rriv 2.56s for b, 20.48s for the others; fused 2.56s for b, inf for the others; physical 5s for K_e, 1.5s for K_e_dot, inf for the others]
     #[arg(long, value_name = "N|Ss|inf", value_parser = str::parse::<Memory>)]
     pub memory: Option<Memory>,
     /// Factor of forgetting instead of --memory: lambda = 1 - 1/memory in samples
@@ -98,7 +102,7 @@ pub struct RecursionArgs {
     /// Polynomials kept stable: predictor (C and F), or noise (D too)
     #[arg(long, value_name = "WHICH", default_value = "predictor")]
     pub stable: StableName,
-    /// Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1.., for physical and adaptive
+    /// Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1.., for physical, adaptive, ekf and ukf
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     pub bound: Option<String>,
     /// Track the delay tau_e too, within this range in s, for physical
@@ -110,7 +114,7 @@ pub struct RecursionArgs {
     /// Samples between two fits for --method window [default: 25]
     #[arg(long, value_name = "N")]
     pub refit: Option<usize>,
-    /// Standard deviations beyond which an innovation moves the estimate no further: a number or inf [default: 5 for rpem,
+    /// Standard deviations beyond which an innovation moves the estimate no further: a number or inf [default: 5 for rpem, fused,
     /// physical and adaptive, inf for rls]
     #[arg(long, value_name = "K")]
     pub limit: Option<f64>,
@@ -142,6 +146,9 @@ pub struct TrackArgs {
     /// Mean of the estimate over the last S seconds in place of each; it lags by S/2
     #[arg(long, value_name = "S")]
     pub moving_average: Option<f64>,
+    /// For --method adaptive: at each sample what all of the record says of it, by hypotheses run from both ends, in place of what the past alone says
+    #[arg(long)]
+    pub smooth: bool,
     /// Keep every N-th sample of the trace
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_count)]
     pub every: usize,

@@ -10,23 +10,20 @@ use hoid_core::{
     },
     delay::DelayLine,
     error_bars::Level,
-    held_operator::held_operator,
     state::{State, visit_all},
 };
-use hoid_model::{
-    SampleTime,
-    uncertainty::{Estimate, OperatorEstimate},
-};
+use hoid_model::{SampleTime, uncertainty::OperatorEstimate};
 
 use super::{
     Change, Recursion, Sample, Taken,
     options::TrackOptions,
+    reported::Reported,
     start::{self, StartState},
 };
 use crate::IdentError;
 
 /// Room for hypotheses, and the largest order of the noise model.
-const HYPOTHESES: usize = 16;
+pub(super) const HYPOTHESES: usize = 16;
 pub(super) const LARGEST_ND: usize = 8;
 /// Time between two births, s.
 const SPACING_S: f64 = 0.32;
@@ -52,7 +49,7 @@ const RECENT_S: f64 = 4.0;
 ///
 /// # Errors
 /// As [`start::physical_bounds`].
-fn suppositions(options: &TrackOptions, sample_time: SampleTime) -> Result<Suppositions, IdentError> {
+pub(super) fn suppositions(options: &TrackOptions, sample_time: SampleTime) -> Result<Suppositions, IdentError> {
     let ts = sample_time.s();
     let spacing = (SPACING_S / ts).round().max(1.0);
     Ok(Suppositions {
@@ -73,16 +70,43 @@ fn suppositions(options: &TrackOptions, sample_time: SampleTime) -> Result<Suppo
     })
 }
 
-/// The bank with its delay line.
+/// The first hypothesis, from the batch fit of the start span, its covariance so many times larger.
+///
+/// # Errors
+/// [`IdentError::BadStart`] without a fit, or where it lies outside the bounds.
+pub(super) fn first_hypothesis(
+    from: &StartState,
+    times: f64,
+    sample_time: SampleTime,
+) -> Result<Hypothesis, IdentError> {
+    if !from.from_fit {
+        return Err(bad(
+            "adaptive needs the noise model of a batch fit; start it from the fit of a span",
+        ));
+    }
+    let p = from.values.len();
+    let covariance = std::array::from_fn(|i| std::array::from_fn(|j| times * from.variance * from.spread[i * p + j]));
+    let memory = (LEVEL_MEMORY_S / sample_time.s()).max(10.0);
+    let level = Level::new(from.variance, from.residuals.clamp(1.0, memory), 1.0 - 1.0 / memory);
+    Hypothesis::new(std::array::from_fn(|i| from.values[i]), &covariance, level).ok_or_else(outside)
+}
+
+fn bad(reason: &str) -> IdentError {
+    IdentError::BadStart {
+        reason: reason.to_owned(),
+    }
+}
+
+pub(super) fn outside() -> IdentError {
+    bad("it lies outside the bounds of the physical parameters, or its covariance is not positive")
+}
+
+/// The bank with its filters and its delay line.
 pub(super) struct AdaptiveRecursion {
-    bank: Box<Adaptive<HYPOTHESES, LARGEST_ND>>,
+    model: Box<Adaptive<HYPOTHESES, LARGEST_ND>>,
     delay: DelayLine<Vec<f64>>,
     sample_time: SampleTime,
-    fixed_tau_s: f64,
-    /// `[b0, b1, d.., f1, f2]` and the covariance of d, which stays that of the start fit.
-    theta: Vec<f64>,
-    of_d: Vec<f64>,
-    by: [[f64; 4]; 4],
+    reported: Reported,
 }
 
 impl AdaptiveRecursion {
@@ -91,137 +115,69 @@ impl AdaptiveRecursion {
     /// # Errors
     /// [`IdentError::BadStart`] without a fit.
     pub(super) fn new(options: &TrackOptions, from: &StartState, sample_time: SampleTime) -> Result<Self, IdentError> {
-        let bad = |reason: &str| IdentError::BadStart {
-            reason: reason.to_owned(),
-        };
-        if !from.from_fit {
-            return Err(bad(
-                "adaptive needs the noise model of a batch fit; start it from the fit of a span",
-            ));
-        }
-        let p = from.values.len();
-        let element = |i: usize, j: usize| from.variance * from.spread[i * p + j];
-        let covariance = std::array::from_fn(|i| std::array::from_fn(|j| element(i, j)));
-        let memory = (LEVEL_MEMORY_S / sample_time.s()).max(10.0);
-        let level = Level::new(from.variance, from.residuals.clamp(1.0, memory), 1.0 - 1.0 / memory);
-        let eta = std::array::from_fn(|i| from.values[i]);
+        let first = first_hypothesis(from, 1.0, sample_time)?;
         let d = &from.values[OPERATOR..];
-        let suppositions = suppositions(options, sample_time)?;
-        let bank = Hypothesis::new(eta, &covariance, level)
-            .and_then(|first| Adaptive::new(first, d, suppositions))
-            .ok_or_else(|| {
-                bad("it lies outside the bounds of the physical parameters, or its covariance is not positive")
-            })?;
-        let nd = d.len();
-        let of_d = (0..nd * nd)
-            .map(|k| element(OPERATOR + k / nd, OPERATOR + k % nd))
-            .collect();
-        let mut recursion = Self {
-            bank: Box::new(bank),
+        let model = Adaptive::new(first, d, suppositions(options, sample_time)?).ok_or_else(outside)?;
+        Ok(Self {
+            model: Box::new(model),
             delay: DelayLine::new(vec![0.0; options.orders.nk]),
             sample_time,
-            fixed_tau_s: (options.orders.nk as f64 - 1.0) * sample_time.s(),
-            theta: from.values.clone(),
-            of_d,
-            by: [[0.0; 4]; 4],
-        };
-        recursion.convert();
-        Ok(recursion)
-    }
-
-    /// theta and the Jacobian of `[b0, b1, f1, f2]`, of the mean of the mixture.
-    fn convert(&mut self) {
-        let (values, by) = held_operator(self.bank.mixture().eta, self.sample_time.s());
-        let p = self.theta.len();
-        self.theta[..2].copy_from_slice(&values[..2]);
-        self.theta[2..p - 2].copy_from_slice(self.bank.d());
-        self.theta[p - 2..].copy_from_slice(&values[2..]);
-        self.by = by;
+            reported: Reported::new(from, options.orders.nk, sample_time),
+        })
     }
 }
 
 impl State for AdaptiveRecursion {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
-        let parts: &mut [&mut dyn State] = &mut [
-            &mut *self.bank,
-            &mut self.delay,
-            &mut self.theta.as_mut_slice(),
-            &mut self.by,
-        ];
-        visit_all(parts, each);
+        visit_all(&mut [&mut *self.model, &mut self.delay, &mut self.reported], each);
     }
 }
 
 impl Recursion for AdaptiveRecursion {
     fn step(&mut self, sample: Sample) -> Taken {
         let x = self.delay.step(sample.e);
-        let step = self.bank.step(x, sample.u);
-        self.convert();
+        let step = self.model.step(x, sample.u);
+        self.reported.set(self.model.bank().mixture().eta);
         step.into()
     }
 
     fn follow(&mut self, sample: Sample) -> Taken {
         let x = self.delay.step(sample.e);
-        self.bank.follow(x, sample.u).into()
+        self.model.follow(x, sample.u).into()
     }
 
     fn bridge(&mut self, sample: Sample) {
         let x = self.delay.step(sample.e);
-        self.bank.bridge(x);
+        self.model.bridge(x);
     }
 
     fn theta(&self) -> &[f64] {
-        &self.theta
+        self.reported.theta()
     }
 
-    /// `J C J'` of the operator, and that of d.
     fn covariance(&self, into: &mut [f64]) -> bool {
-        let p = self.theta.len();
-        let nd = p - OPERATOR;
-        let of_eta = self.bank.covariance();
-        into.fill(0.0);
-        let place = |k: usize| if k < 2 { k } else { nd + k };
-        for i in 0..OPERATOR {
-            for j in 0..OPERATOR {
-                let mut sum = 0.0;
-                for k in 0..OPERATOR {
-                    for l in 0..OPERATOR {
-                        sum += self.by[i][k] * of_eta[k][l] * self.by[j][l];
-                    }
-                }
-                into[place(i) * p + place(j)] = sum;
-            }
-        }
-        for i in 0..nd {
-            into[(2 + i) * p + 2..(2 + i) * p + 2 + nd].copy_from_slice(&self.of_d[i * nd..(i + 1) * nd]);
-        }
+        self.reported.covariance(&self.model.bank().covariance(), into);
         true
     }
 
     fn innovation_variance(&self) -> f64 {
-        self.bank.mixture().variance
+        self.model.bank().mixture().variance
     }
 
     fn operator(&self) -> Option<OperatorEstimate> {
-        let eta = self.bank.mixture().eta;
-        let covariance = self.bank.covariance();
-        let estimate = |i: usize| Estimate::with_variance(eta[i], covariance[i][i]);
-        let [lead, variance] = self.bank.lead(&covariance);
-        Some(OperatorEstimate {
-            k_e: estimate(0),
-            t_l_s: Estimate::with_variance(lead, variance),
-            k_e_dot: estimate(1),
-            omega_nm_rad_s: estimate(2),
-            zeta_nm: estimate(3),
-            tau_e_s: Estimate::fixed(self.fixed_tau_s),
-        })
+        let bank = self.model.bank();
+        let covariance = bank.covariance();
+        Some(
+            self.reported
+                .operator(bank.mixture().eta, &covariance, bank.lead(&covariance)),
+        )
     }
 
     fn change_odds(&self) -> Option<f64> {
-        Some(self.bank.odds())
+        Some(self.model.bank().odds())
     }
 
     fn change(&self) -> Option<Change> {
-        self.bank.change().map(|c| Change::new(&c, self.sample_time))
+        self.model.bank().change().map(|c| Change::new(&c, self.sample_time))
     }
 }

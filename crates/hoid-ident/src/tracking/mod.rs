@@ -7,6 +7,9 @@
 //! | `gain` | the way of forgetting |
 //! | `kernel` | RLS, RPEM and the physical recursion of the real-time kernel |
 //! | `adaptive`, `change` | the bank of hypotheses of the real-time kernel, and the changes that it declares |
+//! | `reported`, `smooth` | what a recursion with a noise model that stays reports; the two-sided estimate of a recorded run |
+//! | `fused` | least squares with the poles of RPEM |
+//! | `joint` | extended and unscented Kalman filter of state and parameters |
 //! | `window`, `predictor` | the batch fit over a sliding window |
 //! | `refined`, `laguerre`, `forgetting` | recursive refined instrumental variable |
 //! | `plan` | orders that are still open, searched on the start span |
@@ -26,7 +29,9 @@ mod adaptive;
 mod change;
 mod columns;
 mod forgetting;
+mod fused;
 mod gain;
+mod joint;
 mod kernel;
 mod laguerre;
 mod live;
@@ -35,7 +40,9 @@ mod past;
 mod plan;
 mod predictor;
 mod refined;
+mod reported;
 mod saved;
+mod smooth;
 mod start;
 mod trace;
 mod window;
@@ -57,6 +64,8 @@ pub use trace::{OPERATOR_COLUMNS, Trace};
 pub use hoid_core::{predictor::Regressor, recursion::Stable};
 
 use adaptive::AdaptiveRecursion;
+use fused::FusedRecursion;
+use joint::JointRecursion;
 use refined::{RefinedRecursion, RefinedStart};
 use start::StartState;
 use trace::{operator_of, pack, packed_len, polynomial_orders};
@@ -350,6 +359,8 @@ fn recursion(
             Ok(Box::new(recursion))
         }
         Method::Adaptive => Ok(Box::new(AdaptiveRecursion::new(options, start, sample_time)?)),
+        Method::Fused => Ok(Box::new(FusedRecursion::new(options, start, sample_time)?)),
+        Method::Ekf | Method::Ukf => Ok(Box::new(JointRecursion::new(options, start, sample_time)?)),
         _ => kernel::build(options, start, sample_time),
     }
 }
@@ -455,5 +466,8 @@ pub fn track(record: &Record, options: &TrackOptions, every: usize) -> Result<Tr
     }
     trace.counts = tracker.counts;
     trace.failures = tracker.failures();
+    if options.smooth {
+        smooth::smooth(record, &mut trace, &tracker.start)?;
+    }
     Ok(trace)
 }

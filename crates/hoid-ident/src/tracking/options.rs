@@ -26,17 +26,26 @@ pub enum Method {
     Refined,
     /// A bank of hypotheses of when the person changed, in physical parameters: Box-Jenkins with nc = 0.
     Adaptive,
+    /// Recursive least squares for B with the poles of the recursive prediction-error method: Box-Jenkins.
+    Fused,
+    /// Extended Kalman filter of state and physical parameters: Box-Jenkins with nc = 0.
+    Ekf,
+    /// Unscented Kalman filter of state and physical parameters: Box-Jenkins with nc = 0.
+    Ukf,
 }
 
 impl Method {
     /// All methods.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 9] = [
         Self::Rls,
         Self::Rpem,
         Self::Physical,
         Self::Window,
         Self::Refined,
         Self::Adaptive,
+        Self::Fused,
+        Self::Ekf,
+        Self::Ukf,
     ];
 
     /// Name as on the command line.
@@ -48,12 +57,20 @@ impl Method {
             Self::Window => "window",
             Self::Refined => "rriv",
             Self::Adaptive => "adaptive",
+            Self::Fused => "fused",
+            Self::Ekf => "ekf",
+            Self::Ukf => "ukf",
         }
     }
 
     /// True for a method that estimates physical parameters.
     pub fn is_physical(self) -> bool {
-        matches!(self, Self::Physical | Self::Adaptive)
+        self == Self::Physical || self.is_model_of_change()
+    }
+
+    /// True for a method that has a model of how the person changes, and no memory: physical parameters behind the noise model of a batch fit, which stays.
+    pub fn is_model_of_change(self) -> bool {
+        matches!(self, Self::Adaptive | Self::Ekf | Self::Ukf)
     }
 
     /// The operator's orders with the noise model that the method takes when none is named: of order 1, for adaptive of order 6, for its
@@ -77,15 +94,16 @@ impl Method {
     /// Memory when none is named: what the parameters in question keep, in seconds.
     ///
     /// RLS: 2.56 s for all, the text's 256 samples at 100 Hz. RPEM and RRIV: 2.56 s for B, 20.48 s for the others. Physical: 5 s for
-    /// K_e, 1.5 s for K_e_dot, without end for the others, which a person hardly changes within a run. Adaptive: none, its memory is what it
-    /// finds.
+    /// K_e, 1.5 s for K_e_dot, without end for the others, which a person hardly changes within a run. Fused: 2.56 s for B, without end for the others.
+    /// Adaptive, ekf and ukf: none, their memory follows from a model of the change.
     pub fn usual_memory(self, parameter: &str) -> Memory {
         match (self, parameter) {
             (Self::Rls, _) => Memory::Seconds(2.56),
             (Self::Physical, "K_e") => Memory::Seconds(5.0),
             (Self::Physical, "K_e_dot") => Memory::Seconds(1.5),
-            (Self::Physical | Self::Adaptive, _) => Memory::Infinite,
+            (Self::Physical | Self::Adaptive | Self::Ekf | Self::Ukf, _) => Memory::Infinite,
             (_, name) if name.starts_with('b') => Memory::Seconds(2.56),
+            (Self::Fused, _) => Memory::Infinite,
             _ => Memory::Seconds(20.48),
         }
     }
@@ -243,13 +261,15 @@ pub struct TrackOptions {
     pub every: usize,
     /// Limits of the search of start fits and windows.
     pub search: SearchOptions,
-    /// Multiple of the innovation's standard deviation beyond which an innovation moves the estimate no further. Default: 5 for rpem,
-    /// physical and adaptive, none (infinite) for rls, as in the text. A window has none.
+    /// Multiple of the innovation's standard deviation beyond which an innovation moves the estimate no further. Default: 5 for rpem, fused,
+    /// physical and adaptive, none (infinite) for rls, as in the text. A window has none, nor have ekf and ukf.
     pub limit: Option<f64>,
     /// Magnitude of e or u beyond which a sample is taken for a fault. Default 1e6.
     pub largest: f64,
     /// Logarithm of the odds from which [`Method::Adaptive`] declares a change. Default 6.
     pub alarm: f64,
+    /// The two-sided estimate of a recorded run in place of the causal one, by [`Method::Adaptive`]; a tracker by itself has none. Default: no.
+    pub smooth: bool,
 }
 
 impl TrackOptions {
@@ -276,6 +296,7 @@ impl TrackOptions {
             limit: None,
             largest: 1e6,
             alarm: 6.0,
+            smooth: false,
         }
     }
 
@@ -323,7 +344,7 @@ impl TrackOptions {
     pub fn limit_in_use(&self) -> f64 {
         match (self.method, &self.forgetting) {
             (_, ForgettingRule::Window) => f64::INFINITY,
-            (Method::Rpem | Method::Physical | Method::Adaptive, _) => self.limit.unwrap_or(5.0),
+            (Method::Rpem | Method::Fused | Method::Physical | Method::Adaptive, _) => self.limit.unwrap_or(5.0),
             _ => self.limit.unwrap_or(f64::INFINITY),
         }
     }
@@ -349,56 +370,72 @@ impl TrackOptions {
                 format!("{} with {o}", self.structure),
                 "arx or fir; take rpem for structures with C, D or F",
             ),
-            Method::Physical | Method::Adaptive if !(o.na == 0 && o.nb == 2 && o.nf == 2) => bad(
+            m if m.is_physical() && !(o.na == 0 && o.nb == 2 && o.nf == 2) => bad(
                 &format!("the orders of {}", self.method.name()),
                 format!("{} with {o}", self.structure),
                 "bj with nb = 2 and nf = 2, the operator; nc and nd are free",
             ),
-            Method::Physical | Method::Adaptive if o.nk == 0 => bad(
+            m if m.is_physical() && o.nk == 0 => bad(
                 "the delay",
                 "nk = 0".to_owned(),
                 "nk of 1 or more: the hold alone delays by one sample",
+            ),
+            Method::Fused if !(o.na == 0 && o.nb == 2 && o.nf == 2) => bad(
+                "the orders of fused",
+                format!("{} with {o}", self.structure),
+                "bj with nb = 2 and nf = 2, the operator; nc and nd are free",
             ),
             Method::Refined if !(o.na == 0 && o.nc == 0) => bad(
                 "the structure of rriv",
                 format!("{} with {o}", self.structure),
                 "bj with nc = 0, or oe",
             ),
-            Method::Window | Method::Refined | Method::Adaptive if self.forgetting != ForgettingRule::Exponential => {
+            m if self.forgetting != ForgettingRule::Exponential
+                && (m.is_model_of_change() || matches!(m, Method::Window | Method::Refined | Method::Fused)) =>
+            {
                 bad(
                     "the way of forgetting",
-                    format!("{:?} with {}", self.forgetting, self.method.name()),
-                    "none for window and adaptive, which have their own, and exponential forgetting for rriv",
+                    format!("{:?} with {}", self.forgetting, m.name()),
+                    "none for window, adaptive, ekf and ukf, which have their own, and exponential forgetting for rriv and fused",
                 )
             }
-            Method::Rls | Method::Window | Method::Refined if self.regressor == Regressor::PseudoLinear => bad(
-                "the regressor",
-                format!("pseudo-linear with {}", self.method.name()),
-                "rpem, whose gradient it replaces",
-            ),
-            Method::Adaptive if !(o.nc == 0 && o.nd <= LARGEST_ND) => bad(
-                "the noise model of adaptive",
+            Method::Rls | Method::Window | Method::Refined | Method::Fused
+                if self.regressor == Regressor::PseudoLinear =>
+            {
+                bad(
+                    "the regressor",
+                    format!("pseudo-linear with {}", self.method.name()),
+                    "rpem, whose gradient it replaces",
+                )
+            }
+            m if m.is_model_of_change() && !(o.nc == 0 && o.nd <= LARGEST_ND) => bad(
+                &format!("the noise model of {}", m.name()),
                 format!("nc={},nd={}", o.nc, o.nd),
                 "nc = 0 and nd of at most 8",
             ),
-            Method::Adaptive if self.memory.is_some() || !self.memory_of.is_empty() => bad(
+            m if m.is_model_of_change() && (self.memory.is_some() || !self.memory_of.is_empty()) => bad(
                 "the memory",
-                "with adaptive".to_owned(),
-                "none: it remembers for as long as nothing changes; take physical to set memories",
+                format!("with {}", m.name()),
+                "none: it follows from a model of how a person changes; take physical to set memories",
             ),
-            Method::Adaptive
-                if self.covariance != StartCovariance::OfFit || !matches!(self.start, StartAt::Span(_)) =>
+            m if m.is_model_of_change()
+                && (self.covariance != StartCovariance::OfFit || !matches!(self.start, StartAt::Span(_))) =>
             {
                 bad(
-                    "the start of adaptive",
+                    &format!("the start of {}", m.name()),
                     "no batch fit, or a covariance of its own".to_owned(),
                     "the batch fit of a span, whose noise model and covariance it needs",
                 )
             }
-            Method::Physical | Method::Adaptive if self.regressor == Regressor::PseudoLinear => bad(
+            m if m.is_physical() && self.regressor == Regressor::PseudoLinear => bad(
                 "the regressor",
                 format!("pseudo-linear with {}", self.method.name()),
                 "rpem, whose gradient it replaces",
+            ),
+            m if self.smooth && m != Method::Adaptive => bad(
+                "the two-sided estimate",
+                format!("with {}", m.name()),
+                "adaptive, whose hypotheses are run from both ends",
             ),
             m if self.track_delay_s.is_some() && m != Method::Physical => bad(
                 "the range of the delay",

@@ -132,6 +132,9 @@ mod tests {
             TrackOptions::new(Method::Rls, Structure::Arx, Structure::Arx.operator_orders(29)),
             of(Method::Physical),
             of(Method::Adaptive),
+            of(Method::Fused),
+            of(Method::Ekf),
+            of(Method::Ukf),
             of(Method::Window),
             of(Method::Refined),
             TrackOptions {

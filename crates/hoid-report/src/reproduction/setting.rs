@@ -149,13 +149,11 @@ fn conditions_table(title: &str) -> hoid_io::OutputTable {
     let mut data = Data::new(&["condition", "states"], &["G_per_s", "t_M_s"]);
     for condition in Condition::ALL {
         let scenario = Scenario::condition(condition);
-        let (rate, at) = match scenario.schedule {
-            Schedule::Constant => (f64::NAN, f64::NAN),
-            Schedule::Sigmoid { rate_per_s, midpoint_s } => (rate_per_s, midpoint_s),
-        };
+        let rate = scenario.schedule.rate_per_s().unwrap_or(f64::NAN);
+        let at = scenario.schedule.change_s().unwrap_or(f64::NAN);
         let states = match scenario.schedule {
             Schedule::Constant => state_name(&scenario.initial).to_owned(),
-            Schedule::Sigmoid { .. } => format!("{} to {}", state_name(&scenario.initial), state_name(&scenario.last)),
+            _ => format!("{} to {}", state_name(&scenario.initial), state_name(&scenario.last)),
         };
         data.row(&[&condition.to_string(), &states], &[rate, at]);
     }

@@ -57,6 +57,7 @@ fn forgetting(options: &TrackOptions) -> String {
             options.every
         ),
         (_, Method::Adaptive) => "since the last change, by hypotheses".to_owned(),
+        (_, Method::Ekf | Method::Ukf) => "by a random walk of the parameters".to_owned(),
         (ForgettingRule::Exponential, _) => format!("exponential, memory {}", memories(options)),
         (ForgettingRule::RandomWalk(drifts), _) => {
             let drifts: Vec<String> = drifts.iter().map(|(name, d)| format!("{name} {}", plain(*d))).collect();

@@ -164,7 +164,7 @@ impl<'a> Study<'a> {
         let (Some(bands), Some(cell)) = (traces.parameters.get(parameter), cell.first()) else {
             return Ok(NOTHING);
         };
-        let hoid_model::schedule::Schedule::Sigmoid { midpoint_s, .. } = cell.resolved.scenario().schedule else {
+        let Some(midpoint_s) = cell.resolved.scenario().schedule.change_s() else {
             return Err(format!("nothing changes in {query}"));
         };
         let end = traces.times_s.last().copied().unwrap_or(midpoint_s);

@@ -62,6 +62,9 @@ pub(super) enum TaskKey {
     Window,
     Rriv,
     Adaptive,
+    Fused,
+    Ekf,
+    Ukf,
     Record,
 }
 
@@ -190,6 +193,8 @@ pub(crate) struct EstimatorTable {
     pub(super) window: Option<MemoryValue>,
     /// Samples between two fits of the window method. Default 25.
     pub(super) refit: Option<usize>,
+    /// Two-sided estimates in place of causal ones, for adaptive. Default: no.
+    pub(super) smooth: Option<bool>,
     /// Range of the delay that the physical recursion tracks, s.
     pub(super) track_delay_s: Option<(f64, f64)>,
 }
@@ -294,6 +299,12 @@ impl EstimatorTable {
             ("stable", self.stable.is_some(), recursive, "the recursive methods"),
             ("window", self.window.is_some(), windowed, "window"),
             ("refit", self.refit.is_some(), windowed, "window"),
+            (
+                "smooth",
+                self.smooth.is_some(),
+                method == Some(Method::Adaptive),
+                "adaptive",
+            ),
             (
                 "track_delay_s",
                 self.track_delay_s.is_some(),
@@ -419,6 +430,7 @@ impl EstimatorTable {
                 Some(StableKey::PredictorAndNoise) => Stable::PredictorAndNoise,
             },
             track_delay_s: self.track_delay_s,
+            smooth: self.smooth.unwrap_or(false),
             window: memory("window", &self.window)?.unwrap_or(usual.window),
             every: self.refit.unwrap_or(usual.every),
             search: self.search(),
@@ -437,6 +449,9 @@ impl TaskKey {
             Self::Window => Some(Method::Window),
             Self::Rriv => Some(Method::Refined),
             Self::Adaptive => Some(Method::Adaptive),
+            Self::Fused => Some(Method::Fused),
+            Self::Ekf => Some(Method::Ekf),
+            Self::Ukf => Some(Method::Ukf),
         }
     }
 }

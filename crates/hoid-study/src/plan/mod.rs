@@ -80,6 +80,8 @@ pub struct Plan {
     pub trace_points: bool,
     /// Whether standard errors are kept.
     pub standard_errors: bool,
+    /// Whether bias, bands and declared changes of recursions are measured.
+    pub changes: bool,
     /// The scenarios of the grid.
     pub cells: Vec<Cell>,
     /// The estimators of the grid.
@@ -137,6 +139,8 @@ pub(crate) struct Keep {
     trace_points: bool,
     /// Whether standard errors are kept. Default true.
     standard_errors: bool,
+    /// Whether bias before and after a change, coverage of the bands and declared changes of recursions are measured. Default false.
+    changes: bool,
 }
 
 impl Default for Keep {
@@ -145,6 +149,7 @@ impl Default for Keep {
             trace_every: None,
             trace_points: true,
             standard_errors: true,
+            changes: false,
         }
     }
 }
@@ -219,6 +224,7 @@ impl Plan {
             trace_every: head_text.keep.trace_every,
             trace_points: head_text.keep.trace_points,
             standard_errors: head_text.keep.standard_errors,
+            changes: head_text.keep.changes,
             cells: Vec::new(),
             estimators: Vec::new(),
             text: text.to_owned(),

@@ -5,7 +5,7 @@ mod result;
 
 pub use result::relative_errors;
 
-use hoid_ident::tracking::{StartAt, TrackOptions, track};
+use hoid_ident::tracking::{Method, StartAt, TrackOptions, track};
 use hoid_io::{check_table_path, write_table};
 use hoid_model::Record;
 
@@ -31,8 +31,12 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         StartAt::Span(_) => StartAt::Span(Some(span_s)),
         other => other,
     };
+    if args.smooth && options.method != Method::Adaptive {
+        return Err(CliError::Usage("--smooth belongs to --method adaptive".to_owned()));
+    }
     let options = TrackOptions {
         start,
+        smooth: args.smooth,
         update_from_s: update_from(args, &record)?,
         ..options
     };
@@ -50,10 +54,14 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
             StartAt::Nothing => "nothing".to_owned(),
         },
     ));
-    settings.push((
-        "estimate moves from".to_owned(),
-        format!("{:.2} s", trace.updated_from_s()),
-    ));
+    if args.smooth {
+        settings.push(("estimate".to_owned(), "two-sided, of the whole record".to_owned()));
+    } else {
+        settings.push((
+            "estimate moves from".to_owned(),
+            format!("{:.2} s", trace.updated_from_s()),
+        ));
+    }
     if rows > 1 {
         let lag = (rows - 1) as f64 / 2.0 * args.every as f64 * record.sample_time().s();
         settings.push(("moving average".to_owned(), format!("{rows} rows, lags by {lag:.3} s")));

@@ -1,0 +1,79 @@
+//! Draws the share of changes that are found against false alarms an hour, from the table that
+//! `cargo run --release -p hoid-ident --example adaptive_evidence -- detection 60` prints:
+//!
+//! `cargo run -p hoid-report --example detection_figure -- detection.txt > docs/src/images/detection.svg`
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+use hoid_report::figures::{Curve, CurveGrid, CurvePanel, LineKind, Shade, curves};
+
+/// Where a rate of zero is drawn, 1/h: below one alarm in all hours of the table.
+const NONE: f64 = 0.02;
+
+fn main() {
+    let path = std::env::args().nth(1).unwrap_or_else(|| "detection.txt".to_owned());
+    let text = std::fs::read_to_string(path).unwrap();
+    let rows: Vec<Vec<&str>> = text
+        .lines()
+        .map(|line| line.split('|').map(str::trim).collect::<Vec<_>>())
+        .filter(|cells| cells.len() > 7 && cells[2].parse::<f64>().is_ok())
+        .collect();
+    let panel = |column: usize| {
+        let curve = |name: &str, statistic: &str, kind: LineKind, shade: Shade| {
+            let number = |cell: &str| cell.parse::<f64>().unwrap_or(f64::NAN);
+            let mut points: Vec<(f64, f64)> = rows
+                .iter()
+                .filter(|cells| cells[1].starts_with(statistic))
+                .map(|cells| (number(cells[3]).max(NONE), number(cells[column])))
+                .collect();
+            // Of thresholds without a false alarm the best is the lowest.
+            points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+            let silent = points.iter().rposition(|p| p.0 <= NONE).unwrap_or(0);
+            let points = &points[silent..];
+            Curve {
+                name: name.to_owned(),
+                kind,
+                shade,
+                x: points.iter().map(|p| p.0).collect(),
+                y: points.iter().map(|p| p.1).collect(),
+                band: Vec::new(),
+                bars: Vec::new(),
+            }
+        };
+        CurvePanel {
+            name: "found".to_owned(),
+            unit: "%".to_owned(),
+            within: Some((70.0, 101.0)),
+            curves: vec![
+                curve(
+                    "log odds of adaptive",
+                    "log odds",
+                    LineKind::Marked,
+                    Shade::of_method(0),
+                ),
+                curve(
+                    "k sigma of error and error rate",
+                    "k sigma",
+                    LineKind::Marked,
+                    Shade::of_method(1),
+                ),
+            ],
+            ..CurvePanel::default()
+        }
+    };
+    let grid = CurveGrid {
+        panels: vec![panel(4), panel(6)],
+        columns: 2,
+        titles: vec!["C4".to_owned(), "C6".to_owned()],
+        abscissa: "false alarms an hour".to_owned(),
+        logarithmic_abscissa: true,
+        shared_ordinates: true,
+    };
+    println!(
+        "{}",
+        curves(
+            "detection",
+            "Share of changes found against false alarms an hour",
+            &grid
+        )
+    );
+}

@@ -1,0 +1,72 @@
+//! What a study measures of a person who changes.
+#![allow(clippy::unwrap_used)]
+
+use hoid_study::{NamedPlan, Plan, Query, Results, RunOptions, run};
+
+const PLAN: &str = r#"
+name = "changes"
+seed = 5
+replications = 2
+
+[keep]
+changes = true
+standard_errors = false
+
+[[scenarios]]
+name = "back"
+condition = "C4"
+schedule.midpoint_s = 40.96
+schedule.interval_s = 20.48
+remnant.noise_level = 0.05
+
+[[estimators]]
+name = "RLS"
+method = "rls"
+orders.nk = 29
+start_span_s = [0.0, 30.72]
+
+[[estimators]]
+name = "adaptive"
+method = "adaptive"
+orders.nk = 29
+orders.nd = 6
+start_span_s = [0.0, 30.72]
+"#;
+
+#[test]
+fn changes_there_and_back_are_found_and_measured() {
+    let directory = tempfile::tempdir().unwrap();
+    let plan = Plan::parse(PLAN, "changes.toml").unwrap();
+    let finished = run(&plan, directory.path(), &RunOptions::default(), &|_| (), &|| true).unwrap();
+    assert!(finished.finished);
+    let results = Results::read(directory.path()).unwrap();
+    let mean = |quantity: &str, name: &str| {
+        let row = results.one(&Query::of(quantity).name(name)).unwrap();
+        row.statistics.mean
+    };
+    // Changes at 40.96 and 61.44 s; that at 81.92 s is beyond the last sample.
+    assert_eq!(mean("found", "adaptive"), 100.0);
+    assert!((0.4..3.0).contains(&mean("lag", "adaptive")));
+    // 51.2 s after the start fit, less 5 s of each change.
+    assert!((mean("hours", "adaptive") - 41.2 / 3600.0).abs() < 1e-6);
+    for p in ["K_e", "T_L", "K_e_dot"] {
+        let (all, through) = (
+            mean(&format!("covered_{p}"), "adaptive"),
+            mean(&format!("covered_through_{p}"), "adaptive"),
+        );
+        assert!(
+            (50.0..=100.0).contains(&all) && (0.0..=100.0).contains(&through),
+            "{p}: {all} {through}"
+        );
+        assert!(mean(&format!("before_{p}"), "adaptive").abs() < 20.0);
+    }
+    // A recursion that declares nothing has neither hits nor false alarms.
+    let silent = results.one(&Query::of("found").name("RLS"));
+    assert!(silent.is_none_or(|row| row.statistics.count == 0));
+}
+
+#[test]
+fn the_comparison_has_nine_methods_in_all_kinds_of_change() {
+    let plan = NamedPlan::find("adaptation").unwrap().plan().unwrap();
+    assert_eq!((plan.cells.len(), plan.estimators.len()), (121, 9));
+}

@@ -1,0 +1,143 @@
+//! A person who changes: the two-sided estimate against the causal one, and the methods that stand beside for comparison.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+use hoid::{
+    ident::tracking::{Method, StartAt, TrackOptions, track},
+    model::{remnant_gain::NoiseDefinition, scenario::RemnantStrength},
+    prelude::*,
+};
+
+const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
+const START_S: f64 = 30.72;
+
+fn run(condition: Condition, remnant_order: usize, noise_level: f64, replication: u64) -> Record {
+    let mut scenario = Scenario::condition(condition);
+    scenario.remnant.order = remnant_order;
+    scenario.remnant.strength = RemnantStrength::Level {
+        level: noise_level,
+        definition: NoiseDefinition::Response,
+    };
+    let stream = Stream {
+        seed: 83,
+        cell: condition as u64,
+        replication,
+    };
+    Simulator::new(&scenario).unwrap().run(stream, false).unwrap()
+}
+
+fn options(method: Method) -> TrackOptions {
+    TrackOptions {
+        start: StartAt::Span(Some((0.0, START_S))),
+        ..TrackOptions::new(method, method.usual_structure(), method.usual_orders(29))
+    }
+}
+
+/// RMS relative error of K_e, T_L ... after the start fit, and the share of samples that 1.96 standard errors cover.
+fn errors(record: &Record, options: &TrackOptions) -> [[f64; 5]; 2] {
+    let trace = track(record, options, 8).unwrap();
+    let (mut squares, mut covered, mut count) = ([0.0; 5], [0.0; 5], 0.0);
+    for row in 0..trace.len() {
+        let t = trace.times_s()[row];
+        if t <= START_S {
+            continue;
+        }
+        count += 1.0;
+        let operator = trace.operator(row).unwrap();
+        for (i, name) in OPERATOR.iter().enumerate() {
+            let truth = record.channel(name).unwrap()[8 * row + 7];
+            let (_, _, estimate) = operator.rows()[i];
+            let error = estimate.value - truth;
+            squares[i] += (error / truth).powi(2);
+            covered[i] += f64::from(error.abs() <= 1.96 * estimate.standard_error.unwrap());
+        }
+    }
+    [squares.map(|s: f64| (s / count).sqrt()), covered.map(|c| c / count)]
+}
+
+/// Root of the mean square over the runs.
+fn mean(all: &[[[f64; 5]; 2]], what: usize, i: usize) -> f64 {
+    let values = all.iter().map(|of| of[what][i]);
+    values.sum::<f64>() / all.len() as f64
+}
+
+#[test]
+fn the_two_sided_estimate_is_closer_and_its_bands_hold() {
+    let two_sided = TrackOptions {
+        smooth: true,
+        ..options(Method::Adaptive)
+    };
+    let (mut causal, mut smooth) = (Vec::new(), Vec::new());
+    for condition in [Condition::C3, Condition::C4, Condition::C5, Condition::C6] {
+        for replication in 0..3 {
+            let record = run(condition, 2, 0.1, replication);
+            causal.push(errors(&record, &options(Method::Adaptive)));
+            smooth.push(errors(&record, &two_sided));
+        }
+    }
+    for (i, name) in OPERATOR.iter().enumerate() {
+        let [before, after] = [&causal, &smooth].map(|all| mean(all, 0, i));
+        let covered = mean(&smooth, 1, i);
+        println!("{name}: {before:.4} {after:.4}, covered {covered:.3}");
+        // The page has .7 for K_e, T_L and K_e_dot; of twelve runs the ratio is known to a tenth.
+        assert!(after < if i < 3 { 0.85 } else { 1.1 } * before, "{name}");
+        // 90 to 99 % is what is asked of many runs; twelve have some three independent errors each.
+        assert!(covered > 0.8, "{name}: {covered}");
+    }
+}
+
+#[test]
+fn the_methods_of_the_literature_follow_a_change() {
+    for method in [Method::Fused, Method::Ekf, Method::Ukf] {
+        let all: Vec<_> = (0..4)
+            .map(|replication| errors(&run(Condition::C3, 2, 0.1, replication), &options(method)))
+            .collect();
+        let found: [f64; 5] = std::array::from_fn(|i| mean(&all, 0, i));
+        println!("{}: {found:.3?}", method.name());
+        // A constant at the start values has errors of .2, .5 and .4 in the gains.
+        assert!(
+            found[0] < 0.2 && found[1] < 0.35 && found[2] < 0.3,
+            "{method:?}: {found:?}"
+        );
+        assert!(found[3] < 0.15 && found[4] < 0.4, "{method:?}: {found:?}");
+    }
+}
+
+#[test]
+fn on_real_dimensions_the_points_and_the_linearisation_agree() {
+    let record = run(Condition::C5, 1, 0.05, 0);
+    let [extended, unscented] = [Method::Ekf, Method::Ukf].map(|m| track(&record, &options(m), 512).unwrap());
+    for row in 0..extended.len() {
+        let (a, b) = (extended.operator(row).unwrap(), unscented.operator(row).unwrap());
+        for ((_, _, a), (_, _, b)) in a.rows()[..5].iter().zip(b.rows()) {
+            assert!(
+                (a.value - b.value).abs() < 0.5 * a.standard_error.unwrap(),
+                "{a:?} {b:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn what_has_a_model_of_the_change_takes_no_memory() {
+    use hoid::ident::tracking::{Memory, StartCovariance};
+    for method in [Method::Ekf, Method::Ukf, Method::Adaptive] {
+        let with_memory = TrackOptions {
+            memory: Some(Memory::Samples(256.0)),
+            ..options(method)
+        };
+        let with_covariance = TrackOptions {
+            covariance: StartCovariance::Multiple(0.1),
+            ..options(method)
+        };
+        assert!(with_memory.check().is_err() && with_covariance.check().is_err());
+    }
+    let other_orders = TrackOptions {
+        orders: hoid::model::Orders {
+            nf: 1,
+            ..Method::Fused.usual_orders(29)
+        },
+        ..options(Method::Fused)
+    };
+    assert!(other_orders.check().is_err());
+}
