@@ -109,6 +109,7 @@ def test_identify_a_change(run: Path, cli: Any) -> None:
              "--moving-average", 0.5],
         ),
         ({"method": "adaptive", "nk": 29}, ["--method", "adaptive", "--nk", 29]),
+        ({"method": "adaptive", "nk": 29, "smooth": True}, ["--method", "adaptive", "--nk", 29, "--smooth"]),
         (
             {"method": "rriv", "nk": 29, "nd": 1, "every": 7},
             ["--method", "rriv", "--nk", 29, "--orders", "nd=1", "--every", 7],

@@ -1,4 +1,4 @@
-"""Types: the stubs are those of the module, and a type checker accepts what people write."""
+"""Types: the stubs are those of the module, and type checkers accept what people write, also as the oldest Python reads it."""
 
 from __future__ import annotations
 
@@ -29,3 +29,7 @@ def test_the_stubs_are_those_of_the_module() -> None:
 
 def test_mypy_accepts_the_package_and_its_use(cache: list[str]) -> None:
     check("mypy", *cache)
+
+
+def test_pyright_accepts_the_package_and_its_use() -> None:
+    check("basedpyright", "--pythonpath", sys.executable)

@@ -5,6 +5,7 @@
 use hoid_ident::IdentError;
 use hoid_io::{IoError, ScenarioFileError};
 use hoid_model::{ModelError, NotConvertible};
+use hoid_report::ReportError;
 use hoid_sim::SimError;
 use hoid_study::StudyError;
 use pyo3::{PyErr, import_exception};
@@ -145,10 +146,22 @@ impl From<StudyError> for Failure {
         let text = in_python(&error.to_string());
         Self(match error {
             StudyError::Io(error) => return error.into(),
-            StudyError::Plan { .. } | StudyError::BadShard { .. } | StudyError::Pattern { .. } => {
-                OptionError::new_err(text)
-            }
+            StudyError::Plan { .. }
+            | StudyError::BadShard { .. }
+            | StudyError::Pattern { .. }
+            | StudyError::Virtual { .. } => OptionError::new_err(text),
             _ => StudyStateError::new_err(text),
         })
+    }
+}
+
+impl From<ReportError> for Failure {
+    fn from(error: ReportError) -> Self {
+        match error {
+            ReportError::Io(error) => error.into(),
+            ReportError::Study(error) => (*error).into(),
+            ReportError::UnknownItem { .. } => Self(OptionError::new_err(error.to_string())),
+            other => Self(DataError::new_err(other.to_string())),
+        }
     }
 }

@@ -1,8 +1,8 @@
-//! `hoid.read`, `hoid.write` and tables of results.
+//! `hoid.read`, `hoid.read_stretches`, `hoid.write` and tables of results.
 
 use std::{collections::BTreeMap, path::PathBuf, str::FromStr};
 
-use hoid_io::{ColumnValues, IoError, NewRate, Preparation, ReadOptions, Repair, read_prepared, write_record};
+use hoid_io::{ColumnValues, IoError, NewRate, Preparation, ReadOptions, Repair, read_stretches, write_record};
 use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyDict};
 
@@ -15,9 +15,10 @@ use crate::{
 /// What a record is made of, what was done to the numbers of the file, and the notes of its reading.
 type Read<'py> = (Bound<'py, PyDict>, Vec<String>, Vec<String>);
 
+/// The record of a file, or those between what is masked.
 #[pyfunction]
 #[pyo3(signature = (path, *, input, output, sampling_frequency, start, stop, resample, fill, detrend, drop_repeated, scale, offset, decimate,
-    new_sampling_frequency, run_in))]
+    new_sampling_frequency, run_in, mask, shortest))]
 #[allow(clippy::too_many_arguments)]
 pub fn read<'py>(
     py: Python<'py>,
@@ -36,7 +37,9 @@ pub fn read<'py>(
     decimate: Option<usize>,
     new_sampling_frequency: Option<f64>,
     run_in: f64,
-) -> Outcome<Read<'py>> {
+    mask: Vec<String>,
+    shortest: f64,
+) -> Outcome<Vec<Read<'py>>> {
     let options = ReadOptions {
         input: match input {
             Some(column) => Some(column.parse()?),
@@ -60,11 +63,20 @@ pub fn read<'py>(
         detrend: names::detrend(detrend)?,
         drop_repeated,
     };
-    let read = py.detach(|| read_prepared(&path, &options, &preparation))?;
-    let steps = read.steps.iter().map(ToString::to_string).collect();
-    let trouble = read.trouble.iter().map(ToString::to_string);
-    let notes = read.notes.iter().cloned().chain(trouble).collect();
-    Ok((parts(py, read.record)?, steps, notes))
+    let mask = mask
+        .iter()
+        .map(|name| names::trouble_kind(name))
+        .collect::<Outcome<Vec<_>>>()?;
+    let found = py.detach(|| read_stretches(&path, &options, &preparation, &mask, shortest))?;
+    found
+        .into_iter()
+        .map(|read| {
+            let steps = read.steps.iter().map(ToString::to_string).collect();
+            let trouble = read.trouble.iter().map(ToString::to_string);
+            let notes = read.notes.iter().cloned().chain(trouble).collect();
+            Ok((parts(py, read.record)?, steps, notes))
+        })
+        .collect()
 }
 
 /// Scalings and offsets by channel, as they are written on the command line.

@@ -1,7 +1,10 @@
 //! A fitted model.
 
-use hoid_ident::{Candidate, Choice, Fit, GreyBoxFit, Series, grey_box::OrderCandidate};
+use std::path::PathBuf;
+
+use hoid_ident::{Candidate, Choice, Fit, GreyBoxFit, MarginEstimates, Series, grey_box::OrderCandidate};
 use hoid_model::{ContinuousTransferFunction, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
+use hoid_report::{ModelSection, Report, known_operator, write_report};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::{
     prelude::*,
@@ -33,6 +36,14 @@ impl PyFit {
             grey_box,
             records,
         }
+    }
+
+    fn margins_with(&self, num: &[f64], den: &[f64]) -> Outcome<MarginEstimates> {
+        let element = ContinuousTransferFunction::new(num, den)?;
+        let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
+        // The sampled model says nothing above half the sampling frequency.
+        let high = high.min(self.fit.model().sample_time().nyquist_rad_s());
+        Ok(self.fit.margins(|omega| element.response(omega), (low, high)))
     }
 
     /// Runs over a record without the interpreter.
@@ -249,12 +260,41 @@ impl PyFit {
 
     /// Crossover and margins of the operator in series with a controlled element NUM/DEN by descending powers of s.
     fn margins<'py>(&self, py: Python<'py>, num: Vec<f64>, den: Vec<f64>) -> Outcome<Bound<'py, PyDict>> {
-        let element = ContinuousTransferFunction::new(&num, &den)?;
-        let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
-        // The sampled model says nothing above half the sampling frequency.
-        let high = high.min(self.fit.model().sample_time().nyquist_rad_s());
-        let found = self.fit.margins(|omega| element.response(omega), (low, high));
-        Ok(figures::margins(py, &found)?)
+        Ok(figures::margins(py, &self.margins_with(&num, &den)?)?)
+    }
+
+    /// Writes the page about the model and its records into a directory.
+    #[pyo3(signature = (records, directory, *, title, settings, controlled_element))]
+    fn report(
+        &self,
+        py: Python<'_>,
+        records: Vec<Bound<'_, PyAny>>,
+        directory: PathBuf,
+        title: String,
+        settings: Vec<(String, String)>,
+        controlled_element: Option<(Vec<f64>, Vec<f64>)>,
+    ) -> Outcome<PathBuf> {
+        let records = arrays::records(&records, Wanted::All)?;
+        let margins = controlled_element
+            .map(|(num, den)| self.margins_with(&num, &den))
+            .transpose()?;
+        let page = py.detach(|| {
+            let report = Report {
+                title,
+                settings,
+                models: vec![ModelSection {
+                    name: self.fit.title(),
+                    fit: &self.fit,
+                    records: &records,
+                    candidates: self.choice.as_ref(),
+                    truth: known_operator(&records),
+                    margins,
+                }],
+                notes: Vec::new(),
+            };
+            write_report(&directory, &report.to_html()?)
+        })?;
+        Ok(page)
     }
 
     /// The table that the model was chosen from.

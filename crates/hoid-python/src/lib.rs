@@ -13,8 +13,8 @@
 //! | `track`, `tracker` | recursive estimates, over a record and live |
 //! | `simulate` | scenarios, margins, conversions |
 //! | `describing` | describing functions |
-//! | `study` | studies and groups |
-//! | `files` | files of records and tables |
+//! | `study`, `group` | studies, the reproduction, groups |
+//! | `files`, `survey` | files of records and tables, and what is in them |
 //! | `interrupt` | long work that an interrupt can end |
 #![allow(
     missing_docs,
@@ -27,12 +27,14 @@ mod errors;
 mod figures;
 mod files;
 mod fit;
+mod group;
 mod identify;
 mod interrupt;
 mod names;
 mod recursion;
 mod simulate;
 mod study;
+mod survey;
 mod time_varying;
 mod track;
 mod tracker;
@@ -55,16 +57,19 @@ fn _hoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(files::read, module)?,
         wrap_pyfunction!(files::read_table, module)?,
         wrap_pyfunction!(files::write, module)?,
+        wrap_pyfunction!(group::group, module)?,
+        wrap_pyfunction!(group::group_manifest, module)?,
+        wrap_pyfunction!(group::simulate_group, module)?,
         wrap_pyfunction!(identify::identify, module)?,
         wrap_pyfunction!(simulate::convert_discrete, module)?,
         wrap_pyfunction!(simulate::convert_operator, module)?,
         wrap_pyfunction!(simulate::discretise_transfer_function, module)?,
         wrap_pyfunction!(simulate::margins, module)?,
         wrap_pyfunction!(simulate::simulate, module)?,
-        wrap_pyfunction!(study::group, module)?,
-        wrap_pyfunction!(study::group_manifest, module)?,
         wrap_pyfunction!(study::merge_shards, module)?,
         wrap_pyfunction!(study::plan_names, module)?,
+        wrap_pyfunction!(study::reproduce, module)?,
+        wrap_pyfunction!(survey::info, module)?,
         wrap_pyfunction!(track::track, module)?,
     ] {
         module.add_function(function)?;

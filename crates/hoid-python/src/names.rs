@@ -7,6 +7,7 @@ use hoid_ident::{
     order_search::Criterion,
     tracking::{Method, Stable},
 };
+use hoid_io::TroubleKind;
 use hoid_model::{
     Detrend, Structure, discretise, remnant::RemnantDiscretisation, remnant_gain::NoiseDefinition,
     scenario::Realisation,
@@ -27,6 +28,17 @@ pub fn word<T: Clone>(option: &str, found: &str, words: &[(&str, T)]) -> Outcome
             )))
         }
     }
+}
+
+/// What can be left out of a record.
+pub fn trouble_kind(found: &str) -> Outcome<TroubleKind> {
+    let kinds = [
+        TroubleKind::Missing,
+        TroubleKind::Gap,
+        TroubleKind::Stalled,
+        TroubleKind::Saturated,
+    ];
+    word("mask", found, &kinds.map(|kind| (kind.name(), kind)))
 }
 
 /// What `identify` fits.
@@ -151,6 +163,9 @@ pub fn tracking_method(found: &str) -> Outcome<Method> {
         ("window", Method::Window),
         ("rriv", Method::Refined),
         ("adaptive", Method::Adaptive),
+        ("fused", Method::Fused),
+        ("ekf", Method::Ekf),
+        ("ukf", Method::Ukf),
     ];
     word("method", found, &words)
 }

@@ -110,6 +110,7 @@ pub fn plan(options: &Bound<'_, PyDict>, sample_time: SampleTime) -> Outcome<Tra
         limit: get(options, "limit")?,
         largest: get(options, "largest")?.unwrap_or(defaults.largest),
         window: self::memory(options, "window")?.unwrap_or(defaults.window),
+        smooth: get(options, "smooth")?.unwrap_or(false),
         alarm: get(options, "alarm")?.unwrap_or(defaults.alarm),
         every: get(options, "refit")?.unwrap_or(defaults.every),
         ..defaults

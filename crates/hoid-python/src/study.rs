@@ -1,11 +1,10 @@
-//! `hoid.study` and `hoid.group`: plans, shards, merged tables.
+//! `hoid.study` and `hoid.reproduce`: plans, shards, merged tables.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use hoid_report::reproduction::{Reproduction, Told, reproduce as reproduce_into};
 use hoid_study::{
-    NAMED_PLANS, NamedPlan, Outcome as StudyOutcome, Plan, RunOptions, StudyError,
-    group::{Manifest, Pattern, run_group},
-    merge, run,
+    FURTHER_PLANS, NAMED_PLANS, NamedPlan, Outcome as StudyOutcome, Plan, RunOptions, StudyError, merge, run,
 };
 use pyo3::{prelude::*, types::PyDict};
 
@@ -39,7 +38,7 @@ impl PyPlan {
             (None, None, Some(name)) => match NamedPlan::find(name) {
                 Some(named) => named.plan()?,
                 None => {
-                    let known: Vec<&str> = NAMED_PLANS.iter().map(|p| p.name).collect();
+                    let known: Vec<&str> = NAMED_PLANS.iter().chain(FURTHER_PLANS).map(|p| p.name).collect();
                     return Err(bad_option(format!(
                         "there is no file and no plan of the name {name}; the plans are {}",
                         known.join(", ")
@@ -163,7 +162,11 @@ pub fn plan_names() -> Outcome<Vec<(String, String)>> {
     let one = |named: &NamedPlan| -> Result<(String, String), StudyError> {
         Ok((named.name.to_owned(), named.plan()?.title))
     };
-    Ok(NAMED_PLANS.iter().map(one).collect::<Result<_, _>>()?)
+    Ok(NAMED_PLANS
+        .iter()
+        .chain(FURTHER_PLANS)
+        .map(one)
+        .collect::<Result<_, _>>()?)
 }
 
 /// Joins the shards of a study.
@@ -173,44 +176,32 @@ pub fn merge_shards(py: Python<'_>, shards: Vec<PathBuf>, directory: PathBuf, cs
     Ok(left(py.detach(|| merge(&shards, &directory, csv))?))
 }
 
-/// Analyses the runs of a manifest.
-#[pyfunction]
-#[pyo3(signature = (manifest, directory, *, jobs, resume, csv, progress))]
-pub fn group(
-    py: Python<'_>,
-    manifest: PathBuf,
-    directory: PathBuf,
-    jobs: Option<usize>,
-    resume: bool,
-    csv: bool,
-    progress: Option<Bound<'_, PyAny>>,
-) -> Outcome<Left> {
-    let found = Manifest::read(&manifest)?;
-    let base = manifest.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
-    let options = RunOptions {
-        jobs,
-        resume,
-        csv,
-        ..RunOptions::default()
-    };
-    let runs = found.runs.iter().filter(|run| run.counts).count() as u64;
-    let outcome = interrupt::run(py, runs, progress.as_ref(), true, move |standing| {
-        run_group(
-            &found,
-            &base,
-            &directory,
-            &options,
-            &|p| standing.set(p.done, p.total),
-            &|| standing.goes_on(),
-        )
-    })?;
-    Ok(left(outcome))
-}
+/// Index page, number of tables and figures, tally of the claims.
+type Reproduced = (PathBuf, usize, Option<[usize; 4]>);
 
-/// The manifest of the files of a directory whose names match a pattern, and the files that do not.
+/// Makes the tables, figures and claims of the reference text; nothing where an interrupt came first.
 #[pyfunction]
-#[pyo3(signature = (directory, pattern))]
-pub fn group_manifest(directory: PathBuf, pattern: &str) -> Outcome<(String, Vec<String>)> {
-    let (manifest, others) = Manifest::of_directory(&directory, &Pattern::new(pattern)?)?;
-    Ok((manifest.text(), others))
+#[pyo3(signature = (directory, *, only, replications, jobs, progress))]
+pub fn reproduce(
+    py: Python<'_>,
+    directory: PathBuf,
+    only: Vec<String>,
+    replications: u64,
+    jobs: Option<usize>,
+    progress: Option<Bound<'_, PyAny>>,
+) -> Outcome<Option<Reproduced>> {
+    let wanted = Reproduction {
+        only,
+        replications,
+        jobs,
+    };
+    let found = interrupt::run(py, 0, progress.as_ref(), true, move |standing| {
+        let tell = |told: Told<'_>| {
+            if let Told::Progress(p) = told {
+                standing.set(p.done, p.total);
+            }
+        };
+        reproduce_into(&wanted, &directory, &tell, &|| standing.goes_on())
+    })?;
+    Ok(found.map(|made| (made.index, made.items, made.tally)))
 }

@@ -1,10 +1,13 @@
 //! `hoid.track`: a recursive estimate over a record.
 
+use std::path::PathBuf;
+
 use hoid_ident::{
     Choice, IdentError,
     tracking::{StartAt, Trace, TrackOptions, track as track_record},
 };
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
+use hoid_report::{BatchLine, TraceSection, TrackReport, usual_batch_fits, write_report};
 use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyDict};
 
@@ -176,8 +179,43 @@ impl PyTrace {
         figures::operator(py, &self.trace.operator(row))
     }
 
+    /// Writes the page about the trace into a directory, with the batch fits of the start and of the last third.
+    #[pyo3(signature = (record, directory, *, title, settings))]
+    fn report(
+        &self,
+        py: Python<'_>,
+        record: &Bound<'_, PyAny>,
+        directory: PathBuf,
+        title: String,
+        settings: Vec<(String, String)>,
+    ) -> Outcome<PathBuf> {
+        let record = arrays::record(record, Wanted::All)?;
+        let trace = &self.trace;
+        let page = py.detach(|| {
+            let (fits, missing) = usual_batch_fits(trace, &record);
+            let line = |((from_s, to_s), fit)| BatchLine { from_s, to_s, fit };
+            let options = trace.options();
+            let report = TrackReport {
+                title,
+                settings,
+                record: &record,
+                traces: vec![TraceSection {
+                    name: format!("{}, {}", options.method.name(), options.structure),
+                    trace,
+                    batch: fits.iter().map(|(span, fit)| line((*span, fit))).collect(),
+                }],
+                notes: missing
+                    .map(|error| format!("There is no batch fit of the last third: {error}."))
+                    .into_iter()
+                    .collect(),
+            };
+            write_report(&directory, &report.to_html()?)
+        })?;
+        Ok(page)
+    }
+
     /// Writes the columns into a file, with comments above them where the format has such.
-    fn write(&self, py: Python<'_>, path: std::path::PathBuf, comments: Vec<String>) -> Outcome<()> {
+    fn write(&self, py: Python<'_>, path: PathBuf, comments: Vec<String>) -> Outcome<()> {
         let trace = &self.trace;
         py.detach(|| {
             let operators = trace.operators();

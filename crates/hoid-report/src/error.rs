@@ -1,10 +1,12 @@
 //! Why a report could not be made.
 
+use hoid_io::IoError;
+use hoid_study::StudyError;
 use thiserror::Error;
 
 /// Everything that stops a report. A model that does not convert or a record that cannot be validated is no error: the page
 /// shows the reason in its place.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ReportError {
     /// Nothing to report.
@@ -30,10 +32,30 @@ pub enum ReportError {
         /// Name of the trace.
         name: String,
     },
+    /// A name that is neither a table nor a figure of the reproduction.
+    #[error("{name}: no table, figure or study is called so; expected {CLAIMS}, or a name, study or appendix of: {known}", CLAIMS = crate::reproduction::CLAIMS)]
+    UnknownItem {
+        /// The name.
+        name: String,
+        /// All names, separated by commas.
+        known: String,
+    },
+    /// Tables that cannot be read, or a page that cannot be written.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// A study of the reproduction that failed.
+    #[error(transparent)]
+    Study(Box<StudyError>),
     /// The page template could not be filled: a defect of this crate.
     #[error("the page template could not be filled: {reason}; please report this as a defect")]
     Template {
         /// What the template engine said.
         reason: String,
     },
+}
+
+impl From<StudyError> for ReportError {
+    fn from(error: StudyError) -> Self {
+        Self::Study(Box::new(error))
+    }
 }

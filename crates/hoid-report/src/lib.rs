@@ -1,9 +1,10 @@
-//! Figures and the report of an identification. Data in, text out: nothing here writes files or prints.
+//! Figures and the report of an identification. Data in, text out, but for two that work in directories: [`write_group_pages`] and
+//! [`reproduction::reproduce`]. Nothing here prints.
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | [`Report`], [`ModelSection`] | one self-contained HTML page about one or several fitted models |
-//! | [`TrackReport`], [`TraceSection`], [`BatchLine`] | one such page about recursive estimates over a record |
+//! | [`TrackReport`], [`TraceSection`], [`BatchLine`], [`batch_fit`], [`usual_batch_fits`] | one such page about recursive estimates over a record |
 //! | [`GroupReport`], [`GroupTables`] | one such page about a group of recorded runs |
 //! | [`figures`] | the figures of these pages, each as an SVG text of its own |
 //! | [`reproduction`] | tables, figures and claims of the reference text, from the results of studies |
@@ -20,6 +21,7 @@ mod tables;
 mod track;
 
 pub use error::ReportError;
-pub use group::{FrequencyTables, GroupReport, GroupTables};
-pub use report::{ModelSection, Report};
-pub use track::{BatchLine, TraceSection, TrackReport};
+pub use group::{FrequencyTables, GroupReport, GroupTables, write_group_pages};
+pub use page::write_report;
+pub use report::{ModelSection, Report, known_operator};
+pub use track::{BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, usual_batch_fits};

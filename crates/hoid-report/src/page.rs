@@ -1,5 +1,8 @@
-//! The templates of the pages, and how they are filled.
+//! The templates of the pages, how they are filled, and how a page is written.
 
+use std::path::{Path, PathBuf};
+
+use hoid_io::{make_directory, write_atomically};
 use minijinja::{Environment, UndefinedBehavior, Value, context};
 
 use crate::ReportError;
@@ -34,4 +37,20 @@ pub fn render(name: &str, values: Value) -> Result<String, ReportError> {
 /// Names and values for the table of settings.
 pub fn facts(pairs: &[(String, String)]) -> Vec<Value> {
     pairs.iter().map(|(label, text)| context! { label, text }).collect()
+}
+
+/// Writes a page into a directory.
+pub fn write(directory: &Path, name: &str, html: &str) -> Result<PathBuf, ReportError> {
+    let path = directory.join(name);
+    write_atomically(&path, |file| file.write_all(html.as_bytes()))?;
+    Ok(path)
+}
+
+/// Writes a page as `report.html` into a directory, which is made if it is not there.
+///
+/// # Errors
+/// [`ReportError::Io`] when it cannot be written.
+pub fn write_report(directory: &Path, html: &str) -> Result<PathBuf, ReportError> {
+    make_directory(directory)?;
+    write(directory, "report.html", html)
 }

@@ -298,7 +298,7 @@ fn a_report_without_models_is_an_error() {
         models: Vec::new(),
         notes: Vec::new(),
     };
-    assert_eq!(report.to_html(), Err(ReportError::NoModels));
+    assert!(matches!(report.to_html(), Err(ReportError::NoModels)));
 }
 
 #[test]

@@ -16,7 +16,7 @@ use hoid_sim::{Simulator, Stream};
 
 use crate::{
     columns::{OPERATOR, Rows, Schemas, extra_axes},
-    merit::{TraceErrors, Truth, variance},
+    merit::{ChangeMeasures, TraceErrors, Truth, variance},
     plan::{Cell, EstimatorCell, Plan, Task},
     prepared::prepared,
 };
@@ -87,9 +87,6 @@ pub(crate) fn run_block(
     };
     let simulator = Simulator::new(cell.resolved.scenario());
     for replication in block.first..block.first + block.count {
-        if !go_on() {
-            return None;
-        }
         let stream = Stream {
             seed: plan.seed,
             cell: cell.index,
@@ -102,7 +99,7 @@ pub(crate) fn run_block(
             ))
         });
         match run {
-            Ok((simulator, record)) => bench.estimate_all(simulator, &record, replication, done),
+            Ok((simulator, record)) => bench.estimate_all(simulator, &record, replication, done, go_on)?,
             Err(reason) => bench.fail_all(replication, &reason, done),
         }
     }
@@ -130,9 +127,20 @@ struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    fn estimate_all(&mut self, simulator: &Simulator, record: &Record, replication: u64, done: &(dyn Fn(u64) + Sync)) {
+    /// Nothing when `go_on` says no: it is asked before each estimator, some of which take a tenth of a second.
+    fn estimate_all(
+        &mut self,
+        simulator: &Simulator,
+        record: &Record,
+        replication: u64,
+        done: &(dyn Fn(u64) + Sync),
+        go_on: &(dyn Fn() -> bool + Sync),
+    ) -> Option<()> {
         self.vafs.clear();
         for (estimator, task) in self.estimators.clone() {
+            if !go_on() {
+                return None;
+            }
             self.begin(estimator, replication);
             let outcome = match task {
                 Task::Describe => self.describe(simulator, record),
@@ -146,6 +154,7 @@ impl<'a> Bench<'a> {
             }
             done(1);
         }
+        Some(())
     }
 
     fn fail_all(&mut self, replication: u64, reason: &str, done: &(dyn Fn(u64) + Sync)) {
@@ -334,6 +343,19 @@ impl<'a> Bench<'a> {
             rows.real(&format!("rms_{name}"), errors.rms_percent[i]);
             rows.real(&format!("settle50_{name}"), errors.settled_s[0][i]);
             rows.real(&format!("settle90_{name}"), errors.settled_s[1][i]);
+        }
+        if self.plan.changes {
+            let measures = ChangeMeasures::of(trace, record, self.cell);
+            for (i, name) in OPERATOR.iter().enumerate() {
+                rows.real(&format!("before_{name}"), measures.before_percent[i]);
+                rows.real(&format!("after_{name}"), measures.after_percent[i]);
+                rows.real(&format!("covered_{name}"), measures.covered_percent[i]);
+                rows.real(&format!("covered_through_{name}"), measures.covered_through_percent[i]);
+            }
+            rows.real("false_alarms", measures.false_alarms);
+            rows.real("hours", measures.hours);
+            rows.real("found", measures.found_percent);
+            rows.real("lag", measures.lag_s);
         }
         rows.whole("diverged", u64::from(errors.diverged));
         rows.whole("steps_shortened", trace.counts().shortened);

@@ -120,6 +120,12 @@ pub enum StudyError {
         /// The directory.
         directory: String,
     },
+    /// A virtual experiment would be written over another.
+    #[error("{directory} already holds an experiment; take another directory")]
+    ExperimentThere {
+        /// The directory.
+        directory: String,
+    },
     /// A virtual experiment that cannot be simulated.
     #[error("the virtual experiment cannot be simulated: {reason}")]
     Virtual {

@@ -59,7 +59,7 @@ pub struct Outcome {
 }
 
 /// Runs a study into a directory. `progress` is called from any thread after each estimate; `go_on` is asked before each
-/// replication, and what it stops can be resumed.
+/// estimate, and what it stops can be resumed.
 ///
 /// # Errors
 /// [`StudyError::Occupied`] when the directory holds a study and `resume` is not asked for, [`StudyError::OtherStudy`] when it is

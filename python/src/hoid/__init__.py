@@ -27,11 +27,18 @@ from .errors import (
     StudyStateError,
 )
 from .estimates import Estimate, Operator, Remnant
-from .identification import Fit, FrequencyResponse, Series, TimeVaryingFit, Validation, identify
-from .record import Record, read, write
+from .fit import Fit, FrequencyResponse, Series, Validation
+from .groups import group, group_manifest, simulate_group
+from .identification import identify
+from .record import Record
+from .reading import info, read, read_stretches, write
+from .reproduction import Reproduction, reproduce
 from .simulation import margins, simulate
-from .studies import Plan, Results, Table, group, group_manifest, merge, plan, plans, results, study
-from .tracking import Trace, Tracker, track
+from .studies import Plan, Results, Table, merge, plan, plans, results, study
+from .time_varying import TimeVaryingFit
+from .trace import Trace
+from .tracker import Tracker
+from .tracking import track
 
 __all__ = [
     "Conversion",
@@ -52,6 +59,7 @@ __all__ = [
     "Plan",
     "Record",
     "Remnant",
+    "Reproduction",
     "Results",
     "Series",
     "StudyStateError",
@@ -69,13 +77,17 @@ __all__ = [
     "group",
     "group_manifest",
     "identify",
+    "info",
     "margins",
     "merge",
     "plan",
     "plans",
     "read",
+    "read_stretches",
+    "reproduce",
     "results",
     "simulate",
+    "simulate_group",
     "study",
     "track",
     "write",

@@ -34,12 +34,15 @@ __all__ = [
     "group",
     "group_manifest",
     "identify",
+    "info",
     "margins",
     "merge_shards",
     "plan_names",
     "read",
     "read_table",
+    "reproduce",
     "simulate",
+    "simulate_group",
     "track",
     "write",
 ]
@@ -100,6 +103,15 @@ class Fit:
     def validate(self, record: Record) -> dict[str, Any]: ...
     def frequency_response(self, omega: _Array) -> list[_Array]: ...
     def margins(self, num: list[float], den: list[float]) -> dict[str, Any]: ...
+    def report(
+        self,
+        records: Sequence[Record],
+        directory: _Path,
+        *,
+        title: str,
+        settings: list[tuple[str, str]],
+        controlled_element: tuple[list[float], list[float]] | None,
+    ) -> Any: ...
 
 @final
 class Plan:
@@ -190,6 +202,7 @@ class Trace:
     def innovation_variance(self) -> _Array: ...
     def columns(self) -> dict[str, npt.NDArray[Any]]: ...
     def operator(self, row: int) -> dict[str, Any] | None: ...
+    def report(self, record: Record, directory: _Path, *, title: str, settings: list[tuple[str, str]]) -> Any: ...
     def write(self, path: _Path, comments: list[str]) -> None: ...
 
 @disjoint_base
@@ -269,7 +282,7 @@ def group(
     resume: bool,
     csv: bool,
     progress: _Progress,
-) -> _Left: ...
+) -> tuple[bool, int]: ...
 def group_manifest(directory: _Path, pattern: str) -> tuple[str, list[str]]: ...
 def identify(
     records: Sequence[Record],
@@ -295,6 +308,7 @@ def identify(
     tolerance: float,
     progress: _Progress,
 ) -> Fit | TimeVaryingFit: ...
+def info(path: _Path) -> dict[str, Any]: ...
 def margins(
     *,
     condition: str | None,
@@ -323,8 +337,18 @@ def read(
     decimate: int | None,
     new_sampling_frequency: float | None,
     run_in: float,
-) -> tuple[dict[str, Any], list[str], list[str]]: ...
+    mask: list[str],
+    shortest: float,
+) -> list[tuple[dict[str, Any], list[str], list[str]]]: ...
 def read_table(path: _Path) -> dict[str, Any]: ...
+def reproduce(
+    directory: _Path,
+    *,
+    only: list[str],
+    replications: int,
+    jobs: int | None,
+    progress: _Progress,
+) -> tuple[Any, int, list[int] | None] | None: ...
 def simulate(
     *,
     condition: str | None,
@@ -341,6 +365,19 @@ def simulate(
     replication: int,
     keep_run_in: bool,
 ) -> dict[str, Any]: ...
+def simulate_group(
+    directory: _Path,
+    *,
+    subjects: int,
+    conditions: list[str],
+    runs: int,
+    between_subjects: float,
+    between_runs: float,
+    remnant_order: int,
+    noise_level: float,
+    seed: int,
+    trouble: list[str],
+) -> int: ...
 def track(
     record: Record,
     options: dict[str, Any],

@@ -11,7 +11,10 @@ from typing import Any
 from .errors import DataError, OptionError
 from .record import Record
 
-__all__ = ["as_records", "bounds", "memory", "numbers", "order", "reporter", "span"]
+__all__ = ["Order", "Progress", "as_records", "bounds", "memory", "numbers", "order", "reporter", "settings", "span"]
+
+Order = int | tuple[int, int] | range
+Progress = bool | Callable[[int, int], object]
 
 
 def order(name: str, value: Any) -> tuple[int, int]:
@@ -86,6 +89,11 @@ def as_records(records: Record | Sequence[Record]) -> list[Record]:
     if not several:
         raise DataError("there is no record; give one or several")
     return several
+
+
+def settings(given: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Settings as a page lists them: what was given or has a default, by name."""
+    return [(name, str(value)) for name, value in given.items() if value is not None and value != {} and value != ()]
 
 
 def reporter(progress: Any, what: str) -> Callable[[int, int], object] | None:

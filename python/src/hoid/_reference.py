@@ -209,6 +209,7 @@ def _maps(columns: Columns) -> Figure:
     for row, quantity in enumerate(quantities):
         of_all = columns["value"][_rows(columns, quantity=quantity)]
         low, high = np.nanmin(of_all), np.nanmax(of_all)
+        mesh = None
         for ax, level in zip(grid[row], levels):
             values = np.full((len(orders), len(delays)), np.nan)
             for k in np.flatnonzero(_rows(columns, quantity=quantity, noise_level=level)):
@@ -220,7 +221,8 @@ def _maps(columns: Columns) -> Figure:
             if row == 0:
                 ax.set_title(f"$P_n$ = {level:g}")
         grid[row][0].set_ylabel("m*")
-        figure.colorbar(mesh, ax=list(grid[row]), label=str(quantity))
+        if mesh is not None:
+            figure.colorbar(mesh, ax=list(grid[row]), label=str(quantity))
     for ax in grid[-1]:
         ax.set_xlabel("nk*")
     return figure

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 from . import _options, studies
 from .errors import OptionError
-from .identification import Progress
+from ._options import Progress
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -20,9 +20,9 @@ from matplotlib.axes import Axes
 from .description import DescribingFunction
 from .errors import OptionError
 from .estimates import UNITS
-from .identification import Fit
+from .fit import Fit
 from .record import Record
-from .tracking import Trace
+from .trace import Trace
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

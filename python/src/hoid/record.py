@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
-from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["Record", "read", "write"]
+__all__ = ["Record"]
 
 
 def _read_only(array: FloatArray) -> FloatArray:
@@ -142,8 +140,19 @@ class Record:
         if times is not None:
             start = float(times[0])
         named = {name: values for name, values in columns.items() if name not in (input, output) and values.dtype.kind in "fiu"}
-        e = None if input is None else columns[input]
-        return cls(e=e, u=columns[output], sample_time=sample_time, start_time=start, **named)
+        record = cls.__new__(cls)
+        # A column may have any name, also that of a keyword.
+        record._fill(
+            e=None if input is None else signal(columns[input], input),
+            u=signal(columns[output], output),
+            sample_time=float(sample_time),
+            start_time=float(start),
+            label="",
+            units={},
+            channels={name: signal(values, name) for name, values in named.items()},
+        )
+        _hoid.check_record(record)
+        return record
 
     @property
     def time(self) -> FloatArray:
@@ -248,107 +257,3 @@ class Record:
 
 def _record_of(parts: Mapping[str, Any]) -> Record:
     return Record._of(parts)
-
-
-def read(
-    path: str | PathLike[str],
-    *,
-    input: str | None = "e",
-    output: str = "u",
-    sampling_frequency: float | None = None,
-    start: float | None = None,
-    stop: float | None = None,
-    resample: bool = False,
-    fill: bool = False,
-    drop_repeated: bool = False,
-    scale: Mapping[str, float | str] | None = None,
-    offset: Mapping[str, float | str] | None = None,
-    decimate: int | None = None,
-    new_sampling_frequency: float | None = None,
-    run_in: float = 0.0,
-    detrend: str = "none",
-) -> Record:
-    """Read a record from a CSV, Parquet, NPZ, NPY, MATLAB .mat or XDF file.
-
-    Parameters
-    ----------
-    path : path
-    input, output : str
-        Columns: a name, ``-name``, or a difference such as ``"r-y"``. ``input=None`` reads an output alone.
-    sampling_frequency : float, optional
-        Hz; without it the column ``t`` (s) gives the sampling.
-    start, stop : float, optional
-        Span to use, s; `stop` is not part of it.
-    resample : bool
-        Bring unevenly sampled data onto an even grid by linear interpolation.
-    fill : bool
-        Bridge missing values by linear interpolation.
-    drop_repeated : bool
-        Drop rows that are there twice, time included.
-    scale : mapping, optional
-        Factors by channel (``e`` and ``u`` are input and output): ``{"u": 12.5}``, into a unit ``{"u": "12.5:deg"}``, or from unit to
-        unit ``{"e": "rad:deg"}``.
-    offset : mapping, optional
-        By how much channels were recorded late: samples ``{"u": 1}`` or seconds ``{"u": "0.0167s"}``.
-    decimate : int, optional
-        Take every M-th sample, behind a low-pass filter.
-    new_sampling_frequency : float, optional
-        Another sampling frequency in Hz, behind a low-pass filter.
-    run_in : float
-        Seconds that are dropped at the beginning.
-    detrend : {"none", "mean", "linear"}
-        What is taken out of input and output, last.
-
-    Returns
-    -------
-    Record
-
-    Raises
-    ------
-    FileError
-        When the file is not there (`FileNotFoundError`) or cannot be read (`OSError`).
-    FormatError
-        When its content is not what was expected; the message names the row.
-
-    Warns
-    -----
-    UserWarning
-        What a person should know of the reading: columns left out, trouble with the sampling. What was done to the numbers stands in
-        `Record.steps`.
-    """
-    parts, steps, notes = _hoid.read(
-        path,
-        input=input,
-        output=output,
-        sampling_frequency=sampling_frequency,
-        start=start,
-        stop=stop,
-        resample=resample,
-        fill=fill,
-        detrend=detrend,
-        drop_repeated=drop_repeated,
-        scale={name: _written(value) for name, value in (scale or {}).items()},
-        offset={name: _written(value) for name, value in (offset or {}).items()},
-        decimate=decimate,
-        new_sampling_frequency=new_sampling_frequency,
-        run_in=float(run_in),
-    )
-    for note in notes:
-        warnings.warn(f"{path}: {note}", UserWarning, stacklevel=2)
-    record = Record._of(parts)
-    record.steps = steps
-    return record
-
-
-def _written(value: float | str) -> str:
-    return value if isinstance(value, str) else repr(float(value))
-
-
-def write(path: str | PathLike[str], record: Record) -> None:
-    """Write a record as CSV, Parquet, NPZ or .mat, with the digits that give the same numbers back.
-
-    Raises
-    ------
-    FileError, FormatError
-    """
-    _hoid.write(path, record)

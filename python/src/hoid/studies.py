@@ -1,4 +1,4 @@
-"""Monte Carlo studies: plans, shards, merged tables; groups of recorded runs."""
+"""Monte Carlo studies: plans, shards, merged tables."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ import numpy as np
 
 from . import _hoid, _options
 from .errors import StudyStateError
-from .identification import Progress
+from ._options import Progress
 
 if TYPE_CHECKING:
     import pandas as pd
     import polars as pl
     import pyarrow as pa
 
-__all__ = ["Plan", "Results", "Table", "group", "group_manifest", "merge", "plan", "plans", "results", "study"]
+__all__ = ["Plan", "Results", "Table", "merge", "plan", "plans", "results", "study"]
 
 Plan = _hoid.Plan
 
@@ -96,6 +96,8 @@ class Results(Mapping[str, Table]):
         False for a shard, which waits to be merged.
     estimates : int
         Estimates that this run made.
+    pages : list of Path
+        The pages beside the tables, as a group has them.
     """
 
     def __init__(self, directory: str | PathLike[str], *, finished: bool = True, estimates: int = 0) -> None:
@@ -103,6 +105,7 @@ class Results(Mapping[str, Table]):
         self.finished = finished
         self.estimates = estimates
         files = sorted([*self.directory.glob("*.parquet"), *self.directory.glob("*.csv")])
+        self.pages = sorted(self.directory.glob("*.html"))
         self._tables = {file.stem: Table(file) for file in files}
 
     def __getitem__(self, name: str) -> Table:
@@ -242,47 +245,3 @@ def results(directory: str | PathLike[str]) -> Results:
     if not found:
         raise StudyStateError(f"{directory} holds no tables: expected the directory of a finished study or group")
     return found
-
-
-def group(
-    manifest: str | PathLike[str],
-    directory: str | PathLike[str],
-    *,
-    jobs: int | None = None,
-    resume: bool = False,
-    csv: bool = False,
-    progress: Progress = False,
-) -> Results:
-    """Analyse many recorded runs by subject and condition.
-
-    Parameters
-    ----------
-    manifest : path
-        The file ``group.toml``, or the directory with it; `group_manifest` writes one.
-    directory : path
-        Where the tables are written.
-    jobs, resume, csv, progress
-        As in `study`.
-
-    Returns
-    -------
-    Results
-        ``estimates``, ``averages``, ``delays``, ``trace-averages``, ...
-
-    Raises
-    ------
-    FileError, OptionError, StudyStateError
-    """
-    file = Path(manifest)
-    file = file / "group.toml" if file.is_dir() else file
-    finished, estimates, _ = _hoid.group(
-        file, Path(directory), jobs=jobs, resume=resume, csv=csv, progress=_options.reporter(progress, "runs")
-    )
-    if not finished:
-        raise StudyStateError(f"the group was stopped; what is done is in {directory}, go on with resume=True")
-    return Results(directory, finished=finished, estimates=estimates)
-
-
-def group_manifest(directory: str | PathLike[str], pattern: str = "{subject}_{condition}_{run}.csv") -> tuple[str, list[str]]:
-    """The manifest (TOML text) of the files of a directory whose names match a pattern, and the files that do not."""
-    return _hoid.group_manifest(Path(directory), pattern)

@@ -13,18 +13,10 @@ use hoid_model::{
     scenario::{Condition, Scenario},
     uncertainty::OperatorEstimate,
 };
-use hoid_report::{BatchLine, ModelSection, Report, TraceSection, TrackReport, numbers};
+use hoid_report::{BatchLine, ModelSection, Report, TraceSection, TrackReport, known_operator, numbers, write_report};
 use hoid_sim::{Simulator, Stream};
 
-use crate::{
-    args::DemoArgs,
-    commands::{
-        identify::{write_page, write_report},
-        track::relative_errors,
-    },
-    error::CliError,
-    output, text,
-};
+use crate::{args::DemoArgs, commands::track::relative_errors, error::CliError, output, text};
 
 /// The spans of the reference text (V.B) that lie wholly before and wholly after the change, s.
 const SPANS: [(&str, f64, f64); 2] = [("before", 0.0, 30.72), ("after", 51.2, 81.92)];
@@ -158,7 +150,7 @@ fn report_of_traces(
             .collect(),
         notes: Vec::new(),
     };
-    write_page(&args.out.join("tracking"), &report.to_html()?)
+    Ok(write_report(&args.out.join("tracking"), &report.to_html()?)?)
 }
 
 /// Box-Jenkins with nk and nd searched as `hoid identify` does by default, and ARX with the same delay.
@@ -192,7 +184,7 @@ fn table(stages: &[Stage]) -> String {
             stage.choice.candidates.len(),
         ));
         let mut rows = text::table(&["operator", "true", "ARX", "Box-Jenkins", "standard error", "unit"]);
-        let truth = super::known_operator(std::slice::from_ref(&stage.record));
+        let truth = known_operator(std::slice::from_ref(&stage.record));
         let (arx, bj) = (stage.arx.operator(), bj.operator());
         match (&bj, truth) {
             (Ok(bj), Some(t)) => {
@@ -217,7 +209,7 @@ fn report(args: &DemoArgs, stages: &[Stage]) -> Result<PathBuf, CliError> {
     let mut models = Vec::new();
     for stage in stages {
         let records = std::slice::from_ref(&stage.record);
-        let truth = super::known_operator(records);
+        let truth = known_operator(records);
         for (name, fit, candidates) in [
             ("ARX", &stage.arx, None),
             ("BJ", &stage.choice.fit, Some(&stage.choice)),
@@ -248,5 +240,5 @@ fn report(args: &DemoArgs, stages: &[Stage]) -> Result<PathBuf, CliError> {
                 .to_owned(),
         ],
     };
-    write_report(&args.out, &report)
+    Ok(write_report(&args.out, &report.to_html()?)?)
 }

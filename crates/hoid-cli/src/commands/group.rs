@@ -5,11 +5,10 @@ use std::{
     sync::atomic::Ordering,
 };
 
-use hoid_io::{ColumnValues, OutputTable};
-use hoid_report::{FrequencyTables, GroupReport, GroupTables};
+use hoid_report::write_group_pages;
 use hoid_study::{
     RunOptions,
-    group::{Manifest, Pattern, VirtualExperiment, run_group, simulate_group},
+    group::{MANIFEST, Manifest, Pattern, VirtualExperiment, run_group, simulate_group},
 };
 use serde_json::json;
 
@@ -19,11 +18,6 @@ use crate::{
     error::CliError,
     output,
 };
-
-/// Name of the manifest in a directory.
-const MANIFEST: &str = "group.toml";
-/// Runs whose preparation and trouble the pages list.
-const MOST_TOLD: usize = 24;
 
 pub fn run(args: &GroupArgs) -> Result<(), CliError> {
     match (&args.command, &args.run.manifest, &args.run.out) {
@@ -36,12 +30,6 @@ pub fn run(args: &GroupArgs) -> Result<(), CliError> {
 }
 
 pub fn simulate(args: &SimulateGroupArgs) -> Result<(), CliError> {
-    if args.out.join(MANIFEST).exists() {
-        return Err(CliError::Usage(format!(
-            "{} already holds an experiment; take another directory",
-            args.out.display()
-        )));
-    }
     let experiment = VirtualExperiment {
         subjects: args.subjects,
         conditions: args.conditions.clone(),
@@ -148,8 +136,8 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
             out.display()
         )));
     }
-    let pages = write_pages(&manifest, out, &path)?;
-    let tables: Vec<String> = outcome.tables.iter().map(|t| t.display().to_string()).collect();
+    let pages = shown(&write_group_pages(&manifest, &path, out)?);
+    let tables = shown(&outcome.tables);
     if args.json {
         output::print(&format!(
             "{:#}\n",
@@ -166,102 +154,6 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     Ok(())
 }
 
-/// The page of the group and one for each subject.
-fn write_pages(manifest: &Manifest, out: &Path, path: &Path) -> Result<Vec<String>, CliError> {
-    let read = |name: &str| hoid_io::read_table(&out.join(format!("{name}.parquet")));
-    let (estimates, averages, delays) = (read("estimates")?, read("averages")?, read("delays")?);
-    let (traces, settling, responses) = (read("trace-averages")?, read("settling")?, read("response-averages")?);
-    let frequencies = if out.join("frequency-margins.parquet").exists() {
-        Some([
-            read("describing-functions")?,
-            read("frequency-margins")?,
-            read("agreement")?,
-        ])
-    } else {
-        None
-    };
-    let tables = GroupTables {
-        estimates: &estimates,
-        averages: &averages,
-        delays: &delays,
-        traces: &traces,
-        settling: &settling,
-        responses: &responses,
-        frequencies: frequencies.as_ref().map(|[lines, margins, agreement]| FrequencyTables {
-            lines,
-            margins,
-            agreement,
-        }),
-    };
-    let counting: Vec<_> = manifest.runs.iter().filter(|run| run.counts).collect();
-    let mut subjects: Vec<&str> = Vec::new();
-    for run in &counting {
-        if !subjects.contains(&run.subject.as_str()) {
-            subjects.push(&run.subject);
-        }
-    }
-    let mut settings = vec![
-        ("made by".to_owned(), format!("hoid {}", env!("CARGO_PKG_VERSION"))),
-        ("manifest".to_owned(), path.display().to_string()),
-        ("runs".to_owned(), counting.len().to_string()),
-        (
-            "input, output".to_owned(),
-            format!("{}, {}", manifest.read.input, manifest.read.output),
-        ),
-        (
-            "delay searched".to_owned(),
-            format!("{} to {} s", manifest.analysis.delay_s.0, manifest.analysis.delay_s.1),
-        ),
-        (
-            "nd searched".to_owned(),
-            format!("{} to {}", manifest.analysis.nd.0, manifest.analysis.nd.1),
-        ),
-    ];
-    settings.extend(account(&read("preparation")?, &read("trouble")?));
-    let mut pages = Vec::new();
-    for subject in std::iter::once(None).chain(subjects.iter().map(|s| Some(*s))) {
-        let page = GroupReport {
-            manifest,
-            tables,
-            settings: settings.clone(),
-            subject,
-        };
-        let plain = |name: &str| name.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
-        let name = subject.map_or("report.html".to_owned(), |subject| {
-            format!("subject-{}.html", plain(subject))
-        });
-        let html = page.html()?;
-        let path = out.join(name);
-        hoid_io::write_atomically(&path, |file| file.write_all(html.as_bytes()))?;
-        pages.push(path.display().to_string());
-    }
-    Ok(pages)
-}
-
-/// What was done to the runs and what is wrong with their sampling, one row a run.
-fn account(preparation: &OutputTable, trouble: &OutputTable) -> Vec<(String, String)> {
-    let mut rows: Vec<(String, String)> = Vec::new();
-    for (table, what) in [(preparation, "preparation"), (trouble, "sampling trouble")] {
-        let text = |name: &str| match table.column(name) {
-            Some(ColumnValues::Text(values)) => values.as_slice(),
-            _ => &[],
-        };
-        for (file, words) in text("file").iter().zip(text("what")) {
-            let name = format!("{what} of {file}");
-            match rows.iter_mut().find(|(known, _)| *known == name) {
-                Some((_, all)) => all.push_str(&format!("; {words}")),
-                None => rows.push((name, words.clone())),
-            }
-        }
-    }
-    // Long lists are in the tables.
-    let more = rows.len().saturating_sub(MOST_TOLD);
-    rows.truncate(MOST_TOLD);
-    if more > 0 {
-        rows.push((
-            "more runs".to_owned(),
-            format!("{more}; all of them are in preparation.csv and trouble.csv"),
-        ));
-    }
-    rows
+fn shown(paths: &[PathBuf]) -> Vec<String> {
+    paths.iter().map(|path| path.display().to_string()).collect()
 }

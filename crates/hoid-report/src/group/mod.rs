@@ -5,14 +5,18 @@
 //! | `estimates` | averages of the fits, chosen delays, what could not be estimated |
 //! | `describing` | describing functions with the fits over them, and where they agree |
 //! | `over_time` | recursive estimates by condition and subject, and how fast they follow a change |
+//! | `pages` | the pages of a directory of tables, one for the group and one a subject |
 
 mod describing;
 mod estimates;
 mod over_time;
+mod pages;
 
 use hoid_io::{ColumnValues, OutputTable};
 use hoid_study::group::Manifest;
 use minijinja::context;
+
+pub use pages::write_group_pages;
 
 use crate::{ReportError, page};
 

@@ -75,6 +75,11 @@ impl IndexPage {
         ];
     }
 
+    /// Claims that hold, hold in part, do not hold, cannot be tested.
+    pub fn tally(&self) -> [usize; 4] {
+        self.tally
+    }
+
     /// Adds a study.
     pub fn add_study(&mut self, study: &StudyEntry) {
         let seconds = study.seconds.map(|s| format!("{s:.1}"));

@@ -10,6 +10,7 @@
 //! | `traces` | Figs. 11, 12, G.1 to G.8, H.1 to H.12: recursive estimates | `recursive`, `recursive-arx` |
 //! | `further` | what the text leaves for later | the other plans |
 //! | `index` | the page that shows it all, with the claims | all |
+//! | `run` | all of this in a directory | |
 //!
 //! Axes, cells and grouping are those of the captions. The hue tells the method (ARX blue, Box-Jenkins vermillion), its shade the noise level or the
 //! delay, black dashes the truth. Each figure comes with its data as a table.
@@ -19,6 +20,7 @@ mod further;
 mod index;
 mod orders;
 mod responses;
+mod run;
 mod setting;
 mod starts;
 mod traces;
@@ -29,6 +31,7 @@ use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 use hoid_study::Results;
 
 pub use index::{IndexPage, StudyEntry};
+pub use run::{CLAIMS, Reproduced, Reproduction, Told, reproduce};
 
 /// Results of the named plans, by name.
 pub type Studies = BTreeMap<String, Results>;

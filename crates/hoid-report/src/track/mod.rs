@@ -6,7 +6,10 @@ mod panels;
 mod tables;
 mod truth;
 
-use hoid_ident::{Fit, tracking::Trace};
+use hoid_ident::{
+    Estimator, Fit, IdentError,
+    tracking::{StartAt, Trace},
+};
 use hoid_model::Record;
 use minijinja::{Value, context};
 
@@ -163,4 +166,42 @@ fn beyond(grid: &TraceGrid) -> Vec<Value> {
         .collect()
     };
     grid.panels.iter().flat_map(of).collect()
+}
+
+/// A batch fit and its span, s.
+pub type BatchFit = ((f64, f64), Fit);
+
+/// A fit of a span of a record with the structure and the orders of a trace.
+///
+/// # Errors
+/// Those of the fit.
+pub fn batch_fit(trace: &Trace, record: &Record, (from, to): (f64, f64)) -> Result<BatchFit, IdentError> {
+    let options = trace.options();
+    let estimator = Estimator {
+        search: options.search,
+        ..Estimator::new(options.structure, options.orders)
+    };
+    Ok(((from, to), estimator.fit(&[record.span(from, to)?])?))
+}
+
+/// The batch fits that a page compares a trace with, where none are asked for: that of the start, and one of the last third of the record; with the
+/// reason where the last third cannot be fitted.
+pub fn usual_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Option<IdentError>) {
+    let mut all = Vec::new();
+    if let (Some(start), StartAt::Span(Some((from, to)))) = (trace.start(), &trace.options().start)
+        && let Ok(span) = record.span(*from, *to)
+    {
+        all.push(((span.time_s(0), span.time_s(span.len())), start.clone()));
+    }
+    let last_third = (
+        record.time_s(record.len() - record.len() / 3),
+        record.time_s(record.len()),
+    );
+    match batch_fit(trace, record, last_third) {
+        Ok(last) => {
+            all.push(last);
+            (all, None)
+        }
+        Err(error) => (all, Some(error)),
+    }
 }

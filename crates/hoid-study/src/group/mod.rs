@@ -52,7 +52,7 @@ use crate::{
 };
 
 /// Name of the copy of the manifest beside the results.
-const MANIFEST: &str = "group.toml";
+pub const MANIFEST: &str = "group.toml";
 
 /// Analyses the runs that count. `base` is the directory from which the files are named.
 ///

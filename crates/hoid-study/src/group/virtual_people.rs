@@ -17,6 +17,7 @@ use hoid_model::{
 use hoid_sim::{Simulator, Stream};
 
 use super::{
+    MANIFEST,
     manifest::{Analysis, ConditionFacts, Manifest, Reading, RunEntry},
     preparing::Preparing,
 };
@@ -101,13 +102,18 @@ const MOST_DRAWS: usize = 100;
 /// Simulates the experiment into a directory: a file a run, `truth.csv`, `group.toml`.
 ///
 /// # Errors
-/// [`StudyError::Virtual`] for an experiment without meaning, [`StudyError::Io`].
+/// [`StudyError::Virtual`] for an experiment without meaning, [`StudyError::ExperimentThere`], [`StudyError::Io`].
 pub fn simulate_group(
     experiment: &VirtualExperiment,
     directory: &Path,
     each: &dyn Fn(),
 ) -> Result<Manifest, StudyError> {
     experiment.check()?;
+    if directory.join(MANIFEST).exists() {
+        return Err(StudyError::ExperimentThere {
+            directory: directory.display().to_string(),
+        });
+    }
     hoid_io::make_directory(directory)?;
     let mut runs = Vec::new();
     let mut truth = Rows::new(&truth_schema());
@@ -134,10 +140,7 @@ pub fn simulate_group(
     hoid_io::write_table(&directory.join("truth.csv"), &truth.into_table(Vec::new()))?;
     let facts = |condition: &Condition| {
         let scenario = Scenario::condition(*condition);
-        let change_s = match scenario.schedule {
-            hoid_model::schedule::Schedule::Constant => None,
-            hoid_model::schedule::Schedule::Sigmoid { midpoint_s, .. } => Some(midpoint_s),
-        };
+        let change_s = scenario.schedule.change_s();
         let element = scenario.initial.controlled_element;
         let facts = ConditionFacts {
             // What is controlled in the whole run.
@@ -168,7 +171,7 @@ pub fn simulate_group(
         runs,
     };
     let text = manifest.text();
-    hoid_io::write_atomically(&directory.join("group.toml"), |file| file.write_all(text.as_bytes()))?;
+    hoid_io::write_atomically(&directory.join(MANIFEST), |file| file.write_all(text.as_bytes()))?;
     Ok(manifest)
 }
 

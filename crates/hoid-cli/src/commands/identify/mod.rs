@@ -3,15 +3,12 @@
 mod change;
 mod estimate;
 
-use std::path::{Path, PathBuf};
-
 use hoid_ident::{
     Fit, MarginEstimates,
     validation::{nrmse_fit, vaf},
 };
-use hoid_io::{make_directory, write_atomically};
 use hoid_model::{ContinuousTransferFunction, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
-use hoid_report::{ModelSection, Report};
+use hoid_report::{ModelSection, Report, known_operator, write_report};
 
 use crate::{
     args::{IdentifyArgs, Kind},
@@ -95,12 +92,12 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
                 fit: &fit,
                 records: &records,
                 candidates: choice.as_ref(),
-                truth: crate::commands::known_operator(&records),
+                truth: known_operator(&records),
                 margins,
             }],
             notes: Vec::new(),
         };
-        let page = write_report(directory, &report)?;
+        let page = write_report(directory, &report.to_html()?)?;
         output::complain(&format!("report: {}", page.display()));
     }
     if args.json {
@@ -225,17 +222,4 @@ fn page(found: &Identified<'_>) -> String {
     }
     page.push_str(&text::settings(found.settings));
     page
-}
-
-/// Writes `report.html` into a directory, which is made if it is not there.
-pub fn write_report(directory: &Path, report: &Report<'_>) -> Result<PathBuf, CliError> {
-    write_page(directory, &report.to_html()?)
-}
-
-/// As [`write_report`], for the text of any page.
-pub fn write_page(directory: &Path, html: &str) -> Result<PathBuf, CliError> {
-    make_directory(directory)?;
-    let path = directory.join("report.html");
-    write_atomically(&path, |out| out.write_all(html.as_bytes()))?;
-    Ok(path)
 }

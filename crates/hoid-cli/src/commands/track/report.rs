@@ -2,22 +2,13 @@
 
 use std::path::PathBuf;
 
-use hoid_ident::{Estimator, Fit, IdentError};
-use hoid_report::{BatchLine, TraceSection, TrackReport};
+use hoid_report::{BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, usual_batch_fits, write_report};
 
 use super::result::Tracked;
-use crate::{
-    args::TrackArgs,
-    commands::{identify::write_page, reading::accounts},
-    error::CliError,
-    output,
-};
-
-/// A batch fit and its span, s.
-type Batch = ((f64, f64), Fit);
+use crate::{args::TrackArgs, commands::reading::accounts, error::CliError, output};
 
 /// Writes the page into the directory that was asked for, nothing where none was.
-pub fn write(args: &TrackArgs, tracked: &Tracked<'_>, batch: &[Batch]) -> Result<Option<PathBuf>, CliError> {
+pub fn write(args: &TrackArgs, tracked: &Tracked<'_>, batch: &[BatchFit]) -> Result<Option<PathBuf>, CliError> {
     let Some(directory) = &args.report else {
         return Ok(None);
     };
@@ -44,36 +35,26 @@ pub fn write(args: &TrackArgs, tracked: &Tracked<'_>, batch: &[Batch]) -> Result
         }],
         notes: Vec::new(),
     };
-    write_page(directory, &report.to_html()?).map(Some)
+    Ok(Some(write_report(directory, &report.to_html()?)?))
 }
 
 /// The batch fits that the page compares with: of the spans as typed, else the start fit and that of the last third. A span of the
 /// program's own choice that cannot be fitted is left out with a note.
-pub fn batch_fits(args: &TrackArgs, tracked: &Tracked<'_>) -> Result<Vec<Batch>, CliError> {
+pub fn batch_fits(args: &TrackArgs, tracked: &Tracked<'_>) -> Result<Vec<BatchFit>, CliError> {
     if args.report.is_none() {
         return Ok(Vec::new());
     }
-    let (record, options) = (tracked.record, tracked.trace.options());
-    let fit = |(from, to): (f64, f64)| -> Result<Batch, IdentError> {
-        let estimator = Estimator {
-            search: options.search,
-            ..Estimator::new(options.structure, options.orders)
-        };
-        Ok(((from, to), estimator.fit(&[record.span(from, to)?])?))
-    };
+    let (record, trace) = (tracked.record, tracked.trace);
     if !args.batch.is_empty() {
-        return Ok(args.batch.iter().map(|span| fit(*span)).collect::<Result<_, _>>()?);
+        return Ok(args
+            .batch
+            .iter()
+            .map(|span| batch_fit(trace, record, *span))
+            .collect::<Result<_, _>>()?);
     }
-    let mut all = Vec::new();
-    if let (Some(start), Some(span)) = (tracked.trace.start(), &tracked.span) {
-        all.push(((span.time_s(0), span.time_s(span.len())), start.clone()));
-    }
-    match fit((
-        record.time_s(record.len() - record.len() / 3),
-        record.time_s(record.len()),
-    )) {
-        Ok(last) => all.push(last),
-        Err(error) => output::complain(&format!("the report has no batch fit of the last third: {error}")),
+    let (all, missing) = usual_batch_fits(trace, record);
+    if let Some(error) = missing {
+        output::complain(&format!("the report has no batch fit of the last third: {error}"));
     }
     Ok(all)
 }

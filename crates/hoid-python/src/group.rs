@@ -1,0 +1,97 @@
+//! `hoid.group` and `hoid.simulate_group`: recorded runs by subject and condition, and a virtual experiment to try it on.
+
+use std::path::{Path, PathBuf};
+
+use hoid_model::scenario::Condition;
+use hoid_report::{ReportError, write_group_pages};
+use hoid_study::{
+    RunOptions,
+    group::{Manifest, Pattern, Trouble, VirtualExperiment, run_group, simulate_group as simulate_into},
+};
+use pyo3::prelude::*;
+
+use crate::{errors::Outcome, interrupt, names};
+
+/// Analyses the runs of a manifest and writes tables and pages: whether it was finished, and the estimates made.
+#[pyfunction]
+#[pyo3(signature = (manifest, directory, *, jobs, resume, csv, progress))]
+pub fn group(
+    py: Python<'_>,
+    manifest: PathBuf,
+    directory: PathBuf,
+    jobs: Option<usize>,
+    resume: bool,
+    csv: bool,
+    progress: Option<Bound<'_, PyAny>>,
+) -> Outcome<(bool, u64)> {
+    let found = Manifest::read(&manifest)?;
+    let base = manifest.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
+    let options = RunOptions {
+        jobs,
+        resume,
+        csv,
+        ..RunOptions::default()
+    };
+    let runs = found.runs.iter().filter(|run| run.counts).count() as u64;
+    let outcome = interrupt::run(py, runs, progress.as_ref(), true, move |standing| {
+        let outcome = run_group(
+            &found,
+            &base,
+            &directory,
+            &options,
+            &|p| standing.set(p.done, p.total),
+            &|| standing.goes_on(),
+        )?;
+        if outcome.finished {
+            write_group_pages(&found, &manifest, &directory)?;
+        }
+        Ok::<_, ReportError>(outcome)
+    })?;
+    Ok((outcome.finished, outcome.estimates))
+}
+
+/// The manifest of the files of a directory whose names match a pattern, and the files that do not.
+#[pyfunction]
+#[pyo3(signature = (directory, pattern))]
+pub fn group_manifest(directory: PathBuf, pattern: &str) -> Outcome<(String, Vec<String>)> {
+    let (manifest, others) = Manifest::of_directory(&directory, &Pattern::new(pattern)?)?;
+    Ok((manifest.text(), others))
+}
+
+/// Simulates the runs of a virtual experiment into a directory; their number.
+#[pyfunction]
+#[pyo3(signature = (directory, *, subjects, conditions, runs, between_subjects, between_runs, remnant_order, noise_level, seed, trouble))]
+#[allow(clippy::too_many_arguments)]
+pub fn simulate_group(
+    py: Python<'_>,
+    directory: PathBuf,
+    subjects: u64,
+    conditions: Vec<String>,
+    runs: u64,
+    between_subjects: f64,
+    between_runs: f64,
+    remnant_order: usize,
+    noise_level: f64,
+    seed: u64,
+    trouble: Vec<String>,
+) -> Outcome<usize> {
+    let experiment = VirtualExperiment {
+        subjects,
+        conditions: conditions
+            .iter()
+            .map(|name| Ok(name.parse::<Condition>()?))
+            .collect::<Outcome<_>>()?,
+        runs,
+        between_subjects,
+        between_runs,
+        remnant_order,
+        noise_level,
+        seed,
+        trouble: trouble
+            .iter()
+            .map(|name| names::word("trouble", name, &Trouble::ALL.map(|t| (t.name(), t))))
+            .collect::<Outcome<_>>()?,
+    };
+    let manifest = py.detach(|| simulate_into(&experiment, &directory, &|| ()))?;
+    Ok(manifest.runs.len())
+}

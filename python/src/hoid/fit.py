@@ -1,0 +1,402 @@
+"""A fitted model: coefficients, operator, remnant, quality, predictions, its page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _hoid, _options, _text
+from ._arrays import FloatArray, signal
+from .errors import DataError, NotConvertibleError
+from .estimates import UNITS, Estimate, Operator, Remnant, estimates
+from .record import Record
+
+if TYPE_CHECKING:
+    import control
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+__all__ = ["Correlation", "Fit", "FrequencyResponse", "Series", "Validation"]
+
+
+class Series(NamedTuple):
+    """Values on the time axis of a record, from sample `first` on: ``record.u[first:]`` belongs to `values`."""
+
+    first: int
+    values: FloatArray
+
+
+class FrequencyResponse(NamedTuple):
+    """Frequency response from e to u with its standard errors (NaN where there are none), all of shape (n,)."""
+
+    omega: FloatArray
+    magnitude_db: FloatArray
+    magnitude_db_se: FloatArray
+    phase_deg: FloatArray
+    phase_deg_se: FloatArray
+
+    @property
+    def response(self) -> npt.NDArray[np.complex128]:
+        """The complex response."""
+        phase = np.deg2rad(self.phase_deg)
+        return np.asarray(10.0 ** (self.magnitude_db / 20.0) * (np.cos(phase) + 1j * np.sin(phase)), dtype=np.complex128)
+
+
+class Correlation(NamedTuple):
+    """Correlation over lags, with the bound that 99 % of white residuals keep."""
+
+    lags: npt.NDArray[np.int64]
+    values: FloatArray
+    bound_99: float
+
+
+class Validation(NamedTuple):
+    """A model judged on a record: simulation, prediction, and tests of the residuals."""
+
+    first: int
+    simulated: FloatArray
+    predicted: FloatArray
+    quality: dict[str, float]
+    autocorrelation: Correlation
+    cross_correlation: Correlation
+    ljung_box: dict[str, float] | None
+    coloured_residuals: bool
+    under_modelled: bool
+    feedback: bool
+
+
+class Fit:
+    """A fitted model. `identify` makes it.
+
+    Attributes
+    ----------
+    records : tuple of Record
+        The records that it was fitted to.
+    settings : dict
+        The keywords that it was made with, defaults included.
+    """
+
+    def __init__(self, native: _hoid.Fit, records: Sequence[Record], settings: Mapping[str, Any] | None = None) -> None:
+        self._native = native
+        self.records: tuple[Record, ...] = tuple(records)
+        self.settings: dict[str, Any] = dict(settings or {})
+        self._quality: dict[str, float] | None = None
+
+    @property
+    def structure(self) -> str:
+        """Name of the structure, as ``"bj"`` or ``"grey-box"``."""
+        return self._native.structure
+
+    @property
+    def orders(self) -> dict[str, int]:
+        """na, nb, nc, nd, nf and nk; nb counts b0, b1, ..."""
+        return self._native.orders
+
+    @property
+    def sample_time(self) -> float:
+        """Ts in s."""
+        return self._native.sample_time
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Coefficients (or physical parameters of a grey box) by name."""
+        return {name: value for name, (value, _) in self._native.parameters}
+
+    @property
+    def standard_errors(self) -> dict[str, float | None]:
+        """Standard errors by name; None for what was fixed, rests at a bound, or was fitted exactly."""
+        return {name: error for name, (_, error) in self._native.parameters}
+
+    @property
+    def estimates(self) -> dict[str, Estimate]:
+        """Both together."""
+        return {name: Estimate(*pair) for name, pair in self._native.parameters}
+
+    @property
+    def covariance(self) -> FloatArray | None:
+        """Covariance of the parameters, shape (p, p), in the order of `parameters`; None for an exact fit."""
+        return self._native.covariance
+
+    @property
+    def polynomials(self) -> dict[str, FloatArray]:
+        """A, B, C, D and F by ascending powers of q^-1; B begins with its delay, the others with 1."""
+        return self._native.polynomials
+
+    @property
+    def loss(self) -> float:
+        """Mean square of the residuals (Ljung 1999, eq. 7.12)."""
+        return float(self._native.figures["loss"])
+
+    @property
+    def innovation_variance(self) -> float:
+        """Variance of the innovations, freed of the bias by the number of parameters."""
+        return float(self._native.figures["innovation_variance"])
+
+    @property
+    def criteria(self) -> dict[str, float | None]:
+        """aic, aicc, bic, fpe, mdl and yic."""
+        return {name: self._native.figures[name] for name in ("aic", "aicc", "bic", "fpe", "mdl", "yic")}
+
+    @property
+    def termination(self) -> dict[str, Any]:
+        """How the search ended: reason, converged, iterations, start."""
+        return self._native.termination
+
+    @property
+    def converged(self) -> bool:
+        """Whether the search converged."""
+        return bool(self._native.termination["converged"])
+
+    @property
+    def stable(self) -> bool:
+        """Whether the model is stable from e to u."""
+        return self._native.stable
+
+    @property
+    def operator(self) -> Operator | None:
+        """The human operator; None where the structure has no meaning as one."""
+        found = self._native.operator
+        return None if found is None else Operator(found)
+
+    @property
+    def operators(self) -> list[Operator | None]:
+        """The operator of each record of a grey box, whose individual parameters differ; empty for another fit."""
+        return [None if found is None else Operator(found) for found in self._native.operators]
+
+    @property
+    def remnant(self) -> Remnant | None:
+        """T_n and K_n by the inverse of the zero-order hold; None without a noise model D. See `remnant_by`."""
+        return self.remnant_by("zoh")
+
+    def remnant_by(self, discretisation: str) -> Remnant | None:
+        """T_n and K_n by the inverse of ``"zoh"`` or ``"backward-euler"``."""
+        found = self._native.remnant(discretisation)
+        return None if found is None else Remnant(found)
+
+    @property
+    def quality(self) -> dict[str, float]:
+        """VAF and NRMSE fit (both in %) of simulation and one-step prediction, over the records of the fit."""
+        if self._quality is None:
+            self._quality = self._native.quality(list(self.records))
+        return self._quality
+
+    @property
+    def candidates(self) -> list[dict[str, Any]]:
+        """The table that the model was chosen from; empty when nothing was searched."""
+        return self._native.candidates
+
+    @property
+    def delay_interval(self) -> tuple[int, int] | None:
+        """nk of the candidates that the data do not tell apart, where nk was searched."""
+        return self._native.delay_interval
+
+    @property
+    def roots(self) -> list[dict[str, Any]]:
+        """Poles and zeros with standard errors, natural frequency (rad/s) and damping."""
+        return self._native.roots
+
+    def predict(self, record: Record, horizon: int = 1) -> Series:
+        """Prediction of u, `horizon` samples ahead.
+
+        Raises
+        ------
+        DataError
+            For a record that is too short or sampled otherwise.
+        """
+        return Series(*self._native.predict(record, horizon))
+
+    def simulate(self, record: Record) -> Series:
+        """Response to e alone, from initial states that fit the record best."""
+        return Series(*self._native.simulate(record))
+
+    def residuals(self, record: Record) -> Series:
+        """One-step prediction errors."""
+        return Series(*self._native.residuals(record))
+
+    def validate(self, record: Record) -> Validation:
+        """Simulation, prediction and residual tests on a record."""
+        found = dict(self._native.validate(record))
+        found["autocorrelation"] = Correlation(*found["autocorrelation"])
+        found["cross_correlation"] = Correlation(*found["cross_correlation"])
+        return Validation(**found)
+
+    def quality_on(self, records: Record | Sequence[Record]) -> dict[str, float]:
+        """`quality` on other records."""
+        return self._native.quality(_options.as_records(records))
+
+    def frequency_response(self, omega: Any = None) -> FrequencyResponse:
+        """Frequency response from e to u.
+
+        Parameters
+        ----------
+        omega : array_like, shape (n,), optional
+            Frequencies in rad/s; default 200 from 0.1 rad/s to the Nyquist frequency.
+        """
+        if omega is None:
+            omega = np.geomspace(0.1, np.pi / self.sample_time, 200)
+        frequencies = signal(np.atleast_1d(omega) if np.isscalar(omega) else omega, "omega")
+        return FrequencyResponse(frequencies, *self._native.frequency_response(frequencies))
+
+    def margins(self, num: Sequence[float], den: Sequence[float]) -> dict[str, Estimate | None]:
+        """Crossover frequency and margins with a controlled element NUM/DEN by descending powers of s."""
+        return estimates(self._native.margins([float(v) for v in num], [float(v) for v in den]))
+
+    def to_control(self) -> control.TransferFunction:
+        """The model from e to u as a transfer function of python-control, in z.
+
+        Raises
+        ------
+        NotConvertibleError
+            For a model without an input.
+        """
+        import control
+
+        parts = self.polynomials
+        if not parts["B"].size:
+            raise NotConvertibleError("the model has no input, so that it has no transfer function from e to u")
+        num = parts["B"]
+        den = np.convolve(parts["A"], parts["F"])
+        length = max(len(num), len(den))
+        num, den = (np.pad(p, (0, length - len(p))) for p in (num, den))
+        # Zeros at the front of the numerator are the delay; equal zeros at both ends cancel.
+        while length > 1 and num[-1] == 0 and den[-1] == 0:
+            num, den, length = num[:-1], den[:-1], length - 1
+        return control.TransferFunction(num, den, self.sample_time)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Parameters, operator and remnant as a table: value, standard_error, unit."""
+        import pandas as pd
+
+        rows = self._all_rows()
+        return pd.DataFrame(
+            {
+                "value": [estimate.value for _, estimate in rows],
+                "standard_error": [np.nan if e.standard_error is None else e.standard_error for _, e in rows],
+                "unit": [UNITS.get(name, "") for name, _ in rows],
+            },
+            index=pd.Index([name for name, _ in rows], name="parameter"),
+        )
+
+    def to_xarray(self) -> xr.Dataset:
+        """Parameters and covariance over the coordinate ``parameter``."""
+        import xarray as xr
+
+        names = list(self.parameters)
+        errors = [np.nan if e is None else e for e in self.standard_errors.values()]
+        variables: dict[str, Any] = {
+            "value": ("parameter", list(self.parameters.values())),
+            "standard_error": ("parameter", errors),
+        }
+        covariance = self.covariance
+        if covariance is not None:
+            variables["covariance"] = (("parameter", "parameter_"), covariance)
+        coordinates = {"parameter": names, "parameter_": names}
+        return xr.Dataset(variables, coords=coordinates, attrs={"structure": self.structure, **self.orders})
+
+    def plot(self, record: Record | None = None, ax: Axes | None = None) -> Axes:
+        """The time response on a record, by default the first of the fit; see `hoid.plots`."""
+        from . import plots
+
+        return plots.time_response(self, record or self.records[0], ax=ax)
+
+    def report(
+        self,
+        directory: str | PathLike[str],
+        *,
+        title: str | None = None,
+        controlled_element: tuple[Sequence[float], Sequence[float]] | None = None,
+    ) -> Path:
+        """Write the page about the model, ``report.html``, into a directory, as ``hoid identify --report`` does.
+
+        Parameters
+        ----------
+        directory : path
+            It is made if it is not there.
+        title : str, optional
+            Heading of the page.
+        controlled_element : (array_like, array_like), optional
+            NUM and DEN by descending powers of s: the page then has the margins of the loop.
+
+        Returns
+        -------
+        Path
+            The page.
+
+        Raises
+        ------
+        FileError
+            When it cannot be written.
+        """
+        if not self.records:
+            raise DataError("the fit has no records, which the page is about; identify makes one that has")
+        labels = [record.label or "(unnamed)" for record in self.records]
+        what = labels[0] if len(labels) == 1 else f"{len(labels)} records"
+        element = None
+        if controlled_element is not None:
+            num, den = controlled_element
+            element = ([float(v) for v in num], [float(v) for v in den])
+        return Path(
+            self._native.report(
+                list(self.records),
+                Path(directory),
+                title=title or f"Identification of {what}",
+                settings=[("hoid", _hoid.__version__), ("records", ", ".join(labels)), *_options.settings(self.settings)],
+                controlled_element=element,
+            )
+        )
+
+    def _all_rows(self) -> list[tuple[str, Estimate]]:
+        rows = list(self.estimates.items())
+        for part in (self.operator, self.remnant):
+            if part is not None and part.convertible:
+                rows.extend((name, estimate) for name, estimate in part.items() if name not in self.parameters)
+        return rows
+
+    def summary(self) -> str:
+        """The fit as a text of tables."""
+        header = ["parameter", "value", "standard error", "unit"]
+        rows = [
+            [name, *_text.with_uncertainty(e.value, e.standard_error), UNITS.get(name, "")]
+            for name, e in self.estimates.items()
+        ]
+        parts = [self._headline(), _text.plain_table(header, rows)]
+        for part in (self.operator, self.remnant):
+            if part is not None:
+                parts.append(repr(part))
+        parts.append(self._closing())
+        return "\n\n".join(parts)
+
+    def _headline(self) -> str:
+        chosen = f", chosen from {len(self.candidates)} candidates" if self.candidates else ""
+        by = f" by {self._native.criterion.upper()}" if self._native.criterion else ""
+        return f"{self._native.title}{chosen}{by}"
+
+    def _closing(self) -> str:
+        q, t = self.quality, self.termination
+        return (
+            f"VAF {q['vaf_simulation']:.2f} % simulation, {q['vaf_prediction']:.2f} % prediction; "
+            f"NRMSE fit {q['nrmse_simulation']:.2f} %, {q['nrmse_prediction']:.2f} %\n"
+            f"BIC {_text.number(self.criteria['bic'], 7)}, loss {_text.number(self.loss)}; "
+            f"{t['reason']} after {t['iterations']} steps"
+        )
+
+    def __repr__(self) -> str:
+        return self.summary()
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        header = ["", "value", "standard error", "unit"]
+        rows = [[name, *_text.with_uncertainty(e.value, e.standard_error), UNITS.get(name, "")] for name, e in self.estimates.items()]
+        parts = [_text.html_table(self._headline(), header, rows)]
+        for part in (self.operator, self.remnant):
+            if part is not None:
+                parts.append(part._repr_html_())
+        parts.append(f"<p>{escape(self._closing())}</p>".replace("\n", "<br>"))
+        return "".join(parts)

@@ -1,0 +1,117 @@
+"""Groups of recorded runs by subject and condition, and virtual experiments to try them on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+from . import _hoid, _options
+from ._options import Progress
+from .errors import StudyStateError
+from .studies import Results
+
+__all__ = ["group", "group_manifest", "simulate_group"]
+
+
+def group(
+    manifest: str | PathLike[str],
+    directory: str | PathLike[str],
+    *,
+    jobs: int | None = None,
+    resume: bool = False,
+    csv: bool = False,
+    progress: Progress = False,
+) -> Results:
+    """Analyse many recorded runs by subject and condition.
+
+    Parameters
+    ----------
+    manifest : path
+        The file ``group.toml``, or the directory with it; `group_manifest` writes one.
+    directory : path
+        Where tables and pages are written.
+    jobs, resume, csv, progress
+        As in `study`.
+
+    Returns
+    -------
+    Results
+        ``estimates``, ``averages``, ``delays``, ``trace-averages``, ...; `Results.pages` has the page of the group, ``report.html``, and one a
+        subject.
+
+    Raises
+    ------
+    FileError, OptionError, StudyStateError
+    """
+    file = Path(manifest)
+    file = file / "group.toml" if file.is_dir() else file
+    finished, estimates = _hoid.group(
+        file, Path(directory), jobs=jobs, resume=resume, csv=csv, progress=_options.reporter(progress, "runs")
+    )
+    if not finished:
+        raise StudyStateError(f"the group was stopped; what is done is in {directory}, go on with resume=True")
+    return Results(directory, finished=finished, estimates=estimates)
+
+
+def group_manifest(directory: str | PathLike[str], pattern: str = "{subject}_{condition}_{run}.csv") -> tuple[str, list[str]]:
+    """The manifest (TOML text) of the files of a directory whose names match a pattern, and the files that do not."""
+    return _hoid.group_manifest(Path(directory), pattern)
+
+
+def simulate_group(
+    directory: str | PathLike[str],
+    *,
+    subjects: int = 3,
+    conditions: Sequence[str] = ("C1", "C2", "C3", "C4", "C5", "C6"),
+    runs: int = 5,
+    between_subjects: float = 0.1,
+    between_runs: float = 0.03,
+    remnant_order: int = 1,
+    noise_level: float = 0.1,
+    seed: int = 1,
+    trouble: Sequence[str] = (),
+) -> int:
+    """Simulate a virtual experiment: a file a run, their true parameters in ``truth.csv``, and a manifest for `group`.
+
+    Parameters
+    ----------
+    directory : path
+        It is made if it is not there.
+    subjects, runs : int
+        Subjects, and runs of each subject and condition.
+    conditions : sequence of str
+    between_subjects, between_runs : float
+        Spread of the parameters between subjects and between the runs of one, 0.1 for 10 %.
+    remnant_order : int
+    noise_level : float
+        P_n = var(u_n) / var(u).
+    seed : int
+    trouble : sequence of str
+        What is wrong with the sampling: some of ``"jitter"``, ``"missing"``, ``"repeated"``, ``"slow-clock"``, ``"saturated"``,
+        ``"quantised"`` and ``"stalled"``.
+
+    Returns
+    -------
+    int
+        Number of runs.
+
+    Raises
+    ------
+    OptionError
+        For an experiment without meaning.
+    StudyStateError
+        When the directory holds one.
+    """
+    return _hoid.simulate_group(
+        Path(directory),
+        subjects=int(subjects),
+        conditions=list(conditions),
+        runs=int(runs),
+        between_subjects=float(between_subjects),
+        between_runs=float(between_runs),
+        remnant_order=int(remnant_order),
+        noise_level=float(noise_level),
+        seed=int(seed),
+        trouble=list(trouble),
+    )

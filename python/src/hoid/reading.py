@@ -1,0 +1,234 @@
+"""Files: records read and written, and what is inside of a file."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from . import _hoid
+from .record import Record
+
+__all__ = ["info", "read", "read_stretches", "write"]
+
+if TYPE_CHECKING:
+    from typing_extensions import TypedDict, Unpack
+
+    class ReadOptions(TypedDict, total=False):
+        """The keywords of `read`."""
+
+        input: str | None
+        output: str
+        sampling_frequency: float | None
+        start: float | None
+        stop: float | None
+        resample: bool
+        fill: bool
+        drop_repeated: bool
+        scale: Mapping[str, float | str] | None
+        offset: Mapping[str, float | str] | None
+        decimate: int | None
+        new_sampling_frequency: float | None
+        run_in: float
+        detrend: str
+
+
+def read(
+    path: str | PathLike[str],
+    *,
+    input: str | None = "e",
+    output: str = "u",
+    sampling_frequency: float | None = None,
+    start: float | None = None,
+    stop: float | None = None,
+    resample: bool = False,
+    fill: bool = False,
+    drop_repeated: bool = False,
+    scale: Mapping[str, float | str] | None = None,
+    offset: Mapping[str, float | str] | None = None,
+    decimate: int | None = None,
+    new_sampling_frequency: float | None = None,
+    run_in: float = 0.0,
+    detrend: str = "none",
+) -> Record:
+    """Read a record from a CSV, Parquet, NPZ, NPY, MATLAB .mat or XDF file.
+
+    Parameters
+    ----------
+    path : path
+    input, output : str
+        Columns: a name, ``-name``, or a difference such as ``"r-y"``. ``input=None`` reads an output alone.
+    sampling_frequency : float, optional
+        Hz; without it the column ``t`` (s) gives the sampling.
+    start, stop : float, optional
+        Span to use, s; `stop` is not part of it.
+    resample : bool
+        Bring unevenly sampled data onto an even grid by linear interpolation.
+    fill : bool
+        Bridge missing values by linear interpolation.
+    drop_repeated : bool
+        Drop rows that are there twice, time included.
+    scale : mapping, optional
+        Factors by channel (``e`` and ``u`` are input and output): ``{"u": 12.5}``, into a unit ``{"u": "12.5:deg"}``, or from unit to
+        unit ``{"e": "rad:deg"}``.
+    offset : mapping, optional
+        By how much channels were recorded late: samples ``{"u": 1}`` or seconds ``{"u": "0.0167s"}``.
+    decimate : int, optional
+        Take every M-th sample, behind a low-pass filter.
+    new_sampling_frequency : float, optional
+        Another sampling frequency in Hz, behind a low-pass filter.
+    run_in : float
+        Seconds that are dropped at the beginning.
+    detrend : {"none", "mean", "linear"}
+        What is taken out of input and output, last.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    FileError
+        When the file is not there (`FileNotFoundError`) or cannot be read (`OSError`).
+    FormatError
+        When its content is not what was expected; the message names the row.
+
+    Warns
+    -----
+    UserWarning
+        What a person should know of the reading: columns left out, trouble with the sampling. What was done to the numbers stands in
+        `Record.steps`.
+    """
+    (record,) = _read(
+        path,
+        (),
+        0.0,
+        input=input,
+        output=output,
+        sampling_frequency=sampling_frequency,
+        start=start,
+        stop=stop,
+        resample=resample,
+        fill=fill,
+        drop_repeated=drop_repeated,
+        scale=scale,
+        offset=offset,
+        decimate=decimate,
+        new_sampling_frequency=new_sampling_frequency,
+        run_in=run_in,
+        detrend=detrend,
+    )
+    return record
+
+
+def read_stretches(
+    path: str | PathLike[str], mask: Sequence[str], *, shortest: float = 2.0, **options: Unpack[ReadOptions]
+) -> list[Record]:
+    """Read the stretches of a file between what is wrong with its sampling, each a record: `identify` gives each its own initial states.
+
+    What is left out is chosen by what was recorded: without the samples at a rail the largest answers are gone, which biases what is left.
+
+    Parameters
+    ----------
+    path : path
+    mask : sequence of str
+        What is left out: some of ``"missing"``, ``"gap"``, ``"stalled"`` and ``"saturated"`` (`info` tells what a file has).
+    shortest : float
+        Shortest stretch in s that is used.
+    **options
+        As in `read`.
+
+    Returns
+    -------
+    list of Record
+
+    Raises
+    ------
+    FileError, FormatError
+        As in `read`; also where no stretch is left.
+
+    Examples
+    --------
+    >>> fit = hoid.identify(hoid.read_stretches("run1.csv", ["missing", "stalled"]))
+    """
+    return _read(path, [mask] if isinstance(mask, str) else mask, shortest, **options)
+
+
+def _read(
+    path: str | PathLike[str],
+    mask: Sequence[str],
+    shortest: float,
+    *,
+    input: str | None = "e",
+    output: str = "u",
+    sampling_frequency: float | None = None,
+    start: float | None = None,
+    stop: float | None = None,
+    resample: bool = False,
+    fill: bool = False,
+    drop_repeated: bool = False,
+    scale: Mapping[str, float | str] | None = None,
+    offset: Mapping[str, float | str] | None = None,
+    decimate: int | None = None,
+    new_sampling_frequency: float | None = None,
+    run_in: float = 0.0,
+    detrend: str = "none",
+) -> list[Record]:
+    found = _hoid.read(
+        path,
+        input=input,
+        output=output,
+        sampling_frequency=sampling_frequency,
+        start=start,
+        stop=stop,
+        resample=resample,
+        fill=fill,
+        detrend=detrend,
+        drop_repeated=drop_repeated,
+        scale={name: _written(value) for name, value in (scale or {}).items()},
+        offset={name: _written(value) for name, value in (offset or {}).items()},
+        decimate=decimate,
+        new_sampling_frequency=new_sampling_frequency,
+        run_in=float(run_in),
+        mask=list(mask),
+        shortest=float(shortest),
+    )
+    records = []
+    for parts, steps, notes in found:
+        for note in notes:
+            warnings.warn(f"{path}: {note}", UserWarning, stacklevel=3)
+        record = Record._of(parts)
+        record.steps = steps
+        records.append(record)
+    return records
+
+
+def _written(value: float | str) -> str:
+    return value if isinstance(value, str) else repr(float(value))
+
+
+def write(path: str | PathLike[str], record: Record) -> None:
+    """Write a record as CSV, Parquet, NPZ or .mat, with the digits that give the same numbers back.
+
+    Raises
+    ------
+    FileError, FormatError
+    """
+    _hoid.write(path, record)
+
+
+def info(path: str | PathLike[str]) -> dict[str, Any]:
+    """What is inside of a file, before anything is identified, as ``hoid info --json`` has it.
+
+    Returns
+    -------
+    dict
+        ``format``; ``columns`` with unit, type, rows and the figures of their values; ``samplings`` with frequency, gaps and jitter;
+        ``trouble`` with what is wrong with the sampling, where, how much, and the remedy; ``notes``.
+
+    Raises
+    ------
+    FileError, FormatError
+    """
+    return _hoid.info(path)

@@ -1,0 +1,88 @@
+"""The tables, figures and claims of the reference text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import NamedTuple
+
+from . import _hoid, _options
+from ._options import Progress
+from .errors import StudyStateError
+from .studies import Results, Table
+
+__all__ = ["Reproduction", "reproduce"]
+
+
+class Reproduction(NamedTuple):
+    """What `reproduce` has made."""
+
+    #: The page that shows it all.
+    page: Path
+    #: Pictures by name, as ``figures["fig-11"]``; `hoid.plots.reference` draws them anew.
+    figures: dict[str, Path]
+    #: Tables, and the numbers of each figure, by name.
+    tables: dict[str, Table]
+    #: Results of the studies by name.
+    studies: dict[str, Results]
+    #: Claims that hold, hold in part, do not hold and cannot be tested; None where they were not asked for.
+    claims: dict[str, int] | None
+
+
+def reproduce(
+    directory: str | PathLike[str],
+    *,
+    only: Sequence[str] = (),
+    replications: int = 100,
+    jobs: int | None = None,
+    progress: Progress = False,
+) -> Reproduction:
+    """Make the tables, figures and claims of the reference text (Ortiz Moya 2023), as ``hoid reproduce`` does.
+
+    Studies that are there already are not run again, so that one that was interrupted goes on.
+
+    Parameters
+    ----------
+    directory : path
+    only : sequence of str
+        Tables, figures, appendices, studies, or ``"claims"``; default all.
+    replications : int
+        Replications of each cell.
+    jobs : int, optional
+        Threads; default one a core.
+    progress : bool or callable
+
+    Returns
+    -------
+    Reproduction
+
+    Raises
+    ------
+    OptionError
+        For a name that is neither table nor figure.
+    StudyStateError
+        When the directory holds studies with other replications.
+    """
+    if isinstance(only, str):
+        only = [only]
+    target = Path(directory)
+    made = _hoid.reproduce(
+        target,
+        only=list(only),
+        replications=int(replications),
+        jobs=jobs,
+        progress=_options.reporter(progress, "estimates"),
+    )
+    if made is None:
+        raise StudyStateError(f"the reproduction was stopped; what is done is in {target}, the same call goes on with it")
+    page, _, tally = made
+    names = ("hold", "hold in part", "do not hold", "cannot be tested")
+    data = [*(target / "tables").glob("*.csv"), *(target / "figures").glob("*.csv")]
+    return Reproduction(
+        page=Path(page),
+        figures={file.stem: file for file in sorted((target / "figures").glob("*.svg"))},
+        tables={file.stem: Table(file) for file in sorted(data, key=lambda file: file.stem)},
+        studies={found.name: Results(found) for found in sorted((target / "studies").iterdir()) if found.is_dir()},
+        claims=None if tally is None else dict(zip(names, tally, strict=True)),
+    )

@@ -1,0 +1,134 @@
+"""A fitted operator whose gains change once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _hoid, _text
+from ._arrays import FloatArray, signal
+from .estimates import Estimate, Operator
+from .fit import Series
+from .record import Record
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["TimeVaryingFit"]
+
+
+class TimeVaryingFit:
+    """A fitted operator whose gains change once, by a sigmoid. `identify` makes it with ``structure="time-varying"``."""
+
+    def __init__(
+        self, native: _hoid.TimeVaryingFit, records: Sequence[Record], settings: Mapping[str, Any] | None = None
+    ) -> None:
+        self._native = native
+        self.records: tuple[Record, ...] = tuple(records)
+        self.settings: dict[str, Any] = dict(settings or {})
+
+    structure = "time-varying"
+
+    @property
+    def estimates(self) -> dict[str, Estimate]:
+        """Parameters with their standard errors."""
+        return {name: Estimate(*pair) for name, pair, _, _ in self._native.parameters}
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Parameters by name."""
+        return {name: pair[0] for name, pair, _, _ in self._native.parameters}
+
+    @property
+    def standard_errors(self) -> dict[str, float | None]:
+        """Standard errors by name."""
+        return {name: pair[1] for name, pair, _, _ in self._native.parameters}
+
+    @property
+    def remarks(self) -> dict[str, str]:
+        """What there is to say of single parameters, as that one rests at a bound."""
+        return {name: remark for name, _, _, remark in self._native.parameters if remark is not None}
+
+    @property
+    def covariance(self) -> FloatArray | None:
+        """Covariance of the parameters, shape (p, p)."""
+        return self._native.covariance
+
+    @property
+    def loss(self) -> float:
+        """Mean square of the residuals."""
+        return float(self._native.figures["loss"])
+
+    @property
+    def innovation_variance(self) -> float:
+        """Variance of the innovations."""
+        return float(self._native.figures["innovation_variance"])
+
+    @property
+    def termination(self) -> dict[str, Any]:
+        """How the search ended."""
+        return self._native.termination
+
+    @property
+    def change(self) -> dict[str, Any]:
+        """Whether a change was found, and its comparison with the operator that does not change."""
+        return self._native.change
+
+    @property
+    def initial(self) -> Operator | None:
+        """The operator before the change."""
+        found = self._native.initial
+        return None if found is None else Operator(found)
+
+    @property
+    def last(self) -> Operator | None:
+        """The operator after the change."""
+        found = self._native.last
+        return None if found is None else Operator(found)
+
+    def gains(self, times: Any) -> dict[str, FloatArray]:
+        """``t``, K_e, T_L and K_e_dot at these times in s, with their standard errors."""
+        return self._native.gains([float(t) for t in signal(np.atleast_1d(times), "times")])
+
+    def residuals(self, record: Record) -> Series:
+        """One-step prediction errors."""
+        return Series(*self._native.residuals(record))
+
+    def simulate(self, record: Record) -> Series:
+        """Response to e alone."""
+        return Series(*self._native.simulate(record))
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Parameters as a table: value, standard_error, unit, remark."""
+        import pandas as pd
+
+        rows = self._native.parameters
+        return pd.DataFrame(
+            {
+                "value": [pair[0] for _, pair, _, _ in rows],
+                "standard_error": [np.nan if pair[1] is None else pair[1] for _, pair, _, _ in rows],
+                "unit": [unit for _, _, unit, _ in rows],
+                "remark": [remark or "" for _, _, _, remark in rows],
+            },
+            index=pd.Index([name for name, *_ in rows], name="parameter"),
+        )
+
+    def summary(self) -> str:
+        """The fit as a text table."""
+        rows = [
+            [name, *_text.with_uncertainty(*pair), unit, remark or ""] for name, pair, unit, remark in self._native.parameters
+        ]
+        found = "" if self.change["found"] else "\nThe records show no change."
+        header = ["parameter", "value", "standard error", "unit", ""]
+        return f"Operator whose gains change once (sigmoid)\n{_text.plain_table(header, rows)}{found}"
+
+    def __repr__(self) -> str:
+        return self.summary()
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [name, *_text.with_uncertainty(*pair), unit, remark or ""] for name, pair, unit, remark in self._native.parameters
+        ]
+        return _text.html_table("Operator whose gains change once (sigmoid)", ["", "value", "standard error", "unit", ""], rows)

@@ -1,0 +1,211 @@
+"""A recursive estimate over a record: columns by name, tables, figures, its page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _hoid, _options, _text
+from ._arrays import FloatArray
+from .estimates import UNITS, Estimate, Operator
+from .fit import Fit
+from .record import Record
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import polars as pl
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+__all__ = ["Trace"]
+
+
+class Trace:
+    """The estimate at every sample that was kept, with its uncertainty. `track` makes it.
+
+    Columns are read by name: ``trace["K_e"]``, ``trace["K_e_se"]`` for its standard errors; all have the shape (N,). NaN stands where a
+    row has no operator.
+
+    Attributes
+    ----------
+    record : Record
+        The record that was tracked.
+    settings : dict
+        The keywords that it was made with, defaults included.
+    """
+
+    def __init__(self, native: _hoid.Trace, record: Record, settings: Mapping[str, Any] | None = None) -> None:
+        self._native = native
+        self.record = record
+        self.settings: dict[str, Any] = dict(settings or {})
+        self._columns: dict[str, npt.NDArray[Any]] | None = None
+
+    @property
+    def columns(self) -> dict[str, npt.NDArray[Any]]:
+        """All columns by name, in the order of the file of a trace."""
+        if self._columns is None:
+            self._columns = self._native.columns()
+        return self._columns
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        try:
+            return self.columns[name]
+        except KeyError:
+            raise KeyError(f"there is no column {name}; the trace has {', '.join(self.columns)}") from None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.columns
+
+    def __len__(self) -> int:
+        return len(self._native)
+
+    @property
+    def time(self) -> FloatArray:
+        """Times of the rows in s."""
+        return self["t"]
+
+    @property
+    def method(self) -> str:
+        """The recursion."""
+        return self._native.method
+
+    @property
+    def structure(self) -> str:
+        """The structure."""
+        return self._native.structure
+
+    @property
+    def orders(self) -> dict[str, int]:
+        """na, nb, nc, nd, nf and nk."""
+        return self._native.orders
+
+    @property
+    def parameter_names(self) -> list[str]:
+        """Names of the coefficients."""
+        return self._native.parameter_names
+
+    @property
+    def operator_names(self) -> list[str]:
+        """Names of the operator's parameters."""
+        return self._native.operator_names
+
+    @property
+    def updated_from(self) -> float:
+        """Time in s from which the estimate moved."""
+        return self._native.updated_from
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """samples, skipped, steps_shortened."""
+        return self._native.counts
+
+    @property
+    def changes(self) -> list[dict[str, Any]]:
+        """The changes that ``"adaptive"`` declared: when, how long ago, the odds, and the gains before and after with standard errors."""
+        return self._native.changes
+
+    @property
+    def innovation_variance(self) -> FloatArray:
+        """Innovation variance of each row, as tracked."""
+        return self._native.innovation_variance
+
+    @property
+    def start(self) -> Fit | None:
+        """The batch fit that the recursion started from."""
+        native = self._native.start
+        if native is None:
+            return None
+        return Fit(native, [self.record])
+
+    def operator(self, row: int = -1) -> Operator | None:
+        """The operator of a row, by default the last."""
+        found = self._native.operator(row if row >= 0 else row + len(self))
+        return None if found is None else Operator(found)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """All columns with the time in s as index."""
+        import pandas as pd
+
+        columns = {name: values for name, values in self.columns.items() if name != "t"}
+        return pd.DataFrame(columns, index=pd.Index(self.time, name="t"), copy=False)
+
+    def to_polars(self) -> pl.DataFrame:
+        """All columns."""
+        import polars as pl
+
+        return pl.DataFrame(dict(self.columns))
+
+    def to_xarray(self) -> xr.Dataset:
+        """All columns over the coordinate ``t`` (s)."""
+        import xarray as xr
+
+        variables = {
+            name: ("t", values, {"units": UNITS.get(name.removesuffix("_se"), "")})
+            for name, values in self.columns.items()
+            if name != "t"
+        }
+        attributes = {"method": self.method, "structure": self.structure}
+        return xr.Dataset(variables, coords={"t": ("t", self.time, {"units": "s"})}, attrs=attributes)
+
+    def write(self, path: str | PathLike[str], comments: Sequence[str] = ()) -> None:
+        """Write the columns as CSV, Parquet, NPZ or .mat, as ``hoid track`` does."""
+        self._native.write(path, list(comments))
+
+    def plot(self, names: Sequence[str] | None = None, axes: Sequence[Axes] | None = None) -> Sequence[Axes]:
+        """The parameters over time with their bands; see `hoid.plots`."""
+        from . import plots
+
+        return plots.trace(self, names, axes=axes)
+
+    def report(self, directory: str | PathLike[str], *, title: str | None = None) -> Path:
+        """Write the page about the trace, ``report.html``, into a directory, as ``hoid track --report`` does.
+
+        It compares with batch fits of the start and of the last third of the record, and with the truth where the record has it.
+
+        Parameters
+        ----------
+        directory : path
+            It is made if it is not there.
+        title : str, optional
+            Heading of the page.
+
+        Returns
+        -------
+        Path
+            The page.
+
+        Raises
+        ------
+        FileError
+            When it cannot be written.
+        """
+        label = self.record.label or "(unnamed)"
+        facts = [("hoid", _hoid.__version__), ("record", label), *_options.settings(self.settings)]
+        title = title or f"{label} tracked by {self.method}"
+        return Path(self._native.report(self.record, Path(directory), title=title, settings=facts))
+
+    def _rows(self) -> list[list[str]]:
+        moved = np.flatnonzero(self.time >= self.updated_from)
+        first = int(moved[0]) if moved.size else 0
+        picked = np.unique(np.linspace(first, len(self) - 1, 8).round().astype(int))
+        names = self.operator_names if bool(np.any(self["convertible"])) else self.parameter_names[:6]
+        rows = []
+        for row in picked:
+            cells = [repr(Estimate(float(self[n][row]), float(self[f"{n}_se"][row]))) for n in names]
+            rows.append([f"{self.time[row]:.2f}", *cells])
+        return [["t in s", *names], *rows]
+
+    def __repr__(self) -> str:
+        if not len(self):
+            return f"Trace by {self.method}: no rows"
+        header, *rows = self._rows()
+        return f"Trace by {self.method}, {self.structure}: {len(self)} rows\n{_text.plain_table(header, rows)}"
+
+    def _repr_html_(self) -> str:
+        header, *rows = self._rows()
+        return _text.html_table(f"Trace by {self.method}, {self.structure}: {len(self)} rows", header, rows)

@@ -1,0 +1,143 @@
+"""Recursive estimates, live."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from . import _hoid, _recursion, _text
+from ._arrays import FloatArray, signal
+from ._options import Order
+from ._recursion import Memory
+from .estimates import Estimate, Operator
+from .fit import Fit
+from .record import Record
+
+__all__ = ["Tracker"]
+
+
+class Tracker(_hoid.Tracker):
+    """A recursive estimate that takes one sample at a time. It can be pickled, and goes on with the same digits.
+
+    Without a start it collects `warm_up` seconds, fits them, and goes on from there; until then `ready` is False.
+
+    Parameters
+    ----------
+    method, structure, ...
+        As in `track`.
+    sample_time : float, default 0.01
+        Ts in s.
+    warm_up : float, default 20
+        Seconds that are collected before the start fit.
+    record : Record, optional
+        A record to start from, in place of the warm-up: its fit is the start, and the filters have seen it.
+
+    Examples
+    --------
+    >>> tracker = hoid.Tracker("rpem", nk=29, nd=1, sample_time=0.01)
+    >>> for e, u in samples:
+    ...     innovation = tracker.step(e, u)
+    """
+
+    _options: dict[str, Any]
+
+    def __new__(
+        cls,
+        method: str = "physical",
+        *,
+        sample_time: float = 0.01,
+        warm_up: float = 20.0,
+        record: Record | None = None,
+        structure: str | None = None,
+        na: Order | None = None,
+        nb: Order | None = None,
+        nc: Order | None = None,
+        nd: Order | None = None,
+        nf: Order | None = None,
+        nk: Order | None = None,
+        criterion: str = "bic",
+        start: Mapping[str, float] | str | None = None,
+        memory: Memory | None = None,
+        forgetting_factor: float | None = None,
+        memory_of: Mapping[str, Memory] | None = None,
+        forgetting: str = "exponential",
+        drift: Mapping[str, float] | None = None,
+        rate: float | None = None,
+        covariance: float | None = None,
+        pseudo_linear: bool = False,
+        stable: str = "predictor",
+        bound: Mapping[str, tuple[float | None, float | None]] | None = None,
+        track_delay: tuple[float, float] | None = None,
+        window: Memory | None = None,
+        refit: int | None = None,
+        limit: float | None = None,
+        alarm: float | None = None,
+        largest: float = 1e6,
+    ) -> Tracker:
+        """See the class."""
+        options = _recursion.plain(locals())
+        samples = round(warm_up / sample_time) if sample_time > 0 else 0
+        return cls._made(options, float(sample_time), samples, record)
+
+    @classmethod
+    def _made(cls, options: dict[str, Any], sample_time: float, warm_up: int, record: Record | None) -> Tracker:
+        tracker: Tracker = super().__new__(cls, options, sample_time, max(warm_up, 0), record)
+        tracker._options = options
+        return tracker
+
+    def update(self, e: Any, u: Any, f_t: Any = None, *, update: bool = True) -> FloatArray:
+        """Take samples one after the other.
+
+        Parameters
+        ----------
+        e, u : array_like, shape (N,)
+        f_t : array_like, shape (N,), optional
+            Forcing function, which ``"rriv"`` makes its instruments of.
+        update : bool
+            False lets the filters follow, and the estimate stays.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Innovations; NaN at faults (values that are not finite or beyond `largest`) and during the warm-up.
+        """
+        reference = None if f_t is None else signal(f_t, "f_t")
+        return self.take_all(signal(e, "e"), signal(u, "u"), reference, update)
+
+    @property
+    def estimates(self) -> dict[str, Estimate]:
+        """Coefficients with their standard errors."""
+        return {name: Estimate(*pair) for name, pair in self.parameters}
+
+    @property
+    def start_fit(self) -> Fit | None:
+        """The batch fit that it started from; None when it was given a start, or came out of a pickle."""
+        native = self.start
+        return None if native is None else Fit(native, [])
+
+    def operator_estimate(self) -> Operator | None:
+        """The operator with standard errors; None where the structure has no meaning as one."""
+        found = self.operator
+        return None if found is None else Operator(found)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (_restored, (type(self), self._options, self.sample_time, *self.saved()))
+
+    def __repr__(self) -> str:
+        if not self.ready:
+            return f"Tracker by {self.method}, {self.structure}: warming up, {self.counts['samples']} samples so far"
+        rows = [[name, repr(estimate)] for name, estimate in self.estimates.items()]
+        title = f"Tracker by {self.method}, {self.structure}: {self.counts['samples']} samples"
+        return f"{title}\n{_text.plain_table(['parameter', 'estimate'], rows)}"
+
+
+def _restored(
+    kind: type[Tracker],
+    options: dict[str, Any],
+    sample_time: float,
+    orders: dict[str, int] | None,
+    numbers: FloatArray,
+) -> Tracker:
+    tracker = kind._made(options, sample_time, 1, None)
+    tracker.restore(orders, numbers)
+    return tracker
