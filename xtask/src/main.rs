@@ -6,10 +6,12 @@
 //! | `cargo xtask python [ARGUMENT...]` | the tests of the Python package alone, arguments for pytest |
 //! | `cargo xtask check` | formatting, lints, documentation of the crates and the book, as continuous integration does |
 //! | `cargo xtask book` | the book in `docs/`, into `docs/book/` (needs mdbook) |
+//! | `cargo xtask bench [OPTION...]` | the tasks of the page "Speed beside others" beside the peers that are installed, or how cost grows (module `bench`) |
 //!
-//! Nothing but the standard library: a chore must start at once on a fresh machine.
+//! Little but the standard library: a chore must start at once on a fresh machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+mod bench;
 mod python;
 
 use std::{
@@ -18,7 +20,7 @@ use std::{
     process::{Command, ExitCode, ExitStatus, Stdio},
 };
 
-const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | book";
+const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | book | bench [OPTION...]";
 
 fn main() -> ExitCode {
     let mut arguments = env::args().skip(1);
@@ -27,6 +29,7 @@ fn main() -> ExitCode {
         Some("python") => python::test(&arguments.collect::<Vec<_>>()).and_then(|counts| counts.verdict()),
         Some("check") => check(),
         Some("book") => book(),
+        Some("bench") => bench::bench(&arguments.collect::<Vec<_>>()),
         _ => Err(USAGE.to_owned()),
     };
     match outcome {

@@ -1,0 +1,81 @@
+//! The data that we and the peers share, written as plain numbers.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `record.csv` | e, u of the measurement of one run of C1, 8192 samples |
+//! | `loop.csv` | forcing function and white noise of the whole run, with its run-in |
+//! | `truth.json` | the parameters of the loop |
+//!
+//! Numbers are written so that they read back to the last bit.
+
+use std::{fmt::Write, path::Path};
+
+use hoid::prelude::*;
+
+/// Delay of the operator of C1 and its hold, samples.
+pub const NK: usize = 29;
+
+/// One run of C1 and what made it.
+pub struct Shared {
+    pub simulator: Simulator,
+    pub noise: Vec<f64>,
+    pub record: Record,
+}
+
+/// The stream of a replication.
+pub fn stream(replication: u64) -> Stream {
+    Stream {
+        seed: 1,
+        cell: 0,
+        replication,
+    }
+}
+
+impl Shared {
+    pub fn new() -> Self {
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        let noise = stream(0).white_noise(simulator.samples());
+        let record = simulator.run(stream(0), false).unwrap();
+        Self {
+            simulator,
+            noise,
+            record,
+        }
+    }
+
+    pub fn write(&self, directory: &Path) {
+        std::fs::create_dir_all(directory).unwrap();
+        columns(
+            &directory.join("record.csv"),
+            [self.record.input(), self.record.output()],
+        );
+        let whole = self.simulator.run(stream(0), true).unwrap();
+        columns(
+            &directory.join("loop.csv"),
+            [whole.channel("f_t").unwrap(), &self.noise],
+        );
+        let names = [
+            "K_e", "T_L", "omega_nm", "zeta_nm", "tau_e", "T_n", "K_n", "K_c", "omega_b",
+        ];
+        let truth: serde_json::Map<String, serde_json::Value> = names
+            .into_iter()
+            .map(|name| (name.to_owned(), self.record.channel(name).unwrap()[0].into()))
+            .chain([
+                ("Ts".to_owned(), self.record.sample_time().s().into()),
+                (
+                    "run_in".to_owned(),
+                    (self.simulator.samples() - self.record.len()).into(),
+                ),
+            ])
+            .collect();
+        std::fs::write(directory.join("truth.json"), serde_json::Value::from(truth).to_string()).unwrap();
+    }
+}
+
+fn columns(file: &Path, of: [&[f64]; 2]) {
+    let mut text = String::new();
+    for (a, b) in of[0].iter().zip(of[1]) {
+        writeln!(text, "{a},{b}").unwrap();
+    }
+    std::fs::write(file, text).unwrap();
+}

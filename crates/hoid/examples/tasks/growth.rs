@@ -1,0 +1,140 @@
+//! One point of how cost grows, in a process of its own, so that its peak memory is its own.
+//!
+//! | name | N is |
+//! |---|---|
+//! | `arx`, `bj`, `rls`, `rpem` | samples of the record; the recursions through `track`, one row a sample |
+//! | `arx parameters`, `rls parameters` | parameters, half of them of A, 8192 samples |
+//! | `bj parameters` | parameters, all but four of them of D, 8192 samples |
+//!
+//! Prints `{"seconds", "data_bytes", "before_bytes", "peak_bytes"}`: the time of one run after one to warm up (where that is short), e and u,
+//! and the largest resident memory before and after (Linux).
+
+use std::{hint::black_box, time::Instant};
+
+use hoid::{
+    ident::tracking::{Method, StartAt, StartCovariance, TrackOptions, track},
+    prelude::*,
+};
+
+use super::{data::NK, traced};
+
+/// Samples of the tables over parameters.
+const SAMPLES: usize = 8192;
+/// A run below this time is repeated, s.
+const SHORT_S: f64 = 0.3;
+
+pub fn measure(name: &str, n: usize, further: &[String]) {
+    let (samples, parameters) = match name.split_once(' ') {
+        Some((_, "parameters")) => (SAMPLES, Some(n)),
+        _ => (n, None),
+    };
+    let record = record(samples);
+    if let [file] = further {
+        return write(&record, file);
+    }
+    let work = work(name, parameters);
+    let before = resident_peak();
+    let begun = Instant::now();
+    work(&record);
+    let mut seconds = begun.elapsed().as_secs_f64();
+    let peak = resident_peak();
+    if seconds < SHORT_S {
+        let mut times: Vec<f64> = (0..(SHORT_S / seconds).clamp(3.0, 200.0) as usize)
+            .map(|_| {
+                let begun = Instant::now();
+                work(&record);
+                begun.elapsed().as_secs_f64()
+            })
+            .collect();
+        times.sort_by(f64::total_cmp);
+        seconds = times[times.len() / 2];
+    }
+    println!(
+        "{}",
+        serde_json::json!({"seconds": seconds, "data_bytes": 16 * samples, "before_bytes": before, "peak_bytes": peak})
+    );
+}
+
+fn work(name: &str, parameters: Option<usize>) -> Box<dyn Fn(&Record)> {
+    let (method, _) = name.split_once(' ').unwrap_or((name, ""));
+    let half = |p: usize| Orders {
+        na: p / 2,
+        nb: p - p / 2,
+        ..Structure::Arx.operator_orders(NK)
+    };
+    match method {
+        "arx" | "bj" => {
+            let structure = if method == "arx" {
+                Structure::Arx
+            } else {
+                Structure::BoxJenkins
+            };
+            let mut orders = structure.operator_orders(NK);
+            if let Some(p) = parameters {
+                orders = if method == "arx" {
+                    half(p)
+                } else {
+                    Orders { nd: p - 4, ..orders }
+                };
+            }
+            let estimator = Estimator::new(structure, orders);
+            Box::new(move |record| {
+                black_box(estimator.fit(std::slice::from_ref(record)).unwrap());
+            })
+        }
+        "rls" | "rpem" => {
+            let mut options = traced(if method == "rls" { Method::Rls } else { Method::Rpem });
+            if let Some(p) = parameters {
+                options = TrackOptions {
+                    start: StartAt::Theta(vec![0.0; p]),
+                    covariance: StartCovariance::Multiple(0.1),
+                    orders: half(p),
+                    ..options
+                };
+            }
+            Box::new(move |record| {
+                black_box(track(record, &options, 1).unwrap());
+            })
+        }
+        _ => panic!("unknown {name}"),
+    }
+}
+
+/// A record of the operator in an open loop: slow noise through the held operator, and autoregressive noise on the output. Made without
+/// further memory, for the memory of the estimators is in question.
+fn record(samples: usize) -> Record {
+    let mut state = 1_u64;
+    let mut uniform = move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let (mut e, mut u) = (Vec::with_capacity(samples), Vec::with_capacity(samples));
+    let (mut slow, mut w, mut noise) = ([0.0; 2], [0.0; 2], 0.0);
+    for t in 0..samples {
+        slow[0] = 0.97 * slow[0] + uniform();
+        slow[1] = 0.9 * slow[1] + 0.1 * slow[0];
+        e.push(slow[1]);
+        let at = |lag: usize| t.checked_sub(lag).map_or(0.0, |t| e[t]);
+        let response = 0.0443 * at(NK) - 0.0432 * at(NK + 1) + 1.9121 * w[0] - 0.9243 * w[1];
+        w = [response, w[0]];
+        noise = 0.85 * noise + 0.02 * uniform();
+        u.push(response + noise);
+    }
+    let (e, u) = (Channel::new("e", "deg", e), Channel::new("u", "deg", u));
+    Record::new(SampleTime::HUNDREDTH, e, u).unwrap()
+}
+
+/// Writes the record instead, for the command line.
+fn write(record: &Record, file: &str) {
+    hoid::io::write_record(std::path::Path::new(file), record).unwrap();
+}
+
+/// Largest resident memory so far, bytes; zero where the system does not say.
+fn resident_peak() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+    let kib = line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok());
+    kib.unwrap_or(0) * 1024
+}

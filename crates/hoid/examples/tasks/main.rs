@@ -1,0 +1,254 @@
+//! The tasks by which hoid is compared with what people would use instead: our side. `cargo xtask bench` runs it beside the peers in
+//! `crates/hoid/benches/peers` and makes the table of the book.
+//!
+//! `cargo run --release -p hoid --example tasks -- DIRECTORY [--task NAME,...] [--seconds S] [--reproduce M]`
+//!
+//! DIRECTORY receives the data that all share ([`data`]). One line of JSON a task: `{"task", "peer", "seconds", "answer"}`, the median of as
+//! many runs as S seconds hold (at least five). All but `reproduce` run on one thread (`RAYON_NUM_THREADS=1`).
+//!
+//! | task | what |
+//! |---|---|
+//! | `arx` | ARX, na = 2, nb = 2, nk = 29, with covariance |
+//! | `bj` | Box-Jenkins, nb = 2, nd = 1, nf = 2, nk = 29, no start given, initial states estimated, with covariance |
+//! | `rls`, `rpem` | theta after each sample, lambda = 1 - 1/256, P = 0.1, nothing else |
+//! | `rls trace`, `rpem trace` | `hoid track`: theta, its covariance, innovation and its variance after each sample |
+//! | `loop` | one run of C1 with its run-in, noise given |
+//! | `loop with noise` | the same with its normal deviates |
+//! | `cell` | 100 runs of C1, each simulated and fitted by ARX and Box-Jenkins |
+//! | `delays` | Box-Jenkins for nk = 20 to 40: the losses on common samples, and the best once more |
+//! | `reproduce` | `hoid reproduce` with M replications, on all cores |
+//!
+//! `-- DIRECTORY --growth NAME N` measures one point of how cost grows ([`growth`]).
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+mod data;
+mod growth;
+
+use std::{hint::black_box, path::Path, time::Instant};
+
+use data::{NK, Shared};
+use hoid::{
+    core::{
+        adaptation::{Covariance, Forgetting},
+        delay::DelayLine,
+        error_bars::NoBars,
+        factored::Factored,
+        predictor::{FixedShape, Regressor},
+        recursion::Stable,
+        rls::Rls,
+        rpem::Rpem,
+    },
+    ident::{
+        order_search::Criterion,
+        tracking::{Memory, Method, StartAt, StartCovariance, TrackOptions, track},
+    },
+    prelude::*,
+    report::reproduction::{Reproduction, reproduce},
+};
+
+/// Start of the recursive prediction-error method: b0, b1, d1, f1, f2.
+const RPEM_START: [f64; 5] = [0.04, -0.04, -0.8, -1.9, 0.92];
+const MEMORY: f64 = 256.0;
+const CELL_RUNS: u64 = 100;
+const TASKS: [&str; 10] = [
+    "arx",
+    "bj",
+    "rls",
+    "rpem",
+    "rls trace",
+    "rpem trace",
+    "loop",
+    "loop with noise",
+    "cell",
+    "delays",
+];
+
+fn main() {
+    let mut arguments = std::env::args().skip(1);
+    let directory = arguments.next().unwrap();
+    let directory = Path::new(&directory);
+    let (mut only, mut seconds, mut replications) = (Vec::new(), 1.0, None);
+    while let Some(option) = arguments.next() {
+        let mut value = || arguments.next().unwrap();
+        match option.as_str() {
+            "--task" => only = value().split(',').map(str::to_owned).collect(),
+            "--seconds" => seconds = value().parse().unwrap(),
+            "--reproduce" => replications = Some(value().parse().unwrap()),
+            "--growth" => return growth::measure(&value(), value().parse().unwrap(), &arguments.collect::<Vec<_>>()),
+            _ => panic!("unknown option {option}"),
+        }
+    }
+    let shared = Shared::new();
+    shared.write(directory);
+    for task in TASKS {
+        if only.is_empty() || only.iter().any(|name| name == task) {
+            let (seconds, answer) = run(task, &shared, seconds);
+            tell(task, seconds, &answer);
+        }
+    }
+    if let Some(replications) = replications {
+        let (seconds, answer) = whole_text(directory, replications);
+        tell("reproduce", seconds, &answer);
+    }
+}
+
+fn tell(task: &str, seconds: f64, answer: &[f64]) {
+    let peer = concat!("hoid ", env!("CARGO_PKG_VERSION"));
+    println!(
+        "{}",
+        serde_json::json!({"task": task, "peer": peer, "seconds": seconds, "answer": answer})
+    );
+}
+
+fn run(task: &str, shared: &Shared, seconds: f64) -> (f64, Vec<f64>) {
+    let record = shared.record.clone();
+    let one = std::slice::from_ref(&record);
+    let estimator = |structure: Structure| Estimator::new(structure, structure.operator_orders(NK));
+    let theta = |fit: &Fit| fit.model().theta().to_vec();
+    let (arx, bj) = (estimator(Structure::Arx), estimator(Structure::BoxJenkins));
+    match task {
+        "arx" => median(seconds, || theta(&arx.fit(one).unwrap())),
+        "bj" => median(seconds, || theta(&bj.fit(one).unwrap())),
+        "rls" => {
+            let mut history = Vec::with_capacity(record.len());
+            median(seconds, || rls(record.input(), record.output(), &mut history).to_vec())
+        }
+        "rpem" => {
+            let mut history = Vec::with_capacity(record.len());
+            median(seconds, || rpem(record.input(), record.output(), &mut history).to_vec())
+        }
+        "rls trace" | "rpem trace" => {
+            let method = if task == "rls trace" { Method::Rls } else { Method::Rpem };
+            let options = traced(method);
+            median(seconds, || {
+                let trace = track(&record, &options, 1).unwrap();
+                trace.theta(trace.len() - 1).to_vec()
+            })
+        }
+        "loop" => median(seconds, || shared.simulator.signals(&shared.noise).unwrap())
+            .map_answer(|signals| vec![*signals.e.last().unwrap(), *signals.u.last().unwrap()]),
+        "loop with noise" => {
+            let mut replication = 0;
+            median(seconds, || {
+                replication += 1;
+                let noise = data::stream(replication).white_noise(shared.simulator.samples());
+                shared.simulator.signals(&noise).unwrap()
+            })
+            .map_answer(|_| Vec::new())
+        }
+        "cell" => median(seconds, || {
+            let mut sums = [0.0; 9];
+            for replication in 0..CELL_RUNS {
+                let record = [shared.simulator.run(data::stream(replication), false).unwrap()];
+                let both = [theta(&arx.fit(&record).unwrap()), theta(&bj.fit(&record).unwrap())].concat();
+                sums.iter_mut().zip(both).for_each(|(sum, value)| *sum += value);
+            }
+            sums.iter().map(|sum| sum / CELL_RUNS as f64).collect()
+        }),
+        "delays" => {
+            let mut ranges = OrderRanges::from(bj.orders);
+            ranges.nk = 20..=40;
+            median(seconds, || choose_orders(&bj, &ranges, Criterion::Loss, one).unwrap()).map_answer(|choice| {
+                let losses = choice.candidates.iter().map(|c| c.outcome.as_ref().unwrap().loss);
+                losses.collect()
+            })
+        }
+        _ => panic!("unknown task {task}"),
+    }
+}
+
+/// `hoid reproduce`: the time and the number of items.
+fn whole_text(directory: &Path, replications: u64) -> (f64, Vec<f64>) {
+    let out = directory.join("reproduction");
+    let _ = std::fs::remove_dir_all(&out);
+    let wanted = Reproduction {
+        only: Vec::new(),
+        replications,
+        jobs: None,
+    };
+    let begun = Instant::now();
+    let made = reproduce(&wanted, &out, &|_| {}, &|| true).unwrap().unwrap();
+    (begun.elapsed().as_secs_f64(), vec![made.items as f64])
+}
+
+fn forgetting<const N: usize>() -> Covariance<N> {
+    let lambda = [1.0 - 1.0 / MEMORY; N];
+    Covariance::new(
+        Factored::diagonal([0.1; N]),
+        Forgetting::Exponential { lambda },
+        [f64::INFINITY; N],
+    )
+}
+
+/// Recursive least squares from zero, theta after each sample.
+pub fn rls(e: &[f64], u: &[f64], history: &mut Vec<[f64; 4]>) -> [f64; 4] {
+    history.clear();
+    let mut recursion = Rls::new(FixedShape::<2, 2, 0, 0, 0>, [0.0; 4], forgetting::<4>(), NoBars).unwrap();
+    let mut memory = [0.0; NK];
+    let mut delay = DelayLine::new(&mut memory[..]);
+    for (&e, &u) in e.iter().zip(u) {
+        recursion.step(delay.step(e), u);
+        history.push(*recursion.theta());
+    }
+    *recursion.theta()
+}
+
+/// The recursive prediction-error method for Box-Jenkins, theta after each sample.
+pub fn rpem(e: &[f64], u: &[f64], history: &mut Vec<[f64; 5]>) -> [f64; 5] {
+    history.clear();
+    let mut recursion = Rpem::<_, 5, 0, _, _>::new(
+        FixedShape::<0, 2, 0, 1, 2>,
+        Regressor::Gradient,
+        Stable::Predictor,
+        RPEM_START,
+        forgetting::<5>(),
+        NoBars,
+    )
+    .unwrap();
+    let mut memory = [0.0; NK];
+    let mut delay = DelayLine::new(&mut memory[..]);
+    for (&e, &u) in e.iter().zip(u) {
+        recursion.step(delay.step(e), u);
+        history.push(*recursion.theta());
+    }
+    *recursion.theta()
+}
+
+/// The same start and memory through `track`.
+pub fn traced(method: Method) -> TrackOptions {
+    let structure = method.usual_structure();
+    TrackOptions {
+        memory: Some(Memory::Samples(MEMORY)),
+        start: StartAt::Theta(match method {
+            Method::Rls => vec![0.0; 4],
+            _ => RPEM_START.to_vec(),
+        }),
+        covariance: StartCovariance::Multiple(0.1),
+        ..TrackOptions::new(method, structure, structure.operator_orders(NK))
+    }
+}
+
+/// What a measurement gives: median time in s, and the last answer.
+trait Measured<T> {
+    fn map_answer<U>(self, map: impl FnOnce(T) -> U) -> (f64, U);
+}
+
+impl<T> Measured<T> for (f64, T) {
+    fn map_answer<U>(self, map: impl FnOnce(T) -> U) -> (f64, U) {
+        (self.0, map(self.1))
+    }
+}
+
+/// Runs the work once to warm up and then for about `budget` seconds, at least five times.
+fn median<T>(budget: f64, mut work: impl FnMut() -> T) -> (f64, T) {
+    let begun = Instant::now();
+    let mut answer = black_box(work());
+    let mut times = Vec::new();
+    while times.len() < 5 || begun.elapsed().as_secs_f64() < budget {
+        let begun = Instant::now();
+        answer = black_box(work());
+        times.push(begun.elapsed().as_secs_f64());
+    }
+    times.sort_by(f64::total_cmp);
+    (times[times.len() / 2], answer)
+}

@@ -1,0 +1,309 @@
+//! How time and memory grow with samples, parameters, replications and threads.
+//!
+//! Each point is a process of its own. Our example says itself what its peak was; of the command line the largest resident memory is read from
+//! `/proc` while it runs (Linux; elsewhere the column is empty). The slope is that of `log time` over `log N` by least squares, from the third
+//! smallest N on, where what a run costs without data no longer counts: 1 is a straight line.
+
+use std::{
+    fmt::Write,
+    fs,
+    path::Path,
+    process::{Command, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+use serde_json::Value;
+
+use super::{
+    output,
+    table::{plain, time},
+};
+
+/// One measured point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Point {
+    n: usize,
+    seconds: f64,
+    /// Memory beyond what stood before, bytes; none where the system does not say.
+    memory: Option<u64>,
+}
+
+/// Between two looks at the memory of a child.
+const LOOK: Duration = Duration::from_millis(2);
+
+const PLAN: &str = "name = \"growth\"
+title = \"One cell: ARX and Box-Jenkins in condition C1\"
+seed = 1
+replications = 100
+
+[[scenarios]]
+name = \"constant\"
+condition = \"C1\"
+
+[[estimators]]
+name = \"ARX\"
+method = \"fit\"
+structure = \"arx\"
+orders.nk = 29
+
+[[estimators]]
+name = \"BJ\"
+method = \"fit\"
+structure = \"bj\"
+orders.nd = 1
+orders.nk = 29
+";
+
+/// All tables as Markdown; `quick` leaves out the largest points.
+///
+/// # Errors
+/// A point that cannot be measured.
+pub fn tables(tasks: &Path, hoid: &Path, work: &Path, quick: bool) -> Result<String, String> {
+    let data = work.join("data");
+    let largest = if quick { 5 } else { 7 };
+    let powers = |to: u32| (3..=to).map(|k| 10_usize.pow(k)).collect::<Vec<_>>();
+    let mut text = String::new();
+    for (name, title, unit, values) in [
+        ("arx", "ARX fit, 4 parameters", "samples", powers(largest)),
+        (
+            "bj",
+            "Box-Jenkins fit, 5 parameters, no start given",
+            "samples",
+            powers(largest),
+        ),
+        (
+            "rls",
+            "RLS by `track`, a row with standard errors a sample",
+            "samples",
+            powers(largest.min(6)),
+        ),
+        (
+            "rpem",
+            "RPEM by `track`, a row with standard errors a sample",
+            "samples",
+            powers(largest.min(6)),
+        ),
+        (
+            "arx parameters",
+            "ARX fit, 8192 samples",
+            "parameters",
+            vec![2, 4, 6, 8, 12, 16, 20],
+        ),
+        (
+            "bj parameters",
+            "Box-Jenkins fit, 8192 samples, nd = p - 4",
+            "parameters",
+            vec![5, 6, 8, 12, 16, 20],
+        ),
+        (
+            "rls parameters",
+            "RLS by `track`, 8192 samples",
+            "parameters",
+            vec![2, 4, 6, 8, 12, 16, 20],
+        ),
+    ] {
+        eprintln!("{name}");
+        let points = values
+            .into_iter()
+            .map(|n| of_tasks(tasks, &data, name, n))
+            .collect::<Result<Vec<_>, _>>()?;
+        section(&mut text, title, unit, &points);
+    }
+    let plan = work.join("growth.toml");
+    fs::write(&plan, PLAN).map_err(|e| format!("{}: {e}", plan.display()))?;
+    for threads in [1, 2] {
+        eprintln!("replications, {threads} threads");
+        let points = (0..=if quick { 3 } else { 4 })
+            .map(|k| replications(hoid, &plan, work, 10_usize.pow(k), threads))
+            .collect::<Result<Vec<_>, _>>()?;
+        let title =
+            format!("`hoid study run`: runs of C1 simulated and fitted by ARX and Box-Jenkins, threads: {threads}");
+        section(&mut text, &title, "replications", &points);
+    }
+    text += &identify(tasks, hoid, work, 10_usize.pow(largest))?;
+    Ok(text)
+}
+
+/// A point of the example `tasks`.
+fn of_tasks(tasks: &Path, data: &Path, name: &str, n: usize) -> Result<Point, String> {
+    let mut command = Command::new(tasks);
+    command
+        .arg(data)
+        .args(["--growth", name, &n.to_string()])
+        .env("RAYON_NUM_THREADS", "1");
+    let printed = output(&mut command)?;
+    let object: Value = serde_json::from_str(printed.trim()).map_err(|e| format!("{name}: {e} in {printed}"))?;
+    let number = |key: &str| object[key].as_f64().unwrap_or(0.0);
+    let (before, peak) = (number("before_bytes"), number("peak_bytes"));
+    Ok(Point {
+        n,
+        seconds: number("seconds"),
+        memory: (peak > 0.0).then_some((peak - before) as u64),
+    })
+}
+
+fn replications(hoid: &Path, plan: &Path, work: &Path, n: usize, threads: usize) -> Result<Point, String> {
+    let out = work.join("growth-study");
+    let _ = fs::remove_dir_all(&out);
+    let mut command = Command::new(hoid);
+    command.args(["study", "run"]).arg(plan).arg("--out").arg(&out).args([
+        "--replications",
+        &n.to_string(),
+        "--jobs",
+        &threads.to_string(),
+    ]);
+    let (seconds, memory) = watched(&mut command)?;
+    Ok(Point { n, seconds, memory })
+}
+
+/// `hoid identify` on a Parquet file of n samples (t, e, u).
+fn identify(tasks: &Path, hoid: &Path, work: &Path, n: usize) -> Result<String, String> {
+    let file = work.join("growth.parquet");
+    let mut write = Command::new(tasks);
+    write
+        .arg(work.join("data"))
+        .args(["--growth", "arx", &n.to_string()])
+        .arg(&file);
+    output(&mut write)?;
+    // The file holds t, e and u; the record that is made of it e and u, 8 bytes each.
+    let data = 16 * n as u64;
+    let mut text = format!(
+        "\n`hoid identify` on a Parquet file of {n} samples (e and u: {}):\n\n| fit | time | peak memory | times e and u |\n|---|---:|---:|---:|\n",
+        bytes(data)
+    );
+    for (structure, orders) in [("arx", "na=2,nb=2"), ("bj", "nb=2,nd=1,nf=2")] {
+        eprintln!("identify {structure}");
+        let mut command = Command::new(hoid);
+        command
+            .arg("identify")
+            .arg(&file)
+            .args(["--structure", structure, "--orders", orders, "--nk", "29"]);
+        let (seconds, memory) = watched(&mut command)?;
+        let (peak, factor) = memory.map_or(("-".to_owned(), "-".to_owned()), |m| {
+            (bytes(m), plain(m as f64 / data as f64))
+        });
+        let _ = writeln!(text, "| {structure} | {} | {peak} | {factor} |", time(seconds));
+    }
+    let _ = fs::remove_file(&file);
+    Ok(text)
+}
+
+/// Runs a command and gives its time and the largest resident memory that was seen.
+fn watched(command: &mut Command) -> Result<(f64, Option<u64>), String> {
+    let shown = format!("{command:?}");
+    let begun = Instant::now();
+    let mut child = command
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .map_err(|e| format!("cannot run {shown}: {e}"))?;
+    let status = format!("/proc/{}/status", child.id());
+    let mut peak = None;
+    loop {
+        peak = peak.max(fs::read_to_string(&status).ok().and_then(|text| high_water(&text)));
+        match child.try_wait().map_err(|e| format!("{shown}: {e}"))? {
+            Some(ended) if ended.success() => return Ok((begun.elapsed().as_secs_f64(), peak)),
+            Some(ended) => return Err(format!("failed ({ended}): {shown}")),
+            None => thread::sleep(LOOK),
+        }
+    }
+}
+
+/// `VmHWM` of a status file, bytes.
+fn high_water(status: &str) -> Option<u64> {
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    line.split_whitespace()
+        .next()?
+        .parse::<u64>()
+        .ok()
+        .map(|kib| 1024 * kib)
+}
+
+fn section(text: &mut String, title: &str, unit: &str, points: &[Point]) {
+    let _ = write!(
+        text,
+        "\n{title}:\n\n| {unit} | time | a unit | memory |\n|---:|---:|---:|---:|\n"
+    );
+    for point in points {
+        let memory = point.memory.map_or("-".to_owned(), bytes);
+        let _ = writeln!(
+            text,
+            "| {} | {} | {} | {memory} |",
+            point.n,
+            time(point.seconds),
+            each(point.seconds / point.n as f64)
+        );
+    }
+    let _ = writeln!(
+        text,
+        "\nSlope: {:.2}.",
+        slope(&points[points.len().saturating_sub(3).min(2)..])
+    );
+}
+
+fn each(seconds: f64) -> String {
+    if seconds < 1e-6 {
+        format!("{} ns", plain(seconds * 1e9))
+    } else {
+        time(seconds)
+    }
+}
+
+/// Slope of `log time` over `log N`.
+fn slope(points: &[Point]) -> f64 {
+    let logs: Vec<(f64, f64)> = points.iter().map(|p| ((p.n as f64).ln(), p.seconds.ln())).collect();
+    let count = logs.len() as f64;
+    let mean = |of: fn(&(f64, f64)) -> f64| logs.iter().map(of).sum::<f64>() / count;
+    let (x, y) = (mean(|l| l.0), mean(|l| l.1));
+    let along: f64 = logs.iter().map(|l| (l.0 - x) * (l.1 - y)).sum();
+    let across: f64 = logs.iter().map(|l| (l.0 - x) * (l.0 - x)).sum();
+    along / across
+}
+
+fn bytes(n: u64) -> String {
+    match n as f64 / f64::from(1 << 20) {
+        m if m >= 1024.0 => format!("{} GiB", plain(m / 1024.0)),
+        m => format!("{} MiB", plain(m)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_of_powers_are_their_exponents() {
+        for exponent in [1.0, 2.0] {
+            let points: Vec<Point> = [10_usize, 100, 1000]
+                .map(|n| Point {
+                    n,
+                    seconds: 1e-6 * (n as f64).powf(exponent),
+                    memory: None,
+                })
+                .to_vec();
+            assert!((slope(&points) - exponent).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn high_water_is_read_and_shown() {
+        assert_eq!(high_water("VmPeak:\t 9 kB\nVmHWM:\t  2048 kB\n"), Some(2 << 20));
+        assert_eq!(high_water(""), None);
+        assert_eq!(bytes(2 << 20), "2.00 MiB");
+        assert_eq!(bytes(3 << 30), "3.00 GiB");
+    }
+
+    #[test]
+    fn a_section_has_a_row_a_point() {
+        let mut text = String::new();
+        let at = |n: usize| Point {
+            n,
+            seconds: 1e-8 * n as f64,
+            memory: Some(1 << 20),
+        };
+        section(&mut text, "Fit", "samples", &[at(10), at(100), at(1000), at(10_000)]);
+        assert!(text.contains("| 1000 | 10.0 us | 10.0 ns | 1.00 MiB |"), "{text}");
+        assert!(text.contains("Slope: 1.00."), "{text}");
+    }
+}

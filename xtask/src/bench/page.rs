@@ -1,0 +1,48 @@
+//! The generated passages of the page of the book.
+
+use std::fs;
+
+const PAGE: &str = "docs/src/reference/speed-peers.md";
+
+/// Puts a text between the markers of its passage, or leaves the page as it is in a dry run.
+///
+/// # Errors
+/// A page that cannot be read or written, or that has no such markers.
+pub fn write(passage: &str, text: &str, dry: bool) -> Result<(), String> {
+    if dry {
+        return Ok(());
+    }
+    let page = fs::read_to_string(PAGE).map_err(|e| format!("{PAGE}: {e}"))?;
+    let new = replaced(&page, passage, text)?;
+    fs::write(PAGE, new).map_err(|e| format!("{PAGE}: {e}"))
+}
+
+fn replaced(page: &str, passage: &str, text: &str) -> Result<String, String> {
+    let (begin, end) = (
+        format!("<!-- generated: {passage} -->"),
+        format!("<!-- end: {passage} -->"),
+    );
+    let parts = page
+        .split_once(&begin)
+        .and_then(|(before, rest)| Some((before, rest.split_once(&end)?.1)));
+    let Some((before, after)) = parts else {
+        return Err(format!(
+            "{PAGE}: found no {begin} ... {end}; put them where the table belongs"
+        ));
+    };
+    Ok(format!("{before}{begin}\n\n{}\n\n{end}{after}", text.trim()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_passage_is_replaced_and_nothing_else() {
+        let page = "a\n<!-- generated: x -->\nold\n<!-- end: x -->\nb\n";
+        let once = replaced(page, "x", "new\n").unwrap();
+        assert_eq!(once, "a\n<!-- generated: x -->\n\nnew\n\n<!-- end: x -->\nb\n");
+        assert_eq!(replaced(&once, "x", "new").unwrap(), once);
+        assert!(replaced(page, "y", "new").is_err());
+    }
+}

@@ -1,0 +1,161 @@
+//! The table of ratios.
+
+use std::fmt::Write;
+
+use super::lines::{Line, Outcome, difference};
+
+/// Answers closer than this are the same.
+const SAME: f64 = 1e-6;
+
+/// What the project demands of its own speed: the ratio to a peer whose name contains all the words, at least.
+const LIMITS: [(&str, &str, f64); 15] = [
+    ("arx", "normal equations", 10.0),
+    ("arx", "numba", 2.0),
+    ("bj", "own LM", 7.0),
+    ("bj", "numba", 1.4),
+    ("bj", "pysib", 1000.0),
+    ("bj", "sippy", 1000.0),
+    ("bj", "timeseries", 1000.0),
+    ("rls", "padasip", 500.0),
+    ("rls", "numba", 1.0),
+    ("rpem", "numpy", 350.0),
+    ("rpem", "numba", 1.0),
+    ("loop with noise", "numba", 6.0),
+    ("cell", "numba", 4.0),
+    ("cell", "own LM", 20.0),
+    ("reproduce, M = 100", "", 0.0),
+];
+
+/// One row a task and peer, ours first, with versions and machine below.
+pub fn ratios(lines: &[Line], machine: &str) -> String {
+    let mut text = String::from(
+        "| task | hoid | peer | its time | ratio | at least | answers |\n|---|---:|---|---:|---:|---:|---|\n",
+    );
+    let mut skipped = String::new();
+    for line in lines {
+        if let Outcome::Skipped(reason) = &line.outcome {
+            let of = if line.task.is_empty() { "all" } else { &line.task };
+            // A list of Markdown on one line each.
+            let _ = writeln!(skipped, "- {}, {of}: {}", line.peer, reason.replace(['\n', '|'], " "));
+        }
+    }
+    for own in lines.iter().filter(|line| line.is_ours()) {
+        let Outcome::Measured { seconds, answer, .. } = &own.outcome else {
+            continue;
+        };
+        let peers: Vec<&Line> = lines.iter().filter(|l| l.task == own.task && !l.is_ours()).collect();
+        let mut alone = true;
+        for peer in peers {
+            let Outcome::Measured {
+                seconds: theirs,
+                answer: other,
+                differs,
+            } = &peer.outcome
+            else {
+                continue;
+            };
+            alone = false;
+            let ratio = theirs / seconds;
+            let limit = LIMITS
+                .iter()
+                .find(|(task, words, _)| *task == own.task && peer.peer.contains(words));
+            let asked = limit.map_or(String::new(), |(_, _, least)| {
+                let missed = if ratio < *least { " (missed)" } else { "" };
+                format!("{}{missed}", plain(*least))
+            });
+            let answers = answers(answer, other, differs.as_deref());
+            let _ = writeln!(
+                text,
+                "| {} | {} | {} | {} | {} | {asked} | {answers} |",
+                own.task,
+                time(*seconds),
+                peer.peer,
+                time(*theirs),
+                plain(ratio)
+            );
+        }
+        if alone {
+            let _ = writeln!(text, "| {} | {} | | | | | |", own.task, time(*seconds));
+        }
+    }
+    let version = lines.iter().find(|l| l.is_ours()).map_or("", |l| l.peer.as_str());
+    let _ = write!(text, "\n{version} on {machine}.\n");
+    if !skipped.is_empty() {
+        let _ = write!(text, "\nNot measured:\n\n{skipped}");
+    }
+    text
+}
+
+fn answers(ours: &[f64], theirs: &[f64], differs: Option<&str>) -> String {
+    match (difference(ours, theirs), differs) {
+        (Some(d), None) if d <= SAME => format!("same to {d:.0e}"),
+        (Some(d), None) => format!("**differ by {d:.0e}**"),
+        (Some(d), Some(why)) => format!("{why} ({d:.0e})"),
+        (None, Some(why)) => why.to_owned(),
+        (None, None) => "random".to_owned(),
+    }
+}
+
+/// Seconds with a unit and three digits.
+pub fn time(seconds: f64) -> String {
+    let (value, unit) = match seconds {
+        s if s < 1e-3 => (s * 1e6, "us"),
+        s if s < 1.0 => (s * 1e3, "ms"),
+        s => (s, "s"),
+    };
+    format!("{} {unit}", plain(value))
+}
+
+/// About three digits.
+pub fn plain(value: f64) -> String {
+    match value.abs() {
+        v if v >= 100.0 => format!("{value:.0}"),
+        v if v >= 10.0 => format!("{value:.1}"),
+        _ => format!("{value:.2}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(task: &str, peer: &str, seconds: f64, answer: &[f64], differs: Option<&str>) -> Line {
+        Line {
+            task: task.to_owned(),
+            peer: peer.to_owned(),
+            outcome: Outcome::Measured {
+                seconds,
+                answer: answer.to_vec(),
+                differs: differs.map(str::to_owned),
+            },
+        }
+    }
+
+    #[test]
+    fn ratios_limits_and_answers_stand_in_the_table() {
+        let skipped = Line {
+            task: "bj".to_owned(),
+            peer: "z".to_owned(),
+            outcome: Outcome::Skipped("no | module".to_owned()),
+        };
+        let lines = [
+            line("arx", "hoid 0.1.0", 1e-5, &[1.0], None),
+            line("rls trace", "hoid 0.1.0", 2.5e-4, &[1.0], None),
+            line("arx", "numba 1", 1.5e-5, &[1.0 + 1e-9], None),
+            line("arx", "numpy 2, normal equations", 2e-4, &[1.1], None),
+            line("arx", "other", 1e-2, &[1.1], Some("zeros before the record")),
+            skipped,
+        ];
+        let text = ratios(&lines, "a machine");
+        for part in [
+            "| arx | 10.0 us | numba 1 | 15.0 us | 1.50 | 2.00 (missed) | same to 1e-9 |",
+            "| arx | 10.0 us | numpy 2, normal equations | 200 us | 20.0 | 10.0 | **differ by 9e-2** |",
+            "| arx | 10.0 us | other | 10.0 ms | 1000 |  | zeros before the record (9e-2) |",
+            "| rls trace | 250 us | | | | | |",
+            "hoid 0.1.0 on a machine.",
+            "- z, bj: no   module",
+        ] {
+            assert!(text.contains(part), "{part}\n{text}");
+        }
+    }
+}
