@@ -243,17 +243,24 @@ fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum()
 }
 
-/// `sum_t x(t) y(t - k)` over the overlap, for `|k|` below the length.
-fn covariance_at(x: &[f64], y: &[f64], lag: i64) -> f64 {
-    let k = lag.unsigned_abs() as usize;
-    if k >= x.len() {
-        return 0.0;
+/// Samples that are multiplied with all lags before the next ones: they stay in the memory near the processor.
+const BLOCK: usize = 8192;
+
+/// `sum_t x(t) y(t - k)` over the overlap, for each lag k; both have the same length.
+fn covariances_at(x: &[f64], y: &[f64], lags: &[i64]) -> Vec<f64> {
+    let n = x.len();
+    let mut sums = vec![0.0; lags.len()];
+    for from in (0..n).step_by(BLOCK) {
+        for (sum, &lag) in sums.iter_mut().zip(lags) {
+            let (late, early) = (lag.max(0).unsigned_abs() as usize, lag.min(0).unsigned_abs() as usize);
+            let first = from.max(late);
+            let end = (from + BLOCK).min(n.saturating_sub(early));
+            if first < end {
+                *sum += dot(&x[first..end], &y[first + early - late..end + early - late]);
+            }
+        }
     }
-    if lag >= 0 {
-        dot(&x[k..], &y[..y.len() - k])
-    } else {
-        dot(&x[..x.len() - k], &y[k..])
-    }
+    sums
 }
 
 fn centred(x: &[f64]) -> Vec<f64> {
@@ -261,21 +268,20 @@ fn centred(x: &[f64]) -> Vec<f64> {
     x.iter().map(|v| v - mean).collect()
 }
 
+/// Covariances over a size; zeros where that is zero.
+fn relative_to(size: f64, mut covariances: Vec<f64>) -> Vec<f64> {
+    covariances
+        .iter_mut()
+        .for_each(|c| *c = if size > 0.0 { *c / size } else { 0.0 });
+    covariances
+}
+
 fn autocorrelation(residuals: &[f64], largest: usize) -> Correlation {
     let x = centred(residuals);
-    let power = covariance_at(&x, &x, 0);
+    let power = covariances_at(&x, &x, &[0])[0];
     let lags: Vec<i64> = (1..=largest.min(x.len().saturating_sub(1)) as i64).collect();
     Correlation {
-        values: lags
-            .iter()
-            .map(|&k| {
-                if power > 0.0 {
-                    covariance_at(&x, &x, k) / power
-                } else {
-                    0.0
-                }
-            })
-            .collect(),
+        values: relative_to(power, covariances_at(&x, &x, &lags)),
         lags,
         bound_99: Z_99 / (x.len() as f64).sqrt(),
     }
@@ -302,25 +308,15 @@ fn ljung_box(correlation: &Correlation, n: usize, free: usize) -> Option<LjungBo
 
 fn cross_correlation(residuals: &[f64], input: &[f64], largest: usize) -> Correlation {
     let (x, y) = (centred(residuals), centred(input));
-    let (power_x, power_y) = (covariance_at(&x, &x, 0), covariance_at(&y, &y, 0));
-    let size = (power_x * power_y).sqrt();
     let largest = largest.min(x.len().saturating_sub(1)) as i64;
     let lags: Vec<i64> = (-largest..=largest).collect();
-    let values = lags
-        .iter()
-        .map(|&k| {
-            if size > 0.0 {
-                covariance_at(&x, &y, k) / size
-            } else {
-                0.0
-            }
-        })
-        .collect();
-    // The residuals are nearly white, so that few lags carry the sum.
-    let reach = (4 * largest).min(x.len() as i64 - 1);
-    let sum: f64 = (-reach..=reach)
-        .map(|k| covariance_at(&x, &x, k) * covariance_at(&y, &y, k))
-        .sum();
+    // The residuals are nearly white, so that few lags carry the sum, which has each of them on both sides of zero.
+    let reach: Vec<i64> = (0..=(4 * largest).min(x.len() as i64 - 1)).collect();
+    let (of_x, of_y) = (covariances_at(&x, &x, &reach), covariances_at(&y, &y, &reach));
+    let zero = of_x.first().zip(of_y.first()).map_or(0.0, |(x, y)| x * y);
+    let size = zero.sqrt();
+    let values = relative_to(size, covariances_at(&x, &y, &lags));
+    let sum: f64 = zero + 2.0 * of_x.iter().zip(&of_y).skip(1).map(|(x, y)| x * y).sum::<f64>();
     let variance = if size > 0.0 {
         (sum / (size * size)).max(0.0) / x.len() as f64
     } else {
@@ -350,6 +346,34 @@ mod tests {
         assert!(nrmse_fit(&u, &[-9.0; 4]) < 0.0);
         assert_eq!(vaf(&[0.0; 3], &[1.0; 3]), 0.0);
         assert_eq!(nrmse_fit(&[2.0; 3], &[1.0; 3]), 0.0);
+    }
+
+    #[test]
+    fn covariances_over_several_blocks_are_plain_sums() {
+        let n = 2 * BLOCK + 77;
+        let x: Vec<f64> = (0..n).map(|t| (0.37 * t as f64).sin()).collect();
+        let y: Vec<f64> = (0..n).map(|t| (0.11 * t as f64).cos()).collect();
+        let lags = [
+            0,
+            1,
+            -1,
+            50,
+            -50,
+            BLOCK as i64 + 3,
+            -(BLOCK as i64) - 3,
+            n as i64 - 1,
+            1 - n as i64,
+            n as i64,
+        ];
+        for (lag, found) in lags.into_iter().zip(covariances_at(&x, &y, &lags)) {
+            let inside = |t: i64| (0..n as i64).contains(&(t - lag));
+            let plain: f64 = (0..n as i64)
+                .filter(|t| inside(*t))
+                .map(|t| x[t as usize] * y[(t - lag) as usize])
+                .sum();
+            // Rounding of some ten thousand terms.
+            assert!((found - plain).abs() < 1e-11, "lag {lag}: {found} and {plain}");
+        }
     }
 
     #[test]
