@@ -41,9 +41,17 @@ pub fn change(declared_at: Option<f64>, c: &Change) -> Value {
         "changed": c.changed(),
         "K_e": before_and_after(&c.k_e),
         "K_e_dot": before_and_after(&c.k_e_dot),
+        "omega_nm": before_and_after(&c.omega_nm_rad_s),
+        "zeta_nm": before_and_after(&c.zeta_nm),
         "T_L": numbers(&c.t_l_s),
         "innovation_variance": numbers(&c.innovation_variance),
-        "z": {"K_e": number(c.z[0]), "K_e_dot": number(c.z[1]), "remnant": number(c.z[2])},
+        "z": {
+            "K_e": number(c.z[0]),
+            "K_e_dot": number(c.z[1]),
+            "omega_nm": number(c.z[2]),
+            "zeta_nm": number(c.z[3]),
+            "remnant": number(c.z[4]),
+        },
     })
 }
 

@@ -79,7 +79,7 @@ impl<const N: usize, R: Number> Factored<N, R> {
     /// `P <- growth P`, then the measurement, in one pass.
     #[inline(always)]
     pub fn grow_and_measure(&mut self, growth: R, psi: &[R; N], variance: R) -> [R; N] {
-        let (zero, one) = (variance.like(0.0), variance.like(1.0));
+        let zero = variance.like(0.0);
         let (mut f, mut v, mut grown) = ([zero; N], [zero; N], [zero; N]);
         for j in 0..N {
             let mut sum = psi[j];
@@ -90,6 +90,13 @@ impl<const N: usize, R: Number> Factored<N, R> {
             f[j] = sum;
             v[j] = grown[j] * sum;
         }
+        self.measured(grown, f, v, variance)
+    }
+
+    /// The measurement, of the projections and of D.
+    #[inline(always)]
+    fn measured(&mut self, grown: [R; N], f: [R; N], v: [R; N], variance: R) -> [R; N] {
+        let (zero, one) = (variance.like(0.0), variance.like(1.0));
         let mut gain = [zero; N];
         let (mut before, mut inverse_before) = (variance, one / variance);
         for j in 0..N {
@@ -151,9 +158,16 @@ impl<const N: usize> Factored<N> {
         f.iter().zip(&v).map(|(f, v)| f * v).sum()
     }
 
-    /// `f = U' psi` and `v = D f`.
-    #[inline]
-    fn projections(&self, psi: &[f64; N]) -> ([f64; N], [f64; N]) {
+    /// [`Factored::measure`] by what [`Factored::projections`] gave for psi.
+    #[inline(always)]
+    pub fn measure_projected(&mut self, (f, v): ([f64; N], [f64; N]), variance: f64) -> [f64; N] {
+        let grown = core::array::from_fn(|j| self.u[j][j]);
+        self.measured(grown, f, v, variance)
+    }
+
+    /// `f = U' psi` and `v = D f`: `psi' P psi = f' v`.
+    #[inline(always)]
+    pub fn projections(&self, psi: &[f64; N]) -> ([f64; N], [f64; N]) {
         let (mut f, mut v) = ([0.0; N], [0.0; N]);
         for j in 0..N {
             let mut sum = psi[j];
@@ -222,6 +236,11 @@ impl<const N: usize> Factored<N> {
     pub fn element(&self, i: usize, j: usize) -> f64 {
         let of = |row: usize, column: usize| if row == column { 1.0 } else { self.u[column][row] };
         (i.max(j)..N).map(|k| of(i, k) * self.u[k][k] * of(j, k)).sum()
+    }
+
+    /// Determinant of P.
+    pub fn determinant(&self) -> f64 {
+        (0..N).map(|j| self.u[j][j]).product()
     }
 
     /// P itself.

@@ -27,6 +27,11 @@ fn suppositions() -> Suppositions {
         hazard: TS / 60.0,
         jump: [0.22, 0.5],
         drift: 0.0005,
+        unrest: [0.005, 0.02, 0.02, 0.02],
+        unrest_for: 300.0,
+        neuromuscular: [0.25, 0.4],
+        whole_every: 4,
+        whole_odds: 0.3,
         crossover: 2.0,
         doubt: 100.0,
         protected: 128,
@@ -269,7 +274,7 @@ fn the_variance_of_the_remnant_alone_is_a_change_too() {
     }
     let (k, change) = declared[0];
     assert!((4000..4150).contains(&k), "{k}");
-    assert!(change.z[2] > 2.0 && change.z[0].abs() < 3.0, "{change:?}");
+    assert!(change.z[4] > 2.0 && change.z[0].abs() < 3.0, "{change:?}");
 }
 
 #[test]
@@ -381,4 +386,43 @@ fn starts_that_cannot_be_are_refused() {
     }
     let negative = diagonal([1e-4, -1e-4, 0.5, 1e-3]);
     assert!(Hypothesis::new(S1, &negative, level(0.02)).is_none());
+}
+
+#[test]
+fn a_neuromuscular_system_that_changes_is_followed_and_named() {
+    let slower = [S1[0], S1[1], 9.0, 0.45];
+    let at = 4500;
+    let mut noise = Noise(17);
+    let (mut slow, mut fast, mut n) = (0.0, 0.0, 0.0);
+    let (mut before, mut w) = (0.0, [0.0; 2]);
+    let first = Hypothesis::new(S1, &diagonal(WIDE), level(0.003)).unwrap();
+    let mut bank: Adaptive<16, 4> = Adaptive::new(first, &[-0.85], suppositions()).unwrap();
+    let mut changes = Vec::new();
+    for k in 0..9000 {
+        let ([b0, b1, f1, f2], _) = held_operator(if k < at { S1 } else { slower }, TS);
+        slow = 0.98 * slow + 0.3 * noise.next();
+        fast = 0.9 * fast + 0.3 * noise.next();
+        let x = slow + fast;
+        w = [b0 * x + b1 * before - f1 * w[0] - f2 * w[1], w[0]];
+        before = x;
+        n = 0.85 * n + 0.003 * noise.next();
+        bank.step(x, w[0] + n);
+        if let Some(change) = bank.bank().change() {
+            assert!((at..at + 500).contains(&k), "{k}");
+            changes.push(change.z);
+        }
+    }
+    assert!(!changes.is_empty() && changes.len() <= 3, "{changes:?}");
+    assert!(changes.iter().any(|z| z[2] < -2.0), "{changes:?}");
+    let (found, covariance) = (bank.bank().mixture().eta, bank.bank().covariance());
+    for i in 0..4 {
+        let error = found[i] - slower[i];
+        // 3.5 standard errors: four numbers, one seed.
+        assert!(
+            error.abs() < 3.5 * covariance[i][i].sqrt(),
+            "{i}: {error} {}",
+            covariance[i][i].sqrt()
+        );
+    }
+    assert!((found[2] - slower[2]).abs() < 0.5, "{found:?}");
 }

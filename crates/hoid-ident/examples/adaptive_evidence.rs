@@ -1,6 +1,6 @@
 //! The numbers of the page "A person who changes" of the book that take too long for a test.
 //!
-//! `cargo run --release -p hoid-ident --example adaptive_evidence -- table|detection|smooth|tune|cost [RUNS]`
+//! `cargo run --release -p hoid-ident --example adaptive_evidence -- table|detection|smooth|tune|set|cost [RUNS]`
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid_ident::tracking::{
@@ -10,6 +10,7 @@ use hoid_model::{
     Record,
     remnant_gain::NoiseDefinition,
     scenario::{Condition, Realisation, RemnantStrength, Scenario},
+    schedule::Schedule,
 };
 use hoid_sim::{Simulator, Stream};
 
@@ -31,12 +32,13 @@ fn main() {
         Some("detection") => detection(runs),
         Some("smooth") => smoothed(runs),
         Some("tune") => tune(runs),
+        Some("set") => set(runs),
         Some("cost") => cost(runs),
-        _ => println!("table, detection, smooth, tune or cost, and a number of runs"),
+        _ => println!("table, detection, smooth, tune, set or cost, and a number of runs"),
     }
 }
 
-fn simulator(condition: Condition, remnant_order: usize, level: f64) -> Simulator {
+fn scenario(condition: Condition, remnant_order: usize, level: f64) -> Scenario {
     let mut scenario = Scenario::condition(condition);
     scenario.remnant.order = remnant_order;
     scenario.remnant.strength = RemnantStrength::Level {
@@ -44,7 +46,11 @@ fn simulator(condition: Condition, remnant_order: usize, level: f64) -> Simulato
         definition: NoiseDefinition::Response,
     };
     scenario.realisation = Realisation::Output;
-    Simulator::new(&scenario).unwrap()
+    scenario
+}
+
+fn simulator(condition: Condition, remnant_order: usize, level: f64) -> Simulator {
+    Simulator::new(&scenario(condition, remnant_order, level)).unwrap()
 }
 
 /// Seed 7000; the method was set on seed 9000, and looked at on seed 5000.
@@ -107,6 +113,8 @@ struct Found {
     /// Share of samples after the start fit, and within 5 s after the change, in which 1.96 standard errors cover the truth.
     covered: [f64; 5],
     covered_through: [f64; 5],
+    /// Changes declared before and after t_M, and whether one was within 5 s after it.
+    declared: [f64; 3],
     /// Time after the change at which K_e_dot has covered half, and nine tenths, of its step, s.
     settling_s: [f64; 2],
 }
@@ -122,7 +130,7 @@ fn follow(record: &Record, options: &TrackOptions) -> Found {
     };
     let (mut squares, mut rows) = ([0.0; 5], 0.0);
     let (mut covered, mut through, mut counts) = ([0.0; 5], [0.0; 5], [0.0; 2]);
-    let mut settling_s = [f64::INFINITY; 2];
+    let (mut settling_s, mut declared) = ([f64::INFINITY; 2], [0.0_f64; 3]);
     let (first, last) = (truth[2][0], truth[2][record.len() - 1]);
     for k in 0..record.len() {
         let t = record.time_s(k);
@@ -132,6 +140,12 @@ fn follow(record: &Record, options: &TrackOptions) -> Found {
             reference: None,
         };
         tracker.take(sample, t >= from);
+        if tracker.change().is_some() {
+            declared[usize::from(t >= CHANGE_S)] += 1.0;
+            if (CHANGE_S..FOUND_UNTIL_S).contains(&t) {
+                declared[2] = 1.0;
+            }
+        }
         if t < 10.0 - 1e-9 {
             continue;
         }
@@ -161,6 +175,7 @@ fn follow(record: &Record, options: &TrackOptions) -> Found {
         errors: squares.map(|s: f64| 100.0 * (s / rows).sqrt()),
         covered: covered.map(|c| c / counts[0]),
         covered_through: through.map(|c| c / counts[1]),
+        declared,
         settling_s,
     }
 }
@@ -480,6 +495,89 @@ fn tune(runs: usize) {
             row([0, 1, 2, 3, 4].map(|i| median(all(i))), 2),
             row([0, 1, 2, 3, 4].map(|i| all(i).fold(0.0, f64::max)), 2),
             row([0, 1, 2, 3, 4].map(|i| median(covered[m].iter().map(|c| c[i]))), 0),
+        );
+    }
+}
+
+/// Cells on which `adaptive` is set: C3 and C5, C1 and C2, and changes of the neuromuscular system that are not those of the plan.
+/// Errors: geometric mean over the cells of the median run.
+fn set(runs: usize) {
+    let options = options(Method::Adaptive);
+    let neuromuscular = |omega: f64, zeta: f64| {
+        move |scenario: &mut Scenario| {
+            scenario.last.operator.omega_nm_rad_s = omega;
+            scenario.last.operator.zeta_nm = zeta;
+            scenario.schedule = Schedule::Sigmoid {
+                rate_per_s: 100.0,
+                midpoint_s: CHANGE_S,
+            };
+        }
+    };
+    type Group = (&'static str, [Condition; 2], Box<dyn Fn(&mut Scenario)>);
+    let groups: [Group; 5] = [
+        ("C1, C2", [Condition::C1, Condition::C2], Box::new(|_| ())),
+        ("C3", [Condition::C3; 2], Box::new(|_| ())),
+        ("C5", [Condition::C5; 2], Box::new(|_| ())),
+        (
+            "to 8.5 rad/s, .45",
+            [Condition::C1, Condition::C2],
+            Box::new(neuromuscular(8.5, 0.45)),
+        ),
+        (
+            "to 14 rad/s, .25",
+            [Condition::C1, Condition::C2],
+            Box::new(neuromuscular(14.0, 0.25)),
+        ),
+    ];
+    println!("{runs} runs a cell, seed 9000; {}", COLUMNS.join(" / "));
+    println!(
+        "| cells | RMS relative error, % | covered, % | within 5 s after t_M, %: median cell | least cell | declared before, after t_M, an hour | within 5 s, % | 50, 90 % of K_e_dot, s |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    for (name, conditions, change) in &groups {
+        let mut found: Vec<Vec<Found>> = Vec::new();
+        for (c, condition) in conditions.iter().enumerate() {
+            let order = if conditions[0] == conditions[1] { 2 + c } else { 2 };
+            for level in LEVELS {
+                let mut scenario = scenario(*condition, order, level);
+                change(&mut scenario);
+                let simulator = Simulator::new(&scenario).unwrap();
+                found.push(on_all_cores(runs, |replication| {
+                    let stream = Stream {
+                        seed: 9000,
+                        cell: *condition as u64 * 16 + order as u64 * 4,
+                        replication,
+                    };
+                    follow(&simulator.run(stream, false).unwrap(), &options)
+                }));
+            }
+        }
+        let columns = [0, 1, 2, 3, 4];
+        let means = |i: usize, of: fn(&Found) -> [f64; 5]| {
+            let mean = |cell: &Vec<Found>| 100.0 * cell.iter().map(|f| of(f)[i]).sum::<f64>() / runs as f64;
+            found.iter().map(mean).collect::<Vec<f64>>()
+        };
+        let errors = columns.map(|i| {
+            let logs = found.iter().map(|cell| median(cell.iter().map(|f| f.errors[i])).ln());
+            (logs.sum::<f64>() / found.len() as f64).exp()
+        });
+        let all = || found.iter().flatten();
+        let each_hour =
+            |k: usize, hours: f64| all().map(|f| f.declared[k]).sum::<f64>() / (all().count() as f64 * hours);
+        println!(
+            "| {name} | {} | {} | {} | {} | {:.1}, {:.1} | {:.0} | {:.2}, {:.2} |",
+            row(errors, 2),
+            row(columns.map(|i| median(means(i, |f| f.covered).into_iter())), 0),
+            row(columns.map(|i| median(means(i, |f| f.covered_through).into_iter())), 0),
+            row(
+                columns.map(|i| means(i, |f| f.covered_through).into_iter().fold(100.0, f64::min)),
+                0
+            ),
+            each_hour(0, (CHANGE_S - START_S) / 3600.0),
+            each_hour(1, (81.92 - CHANGE_S) / 3600.0),
+            100.0 * each_hour(2, 1.0),
+            median(all().map(|f| f.settling_s[0])),
+            median(all().map(|f| f.settling_s[1])),
         );
     }
 }

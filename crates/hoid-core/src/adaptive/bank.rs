@@ -14,11 +14,13 @@ pub struct Bank<const M: usize> {
     hypotheses: [Option<Hypothesis>; M],
     samples: u64,
     wait: u32,
+    births: u32,
+    /// Sample from which hypotheses of a change of omega_nm and zeta_nm are born.
+    whole_from: u64,
     watch: Watch,
-    mixture: Mixture,
 }
 
-crate::state!([const M: usize] Bank<M> { hypotheses, samples, wait, watch, mixture });
+crate::state!([const M: usize] Bank<M> { hypotheses, samples, wait, births, whole_from, watch });
 
 /// Mean of the mixture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,8 +30,6 @@ pub struct Mixture {
     /// Innovation variance.
     pub variance: f64,
 }
-
-crate::state!([] Mixture { eta, variance });
 
 /// Least probability of a hypothesis.
 const LEAST: f64 = 1e-12;
@@ -58,42 +58,68 @@ impl<const M: usize> Bank<M> {
             hypotheses,
             samples: 0,
             wait: s.spacing,
+            births: 0,
+            whole_from: 0,
             watch: Watch::default(),
-            mixture: Mixture {
-                eta,
-                variance: first.level.variance(),
-            },
             suppositions,
         })
     }
 
     /// Takes output and signals of a sample behind the whitening filter, `None` where they are not known; returns the innovation.
     pub fn take(&mut self, seen: Option<(f64, &Signals)>, about: [f64; 2]) -> f64 {
+        let innovation = self.learn(seen, about);
+        if self.watch.look(&self.hypotheses, self.samples, &self.suppositions) {
+            self.wait_for_whole();
+        }
+        innovation
+    }
+
+    /// Gains that jump pass through the neuromuscular system, and for a while the person is neither what he was nor what he will be: nothing is learnt
+    /// of omega_nm and zeta_nm then. Hypotheses of their change begin anew when that is over.
+    fn wait_for_whole(&mut self) {
+        self.whole_from = self.samples + self.suppositions.settled;
+        let lasting = |h: &Hypothesis| !h.whole || self.samples - h.born >= self.suppositions.recent;
+        let rest: f64 = self
+            .hypotheses
+            .iter()
+            .flatten()
+            .filter(|h| lasting(h))
+            .map(|h| h.weight)
+            .sum();
+        if rest > 0.0 {
+            for place in &mut self.hypotheses {
+                *place = place.filter(|h| !h.whole || self.samples - h.born >= self.suppositions.recent);
+                if let Some(h) = place {
+                    h.weight /= rest;
+                }
+            }
+        }
+    }
+
+    /// As [`Bank::take`], and does not look for changes.
+    pub fn learn(&mut self, seen: Option<(f64, &Signals)>, about: [f64; 2]) -> f64 {
         self.samples += 1;
         let mut innovation = 0.0;
         if let Some((y, r)) = seen {
-            let mut logs = [f64::NEG_INFINITY; M];
-            let mut most = f64::NEG_INFINITY;
-            for (h, log) in self.hypotheses.iter_mut().zip(&mut logs) {
-                let Some(h) = h else { continue };
-                let before = h.weight;
+            for h in self.hypotheses.iter_mut().flatten() {
                 let (eps, density) = h.step(y, r, about, &self.suppositions);
-                innovation += before * eps;
-                *log = libm::log(before) + density;
-                if *log > most {
-                    most = *log;
-                }
+                innovation += h.weight * eps;
+                h.weight *= density;
             }
-            self.weigh(&logs, most);
+            self.weigh();
         }
         self.wait -= 1;
         if self.wait == 0 {
             self.wait = self.suppositions.spacing;
             self.drift();
-            self.bear();
+            self.births = self.births.wrapping_add(1);
+            let share = self.suppositions.hazard * f64::from(self.suppositions.spacing);
+            self.bear(share, false);
+            let every = self.suppositions.whole_every;
+            if every > 0 && self.births.is_multiple_of(every) && self.samples >= self.whole_from {
+                self.bear(share * f64::from(every) * self.suppositions.whole_odds, true);
+            }
         }
-        self.mix();
-        self.watch.look(&self.hypotheses, self.samples, &self.suppositions);
         innovation
     }
 
@@ -102,28 +128,34 @@ impl<const M: usize> Bank<M> {
         self.samples += 1;
     }
 
-    /// Probabilities from their logarithms. What has become impossible, or not finite, is nearly so.
-    fn weigh(&mut self, logs: &[f64; M], most: f64) {
-        let mut sum = 0.0;
-        for (h, log) in self.hypotheses.iter_mut().zip(logs) {
-            let Some(h) = h else { continue };
-            let weight = libm::exp(log - most);
+    /// Brings the sum of the probabilities to one. What has become impossible, or not finite, is nearly so.
+    fn weigh(&mut self) {
+        let mut most = 0.0;
+        for h in self.hypotheses.iter().flatten() {
+            if h.weight > most {
+                most = h.weight;
+            }
+        }
+        let (scale, mut sum) = (1.0 / most, 0.0);
+        for h in self.hypotheses.iter_mut().flatten() {
+            let weight = h.weight * scale;
             h.weight = if weight > LEAST { weight } else { LEAST };
             sum += h.weight;
         }
+        let scale = 1.0 / sum;
         for h in self.hypotheses.iter_mut().flatten() {
-            h.weight /= sum;
+            h.weight *= scale;
         }
     }
 
     fn drift(&mut self) {
         for h in self.hypotheses.iter_mut().flatten() {
-            h.drift(&self.suppositions);
+            h.drift(self.samples, &self.suppositions);
         }
     }
 
-    /// A hypothesis that the person changes now.
-    fn bear(&mut self) {
+    /// A hypothesis that the person changes now, with its probability.
+    fn bear(&mut self, share: f64, whole: bool) {
         let (mut likeliest, mut place) = (None, None);
         let (mut highest, mut lowest) = (0.0, f64::INFINITY);
         for (i, h) in self.hypotheses.iter().enumerate() {
@@ -144,8 +176,7 @@ impl<const M: usize> Bank<M> {
         if highest == lowest {
             return;
         }
-        let mut child = parent.opened(self.samples, &self.suppositions);
-        let share = self.suppositions.hazard * f64::from(self.suppositions.spacing);
+        let mut child = parent.opened(self.samples, whole, &self.suppositions);
         self.hypotheses[place] = None;
         let rest: f64 = self.hypotheses.iter().flatten().map(|h| h.weight).sum();
         for h in self.hypotheses.iter_mut().flatten() {
@@ -155,7 +186,8 @@ impl<const M: usize> Bank<M> {
         self.hypotheses[place] = Some(child);
     }
 
-    fn mix(&mut self) {
+    /// Mean of the mixture.
+    pub fn mixture(&self) -> Mixture {
         let mut mixture = Mixture {
             eta: [0.0; OPERATOR],
             variance: 0.0,
@@ -166,23 +198,19 @@ impl<const M: usize> Bank<M> {
             }
             mixture.variance += h.weight * h.level.variance();
         }
-        self.mixture = mixture;
-    }
-
-    /// Mean of the mixture.
-    pub fn mixture(&self) -> &Mixture {
-        &self.mixture
+        mixture
     }
 
     /// Covariance of eta.
     pub fn covariance(&self) -> [[f64; OPERATOR]; OPERATOR] {
+        let mean = self.mixture().eta;
         let mut covariance = [[0.0; OPERATOR]; OPERATOR];
         for h in self.hypotheses.iter().flatten() {
             let p = h.covariance.matrix();
             for i in 0..OPERATOR {
-                let a = h.eta[i] - self.mixture.eta[i];
+                let a = h.eta[i] - mean[i];
                 for j in 0..OPERATOR {
-                    let b = h.eta[j] - self.mixture.eta[j];
+                    let b = h.eta[j] - mean[j];
                     covariance[i][j] += h.weight * (p[i][j] + a * b);
                 }
             }
@@ -192,7 +220,7 @@ impl<const M: usize> Bank<M> {
 
     /// T_L in s and its variance, from `E[K_e K_e_dot]/E[K_e^2]`.
     pub fn lead(&self, covariance: &[[f64; OPERATOR]; OPERATOR]) -> [f64; 2] {
-        let [k_e, k_e_dot, ..] = self.mixture.eta;
+        let [k_e, k_e_dot, ..] = self.mixture().eta;
         let square = k_e * k_e + covariance[0][0];
         let lead = (k_e * k_e_dot + covariance[0][1]) / square;
         // d T_L = (d K_e_dot - T_L d K_e)/K_e.

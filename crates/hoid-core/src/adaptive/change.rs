@@ -5,14 +5,14 @@
 //! with the size of the change and its time averaged out instead of maximised, so that its expectation does not grow with the number of
 //! times that are tried. A change is declared when Lambda is over the threshold and the likeliest of the recent hypotheses is old enough to
 //! say what changed; the next only after Lambda has been below zero, when
-//! what changed has become what holds.
+//! what changed has become what holds, or when the neuromuscular system turns out to have changed too: the same odds of such hypotheses against all others.
 //!
 //! The likeliest of the recent hypotheses says since when, and what held before: the change of each quantity over its standard
 //! error tells in what the person changed. For the innovation variance that is `ln(s2/s1)/sqrt(2/n)` with the n samples since.
 
 use super::{
     Suppositions,
-    hypothesis::{Before, Hypothesis},
+    hypothesis::{Before, Hypothesis, OPERATOR},
 };
 use crate::state::{State, visit_all};
 
@@ -27,8 +27,8 @@ pub struct Change {
     pub before: Before,
     /// What holds now.
     pub now: Before,
-    /// Change of K_e, K_e_dot and of the innovation variance, each over its standard error.
-    pub z: [f64; 3],
+    /// Change of K_e, K_e_dot, omega_nm, zeta_nm and of the innovation variance, each over its standard error.
+    pub z: [f64; OPERATOR + 1],
 }
 
 /// Odds, and whether a change is being declared.
@@ -36,6 +36,8 @@ pub struct Change {
 pub struct Watch {
     odds: f64,
     raised: bool,
+    /// The same for one in which the neuromuscular system changed too.
+    raised_whole: bool,
     change: Option<Change>,
 }
 
@@ -44,7 +46,10 @@ crate::state!([] Change { samples_ago, odds, before, now, z });
 impl State for Watch {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         let mut is_there = self.change.is_some();
-        visit_all(&mut [&mut self.odds, &mut self.raised, &mut is_there], each);
+        visit_all(
+            &mut [&mut self.odds, &mut self.raised, &mut self.raised_whole, &mut is_there],
+            each,
+        );
         self.change = is_there.then(|| self.change.take().unwrap_or_default());
         if let Some(change) = &mut self.change {
             change.visit(each);
@@ -57,6 +62,7 @@ impl Default for Watch {
         Self {
             odds: f64::NEG_INFINITY,
             raised: false,
+            raised_whole: false,
             change: None,
         }
     }
@@ -66,31 +72,39 @@ impl Default for Watch {
 const LEAST: f64 = 1e-12;
 
 impl Watch {
-    /// Looks at the hypotheses after a sample.
-    pub fn look(&mut self, hypotheses: &[Option<Hypothesis>], now: u64, suppositions: &Suppositions) {
-        let (mut recent, mut older) = (0.0, 0.0);
+    /// Looks at the hypotheses after a sample. True where Lambda rises above zero: a change begins.
+    pub fn look(&mut self, hypotheses: &[Option<Hypothesis>], now: u64, suppositions: &Suppositions) -> bool {
+        let (mut recent, mut older, mut whole) = (0.0, 0.0, 0.0);
+        let mut likeliest: Option<&Hypothesis> = None;
         for h in hypotheses.iter().flatten() {
-            if is_recent(h, now, suppositions) {
-                recent += h.weight;
-            } else {
+            if !is_recent(h, now, suppositions) {
                 older += h.weight;
+                continue;
+            }
+            recent += h.weight;
+            whole += if h.whole { h.weight } else { 0.0 };
+            if likeliest.is_none_or(|l| h.weight > l.weight) {
+                likeliest = Some(h);
             }
         }
+        let before = self.odds;
         self.odds = libm::log((recent + LEAST) / (older + LEAST));
         self.change = None;
-        if self.odds > suppositions.threshold && !self.raised {
-            let mut likeliest: Option<&Hypothesis> = None;
-            for h in hypotheses.iter().flatten() {
-                if is_recent(h, now, suppositions) && likeliest.is_none_or(|l| h.weight > l.weight) {
-                    likeliest = Some(h);
-                }
-            }
+        if self.odds < 0.0 {
+            (self.raised, self.raised_whole) = (false, false);
+        } else if self.odds > suppositions.threshold {
             let settled = likeliest.filter(|h| now - h.born >= suppositions.settled);
-            self.change = settled.map(|h| of(h, now, self.odds));
-            self.raised = self.change.is_some();
-        } else if self.odds < 0.0 {
-            self.raised = false;
+            let others = recent + older - whole;
+            let is_whole = libm::log((whole + LEAST) / (others.max(0.0) + LEAST)) > suppositions.threshold;
+            if let Some(h) = settled
+                && (!self.raised || is_whole && h.whole && !self.raised_whole)
+            {
+                self.change = Some(of(h, now, self.odds));
+                self.raised = true;
+                self.raised_whole = h.whole;
+            }
         }
+        self.odds > 0.0 && before <= 0.0
     }
 
     /// Lambda.
@@ -112,15 +126,16 @@ fn is_recent(h: &Hypothesis, now: u64, suppositions: &Suppositions) -> bool {
 fn of(h: &Hypothesis, now: u64, odds: f64) -> Change {
     let (before, after) = (h.before, h.now());
     let samples_ago = now - h.born;
-    let mut z = [0.0; 3];
-    for i in 0..2 {
-        let variance = before.gains[i] + after.gains[i];
+    let mut z = [0.0; OPERATOR + 1];
+    for i in 0..OPERATOR {
+        let of = |b: &Before| if i < 2 { b.gains[i] } else { b.neuromuscular[i - 2] };
+        let variance = of(&before) + of(&after);
         if variance > 0.0 {
             z[i] = (after.eta[i] - before.eta[i]) / libm::sqrt(variance);
         }
     }
     if samples_ago > 0 && before.variance > 0.0 && after.variance > 0.0 {
-        z[2] = libm::log(after.variance / before.variance) / libm::sqrt(2.0 / samples_ago as f64);
+        z[OPERATOR] = libm::log(after.variance / before.variance) / libm::sqrt(2.0 / samples_ago as f64);
     }
     Change {
         samples_ago,

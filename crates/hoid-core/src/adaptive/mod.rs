@@ -10,9 +10,10 @@
 //!
 //! **A hypothesis** ([`hypothesis`]) says that the person last changed at its birth. It is a Kalman filter of
 //! `eta = [K_e, K_e_dot, omega_nm, zeta_nm]` with an innovation variance of its own: beside a slow drift of the gains nothing changes
-//! any more, so that its memory grows for as long as it lives. Every `spacing` samples one is born: a copy of the likeliest,
+//! any more, so that its memory grows for as long as it lives. In its first seconds it drifts more, for what changed seldom stands still at once.
+//! Every `spacing` samples one is born: a copy of the likeliest,
 //! whose gains are opened by the covariance of a change that is to be expected, and whose innovation variance rests on few samples. It is
-//! given the prior probability of a change in that time. The probability of each is multiplied, at each sample, by the density that it
+//! given the prior probability of a change in that time. With every few of them another is born in which omega_nm and zeta_nm are opened too. The probability of each is multiplied, at each sample, by the density that it
 //! gave to the innovation. When there is no room, the least likely of those that have had time to prove themselves makes way.
 //! (M. Basseville and I. V. Nikiforov, *Detection of Abrupt Changes*, 1993, section 7.2; P. Andersson, *International Journal of Control* 42 (1985) 1175-1193: adaptive
 //! forgetting by multiple models; R. P. Adams and D. J. C. MacKay, *Bayesian online changepoint detection*, 2007.)
@@ -48,6 +49,17 @@ pub struct Suppositions {
     pub jump: [f64; 2],
     /// The same for the drift of both gains in one sample.
     pub drift: f64,
+    /// What K_e and K_e_dot drift in one sample just after a change, in the same units; for omega_nm and zeta_nm, where they changed, in those of
+    /// [`Suppositions::neuromuscular`].
+    pub unrest: [f64; OPERATOR],
+    /// Time constant with which this becomes [`Suppositions::drift`], samples.
+    pub unrest_for: f64,
+    /// Standard deviation of a change of omega_nm and of zeta_nm, as shares of them.
+    pub neuromuscular: [f64; 2],
+    /// Births of hypotheses that the gains change, for one that omega_nm and zeta_nm change too; zero: never.
+    pub whole_every: u32,
+    /// Odds of a change of all four against one of the gains.
+    pub whole_odds: f64,
     /// The crossover at which the two gains are compared, rad/s.
     pub crossover: f64,
     /// Residuals that the innovation variance rests on after a change.
@@ -150,8 +162,8 @@ impl<const M: usize, const D: usize> Adaptive<M, D> {
 
     /// `D w` of the mixture.
     fn foretold(&self, r: &Signals) -> f64 {
-        let eta = &self.bank.mixture().eta;
-        let psi = hypothesis::gradient(eta, r, self.response.about());
+        let eta = self.bank.mixture().eta;
+        let psi = hypothesis::gradient(&eta, r, self.response.about());
         eta[0] * psi[0] + eta[1] * psi[1]
     }
 
@@ -172,7 +184,10 @@ impl<const M: usize, const D: usize> Adaptive<M, D> {
         }
         if self.bank.samples().is_multiple_of(FOLLOWS) {
             let [.., omega, zeta] = self.bank.mixture().eta;
-            self.response.move_to([omega, zeta], &mut self.past);
+            let about = self.response.about();
+            let toward = |to: f64, from: f64| to.clamp((1.0 - STRIDE) * from, (1.0 + STRIDE) * from);
+            let there = [toward(omega, about[0]), toward(zeta, about[1])];
+            self.response.move_to(there, &mut self.past);
         }
     }
 
@@ -194,3 +209,5 @@ impl<const M: usize, const D: usize> Adaptive<M, D> {
 
 /// Samples after which the point of the filters follows the estimate.
 const FOLLOWS: u64 = 64;
+/// How far it does at most, as a share: what the filters remember moves along its derivative.
+const STRIDE: f64 = 0.1;

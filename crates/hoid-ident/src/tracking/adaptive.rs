@@ -33,6 +33,13 @@ const BETWEEN_CHANGES_S: f64 = 60.0;
 const JUMP: [f64; 2] = [0.22, 0.5];
 /// Drift of the gains in one second, in the same units.
 const DRIFT: f64 = 0.005;
+/// The drift just after a change, for K_e and K_e_dot in the same units, for omega_nm and zeta_nm in those of a change of them; and how long it lasts, s.
+const UNREST: [f64; OPERATOR] = [0.05, 0.2, 0.2, 0.2];
+const UNREST_FOR_S: f64 = 3.0;
+/// Relative change of omega_nm and of zeta_nm to be expected, how many births there are for one of this kind, and its odds against the other.
+const NEUROMUSCULAR: [f64; 2] = [0.25, 0.4];
+const WHOLE_EVERY: u32 = 4;
+const WHOLE_ODDS: f64 = 0.3;
 /// Crossover at which the gains are compared, rad/s.
 const CROSSOVER_RAD_S: f64 = 2.0;
 /// Memory of the innovation variance, and what of it is left after a change, s.
@@ -60,6 +67,11 @@ pub(super) fn suppositions(options: &TrackOptions, sample_time: SampleTime) -> R
         hazard: (ts / BETWEEN_CHANGES_S).min(0.5 / spacing),
         jump: JUMP,
         drift: DRIFT * ts.sqrt(),
+        unrest: UNREST.map(|u| u * ts.sqrt()),
+        unrest_for: UNREST_FOR_S / ts,
+        neuromuscular: NEUROMUSCULAR,
+        whole_every: WHOLE_EVERY,
+        whole_odds: WHOLE_ODDS,
         crossover: CROSSOVER_RAD_S,
         doubt: (DOUBT_S / ts).max(4.0),
         protected: (PROTECTED_BIRTHS * spacing) as u64,

@@ -4,7 +4,7 @@
 //! standard deviations before the change (R. A. Hess, *Journal of Guidance, Control, and Dynamics* 32 (2009): three; here either
 //! signal raises the alarm, the rate by the difference of neighbouring samples).
 
-use hoid_core::adaptive::change as kernel;
+use hoid_core::adaptive::{change as kernel_change, hypothesis as kernel};
 use hoid_model::{SampleTime, uncertainty::Estimate};
 
 /// A change of the person that was declared.
@@ -18,34 +18,38 @@ pub struct Change {
     pub k_e: [Estimate; 2],
     /// K_e_dot before and after, s.
     pub k_e_dot: [Estimate; 2],
+    /// omega_nm before and after, rad/s.
+    pub omega_nm_rad_s: [Estimate; 2],
+    /// zeta_nm before and after.
+    pub zeta_nm: [Estimate; 2],
     /// T_L before and after, s.
     pub t_l_s: [f64; 2],
     /// Innovation variance before and after.
     pub innovation_variance: [f64; 2],
-    /// Change of K_e, K_e_dot and the logarithm of the innovation variance, each over its standard error.
-    pub z: [f64; 3],
+    /// Change of K_e, K_e_dot, omega_nm, zeta_nm and the logarithm of the innovation variance, each over its standard error.
+    pub z: [f64; 5],
 }
 
 /// Change over its standard error from which a quantity is said to have changed.
 const CHANGED: f64 = 2.0;
+/// What [`Change::z`] is of.
+const QUANTITIES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "remnant"];
 
 impl Change {
-    pub(super) fn new(change: &kernel::Change, sample_time: SampleTime) -> Self {
+    pub(super) fn new(change: &kernel_change::Change, sample_time: SampleTime) -> Self {
         let (before, now) = (&change.before, &change.now);
         let pair = |i: usize| {
-            [
-                Estimate::with_variance(before.eta[i], before.gains[i]),
-                Estimate::with_variance(now.eta[i], now.gains[i]),
-            ]
+            let of = |b: &kernel::Before| if i < 2 { b.gains[i] } else { b.neuromuscular[i - 2] };
+            [before, now].map(|b| Estimate::with_variance(b.eta[i], of(b)))
         };
-        let lead = |b: &hoid_core::adaptive::hypothesis::Before| {
-            (b.eta[0] * b.eta[1] + b.gains[2]) / (b.eta[0] * b.eta[0] + b.gains[0])
-        };
+        let lead = |b: &kernel::Before| (b.eta[0] * b.eta[1] + b.gains[2]) / (b.eta[0] * b.eta[0] + b.gains[0]);
         Self {
             seconds_ago: change.samples_ago as f64 * sample_time.s(),
             odds: change.odds,
             k_e: pair(0),
             k_e_dot: pair(1),
+            omega_nm_rad_s: pair(2),
+            zeta_nm: pair(3),
             t_l_s: [lead(before), lead(now)],
             innovation_variance: [before.variance, now.variance],
             z: change.z,
@@ -57,10 +61,10 @@ impl Change {
         1.0 / (1.0 + (-self.odds).exp())
     }
 
-    /// Names of what changed by more than two standard errors: `K_e`, `K_e_dot`, `remnant`.
+    /// Names of what changed by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`, `zeta_nm`, `remnant`.
     pub fn changed(&self) -> Vec<&'static str> {
-        let names = ["K_e", "K_e_dot", "remnant"].into_iter().zip(self.z);
-        names.filter(|(_, z)| z.abs() > CHANGED).map(|(name, _)| name).collect()
+        let each = QUANTITIES.into_iter().zip(self.z);
+        each.filter(|(_, z)| z.abs() > CHANGED).map(|(name, _)| name).collect()
     }
 }
 

@@ -15,7 +15,7 @@
 //!
 //! The run from the back needs a start about which it is linear: it is the end of the run from the front, with [`KNOWN_LITTLE`] times the covariance of
 //! the start fit, and so is that of the run from the front. What counts twice is one part in so many. omega_nm and zeta_nm, about which the filters stand, are those at
-//! the end of a first run from the front.
+//! the end of the causal estimate.
 //!
 //! There is time for more hypotheses here: one is born every 0.08 s, and there is room for 64.
 
@@ -55,20 +55,24 @@ struct Side {
     log_weight: f64,
     eta: [f64; OPERATOR],
     covariance: [[f64; OPERATOR]; OPERATOR],
+    /// Half the logarithm of the determinant of all variances.
+    size: f64,
     /// Logarithm of the innovation variance, and the variance of this logarithm.
     level: [f64; 2],
 }
 
 impl Side {
     fn of(h: &Hypothesis) -> Self {
+        let level = [
+            h.level.variance().max(f64::MIN_POSITIVE).ln(),
+            2.0 / h.level.weight().max(1.0),
+        ];
         Self {
             log_weight: h.weight.ln(),
             eta: h.eta,
             covariance: h.covariance.matrix(),
-            level: [
-                h.level.variance().max(f64::MIN_POSITIVE).ln(),
-                2.0 / h.level.weight().max(1.0),
-            ],
+            size: 0.5 * (h.covariance.determinant() * level[1]).ln(),
+            level,
         }
     }
 }
@@ -91,7 +95,10 @@ type Seen = Option<(f64, Signals)>;
 pub(super) fn smooth(record: &Record, trace: &mut Trace, from: &StartState) -> Result<(), IdentError> {
     let options = trace.options.clone();
     let rows = kept_rows(record.len(), trace.every);
-    let joined = two_sided(record, &options, from, &rows)?;
+    let about = trace.operator.last().map_or([from.values[2], from.values[3]], |o| {
+        [o.omega_nm_rad_s.value, o.zeta_nm.value]
+    });
+    let joined = two_sided(record, &options, from, about, &rows)?;
     let mut reported = Reported::new(from, options.orders.nk, record.sample_time());
     let p = reported.theta().len();
     let mut covariance = vec![0.0; p * p];
@@ -124,6 +131,7 @@ fn two_sided(
     record: &Record,
     options: &TrackOptions,
     from: &StartState,
+    about: [f64; 2],
     rows: &[usize],
 ) -> Result<Vec<Joined>, IdentError> {
     let sample_time = record.sample_time();
@@ -132,6 +140,7 @@ fn two_sided(
     let supposed = Suppositions {
         spacing: spacing as u32,
         hazard: usual.hazard.min(0.5 / spacing),
+        whole_every: 0,
         ..usual
     };
     let first = first_hypothesis(from, KNOWN_LITTLE, sample_time)?;
@@ -139,18 +148,11 @@ fn two_sided(
         Ok(Box::new(Bank::new(first, supposed).ok_or_else(outside)?))
     };
     let d = &from.values[OPERATOR..];
-    let mut about = [first.eta[2], first.eta[3]];
-    let mut front = bank(first)?;
-    for seen in &whitened(record, options, d, about) {
-        front.take(seen.as_ref().map(|(y, r)| (*y, r)), about);
-    }
-    about = [front.mixture().eta[2], front.mixture().eta[3]];
-
     let seen = whitened(record, options, d, about);
     let mut front = bank(first)?;
     let mut before: Vec<Vec<Side>> = Vec::with_capacity(rows.len());
     for (k, seen) in seen.iter().enumerate() {
-        front.take(seen.as_ref().map(|(y, r)| (*y, r)), about);
+        front.learn(seen.as_ref().map(|(y, r)| (*y, r)), about);
         if rows.get(before.len()) == Some(&k) {
             before.push(sides(&front));
         }
@@ -165,7 +167,7 @@ fn two_sided(
         {
             joined.push(join(&before, &sides(&back)));
         }
-        back.take(seen.as_ref().map(|(y, r)| (*y, r)), about);
+        back.learn(seen.as_ref().map(|(y, r)| (*y, r)), about);
     }
     joined.reverse();
     Ok(joined)
@@ -207,24 +209,32 @@ fn whitened(record: &Record, options: &TrackOptions, d: &[f64], about: [f64; 2])
         .collect()
 }
 
+/// The likely hypotheses, the likeliest first: a pair of these leaves out most of the others.
 fn sides(bank: &Bank<HYPOTHESES>) -> Vec<Side> {
     let likely = bank.hypotheses().filter(|h| h.weight >= LEAST);
-    likely.map(Side::of).collect()
+    let mut sides: Vec<Side> = likely.map(Side::of).collect();
+    sides.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+    sides
 }
 
 /// The product of two mixtures.
 fn join(before: &[Side], after: &[Side]) -> Joined {
-    let mut pairs: Vec<(f64, Pair)> = Vec::with_capacity(before.len() * after.len());
-    let mut most = f64::NEG_INFINITY;
+    let mut pairs: Vec<(f64, Pair)> = Vec::with_capacity(before.len() + after.len());
+    let (mut most, least) = (f64::NEG_INFINITY, LEAST.ln());
     for f in before {
         for b in after {
+            // Not a number where nothing is bounded: such a pair is tried.
+            let highest = f.log_weight + b.log_weight - f.size.max(b.size);
+            if highest < most + least || highest - Pair::half_square(f, b) < most + least {
+                continue;
+            }
             if let Some((log, pair)) = Pair::of(f, b) {
                 most = most.max(log);
                 pairs.push((log, pair));
             }
         }
     }
-    pairs.retain(|(log, _)| *log >= most + LEAST.ln());
+    pairs.retain(|(log, _)| *log >= most + least);
     let each: Vec<(f64, Joined)> = if pairs.is_empty() {
         // Nothing could be joined: what the past says alone.
         let shares = before.iter().map(|f| (f.log_weight.exp(), alone(f)));
@@ -282,6 +292,18 @@ fn dot(a: &[f64; OPERATOR], b: &[f64; OPERATOR]) -> f64 {
 }
 
 impl<'a> Pair<'a> {
+    /// What the difference takes from the logarithm of the weight, at least: `z'z` is no less than the square of one difference over its variance.
+    /// As S is larger than either covariance, neither of these bounds is crossed but for rounding.
+    fn half_square(f: &Side, b: &Side) -> f64 {
+        let apart = b.level[0] - f.level[0];
+        let mut square = 0.0_f64;
+        for i in 0..OPERATOR {
+            let away = b.eta[i] - f.eta[i];
+            square = square.max(away * away / (f.covariance[i][i] + b.covariance[i][i]));
+        }
+        0.5 * (square + apart * apart / (f.level[1] + b.level[1])) - 0.01
+    }
+
     /// The pair with the logarithm of its weight up to a constant. `None` where S is not positive.
     fn of(f: &'a Side, b: &'a Side) -> Option<(f64, Self)> {
         let sum = std::array::from_fn(|i| std::array::from_fn(|j| f.covariance[i][j] + b.covariance[i][j]));
@@ -291,7 +313,7 @@ impl<'a> Pair<'a> {
         let spread = f.level[1] + b.level[1];
         let apart = b.level[0] - f.level[0];
         let square = dot(&z, &z) + apart * apart / spread;
-        let log = f.log_weight + b.log_weight - determinant.ln() - 0.5 * spread.ln() - 0.5 * square;
+        let log = f.log_weight + b.log_weight - (determinant * spread.sqrt()).ln() - 0.5 * square;
         log.is_finite().then_some((log, Self { f, b, root, z }))
     }
 

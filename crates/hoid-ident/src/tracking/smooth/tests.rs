@@ -16,6 +16,8 @@ fn side(eta: [f64; OPERATOR], scale: f64, weight: f64) -> Side {
         covariance: std::array::from_fn(|i| {
             std::array::from_fn(|j| scale * (f64::from(u8::from(i == j)) + direction[i] * direction[j]))
         }),
+        // 1 + |direction|^2 is the eigenvalue that is not one.
+        size: 0.5 * (scale.powi(4) * 1.87 * 0.02).ln(),
         level: [0.1 * scale, 0.02],
     }
 }
