@@ -1,13 +1,14 @@
 //! The numbers of the page "A person who changes" of the book that take too long for a test.
 //!
-//! `cargo run --release -p hoid-ident --example adaptive_evidence -- table|detection|smooth|tune|set|cost [RUNS]`
+//! `cargo run --release -p hoid-ident --example adaptive_evidence -- table|detection|smooth|tune|set|cost [RUNS]` or `-- joined FIRST.csv SECOND.csv ..`, pairs of
+//! recordings with the columns t, r, u and y that are joined in the middle
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid_ident::tracking::{
     ErrorThreshold, Memory, Method, Sample, Stable, StartAt, StartCovariance, TrackOptions, Tracker, track,
 };
 use hoid_model::{
-    Record,
+    Channel, Record, SampleTime,
     remnant_gain::NoiseDefinition,
     scenario::{Condition, Realisation, RemnantStrength, Scenario},
     schedule::Schedule,
@@ -26,15 +27,16 @@ const ONE_EVENT_S: f64 = 4.0;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let runs = arguments.get(1).map_or(100, |n| n.parse().unwrap());
+    let runs = arguments.get(1).and_then(|n| n.parse().ok()).unwrap_or(100);
     match arguments.first().map(String::as_str) {
         Some("table") => table(runs),
         Some("detection") => detection(runs),
         Some("smooth") => smoothed(runs),
         Some("tune") => tune(runs),
+        Some("joined") => joined(&arguments[1..]),
         Some("set") => set(runs),
         Some("cost") => cost(runs),
-        _ => println!("table, detection, smooth, tune, set or cost, and a number of runs"),
+        _ => println!("table, detection, smooth, tune, set or cost, and a number of runs; joined and pairs of files"),
     }
 }
 
@@ -579,6 +581,93 @@ fn set(runs: usize) {
             median(all().map(|f| f.settling_s[0])),
             median(all().map(|f| f.settling_s[1])),
         );
+    }
+}
+
+/// Error and control of t in [5, 45) s.
+fn recording(path: &str) -> [Vec<f64>; 2] {
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let at = |name: &str| names.iter().position(|n| *n == name).unwrap();
+    let (t, r, u, y) = (at("t"), at("r"), at("u"), at("y"));
+    let (mut e, mut control) = (Vec::new(), Vec::new());
+    for line in lines {
+        let row: Vec<f64> = line.split(',').map(|v| v.parse().unwrap_or(f64::NAN)).collect();
+        if (5.0..45.0).contains(&row[t]) {
+            e.push(row[r] - row[y]);
+            control.push(row[u]);
+        }
+    }
+    [e, control]
+}
+
+/// What is declared around the joint of two recordings of a person: the first 30 s start it, up to 40 s nothing changes.
+fn joined(files: &[String]) {
+    let (start_s, seam_s) = (30.0, 40.0);
+    let sample_time = SampleTime::new(1.0 / 60.0).unwrap();
+    let thresholds = [[3.0, 6.0, 10.0, 20.0], [2.5, 3.0, 4.0, 5.0]];
+    let mut lags = [0, 1].map(|_| [0, 1, 2, 3].map(|_| Vec::new()));
+    let mut events = [[0; 4]; 2];
+    let (mut pairs, mut failed) = (0, 0);
+    for pair in files.chunks_exact(2) {
+        let [[mut e, mut u], [e2, u2]] = [&pair[0], &pair[1]].map(|path| recording(path));
+        e.extend(e2);
+        u.extend(u2);
+        let record = Record::new(sample_time, Channel::new("e", "1", e), Channel::new("u", "1", u)).unwrap();
+        let span = record.span(0.0, start_s).unwrap();
+        // The delay of the least innovation variance of the start fit.
+        let fits = (8..=26).filter_map(|nk| {
+            let m = Method::Adaptive;
+            let options = TrackOptions::new(m, m.usual_structure(), m.usual_orders(nk));
+            Tracker::new(&options, Some(&span), sample_time).ok()
+        });
+        let Some(mut tracker) = fits.min_by(|a, b| a.innovation_variance().total_cmp(&b.innovation_variance())) else {
+            failed += 1;
+            continue;
+        };
+        pairs += 1;
+        let mut baseline = ErrorThreshold::new(span.input(), sample_time).unwrap();
+        let mut both = [Vec::new(), Vec::new()];
+        for k in 0..record.len() {
+            let (t, e) = (record.time_s(k), record.input()[k]);
+            let sample = Sample {
+                e,
+                u: record.output()[k],
+                reference: None,
+            };
+            tracker.take(sample, t >= start_s);
+            let distance = baseline.step(e);
+            if t >= start_s {
+                // As if the seam were at the change of the conditions.
+                both[0].push((t + CHANGE_S - seam_s, tracker.change_odds().unwrap()));
+                both[1].push((t + CHANGE_S - seam_s, distance));
+            }
+        }
+        for m in 0..2 {
+            for (k, threshold) in thresholds[m].iter().enumerate() {
+                let (lag, count) = alarms(&both[m], *threshold, true);
+                lags[m][k].push(lag.unwrap_or(f64::INFINITY));
+                events[m][k] += count;
+            }
+        }
+    }
+    println!(
+        "{pairs} joined pairs, {failed} without a start fit; {:.2} h before the seam",
+        pairs as f64 * 10.0 / 3600.0
+    );
+    println!("| statistic | threshold | alarms in the 10 s before the seam | found within 5 s, % | median lag, s |");
+    println!("|---|---|---|---|---|");
+    for (m, name) in ["log odds", "k sigma of e and its rate"].into_iter().enumerate() {
+        for (k, threshold) in thresholds[m].iter().enumerate() {
+            let hits = lags[m][k].iter().filter(|l: &&f64| l.is_finite()).count();
+            println!(
+                "| {name} | {threshold} | {} | {:.0} | {:.2} |",
+                events[m][k],
+                100.0 * hits as f64 / pairs as f64,
+                median(lags[m][k].iter().copied())
+            );
+        }
     }
 }
 

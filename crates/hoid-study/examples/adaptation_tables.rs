@@ -1,4 +1,4 @@
-//! The tables of the page "A person who changes, compared" of the book, from the results of the study:
+//! The tables of the page "A person who changes, compared" of the book, from the results of the study, as they stand there:
 //!
 //! `hoid study run adaptation --out adaptation` and `cargo run --release -p hoid-study --example adaptation_tables -- adaptation`
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
@@ -8,6 +8,18 @@ use std::path::Path;
 use hoid_study::{Query, Results, Statistics, SummaryRow};
 
 const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
+const LABELS: [&str; 5] = ["K_e", "T_L", "K_ė", "ω_nm", "ζ_nm"];
+const ALL: [&str; 6] = ["C1", "C2", "C3", "C4", "C5", "C6"];
+/// Other changes: name in the plan, heading on the page.
+const OTHERS: [(&str, &str); 5] = [
+    ("slow", "slow: G = .2 1/s"),
+    ("lead alone", "T_L alone: 1.2 to .8 s"),
+    ("again and again", "C4, C6, and back every 10.24 s"),
+    ("neuromuscular", "ω_nm to 8 rad/s, ζ_nm to .5"),
+    ("other delay", "C4, C6, τ_e .25 or .31 s, nk = 29"),
+];
+/// Methods of which all cells are shown.
+const SHOWN: [&str; 5] = ["RLS", "RPEM", "physical", "adaptive", "two-sided"];
 const CHANGING: [&str; 4] = ["C3", "C4", "C5", "C6"];
 const STEADY: [&str; 2] = ["C1", "C2"];
 
@@ -21,19 +33,28 @@ fn main() {
     let results = Results::read(Path::new(&directory)).unwrap();
     let names = results.plan.estimators.iter().map(|e| e.name.clone()).collect();
     let tables = Tables { results, names };
-    println!("{} replications\n", tables.results.plan.replications);
-    for (title, conditions) in [("C3 to C6", &CHANGING[..]), ("C1 and C2", &STEADY[..])] {
-        tables.ratios(title, conditions);
-    }
-    tables.bias();
-    tables.settling();
-    tables.coverage();
-    tables.declared("all", &STEADY);
-    tables.declared("all", &CHANGING);
-    for scenario in ["slow", "lead alone", "again and again", "neuromuscular", "other delay"] {
-        tables.elsewhere(scenario);
-    }
+    println!(
+        "{} replications, seed {}\n",
+        tables.results.plan.replications, tables.results.plan.seed
+    );
+    println!("## Errors\n");
+    println!("Over the better of RLS and RPEM, C3 to C6: median cell (worst cell; cells above 1).\n");
+    tables.ratios(&CHANGING);
+    println!("C1 and C2, where nothing changes.\n");
+    tables.ratios(&STEADY);
     tables.above_one();
+    println!("## Bias and spread\n");
+    tables.bias();
+    println!("## Settling\n");
+    tables.settling();
+    println!("## Bands\n");
+    tables.coverage();
+    println!("## Detection\n");
+    tables.detection();
+    println!("## Other changes\n");
+    tables.elsewhere();
+    println!("## All cells\n");
+    tables.cells();
 }
 
 impl Tables {
@@ -62,9 +83,8 @@ impl Tables {
             .collect()
     }
 
-    fn ratios(&self, title: &str, conditions: &[&str]) {
-        println!("Error over the better of RLS and RPEM, {title}: median cell (worst cell; cells above 1)\n");
-        header("method", &OPERATOR);
+    fn ratios(&self, conditions: &[&str]) {
+        header("method", &LABELS);
         for name in &self.names {
             let cell = |p: &&str| {
                 let all = self.relative(&format!("rms_{p}"), conditions, name);
@@ -80,10 +100,10 @@ impl Tables {
 
     fn bias(&self) {
         println!(
-            "Bias before and after the change, and spread over the replications, C3 to C6, %: median cell of the sizes\n"
+            "Median size over the cells of C3 to C6 of the median error before t_M ± its spread over the runs (interquartile range/1.349), %; then the same for the last ten seconds.\n"
         );
         for what in ["before", "after"] {
-            header(what, &OPERATOR);
+            header(what, &LABELS);
             for name in &self.names {
                 let cell = |p: &&str| {
                     let rows = self.rows(&format!("{what}_{p}"), "all", &CHANGING, name);
@@ -103,12 +123,12 @@ impl Tables {
 
     fn settling(&self) {
         println!(
-            "Seconds after t_M until half, and nine tenths, of the step of K_e_dot are covered: median run, median cell (worst cell)\n"
+            "Seconds after t_M until half, and nine tenths, of the step of K_ė are covered: median run, median cell (worst cell).\n"
         );
         let groups: [(&str, &[&str], f64); 4] = [
-            ("C4, C6, P_n up to .1", &["C4", "C6"], 0.1),
+            ("C4, C6, P_n ≤ .1", &["C4", "C6"], 0.1),
             ("C4, C6, all", &["C4", "C6"], 1.0),
-            ("C3, C5, P_n up to .1", &["C3", "C5"], 0.1),
+            ("C3, C5, P_n ≤ .1", &["C3", "C5"], 0.1),
             ("C3, C5, all", &["C3", "C5"], 1.0),
         ];
         header("method", &groups.map(|g| g.0));
@@ -132,16 +152,14 @@ impl Tables {
     }
 
     fn coverage(&self) {
+        println!(
+            "Samples covered by 1.96 standard errors, %, median cell (least cell): after the start fit in all conditions; then within 5 s after t_M, C3 to C6.\n"
+        );
         for (title, quantity, conditions) in [
-            (
-                "after the start fit, all conditions",
-                "covered",
-                &["C1", "C2", "C3", "C4", "C5", "C6"][..],
-            ),
-            ("within 5 s after t_M, C3 to C6", "covered_through", &CHANGING[..]),
+            ("all", "covered", &ALL[..]),
+            ("through the change", "covered_through", &CHANGING[..]),
         ] {
-            println!("Covered by 1.96 standard errors, {title}, %: median cell (least cell)\n");
-            header("method", &OPERATOR);
+            header(title, &LABELS);
             for name in &self.names {
                 let cell = |p: &&str| {
                     let rows = self.rows(&format!("{quantity}_{p}"), "all", conditions, name);
@@ -155,68 +173,123 @@ impl Tables {
         }
     }
 
-    /// False alarms an hour, found in %, lag in s, by adaptive.
-    fn declared(&self, scenario: &str, conditions: &[&str]) {
-        for condition in conditions {
-            let total = |quantity: &str| -> f64 {
-                let query = Query::of(quantity)
-                    .scenario(scenario)
-                    .condition(condition)
-                    .name("adaptive");
-                self.results.values(&query).iter().filter(|v| v.is_finite()).sum()
-            };
-            let of = |quantity: &str| {
-                let query = Query::of(quantity)
-                    .scenario(scenario)
-                    .condition(condition)
-                    .name("adaptive");
-                self.results.values(&query)
-            };
-            let found: Vec<f64> = of("found").into_iter().filter(|v| v.is_finite()).collect();
-            println!(
-                "{scenario} {condition}: {} false alarms in {:.1} h; found {:.1} %, median lag {:.2} s",
-                total("false_alarms"),
-                total("hours"),
-                found.iter().sum::<f64>() / found.len() as f64,
-                median(&of("lag")),
-            );
+    fn of_adaptive(&self, quantity: &str, scenario: &str, condition: &str) -> Vec<f64> {
+        let query = Query::of(quantity)
+            .scenario(scenario)
+            .condition(condition)
+            .name("adaptive");
+        let mut values = self.results.values(&query);
+        values.retain(|v| v.is_finite());
+        values
+    }
+
+    /// What adaptive declares: false alarms, hours, found in %, median lag in s.
+    fn declared(&self, scenario: &str, conditions: &[&str]) -> [f64; 4] {
+        let all = |quantity: &str| -> Vec<f64> {
+            let each = conditions.iter().map(|c| self.of_adaptive(quantity, scenario, c));
+            each.flatten().collect()
+        };
+        let found = all("found");
+        [
+            all("false_alarms").iter().sum(),
+            all("hours").iter().sum(),
+            found.iter().sum::<f64>() / found.len() as f64,
+            median(&all("lag")),
+        ]
+    }
+
+    fn detection(&self) {
+        header(
+            "condition",
+            &["hours", "false alarms", "found within 5 s, %", "median lag, s"],
+        );
+        for conditions in [&STEADY[..], &["C4"], &["C6"], &["C3"], &["C5"]] {
+            let [alarms, hours, found, lag] = self.declared("all", conditions);
+            let cells = [
+                format!("{hours:.2}"),
+                format!("{alarms}"),
+                known(found, 0),
+                known(lag, 2),
+            ];
+            line(&conditions.join(", "), cells.into_iter());
         }
         println!();
     }
 
-    fn elsewhere(&self, scenario: &str) {
-        let conditions = ["C1", "C2", "C3", "C4", "C5", "C6"];
-        println!("{scenario}: RMS relative error, %, median run, median cell\n");
-        header("method", &OPERATOR);
+    fn elsewhere(&self) {
+        println!("RMS relative error in %, median cell of the median run: K_e / T_L / K_ė / ω_nm / ζ_nm.\n");
+        header("method", &OTHERS.map(|o| o.1));
         for name in &self.names {
-            let cell = |p: &&str| short(median(&self.medians(&format!("rms_{p}"), scenario, &conditions, name)));
-            line(name, OPERATOR.iter().map(cell));
+            let cell = |(scenario, _): &(&str, &str)| {
+                let error = |p: &&str| short(median(&self.medians(&format!("rms_{p}"), scenario, &ALL, name)));
+                OPERATOR.iter().map(error).collect::<Vec<_>>().join(" / ")
+            };
+            line(name, OTHERS.iter().map(cell));
+        }
+        let cell = |(scenario, _): &(&str, &str)| {
+            let [alarms, hours, found, lag] = self.declared(scenario, &ALL);
+            format!("{}, {} ({alarms} in {hours:.2} h)", known(found, 0), known(lag, 1))
+        };
+        line(
+            "adaptive declares: found, %, lag, s (false alarms)",
+            OTHERS.iter().map(cell),
+        );
+        println!();
+        println!("Samples covered by 1.96 standard errors of `adaptive`, %, median cell:\n");
+        header("", &OTHERS.map(|o| o.1));
+        let cell = |(scenario, _): &(&str, &str)| {
+            let covered = |p: &&str| {
+                let rows = self.rows(&format!("covered_{p}"), scenario, &ALL, "adaptive");
+                let means: Vec<f64> = rows.iter().map(|row| row.statistics.mean).collect();
+                known(median(&means), 0)
+            };
+            OPERATOR.iter().map(covered).collect::<Vec<_>>().join(" / ")
+        };
+        line("adaptive", OTHERS.iter().map(cell));
+        println!();
+    }
+
+    /// Errors of every cell of C1 to C6.
+    fn cells(&self) {
+        println!("RMS relative error in %, median run: K_e / T_L / K_ė / ω_nm / ζ_nm.\n");
+        header("cell", &SHOWN);
+        for condition in ALL {
+            let errors =
+                SHOWN.map(|name| OPERATOR.map(|p| self.medians(&format!("rms_{p}"), "all", &[condition], name)));
+            let rows = self.rows("rms_K_e", "all", &[condition], "adaptive");
+            for (i, row) in rows.iter().enumerate() {
+                let cell = |of: &[Vec<f64>; 5]| {
+                    let each = of.iter().map(|e| e.get(i).map_or("-".to_owned(), |e| short(*e)));
+                    each.collect::<Vec<_>>().join(" / ")
+                };
+                let name = format!("{condition} m₀ = {} P_n = {}", row.remnant_order, row.noise_level);
+                line(&name, errors.iter().map(cell));
+            }
         }
         println!();
-        let there = |condition: &&str| {
-            let query = Query::of("found")
-                .scenario(scenario)
-                .condition(condition)
-                .name("adaptive");
-            !self.results.values(&query).is_empty()
-        };
-        let conditions: Vec<&str> = conditions.into_iter().filter(there).collect();
-        self.declared(scenario, &conditions);
     }
 
     /// Cells in which adaptive is worse than the better of RLS and RPEM.
     fn above_one(&self) {
-        for p in OPERATOR {
+        let mut cells = Vec::new();
+        for (p, label) in OPERATOR.iter().zip(LABELS) {
             let quantity = format!("rms_{p}");
             let ratios = self.relative(&quantity, &CHANGING, "adaptive");
             let rows = self.rows(&quantity, "all", &CHANGING, "adaptive");
             for (row, ratio) in rows.iter().zip(ratios).filter(|(_, ratio)| *ratio > 1.0) {
-                println!(
-                    "adaptive, {p}, {} m0={} P_n={}: {ratio:.2}",
-                    row.condition, row.remnant_order, row.noise_level
-                );
+                let (m, p_n) = (row.remnant_order, row.noise_level);
+                cells.push(format!(
+                    "{label} in {} m₀ = {m} P_n = {p_n} ({ratio:.2})",
+                    row.condition
+                ));
             }
         }
+        let cells = if cells.is_empty() {
+            "none".to_owned()
+        } else {
+            cells.join("; ")
+        };
+        println!("Cells of C3 to C6 in which `adaptive` is above 1: {cells}.\n");
     }
 }
 
@@ -240,5 +313,13 @@ fn short(value: f64) -> String {
         v if v >= 100.0 => format!("{value:.0}"),
         v if v >= 10.0 => format!("{value:.1}"),
         _ => format!("{value:.2}"),
+    }
+}
+
+fn known(value: f64, digits: usize) -> String {
+    if value.is_finite() {
+        format!("{value:.digits$}")
+    } else {
+        String::new()
     }
 }
