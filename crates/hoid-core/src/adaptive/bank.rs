@@ -78,22 +78,23 @@ impl<const M: usize> Bank<M> {
     /// of omega_nm and zeta_nm then. Hypotheses of their change begin anew when that is over.
     fn wait_for_whole(&mut self) {
         self.whole_from = self.samples + self.suppositions.settled;
-        let lasting = |h: &Hypothesis| !h.whole || self.samples - h.born >= self.suppositions.recent;
-        let rest: f64 = self
-            .hypotheses
-            .iter()
-            .flatten()
-            .filter(|h| lasting(h))
-            .map(|h| h.weight)
-            .sum();
+        let mut rest = 0.0;
+        for h in self.hypotheses.iter().flatten() {
+            rest += if self.is_young_whole(h) { 0.0 } else { h.weight };
+        }
         if rest > 0.0 {
-            for place in &mut self.hypotheses {
-                *place = place.filter(|h| !h.whole || self.samples - h.born >= self.suppositions.recent);
-                if let Some(h) = place {
+            for i in 0..M {
+                self.hypotheses[i] = self.hypotheses[i].filter(|h| !self.is_young_whole(h));
+                if let Some(h) = &mut self.hypotheses[i] {
                     h.weight /= rest;
                 }
             }
         }
+    }
+
+    /// A hypothesis that omega_nm and zeta_nm changed within the last seconds.
+    fn is_young_whole(&self, h: &Hypothesis) -> bool {
+        h.whole && self.samples - h.born < self.suppositions.recent
     }
 
     /// As [`Bank::take`], and does not look for changes.
@@ -163,7 +164,8 @@ impl<const M: usize> Bank<M> {
                 (place, lowest) = (Some(i), f64::NEG_INFINITY);
                 continue;
             };
-            if h.weight > highest {
+            // What a jump of the gains does to omega_nm and zeta_nm in passing is not handed on.
+            if h.weight > highest && !self.is_young_whole(h) {
                 (likeliest, highest) = (Some(h), h.weight);
             }
             if self.samples - h.born >= self.suppositions.protected && h.weight < lowest {
