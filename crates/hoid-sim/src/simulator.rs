@@ -51,7 +51,7 @@ struct Matrices {
 }
 
 /// The signals of one run, run-in included.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Signals {
     /// Tracking error e, deg.
     pub e: Vec<f64>,
@@ -114,14 +114,23 @@ impl Simulator {
     /// # Errors
     /// [`SimError::NoiseLength`], [`SimError::NoiseNotFinite`], [`SimError::Diverged`].
     pub fn signals(&self, noise: &[f64]) -> Result<Signals, SimError> {
+        let mut signals = Signals::default();
+        self.signals_into(noise, &mut signals)?;
+        Ok(signals)
+    }
+
+    /// As [`Simulator::signals`], into memory that was used before: new memory costs half as much as the run.
+    ///
+    /// # Errors
+    /// As [`Simulator::signals`]; the signals are then of no use.
+    pub fn signals_into(&self, noise: &[f64], signals: &mut Signals) -> Result<(), SimError> {
         self.check_noise(noise)?;
         let samples = self.samples();
-        let mut signals = Signals::zeros(samples);
+        signals.make_room(samples);
         let mut state = LoopState::at_rest(0.0, self.scenario.delay_samples());
-        let Signals { e, u, x, n } = &mut signals;
+        let Signals { e, u, x, n } = &mut *signals;
         self.pass(&mut state, 0..samples, noise, [e, u, x, n]);
-        self.check_finite(&signals)?;
-        Ok(signals)
+        self.check_finite(signals)
     }
 
     /// The signals of several runs, each driven by its own white noise, side by side in the lanes of vector registers: the bits of
@@ -148,12 +157,9 @@ impl Simulator {
         for noise in noises {
             self.check_noise(noise)?;
         }
-        into.resize_with(noises.len(), || Signals::zeros(0));
+        into.resize_with(noises.len(), Signals::default);
         for signals in into.iter_mut() {
-            let Signals { e, u, x, n } = signals;
-            for values in [e, u, x, n] {
-                values.resize(self.samples(), 0.0);
-            }
+            signals.make_room(self.samples());
         }
         let many = Many {
             simulator: self,
@@ -214,6 +220,8 @@ impl Simulator {
             &mut x_out[..count * width],
             &mut n_out[..count * width],
         );
+        let (memory, delay) = (&mut state.memory[..], state.delay);
+        let last = memory.len() - 1;
         for (i, k) in range.enumerate() {
             if !constant {
                 m = self.matrices[k];
@@ -222,14 +230,9 @@ impl Simulator {
             let x = zero.like(m.element_output) * element[0];
             let e = zero.like(self.forcing_deg[k]) - x;
             let [of_output, of_rate] = m.operator_output;
-            let mut response = zero.like(of_output) * operator[0] + zero.like(of_rate) * operator[1];
-            if !state.memory.is_empty() {
-                std::mem::swap(&mut state.memory[state.oldest], &mut response);
-                state.oldest += 1;
-                if state.oldest == state.memory.len() {
-                    state.oldest = 0;
-                }
-            }
+            // The memory is a ring whose length is a power of two.
+            memory[k & last] = zero.like(of_output) * operator[0] + zero.like(of_rate) * operator[1];
+            let response = memory[k.wrapping_sub(delay) & last];
             let n = zero.like(m.k_n) * remnant[M - 1];
             let u = response + n;
             operator = held(&m.operator, operator, e);
@@ -323,9 +326,9 @@ struct LoopState<R> {
     operator: [R; 2],
     element: [R; 2],
     remnant: [R; MOST],
-    /// Responses that the delay holds back, and the place of the oldest.
+    /// The last responses, that of sample k in place k of a ring, and how many the delay holds back.
     memory: Vec<R>,
-    oldest: usize,
+    delay: usize,
 }
 
 impl<R: Number> LoopState<R> {
@@ -334,20 +337,21 @@ impl<R: Number> LoopState<R> {
             operator: [zero; 2],
             element: [zero; 2],
             remnant: [zero; MOST],
-            memory: vec![zero; delay],
-            oldest: 0,
+            memory: vec![zero; (delay + 1).next_power_of_two()],
+            delay,
         }
     }
 }
 
 impl Signals {
-    fn zeros(samples: usize) -> Self {
-        let zeros = || vec![0.0; samples];
-        Self {
-            e: zeros(),
-            u: zeros(),
-            x: zeros(),
-            n: zeros(),
+    fn make_room(&mut self, samples: usize) {
+        let Self { e, u, x, n } = self;
+        for values in [e, u, x, n] {
+            if values.capacity() < samples {
+                // Zeros of the system cost nothing before they are written.
+                *values = vec![0.0; samples];
+            }
+            values.resize(samples, 0.0);
         }
     }
 }
