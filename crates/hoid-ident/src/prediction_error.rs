@@ -113,7 +113,7 @@ pub(crate) fn output_variance(data: &[Data<'_>], first: usize) -> f64 {
 }
 
 /// Sum of squares, `psi' eps` and the projected `psi' psi` (by rows).
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Linearisation {
     pub sum_of_squares: f64,
     pub descent: Vec<f64>,

@@ -57,7 +57,12 @@ impl Path {
     /// All paths that this processor has, [`Path::Best`] among them.
     pub fn available() -> Vec<Self> {
         let all = [Self::Best, Self::Scalar, Self::Avx2, Self::Avx512];
-        all.into_iter().filter(|path| path.do_with(Width).is_some()).collect()
+        all.into_iter().filter(|path| path.lanes().is_some()).collect()
+    }
+
+    /// Number of runs side by side; `None` when this processor has no such registers.
+    pub fn lanes(self) -> Option<usize> {
+        self.do_with(Width)
     }
 
     /// Runs side by side; `None` when this processor has no such registers.

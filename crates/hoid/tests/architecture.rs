@@ -9,7 +9,7 @@ use serde_json::Value;
 const ALLOWED: [(&str, &[&str]); 12] = [
     ("hoid-core", &[]),
     ("hoid-model", &["hoid-core"]),
-    ("hoid-ident", &["hoid-core", "hoid-model"]),
+    ("hoid-ident", &["hoid-core", "hoid-lanes", "hoid-model"]),
     ("hoid-lanes", &["hoid-core"]),
     ("hoid-sim", &["hoid-core", "hoid-lanes", "hoid-model"]),
     ("hoid-io", &["hoid-model"]),

@@ -183,8 +183,18 @@ impl Tracker {
     /// # Errors
     /// [`IdentError`] when options contradict each other, or the start fit fails.
     pub fn new(options: &TrackOptions, span: Option<&Record>, sample_time: SampleTime) -> Result<Self, IdentError> {
+        Self::from_fit(options, span, None, sample_time)
+    }
+
+    /// As [`Tracker::new`], with the fit of the span where it is known.
+    fn from_fit(
+        options: &TrackOptions,
+        span: Option<&Record>,
+        known: Option<&Fit>,
+        sample_time: SampleTime,
+    ) -> Result<Self, IdentError> {
         options.check()?;
-        let start = StartState::new(options, span, sample_time)?;
+        let start = StartState::new(options, span, known, sample_time)?;
         Ok(Self {
             recursion: recursion(options, &start, sample_time)?,
             options: options.clone(),
@@ -370,6 +380,20 @@ fn recursion(
 /// # Errors
 /// [`IdentError`] when the options contradict each other or the record, or the start fit fails.
 pub fn track(record: &Record, options: &TrackOptions, every: usize) -> Result<Trace, IdentError> {
+    track_from(record, options, every, None)
+}
+
+/// As [`track`], from a fit that is known: that of [`TrackOptions::start_estimator`] to the start span. Several methods that start from the
+/// same fit need it only once.
+///
+/// # Errors
+/// As [`track`].
+pub fn track_from(
+    record: &Record,
+    options: &TrackOptions,
+    every: usize,
+    start: Option<&Fit>,
+) -> Result<Trace, IdentError> {
     trace::check_every(every)?;
     options.check()?;
     let sample_time = record.sample_time();
@@ -379,14 +403,9 @@ pub fn track(record: &Record, options: &TrackOptions, every: usize) -> Result<Tr
             label: record.label().to_owned(),
         });
     }
-    let (span, end_s) = match &options.start {
-        StartAt::Span(span) => {
-            let begin = record.time_s(0);
-            let third = begin + record.len() as f64 * sample_time.s() / 3.0;
-            let (from, to) = span.unwrap_or((begin, third));
-            (Some(record.span(from, to)?), to)
-        }
-        _ => (None, f64::NEG_INFINITY),
+    let (span, end_s) = match options.start_span(record) {
+        Some((from, to)) => (Some(record.span(from, to)?), to),
+        None => (None, f64::NEG_INFINITY),
     };
     let mut options = options.clone();
     if options.method == Method::Refined && options.instruments.is_none() && record.channel(FORCING_CHANNEL).is_some() {
@@ -407,7 +426,7 @@ pub fn track(record: &Record, options: &TrackOptions, every: usize) -> Result<Tr
             }
         })?),
     };
-    let mut tracker = Tracker::new(options, span.as_ref(), sample_time)?;
+    let mut tracker = Tracker::from_fit(options, span.as_ref(), start, sample_time)?;
     let known = span.is_some() && options.covariance == StartCovariance::OfFit;
     let from_s = options
         .update_from_s

@@ -3,10 +3,10 @@
 use std::{collections::BTreeMap, str::FromStr};
 
 use hoid_core::{predictor::Regressor, recursion::Stable};
-use hoid_model::{Orders, SampleTime, Structure};
+use hoid_model::{Orders, Record, SampleTime, Structure};
 
 use super::adaptive::LARGEST_ND;
-use crate::{Constraint, IdentError, SearchOptions};
+use crate::{Constraint, Estimator, IdentError, SearchOptions};
 
 /// Order of the noise model of the method adaptive when none is named.
 const USUAL_ND: usize = 6;
@@ -273,6 +273,22 @@ pub struct TrackOptions {
 }
 
 impl TrackOptions {
+    /// The batch fit from which a recursion starts.
+    pub fn start_estimator(&self) -> Estimator {
+        Estimator {
+            search: self.search,
+            ..Estimator::new(self.structure, self.orders)
+        }
+    }
+
+    /// The span of a record that gives the start fit, s; none where there is no such fit.
+    pub fn start_span(&self, record: &Record) -> Option<(f64, f64)> {
+        let StartAt::Span(span) = self.start else { return None };
+        let begin = record.time_s(0);
+        let third = begin + record.len() as f64 * record.sample_time().s() / 3.0;
+        Some(span.unwrap_or((begin, third)))
+    }
+
     /// Default options of a method, for the orders given.
     pub fn new(method: Method, structure: Structure, orders: Orders) -> Self {
         Self {

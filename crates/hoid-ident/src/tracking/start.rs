@@ -10,7 +10,7 @@ use hoid_core::{recursion::Stable, stability::roots_inside};
 use hoid_model::{Record, SampleTime, operator::retrieval_jacobian};
 
 use super::options::{PHYSICAL_NAMES, StartAt, StartCovariance, TrackOptions};
-use crate::{Constraint, Estimator, Fit, GreyBox, IdentError};
+use crate::{Constraint, Fit, GreyBox, IdentError};
 
 /// Variance of P for a start from nothing, in units of the innovation variance.
 const UNKNOWN: f64 = 1e6;
@@ -45,14 +45,19 @@ pub(super) struct StartState {
 }
 
 impl StartState {
-    /// The start that the options ask for, from a record of the start span where a fit is wanted.
+    /// The start that the options ask for, from a record of the start span where a fit is wanted, and that fit where it is known.
     ///
     /// # Errors
     /// Those of the batch fit; [`IdentError::BadStart`].
-    pub fn new(options: &TrackOptions, span: Option<&Record>, sample_time: SampleTime) -> Result<Self, IdentError> {
+    pub fn new(
+        options: &TrackOptions,
+        span: Option<&Record>,
+        known: Option<&Fit>,
+        sample_time: SampleTime,
+    ) -> Result<Self, IdentError> {
         match (&options.start, span) {
             (StartAt::Theta(theta), _) => Self::given(options, theta, sample_time),
-            (StartAt::Span(_), Some(record)) => Self::fitted(options, record),
+            (StartAt::Span(_), Some(record)) => Self::fitted(options, record, known),
             _ => Self::nothing(options, sample_time),
         }
     }
@@ -111,15 +116,11 @@ impl StartState {
     }
 
     /// From the batch fit of a record.
-    fn fitted(options: &TrackOptions, record: &Record) -> Result<Self, IdentError> {
+    fn fitted(options: &TrackOptions, record: &Record, known: Option<&Fit>) -> Result<Self, IdentError> {
         let (values, covariance, fit) = if options.method.is_physical() {
-            fit_physical(options, record)?
+            fit_physical(options, record, known)?
         } else {
-            let estimator = Estimator {
-                search: options.search,
-                ..Estimator::new(options.structure, options.orders)
-            };
-            let fit = estimator.fit(std::slice::from_ref(record))?;
+            let fit = polynomial_fit(options, record, known)?;
             (fit.model().theta().to_vec(), fit.covariance().map(<[f64]>::to_vec), fit)
         };
         let values = stabilised(options, values);
@@ -251,22 +252,30 @@ fn physical_values(options: &TrackOptions, theta: &[f64], sample_time: SampleTim
 type PhysicalStart = (Vec<f64>, Option<Vec<f64>>, Fit);
 
 /// The Box-Jenkins fit where it has physical parameters within the bounds, else the grey box, which always has.
-fn fit_physical(options: &TrackOptions, record: &Record) -> Result<PhysicalStart, IdentError> {
+/// The fit of the start span, made where it is not known.
+fn polynomial_fit(options: &TrackOptions, record: &Record, known: Option<&Fit>) -> Result<Fit, IdentError> {
+    match known {
+        Some(fit) => Ok(fit.clone()),
+        None => options.start_estimator().fit(std::slice::from_ref(record)),
+    }
+}
+
+fn fit_physical(options: &TrackOptions, record: &Record, known: Option<&Fit>) -> Result<PhysicalStart, IdentError> {
     if options.track_delay_s.is_none()
-        && let Some(start) = from_box_jenkins(options, record)?
+        && let Some(start) = from_box_jenkins(options, record, known)?
     {
         return Ok(start);
     }
     from_grey_box(options, record)
 }
 
-fn from_box_jenkins(options: &TrackOptions, record: &Record) -> Result<Option<PhysicalStart>, IdentError> {
+fn from_box_jenkins(
+    options: &TrackOptions,
+    record: &Record,
+    known: Option<&Fit>,
+) -> Result<Option<PhysicalStart>, IdentError> {
     let sample_time = record.sample_time();
-    let estimator = Estimator {
-        search: options.search,
-        ..Estimator::new(options.structure, options.orders)
-    };
-    let Ok(fit) = estimator.fit(std::slice::from_ref(record)) else {
+    let Ok(fit) = polynomial_fit(options, record, known) else {
         return Ok(None);
     };
     let Ok(eta) = physical_values(options, fit.model().theta(), sample_time) else {

@@ -132,6 +132,24 @@ impl Trace {
         )
     }
 
+    /// The operator of a row without standard errors, which take most of the time of [`Trace::operator`].
+    ///
+    /// # Errors
+    /// [`NotConvertible`] with the reason.
+    pub fn operator_values(&self, row: usize) -> Result<OperatorEstimate, NotConvertible> {
+        if self.operator.is_empty() {
+            operator_of(
+                self.options.structure,
+                self.options.orders,
+                self.sample_time,
+                self.theta(row),
+                None,
+            )
+        } else {
+            self.operator(row)
+        }
+    }
+
     /// A-priori innovation of each row.
     pub fn innovation(&self) -> &[f64] {
         &self.innovation

@@ -1,0 +1,42 @@
+//! Rows of numbers, one for each lane, that begin at the border of a line of the nearest memory.
+
+use std::ops::{Deref, DerefMut};
+
+/// Bytes of a line.
+const LINE: usize = 64;
+
+/// A row for each sample. A row that lies across two lines takes two reads.
+#[derive(Debug, Default)]
+pub(super) struct Rows {
+    all: Vec<f64>,
+    begin: usize,
+    count: usize,
+}
+
+impl Rows {
+    /// Room for so many numbers, whose values are whatever was there.
+    pub fn make_room(&mut self, count: usize) {
+        let spare = LINE / size_of::<f64>();
+        if self.all.len() < count + spare {
+            self.all.resize(count + spare, 0.0);
+        }
+        self.begin = self.all.as_ptr().align_offset(LINE).min(spare);
+        self.count = count;
+    }
+}
+
+impl Deref for Rows {
+    type Target = [f64];
+
+    #[inline(always)]
+    fn deref(&self) -> &[f64] {
+        &self.all[self.begin..self.begin + self.count]
+    }
+}
+
+impl DerefMut for Rows {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [f64] {
+        &mut self.all[self.begin..self.begin + self.count]
+    }
+}
