@@ -2,7 +2,7 @@
 
 use hoid_ident::{
     Fit, IdentError,
-    tracking::{Trace, track},
+    tracking::{Trace, track_from},
 };
 use hoid_io::OutputTable;
 use hoid_model::{
@@ -15,14 +15,18 @@ use hoid_model::{
 use hoid_sim::{Simulator, Stream};
 
 use crate::{
+    batch_fits::BatchFits,
     columns::{OPERATOR, Rows, Schemas, extra_axes},
     merit::{ChangeMeasures, TraceErrors, Truth, variance},
     plan::{Cell, EstimatorCell, Plan, Task},
-    prepared::prepared,
+    prepared::Preparation,
 };
 
 /// Samples between two points of a trace at which its errors are taken: far less than any memory.
 const ERRORS_EVERY: usize = 4;
+
+/// Replications whose fits are made side by side; a run of the text takes a megabyte.
+const AT_A_TIME: usize = 50;
 
 /// Some replications of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,32 +89,34 @@ pub(crate) fn run_block(
         fits: Rows::new(&schemas.fits),
         traces: schemas.traces.as_ref().map(Rows::new),
     };
-    let simulator = Simulator::new(cell.resolved.scenario());
-    for replication in block.first..block.first + block.count {
-        let stream = Stream {
-            seed: plan.seed,
-            cell: cell.index,
-            replication,
-        };
-        let run = simulator.as_ref().map_err(ToString::to_string).and_then(|simulator| {
-            Ok((
-                simulator,
-                simulator.run(stream, false).map_err(|error| error.to_string())?,
-            ))
-        });
-        match run {
-            Ok((simulator, record)) => bench.estimate_all(simulator, &record, replication, done, go_on)?,
-            Err(reason) => bench.fail_all(replication, &reason, done),
+    let simulator = match Simulator::new(cell.resolved.scenario()) {
+        Ok(simulator) => simulator,
+        Err(error) => {
+            for replication in block.first..block.first + block.count {
+                bench.fail_all(replication, &error.to_string(), done);
+            }
+            return Some(bench.tables(schemas));
         }
+    };
+    let all: Vec<u64> = (block.first..block.first + block.count).collect();
+    for replications in all.chunks(AT_A_TIME) {
+        let run = |&replication: &u64| {
+            let stream = Stream {
+                seed: plan.seed,
+                cell: cell.index,
+                replication,
+            };
+            let record = simulator.run(stream, false).map_err(|error| error.to_string());
+            (replication, record)
+        };
+        let runs: Vec<Run> = replications.iter().map(run).collect();
+        bench.estimate_all(&simulator, &runs, done, go_on)?;
     }
-    Some(BlockTables {
-        fits: bench.fits.into_table(schemas.fits.comments.clone()),
-        traces: bench
-            .traces
-            .zip(schemas.traces.as_ref())
-            .map(|(rows, schema)| rows.into_table(schema.comments.clone())),
-    })
+    Some(bench.tables(schemas))
 }
+
+/// A replication and its record, or why there is none.
+type Run = (u64, Result<Record, String>);
 
 struct Bench<'a> {
     plan: &'a Plan,
@@ -127,34 +133,55 @@ struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    /// Nothing when `go_on` says no: it is asked before each estimator, some of which take a tenth of a second.
+    /// Estimates of these runs. Nothing when `go_on` says no: it is asked before each estimator, some of which take a tenth of a second.
     fn estimate_all(
         &mut self,
         simulator: &Simulator,
-        record: &Record,
-        replication: u64,
+        runs: &[Run],
         done: &(dyn Fn(u64) + Sync),
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Option<()> {
-        self.vafs.clear();
-        for (estimator, task) in self.estimators.clone() {
-            if !go_on() {
-                return None;
+        let estimators = self.estimators.clone();
+        let records: Vec<&Record> = runs.iter().filter_map(|(_, run)| run.as_ref().ok()).collect();
+        let fits = BatchFits::of(&estimators, &records, go_on)?;
+        let mut records = records.into_iter().enumerate();
+        for (replication, run) in runs {
+            if let Err(reason) = run {
+                self.fail_all(*replication, reason, done);
+                continue;
             }
-            self.begin(estimator, replication);
-            let outcome = match task {
-                Task::Describe => self.describe(simulator, record),
-                task => {
-                    prepared(record, estimator).and_then(|record| self.estimate(&task, &record, estimator, replication))
+            let (index, record) = records.next()?;
+            self.vafs.clear();
+            for (estimator, task) in &estimators {
+                if !go_on() {
+                    return None;
                 }
-            };
-            if let Err(reason) = outcome {
-                self.fits.text("status", "failed");
-                self.fits.text("reason", &reason);
+                self.begin(estimator, *replication);
+                let fit = fits.of_run(estimator, task, index, record);
+                let outcome = match task {
+                    Task::Describe => self.describe(simulator, record),
+                    task => Preparation::of(estimator)
+                        .of_record(record)
+                        .and_then(|record| self.estimate(task, fit, &record, estimator, *replication)),
+                };
+                if let Err(reason) = outcome {
+                    self.fits.text("status", "failed");
+                    self.fits.text("reason", &reason);
+                }
+                done(1);
             }
-            done(1);
         }
         Some(())
+    }
+
+    fn tables(self, schemas: &Schemas) -> BlockTables {
+        BlockTables {
+            fits: self.fits.into_table(schemas.fits.comments.clone()),
+            traces: self
+                .traces
+                .zip(schemas.traces.as_ref())
+                .map(|(rows, schema)| rows.into_table(schema.comments.clone())),
+        }
     }
 
     fn fail_all(&mut self, replication: u64, reason: &str, done: &(dyn Fn(u64) + Sync)) {
@@ -247,6 +274,7 @@ impl<'a> Bench<'a> {
     fn estimate(
         &mut self,
         task: &Task,
+        fit: Option<&Result<Fit, String>>,
         record: &Record,
         estimator: &'a EstimatorCell,
         replication: u64,
@@ -256,7 +284,10 @@ impl<'a> Bench<'a> {
         match task {
             Task::Describe => {}
             Task::Fit(options) => {
-                let fit = options.fit(records).map_err(text)?;
+                let fit = match fit {
+                    Some(fit) => fit.clone()?,
+                    None => options.fit(records).map_err(text)?,
+                };
                 let operator = fit.operator().map_err(|reason| reason.to_string());
                 self.fit_row(estimator, &fit, record, operator)?;
             }
@@ -271,7 +302,9 @@ impl<'a> Bench<'a> {
             Task::Track(options) => {
                 let kept = self.plan.trace_every.unwrap_or(ERRORS_EVERY);
                 let every = greatest_common_divisor(kept, ERRORS_EVERY);
-                let trace = track(record, options, every).map_err(text)?;
+                // What went wrong with the start fit is told by the recursion.
+                let start = fit.and_then(|fit| fit.as_ref().ok());
+                let trace = track_from(record, options, every, start).map_err(text)?;
                 self.track_row(&trace, record);
                 if self.plan.trace_every.is_some() {
                     self.trace_rows(&trace, kept / every, estimator, replication);
@@ -413,7 +446,12 @@ impl<'a> Bench<'a> {
                     put(rows, *places, Estimate::fixed(*value));
                 }
             }
-            if let Ok(found) = trace.operator(k) {
+            let operator_of_row = if with_errors {
+                trace.operator(k)
+            } else {
+                trace.operator_values(k)
+            };
+            if let Ok(found) = operator_of_row {
                 for (places, (_, _, estimate)) in operator.iter().zip(found.rows()) {
                     put(rows, *places, estimate);
                 }

@@ -22,6 +22,7 @@
 //! # Ok::<(), hoid_study::StudyError>(())
 //! ```
 
+mod batch_fits;
 mod block;
 pub mod claims;
 mod columns;

@@ -91,7 +91,9 @@ impl TraceErrors {
                 continue;
             }
             counted += 1;
-            let Ok(found) = trace.operator(row) else { continue };
+            let Ok(found) = trace.operator_values(row) else {
+                continue;
+            };
             converted += 1;
             let k = ((t - record.time_s(0)) / record.sample_time().s()).round() as usize;
             for (i, (_, _, estimate)) in found.rows()[..5].iter().enumerate() {

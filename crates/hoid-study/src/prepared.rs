@@ -6,19 +6,46 @@ use hoid_model::{Channel, Detrend, Record, SampleTime};
 
 use crate::plan::EstimatorCell;
 
-/// The record as an estimator takes it: span, every so manieth sample, without mean or line.
-pub(crate) fn prepared<'r>(record: &'r Record, estimator: &EstimatorCell) -> Result<Cow<'r, Record>, String> {
-    let mut record = match estimator.span_s {
-        None => Cow::Borrowed(record),
-        Some((from, to)) => Cow::Owned(record.span(from, to).map_err(|error| error.to_string())?),
-    };
-    if estimator.decimate > 1 {
-        record = Cow::Owned(decimated(&record, estimator.decimate)?);
+/// What is done with a record before it is used.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Preparation {
+    /// The span that is taken, s; none for all.
+    pub span_s: Option<(f64, f64)>,
+    /// Every so manieth sample.
+    pub decimate: usize,
+    /// What is subtracted.
+    pub detrend: Detrend,
+}
+
+impl Preparation {
+    /// What an estimator asks for.
+    pub fn of(estimator: &EstimatorCell) -> Self {
+        Self {
+            span_s: estimator.span_s,
+            decimate: estimator.decimate,
+            detrend: estimator.detrend,
+        }
     }
-    if estimator.detrend != Detrend::None {
-        record = Cow::Owned(record.into_owned().detrended(estimator.detrend));
+
+    /// True for a record as it is.
+    pub fn is_none(&self) -> bool {
+        self.span_s.is_none() && self.decimate == 1 && self.detrend == Detrend::None
     }
-    Ok(record)
+
+    /// The record as an estimator takes it.
+    pub fn of_record<'r>(&self, record: &'r Record) -> Result<Cow<'r, Record>, String> {
+        let mut record = match self.span_s {
+            None => Cow::Borrowed(record),
+            Some((from, to)) => Cow::Owned(record.span(from, to).map_err(|error| error.to_string())?),
+        };
+        if self.decimate > 1 {
+            record = Cow::Owned(decimated(&record, self.decimate)?);
+        }
+        if self.detrend != Detrend::None {
+            record = Cow::Owned(record.into_owned().detrended(self.detrend));
+        }
+        Ok(record)
+    }
 }
 
 /// Every `n`-th sample of all channels, without a filter.

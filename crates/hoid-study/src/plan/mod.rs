@@ -122,7 +122,7 @@ pub(crate) struct Head {
     seed: u64,
     /// Replications of each cell.
     replications: u64,
-    /// Replications that are run and stored together, which a stopped study loses at most. Default 25.
+    /// Replications that are run and stored together, which a stopped study loses at most. Default 50.
     #[serde(default = "usual_block")]
     block: u64,
     /// What is kept.
@@ -166,7 +166,7 @@ fn one() -> u64 {
 }
 
 fn usual_block() -> u64 {
-    25
+    50
 }
 
 /// Most replications of a cell.
