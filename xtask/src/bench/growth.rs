@@ -114,7 +114,7 @@ pub fn tables(tasks: &Path, hoid: &Path, work: &Path, quick: bool) -> Result<Str
     fs::write(&plan, PLAN).map_err(|e| format!("{}: {e}", plan.display()))?;
     for threads in [1, 2] {
         eprintln!("replications, {threads} threads");
-        let points = (0..=if quick { 3 } else { 4 })
+        let points = (0..=if quick { 3 } else { 5 })
             .map(|k| replications(hoid, &plan, work, 10_usize.pow(k), threads))
             .collect::<Result<Vec<_>, _>>()?;
         let title =

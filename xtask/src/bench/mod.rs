@@ -5,6 +5,7 @@
 //! tables go between the markers of a page of the book ([`page`]).
 
 mod growth;
+mod instructions;
 mod lines;
 mod page;
 mod table;
@@ -21,7 +22,7 @@ const PEERS: &str = "crates/hoid/benches/peers";
 /// Belongs to the example `evidence` and prints no lines.
 const OF_EVIDENCE: &str = "scipy_bj.py";
 const WORK: &str = "target/bench";
-pub const USAGE: &str = "cargo xtask bench [--only TASK,...] [--peers none|installed|install] [--rounds N] [--reproduce M] [--growth [--quick]] [--dry]";
+pub const USAGE: &str = "cargo xtask bench [--only TASK,...] [--peers none|installed|install] [--rounds N] [--reproduce M] [--growth [--quick]] [--instructions [--keep]] [--dry]";
 
 /// Which peers take part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,6 +40,8 @@ struct Options {
     reproduce: Option<u64>,
     growth: bool,
     quick: bool,
+    instructions: bool,
+    keep: bool,
     dry: bool,
 }
 
@@ -51,6 +54,8 @@ impl Options {
             reproduce: None,
             growth: false,
             quick: false,
+            instructions: false,
+            keep: false,
             dry: false,
         };
         let mut rest = arguments.iter();
@@ -74,6 +79,8 @@ impl Options {
                 "--reproduce" => options.reproduce = Some(number(value()?)?),
                 "--growth" => options.growth = true,
                 "--quick" => options.quick = true,
+                "--instructions" => options.instructions = true,
+                "--keep" => options.keep = true,
                 "--dry" => options.dry = true,
                 _ => return Err(format!("unknown {argument}\nusage: {USAGE}")),
             }
@@ -92,9 +99,18 @@ impl Options {
 /// What cannot be run or written, in words.
 pub fn bench(arguments: &[String]) -> Result<(), String> {
     let options = Options::read(arguments)?;
-    let ours = build(&["-p", "hoid", "--example", "tasks"], "examples/tasks")?;
+    if options.instructions {
+        // Of the whole workspace, as the tests: with other features the same crates would be built twice.
+        let ours = build(&["--workspace", "--example", "tasks"], "examples/tasks", Profile::Tests)?;
+        return instructions::gate(&ours, &data(), options.keep);
+    }
+    let ours = build(
+        &["-p", "hoid", "--example", "tasks"],
+        "examples/tasks",
+        Profile::Release,
+    )?;
     if options.growth {
-        let hoid = build(&["-p", "hoid-cli"], "hoid")?;
+        let hoid = build(&["-p", "hoid-cli"], "hoid", Profile::Release)?;
         let text = growth::tables(&ours, &hoid, Path::new(WORK), options.quick)?;
         println!("\n{text}");
         return page::write("growth", &text, options.dry);
@@ -117,14 +133,30 @@ pub fn bench(arguments: &[String]) -> Result<(), String> {
     page::write("ratios", &text, options.dry || !options.only.is_empty())
 }
 
-/// Builds for release and says where the program is.
-fn build(arguments: &[&str], program: &str) -> Result<PathBuf, String> {
+/// How a program is built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Profile {
+    Release,
+    /// As the tests are, which have compiled all of it before.
+    Tests,
+}
+
+/// Builds a program and says where it is.
+fn build(arguments: &[&str], program: &str, profile: Profile) -> Result<PathBuf, String> {
     let mut command = super::cargo_command();
-    command.args(["build", "--quiet", "--release"]).args(arguments);
+    command.args(["build", "--quiet"]).args(arguments);
+    if profile == Profile::Release {
+        command.arg("--release");
+    }
     super::run(&mut command)?;
     let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| PathBuf::from("target"), PathBuf::from);
+    let folder = if profile == Profile::Release {
+        "release"
+    } else {
+        "debug"
+    };
     let name = format!("{program}{}", env::consts::EXE_SUFFIX);
-    Ok(target.join("release").join(name))
+    Ok(target.join(folder).join(name))
 }
 
 fn run_ours(program: &Path, options: &Options, first: bool) -> Result<Vec<Line>, String> {

@@ -10,7 +10,7 @@
 
 use std::{fmt::Write, path::Path};
 
-use hoid::prelude::*;
+use hoid::{model::Channel, prelude::*, sim::Signals};
 
 /// Delay of the operator of C1 and its hold, samples.
 pub const NK: usize = 29;
@@ -69,6 +69,15 @@ impl Shared {
             ])
             .collect();
         std::fs::write(directory.join("truth.json"), serde_json::Value::from(truth).to_string()).unwrap();
+    }
+}
+
+impl Shared {
+    /// Input and output of the measurement of a run.
+    pub fn measured(&self, run: &Signals) -> Record {
+        let from = run.e.len() - self.record.len();
+        let channel = |name, values: &[f64]| Channel::new(name, "deg", values[from..].to_vec());
+        Record::new(self.record.sample_time(), channel("e", &run.e), channel("u", &run.u)).unwrap()
     }
 }
 

@@ -1,10 +1,10 @@
 //! The tasks by which hoid is compared with what people would use instead: our side. `cargo xtask bench` runs it beside the peers in
 //! `crates/hoid/benches/peers` and makes the table of the book.
 //!
-//! `cargo run --release -p hoid --example tasks -- DIRECTORY [--task NAME,...] [--seconds S] [--reproduce M]`
+//! `cargo run --release -p hoid --example tasks -- DIRECTORY [--task NAME,...] [--seconds S | --times K] [--reproduce M]`
 //!
 //! DIRECTORY receives the data that all share ([`data`]). One line of JSON a task: `{"task", "peer", "seconds", "answer"}`, the median of as
-//! many runs as S seconds hold (at least five). All but `reproduce` run on one thread (`RAYON_NUM_THREADS=1`).
+//! many runs as S seconds hold (at least five), or of K runs. All but `reproduce` run on one thread (`RAYON_NUM_THREADS=1`).
 //!
 //! | task | what |
 //! |---|---|
@@ -12,9 +12,9 @@
 //! | `bj` | Box-Jenkins, nb = 2, nd = 1, nf = 2, nk = 29, no start given, initial states estimated, with covariance |
 //! | `rls`, `rpem` | theta after each sample, lambda = 1 - 1/256, P = 0.1, nothing else |
 //! | `rls trace`, `rpem trace` | `hoid track`: theta, its covariance, innovation and its variance after each sample |
-//! | `loop` | one run of C1 with its run-in, noise given |
+//! | `loop` | one run of C1 with its run-in, noise given, into memory that was used before |
 //! | `loop with noise` | the same with its normal deviates |
-//! | `cell` | 100 runs of C1, each simulated and fitted by ARX and Box-Jenkins |
+//! | `cell` | 100 runs of C1, each simulated and fitted by ARX and Box-Jenkins, side by side |
 //! | `delays` | Box-Jenkins for nk = 20 to 40: the losses on common samples, and the best once more |
 //! | `reproduce` | `hoid reproduce` with M replications, on all cores |
 //!
@@ -42,8 +42,10 @@ use hoid::{
         order_search::Criterion,
         tracking::{Memory, Method, StartAt, StartCovariance, TrackOptions, track},
     },
+    lanes::Path as LanesPath,
     prelude::*,
     report::reproduction::{Reproduction, reproduce},
+    sim::Signals,
 };
 
 /// Start of the recursive prediction-error method: b0, b1, d1, f1, f2.
@@ -67,12 +69,18 @@ fn main() {
     let mut arguments = std::env::args().skip(1);
     let directory = arguments.next().unwrap();
     let directory = Path::new(&directory);
-    let (mut only, mut seconds, mut replications) = (Vec::new(), 1.0, None);
+    let (mut only, mut effort, mut replications) = (Vec::new(), Effort::default(), None);
     while let Some(option) = arguments.next() {
         let mut value = || arguments.next().unwrap();
         match option.as_str() {
             "--task" => only = value().split(',').map(str::to_owned).collect(),
-            "--seconds" => seconds = value().parse().unwrap(),
+            "--seconds" => effort.seconds = value().parse().unwrap(),
+            "--times" => {
+                effort = Effort {
+                    seconds: 0.0,
+                    times: value().parse().unwrap(),
+                }
+            }
             "--reproduce" => replications = Some(value().parse().unwrap()),
             "--growth" => return growth::measure(&value(), value().parse().unwrap(), &arguments.collect::<Vec<_>>()),
             _ => panic!("unknown option {option}"),
@@ -82,7 +90,7 @@ fn main() {
     shared.write(directory);
     for task in TASKS {
         if only.is_empty() || only.iter().any(|name| name == task) {
-            let (seconds, answer) = run(task, &shared, seconds);
+            let (seconds, answer) = run(task, &shared, effort);
             tell(task, seconds, &answer);
         }
     }
@@ -100,47 +108,57 @@ fn tell(task: &str, seconds: f64, answer: &[f64]) {
     );
 }
 
-fn run(task: &str, shared: &Shared, seconds: f64) -> (f64, Vec<f64>) {
+fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
     let record = shared.record.clone();
     let one = std::slice::from_ref(&record);
     let estimator = |structure: Structure| Estimator::new(structure, structure.operator_orders(NK));
     let theta = |fit: &Fit| fit.model().theta().to_vec();
     let (arx, bj) = (estimator(Structure::Arx), estimator(Structure::BoxJenkins));
     match task {
-        "arx" => median(seconds, || theta(&arx.fit(one).unwrap())),
-        "bj" => median(seconds, || theta(&bj.fit(one).unwrap())),
+        "arx" => median(effort, || theta(&arx.fit(one).unwrap())),
+        "bj" => median(effort, || theta(&bj.fit(one).unwrap())),
         "rls" => {
             let mut history = Vec::with_capacity(record.len());
-            median(seconds, || rls(record.input(), record.output(), &mut history).to_vec())
+            median(effort, || rls(record.input(), record.output(), &mut history).to_vec())
         }
         "rpem" => {
             let mut history = Vec::with_capacity(record.len());
-            median(seconds, || rpem(record.input(), record.output(), &mut history).to_vec())
+            median(effort, || rpem(record.input(), record.output(), &mut history).to_vec())
         }
         "rls trace" | "rpem trace" => {
             let method = if task == "rls trace" { Method::Rls } else { Method::Rpem };
             let options = traced(method);
-            median(seconds, || {
+            median(effort, || {
                 let trace = track(&record, &options, 1).unwrap();
                 trace.theta(trace.len() - 1).to_vec()
             })
         }
-        "loop" => median(seconds, || shared.simulator.signals(&shared.noise).unwrap())
-            .map_answer(|signals| vec![*signals.e.last().unwrap(), *signals.u.last().unwrap()]),
-        "loop with noise" => {
-            let mut replication = 0;
-            median(seconds, || {
-                replication += 1;
-                let noise = data::stream(replication).white_noise(shared.simulator.samples());
-                shared.simulator.signals(&noise).unwrap()
+        "loop" => {
+            let mut signals = Signals::default();
+            median(effort, || {
+                shared.simulator.signals_into(&shared.noise, &mut signals).unwrap();
+                vec![*signals.e.last().unwrap(), *signals.u.last().unwrap()]
             })
-            .map_answer(|_| Vec::new())
         }
-        "cell" => median(seconds, || {
+        "loop with noise" => {
+            let (mut noise, mut signals) = (shared.noise.clone(), Signals::default());
+            let mut replication = 0;
+            median(effort, || {
+                replication += 1;
+                data::stream(replication).white_noise_into(&mut noise);
+                shared.simulator.signals_into(&noise, &mut signals).unwrap();
+            })
+            .map_answer(|()| Vec::new())
+        }
+        "cell" => median(effort, || {
+            let noise = |replication| data::stream(replication).white_noise(shared.simulator.samples());
+            let noises: Vec<Vec<f64>> = (0..CELL_RUNS).map(noise).collect();
+            let runs = shared.simulator.signals_of_many(&noises, LanesPath::Best).unwrap();
+            let records: Vec<Record> = runs.iter().map(|run| shared.measured(run)).collect();
+            let records: Vec<&Record> = records.iter().collect();
             let mut sums = [0.0; 9];
-            for replication in 0..CELL_RUNS {
-                let record = [shared.simulator.run(data::stream(replication), false).unwrap()];
-                let both = [theta(&arx.fit(&record).unwrap()), theta(&bj.fit(&record).unwrap())].concat();
+            for (arx, bj) in arx.fit_each(&records).into_iter().zip(bj.fit_each(&records)) {
+                let both = [theta(&arx.unwrap()), theta(&bj.unwrap())].concat();
                 sums.iter_mut().zip(both).for_each(|(sum, value)| *sum += value);
             }
             sums.iter().map(|sum| sum / CELL_RUNS as f64).collect()
@@ -148,7 +166,7 @@ fn run(task: &str, shared: &Shared, seconds: f64) -> (f64, Vec<f64>) {
         "delays" => {
             let mut ranges = OrderRanges::from(bj.orders);
             ranges.nk = 20..=40;
-            median(seconds, || choose_orders(&bj, &ranges, Criterion::Loss, one).unwrap()).map_answer(|choice| {
+            median(effort, || choose_orders(&bj, &ranges, Criterion::Loss, one).unwrap()).map_answer(|choice| {
                 let losses = choice.candidates.iter().map(|c| c.outcome.as_ref().unwrap().loss);
                 losses.collect()
             })
@@ -239,12 +257,25 @@ impl<T> Measured<T> for (f64, T) {
     }
 }
 
-/// Runs the work once to warm up and then for about `budget` seconds, at least five times.
-fn median<T>(budget: f64, mut work: impl FnMut() -> T) -> (f64, T) {
+/// How long and how often a task is run.
+#[derive(Clone, Copy)]
+struct Effort {
+    seconds: f64,
+    times: usize,
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Self { seconds: 1.0, times: 5 }
+    }
+}
+
+/// Runs the work once to warm up, and then as long and as often as the effort says at least.
+fn median<T>(effort: Effort, mut work: impl FnMut() -> T) -> (f64, T) {
     let begun = Instant::now();
     let mut answer = black_box(work());
     let mut times = Vec::new();
-    while times.len() < 5 || begun.elapsed().as_secs_f64() < budget {
+    while times.len() < effort.times || begun.elapsed().as_secs_f64() < effort.seconds {
         let begun = Instant::now();
         answer = black_box(work());
         times.push(begun.elapsed().as_secs_f64());

@@ -1,0 +1,144 @@
+//! A gate on the instructions that a task takes.
+//!
+//! Times of a shared machine say little; the number of instructions of a program is the same to a few in a thousand whatever else runs. Callgrind
+//! (Valgrind) counts those of one run of the example `tasks` and of three: half of the difference belongs to one run of the task. The numbers that are
+//! kept stand in [`KEPT`] with the compiler that gave them. More than [`ALLOWED`] above them fails; with another compiler it is only said.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::Path,
+    process::{Command, Stdio},
+};
+
+use serde_json::{Value, json};
+
+const KEPT: &str = "crates/hoid/benches/instructions.json";
+/// Share above the kept number that is allowed.
+const ALLOWED: f64 = 0.05;
+/// Tasks whose instructions do not depend on the width of the registers.
+const TASKS: [&str; 6] = ["arx", "bj", "rls", "rpem", "loop", "loop with noise"];
+
+/// Counts, compares, and with `keep` writes the numbers down.
+///
+/// # Errors
+/// When a task takes more instructions than allowed, or Valgrind does not run as it should.
+pub fn gate(program: &Path, data: &Path, keep: bool) -> Result<(), String> {
+    if Command::new("valgrind")
+        .arg("--version")
+        .stdout(Stdio::null())
+        .status()
+        .is_err()
+    {
+        println!("instructions were not counted: valgrind is not installed (apt install valgrind)");
+        return Ok(());
+    }
+    let compiler = compiler()?;
+    let mut found = BTreeMap::new();
+    for task in TASKS {
+        let (one, three) = (count(program, data, task, 1)?, count(program, data, task, 3)?);
+        found.insert(task.to_owned(), three.saturating_sub(one) / 2);
+    }
+    let kept = read();
+    let same_compiler = kept.as_ref().is_some_and(|kept| kept.compiler == compiler);
+    let known = kept.map(|kept| kept.tasks).unwrap_or_default();
+    let (text, over) = compare(&found, &known);
+    println!("{text}");
+    if keep {
+        let text = format!("{:#}\n", json!({"compiler": compiler, "tasks": found}));
+        return fs::write(KEPT, text).map_err(|error| format!("{KEPT}: {error}"));
+    }
+    match (over, same_compiler) {
+        (false, _) => Ok(()),
+        (true, true) => Err(format!(
+            "a task takes more than {:.0} % more instructions than {KEPT} says; mend it, or keep the new numbers with \
+             `cargo xtask bench --instructions --keep` and say why",
+            100.0 * ALLOWED
+        )),
+        (true, false) => {
+            println!("{KEPT} was made by another compiler than {compiler}: nothing follows");
+            Ok(())
+        }
+    }
+}
+
+struct Kept {
+    compiler: String,
+    tasks: BTreeMap<String, u64>,
+}
+
+fn read() -> Option<Kept> {
+    let value: Value = serde_json::from_str(&fs::read_to_string(KEPT).ok()?).ok()?;
+    let tasks = value.get("tasks")?.as_object()?;
+    Some(Kept {
+        compiler: value.get("compiler")?.as_str()?.to_owned(),
+        tasks: tasks
+            .iter()
+            .filter_map(|(task, n)| Some((task.clone(), n.as_u64()?)))
+            .collect(),
+    })
+}
+
+/// A line for each task, and whether one is over.
+fn compare(found: &BTreeMap<String, u64>, kept: &BTreeMap<String, u64>) -> (String, bool) {
+    let mut over = false;
+    let mut lines = vec![format!(
+        "{:<16} {:>12} {:>12} {:>7}",
+        "instructions", "found", "kept", "ratio"
+    )];
+    for (task, n) in found {
+        lines.push(match kept.get(task) {
+            Some(kept) => {
+                let ratio = *n as f64 / *kept as f64;
+                over |= ratio > 1.0 + ALLOWED;
+                format!("{task:<16} {n:>12} {kept:>12} {ratio:>7.3}")
+            }
+            None => format!("{task:<16} {n:>12}"),
+        });
+    }
+    (lines.join("\n"), over)
+}
+
+fn count(program: &Path, data: &Path, task: &str, times: usize) -> Result<u64, String> {
+    let output = Command::new("valgrind")
+        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
+        .arg(program)
+        .arg(data)
+        .args(["--task", task, "--times", &times.to_string()])
+        .env("RAYON_NUM_THREADS", "1")
+        .output()
+        .map_err(|error| format!("cannot run valgrind: {error}"))?;
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    collected(&said).ok_or_else(|| format!("valgrind did not count {task}:\n{said}"))
+}
+
+/// The number behind `Collected :`.
+fn collected(said: &str) -> Option<u64> {
+    let line = said.lines().find(|line| line.contains("Collected :"))?;
+    line.rsplit(' ').next()?.parse().ok()
+}
+
+fn compiler() -> Result<String, String> {
+    let output = Command::new("rustc").arg("--version").output();
+    let output = output.map_err(|error| format!("cannot run rustc: {error}"))?;
+    Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_are_read_and_compared() {
+        assert_eq!(
+            collected("==7== Events    : Ir\n==7== Collected : 4711\n==7=="),
+            Some(4711)
+        );
+        assert_eq!(collected("==7== no such program"), None);
+        let kept: BTreeMap<String, u64> = [("arx".to_owned(), 1000)].into();
+        let with = |n| compare(&[("arx".to_owned(), n), ("bj".to_owned(), 5)].into(), &kept);
+        assert!(!with(1050).1 && !with(900).1);
+        let (text, over) = with(1051);
+        assert!(over && text.contains("1.051"), "{text}");
+    }
+}
