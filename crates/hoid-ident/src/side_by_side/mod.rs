@@ -5,6 +5,7 @@
 //! record takes its place. A search that needs more than the criterion (the border of stability, a start that is weighed against a
 //! minimum, free responses that are not independent) goes there alone.
 
+mod columns;
 mod pass;
 mod rows;
 
