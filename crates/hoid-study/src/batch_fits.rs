@@ -18,7 +18,8 @@ type Question = (Estimator, Preparation);
 
 /// The fits of some runs.
 pub(crate) struct BatchFits {
-    questions: Vec<Question>,
+    /// For each estimator, the number of its question.
+    asked: Vec<Option<usize>>,
     /// For each question, the fit of each run.
     fits: Vec<Vec<Result<Fit, String>>>,
 }
@@ -30,37 +31,31 @@ impl BatchFits {
         runs: &[&Record],
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Option<Self> {
-        let mut all = Self {
-            questions: Vec::new(),
-            fits: Vec::new(),
-        };
+        let mut questions: Vec<Question> = Vec::new();
+        let (mut asked, mut fits) = (Vec::with_capacity(estimators.len()), Vec::new());
         for (estimator, task) in estimators {
             let Some(question) = runs.first().and_then(|run| question(estimator, task, run)) else {
+                asked.push(None);
                 continue;
             };
-            if all.questions.contains(&question) {
+            let known = questions.iter().position(|known| *known == question);
+            asked.push(Some(known.unwrap_or(questions.len())));
+            if known.is_some() {
                 continue;
             }
             if !go_on() {
                 return None;
             }
-            all.fits.push(answers(&question, runs));
-            all.questions.push(question);
+            fits.push(answers(&question, runs));
+            questions.push(question);
         }
-        Some(all)
+        Some(Self { asked, fits })
     }
 
-    /// The fit of a run that an estimator asks for; none where it asks for none.
-    pub fn of_run(
-        &self,
-        estimator: &EstimatorCell,
-        task: &Task,
-        run: usize,
-        record: &Record,
-    ) -> Option<&Result<Fit, String>> {
-        let question = question(estimator, task, record)?;
-        let at = self.questions.iter().position(|known| *known == question)?;
-        self.fits[at].get(run)
+    /// The fit of a run that an estimator (by its place) asks for; none where it asks for none.
+    pub fn of_run(&self, estimator: usize, run: usize) -> Option<&Result<Fit, String>> {
+        let question = (*self.asked.get(estimator)?)?;
+        self.fits.get(question)?.get(run)
     }
 }
 

@@ -152,12 +152,12 @@ impl<'a> Bench<'a> {
             }
             let (index, record) = records.next()?;
             self.vafs.clear();
-            for (estimator, task) in &estimators {
+            for (place, (estimator, task)) in estimators.iter().enumerate() {
                 if !go_on() {
                     return None;
                 }
                 self.begin(estimator, *replication);
-                let fit = fits.of_run(estimator, task, index, record);
+                let fit = fits.of_run(place, index);
                 let outcome = match task {
                     Task::Describe => self.describe(simulator, record),
                     task => Preparation::of(estimator)
