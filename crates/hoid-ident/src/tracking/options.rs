@@ -250,7 +250,8 @@ pub struct TrackOptions {
     pub stable: Stable,
     /// Bounds of physical parameters, by name.
     pub bounds: BTreeMap<String, Constraint>,
-    /// Range of the delay tau_e in s that the physical recursion tracks. Default: none, nk is fixed.
+    /// Range of the delay tau_e in s that is tracked: by [`Method::Physical`] as a parameter, by [`Method::Adaptive`] as hypotheses of whole samples. Default:
+    /// none, nk is fixed.
     pub track_delay_s: Option<(f64, f64)>,
     /// Channel of the signal from outside the loop that [`Method::Refined`] makes its instruments of. Default: f_t where a record has it,
     /// else the error itself.
@@ -316,13 +317,18 @@ impl TrackOptions {
         }
     }
 
+    /// Range of tau_e in s where it is one of the parameters that the recursion moves.
+    pub(super) fn delay_parameter_s(&self) -> Option<(f64, f64)> {
+        self.track_delay_s.filter(|_| self.method == Method::Physical)
+    }
+
     /// Names of the parameters that the recursion moves: theta, or the physical ones.
     pub fn parameter_names(&self) -> Vec<String> {
         if !self.method.is_physical() {
             return self.orders.parameter_names();
         }
         let mut names: Vec<String> = PHYSICAL_NAMES[..4].iter().map(|n| (*n).to_owned()).collect();
-        if self.track_delay_s.is_some() {
+        if self.delay_parameter_s().is_some() {
             names.push(PHYSICAL_NAMES[4].to_owned());
         }
         names.extend((1..=self.orders.nc).map(|i| format!("c{i}")));
@@ -453,10 +459,25 @@ impl TrackOptions {
                 format!("with {}", m.name()),
                 "adaptive, whose hypotheses are run from both ends",
             ),
-            m if self.track_delay_s.is_some() && m != Method::Physical => bad(
+            m if self.track_delay_s.is_some() && !matches!(m, Method::Physical | Method::Adaptive) => bad(
                 "the range of the delay",
                 format!("with {}", m.name()),
-                "physical, the only method that moves tau_e",
+                "physical or adaptive, the methods that follow tau_e",
+            ),
+            _ if self
+                .track_delay_s
+                .is_some_and(|(low, high)| !(0.0 <= low && low <= high && high.is_finite())) =>
+            {
+                bad(
+                    "the range of the delay",
+                    format!("{:?} s", self.track_delay_s.unwrap_or_default()),
+                    "two finite times, the shorter first",
+                )
+            }
+            _ if self.track_delay_s.is_some() && self.smooth => bad(
+                "the range of the delay",
+                "with the two-sided estimate".to_owned(),
+                "a delay that is given or searched on the start span: past and future are joined for one delay",
             ),
             _ => Ok(()),
         }?;
