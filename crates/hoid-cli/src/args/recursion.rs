@@ -114,8 +114,8 @@ pub struct RecursionArgs {
     /// Samples between two fits for --method window [default: 25]
     #[arg(long, value_name = "N")]
     pub refit: Option<usize>,
-    /// Standard deviations beyond which an innovation moves the estimate no further: a number or inf [default: 5 for rpem, fused,
-    /// physical and adaptive, inf for rls]
+    /// Standard deviations beyond which an innovation moves the estimate no further: a number or inf [default: 5 for rpem, fused
+    /// and physical, 3.5 for adaptive, inf for rls]
     #[arg(long, value_name = "K")]
     pub limit: Option<f64>,
     /// For --method adaptive: logarithm of the odds from which a change is declared [default: 6]

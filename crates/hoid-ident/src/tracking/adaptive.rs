@@ -40,11 +40,11 @@ const SPACING_S: f64 = 0.32;
 /// Mean time between two changes, s.
 const BETWEEN_CHANGES_S: f64 = 60.0;
 /// Change of K_e and of K_e_dot to be expected, in the units of [`Suppositions::jump`].
-const JUMP: [f64; 2] = [0.22, 0.5];
+const JUMP: [f64; 2] = [0.15, 0.5];
 /// Drift of the gains in one second, in the same units.
 const DRIFT: f64 = 0.005;
 /// The drift just after a change, for K_e and K_e_dot in the same units, for omega_nm and zeta_nm in those of a change of them; and how long it lasts, s.
-const UNREST: [f64; OPERATOR] = [0.05, 0.2, 0.2, 0.2];
+const UNREST: [f64; OPERATOR] = [0.05, 0.25, 0.2, 0.2];
 const UNREST_FOR_S: f64 = 3.0;
 /// Relative change of omega_nm and of zeta_nm to be expected, how many births there are for one of this kind, and its odds against the other.
 const NEUROMUSCULAR: [f64; 2] = [0.25, 0.4];

@@ -262,8 +262,8 @@ pub struct TrackOptions {
     pub every: usize,
     /// Limits of the search of start fits and windows.
     pub search: SearchOptions,
-    /// Multiple of the innovation's standard deviation beyond which an innovation moves the estimate no further. Default: 5 for rpem, fused,
-    /// physical and adaptive, none (infinite) for rls, as in the text. A window has none, nor have ekf and ukf.
+    /// Multiple of the innovation's standard deviation beyond which an innovation moves the estimate no further. Default: 5 for rpem, fused
+    /// and physical, 3.5 for adaptive, none (infinite) for rls, as in the text. A window has none, nor have ekf and ukf.
     pub limit: Option<f64>,
     /// Magnitude of e or u beyond which a sample is taken for a fault. Default 1e6.
     pub largest: f64,
@@ -366,7 +366,8 @@ impl TrackOptions {
     pub fn limit_in_use(&self) -> f64 {
         match (self.method, &self.forgetting) {
             (_, ForgettingRule::Window) => f64::INFINITY,
-            (Method::Rpem | Method::Fused | Method::Physical | Method::Adaptive, _) => self.limit.unwrap_or(5.0),
+            (Method::Rpem | Method::Fused | Method::Physical, _) => self.limit.unwrap_or(5.0),
+            (Method::Adaptive, _) => self.limit.unwrap_or(3.5),
             _ => self.limit.unwrap_or(f64::INFINITY),
         }
     }
