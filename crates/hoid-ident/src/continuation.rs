@@ -10,9 +10,10 @@
 use hoid_model::{Complex64, Orders, SampleTime, polynomial, polynomial_model::monic};
 
 use crate::{
-    prediction_error::{Criterion, Data, InitialState, Workspace, first_residual},
-    search::{SearchMethod, SearchOptions, minimise},
-    starts,
+    prediction_error::{Block, Criterion, Data, InitialState, Linearisation, Workspace, first_residual},
+    search::{Objective, SearchMethod, SearchOptions},
+    searches::{Asks, Searches},
+    starts::{Start, pole_grid},
 };
 
 /// Samples that each record keeps at least.
@@ -23,6 +24,12 @@ const LARGEST_FACTOR: usize = 8;
 const LARGEST_ND: usize = 2;
 /// Poles of the grid from which the search runs.
 const SEARCHED: usize = 2;
+/// The search on the averaged record.
+const SEARCH: SearchOptions = SearchOptions {
+    method: SearchMethod::LevenbergMarquardt,
+    max_iterations: 30,
+    tolerance: 1e-6,
+};
 
 /// `|ln z|` of a pole of the averaged record below which it lies well inside what the average leaves (its Nyquist frequency
 /// is pi).
@@ -30,7 +37,7 @@ const SLOW: f64 = 1.3;
 
 /// What the averaged record proposes.
 #[derive(Debug, Default)]
-pub(crate) struct Proposals {
+pub(crate) struct Slow {
     /// Polynomials F, best first; none where the records are short or the model has no poles in F alone.
     pub f: Vec<Vec<f64>>,
     /// True when all poles of the best one are slow beside the average, so that it says nearly all that the record does.
@@ -38,69 +45,187 @@ pub(crate) struct Proposals {
 }
 
 /// Proposals for F.
-pub(crate) fn propose(criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> Proposals {
-    let shortest = criterion.data.iter().map(|d| d.u.len()).min().unwrap_or(0);
-    let factor = (shortest / SAMPLES_LEFT).min(LARGEST_FACTOR);
-    let o = criterion.orders;
-    let Ok(coarse) = SampleTime::new(sample_time.s() * factor as f64) else {
-        return Proposals::default();
+pub(crate) fn propose(criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> Slow {
+    let Some(averaged) = Averaged::of(criterion, sample_time) else {
+        return Slow::default();
     };
-    if factor < 2 || o.nf == 0 || o.na > 0 {
-        return Proposals::default();
+    let low = averaged.criterion();
+    let mut continuation = Continuation::new(&averaged, &low);
+    while let Some(theta) = continuation.asked() {
+        let there = match continuation.block() {
+            Some(block) => low.linearise_block(theta, block, workspace),
+            None => low.linearise(theta, workspace),
+        };
+        continuation.take(there, workspace);
     }
-    let slow: Vec<(Vec<f64>, Vec<f64>)> = criterion
-        .data
-        .iter()
-        .map(|d| (averaged(d.e, factor), averaged(d.u, factor)))
-        .collect();
-    let orders = Orders {
-        nb: o.nb + 1,
-        nd: (o.nc + o.nd).min(LARGEST_ND),
-        nf: o.nf,
-        nk: o.nk / factor,
-        ..Orders::default()
-    };
-    let first = first_residual(&orders, InitialState::Estimate);
-    let low = Criterion {
-        orders,
-        data: slow.iter().map(|(e, u)| Data { e, u }).collect(),
-        initial: InitialState::Estimate,
-        first,
-        weights: None,
-    };
-    if low
-        .data
-        .iter()
-        .any(|d| d.u.len() <= first + orders.parameters() + orders.nf)
-    {
-        return Proposals::default();
+    continuation.slow()
+}
+
+/// The averaged records of a criterion.
+pub(crate) struct Averaged {
+    factor: usize,
+    orders: Orders,
+    sample_time: SampleTime,
+    records: Vec<[Vec<f64>; 2]>,
+}
+
+impl Averaged {
+    /// `None` where the records are too short, or the model has no poles in F alone.
+    pub fn of(criterion: &Criterion<'_>, sample_time: SampleTime) -> Option<Self> {
+        let shortest = criterion.data.iter().map(|d| d.u.len()).min().unwrap_or(0);
+        let factor = (shortest / SAMPLES_LEFT).min(LARGEST_FACTOR);
+        let o = criterion.orders;
+        if factor < 2 || o.nf == 0 || o.na > 0 {
+            return None;
+        }
+        let orders = Orders {
+            nb: o.nb + 1,
+            nd: (o.nc + o.nd).min(LARGEST_ND),
+            nf: o.nf,
+            nk: o.nk / factor,
+            ..Orders::default()
+        };
+        let needed = first_residual(&orders, InitialState::Estimate) + orders.parameters() + orders.nf;
+        let sample_time = SampleTime::new(sample_time.s() * factor as f64).ok()?;
+        (shortest / factor > needed).then(|| Self {
+            factor,
+            orders,
+            sample_time,
+            records: (criterion.data.iter())
+                .map(|d| [averaged(d.e, factor), averaged(d.u, factor)])
+                .collect(),
+        })
     }
-    let options = SearchOptions {
-        method: SearchMethod::LevenbergMarquardt,
-        max_iterations: 30,
-        tolerance: 1e-6,
-    };
-    let mut minima: Vec<(f64, Vec<f64>)> = Vec::new();
-    for start in starts::from_grid(&low, coarse, SEARCHED, workspace) {
-        let known = minima.iter().map(|m| m.0).reduce(f64::min);
-        if let Some(minimum) = minimise(&low, start.theta, &options, known, workspace)
-            && let Some(f) = root_of_poles(&minimum.theta[orders.parameters() - orders.nf..], factor)
-        {
-            minima.push((minimum.at.sum_of_squares, f));
+
+    /// The criterion over them.
+    pub fn criterion(&self) -> Criterion<'_> {
+        Criterion {
+            orders: self.orders,
+            data: self.records.iter().map(|[e, u]| Data { e, u }).collect(),
+            initial: InitialState::Estimate,
+            first: first_residual(&self.orders, InitialState::Estimate),
+            weights: None,
         }
     }
-    minima.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let f: Vec<Vec<f64>> = minima
-        .into_iter()
-        .map(|(_, f)| f)
-        .filter(|f| hoid_core::stability::roots_inside(f, 1.0))
-        .collect();
-    let slow = |f: &Vec<f64>| {
-        polynomial::roots(&monic(f)).is_some_and(|z| z.iter().all(|z| z.ln().norm() * (factor as f64) < SLOW))
-    };
-    Proposals {
-        complete: f.first().is_some_and(slow),
-        f,
+}
+
+/// The search on the averaged records: the places of the pole grid are ranked with one noise model, that of the first of them, and the best
+/// are searched from.
+pub(crate) struct Continuation<'c> {
+    low: &'c Criterion<'c>,
+    factor: usize,
+    grid: Vec<Vec<f64>>,
+    /// The noise model of the ranking, once it is known.
+    noise: Option<Vec<f64>>,
+    /// The place of the grid that is tried, and its number.
+    trial: Option<Start>,
+    tried: usize,
+    ranked: Vec<Start>,
+    searches: Option<Searches<'c, Criterion<'c>>>,
+}
+
+impl<'c> Continuation<'c> {
+    /// On these records, of which `low` is the criterion.
+    pub fn new(averaged: &Averaged, low: &'c Criterion<'c>) -> Self {
+        let grid = pole_grid(low.orders.nf, averaged.sample_time);
+        let mut continuation = Self {
+            low,
+            factor: averaged.factor,
+            grid: grid.into_iter().map(|(_, f)| f).collect(),
+            noise: (low.orders.nd == 0).then(Vec::new),
+            trial: None,
+            tried: 0,
+            ranked: Vec::new(),
+            searches: None,
+        };
+        continuation.go_on();
+        continuation
+    }
+
+    /// To the next place of the grid, and from the last to the searches.
+    fn go_on(&mut self) {
+        let o = &self.low.orders;
+        let start = |noise: &[f64], f: &[f64], left| {
+            Start::to_be_found("pole grid", [&vec![0.0; o.nb], noise, f].concat(), left)
+        };
+        self.trial = match (&self.noise, self.grid.get(self.tried)) {
+            (None, Some(f)) => Some(start(&vec![0.0; o.nd], f, vec![Block::D, Block::B])),
+            (Some(noise), Some(f)) => Some(start(noise, f, vec![Block::B])),
+            (_, None) => None,
+        };
+        if self.trial.is_none() {
+            let mut ranked = std::mem::take(&mut self.ranked);
+            ranked.sort_by(|a, b| a.value.total_cmp(&b.value));
+            ranked.truncate(SEARCHED);
+            let starts = ranked.into_iter().map(|start| start.with_own_noise(o)).collect();
+            self.searches = Some(Searches::new(self.low, *o, &SEARCH, SEARCHED, starts));
+        }
+    }
+
+    /// What it has come to.
+    pub fn slow(self) -> Slow {
+        let o = &self.low.orders;
+        let mut minima = self.searches.map(|searches| searches.minima).unwrap_or_default();
+        minima.sort_by(|(_, a), (_, b)| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares));
+        let f: Vec<Vec<f64>> = minima
+            .into_iter()
+            .filter_map(|(_, minimum)| root_of_poles(&minimum.theta[o.parameters() - o.nf..], self.factor))
+            .filter(|f| hoid_core::stability::roots_inside(f, 1.0))
+            .collect();
+        let slow = |f: &Vec<f64>| {
+            polynomial::roots(&monic(f)).is_some_and(|z| z.iter().all(|z| z.ln().norm() * (self.factor as f64) < SLOW))
+        };
+        Slow {
+            complete: f.first().is_some_and(slow),
+            f,
+        }
+    }
+}
+
+impl Asks for Continuation<'_> {
+    fn criterion(&self) -> &Criterion<'_> {
+        self.low
+    }
+
+    fn asked(&self) -> Option<&[f64]> {
+        match (&self.trial, &self.searches) {
+            (Some(trial), _) => Some(&trial.theta),
+            (None, Some(searches)) => searches.asked(),
+            (None, None) => None,
+        }
+    }
+
+    fn block(&self) -> Option<Block> {
+        match (&self.trial, &self.searches) {
+            (Some(trial), _) => trial.wanted(),
+            (None, Some(searches)) => searches.block(),
+            (None, None) => None,
+        }
+    }
+
+    fn take(&mut self, there: Linearisation, workspace: &mut Workspace) {
+        let o = &self.low.orders;
+        let Some(mut trial) = self.trial.take() else {
+            if let Some(searches) = &mut self.searches {
+                searches.take(there, workspace);
+            }
+            return;
+        };
+        trial.take(o, &there);
+        if trial.wanted().is_some() {
+            self.trial = Some(trial);
+            return;
+        }
+        let known = trial.value.is_finite();
+        if self.noise.is_none() && known {
+            // From the first place again, now with the noise model.
+            self.noise = Some(trial.theta[Block::D.place(o)].to_vec());
+            self.tried = 0;
+        } else {
+            self.ranked.extend(known.then_some(trial));
+            self.tried += 1;
+        }
+        self.go_on();
     }
 }
 

@@ -14,7 +14,9 @@ use crate::{
     quest::Quest,
     robust::{ROUNDS, Reweighting},
     search::{Minimum, Objective, free_parameters, minimise},
-    side_by_side, simulation_focus, starts,
+    searches::Asks,
+    side_by_side, simulation_focus,
+    starts::{self, Start},
 };
 
 /// Rounds of the robust loss end when theta moves by less than this share of its standard errors.
@@ -198,9 +200,13 @@ impl Estimator {
     fn fit_iteratively(&self, criterion: &Criterion<'_>, sample_time: SampleTime) -> Result<Fit, IdentError> {
         let mut workspace = Workspace::of_thread();
         let informed = self.inform(criterion);
-        let mut quest = Quest::new(self, &informed, sample_time, &mut workspace)?;
+        let own = || starts::propose(criterion, sample_time, &mut workspace);
+        let mut quest = Quest::new(self, &informed, sample_time, own)?;
         while let Some(theta) = quest.asked() {
-            let there = informed.linearise(theta, &mut workspace);
+            let there = match quest.block() {
+                Some(block) => criterion.linearise_block(theta, block, &mut workspace),
+                None => informed.linearise(theta, &mut workspace),
+            };
             quest.take(there, &mut workspace);
         }
         quest.fit(&mut workspace)
@@ -320,12 +326,12 @@ impl Estimator {
     }
 
     /// The start with a stable A where that was asked for.
-    pub(crate) fn stabilised(&self, mut theta: Vec<f64>) -> Option<Vec<f64>> {
+    pub(crate) fn stabilised(&self, mut start: Start) -> Option<Start> {
         if self.stable {
-            let a = starts::reflected_inside(&theta[..self.orders.na])?;
-            theta[..self.orders.na].copy_from_slice(&a);
+            let a = starts::reflected_inside(&start.theta[..self.orders.na])?;
+            start.theta[..self.orders.na].copy_from_slice(&a);
         }
-        Some(theta)
+        Some(start)
     }
 
     pub(crate) fn check_start(&self, theta: &[f64], objective: &Informed<'_, '_>) -> Result<Vec<f64>, IdentError> {

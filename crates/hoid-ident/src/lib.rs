@@ -7,7 +7,7 @@
 //! | `initial_states` | what a record does not say about its past, eliminated exactly |
 //! | `stationary_past` | the noise before the record, when it was stationary |
 //! | `search`, `stable_coordinates` | damped Gauss-Newton, also along the border of stability |
-//! | `quest`, `side_by_side` | the search from all starts of a fit; those of many records at a time |
+//! | `searches`, `quest`, `side_by_side` | the searches from all starts, the fit at the lowest minimum; those of many records at a time |
 //! | `objective`, `robust`, `simulation_focus` | bounds and priors, a loss against outliers, models that are to simulate |
 //! | `starts`, `continuation`, `shared_poles` | where the search begins when nobody says |
 //! | `arx`, `least_squares` | linear regression by QR with column pivoting |
@@ -42,6 +42,7 @@ mod products;
 mod quest;
 mod robust;
 mod search;
+mod searches;
 mod shared_poles;
 mod side_by_side;
 mod simulation_focus;

@@ -257,6 +257,39 @@ impl Criterion<'_> {
         value.is_finite().then_some((best, value))
     }
 
+    /// As [`Objective::linearise`], with the derivatives to the coefficients of one polynomial alone; those to others are zero.
+    pub fn linearise_block(&self, theta: &[f64], block: Block, workspace: &mut Workspace) -> Linearisation {
+        let (p, place) = (theta.len(), block.place(&self.orders));
+        let count = place.len();
+        let mut part = Linearisation {
+            sum_of_squares: 0.0,
+            descent: vec![0.0; count],
+            gram: vec![0.0; count * count],
+        };
+        let parts = Parts::split(&self.orders, theta);
+        for (index, data) in self.data.iter().enumerate() {
+            let passed = self.residual_pass(theta, index, workspace);
+            match block {
+                Block::B => self.whiten_input(&parts, workspace),
+                // Without C its signal is v itself.
+                Block::D if self.orders.nc == 0 => {}
+                _ => self.gradient_pass(theta, *data, workspace),
+            }
+            let columns = self.columns(&parts, data.u.len(), workspace, &[block]);
+            self.accumulate(&passed, &columns, index, workspace, &mut part);
+        }
+        let mut whole = Linearisation {
+            sum_of_squares: part.sum_of_squares,
+            descent: vec![0.0; p],
+            gram: vec![0.0; p * p],
+        };
+        whole.descent[place.clone()].copy_from_slice(&part.descent);
+        for (i, row) in place.clone().zip(part.gram.chunks_exact(count.max(1))) {
+            whole.gram[i * p + place.start..i * p + place.end].copy_from_slice(row);
+        }
+        whole
+    }
+
     /// Residuals of one record, from [`Criterion::first`] on.
     pub fn residuals_of(&self, theta: &[f64], record: usize, workspace: &mut Workspace) -> Vec<f64> {
         self.residual_pass(theta, record, workspace);
@@ -605,8 +638,8 @@ impl Objective for Criterion<'_> {
 }
 
 /// The polynomials as blocks of theta; the number is the place of their signal in the workspace.
-#[derive(Debug, Clone, Copy)]
-enum Block {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Block {
     A,
     B,
     C,
@@ -616,6 +649,13 @@ enum Block {
 
 impl Block {
     const ALL: [Self; 5] = [Self::A, Self::B, Self::C, Self::D, Self::F];
+
+    /// Its coefficients in theta.
+    pub fn place(self, o: &Orders) -> Range<usize> {
+        let counts = [o.na, o.nb, o.nc, o.nd, o.nf];
+        let from = counts[..self as usize].iter().sum();
+        from..from + counts[self as usize]
+    }
 
     /// First shift, number of shifts, sign of psi.
     fn shifts(self, o: &Orders) -> (usize, usize, f64) {

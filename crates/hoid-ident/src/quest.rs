@@ -1,8 +1,4 @@
-//! The search for the lowest minimum from all starts of one fit, one linearisation after the other.
-//!
-//! It asks for the criterion at one theta and is told, so that the quests of several records can go on side by side
-//! ([`crate::side_by_side`]). A start in the basin of a minimum that is known is left out, and a search that comes close to one without
-//! a promise to end lower is stopped.
+//! The search for the lowest minimum from all starts of one fit, and the fit there.
 
 use hoid_model::SampleTime;
 
@@ -11,9 +7,10 @@ use crate::{
     estimator::held,
     information::inverse_of_free,
     objective::Informed,
-    prediction_error::{Criterion, Linearisation, Workspace},
-    search::{Descent, Minimum, Progress, free_parameters, leads_to, minimise},
-    starts,
+    prediction_error::{Block, Criterion, Linearisation, Workspace},
+    search::{free_parameters, minimise},
+    searches::{Asks, Searches},
+    starts::{self, Start},
 };
 
 /// All that is under way for one fit.
@@ -21,15 +18,11 @@ pub(crate) struct Quest<'q, 'a> {
     estimator: &'q Estimator,
     informed: &'q Informed<'q, 'a>,
     sample_time: SampleTime,
-    /// Starts that are left.
-    candidates: std::vec::IntoIter<(String, Vec<f64>)>,
-    /// The start of the search that is under way, and the search.
-    searching: Option<(String, Descent<'q, Informed<'q, 'a>>)>,
-    best: Option<(String, Minimum)>,
+    searches: Searches<'q, Informed<'q, 'a>>,
 }
 
 impl<'q, 'a> Quest<'q, 'a> {
-    /// Makes the starts and begins at the best of them.
+    /// From the start that the estimator was given, or from those that `own` makes.
     ///
     /// # Errors
     /// [`IdentError::BadStart`].
@@ -37,74 +30,22 @@ impl<'q, 'a> Quest<'q, 'a> {
         estimator: &'q Estimator,
         informed: &'q Informed<'q, 'a>,
         sample_time: SampleTime,
-        workspace: &mut Workspace,
+        own: impl FnOnce() -> Vec<Start>,
     ) -> Result<Self, IdentError> {
-        let candidates: Vec<(String, Vec<f64>)> = match &estimator.start {
-            Some(theta) => vec![("given".to_owned(), estimator.check_start(theta, informed)?)],
-            None => starts::propose(informed.criterion, sample_time, workspace)
+        let starts = match &estimator.start {
+            Some(theta) => vec![Start::complete("given", estimator.check_start(theta, informed)?, 0.0)],
+            None => own()
                 .into_iter()
-                .take(estimator.starts.max(1))
-                .filter_map(|s| Some((s.label, estimator.stabilised(s.theta)?)))
+                .filter_map(|start| estimator.stabilised(start))
                 .collect(),
         };
-        let mut quest = Self {
+        let (orders, most) = (estimator.orders, estimator.starts.max(1));
+        Ok(Self {
             estimator,
             informed,
             sample_time,
-            candidates: candidates.into_iter(),
-            searching: None,
-            best: None,
-        };
-        quest.begin(workspace);
-        Ok(quest)
-    }
-
-    /// The criterion that is searched.
-    pub fn criterion(&self) -> &'q Criterion<'a> {
-        self.informed.criterion
-    }
-
-    /// Where the criterion and its derivatives are wanted next; nowhere when all searches have ended.
-    pub fn asked(&self) -> Option<&[f64]> {
-        self.searching.as_ref().map(|(_, descent)| descent.asked())
-    }
-
-    /// Takes what was found there.
-    pub fn take(&mut self, there: Linearisation, workspace: &mut Workspace) {
-        let Some((label, mut descent)) = self.searching.take() else {
-            return;
-        };
-        match descent.take(there) {
-            Progress::GoesOn => self.searching = Some((label, descent)),
-            Progress::Ended(reason) => {
-                if let Some(minimum) = reason.and_then(|reason| descent.finish(reason, workspace))
-                    && self.known().is_none_or(|known| minimum.at.sum_of_squares < known)
-                {
-                    self.best = Some((label, minimum));
-                }
-                self.begin(workspace);
-            }
-        }
-    }
-
-    /// Begins at the next start that promises something.
-    fn begin(&mut self, workspace: &mut Workspace) {
-        while let Some((label, theta)) = self.candidates.next() {
-            if let Some((_, known)) = &self.best
-                && leads_to(known, self.informed, &theta, workspace)
-            {
-                continue;
-            }
-            if let Some(descent) = Descent::new(self.informed, theta, &self.estimator.search, self.known()) {
-                self.searching = Some((label, descent));
-                return;
-            }
-        }
-    }
-
-    /// Sum of squares of the best minimum so far.
-    fn known(&self) -> Option<f64> {
-        self.best.as_ref().map(|(_, minimum)| minimum.at.sum_of_squares)
+            searches: Searches::new(informed, orders, &estimator.search, most, starts),
+        })
     }
 
     /// The fit at the lowest minimum, once all searches have ended.
@@ -115,7 +56,7 @@ impl<'q, 'a> Quest<'q, 'a> {
         let Self {
             estimator, informed, ..
         } = self;
-        let (mut start, mut minimum) = self.best.ok_or(IdentError::NoFiniteLoss)?;
+        let (mut start, mut minimum) = self.searches.lowest().ok_or(IdentError::NoFiniteLoss)?;
         if estimator.start.is_none() && matches!(minimum.termination.reason, Reason::Border | Reason::NoDescent) {
             // The loss often has a minimum on the border besides a lower one inside.
             let inside = starts::with_c_drawn_inside(&estimator.orders, &minimum.theta);
@@ -156,5 +97,23 @@ impl<'q, 'a> Quest<'q, 'a> {
             covariance: Some(inverse.iter().map(|g| sigma2 * g).collect()),
             ..fit
         })
+    }
+}
+
+impl Asks for Quest<'_, '_> {
+    fn criterion(&self) -> &Criterion<'_> {
+        self.informed.criterion
+    }
+
+    fn asked(&self) -> Option<&[f64]> {
+        self.searches.asked()
+    }
+
+    fn block(&self) -> Option<Block> {
+        self.searches.block()
+    }
+
+    fn take(&mut self, there: Linearisation, workspace: &mut Workspace) {
+        self.searches.take(there, workspace);
     }
 }

@@ -169,24 +169,16 @@ pub(crate) fn minimise(
     descent.finish(reason, workspace)
 }
 
-/// True when a start lies in the basin of a minimum that is known: its loss is what the quadratic model around the minimum says
-/// of it, so that a search from there would end in the same place.
-pub(crate) fn leads_to(
-    minimum: &Minimum,
-    objective: &impl Objective,
-    start: &[f64],
-    workspace: &mut Workspace,
-) -> bool {
+/// True when a start of that loss lies in the basin of a minimum that is known: its loss is what the quadratic model around the minimum
+/// says of it, so that a search from there would end in the same place.
+pub(crate) fn lies_in_basin(minimum: &Minimum, start: &[f64], sum_of_squares: f64) -> bool {
     let p = start.len();
     let delta: Vec<f64> = start.iter().zip(&minimum.theta).map(|(a, b)| a - b).collect();
     let rise: f64 = (0..p)
         .map(|i| delta[i] * dot(&minimum.at.gram[i * p..(i + 1) * p], &delta))
         .sum();
-    if !objective.is_feasible(start) || rise.is_nan() || rise > BASIN * minimum.at.sum_of_squares {
-        return false;
-    }
-    let found = objective.linearise(start, workspace).sum_of_squares - minimum.at.sum_of_squares;
-    (found - rise).abs() <= 0.1 * rise
+    let found = sum_of_squares - minimum.at.sum_of_squares;
+    rise <= BASIN * minimum.at.sum_of_squares && (found - rise).abs() <= 0.1 * rise
 }
 
 /// Relative rise of the loss up to which a start is held against the quadratic model of a minimum.
@@ -269,6 +261,11 @@ impl<'s, O: Objective> Descent<'s, O> {
     /// Where the derivatives are wanted.
     pub fn asked(&self) -> &[f64] {
         &self.asked
+    }
+
+    /// True while nothing is known of it but its start.
+    pub fn is_at_its_start(&self) -> bool {
+        matches!(self.trial, Trial::Start)
     }
 
     /// Until it ends, alone.

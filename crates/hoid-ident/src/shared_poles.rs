@@ -33,15 +33,11 @@ pub(crate) fn concerns(o: &Orders) -> bool {
 }
 
 /// The best starts of both kinds and of `others`, after a few steps of the search, with their sums of squares.
-pub(crate) fn propose(
-    criterion: &Criterion<'_>,
-    others: Vec<(Start, f64)>,
-    workspace: &mut Workspace,
-) -> Vec<(Start, f64)> {
+pub(crate) fn propose(criterion: &Criterion<'_>, others: Vec<Start>, workspace: &mut Workspace) -> Vec<Start> {
     let mut starts = others;
     starts.extend(from_instruments(criterion, workspace));
     starts.extend(from_long_arx(criterion, workspace));
-    starts.sort_by(|a, b| a.1.total_cmp(&b.1));
+    starts.sort_by(|a, b| a.value.total_cmp(&b.value));
     let options = SearchOptions {
         max_iterations: STEPS,
         ..SearchOptions::default()
@@ -49,15 +45,14 @@ pub(crate) fn propose(
     starts
         .into_iter()
         .take(TRIED)
-        .filter_map(|(Start { label, theta }, _)| {
-            let end = minimise(criterion, theta, &options, None, workspace)?;
-            let theta = end.theta;
-            Some((Start { label, theta }, end.at.sum_of_squares))
+        .filter_map(|start| {
+            let end = minimise(criterion, start.theta, &options, None, workspace)?;
+            Some(Start::complete(&start.label, end.theta, end.at.sum_of_squares))
         })
         .collect()
 }
 
-fn from_instruments(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<(Start, f64)> {
+fn from_instruments(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Start> {
     let o = criterion.orders;
     let pooled = Criterion {
         orders: Orders {
@@ -83,7 +78,7 @@ fn from_instruments(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec
         .collect()
 }
 
-fn from_long_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<(Start, f64)> {
+fn from_long_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Start> {
     let o = criterion.orders;
     if o.nd == 0 {
         return Vec::new();
@@ -122,7 +117,7 @@ fn start(
     linear: Vec<f64>,
     f: &[f64],
     workspace: &mut Workspace,
-) -> Option<(Start, f64)> {
+) -> Option<Start> {
     let o = criterion.orders;
     let white = Criterion {
         orders: Orders { nc: 0, nd: 0, ..o },
@@ -136,8 +131,7 @@ fn start(
     let mut theta = [&linear, &c[..], &d, f].concat();
     let (linear, value) = criterion.best_linear_part(&theta, workspace)?;
     theta[..o.na + o.nb].copy_from_slice(&linear);
-    let label = label.to_owned();
-    Some((Start { label, theta }, value))
+    Some(Start::complete(label, theta, value))
 }
 
 fn coefficients(roots: &[Complex64]) -> Vec<f64> {

@@ -24,10 +24,10 @@ use hoid_core::{
 use hoid_model::{Complex64, Orders, SampleTime, polynomial, polynomial_model::monic};
 
 use crate::{
-    continuation,
+    continuation::{self, Slow},
     instrumental::instrument_chain,
-    least_squares::{dot, solve_symmetric},
-    prediction_error::{Criterion, Data, InitialState, Workspace, first_residual},
+    least_squares::{add_scaled, dot, solve_symmetric},
+    prediction_error::{Block, Criterion, Data, InitialState, Linearisation, Workspace, first_residual},
     search::Objective,
     shared_poles,
 };
@@ -40,6 +40,71 @@ const STEIGLITZ_MCBRIDE_STEPS: usize = 4;
 pub(crate) struct Start {
     pub label: String,
     pub theta: Vec<f64>,
+    /// The sum of squares there, once nothing is left to find; not finite where a regression was singular.
+    pub value: f64,
+    /// Polynomials that are still to be found, the next one last.
+    left: Vec<Block>,
+}
+
+impl Start {
+    /// Of which nothing is left to find.
+    pub fn complete(label: &str, theta: Vec<f64>, value: f64) -> Self {
+        Self {
+            label: label.to_owned(),
+            theta,
+            value,
+            left: Vec::new(),
+        }
+    }
+
+    /// With B and the noise model still to be found for its F, without A and C: B with white noise, D of what is left, and B once more with
+    /// that noise model.
+    pub fn of_poles(label: &str, o: &Orders, f: &[f64]) -> Self {
+        let left = if o.nd > 0 {
+            vec![Block::B, Block::D, Block::B]
+        } else {
+            vec![Block::B]
+        };
+        Self::to_be_found(label, [&vec![0.0; o.nb + o.nd], f].concat(), left)
+    }
+
+    /// With some polynomials still to be found, the next one last.
+    pub fn to_be_found(label: &str, theta: Vec<f64>, left: Vec<Block>) -> Self {
+        Self {
+            label: label.to_owned(),
+            theta,
+            value: f64::NAN,
+            left,
+        }
+    }
+
+    /// With a noise model of its own, and B once more with that.
+    pub fn with_own_noise(mut self, o: &Orders) -> Self {
+        if o.nd > 0 {
+            self.left = vec![Block::B, Block::D];
+        }
+        self
+    }
+
+    /// The polynomial that is to be found next.
+    pub fn wanted(&self) -> Option<Block> {
+        self.left.last().copied()
+    }
+
+    /// Takes the criterion at theta. The residual is affine in B, and in D: one step of least squares finds either with the rest as it is.
+    pub fn take(&mut self, o: &Orders, there: &Linearisation) {
+        let Some(block) = self.left.pop() else { return };
+        let (p, place) = (self.theta.len(), block.place(o));
+        let rows = place.clone().map(|i| &there.gram[i * p..(i + 1) * p]);
+        let gram: Vec<f64> = rows.flat_map(|row| &row[place.clone()]).copied().collect();
+        let descent = &there.descent[place.clone()];
+        if let Some(step) = solve_symmetric(&gram, descent) {
+            self.value = there.sum_of_squares - dot(&step, descent);
+            add_scaled(&mut self.theta[place], 1.0, &step);
+        } else if block == Block::B {
+            (self.value, self.left) = (f64::NAN, Vec::new());
+        }
+    }
 }
 
 /// Neuromuscular frequencies of the pole grid, rad/s.
@@ -52,25 +117,34 @@ const EXTRA_POLE: f64 = 0.3;
 /// Proposals that are completed with a noise model of their own.
 const COMPLETED: usize = 4;
 
-/// The best starts, best first.
+/// The starts, with what is left to find of them.
 pub(crate) fn propose(criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> Vec<Start> {
-    let starts = from_poles(criterion, sample_time, workspace);
+    let slow = continuation::propose(criterion, sample_time, workspace);
+    propose_beside(slow, criterion, sample_time, workspace)
+}
+
+/// As [`propose`], with what the averaged record has said.
+pub(crate) fn propose_beside(
+    slow: Slow,
+    criterion: &Criterion<'_>,
+    sample_time: SampleTime,
+    workspace: &mut Workspace,
+) -> Vec<Start> {
+    let starts = from_poles(slow, criterion, sample_time, workspace);
     if shared_poles::concerns(&criterion.orders) {
-        return ranked(shared_poles::propose(criterion, starts, workspace));
+        return shared_poles::propose(criterion, starts, workspace);
     }
-    ranked(starts)
+    starts
 }
 
 /// Starts from proposals for F.
-fn from_poles(criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> Vec<(Start, f64)> {
+fn from_poles(slow: Slow, criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> Vec<Start> {
     if criterion.orders.nb == 0 {
         return time_series(criterion, workspace);
     }
     if criterion.orders.nf == 0 {
-        let linear = vec![("linear".to_owned(), Vec::new())];
-        return completed(criterion, linear, workspace);
+        return completed(criterion, vec![("linear".to_owned(), Vec::new())], workspace);
     }
-    let slow = continuation::propose(criterion, sample_time, workspace);
     let mut proposals: Vec<(String, Vec<f64>)> = slow
         .f
         .into_iter()
@@ -92,47 +166,29 @@ fn from_poles(criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mu
     }
     let mut starts = completed(criterion, proposals, workspace);
     if !slow.complete
-        && let Some(theta) = instrument_chain(criterion).filter(|theta| criterion.is_feasible(theta))
+        && let Some(mut theta) = instrument_chain(criterion).filter(|theta| criterion.is_feasible(theta))
         && let Some((linear, value)) = criterion.best_linear_part(&theta, workspace)
     {
-        let mut theta = theta;
         theta[..linear.len()].copy_from_slice(&linear);
-        let label = "instruments".to_owned();
-        starts.push((Start { label, theta }, value));
+        starts.push(Start::complete("instruments", theta, value));
     }
     starts
 }
 
-/// The best starts of the pole grid alone.
-pub(crate) fn from_grid(
-    criterion: &Criterion<'_>,
-    sample_time: SampleTime,
-    count: usize,
-    workspace: &mut Workspace,
-) -> Vec<Start> {
-    let proposals = ranked_grid(criterion, sample_time, count, workspace);
-    ranked(completed(criterion, proposals, workspace))
-}
-
-/// Proposals with A, B and a noise model of their own, and their sums of squares.
-fn completed(
-    criterion: &Criterion<'_>,
-    proposals: Vec<(String, Vec<f64>)>,
-    workspace: &mut Workspace,
-) -> Vec<(Start, f64)> {
+/// Proposals for F with A, B and a noise model of their own: to be found, or found where A or C takes part.
+fn completed(criterion: &Criterion<'_>, proposals: Vec<(String, Vec<f64>)>, workspace: &mut Workspace) -> Vec<Start> {
+    let o = &criterion.orders;
+    let in_steps = o.na + o.nc == 0 && criterion.initial != InitialState::Backcast;
     proposals
         .into_iter()
         .filter_map(|(label, f)| {
+            if in_steps {
+                return Some(Start::of_poles(&label, o, &f));
+            }
             let (theta, value) = complete(criterion, &f, workspace)?;
-            Some((Start { label, theta }, value))
+            Some(Start::complete(&label, theta, value))
         })
         .collect()
-}
-
-/// Best first.
-fn ranked(mut starts: Vec<(Start, f64)>) -> Vec<Start> {
-    starts.sort_by(|a, b| a.1.total_cmp(&b.1));
-    starts.into_iter().map(|(start, _)| start).collect()
 }
 
 /// The pole grid, best first: all are ranked with the noise model of the first one, which costs one pass each.
@@ -143,17 +199,7 @@ fn ranked_grid(
     workspace: &mut Workspace,
 ) -> Vec<(String, Vec<f64>)> {
     let o = &criterion.orders;
-    let grid: Vec<(String, Vec<f64>)> = GRID_OMEGA
-        .into_iter()
-        .flat_map(|omega| GRID_ZETA.map(|zeta| (omega, zeta)))
-        // One pole has no damping.
-        .filter(|(_, zeta)| o.nf > 1 || *zeta == GRID_ZETA[0])
-        .map(|(omega, zeta)| {
-            let poles = grid_poles(o.nf, omega, zeta, sample_time.s());
-            let f = polynomial::from_roots(&poles)[1..].to_vec();
-            (format!("pole grid {omega} rad/s, damping {zeta}"), f)
-        })
-        .collect();
+    let grid = pole_grid(o.nf, sample_time);
     let Some((reference, _)) = grid.iter().find_map(|(_, f)| complete(criterion, f, workspace)) else {
         return Vec::new();
     };
@@ -168,6 +214,21 @@ fn ranked_grid(
         .collect();
     ranked.sort_by(|a, b| a.2.total_cmp(&b.2));
     ranked.into_iter().take(count).map(|(label, f, _)| (label, f)).collect()
+}
+
+/// F of each place of the grid, with its name.
+pub(crate) fn pole_grid(nf: usize, sample_time: SampleTime) -> Vec<(String, Vec<f64>)> {
+    GRID_OMEGA
+        .into_iter()
+        .flat_map(|omega| GRID_ZETA.map(|zeta| (omega, zeta)))
+        // One pole has no damping.
+        .filter(|(_, zeta)| nf > 1 || *zeta == GRID_ZETA[0])
+        .map(|(omega, zeta)| {
+            let poles = grid_poles(nf, omega, zeta, sample_time.s());
+            let f = polynomial::from_roots(&poles)[1..].to_vec();
+            (format!("pole grid {omega} rad/s, damping {zeta}"), f)
+        })
+        .collect()
 }
 
 fn grid_poles(nf: usize, omega: f64, zeta: f64, ts: f64) -> Vec<Complex64> {
@@ -353,7 +414,7 @@ fn complete(criterion: &Criterion<'_>, f: &[f64], workspace: &mut Workspace) -> 
 /// Starts of a model of the output alone, `u = (C/A) eps`: A and C by Hannan and Rissanen, which cancel each other in part where
 /// the roots of C are near the unit circle and the long autoregression is too short; and A by its own autoregression, with the
 /// same C and with C = 1.
-fn time_series(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<(Start, f64)> {
+fn time_series(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Start> {
     let o = criterion.orders;
     let outputs: Vec<Vec<f64>> = criterion.data.iter().map(|d| d.u.to_vec()).collect();
     let (c, a) = noise_model(&outputs, o.nc, o.na);
@@ -366,9 +427,8 @@ fn time_series(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<(Sta
     let start = |(label, a, c): (&str, Vec<f64>, Vec<f64>)| {
         let mut theta = if o.na > 0 { reflected_inside(&a)? } else { a };
         theta.extend(c);
-        let label = label.to_owned();
         let value = criterion.linearise(&theta, workspace).sum_of_squares;
-        value.is_finite().then_some((Start { label, theta }, value))
+        Some(Start::complete(label, theta, value))
     };
     proposals.into_iter().filter_map(start).collect()
 }

@@ -26,7 +26,7 @@ use crate::{
     fit::Physical,
     information::inverse_of_free,
     prediction_error::{Data, Workspace, first_residual, output_variance},
-    search::{Minimum, leads_to},
+    search::{Minimum, Objective, lies_in_basin},
 };
 
 pub use layout::GREY_BOX_NAMES;
@@ -210,7 +210,8 @@ impl GreyBox {
         let mut best: Option<(String, Minimum)> = None;
         for (label, eta) in etas {
             if let Some((_, known)) = &best
-                && leads_to(known, criterion, &eta, workspace)
+                && criterion.is_feasible(&eta)
+                && lies_in_basin(known, &eta, criterion.linearise(&eta, workspace).sum_of_squares)
             {
                 continue;
             }

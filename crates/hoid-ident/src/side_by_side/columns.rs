@@ -133,7 +133,7 @@ impl Columns {
 
 /// `x' y` for four y.
 #[inline(always)]
-fn four_products<R: Number>(zero: R, x: &[f64], [a, b, c, d]: [&[f64]; 4]) -> [R; 4] {
+pub(super) fn four_products<R: Number>(zero: R, x: &[f64], [a, b, c, d]: [&[f64]; 4]) -> [R; 4] {
     let width = zero.lanes();
     let mut sums = (zero, zero, zero, zero);
     let others =
@@ -150,7 +150,7 @@ fn four_products<R: Number>(zero: R, x: &[f64], [a, b, c, d]: [&[f64]; 4]) -> [R
 
 /// `x' y` for two y.
 #[inline(always)]
-fn two_products<R: Number>(zero: R, x: &[f64], [a, b]: [&[f64]; 2]) -> [R; 2] {
+pub(super) fn two_products<R: Number>(zero: R, x: &[f64], [a, b]: [&[f64]; 2]) -> [R; 2] {
     let width = zero.lanes();
     let mut sums = (zero, zero);
     for ((x, a), b) in x

@@ -2,17 +2,19 @@
 //!
 //! A search is a chain of passes over its record, each a chain of filters that wait for their own last value ([`crate::prediction_error`]).
 //! Searches of different records wait for nothing of each other: each takes a lane of [`pass`], and when it has come to rest the next
-//! record takes its place. A search that needs more than the criterion (the border of stability, a start that is weighed against a
-//! minimum, free responses that are not independent) goes there alone.
+//! record takes its place; the search on the averaged records ([`crate::continuation`]) goes first in the same way. What needs more than the
+//! criterion (the border of stability, starts where the averages do not say enough, free responses that are not independent) goes there alone.
 
 mod columns;
+mod filters;
+mod free_responses;
 mod pass;
 mod rows;
 
 use std::cell::Cell;
 
 use hoid_lanes::Path;
-use hoid_model::{Orders, Record, Structure};
+use hoid_model::{Orders, Record, SampleTime, Structure};
 
 use self::{
     pass::{Pass, Room, Sums},
@@ -20,17 +22,21 @@ use self::{
 };
 use crate::{
     Estimator, Fit, Focus, IdentError, InitialState,
-    prediction_error::{Linearisation, Workspace},
+    continuation::{Averaged, Continuation, Slow},
+    objective::Informed,
+    prediction_error::{Criterion, Data, Linearisation, Workspace},
     quest::Quest,
     search::Objective,
+    searches::Asks,
+    starts,
 };
 
-/// A fit to each record; `None` for what is not searched side by side: anything but Box-Jenkins models with their initial states
-/// estimated and nothing known beforehand, records of different lengths, registers that this processor has not.
+/// A fit to each record; `None` for what is not searched side by side: anything but Box-Jenkins models without C, with their initial
+/// states estimated and nothing known beforehand, records of different lengths, registers that this processor has not.
 pub(crate) fn fit_each(estimator: &Estimator, records: &[&Record], path: Path) -> Option<Vec<Result<Fit, IdentError>>> {
     let o = &estimator.orders;
     let plain = estimator.structure == Structure::BoxJenkins
-        && (o.nb > 0 && o.nf > 0)
+        && (o.nb > 0 && o.nc == 0 && o.nf > 0)
         && estimator.initial_state_in_use() == InitialState::Estimate
         && estimator.focus == Focus::Prediction
         && estimator.knows_nothing_beforehand();
@@ -38,7 +44,7 @@ pub(crate) fn fit_each(estimator: &Estimator, records: &[&Record], path: Path) -
     if !plain || records.iter().any(|record| record.len() != n) {
         return None;
     }
-    let width = path.lanes()?;
+    path.lanes()?;
     let mut workspace = Workspace::of_thread();
     let criteria: Vec<_> = (records.iter())
         .map(|record| estimator.criterion(std::slice::from_ref(*record), 0))
@@ -46,19 +52,52 @@ pub(crate) fn fit_each(estimator: &Estimator, records: &[&Record], path: Path) -
     let informed: Vec<_> = (criteria.iter())
         .map(|found| found.as_ref().map(|(criterion, ts)| (estimator.inform(criterion), *ts)))
         .collect();
+    let mut slow = if estimator.start.is_none() {
+        averages_say(&informed, path, &mut workspace)
+    } else {
+        Vec::new()
+    }
+    .into_iter();
     let mut quests: Vec<Result<Quest<'_, '_>, IdentError>> = (informed.iter())
-        .map(|found| match found {
-            Ok((informed, sample_time)) => Quest::new(estimator, informed, *sample_time, &mut workspace),
-            Err(error) => Err((*error).clone()),
+        .map(|found| {
+            let slow = slow.next().unwrap_or_default();
+            let (informed, sample_time) = found.as_ref().map_err(|error| (*error).clone())?;
+            let own = || starts::propose_beside(slow, informed.criterion, *sample_time, &mut workspace);
+            Quest::new(estimator, informed, *sample_time, own)
         })
         .collect();
-    let open: Vec<(&Record, &mut Quest<'_, '_>)> = (records.iter().zip(&mut quests))
-        .filter_map(|(record, quest)| Some((*record, quest.as_mut().ok()?)))
-        .collect();
-    if let Some((_, quest)) = open.first() {
-        Lanes::new(estimator.orders, quest.criterion().first, n, width).search(open, path, &mut workspace);
-    }
+    search(quests.iter_mut().flatten().collect(), path, &mut workspace);
     Some(quests.into_iter().map(|quest| quest?.fit(&mut workspace)).collect())
+}
+
+/// What the averages of each record propose.
+fn averages_say(
+    informed: &[Result<(Informed<'_, '_>, SampleTime), &IdentError>],
+    path: Path,
+    workspace: &mut Workspace,
+) -> Vec<Slow> {
+    let averaged: Vec<Option<Averaged>> = (informed.iter())
+        .map(|found| (found.as_ref().ok()).and_then(|(informed, ts)| Averaged::of(informed.criterion, *ts)))
+        .collect();
+    let low: Vec<Option<Criterion<'_>>> = (averaged.iter())
+        .map(|averaged| averaged.as_ref().map(Averaged::criterion))
+        .collect();
+    let mut all: Vec<Option<Continuation<'_>>> = (averaged.iter().zip(&low))
+        .map(|(averaged, low)| Some(Continuation::new(averaged.as_ref()?, low.as_ref()?)))
+        .collect();
+    search(all.iter_mut().flatten().collect(), path, workspace);
+    (all.into_iter())
+        .map(|continuation| continuation.map(Continuation::slow).unwrap_or_default())
+        .collect()
+}
+
+/// Answers all that is asked for, side by side; the records are of one length and the orders the same.
+fn search(open: Vec<&mut impl Asks>, path: Path, workspace: &mut Workspace) {
+    let first = open.first().map(|asks| asks.criterion());
+    let lanes = first.and_then(|c| Some(Lanes::new(c.orders, c.first, c.data.first()?.u.len(), path.lanes()?)));
+    if let Some(mut lanes) = lanes {
+        lanes.search(open, path, workspace);
+    }
 }
 
 /// The records in the lanes, and what a pass over them needs.
@@ -117,21 +156,21 @@ impl Lanes {
     }
 
     /// Runs all searches to their end, as many at a time as there are lanes.
-    fn search(&mut self, open: Vec<(&Record, &mut Quest<'_, '_>)>, path: Path, workspace: &mut Workspace) {
+    fn search<A: Asks>(&mut self, open: Vec<&mut A>, path: Path, workspace: &mut Workspace) {
         let mut open = open.into_iter();
-        let mut searching: Vec<Option<&mut Quest<'_, '_>>> = (0..self.width).map(|_| None).collect();
+        let mut searching: Vec<Option<&mut A>> = (0..self.width).map(|_| None).collect();
         loop {
             for lane in 0..self.width {
-                while searching[lane].as_ref().is_none_or(|quest| quest.asked().is_none()) {
-                    let Some((record, quest)) = open.next() else {
+                while searching[lane].as_ref().is_none_or(|asks| asks.asked().is_none()) {
+                    let Some(next) = open.next() else {
                         searching[lane] = None;
                         break;
                     };
-                    self.put(lane, record);
-                    searching[lane] = Some(quest);
+                    self.put(lane, next.criterion().data[0]);
+                    searching[lane] = Some(next);
                 }
                 // A lane that is left over goes on with what it has.
-                let asked = searching[lane].iter().filter_map(|quest| quest.asked()).flatten();
+                let asked = searching[lane].iter().filter_map(|asks| asks.asked()).flatten();
                 for (i, value) in asked.enumerate() {
                     self.memory.theta[i * self.width + lane] = *value;
                 }
@@ -141,12 +180,12 @@ impl Lanes {
             }
             self.pass(path);
             for (lane, place) in searching.iter_mut().enumerate() {
-                let Some(quest) = place else { continue };
-                let there = match quest.asked() {
-                    Some(theta) if self.memory.sums.dependent[lane] => quest.criterion().linearise(theta, workspace),
+                let Some(asks) = place else { continue };
+                let there = match asks.asked() {
+                    Some(theta) if self.memory.sums.dependent[lane] => asks.criterion().linearise(theta, workspace),
                     _ => self.linearisation(lane),
                 };
-                quest.take(there, workspace);
+                asks.take(there, workspace);
             }
         }
     }
@@ -166,11 +205,8 @@ impl Lanes {
     }
 
     /// Puts a record into a lane.
-    fn put(&mut self, lane: usize, record: &Record) {
-        for (lanes, values) in [
-            (&mut self.memory.e, record.input()),
-            (&mut self.memory.u, record.output()),
-        ] {
+    fn put(&mut self, lane: usize, record: Data<'_>) {
+        for (lanes, values) in [(&mut self.memory.e, record.e), (&mut self.memory.u, record.u)] {
             for (row, value) in lanes.chunks_exact_mut(self.width).zip(values) {
                 row[lane] = *value;
             }

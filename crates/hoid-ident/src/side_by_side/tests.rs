@@ -43,7 +43,7 @@ fn pass(o: Orders, records: &[Record], thetas: &[Vec<f64>], path: Path) -> Vec<(
     let first = first_residual(&o, InitialState::Estimate);
     let mut lanes = Lanes::new(o, first, records[0].len(), path.lanes().unwrap());
     for (lane, (record, theta)) in records.iter().zip(thetas).enumerate().take(lanes.width) {
-        lanes.put(lane, record);
+        lanes.put(lane, Data::of(std::slice::from_ref(record))[0]);
         for (i, value) in theta.iter().enumerate() {
             lanes.memory.theta[i * lanes.width + lane] = *value;
         }
@@ -160,6 +160,28 @@ fn fits_side_by_side_are_those_alone() {
 }
 
 #[test]
+fn fits_from_no_start_have_the_same_bits_on_every_path_and_beside_anything() {
+    let records = runs(5, 2048);
+    let estimator = Estimator::new(Structure::BoxJenkins, orders(2, 1, 2, 29));
+    let bits = |records: &[Record], path: Path| -> Vec<Vec<u64>> {
+        let fits = fit_each(&estimator, &by_reference(records), path).unwrap();
+        let theta = |fit: Result<Fit, IdentError>| fit.unwrap().model().theta().iter().map(|t| t.to_bits()).collect();
+        fits.into_iter().map(theta).collect()
+    };
+    let best = bits(&records, Path::Best);
+    for path in Path::available() {
+        assert_eq!(bits(&records, path), best, "{path:?}");
+        for (lane, alone) in best.iter().enumerate() {
+            assert_eq!(
+                bits(&records[lane..=lane], path)[0],
+                *alone,
+                "record {lane} on {path:?}"
+            );
+        }
+    }
+}
+
+#[test]
 fn bad_records_fail_alone() {
     let mut records = runs(3, 1024);
     let silent = Record::new(
@@ -186,6 +208,10 @@ fn other_models_and_records_of_different_lengths_are_fitted_one_after_the_other(
     let bj = Estimator::new(Structure::BoxJenkins, orders(2, 1, 2, 29));
     let arx = Estimator::new(Structure::Arx, Structure::Arx.operator_orders(29));
     assert!(fit_each(&arx, &by_reference(&records), Path::Best).is_none());
+    // The pass has no C.
+    let with_c = Orders { nc: 1, ..bj.orders };
+    let with_c = Estimator::new(Structure::BoxJenkins, with_c);
+    assert!(fit_each(&with_c, &by_reference(&records), Path::Best).is_none());
     assert!(arx.fit_each(&by_reference(&records)).into_iter().all(|fit| fit.is_ok()));
     records[1] = records[1].span(0.0, 9.0).unwrap();
     assert!(fit_each(&bj, &by_reference(&records), Path::Best).is_none());

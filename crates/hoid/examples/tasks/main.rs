@@ -150,19 +150,32 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
             })
             .map_answer(|()| Vec::new())
         }
-        "cell" => median(effort, || {
-            let noise = |replication| data::stream(replication).white_noise(shared.simulator.samples());
-            let noises: Vec<Vec<f64>> = (0..CELL_RUNS).map(noise).collect();
-            let runs = shared.simulator.signals_of_many(&noises, LanesPath::Best).unwrap();
-            let records: Vec<Record> = runs.iter().map(|run| shared.measured(run)).collect();
-            let records: Vec<&Record> = records.iter().collect();
-            let mut sums = [0.0; 9];
-            for (arx, bj) in arx.fit_each(&records).into_iter().zip(bj.fit_each(&records)) {
-                let both = [theta(&arx.unwrap()), theta(&bj.unwrap())].concat();
-                sums.iter_mut().zip(both).for_each(|(sum, value)| *sum += value);
-            }
-            sums.iter().map(|sum| sum / CELL_RUNS as f64).collect()
-        }),
+        "cell" => {
+            // As many runs at a time as there are lanes, in memory that was used before.
+            let beside = LanesPath::Best.lanes().unwrap();
+            let (mut noises, mut runs) = (vec![shared.noise.clone(); beside], Vec::new());
+            median(effort, || {
+                let mut records = Vec::with_capacity(CELL_RUNS as usize + beside);
+                for begin in (0..CELL_RUNS).step_by(beside) {
+                    for (noise, replication) in noises.iter_mut().zip(begin..CELL_RUNS) {
+                        data::stream(replication).white_noise_into(noise);
+                    }
+                    let simulator = &shared.simulator;
+                    simulator
+                        .signals_of_many_into(&noises, LanesPath::Best, &mut runs)
+                        .unwrap();
+                    let count = (CELL_RUNS - begin) as usize;
+                    records.extend(runs.iter().take(count).map(|run| shared.measured(run)));
+                }
+                let records: Vec<&Record> = records.iter().collect();
+                let mut sums = [0.0; 9];
+                for (arx, bj) in arx.fit_each(&records).into_iter().zip(bj.fit_each(&records)) {
+                    let both = [theta(&arx.unwrap()), theta(&bj.unwrap())].concat();
+                    sums.iter_mut().zip(both).for_each(|(sum, value)| *sum += value);
+                }
+                sums.iter().map(|sum| sum / CELL_RUNS as f64).collect()
+            })
+        }
         "delays" => {
             let mut ranges = OrderRanges::from(bj.orders);
             ranges.nk = 20..=40;
