@@ -1,11 +1,11 @@
 //! The numbers of the page "A person who changes" of the book that take too long for a test.
 //!
-//! `cargo run --release -p hoid-ident --example adaptive_evidence -- table|detection|smooth|tune|set|cost [RUNS]` or `-- joined FIRST.csv SECOND.csv ..`, pairs of
+//! `cargo run --release -p hoid-ident --example adaptive_evidence -- detection|tune|set|cost [RUNS]` or `-- joined FIRST.csv SECOND.csv ..`, pairs of
 //! recordings with the columns t, r, u and y that are joined in the middle
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid_ident::tracking::{
-    ErrorThreshold, Memory, Method, Sample, Stable, StartAt, StartCovariance, TrackOptions, Tracker, track,
+    ErrorThreshold, Memory, Method, Sample, Stable, StartAt, StartCovariance, TrackOptions, Tracker,
 };
 use hoid_model::{
     Channel, Record, SampleTime,
@@ -29,14 +29,12 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let runs = arguments.get(1).and_then(|n| n.parse().ok()).unwrap_or(100);
     match arguments.first().map(String::as_str) {
-        Some("table") => table(runs),
         Some("detection") => detection(runs),
-        Some("smooth") => smoothed(runs),
         Some("tune") => tune(runs),
         Some("joined") => joined(&arguments[1..]),
         Some("set") => set(runs),
         Some("cost") => cost(runs),
-        _ => println!("table, detection, smooth, tune, set or cost, and a number of runs; joined and pairs of files"),
+        _ => println!("detection, tune, set or cost, and a number of runs; joined and pairs of files"),
     }
 }
 
@@ -194,73 +192,6 @@ fn row(values: [f64; 5], digits: usize) -> String {
         .join(" / ")
 }
 
-/// Errors, coverage and settling times of each cell, and what they come to over the cells.
-fn table(runs: usize) {
-    println!(
-        "RMS relative error in %, {}, median of {runs} runs",
-        COLUMNS.join(" / ")
-    );
-    println!(
-        "| cell | RLS | RPEM | physical | adaptive | adaptive: covered, % | within 5 s of the change, % | 50, 90 % of K_e_dot, s |"
-    );
-    println!("|---|---|---|---|---|---|---|---|");
-    let methods = [
-        of_the_text(Method::Rls),
-        of_the_text(Method::Rpem),
-        options(Method::Physical),
-        options(Method::Adaptive),
-    ];
-    let mut ratios: [Vec<[[f64; 5]; 2]>; 2] = [Vec::new(), Vec::new()];
-    for condition in Condition::ALL {
-        let steady = matches!(condition, Condition::C1 | Condition::C2);
-        for order in 1..=4 {
-            for (l, level) in LEVELS.into_iter().enumerate() {
-                let simulator = simulator(condition, order, level);
-                let found = on_all_cores(runs, |r| {
-                    let record = run(&simulator, condition, order, l, r);
-                    methods.each_ref().map(|options| follow(&record, options))
-                });
-                let errors =
-                    [0, 1, 2, 3].map(|m| [0, 1, 2, 3, 4].map(|i| median(found.iter().map(|f| f[m].errors[i]))));
-                let mean = |of: fn(&Found) -> [f64; 5]| {
-                    [0, 1, 2, 3, 4].map(|i| 100.0 * found.iter().map(|f| of(&f[3])[i]).sum::<f64>() / runs as f64)
-                };
-                let settled = [0, 1].map(|q| median(found.iter().map(|f| f[3].settling_s[q])));
-                println!(
-                    "| {condition} m0={order} P_n={level} | {} | {} | {} | {} | {} | {} | {:.2}, {:.2} |",
-                    row(errors[0], 1),
-                    row(errors[1], 1),
-                    row(errors[2], 1),
-                    row(errors[3], 1),
-                    row(mean(|f| f.covered), 0),
-                    row(mean(|f| f.covered_through), 0),
-                    settled[0],
-                    settled[1],
-                );
-                let better = |i: usize| {
-                    if errors[0][i].is_nan() {
-                        errors[1][i]
-                    } else {
-                        errors[0][i].min(errors[1][i])
-                    }
-                };
-                ratios[usize::from(steady)].push([2, 3].map(|m| [0, 1, 2, 3, 4].map(|i| errors[m][i] / better(i))));
-            }
-        }
-    }
-    for (name, ratios) in ["C3 to C6", "C1 and C2"].into_iter().zip(&ratios) {
-        for (m, method) in ["physical", "adaptive"].into_iter().enumerate() {
-            let all = |i: usize| ratios.iter().map(move |r| r[m][i]);
-            println!(
-                "{name}, {method} over the better of RLS and RPEM: median cell {}, worst {}; cells above 1: {}",
-                row([0, 1, 2, 3, 4].map(|i| median(all(i))), 2),
-                row([0, 1, 2, 3, 4].map(|i| all(i).fold(0.0, f64::max)), 2),
-                row([0, 1, 2, 3, 4].map(|i| all(i).filter(|r| *r > 1.0).count() as f64), 0),
-            );
-        }
-    }
-}
-
 /// A statistic in time, from the end of the start fit on.
 type Statistic = Vec<(f64, f64)>;
 
@@ -360,94 +291,6 @@ fn detection(runs: usize) {
                 "| {name} | {threshold} | {:.2} | {} |",
                 events[m][k] as f64 / hours,
                 cells.join(" | ")
-            );
-        }
-    }
-}
-
-/// RMS relative error in per cent of a trace after the start fit, share of covered samples, and the same within 5 s of the change.
-fn after_start(record: &Record, options: &TrackOptions) -> [[f64; 5]; 3] {
-    let truth = COLUMNS.map(|c| record.channel(c).unwrap());
-    let trace = track(record, options, 4).unwrap();
-    let (mut squares, mut covered, mut through) = ([0.0; 5], [0.0; 5], [0.0; 5]);
-    let mut counts = [0.0; 2];
-    for (row, t) in trace.times_s().iter().enumerate().filter(|(_, t)| **t > START_S) {
-        let k = 4 * row + 3;
-        let changing = (CHANGE_S - 5.0..FOUND_UNTIL_S).contains(t);
-        counts[0] += 1.0;
-        counts[1] += f64::from(changing);
-        for (i, (_, _, e)) in trace.operator(row).unwrap().rows()[..5].iter().enumerate() {
-            let error = e.value - truth[i][k];
-            let inside = f64::from(error.abs() <= 1.96 * e.standard_error.unwrap());
-            squares[i] += (error / truth[i][k]).powi(2);
-            covered[i] += inside;
-            through[i] += if changing { inside } else { 0.0 };
-        }
-    }
-    [
-        squares.map(|s: f64| 100.0 * (s / counts[0]).sqrt()),
-        covered.map(|c| 100.0 * c / counts[0]),
-        through.map(|c| 100.0 * c / counts[1]),
-    ]
-}
-
-/// The causal estimate against the two-sided one.
-fn smoothed(runs: usize) {
-    println!(
-        "RMS relative error in % over t in [{START_S}, 81.92] s, {}, median of {runs} runs; covered: mean",
-        COLUMNS.join(" / ")
-    );
-    println!(
-        "| cell | causal | two-sided | causal: covered, % | two-sided: covered, % | causal: within 5 s of the change, % | two-sided |"
-    );
-    println!("|---|---|---|---|---|---|---|");
-    let methods = [false, true].map(|smooth| TrackOptions {
-        smooth,
-        ..options(Method::Adaptive)
-    });
-    let mut ratios: [Vec<[f64; 5]>; 2] = [Vec::new(), Vec::new()];
-    let mut coverage: [[Vec<[f64; 5]>; 2]; 2] = Default::default();
-    for condition in Condition::ALL {
-        let steady = matches!(condition, Condition::C1 | Condition::C2);
-        for order in 1..=4 {
-            for (l, level) in LEVELS.into_iter().enumerate() {
-                let simulator = simulator(condition, order, level);
-                let found = on_all_cores(runs, |r| {
-                    let record = run(&simulator, condition, order, l, r);
-                    methods.each_ref().map(|options| after_start(&record, options))
-                });
-                let all = |m: usize, q: usize, i: usize| found.iter().map(move |f| f[m][q][i]);
-                let errors = [0, 1].map(|m| [0, 1, 2, 3, 4].map(|i| median(all(m, 0, i))));
-                let mean = |m: usize, q: usize| [0, 1, 2, 3, 4].map(|i| all(m, q, i).sum::<f64>() / runs as f64);
-                println!(
-                    "| {condition} m0={order} P_n={level} | {} | {} | {} | {} | {} | {} |",
-                    row(errors[0], 1),
-                    row(errors[1], 1),
-                    row(mean(0, 1), 0),
-                    row(mean(1, 1), 0),
-                    row(mean(0, 2), 0),
-                    row(mean(1, 2), 0),
-                );
-                ratios[usize::from(steady)].push([0, 1, 2, 3, 4].map(|i| errors[1][i] / errors[0][i]));
-                coverage[usize::from(steady)][0].push(mean(1, 1));
-                coverage[usize::from(steady)][1].push(mean(1, 2));
-            }
-        }
-    }
-    for (name, (ratios, coverage)) in ["C3 to C6", "C1 and C2"].into_iter().zip(ratios.iter().zip(&coverage)) {
-        let all = |i: usize| ratios.iter().map(move |r| r[i]);
-        println!(
-            "{name}, two-sided over causal: median cell {}, worst {}; cells above 1: {}",
-            row([0, 1, 2, 3, 4].map(|i| median(all(i))), 2),
-            row([0, 1, 2, 3, 4].map(|i| all(i).fold(0.0, f64::max)), 2),
-            row([0, 1, 2, 3, 4].map(|i| all(i).filter(|r| *r > 1.0).count() as f64), 0),
-        );
-        for (what, cells) in ["covered", "within 5 s of the change"].into_iter().zip(coverage) {
-            let all = |i: usize| cells.iter().map(move |c| c[i]);
-            println!(
-                "{name}, two-sided, {what}, %: least {}, median {}",
-                row([0, 1, 2, 3, 4].map(|i| all(i).fold(100.0, f64::min)), 0),
-                row([0, 1, 2, 3, 4].map(|i| median(all(i))), 0),
             );
         }
     }
