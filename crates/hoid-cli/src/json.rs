@@ -43,6 +43,7 @@ pub fn change(declared_at: Option<f64>, c: &Change) -> Value {
         "K_e_dot": before_and_after(&c.k_e_dot),
         "omega_nm": before_and_after(&c.omega_nm_rad_s),
         "zeta_nm": before_and_after(&c.zeta_nm),
+        "tau_e": before_and_after(&c.tau_e_s),
         "T_L": numbers(&c.t_l_s),
         "innovation_variance": numbers(&c.innovation_variance),
         "z": {
@@ -51,6 +52,7 @@ pub fn change(declared_at: Option<f64>, c: &Change) -> Value {
             "omega_nm": number(c.z[2]),
             "zeta_nm": number(c.z[3]),
             "remnant": number(c.z[4]),
+            "tau_e": number(c.z[5]),
         },
     })
 }

@@ -208,9 +208,9 @@ fn misplaced(args: &RecursionArgs, method: Method) -> Result<(), CliError> {
         ),
         (args.alarm.is_some() && !adaptive, "--alarm", "--method adaptive"),
         (
-            args.track_delay.is_some() && method != Method::Physical,
+            args.track_delay.is_some() && !(adaptive || method == Method::Physical),
             "--track-delay",
-            "--method physical",
+            "--method physical or adaptive",
         ),
         (
             args.drift.is_some() && args.forgetting != ForgettingName::RandomWalk,

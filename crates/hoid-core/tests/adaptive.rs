@@ -5,7 +5,7 @@ mod common;
 
 use common::Noise;
 use hoid_core::{
-    adaptive::{Adaptive, Suppositions, hypothesis::Hypothesis, response::Response},
+    adaptive::{Adaptive, Suppositions, delays::Delays, hypothesis::Hypothesis, response::Response},
     error_bars::Level,
     held_operator::held_operator,
 };
@@ -39,6 +39,7 @@ fn suppositions() -> Suppositions {
         recent: 400,
         settled: 50,
         threshold: 4.0,
+        delays: Delays::KNOWN,
     }
 }
 

@@ -516,7 +516,21 @@ fn set(runs: usize) {
         }
     };
     type Group = (&'static str, [Condition; 2], Box<dyn Fn(&mut Scenario)>);
-    let groups: [Group; 5] = [
+    let sudden = |back: bool| {
+        move |scenario: &mut Scenario| {
+            for (state, [k_e, t_l_s, k_c, omega_b_rad_s]) in [
+                (&mut scenario.initial, [0.1, 0.5, 75.0, 4.0]),
+                (&mut scenario.last, [0.075, 1.0, 40.0, 0.5]),
+            ] {
+                (state.operator.k_e, state.operator.t_l_s) = (k_e, t_l_s);
+                (state.controlled_element.k_c, state.controlled_element.omega_b_rad_s) = (k_c, omega_b_rad_s);
+            }
+            if back {
+                std::mem::swap(&mut scenario.initial, &mut scenario.last);
+            }
+        }
+    };
+    let groups: [Group; 7] = [
         ("C1, C2", [Condition::C1, Condition::C2], Box::new(|_| ())),
         ("C3", [Condition::C3; 2], Box::new(|_| ())),
         ("C5", [Condition::C5; 2], Box::new(|_| ())),
@@ -530,6 +544,8 @@ fn set(runs: usize) {
             [Condition::C1, Condition::C2],
             Box::new(neuromuscular(14.0, 0.25)),
         ),
+        ("sudden", [Condition::C4; 2], Box::new(sudden(false))),
+        ("sudden, back", [Condition::C4; 2], Box::new(sudden(true))),
     ];
     println!("{runs} runs a cell, seed 9000; {}", COLUMNS.join(" / "));
     println!(
@@ -539,7 +555,11 @@ fn set(runs: usize) {
     for (name, conditions, change) in &groups {
         let mut found: Vec<Vec<Found>> = Vec::new();
         for (c, condition) in conditions.iter().enumerate() {
-            let order = if conditions[0] == conditions[1] { 2 + c } else { 2 };
+            let order = match (name.starts_with("sudden"), conditions[0] == conditions[1]) {
+                (true, _) => [1, 4][c],
+                (false, true) => 2 + c,
+                (false, false) => 2,
+            };
             for level in LEVELS {
                 let mut scenario = scenario(*condition, order, level);
                 change(&mut scenario);
@@ -676,7 +696,11 @@ fn cost(runs: usize) {
     let simulator = simulator(Condition::C4, 2, 0.1);
     let record = run(&simulator, Condition::C4, 2, 1, 0);
     let span = record.span(0.0, START_S).unwrap();
-    for method in [
+    let tracked = TrackOptions {
+        track_delay_s: Some((0.2, 0.4)),
+        ..options(Method::Adaptive)
+    };
+    let methods = [
         Method::Rls,
         Method::Rpem,
         Method::Fused,
@@ -684,16 +708,18 @@ fn cost(runs: usize) {
         Method::Ekf,
         Method::Ukf,
         Method::Adaptive,
-    ] {
+    ];
+    for options in methods.map(options).into_iter().chain([tracked]) {
         let mut least = f64::INFINITY;
         for _ in 0..runs {
-            let mut tracker = Tracker::new(&options(method), Some(&span), record.sample_time()).unwrap();
+            let mut tracker = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
             let begin = std::time::Instant::now();
             for (e, u) in record.input().iter().zip(record.output()) {
                 tracker.step(*e, *u);
             }
             least = least.min(begin.elapsed().as_secs_f64() / record.len() as f64);
         }
-        println!("{}: {:.0} ns", method.name(), 1e9 * least);
+        let delays = options.track_delay_s.map_or("", |_| ", delays of .2 to .4 s");
+        println!("{}{delays}: {:.0} ns", options.method.name(), 1e9 * least);
     }
 }

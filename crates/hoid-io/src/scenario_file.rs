@@ -6,7 +6,7 @@
 //! ```toml
 //! condition = "C4"          # without it, tau_e_s and all keys of [initial] are required
 //! realisation = "output"    # or "input"
-//! tau_e_s = 0.3             # constant within a run
+//! tau_e_s = 0.3             # of both states
 //!
 //! [last]                    # the state after the change; [initial] has the same keys
 //! K_e = 0.08
@@ -23,7 +23,7 @@
 //! | table | keys |
 //! |---|---|
 //! | (top) | `condition`, `name`, `sample_time_s`, `measurement_s`, `run_in_s`, `tau_e_s`, `realisation` |
-//! | `[initial]`, `[last]` | `K_e`, `T_L_s`, `omega_nm_rad_s`, `zeta_nm`, `K_c`, `omega_b_rad_s` |
+//! | `[initial]`, `[last]` | `K_e`, `T_L_s`, `omega_nm_rad_s`, `zeta_nm`, `tau_e_s`, `K_c`, `omega_b_rad_s` |
 //! | `[schedule]` | `rate_per_s` (G), `midpoint_s` (t_M), `interval_s` (T, for changes there and back again) |
 //! | `[remnant]` | `order`, `T_n_s`; `noise_level` and `noise_definition` ("response", "remnant"), or `K_n_initial_deg` and `K_n_last_deg` |
 //! | `[[forcing]]` | `amplitude_deg`, `phase_rad`, and `omega_rad_s` or `cycles` (within `measurement_s`); `forcing = []` is a target at rest |
@@ -152,6 +152,8 @@ struct StateTable {
     omega_nm_rad_s: Option<Number>,
     #[schemars(with = "Option<f64>")]
     zeta_nm: Option<Number>,
+    #[schemars(with = "Option<f64>")]
+    tau_e_s: Option<Number>,
     #[serde(rename = "K_c")]
     #[schemars(with = "Option<f64>")]
     k_c: Option<Number>,
@@ -276,6 +278,9 @@ impl Source<'_> {
         }
         let ts = scenario.sample_time;
         let tau_e_s = self.whole("tau_e_s", file.tau_e_s, scenario.initial.operator.tau_e_s, ts, 0.0)?;
+        for state in [&mut scenario.initial, &mut scenario.last] {
+            state.operator.tau_e_s = tau_e_s;
+        }
         scenario.measurement_s = self.whole("measurement_s", file.measurement_s, scenario.measurement_s, ts, 1.0)?;
         scenario.run_in_s = self.whole("run_in_s", file.run_in_s, scenario.run_in_s, ts, 0.0)?;
         match file.realisation {
@@ -284,16 +289,14 @@ impl Source<'_> {
             None => {}
         }
 
-        self.change(&mut scenario.initial, "initial", file.initial)?;
+        self.change(&mut scenario.initial, "initial", file.initial, ts)?;
         if scenario.schedule == Schedule::Constant {
             scenario.last = scenario.initial;
         }
         let changes_last = file.last.is_some();
         if let Some(table) = file.last {
-            self.change(&mut scenario.last, "last", table)?;
+            self.change(&mut scenario.last, "last", table, ts)?;
         }
-        scenario.initial.operator.tau_e_s = tau_e_s;
-        scenario.last.operator.tau_e_s = tau_e_s;
         scenario.schedule = self.schedule(file.schedule, scenario.schedule)?;
         if scenario.schedule == Schedule::Constant && changes_last {
             return Err(
@@ -313,7 +316,7 @@ impl Source<'_> {
     fn require_all(&self, file: &File) -> Result<(), ScenarioFileError> {
         let i = &file.initial;
         let missing: Vec<&str> = [
-            ("tau_e_s", &file.tau_e_s),
+            ("tau_e_s", if i.tau_e_s.is_some() { &i.tau_e_s } else { &file.tau_e_s }),
             ("initial.K_e", &i.k_e),
             ("initial.T_L_s", &i.t_l_s),
             ("initial.omega_nm_rad_s", &i.omega_nm_rad_s),
@@ -333,12 +336,19 @@ impl Source<'_> {
         )))
     }
 
-    fn change(&self, state: &mut OperatingState, table: &str, given: StateTable) -> Result<(), ScenarioFileError> {
+    fn change(
+        &self,
+        state: &mut OperatingState,
+        table: &str,
+        given: StateTable,
+        sample_time: SampleTime,
+    ) -> Result<(), ScenarioFileError> {
         let key = |name: &str| format!("{table}.{name}");
         let OperatingState {
             operator,
             controlled_element,
         } = state;
+        operator.tau_e_s = self.whole(&key("tau_e_s"), given.tau_e_s, operator.tau_e_s, sample_time, 0.0)?;
         let any = [
             ("K_e", given.k_e, &mut operator.k_e),
             ("T_L_s", given.t_l_s, &mut operator.t_l_s),
@@ -594,6 +604,20 @@ mod tests {
     }
 
     #[test]
+    fn a_delay_of_its_own_for_each_state() {
+        let delays = |text: &str| {
+            let scenario = parse(text).unwrap();
+            [scenario.initial, scenario.last].map(|state| state.operator.tau_e_s)
+        };
+        assert_eq!(delays("condition = \"C4\"\n[last]\ntau_e_s = 0.34"), [0.28, 0.34]);
+        assert_eq!(
+            delays("condition = \"C4\"\ntau_e_s = 0.3\n[last]\ntau_e_s = 0.34"),
+            [0.3, 0.34]
+        );
+        assert_eq!(delays("condition = \"C1\"\n[initial]\ntau_e_s = 0.2"), [0.2, 0.2]);
+    }
+
+    #[test]
     fn an_interval_is_there_and_back_again() {
         let mut expected = named(Condition::C4);
         expected.schedule = Schedule::Alternating {
@@ -653,6 +677,10 @@ mod tests {
             (
                 "condition = \"C1\"\ntau_e_s = 0.285",
                 ["line 2", "tau_e_s is 0.285", "change sample_time_s"],
+            ),
+            (
+                "condition = \"C4\"\n[last]\ntau_e_s = 0.285",
+                ["line 3", "last.tau_e_s is 0.285", "change sample_time_s"],
             ),
             (
                 "condition = \"C1\"\nsample_time_s = 0.03",

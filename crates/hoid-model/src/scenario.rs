@@ -10,8 +10,8 @@
 //! | C5, C6 | s2 to s1 at 40.96 s | 0.5, 100 1/s |
 //!
 //! The gains, time constants and frequencies of operator and controlled element and the remnant gain K_n follow one sigmoid
-//! (eq. 5); delay and remnant time constant are constant. The remnant gain of each state gives the demanded noise level in
-//! that state (eq. 43 or A.17).
+//! (eq. 5); the remnant time constant is constant. The delay is that of the text's conditions throughout; where it changes it goes along the same
+//! sigmoid, in steps of a sample. The remnant gain of each state gives the demanded noise level in that state (eq. 43 or A.17).
 
 use std::{fmt, str::FromStr};
 
@@ -224,7 +224,7 @@ pub struct TrueParameters {
 pub struct ResolvedScenario {
     scenario: Scenario,
     k_n: [f64; 2],
-    delay_samples: usize,
+    delay_samples: [usize; 2],
     run_in_samples: usize,
     measurement_samples: usize,
 }
@@ -325,17 +325,9 @@ impl Scenario {
                 expected: "at most 1e8 samples: shorten the run or take a longer sample time",
             });
         }
-        if self.initial.operator.tau_e_s != self.last.operator.tau_e_s {
-            return Err(ModelError::OutOfRange {
-                quantity: "delay tau_e of the last state in s",
-                found: self.last.operator.tau_e_s,
-                expected: "the delay of the initial state: it does not change during a run",
-            });
-        }
-        let mut delay_samples = 0;
-        for state in [&self.initial, &self.last] {
-            let discrete = state.operator.discretise(self.sample_time)?;
-            delay_samples = discrete.nk - 1;
+        let mut delay_samples = [0; 2];
+        for (delay, state) in delay_samples.iter_mut().zip([&self.initial, &self.last]) {
+            *delay = state.operator.discretise(self.sample_time)?.nk - 1;
             state.controlled_element.check()?;
         }
         let given = match self.remnant.strength {
@@ -365,9 +357,15 @@ impl ResolvedScenario {
         &self.scenario
     }
 
-    /// Operator delay tau_e in samples.
-    pub fn delay_samples(&self) -> usize {
+    /// Operator delay tau_e in samples before and after the change.
+    pub fn delay_samples(&self) -> [usize; 2] {
         self.delay_samples
+    }
+
+    /// Operator delay tau_e in samples at time `t_s`: the nearest whole number on its way.
+    pub fn delay_samples_at(&self, t_s: f64) -> usize {
+        let [initial, last] = self.delay_samples;
+        self.scenario.schedule.value(initial as f64, last as f64, t_s).round() as usize
     }
 
     /// Samples before t = 0.
@@ -398,7 +396,11 @@ impl ResolvedScenario {
                 t_l_s: between(a.t_l_s, b.t_l_s),
                 omega_nm_rad_s: between(a.omega_nm_rad_s, b.omega_nm_rad_s),
                 zeta_nm: between(a.zeta_nm, b.zeta_nm),
-                tau_e_s: a.tau_e_s,
+                tau_e_s: if a.tau_e_s == b.tau_e_s {
+                    a.tau_e_s
+                } else {
+                    self.delay_samples_at(t_s) as f64 * self.scenario.sample_time.s()
+                },
             },
             controlled_element: ControlledElement {
                 k_c: between(c.k_c, d.k_c),
@@ -442,8 +444,25 @@ mod tests {
         assert!((c4.parameters_at(81.92).k_n - 0.13971).abs() < 5e-6);
         assert_eq!(
             (c4.delay_samples(), c4.run_in_samples(), c4.measurement_samples()),
-            (28, 1000, 8192)
+            ([28; 2], 1000, 8192)
         );
+    }
+
+    #[test]
+    fn a_delay_goes_along_the_sigmoid_in_whole_samples() {
+        let mut scenario = Scenario::condition(Condition::C3);
+        scenario.last.operator.tau_e_s = 0.34;
+        let resolved = scenario.resolve().unwrap();
+        assert_eq!(resolved.delay_samples(), [28, 34]);
+        assert_eq!([0.0, 40.96, 81.92].map(|t| resolved.delay_samples_at(t)), [28, 31, 34]);
+        for k in 0..8192 {
+            let p = resolved.parameters_at(0.01 * f64::from(k));
+            // The gain is where the delay is, to half a sample of six.
+            let share = (p.operator.k_e - 0.09) / (0.07 - 0.09);
+            let samples = p.operator.tau_e_s / 0.01;
+            assert!((samples - samples.round()).abs() < 1e-9);
+            assert!((samples - 28.0 - 6.0 * share).abs() < 0.5 + 1e-9, "{k}");
+        }
     }
 
     #[test]
@@ -458,7 +477,7 @@ mod tests {
         assert!(refused(|s| s.run_in_s = -1.0).contains("t_0"));
         assert!(refused(|s| s.measurement_s = 8.192e10).contains("1e8 samples"));
         assert!(refused(|s| s.initial.operator.tau_e_s = 0.285).contains("tau_e"));
-        assert!(refused(|s| s.last.operator.tau_e_s = 0.2).contains("tau_e"));
+        assert!(refused(|s| s.last.operator.tau_e_s = 0.205).contains("tau_e"));
         assert!(refused(|s| s.initial.operator.omega_nm_rad_s = 0.0).contains("omega_nm"));
         assert!(refused(|s| s.remnant.order = 5).contains("order"));
         assert!(refused(|s| s.remnant.time_constant_s = 0.0).contains("T_n"));

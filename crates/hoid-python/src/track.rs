@@ -123,6 +123,7 @@ impl PyTrace {
             all.set_item("K_e_dot", c.k_e_dot.map(figures::pair))?;
             all.set_item("omega_nm", c.omega_nm_rad_s.map(figures::pair))?;
             all.set_item("zeta_nm", c.zeta_nm.map(figures::pair))?;
+            all.set_item("tau_e", c.tau_e_s.map(figures::pair))?;
             all.set_item("T_L", c.t_l_s)?;
             all.set_item("innovation_variance", c.innovation_variance)?;
             all.set_item("z", c.z)?;

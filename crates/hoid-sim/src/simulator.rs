@@ -7,7 +7,8 @@
 //! where y is the operator's response without delay, x the output of the controlled element and z that of the unit remnant
 //! cascade. Each block is then taken over one sample exactly, for an input that is held: the operator driven by e, the
 //! controlled element by u, the cascade by one normal deviate. The hold delays the response by one sample more, so that
-//! `nk = tau_e/Ts + 1`. The remnant is not delayed.
+//! `nk = tau_e/Ts + 1`. The remnant is not delayed. A delay that changes is that of the sample at which the response arrives: when it grows, parts
+//! of the response are heard twice, when it shrinks some are not heard.
 //!
 //! Operator and controlled element are in controllable canonical form (states: output and rate of `1/den`). The operator's
 //! gains stand in its output matrix; those of the controlled element where [`Realisation`] says. When parameters change,
@@ -48,6 +49,7 @@ struct Matrices {
     element_input: f64,
     element_output: f64,
     k_n: f64,
+    delay: usize,
 }
 
 /// A held system by rows, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`: the bits of [`HeldStates::step`]. Were both rows sums, the compiler would
@@ -108,7 +110,9 @@ impl Simulator {
         let parameters: Vec<TrueParameters> = (0..entries)
             .map(|k| resolved.parameters_at(start_s + k as f64 * ts.s()))
             .collect();
-        let matrices = parameters.iter().map(|p| Matrices::of(p, scenario)).collect();
+        let matrices = (parameters.iter().enumerate())
+            .map(|(k, p)| Matrices::of(p, resolved.delay_samples_at(start_s + k as f64 * ts.s()), scenario))
+            .collect();
         Ok(Self {
             forcing_deg: scenario.forcing.samples(start_s, ts, samples),
             cascade: Cascade::new(scenario.remnant.order, ts.s() / scenario.remnant.time_constant_s),
@@ -155,7 +159,7 @@ impl Simulator {
         self.check_length(noise)?;
         let samples = self.samples();
         signals.make_room(samples);
-        let mut state = LoopState::at_rest(0.0, self.scenario.delay_samples());
+        let mut state = LoopState::at_rest(0.0, self.longest_delay());
         let Signals { e, u, x, n } = &mut *signals;
         self.pass(&mut state, 0..samples, noise, [e, u, x, n]);
         if state.is_finite(0) {
@@ -205,6 +209,11 @@ impl Simulator {
         (noises.iter().zip(&*into)).try_for_each(|(noise, signals)| self.why_not_finite(noise, signals))
     }
 
+    fn longest_delay(&self) -> usize {
+        let [initial, last] = self.scenario.delay_samples();
+        initial.max(last)
+    }
+
     fn check_length(&self, noise: &[f64]) -> Result<(), SimError> {
         if noise.len() == self.samples() {
             return Ok(());
@@ -249,7 +258,7 @@ impl Simulator {
             &mut x_out[..count * width],
             &mut n_out[..count * width],
         );
-        let (memory, delay) = (&mut state.memory[..], state.delay);
+        let memory = &mut state.memory[..];
         let last = memory.len() - 1;
         for (i, k) in range.enumerate() {
             if !constant {
@@ -261,7 +270,7 @@ impl Simulator {
             let [of_output, of_rate] = m.operator_output;
             // The memory is a ring whose length is a power of two.
             memory[k & last] = zero.like(of_output) * operator[0] + zero.like(of_rate) * operator[1];
-            let response = memory[k.wrapping_sub(delay) & last];
+            let response = memory[k.wrapping_sub(m.delay) & last];
             let n = zero.like(m.k_n) * remnant[M - 1];
             let u = response + n;
             operator = m.operator.step(operator, e);
@@ -346,19 +355,17 @@ struct LoopState<R> {
     operator: [R; 2],
     element: [R; 2],
     remnant: [R; MOST],
-    /// The last responses, that of sample k in place k of a ring, and how many the delay holds back.
+    /// The last responses, that of sample k in place k of a ring.
     memory: Vec<R>,
-    delay: usize,
 }
 
 impl<R: Number> LoopState<R> {
-    fn at_rest(zero: R, delay: usize) -> Self {
+    fn at_rest(zero: R, longest_delay: usize) -> Self {
         Self {
             operator: [zero; 2],
             element: [zero; 2],
             remnant: [zero; MOST],
-            memory: vec![zero; (delay + 1).next_power_of_two()],
-            delay,
+            memory: vec![zero; (longest_delay + 1).next_power_of_two()],
         }
     }
 
@@ -405,7 +412,7 @@ impl SideBySide for Many<'_> {
         let mut out: [Vec<f64>; 4] = std::array::from_fn(|_| vec![0.0; width * BLOCK]);
         let mut finite = true;
         for (noises, into) in self.noises.chunks(width).zip(self.into.chunks_mut(width)) {
-            let mut state = LoopState::at_rest(zero, self.simulator.scenario.delay_samples());
+            let mut state = LoopState::at_rest(zero, self.simulator.longest_delay());
             // Lanes that are left over run without remnant.
             noise.fill(0.0);
             for begin in (0..samples).step_by(BLOCK) {
@@ -436,7 +443,7 @@ impl SideBySide for Many<'_> {
 }
 
 impl Matrices {
-    fn of(p: &TrueParameters, scenario: &Scenario) -> Self {
+    fn of(p: &TrueParameters, delay: usize, scenario: &Scenario) -> Self {
         let (o, c, ts) = (&p.operator, &p.controlled_element, scenario.sample_time);
         let w2 = o.omega_nm_rad_s * o.omega_nm_rad_s;
         let (element_input, element_output) = match scenario.realisation {
@@ -450,6 +457,7 @@ impl Matrices {
             element_input,
             element_output,
             k_n: p.k_n,
+            delay,
         }
     }
 }

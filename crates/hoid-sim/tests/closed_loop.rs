@@ -168,6 +168,59 @@ fn realisations_agree_while_nothing_changes_and_differ_at_the_jump() {
     assert!(largest_step(&output.x) > 5.0 * largest_step(&input.x));
 }
 
+/// With a controlled element that does nothing the error is the target, and the response at each sample is that of the delay of this sample.
+#[test]
+fn a_delay_that_changes_is_that_of_the_sample_at_which_the_response_arrives() {
+    let with = |before: f64, after: f64| {
+        let mut scenario = with_level(Condition::C3, 0.0);
+        for (state, delay) in [(&mut scenario.initial, before), (&mut scenario.last, after)] {
+            state.controlled_element.k_c = 0.0;
+            state.operator.tau_e_s = delay;
+        }
+        scenario
+    };
+    for (before, after) in [(0.28, 0.34), (0.28, 0.2)] {
+        let (simulator, signals) = silent_run(&with(before, after));
+        let each: Vec<Signals> = (20..=34)
+            .map(|d| silent_run(&with(0.01 * f64::from(d), 0.01 * f64::from(d))).1)
+            .collect();
+        let resolved = simulator.scenario();
+        let mut seen = Vec::new();
+        for (k, u) in signals.u.iter().enumerate() {
+            let delay = resolved.delay_samples_at(0.01 * (k as f64 - 1000.0));
+            assert_eq!(*u, each[delay - 20].u[k], "{k}");
+            if seen.last() != Some(&delay) {
+                seen.push(delay);
+            }
+        }
+        let on_its_way: Vec<usize> = if after > before {
+            (28..=34).collect()
+        } else {
+            (20..=28).rev().collect()
+        };
+        assert_eq!(seen, on_its_way);
+    }
+    // Many at a time have the same bits.
+    let simulator = Simulator::new(&with(0.28, 0.34)).unwrap();
+    let noises: Vec<Vec<f64>> = (0..3)
+        .map(|replication| {
+            let stream = Stream {
+                replication,
+                ..Stream::default()
+            };
+            stream.white_noise(simulator.samples())
+        })
+        .collect();
+    for (many, noise) in simulator
+        .signals_of_many(&noises, Path::Best)
+        .unwrap()
+        .iter()
+        .zip(&noises)
+    {
+        assert_eq!(*many, simulator.signals(noise).unwrap());
+    }
+}
+
 #[test]
 fn the_obtained_noise_level_is_the_demanded_one() {
     for condition in [Condition::C1, Condition::C2] {

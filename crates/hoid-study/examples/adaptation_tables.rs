@@ -11,13 +11,19 @@ const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
 const LABELS: [&str; 5] = ["K_e", "T_L", "K_ė", "ω_nm", "ζ_nm"];
 const ALL: [&str; 6] = ["C1", "C2", "C3", "C4", "C5", "C6"];
 /// Other changes: name in the plan, heading on the page.
-const OTHERS: [(&str, &str); 5] = [
+const OTHERS: [(&str, &str); 4] = [
     ("slow", "slow: G = .2 1/s"),
     ("lead alone", "T_L alone: 1.2 to .8 s"),
     ("again and again", "C4, C6, and back every 10.24 s"),
     ("neuromuscular", "ω_nm to 8 rad/s, ζ_nm to .5"),
-    ("other delay", "C4, C6, τ_e .25 or .31 s, nk = 29"),
 ];
+/// Delays that are not what is supposed.
+const DELAYS: [(&str, &str); 3] = [
+    ("delay alone", "C1, C2, τ_e to .34 s"),
+    ("delay too", "C4, C6, τ_e to .34 s"),
+    ("other delay", "C4, C6, τ_e .25 or .31 s"),
+];
+const WITH_DELAY: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 /// Methods of which all cells are shown.
 const SHOWN: [&str; 5] = ["RLS", "RPEM", "physical", "adaptive", "two-sided"];
 const CHANGING: [&str; 4] = ["C3", "C4", "C5", "C6"];
@@ -31,8 +37,13 @@ struct Tables {
 fn main() {
     let directory = std::env::args().nth(1).unwrap_or_else(|| "adaptation".to_owned());
     let results = Results::read(Path::new(&directory)).unwrap();
-    let names = results.plan.estimators.iter().map(|e| e.name.clone()).collect();
-    let tables = Tables { results, names };
+    let mut tables = Tables {
+        results,
+        names: Vec::new(),
+    };
+    let every: Vec<String> = tables.results.plan.estimators.iter().map(|e| e.name.clone()).collect();
+    let is_in_all = |name: &&String| !tables.rows("rms_K_e", "all", &ALL, name).is_empty();
+    tables.names = every.iter().filter(is_in_all).cloned().collect();
     println!(
         "{} replications, seed {}\n",
         tables.results.plan.replications, tables.results.plan.seed
@@ -52,7 +63,11 @@ fn main() {
     println!("## Detection\n");
     tables.detection();
     println!("## Other changes\n");
-    tables.elsewhere();
+    tables.elsewhere(&OTHERS, &OPERATOR, &["adaptive"]);
+    println!("## Delays\n");
+    let without_delay = std::mem::replace(&mut tables.names, every);
+    tables.elsewhere(&DELAYS, &WITH_DELAY, &["adaptive", "adaptive, delay"]);
+    tables.names = without_delay;
     println!("## All cells\n");
     tables.cells();
 }
@@ -173,21 +188,14 @@ impl Tables {
         }
     }
 
-    fn of_adaptive(&self, quantity: &str, scenario: &str, condition: &str) -> Vec<f64> {
-        let query = Query::of(quantity)
-            .scenario(scenario)
-            .condition(condition)
-            .name("adaptive");
-        let mut values = self.results.values(&query);
-        values.retain(|v| v.is_finite());
-        values
-    }
-
-    /// What adaptive declares: false alarms, hours, found in %, median lag in s.
-    fn declared(&self, scenario: &str, conditions: &[&str]) -> [f64; 4] {
+    /// What a method declares: false alarms, hours, found in %, median lag in s.
+    fn declared(&self, name: &str, scenario: &str, conditions: &[&str]) -> [f64; 4] {
         let all = |quantity: &str| -> Vec<f64> {
-            let each = conditions.iter().map(|c| self.of_adaptive(quantity, scenario, c));
-            each.flatten().collect()
+            let of = |condition: &&str| {
+                let query = Query::of(quantity).scenario(scenario).condition(condition).name(name);
+                self.results.values(&query)
+            };
+            conditions.iter().flat_map(of).filter(|v| v.is_finite()).collect()
         };
         let found = all("found");
         [
@@ -204,7 +212,7 @@ impl Tables {
             &["hours", "false alarms", "found within 5 s, %", "median lag, s"],
         );
         for conditions in [&STEADY[..], &["C4"], &["C6"], &["C3"], &["C5"]] {
-            let [alarms, hours, found, lag] = self.declared("all", conditions);
+            let [alarms, hours, found, lag] = self.declared("adaptive", "all", conditions);
             let cells = [
                 format!("{hours:.2}"),
                 format!("{alarms}"),
@@ -216,36 +224,45 @@ impl Tables {
         println!();
     }
 
-    fn elsewhere(&self) {
-        println!("RMS relative error in %, median cell of the median run: K_e / T_L / K_ė / ω_nm / ζ_nm.\n");
-        header("method", &OTHERS.map(|o| o.1));
+    /// Errors of all methods in other cases, and what those that declare changes say there.
+    fn elsewhere(&self, cases: &[(&str, &str)], quantities: &[&str], telling: &[&str]) {
+        let titles: Vec<&str> = cases.iter().map(|(_, title)| *title).collect();
+        println!(
+            "RMS relative error in %, median cell of the median run: {}.\n",
+            quantities.join(" / ")
+        );
+        header("method", &titles);
         for name in &self.names {
             let cell = |(scenario, _): &(&str, &str)| {
                 let error = |p: &&str| short(median(&self.medians(&format!("rms_{p}"), scenario, &ALL, name)));
-                OPERATOR.iter().map(error).collect::<Vec<_>>().join(" / ")
+                quantities.iter().map(error).collect::<Vec<_>>().join(" / ")
             };
-            line(name, OTHERS.iter().map(cell));
+            line(name, cases.iter().map(cell));
         }
-        let cell = |(scenario, _): &(&str, &str)| {
-            let [alarms, hours, found, lag] = self.declared(scenario, &ALL);
-            format!("{}, {} ({alarms} in {hours:.2} h)", known(found, 0), known(lag, 1))
-        };
-        line(
-            "adaptive declares: found, %, lag, s (false alarms)",
-            OTHERS.iter().map(cell),
-        );
-        println!();
-        println!("Samples covered by 1.96 standard errors of `adaptive`, %, median cell:\n");
-        header("", &OTHERS.map(|o| o.1));
-        let cell = |(scenario, _): &(&str, &str)| {
-            let covered = |p: &&str| {
-                let rows = self.rows(&format!("covered_{p}"), scenario, &ALL, "adaptive");
-                let means: Vec<f64> = rows.iter().map(|row| row.statistics.mean).collect();
-                known(median(&means), 0)
+        for name in telling {
+            let cell = |(scenario, _): &(&str, &str)| {
+                let [alarms, hours, found, lag] = self.declared(name, scenario, &ALL);
+                format!("{}, {} ({alarms} in {hours:.2} h)", known(found, 0), known(lag, 1))
             };
-            OPERATOR.iter().map(covered).collect::<Vec<_>>().join(" / ")
-        };
-        line("adaptive", OTHERS.iter().map(cell));
+            line(
+                &format!("{name} declares: found, %, lag, s (false alarms)"),
+                cases.iter().map(cell),
+            );
+        }
+        println!();
+        println!("Samples covered by 1.96 standard errors, %, median cell:\n");
+        header("", &titles);
+        for name in telling {
+            let cell = |(scenario, _): &(&str, &str)| {
+                let covered = |p: &&str| {
+                    let rows = self.rows(&format!("covered_{p}"), scenario, &ALL, name);
+                    let means: Vec<f64> = rows.iter().map(|row| row.statistics.mean).collect();
+                    known(median(&means), 0)
+                };
+                quantities.iter().map(covered).collect::<Vec<_>>().join(" / ")
+            };
+            line(name, cases.iter().map(cell));
+        }
         println!();
     }
 

@@ -16,7 +16,7 @@ use hoid_sim::{Simulator, Stream};
 
 use crate::{
     batch_fits::BatchFits,
-    columns::{OPERATOR, Rows, Schemas, extra_axes},
+    columns::{OPERATOR, Rows, Schemas, TRACED, extra_axes},
     merit::{ChangeMeasures, TraceErrors, Truth, variance},
     plan::{Cell, EstimatorCell, Plan, Task},
     prepared::Preparation,
@@ -372,14 +372,14 @@ impl<'a> Bench<'a> {
     fn track_row(&mut self, trace: &Trace, record: &Record) {
         let errors = TraceErrors::of(trace, record, self.cell);
         let rows = &mut self.fits;
-        for (i, name) in OPERATOR.iter().enumerate() {
+        for (i, name) in TRACED.iter().enumerate() {
             rows.real(&format!("rms_{name}"), errors.rms_percent[i]);
             rows.real(&format!("settle50_{name}"), errors.settled_s[0][i]);
             rows.real(&format!("settle90_{name}"), errors.settled_s[1][i]);
         }
         if self.plan.changes {
             let measures = ChangeMeasures::of(trace, record, self.cell);
-            for (i, name) in OPERATOR.iter().enumerate() {
+            for (i, name) in TRACED.iter().enumerate() {
                 rows.real(&format!("before_{name}"), measures.before_percent[i]);
                 rows.real(&format!("after_{name}"), measures.after_percent[i]);
                 rows.real(&format!("covered_{name}"), measures.covered_percent[i]);

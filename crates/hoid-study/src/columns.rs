@@ -16,6 +16,8 @@ use crate::plan::{Plan, Task};
 
 /// The operator's parameters, in the order of all tables.
 pub const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
+/// What is looked at in a trace: these and the delay, in the order of [`hoid_model::uncertainty::OperatorEstimate::rows`].
+pub(crate) const TRACED: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
 /// Rows under known columns.
 #[derive(Debug, Clone)]
@@ -234,7 +236,7 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
     }
     c.add(Real, &["T_n_backward_euler", "K_n_backward_euler"]);
     if plan.estimators.iter().any(|e| matches!(e.task, Task::Track(_))) {
-        for name in OPERATOR {
+        for name in TRACED {
             c.add(
                 Real,
                 &[
@@ -245,7 +247,7 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
             );
         }
         if plan.changes {
-            for name in OPERATOR {
+            for name in TRACED {
                 let of = ["before", "after", "covered", "covered_through"].map(|what| format!("{what}_{name}"));
                 c.add(Real, &of.each_ref().map(String::as_str));
             }

@@ -21,7 +21,7 @@ use hoid_ident::{
 };
 use hoid_model::{Complex64, Orders, PolynomialModel, Record, Structure, uncertainty::OperatorEstimate};
 
-use crate::{columns::OPERATOR, plan::Cell};
+use crate::{columns::TRACED, plan::Cell};
 
 /// Time from which the errors of a trace count, s.
 const ERRORS_FROM_S: f64 = 10.0;
@@ -64,9 +64,9 @@ impl Truth {
 
 /// The errors of a trace against the true parameters of its record.
 pub(crate) struct TraceErrors {
-    pub rms_percent: [f64; 5],
+    pub rms_percent: [f64; TRACED.len()],
     /// 50 and 90 % of the step.
-    pub settled_s: [[f64; 5]; 2],
+    pub settled_s: [[f64; TRACED.len()]; 2],
     pub diverged: bool,
     pub share_not_convertible: f64,
 }
@@ -74,15 +74,15 @@ pub(crate) struct TraceErrors {
 impl TraceErrors {
     pub fn of(trace: &Trace, record: &Record, cell: &Cell) -> Self {
         let scenario = cell.resolved.scenario();
-        let truth = OPERATOR.map(|name| record.channel(name).unwrap_or_default());
+        let truth = TRACED.map(|name| record.channel(name).unwrap_or_default());
         let values = |state: &hoid_model::scenario::OperatingState| {
             let o = OperatorEstimate::from(state.operator).rows();
-            [0, 1, 2, 3, 4].map(|i| o[i].2.value)
+            [0, 1, 2, 3, 4, 5].map(|i| o[i].2.value)
         };
         let (from, to) = (values(&scenario.initial), values(&scenario.last));
         let change_s = scenario.schedule.change_s().unwrap_or(f64::INFINITY);
-        let (mut sums, mut converted, mut counted) = ([0.0; 5], 0usize, 0usize);
-        let mut settled_s = [[f64::NAN; 5]; 2];
+        let (mut sums, mut converted, mut counted) = ([0.0; TRACED.len()], 0usize, 0usize);
+        let mut settled_s = [[f64::NAN; TRACED.len()]; 2];
         let mut diverged = false;
         for (row, t) in trace.times_s().iter().enumerate() {
             let bad = |v: &f64| !v.is_finite() || v.abs() > DIVERGED;
@@ -96,7 +96,7 @@ impl TraceErrors {
             };
             converted += 1;
             let k = ((t - record.time_s(0)) / record.sample_time().s()).round() as usize;
-            for (i, (_, _, estimate)) in found.rows()[..5].iter().enumerate() {
+            for (i, (_, _, estimate)) in found.rows().iter().enumerate() {
                 let true_value = truth[i].get(k).copied().unwrap_or(f64::NAN);
                 sums[i] += ((estimate.value - true_value) / true_value).powi(2);
                 if *t <= change_s || (to[i] - from[i]).abs() <= 1e-3 * from[i].abs() {
@@ -129,11 +129,11 @@ const BAND: f64 = 1.96;
 /// How a trace follows a change, its bands, and what it declares.
 pub(crate) struct ChangeMeasures {
     /// Mean relative error before the change and at the end, %.
-    pub before_percent: [f64; 5],
-    pub after_percent: [f64; 5],
+    pub before_percent: [f64; TRACED.len()],
+    pub after_percent: [f64; TRACED.len()],
     /// Covered after the start fit, and within 5 s after a change, %.
-    pub covered_percent: [f64; 5],
-    pub covered_through_percent: [f64; 5],
+    pub covered_percent: [f64; TRACED.len()],
+    pub covered_through_percent: [f64; TRACED.len()],
     pub false_alarms: f64,
     pub hours: f64,
     pub found_percent: f64,
@@ -158,7 +158,7 @@ impl Mean {
 impl ChangeMeasures {
     pub fn of(trace: &Trace, record: &Record, cell: &Cell) -> Self {
         let scenario = cell.resolved.scenario();
-        let truth = OPERATOR.map(|name| record.channel(name).unwrap_or_default());
+        let truth = TRACED.map(|name| record.channel(name).unwrap_or_default());
         let end_s = record.time_s(record.len());
         let changes_s = scenario.schedule.changes_s(end_s);
         let first_s = changes_s.first().copied().unwrap_or(f64::INFINITY);
@@ -168,11 +168,11 @@ impl ChangeMeasures {
             _ => trace.updated_from_s(),
         };
         let within = |t: f64| changes_s.iter().any(|c| (*c..*c + THROUGH_S).contains(&t));
-        let [mut before, mut after, mut covered, mut through] = [[Mean::default(); 5]; 4];
+        let [mut before, mut after, mut covered, mut through] = [[Mean::default(); TRACED.len()]; 4];
         for (row, t) in trace.times_s().iter().enumerate() {
             let Ok(found) = trace.operator(row) else { continue };
             let k = ((t - record.time_s(0)) / record.sample_time().s()).round() as usize;
-            for (i, (_, _, estimate)) in found.rows()[..5].iter().enumerate() {
+            for (i, (_, _, estimate)) in found.rows().iter().enumerate() {
                 let true_value = truth[i].get(k).copied().unwrap_or(f64::NAN);
                 let error = estimate.value - true_value;
                 let inside = estimate

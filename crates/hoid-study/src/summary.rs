@@ -248,7 +248,8 @@ pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
         return state.operator[i];
     }
     let coefficient = match name {
-        "tau_e" => return scenario.initial.operator.tau_e_s,
+        "tau_e" if close(first.tau_e_s, last.tau_e_s) => return last.tau_e_s,
+        "tau_e" => return f64::NAN,
         "T_n" | "T_n_backward_euler" => return scenario.remnant.time_constant_s,
         "K_n" | "K_n_backward_euler" => return state.k_n,
         "f1" | "a1" => 0,

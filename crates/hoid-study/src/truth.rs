@@ -79,8 +79,8 @@ pub(crate) fn cells_table(plan: &Plan) -> OutputTable {
     ];
     for when in ["initial", "last"] {
         columns.extend(STATE.map(|name| (format!("{name}_{when}"), Real)));
+        columns.push((format!("tau_e_{when}"), Real));
     }
-    columns.push(("tau_e".to_owned(), Real));
     let schema = TableSchema {
         comments: comments(plan),
         columns: columns
@@ -103,11 +103,12 @@ pub(crate) fn cells_table(plan: &Plan) -> OutputTable {
         rows.real("T_n", scenario.remnant.time_constant_s);
         rows.real("sample_time_s", scenario.sample_time.s());
         rows.real("measurement_s", scenario.measurement_s);
-        rows.real("tau_e", scenario.initial.operator.tau_e_s);
         if let (Some(change_s), Some(rate_per_s)) = (scenario.schedule.change_s(), scenario.schedule.rate_per_s()) {
             rows.real("change_s", change_s);
             rows.real("rate_per_s", rate_per_s);
         }
+        rows.real("tau_e_initial", scenario.initial.operator.tau_e_s);
+        rows.real("tau_e_last", scenario.last.operator.tau_e_s);
         for (state, when) in cell.truth().iter().zip(["initial", "last"]) {
             for (name, value) in OPERATOR.iter().zip(state.operator) {
                 rows.real(&format!("{name}_{when}"), value);

@@ -119,6 +119,63 @@ fn on_real_dimensions_the_points_and_the_linearisation_agree() {
 }
 
 #[test]
+fn a_delay_that_changes_is_followed_and_named() {
+    let mut scenario = Scenario::condition(Condition::C4);
+    scenario.realisation = hoid::model::scenario::Realisation::Output;
+    scenario.last.operator.tau_e_s = 0.34;
+    let simulator = Simulator::new(&scenario).unwrap();
+    let tracked = TrackOptions {
+        track_delay_s: Some((0.2, 0.4)),
+        ..options(Method::Adaptive)
+    };
+    for replication in 0..2 {
+        let stream = Stream {
+            seed: 84,
+            cell: 0,
+            replication,
+        };
+        let record = simulator.run(stream, false).unwrap();
+        let delay = record.channel("tau_e").unwrap();
+        assert_eq!((delay[0], delay[8191]), (0.28, 0.34));
+        let trace = track(&record, &tracked, 8).unwrap();
+        assert_eq!(trace.operator_columns()[5], "tau_e");
+        let named = |(t, c): &&(f64, hoid::ident::tracking::Change)| {
+            (40.96..46.0).contains(t) && c.changed().contains(&"tau_e")
+        };
+        let (_, change) = trace.changes().iter().find(named).unwrap();
+        assert!(change.tau_e_s[1].value - change.tau_e_s[0].value > 0.04, "{change:?}");
+        for t in [35.0, 60.0, 81.0] {
+            let row = trace.times_s().iter().position(|s| *s >= t).unwrap();
+            let tau = trace.operator(row).unwrap().tau_e_s;
+            let error = tau.value - delay[8 * row + 7];
+            let se = tau.standard_error.unwrap();
+            assert!(error.abs() < 4.0 * se && se < 0.02, "{t}: {tau:?}");
+        }
+    }
+    // A start outside what is tracked, a range that is none, and two sides.
+    let refused = |options: TrackOptions| {
+        track(&run(Condition::C1, 1, 0.1, 0), &options, 8)
+            .unwrap_err()
+            .to_string()
+    };
+    let with = |range| TrackOptions {
+        track_delay_s: Some(range),
+        ..options(Method::Adaptive)
+    };
+    let says = refused(with((0.3, 0.4)));
+    assert!(says.contains("nk = 29") && says.contains("31 to 41"), "{says}");
+    for range in [(0.4, 0.2), (f64::NAN, 0.4), (-0.1, 0.4), (0.2, f64::INFINITY)] {
+        let says = refused(with(range));
+        assert!(says.contains("shorter first"), "{says}");
+    }
+    let says = refused(TrackOptions {
+        smooth: true,
+        ..tracked
+    });
+    assert!(says.contains("one delay"), "{says}");
+}
+
+#[test]
 fn what_has_a_model_of_the_change_takes_no_memory() {
     use hoid::ident::tracking::{Memory, StartCovariance};
     for method in [Method::Ekf, Method::Ukf, Method::Adaptive] {

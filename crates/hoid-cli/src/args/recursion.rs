@@ -105,7 +105,7 @@ pub struct RecursionArgs {
     /// Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1.., for physical, adaptive, ekf and ukf
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     pub bound: Option<String>,
-    /// Track the delay tau_e too, within this range in s, for physical
+    /// Track the delay tau_e too, within this range in s: as a parameter for physical, in whole samples for adaptive
     #[arg(long, value_name = "LO..HI", value_parser = parse_span)]
     pub track_delay: Option<(f64, f64)>,
     /// Length of the window for --method window: samples or seconds [default: 20s]
@@ -114,8 +114,8 @@ pub struct RecursionArgs {
     /// Samples between two fits for --method window [default: 25]
     #[arg(long, value_name = "N")]
     pub refit: Option<usize>,
-    /// Standard deviations beyond which an innovation moves the estimate no further: a number or inf [default: 5 for rpem, fused,
-    /// physical and adaptive, inf for rls]
+    /// Standard deviations beyond which an innovation moves the estimate no further: a number or inf [default: 5 for rpem, fused
+    /// and physical, 3.5 for adaptive, inf for rls]
     #[arg(long, value_name = "K")]
     pub limit: Option<f64>,
     /// For --method adaptive: logarithm of the odds from which a change is declared [default: 6]

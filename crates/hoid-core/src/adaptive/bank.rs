@@ -2,9 +2,9 @@
 
 use super::{
     Suppositions,
-    change::{Change, Watch},
+    change::{Change, Watch, delay_of},
+    delays::ByDelay,
     hypothesis::{Hypothesis, OPERATOR},
-    response::Signals,
 };
 
 /// The hypotheses. M is the room for them.
@@ -31,6 +31,8 @@ pub struct Mixture {
     pub variance: f64,
 }
 
+/// Delays on either side of the likeliest that are proposed as what held all the time.
+const NEIGHBOURS: usize = 3;
 /// Least probability of a hypothesis.
 const LEAST: f64 = 1e-12;
 
@@ -48,13 +50,16 @@ impl<const M: usize> Bank<M> {
             && s.sample_time > 0.0
             && s.spacing > 0
             && (0.0..1.0).contains(&(s.hazard * f64::from(s.spacing)))
+            && (s.delays.every > 0 && s.delays.births > 0 && first.later < s.delays.count)
+            && (0.0..0.5).contains(&s.delays.neighbour)
+            && s.delays.jump > 0.0
             && first.is_sound();
         if !sound {
             return None;
         }
         let mut hypotheses = core::array::from_fn(|_| None);
         hypotheses[0] = Some(first);
-        Some(Self {
+        let mut bank = Self {
             hypotheses,
             samples: 0,
             wait: s.spacing,
@@ -62,11 +67,13 @@ impl<const M: usize> Bank<M> {
             whole_from: 0,
             watch: Watch::default(),
             suppositions,
-        })
+        };
+        bank.bear_beside();
+        Some(bank)
     }
 
     /// Takes output and signals of a sample behind the whitening filter, `None` where they are not known; returns the innovation.
-    pub fn take(&mut self, seen: Option<(f64, &Signals)>, about: [f64; 2]) -> f64 {
+    pub fn take(&mut self, seen: Option<(f64, ByDelay<'_>)>, about: [f64; 2]) -> f64 {
         let innovation = self.learn(seen, about);
         if self.watch.look(&self.hypotheses, self.samples, &self.suppositions) {
             self.wait_for_whole();
@@ -98,12 +105,12 @@ impl<const M: usize> Bank<M> {
     }
 
     /// As [`Bank::take`], and does not look for changes.
-    pub fn learn(&mut self, seen: Option<(f64, &Signals)>, about: [f64; 2]) -> f64 {
+    pub fn learn(&mut self, seen: Option<(f64, ByDelay<'_>)>, about: [f64; 2]) -> f64 {
         self.samples += 1;
         let mut innovation = 0.0;
-        if let Some((y, r)) = seen {
+        if let Some((y, signals)) = seen {
             for h in self.hypotheses.iter_mut().flatten() {
-                let (eps, density) = h.step(y, r, about, &self.suppositions);
+                let (eps, density) = h.step(y, signals.at(h.later), about, &self.suppositions);
                 innovation += h.weight * eps;
                 h.weight *= density;
             }
@@ -115,10 +122,15 @@ impl<const M: usize> Bank<M> {
             self.drift();
             self.births = self.births.wrapping_add(1);
             let share = self.suppositions.hazard * f64::from(self.suppositions.spacing);
-            self.bear(share, false);
+            self.bear_changed(share, false);
             let every = self.suppositions.whole_every;
             if every > 0 && self.births.is_multiple_of(every) && self.samples >= self.whole_from {
-                self.bear(share * f64::from(every) * self.suppositions.whole_odds, true);
+                self.bear_changed(share * f64::from(every) * self.suppositions.whole_odds, true);
+            }
+            let delays = self.suppositions.delays;
+            if delays.count > 1 && self.births.is_multiple_of(delays.every) {
+                self.bear_beside();
+                self.bear_elsewhere(share * f64::from(delays.every) * delays.odds);
             }
         }
         innovation
@@ -155,30 +167,94 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// A hypothesis that the person changes now, with its probability.
-    fn bear(&mut self, share: f64, whole: bool) {
-        let (mut likeliest, mut place) = (None, None);
-        let (mut highest, mut lowest) = (0.0, f64::INFINITY);
-        for (i, h) in self.hypotheses.iter().enumerate() {
-            let Some(h) = h else {
-                (place, lowest) = (Some(i), f64::NEG_INFINITY);
-                continue;
-            };
-            // What a jump of the gains does to omega_nm and zeta_nm in passing is not handed on.
-            if h.weight > highest && !self.is_young_whole(h) {
-                (likeliest, highest) = (Some(h), h.weight);
-            }
-            if self.samples - h.born >= self.suppositions.protected && h.weight < lowest {
-                (place, lowest) = (Some(i), h.weight);
+    /// The hypothesis that the gains change now, omega_nm and zeta_nm too or not, with its probability.
+    fn bear_changed(&mut self, share: f64, whole: bool) {
+        if let Some((place, parent)) = self.parent() {
+            self.bear(self.opened(&parent, whole), share, place);
+        }
+    }
+
+    /// Hypotheses of the delays next to the likeliest, where there are none.
+    fn bear_beside(&mut self) {
+        let Some((place, parent)) = self.parent() else { return };
+        let delays = self.suppositions.delays;
+        let mut share = 1.0;
+        for away in 1..=NEIGHBOURS {
+            share *= delays.neighbour;
+            for later in [parent.later.checked_sub(away), Some(parent.later + away)]
+                .into_iter()
+                .flatten()
+            {
+                let is_there = |h: &Hypothesis| h.later == later && h.born == parent.born;
+                if later < delays.count && !self.hypotheses().any(is_there) {
+                    self.bear(parent.beside(later, &self.suppositions), share, place);
+                }
             }
         }
-        let (Some(parent), Some(place)) = (likeliest, place) else {
+    }
+
+    /// Hypotheses that the delay changes too, with the probability of them all.
+    fn bear_elsewhere(&mut self, share: f64) {
+        let Some((place, parent)) = self.parent() else { return };
+        let delays = self.suppositions.delays;
+        let apart = delays.count.div_ceil(delays.births);
+        let first = (self.births / delays.every) as usize % apart;
+        let density = |later: usize| {
+            let step = later.abs_diff(parent.later) as f64 / delays.jump;
+            libm::exp(-0.5 * step * step)
+        };
+        let all: f64 = (first..delays.count).step_by(apart).map(density).sum();
+        if all <= 0.0 {
+            return;
+        }
+        for later in (first..delays.count)
+            .step_by(apart)
+            .filter(|later| *later != parent.later)
+        {
+            self.bear(
+                self.opened(&parent, false).delayed(later),
+                share * density(later) / all,
+                place,
+            );
+        }
+    }
+
+    /// The likeliest hypothesis, and its place. What a jump of the gains does to omega_nm and zeta_nm in passing is not handed on.
+    fn parent(&self) -> Option<(usize, Hypothesis)> {
+        let (mut likeliest, mut highest) = (None, 0.0);
+        for (place, h) in self.hypotheses.iter().enumerate() {
+            if let Some(h) = h
+                && h.weight > highest
+                && !self.is_young_whole(h)
+            {
+                (likeliest, highest) = (Some((place, *h)), h.weight);
+            }
+        }
+        likeliest
+    }
+
+    /// A child that says that the person changes now.
+    fn opened(&self, parent: &Hypothesis, whole: bool) -> Hypothesis {
+        let mut child = parent.opened(self.samples, whole, &self.suppositions);
+        child.before.delay = self.delay();
+        child
+    }
+
+    /// Takes a child in the place of the least likely that is old enough, its parent excepted.
+    fn bear(&mut self, mut child: Hypothesis, share: f64, parent: usize) {
+        let (mut place, mut lowest) = (None, f64::INFINITY);
+        for (i, h) in self.hypotheses.iter().enumerate() {
+            match h {
+                None => (place, lowest) = (Some(i), f64::NEG_INFINITY),
+                Some(h) if self.samples - h.born >= self.suppositions.protected && h.weight < lowest => {
+                    (place, lowest) = (Some(i), h.weight);
+                }
+                Some(_) => {}
+            }
+        }
+        let Some(place) = place.filter(|place| *place != parent) else {
             return;
         };
-        if highest == lowest {
-            return;
-        }
-        let mut child = parent.opened(self.samples, whole, &self.suppositions);
         self.hypotheses[place] = None;
         let rest: f64 = self.hypotheses.iter().flatten().map(|h| h.weight).sum();
         for h in self.hypotheses.iter_mut().flatten() {
@@ -228,6 +304,22 @@ impl<const M: usize> Bank<M> {
         // d T_L = (d K_e_dot - T_L d K_e)/K_e.
         let of_ratio = covariance[1][1] - 2.0 * lead * covariance[0][1] + lead * lead * covariance[0][0];
         [lead, of_ratio.max(0.0) / square]
+    }
+
+    /// Number of delays in question.
+    pub fn delays(&self) -> usize {
+        self.suppositions.delays.count
+    }
+
+    /// Mean and variance of the delay, in samples beyond the shortest.
+    pub fn delay(&self) -> [f64; 2] {
+        delay_of(self.hypotheses())
+    }
+
+    /// The delay of the likeliest hypothesis.
+    pub fn likeliest_delay(&self) -> usize {
+        let likeliest = self.hypotheses().max_by(|a, b| a.weight.total_cmp(&b.weight));
+        likeliest.map_or(0, |h| h.later)
     }
 
     /// The hypotheses that there are.

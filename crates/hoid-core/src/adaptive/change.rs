@@ -5,7 +5,8 @@
 //! with the size of the change and its time averaged out instead of maximised, so that its expectation does not grow with the number of
 //! times that are tried. A change is declared when Lambda is over the threshold and the likeliest of the recent hypotheses is old enough to
 //! say what changed; the next only after Lambda has been below zero, when
-//! what changed has become what holds, or when the neuromuscular system turns out to have changed too: the same odds of such hypotheses against all others.
+//! what changed has become what holds, or when more turns out to have changed: the neuromuscular system, by the same odds of such hypotheses against all
+//! others, or the delay, by three standard errors.
 //!
 //! The likeliest of the recent hypotheses says since when, and what held before: the change of each quantity over its standard
 //! error tells in what the person changed. For the innovation variance that is `ln(s2/s1)/sqrt(2/n)` with the n samples since.
@@ -27,8 +28,8 @@ pub struct Change {
     pub before: Before,
     /// What holds now.
     pub now: Before,
-    /// Change of K_e, K_e_dot, omega_nm, zeta_nm and of the innovation variance, each over its standard error.
-    pub z: [f64; OPERATOR + 1],
+    /// Change of K_e, K_e_dot, omega_nm, zeta_nm, of the innovation variance and of the delay, each over its standard error.
+    pub z: [f64; OPERATOR + 2],
 }
 
 /// Odds, and whether a change is being declared.
@@ -36,8 +37,9 @@ pub struct Change {
 pub struct Watch {
     odds: f64,
     raised: bool,
-    /// The same for one in which the neuromuscular system changed too.
+    /// The same for one in which the neuromuscular system changed too, and for one in which the delay did.
     raised_whole: bool,
+    raised_delay: bool,
     change: Option<Change>,
 }
 
@@ -47,7 +49,13 @@ impl State for Watch {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         let mut is_there = self.change.is_some();
         visit_all(
-            &mut [&mut self.odds, &mut self.raised, &mut self.raised_whole, &mut is_there],
+            &mut [
+                &mut self.odds,
+                &mut self.raised,
+                &mut self.raised_whole,
+                &mut self.raised_delay,
+                &mut is_there,
+            ],
             each,
         );
         self.change = is_there.then(|| self.change.take().unwrap_or_default());
@@ -63,11 +71,14 @@ impl Default for Watch {
             odds: f64::NEG_INFINITY,
             raised: false,
             raised_whole: false,
+            raised_delay: false,
             change: None,
         }
     }
 }
 
+/// Change of the delay over its standard error that is declared where a change was declared without one.
+const OTHER_DELAY: f64 = 3.0;
 /// Least share of either side of the odds.
 const LEAST: f64 = 1e-12;
 
@@ -91,17 +102,23 @@ impl Watch {
         self.odds = libm::log((recent + LEAST) / (older + LEAST));
         self.change = None;
         if self.odds < 0.0 {
-            (self.raised, self.raised_whole) = (false, false);
+            (self.raised, self.raised_whole, self.raised_delay) = (false, false, false);
         } else if self.odds > suppositions.threshold {
             let settled = likeliest.filter(|h| now - h.born >= suppositions.settled);
             let others = recent + older - whole;
             let is_whole = libm::log((whole + LEAST) / (others.max(0.0) + LEAST)) > suppositions.threshold;
-            if let Some(h) = settled
-                && (!self.raised || is_whole && h.whole && !self.raised_whole)
-            {
-                self.change = Some(of(h, now, self.odds));
-                self.raised = true;
-                self.raised_whole = h.whole;
+            if let Some(h) = settled {
+                let of_recent = |h: &&Hypothesis| is_recent(h, now, suppositions);
+                let delay = delay_of(hypotheses.iter().flatten().filter(of_recent));
+                let change = of(h, delay, now, self.odds);
+                let other_delay = change.z[OPERATOR + 1].abs() > OTHER_DELAY;
+                let more = is_whole && h.whole && !self.raised_whole || other_delay && !self.raised_delay;
+                if !self.raised || more {
+                    self.change = Some(change);
+                    self.raised = true;
+                    self.raised_whole |= h.whole;
+                    self.raised_delay |= other_delay;
+                }
             }
         }
         self.odds > 0.0 && before <= 0.0
@@ -123,10 +140,23 @@ fn is_recent(h: &Hypothesis, now: u64, suppositions: &Suppositions) -> bool {
     h.born > 0 && now - h.born < suppositions.recent
 }
 
-fn of(h: &Hypothesis, now: u64, odds: f64) -> Change {
-    let (before, after) = (h.before, h.now());
+/// Mean and variance of the delay of hypotheses, in samples beyond the shortest; that of rounding to whole samples included.
+pub(super) fn delay_of<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> [f64; 2] {
+    let (mut sum, mut first, mut second) = (0.0, 0.0, 0.0);
+    for h in hypotheses {
+        let later = h.later as f64;
+        sum += h.weight;
+        first += h.weight * later;
+        second += h.weight * later * later;
+    }
+    let mean = first / sum;
+    [mean, (second / sum - mean * mean).max(0.0) + 1.0 / 12.0]
+}
+
+fn of(h: &Hypothesis, delay: [f64; 2], now: u64, odds: f64) -> Change {
+    let (before, after) = (h.before, Before { delay, ..h.now() });
     let samples_ago = now - h.born;
-    let mut z = [0.0; OPERATOR + 1];
+    let mut z = [0.0; OPERATOR + 2];
     for i in 0..OPERATOR {
         let of = |b: &Before| if i < 2 { b.gains[i] } else { b.neuromuscular[i - 2] };
         let variance = of(&before) + of(&after);
@@ -137,6 +167,7 @@ fn of(h: &Hypothesis, now: u64, odds: f64) -> Change {
     if samples_ago > 0 && before.variance > 0.0 && after.variance > 0.0 {
         z[OPERATOR] = libm::log(after.variance / before.variance) / libm::sqrt(2.0 / samples_ago as f64);
     }
+    z[OPERATOR + 1] = (after.delay[0] - before.delay[0]) / libm::sqrt(before.delay[1] + after.delay[1]);
     Change {
         samples_ago,
         odds,

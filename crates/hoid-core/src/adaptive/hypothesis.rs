@@ -45,6 +45,8 @@ pub struct Hypothesis {
     pub born: u64,
     /// Whether the neuromuscular system changed too at its birth.
     pub whole: bool,
+    /// Its delay, in samples beyond the shortest.
+    pub later: usize,
     /// What held before.
     pub before: Before,
     least: f64,
@@ -61,10 +63,12 @@ pub struct Before {
     pub neuromuscular: [f64; 2],
     /// Innovation variance.
     pub variance: f64,
+    /// Mean and variance of the delay, in samples beyond the shortest.
+    pub delay: [f64; 2],
 }
 
-crate::state!([] Hypothesis { eta, covariance, level, weight, born, whole, before, least });
-crate::state!([] Before { eta, gains, neuromuscular, variance });
+crate::state!([] Hypothesis { eta, covariance, level, weight, born, whole, later, before, least });
+crate::state!([] Before { eta, gains, neuromuscular, variance, delay });
 
 /// A place of the bank: whether there is a hypothesis, and it.
 impl State for Option<Hypothesis> {
@@ -100,6 +104,7 @@ impl Hypothesis {
             weight: 0.0,
             born: 0,
             whole: false,
+            later: 0,
             before: Before::default(),
             least: 0.0,
         }
@@ -115,12 +120,8 @@ impl Hypothesis {
             weight: 1.0,
             born: 0,
             whole: false,
-            before: Before {
-                eta,
-                gains: [0.0; 3],
-                neuromuscular: [0.0; 2],
-                variance: level.variance(),
-            },
+            later: 0,
+            before: Before::default(),
             least: LEAST_SHARE * level.variance(),
         };
         first.before = first.now();
@@ -205,6 +206,23 @@ impl Hypothesis {
         }
     }
 
+    /// The same with the delay so many samples beyond the shortest.
+    pub fn delayed(self, later: usize) -> Self {
+        Self { later, ..self }
+    }
+
+    /// The hypothesis that the delay is, and was, another near its own.
+    pub fn beside(&self, later: usize, suppositions: &Suppositions) -> Self {
+        let mut other = self.delayed(later);
+        let (scales, away) = (self.scales(suppositions), later.abs_diff(self.later) as f64);
+        for i in 0..OPERATOR {
+            let scale = if i < 2 { scales[i] } else { self.eta[i] * self.eta[i] };
+            let worth = away * suppositions.delays.worth[i];
+            other.widen(i, worth * worth * scale);
+        }
+        other
+    }
+
     /// The hypothesis that the person changes now, the neuromuscular system included or not.
     pub fn opened(&self, now: u64, whole: bool, suppositions: &Suppositions) -> Self {
         let mut child = *self;
@@ -239,6 +257,7 @@ impl Hypothesis {
             gains: [p.element(0, 0), p.element(1, 1), p.element(0, 1)],
             neuromuscular: [p.element(2, 2), p.element(3, 3)],
             variance: self.level.variance(),
+            delay: [self.later as f64, 0.0],
         }
     }
 

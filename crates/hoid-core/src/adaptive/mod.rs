@@ -21,14 +21,18 @@
 //! **The estimate** is the mean of the mixture, its covariance that of the mixture, what the hypotheses disagree about included. T_L is
 //! `E[K_e K_e_dot]/E[K_e^2]`, the T for which `E (K_e_dot - T K_e)^2` is least: it stays finite as K_e becomes zero.
 //!
+//! **The delay** ([`delays`]) is known, or one more thing on which hypotheses differ.
+//!
 //! **A change** ([`change`]) is seen in the odds of the hypotheses that were born within the last seconds against those that are older.
 
 pub mod bank;
 pub mod change;
+pub mod delays;
 pub mod hypothesis;
 pub mod response;
 
 use bank::Bank;
+use delays::{ByDelay, Delays, Ring};
 use hypothesis::{Hypothesis, LARGEST, OPERATOR};
 use response::{Response, Signals};
 
@@ -74,13 +78,17 @@ pub struct Suppositions {
     pub settled: u64,
     /// Logarithm of the odds from which a change is declared.
     pub threshold: f64,
+    /// The delay.
+    pub delays: Delays,
 }
 
-/// The bank behind its filters. M is the room for hypotheses, D the largest order of the noise model.
+/// The bank behind its filters. M is the room for hypotheses, D the largest order of the noise model, B the memory for as many signals as there are
+/// delays.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Adaptive<const M: usize, const D: usize> {
+pub struct Adaptive<const M: usize, const D: usize, B = [Signals; 1]> {
     bank: Bank<M>,
     response: Response,
+    ring: Ring<B>,
     /// D, its order, and the past of u and of the signals, newest first.
     d: [f64; D],
     order: usize,
@@ -89,12 +97,20 @@ pub struct Adaptive<const M: usize, const D: usize> {
     restarts: u64,
 }
 
-crate::state!([const M: usize, const D: usize] Adaptive<M, D> { bank, response, d, order, u, past, restarts });
+crate::state!([const M: usize, const D: usize, B: AsMut<[Signals]>] Adaptive<M, D, B> { bank, response, ring, d, order, u, past, restarts });
 
 impl<const M: usize, const D: usize> Adaptive<M, D> {
-    /// Starts from one hypothesis, with filters at rest. `None` for a noise model that does not fit, and as [`Bank::new`].
+    /// Starts from one hypothesis, with filters at rest, for a delay that is known. `None` for a noise model that does not fit, and as [`Bank::new`].
     pub fn new(first: Hypothesis, d: &[f64], suppositions: Suppositions) -> Option<Self> {
-        if d.len() > D {
+        Self::with_delays(first, d, suppositions, [[0.0; 6]; 1])
+    }
+}
+
+impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Adaptive<M, D, B> {
+    /// As [`Adaptive::new`], with memory for as many signals as there are delays. `None` for another number too.
+    pub fn with_delays(first: Hypothesis, d: &[f64], suppositions: Suppositions, memory: B) -> Option<Self> {
+        let ring = Ring::new(memory);
+        if d.len() > D || ring.count() != suppositions.delays.count {
             return None;
         }
         let mut kept = [0.0; D];
@@ -103,6 +119,7 @@ impl<const M: usize, const D: usize> Adaptive<M, D> {
         Some(Self {
             bank: Bank::new(first, suppositions)?,
             response: Response::new(about, suppositions.sample_time),
+            ring,
             d: kept,
             order: d.len(),
             u: [0.0; D],
@@ -111,12 +128,14 @@ impl<const M: usize, const D: usize> Adaptive<M, D> {
         })
     }
 
-    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`. Both must be finite.
+    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`, with nk of the shortest delay. Both must be finite.
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         let signals = self.response.step(x);
         let (y, r) = self.whitened(u, &signals);
         let finite = y.abs() < LARGEST && r.iter().all(|r| r.abs() < LARGEST);
-        let innovation = self.bank.take(finite.then_some((y, &r)), self.response.about());
+        self.ring.put(if finite { r } else { [0.0; 6] });
+        let seen = finite.then_some((y, self.ring.last()));
+        let innovation = self.bank.take(seen, self.response.about());
         self.keep(u, signals);
         Step {
             innovation,
@@ -129,7 +148,8 @@ impl<const M: usize, const D: usize> Adaptive<M, D> {
         self.bank.pass();
         let signals = self.response.step(x);
         let (y, r) = self.whitened(u, &signals);
-        let innovation = y - self.foretold(&r);
+        self.ring.put(r);
+        let innovation = y - self.foretold(self.ring.last());
         self.keep(u, signals);
         Step {
             innovation,
@@ -142,7 +162,8 @@ impl<const M: usize, const D: usize> Adaptive<M, D> {
         self.bank.pass();
         let signals = self.response.step(x);
         let (y, r) = self.whitened(0.0, &signals);
-        let u = self.foretold(&r) - y;
+        self.ring.put(r);
+        let u = self.foretold(self.ring.last()) - y;
         self.keep(u, signals);
     }
 
@@ -160,9 +181,10 @@ impl<const M: usize, const D: usize> Adaptive<M, D> {
         (y, r)
     }
 
-    /// `D w` of the mixture.
-    fn foretold(&self, r: &Signals) -> f64 {
+    /// `D w` of the mixture, with the likeliest delay.
+    fn foretold(&self, signals: ByDelay<'_>) -> f64 {
         let eta = self.bank.mixture().eta;
+        let r = signals.at(self.bank.likeliest_delay());
         let psi = hypothesis::gradient(&eta, r, self.response.about());
         eta[0] * psi[0] + eta[1] * psi[1]
     }
@@ -173,6 +195,7 @@ impl<const M: usize, const D: usize> Adaptive<M, D> {
             self.response.rest();
             self.u = [0.0; D];
             self.past = [[0.0; 6]; D];
+            self.ring.iter_mut().for_each(|signals| *signals = [0.0; 6]);
             self.restarts += 1;
             return;
         }
@@ -187,7 +210,8 @@ impl<const M: usize, const D: usize> Adaptive<M, D> {
             let about = self.response.about();
             let toward = |to: f64, from: f64| to.clamp((1.0 - STRIDE) * from, (1.0 + STRIDE) * from);
             let there = [toward(omega, about[0]), toward(zeta, about[1])];
-            self.response.move_to(there, &mut self.past);
+            self.response
+                .move_to(there, self.past.iter_mut().chain(self.ring.iter_mut()));
         }
     }
 

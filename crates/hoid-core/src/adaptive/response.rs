@@ -77,16 +77,18 @@ impl Response {
     }
 
     /// Moves the point, and what the filters remember, here and in `elsewhere`, along its derivative.
-    pub fn move_to(&mut self, at: [f64; 2], elsewhere: &mut [Signals]) {
+    pub fn move_to<'a>(&mut self, at: [f64; 2], elsewhere: impl IntoIterator<Item = &'a mut Signals>) {
         let by = [at[0] - self.at[0], at[1] - self.at[1]];
         if by == [0.0; 2] || !at.iter().all(|a| a.is_finite()) {
             return;
         }
-        for x in self.past.iter_mut().chain(elsewhere) {
+        let along = |x: &mut Signals| {
             for gain in 0..2 {
                 x[gain] += by[0] * x[2 + gain] + by[1] * x[4 + gain];
             }
-        }
+        };
+        elsewhere.into_iter().for_each(along);
+        self.past.iter_mut().for_each(along);
         self.set(at);
     }
 

@@ -22,21 +22,23 @@ pub struct Change {
     pub omega_nm_rad_s: [Estimate; 2],
     /// zeta_nm before and after.
     pub zeta_nm: [Estimate; 2],
+    /// Delay tau_e before and after, s; the same where it is known.
+    pub tau_e_s: [Estimate; 2],
     /// T_L before and after, s.
     pub t_l_s: [f64; 2],
     /// Innovation variance before and after.
     pub innovation_variance: [f64; 2],
-    /// Change of K_e, K_e_dot, omega_nm, zeta_nm and the logarithm of the innovation variance, each over its standard error.
-    pub z: [f64; 5],
+    /// Change of K_e, K_e_dot, omega_nm, zeta_nm, the logarithm of the innovation variance and tau_e, each over its standard error.
+    pub z: [f64; 6],
 }
 
 /// Change over its standard error from which a quantity is said to have changed.
 const CHANGED: f64 = 2.0;
 /// What [`Change::z`] is of.
-const QUANTITIES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "remnant"];
+const QUANTITIES: [&str; 6] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "remnant", "tau_e"];
 
 impl Change {
-    pub(super) fn new(change: &kernel_change::Change, sample_time: SampleTime) -> Self {
+    pub(super) fn new(change: &kernel_change::Change, tau_e_s: [Estimate; 2], sample_time: SampleTime) -> Self {
         let (before, now) = (&change.before, &change.now);
         let pair = |i: usize| {
             let of = |b: &kernel::Before| if i < 2 { b.gains[i] } else { b.neuromuscular[i - 2] };
@@ -50,6 +52,7 @@ impl Change {
             k_e_dot: pair(1),
             omega_nm_rad_s: pair(2),
             zeta_nm: pair(3),
+            tau_e_s,
             t_l_s: [lead(before), lead(now)],
             innovation_variance: [before.variance, now.variance],
             z: change.z,
@@ -61,7 +64,7 @@ impl Change {
         1.0 / (1.0 + (-self.odds).exp())
     }
 
-    /// Names of what changed by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`, `zeta_nm`, `remnant`.
+    /// Names of what changed by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`, `zeta_nm`, `remnant`, `tau_e`.
     pub fn changed(&self) -> Vec<&'static str> {
         let each = QUANTITIES.into_iter().zip(self.z);
         each.filter(|(_, z)| z.abs() > CHANGED).map(|(name, _)| name).collect()

@@ -63,7 +63,6 @@ pub use trace::{OPERATOR_COLUMNS, Trace};
 /// Regressor and stability of the recursions, options of the kernel.
 pub use hoid_core::{predictor::Regressor, recursion::Stable};
 
-use adaptive::AdaptiveRecursion;
 use fused::FusedRecursion;
 use joint::JointRecursion;
 use refined::{RefinedRecursion, RefinedStart};
@@ -368,7 +367,7 @@ fn recursion(
             let recursion = RefinedRecursion::new(options.orders, from, &lambda, options.instruments.is_some())?;
             Ok(Box::new(recursion))
         }
-        Method::Adaptive => Ok(Box::new(AdaptiveRecursion::new(options, start, sample_time)?)),
+        Method::Adaptive => adaptive::build(options, start, sample_time),
         Method::Fused => Ok(Box::new(FusedRecursion::new(options, start, sample_time)?)),
         Method::Ekf | Method::Ukf => Ok(Box::new(JointRecursion::new(options, start, sample_time)?)),
         _ => kernel::build(options, start, sample_time),

@@ -250,7 +250,8 @@ pub struct TrackOptions {
     pub stable: Stable,
     /// Bounds of physical parameters, by name.
     pub bounds: BTreeMap<String, Constraint>,
-    /// Range of the delay tau_e in s that the physical recursion tracks. Default: none, nk is fixed.
+    /// Range of the delay tau_e in s that is tracked: by [`Method::Physical`] as a parameter, by [`Method::Adaptive`] as hypotheses of whole samples. Default:
+    /// none, nk is fixed.
     pub track_delay_s: Option<(f64, f64)>,
     /// Channel of the signal from outside the loop that [`Method::Refined`] makes its instruments of. Default: f_t where a record has it,
     /// else the error itself.
@@ -261,8 +262,8 @@ pub struct TrackOptions {
     pub every: usize,
     /// Limits of the search of start fits and windows.
     pub search: SearchOptions,
-    /// Multiple of the innovation's standard deviation beyond which an innovation moves the estimate no further. Default: 5 for rpem, fused,
-    /// physical and adaptive, none (infinite) for rls, as in the text. A window has none, nor have ekf and ukf.
+    /// Multiple of the innovation's standard deviation beyond which an innovation moves the estimate no further. Default: 5 for rpem, fused
+    /// and physical, 3.5 for adaptive, none (infinite) for rls, as in the text. A window has none, nor have ekf and ukf.
     pub limit: Option<f64>,
     /// Magnitude of e or u beyond which a sample is taken for a fault. Default 1e6.
     pub largest: f64,
@@ -316,13 +317,18 @@ impl TrackOptions {
         }
     }
 
+    /// Range of tau_e in s where it is one of the parameters that the recursion moves.
+    pub(super) fn delay_parameter_s(&self) -> Option<(f64, f64)> {
+        self.track_delay_s.filter(|_| self.method == Method::Physical)
+    }
+
     /// Names of the parameters that the recursion moves: theta, or the physical ones.
     pub fn parameter_names(&self) -> Vec<String> {
         if !self.method.is_physical() {
             return self.orders.parameter_names();
         }
         let mut names: Vec<String> = PHYSICAL_NAMES[..4].iter().map(|n| (*n).to_owned()).collect();
-        if self.track_delay_s.is_some() {
+        if self.delay_parameter_s().is_some() {
             names.push(PHYSICAL_NAMES[4].to_owned());
         }
         names.extend((1..=self.orders.nc).map(|i| format!("c{i}")));
@@ -360,7 +366,8 @@ impl TrackOptions {
     pub fn limit_in_use(&self) -> f64 {
         match (self.method, &self.forgetting) {
             (_, ForgettingRule::Window) => f64::INFINITY,
-            (Method::Rpem | Method::Fused | Method::Physical | Method::Adaptive, _) => self.limit.unwrap_or(5.0),
+            (Method::Rpem | Method::Fused | Method::Physical, _) => self.limit.unwrap_or(5.0),
+            (Method::Adaptive, _) => self.limit.unwrap_or(3.5),
             _ => self.limit.unwrap_or(f64::INFINITY),
         }
     }
@@ -453,10 +460,25 @@ impl TrackOptions {
                 format!("with {}", m.name()),
                 "adaptive, whose hypotheses are run from both ends",
             ),
-            m if self.track_delay_s.is_some() && m != Method::Physical => bad(
+            m if self.track_delay_s.is_some() && !matches!(m, Method::Physical | Method::Adaptive) => bad(
                 "the range of the delay",
                 format!("with {}", m.name()),
-                "physical, the only method that moves tau_e",
+                "physical or adaptive, the methods that follow tau_e",
+            ),
+            _ if self
+                .track_delay_s
+                .is_some_and(|(low, high)| !(0.0 <= low && low <= high && high.is_finite())) =>
+            {
+                bad(
+                    "the range of the delay",
+                    format!("{:?} s", self.track_delay_s.unwrap_or_default()),
+                    "two finite times, the shorter first",
+                )
+            }
+            _ if self.track_delay_s.is_some() && self.smooth => bad(
+                "the range of the delay",
+                "with the two-sided estimate".to_owned(),
+                "a delay that is given or searched on the start span: past and future are joined for one delay",
             ),
             _ => Ok(()),
         }?;

@@ -141,6 +141,10 @@ mod tests {
                 track_delay_s: Some((0.2, 0.35)),
                 ..of(Method::Physical)
             },
+            TrackOptions {
+                track_delay_s: Some((0.2, 0.35)),
+                ..of(Method::Adaptive)
+            },
         ];
         for forgetting in [
             ForgettingRule::Exponential,

@@ -22,6 +22,7 @@
 use hoid_core::adaptive::{
     Suppositions,
     bank::Bank,
+    delays::ByDelay,
     hypothesis::{Hypothesis, OPERATOR},
     response::{Response, Signals},
 };
@@ -152,7 +153,7 @@ fn two_sided(
     let mut front = bank(first)?;
     let mut before: Vec<Vec<Side>> = Vec::with_capacity(rows.len());
     for (k, seen) in seen.iter().enumerate() {
-        front.learn(seen.as_ref().map(|(y, r)| (*y, r)), about);
+        front.learn(seen.as_ref().map(|(y, r)| (*y, ByDelay::known(r))), about);
         if rows.get(before.len()) == Some(&k) {
             before.push(sides(&front));
         }
@@ -167,7 +168,7 @@ fn two_sided(
         {
             joined.push(join(&before, &sides(&back)));
         }
-        back.learn(seen.as_ref().map(|(y, r)| (*y, r)), about);
+        back.learn(seen.as_ref().map(|(y, r)| (*y, ByDelay::known(r))), about);
     }
     joined.reverse();
     Ok(joined)

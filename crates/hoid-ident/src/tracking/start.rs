@@ -82,9 +82,9 @@ impl StartState {
         let o = &options.orders;
         let mut values = vec![0.0; options.parameter_names().len()];
         if options.method.is_physical() {
-            let first = if options.track_delay_s.is_some() { 5 } else { 4 };
+            let first = if options.delay_parameter_s().is_some() { 5 } else { 4 };
             values[..first].copy_from_slice(&TYPICAL_OPERATOR[..first]);
-            if let Some((low, high)) = options.track_delay_s {
+            if let Some((low, high)) = options.delay_parameter_s() {
                 values[4] = TYPICAL_OPERATOR[4].clamp(low.min(high), high.max(low));
             }
             let limits = bounds(options, sample_time)?;
@@ -174,7 +174,9 @@ pub(super) fn bounds(options: &TrackOptions, sample_time: SampleTime) -> Result<
     let usual = |name: &str| match name {
         "omega_nm" => [SLOWEST_OMEGA, FASTEST_SHARE * sample_time.nyquist_rad_s()],
         "zeta_nm" => DAMPING,
-        "tau_e" => options.track_delay_s.map_or([0.0, 0.0], |(low, high)| [low, high]),
+        "tau_e" => options
+            .delay_parameter_s()
+            .map_or([0.0, 0.0], |(low, high)| [low, high]),
         _ => [f64::NEG_INFINITY, f64::INFINITY],
     };
     names
@@ -241,7 +243,7 @@ fn physical_values(options: &TrackOptions, theta: &[f64], sample_time: SampleTim
         operator.omega_nm_rad_s,
         operator.zeta_nm,
     ];
-    if options.track_delay_s.is_some() {
+    if options.delay_parameter_s().is_some() {
         eta.push(operator.tau_e_s);
     }
     eta.extend_from_slice(model.c());
@@ -261,7 +263,7 @@ fn polynomial_fit(options: &TrackOptions, record: &Record, known: Option<&Fit>) 
 }
 
 fn fit_physical(options: &TrackOptions, record: &Record, known: Option<&Fit>) -> Result<PhysicalStart, IdentError> {
-    if options.track_delay_s.is_none()
+    if options.delay_parameter_s().is_none()
         && let Some(start) = from_box_jenkins(options, record, known)?
     {
         return Ok(start);
@@ -332,7 +334,7 @@ fn from_grey_box(options: &TrackOptions, record: &Record) -> Result<PhysicalStar
         search: options.search,
         ..GreyBox::new(order..=order)
     };
-    match options.track_delay_s {
+    match options.delay_parameter_s() {
         Some(range) => grey.delay_range_s = range,
         None => {
             let tau = (o.nk as f64 - 1.0) * ts;
@@ -344,7 +346,7 @@ fn from_grey_box(options: &TrackOptions, record: &Record) -> Result<PhysicalStar
     let found = grey.fit(std::slice::from_ref(record))?;
     let parameters = found.parameters();
     let value = |name: &str| parameters.iter().position(|(n, _)| n == name);
-    let operator = if options.track_delay_s.is_some() { 5 } else { 4 };
+    let operator = if options.delay_parameter_s().is_some() { 5 } else { 4 };
     let variance = found.innovation_variance();
     let width = parameters.len();
     let (mut eta, mut rows) = (Vec::new(), Vec::new());

@@ -251,7 +251,7 @@ impl Trace {
 
 /// Orders of the polynomials that the method reports.
 pub(super) fn polynomial_orders(options: &TrackOptions) -> Orders {
-    match options.track_delay_s {
+    match options.delay_parameter_s() {
         Some(_) => Orders {
             nb: 3,
             ..options.orders

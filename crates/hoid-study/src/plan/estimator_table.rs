@@ -308,8 +308,8 @@ impl EstimatorTable {
             (
                 "track_delay_s",
                 self.track_delay_s.is_some(),
-                method == Some(Method::Physical),
-                "physical",
+                matches!(method, Some(Method::Physical | Method::Adaptive)),
+                "physical and adaptive",
             ),
         ];
         for (key, is_given, has_effect, of) in given {

@@ -1,0 +1,219 @@
+//! The bank of hypotheses where the delay is not known: one delay against a delay line, delays that were wrong or that change, signals that overflow.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::Noise;
+use hoid_core::{
+    adaptive::{
+        Adaptive, Suppositions,
+        delays::Delays,
+        hypothesis::Hypothesis,
+        response::{Response, Signals},
+    },
+    error_bars::Level,
+};
+
+const TS: f64 = 0.01;
+const S1: [f64; 4] = [0.09, 0.036, 11.25, 0.35];
+/// Delays in question.
+const COUNT: usize = 16;
+const D: [f64; 1] = [-0.85];
+const DEVIATION: f64 = 0.02;
+
+type Bank = Adaptive<48, 4, Vec<Signals>>;
+
+fn suppositions(delays: Delays) -> Suppositions {
+    Suppositions {
+        sample_time: TS,
+        bounds: [
+            [f64::NEG_INFINITY, f64::INFINITY],
+            [f64::NEG_INFINITY, f64::INFINITY],
+            [0.5, 150.0],
+            [0.02, 5.0],
+        ],
+        spacing: 32,
+        hazard: TS / 60.0,
+        jump: [0.22, 0.5],
+        drift: 0.0005,
+        unrest: [0.005, 0.02, 0.02, 0.02],
+        unrest_for: 300.0,
+        neuromuscular: [0.25, 0.4],
+        whole_every: 4,
+        whole_odds: 0.3,
+        crossover: 2.0,
+        doubt: 100.0,
+        protected: 128,
+        limit: 5.0,
+        recent: 400,
+        settled: 50,
+        threshold: 4.0,
+        delays,
+    }
+}
+
+const OPEN: Delays = Delays {
+    count: COUNT,
+    every: 4,
+    odds: 0.5,
+    births: 8,
+    jump: 5.0,
+    neighbour: 0.05,
+    worth: [0.01, 0.03, 0.04, 0.08],
+};
+
+const SPREAD: [f64; 4] = [1e-5, 1e-5, 0.05, 1e-4];
+
+fn first(spread: [f64; 4]) -> Hypothesis {
+    let covariance = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { spread[i] } else { 0.0 }));
+    let level = Level::new(DEVIATION * DEVIATION, 2000.0, 1.0 - 1.0 / 2000.0);
+    Hypothesis::new(S1, &covariance, level).unwrap()
+}
+
+fn bank(later: usize, delays: Delays) -> Bank {
+    Adaptive::with_delays(
+        first(SPREAD).delayed(later),
+        &D,
+        suppositions(delays),
+        vec![[0.0; 6]; delays.count],
+    )
+    .unwrap()
+}
+
+/// Error and control of an operator with so many samples of delay at each sample, with AR(1) noise.
+fn operator(samples: usize, seed: u64, delay: impl Fn(usize) -> usize) -> Vec<(f64, f64)> {
+    let mut noise = Noise(seed);
+    let mut response = Response::new([S1[2], S1[3]], TS);
+    let (mut slow, mut fast, mut n, mut w) = (0.0, 0.0, 0.0, Vec::new());
+    (0..samples)
+        .map(|k| {
+            slow = 0.98 * slow + 0.3 * noise.next();
+            fast = 0.9 * fast + 0.3 * noise.next();
+            let x = slow + fast;
+            let signals = response.step(x);
+            w.push(S1[0] * signals[0] + S1[1] * signals[1]);
+            n = -D[0] * n + DEVIATION * noise.next();
+            (x, n + k.checked_sub(delay(k)).map_or(0.0, |past| w[past]))
+        })
+        .collect()
+}
+
+#[test]
+fn a_delay_that_is_not_questioned_is_a_delay_line() {
+    // omega_nm and zeta_nm are known, so that the point of the filters stays: when it moves, signals that the delay line has not let through yet differ in
+    // the second order.
+    let suppositions = |delays| Suppositions {
+        whole_every: 0,
+        ..suppositions(delays)
+    };
+    let first = first([1e-5, 1e-5, 0.0, 0.0]);
+    let silent = Delays {
+        every: u32::MAX,
+        neighbour: 0.0,
+        ..OPEN
+    };
+    let memory = vec![[0.0; 6]; COUNT];
+    let mut one: Bank = Adaptive::with_delays(first.delayed(5), &D, suppositions(silent), memory).unwrap();
+    let mut other: Adaptive<48, 4> = Adaptive::new(first, &D, suppositions(Delays::KNOWN)).unwrap();
+    let data = operator(4000, 3, |k| if k < 2000 { 5 } else { 6 });
+    for (k, &(x, u)) in data.iter().enumerate() {
+        let delayed = k.checked_sub(5).map_or(0.0, |past| data[past].0);
+        // Rounding: the two are compiled apart.
+        let (a, b) = (one.step(x, u).innovation, other.step(delayed, u).innovation);
+        assert!((a - b).abs() < 1e-9, "{k}: {a} {b}");
+    }
+    for (a, b) in one.bank().mixture().eta.iter().zip(other.bank().mixture().eta) {
+        assert!((a / b - 1.0).abs() < 1e-6);
+    }
+    assert_eq!(one.bank().delay(), [5.0, 1.0 / 12.0]);
+}
+
+#[test]
+fn a_delay_that_changes_is_found_and_named() {
+    for (seed, from, to) in [(11, 4, 10), (12, 10, 5), (13, 2, 4)] {
+        let data = operator(10_000, seed, |k| if k < 6000 { from } else { to });
+        let mut bank = bank(from, OPEN);
+        let mut declared = Vec::new();
+        for (k, &(x, u)) in data.iter().enumerate() {
+            bank.step(x, u);
+            let total: f64 = bank.bank().hypotheses().map(|h| h.weight).sum();
+            assert!((total - 1.0).abs() < 1e-12);
+            declared.extend(bank.bank().change().map(|c| (k, c)));
+        }
+        // Two births of other delays after the change; a second one may say better what changed.
+        let (k, change) = declared[0];
+        assert!((6000..6300).contains(&k), "{seed}: {k} {change:?}");
+        let last = declared[declared.len() - 1].1;
+        assert!(last.z[5].abs() > 2.0, "{seed}: {last:?}");
+        let [mean, variance] = bank.bank().delay();
+        assert!(
+            (mean - to as f64).abs() < 0.5 && variance < 0.3,
+            "{seed}: {mean} {variance}"
+        );
+        let covariance = bank.bank().covariance();
+        for i in 0..4 {
+            let error = bank.bank().mixture().eta[i] - S1[i];
+            assert!(error.abs() < 4.0 * covariance[i][i].sqrt(), "{seed} {i}: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_first_delay_that_was_wrong_is_mended_without_an_alarm() {
+    for (seed, wrong) in [(5, 7), (6, 9)] {
+        let data = operator(6000, seed, |_| 8);
+        let mut bank = bank(wrong, OPEN);
+        for (k, &(x, u)) in data.iter().enumerate() {
+            bank.step(x, u);
+            assert!(bank.bank().change().is_none(), "{seed}: {k}");
+        }
+        assert!((bank.bank().delay()[0] - 8.0).abs() < 0.5);
+    }
+}
+
+#[test]
+fn a_steady_person_raises_no_alarm() {
+    // Ten minutes.
+    let data = operator(60_000, 34, |_| 8);
+    let mut bank = bank(8, OPEN);
+    for &(x, u) in &data {
+        bank.step(x, u);
+        assert!(bank.bank().change().is_none());
+    }
+    assert!(
+        bank.bank()
+            .hypotheses()
+            .any(|h| h.born == 0 && h.later == 8 && h.weight > 0.5)
+    );
+}
+
+#[test]
+fn overflow_silence_and_bad_memory() {
+    let mut bank = bank(8, OPEN);
+    for (k, (x, u)) in operator(3000, 7, |_| 8).into_iter().enumerate() {
+        match k {
+            500 => _ = bank.step(1e200, u),
+            800 => _ = bank.step(x, -1e200),
+            1000..2000 => _ = bank.step(0.0, 0.0),
+            2100..2200 => bank.bridge(x),
+            2200..2300 => _ = bank.follow(x, u),
+            _ => _ = bank.step(x, u),
+        }
+        assert!(bank.bank().hypotheses().all(Hypothesis::is_sound), "{k}");
+        assert!(bank.bank().delay().iter().all(|d| d.is_finite()));
+    }
+    let with = |delays: Delays, memory: usize| {
+        Bank::with_delays(first(SPREAD), &D, suppositions(delays), vec![[0.0; 6]; memory]).is_some()
+    };
+    assert!(with(OPEN, COUNT));
+    assert!(!with(OPEN, COUNT - 1) && !with(OPEN, 0));
+    assert!(!with(Delays { count: 0, ..OPEN }, 0));
+    assert!(!with(Delays { births: 0, ..OPEN }, COUNT) && !with(Delays { every: 0, ..OPEN }, COUNT));
+    assert!(!with(
+        Delays {
+            neighbour: f64::NAN,
+            ..OPEN
+        },
+        COUNT
+    ));
+}
