@@ -9,7 +9,7 @@ use hoid_model::{
     Channel, Orders, Record, Structure,
     scenario::{Condition, Scenario},
 };
-use hoid_report::{BatchLine, ReportError, TraceSection, TrackReport};
+use hoid_report::{BatchLine, ReportError, TraceSection, TrackReport, batch_fit};
 use hoid_sim::{Simulator, Stream};
 
 const SPANS: [(f64, f64); 2] = [(0.0, 30.72), (51.20, 81.92)];
@@ -267,6 +267,24 @@ fn the_delay_is_shown_where_it_is_tracked() {
     check_page(&html);
     assert_eq!(figure(&html, "operator").matches("rotate(-90").count(), 6);
     assert!(html.contains("tau_e tracked in 0.2 to 0.4 s"));
+}
+
+#[test]
+fn a_batch_fit_beside_a_delay_that_changed_has_the_delay_of_its_span() {
+    let mut scenario = Scenario::condition(Condition::C4);
+    scenario.last.operator.tau_e_s = 0.34;
+    let record = Simulator::new(&scenario)
+        .unwrap()
+        .run(Stream::default(), false)
+        .unwrap();
+    let mut with_delay = options(Method::Adaptive);
+    with_delay.orders = Method::Adaptive.usual_orders(29);
+    with_delay.track_delay_s = Some((0.2, 0.4));
+    let trace = track(&record, &with_delay, 8).unwrap();
+    let (_, fit) = batch_fit(&trace, &record, SPANS[1]).unwrap();
+    assert!((34..=36).contains(&fit.orders().nk), "{}", fit.orders());
+    // The trace has no row there that says otherwise: the start's.
+    assert_eq!(batch_fit(&trace, &record, SPANS[0]).unwrap().1.orders().nk, 29);
 }
 
 #[test]

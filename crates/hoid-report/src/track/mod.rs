@@ -10,7 +10,7 @@ use hoid_ident::{
     Estimator, Fit, IdentError,
     tracking::{StartAt, Trace},
 };
-use hoid_model::Record;
+use hoid_model::{Orders, Record};
 use minijinja::{Value, context};
 
 use crate::{ReportError, figures, page, tables as of_fits};
@@ -171,7 +171,31 @@ fn beyond(grid: &TraceGrid) -> Vec<Value> {
 /// A batch fit and its span, s.
 pub type BatchFit = ((f64, f64), Fit);
 
-/// A fit of a span of a record with the structure and the orders of a trace.
+/// The orders of a trace; where it tracks the delay, with the median of what it says of the delay in a span, s.
+fn orders_within(trace: &Trace, (from, to): (f64, f64)) -> Orders {
+    let orders = trace.options().orders;
+    if trace.options().track_delay_s.is_none() {
+        return orders;
+    }
+    let rows = trace
+        .times_s()
+        .iter()
+        .enumerate()
+        .filter(|(_, t)| (from..to).contains(*t));
+    let mut delays: Vec<f64> = rows
+        .filter_map(|(row, _)| Some(trace.operator_values(row).ok()?.tau_e_s.value))
+        .collect();
+    delays.sort_by(f64::total_cmp);
+    match delays.get(delays.len() / 2) {
+        Some(delay_s) => Orders {
+            nk: (delay_s / trace.sample_time().s()).round() as usize + 1,
+            ..orders
+        },
+        None => orders,
+    }
+}
+
+/// A fit of a span of a record with the structure and the orders of a trace; where the trace tracks the delay, with what it says of it there.
 ///
 /// # Errors
 /// Those of the fit.
@@ -179,7 +203,7 @@ pub fn batch_fit(trace: &Trace, record: &Record, (from, to): (f64, f64)) -> Resu
     let options = trace.options();
     let estimator = Estimator {
         search: options.search,
-        ..Estimator::new(options.structure, options.orders)
+        ..Estimator::new(options.structure, orders_within(trace, (from, to)))
     };
     Ok(((from, to), estimator.fit(&[record.span(from, to)?])?))
 }
