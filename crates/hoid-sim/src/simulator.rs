@@ -43,13 +43,41 @@ pub struct Simulator {
 
 #[derive(Debug, Clone, Copy)]
 struct Matrices {
-    operator: HeldStates,
+    operator: Rows,
     operator_output: [f64; 2],
-    element: HeldStates,
+    element: Rows,
     element_input: f64,
     element_output: f64,
     k_n: f64,
     delay: usize,
+}
+
+/// A held system by rows, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`: the bits of [`HeldStates::step`]. Were both rows sums, the compiler would
+/// pack the states into one register, and each sample would wait for the shuffles besides.
+#[derive(Debug, Clone, Copy)]
+struct Rows {
+    plus: [f64; 3],
+    minus: [f64; 3],
+}
+
+impl Rows {
+    fn of(system: &HeldStates) -> Self {
+        let ([[a, b], [c, d]], [g, h]) = (system.transition, system.input);
+        Self {
+            plus: [a, b, g],
+            minus: [d, -c, -h],
+        }
+    }
+
+    /// One sample on.
+    #[inline(always)]
+    fn step<R: Number>(&self, x: [R; 2], u: R) -> [R; 2] {
+        let ([a, b, g], [d, c, h]) = (self.plus, self.minus);
+        [
+            u.like(a) * x[0] + u.like(b) * x[1] + u.like(g) * u,
+            u.like(d) * x[1] - u.like(c) * x[0] - u.like(h) * u,
+        ]
+    }
 }
 
 /// The signals of one run, run-in included.
@@ -128,13 +156,17 @@ impl Simulator {
     /// # Errors
     /// As [`Simulator::signals`]; the signals are then of no use.
     pub fn signals_into(&self, noise: &[f64], signals: &mut Signals) -> Result<(), SimError> {
-        self.check_noise(noise)?;
+        self.check_length(noise)?;
         let samples = self.samples();
         signals.make_room(samples);
         let mut state = LoopState::at_rest(0.0, self.longest_delay());
         let Signals { e, u, x, n } = &mut *signals;
         self.pass(&mut state, 0..samples, noise, [e, u, x, n]);
-        self.check_finite(signals)
+        if state.is_finite(0) {
+            Ok(())
+        } else {
+            self.why_not_finite(noise, signals)
+        }
     }
 
     /// The signals of several runs, each driven by its own white noise, side by side in the lanes of vector registers: the bits of
@@ -159,7 +191,7 @@ impl Simulator {
         into: &mut Vec<Signals>,
     ) -> Result<(), SimError> {
         for noise in noises {
-            self.check_noise(noise)?;
+            self.check_length(noise)?;
         }
         into.resize_with(noises.len(), Signals::default);
         for signals in into.iter_mut() {
@@ -170,8 +202,11 @@ impl Simulator {
             noises,
             into,
         };
-        path.do_with(many).ok_or(SimError::NoSuchPath)?;
-        into.iter().try_for_each(|signals| self.check_finite(signals))
+        let finite = path.do_with(many).ok_or(SimError::NoSuchPath)?;
+        if finite {
+            return Ok(());
+        }
+        (noises.iter().zip(&*into)).try_for_each(|(noise, signals)| self.why_not_finite(noise, signals))
     }
 
     fn longest_delay(&self) -> usize {
@@ -179,20 +214,14 @@ impl Simulator {
         initial.max(last)
     }
 
-    fn check_noise(&self, noise: &[f64]) -> Result<(), SimError> {
-        if noise.len() != self.samples() {
-            return Err(SimError::NoiseLength {
-                found: noise.len(),
-                expected: self.samples(),
-            });
+    fn check_length(&self, noise: &[f64]) -> Result<(), SimError> {
+        if noise.len() == self.samples() {
+            return Ok(());
         }
-        match first_not_finite(noise) {
-            None => Ok(()),
-            Some(index) => Err(SimError::NoiseNotFinite {
-                index,
-                value: noise[index],
-            }),
-        }
+        Err(SimError::NoiseLength {
+            found: noise.len(),
+            expected: self.samples(),
+        })
     }
 
     /// The samples of `range`, from noise into e, u, x and n that hold the lanes of each sample beside each other.
@@ -244,8 +273,8 @@ impl Simulator {
             let response = memory[k.wrapping_sub(m.delay) & last];
             let n = zero.like(m.k_n) * remnant[M - 1];
             let u = response + n;
-            operator = held(&m.operator, operator, e);
-            element = held(&m.element, element, zero.like(m.element_input) * u);
+            operator = m.operator.step(operator, e);
+            element = m.element.step(element, zero.like(m.element_input) * u);
             remnant = self.cascade.step(remnant, zero.load(&noise[at..]));
             e.store(&mut e_out[at..]);
             u.store(&mut u_out[at..]);
@@ -296,7 +325,12 @@ impl Simulator {
         Ok(record)
     }
 
-    fn check_finite(&self, signals: &Signals) -> Result<(), SimError> {
+    /// The first number that is not finite, where there is one.
+    fn why_not_finite(&self, noise: &[f64], signals: &Signals) -> Result<(), SimError> {
+        if let Some(index) = first_not_finite(noise) {
+            let value = noise[index];
+            return Err(SimError::NoiseNotFinite { index, value });
+        }
         for (signal, values) in [("e", &signals.e), ("u", &signals.u)] {
             if let Some(k) = first_not_finite(values) {
                 let ts = self.scenario.scenario().sample_time.s();
@@ -311,23 +345,9 @@ impl Simulator {
     }
 }
 
-/// Index of the first value that is not finite. Mostly there is none, which is known without a branch for each.
+/// Index of the first value that is not finite.
 fn first_not_finite(values: &[f64]) -> Option<usize> {
-    if values.iter().fold(true, |sound, v| sound & v.is_finite()) {
-        return None;
-    }
     values.iter().position(|v| !v.is_finite())
-}
-
-/// One sample of a held system on, as [`HeldStates::step`].
-#[inline(always)]
-fn held<R: Number>(system: &HeldStates, x: [R; 2], u: R) -> [R; 2] {
-    let [[a, b], [c, d]] = system.transition;
-    let [g, h] = system.input;
-    [
-        u.like(a) * x[0] + u.like(b) * x[1] + u.like(g) * u,
-        u.like(c) * x[0] + u.like(d) * x[1] + u.like(h) * u,
-    ]
 }
 
 /// Where the loop stands between two samples.
@@ -347,6 +367,13 @@ impl<R: Number> LoopState<R> {
             remnant: [zero; MOST],
             memory: vec![zero; (longest_delay + 1).next_power_of_two()],
         }
+    }
+
+    /// True when all that a lane has gone through was finite. A number that is not stays in the states for ever: zero times it is not finite
+    /// either.
+    fn is_finite(&self, lane: usize) -> bool {
+        let states = self.operator.iter().chain(&self.element).chain(&self.remnant);
+        states.chain(&self.memory).all(|state| state.lane(lane).is_finite())
     }
 }
 
@@ -375,13 +402,15 @@ struct Many<'a> {
 }
 
 impl SideBySide for Many<'_> {
-    type Output = ();
+    /// True when all was finite.
+    type Output = bool;
 
     #[inline(always)]
-    fn run<R: Number>(self, zero: R) {
+    fn run<R: Number>(self, zero: R) -> bool {
         let (width, samples) = (zero.lanes(), self.simulator.samples());
         let mut noise = vec![0.0; width * BLOCK];
         let mut out: [Vec<f64>; 4] = std::array::from_fn(|_| vec![0.0; width * BLOCK]);
+        let mut finite = true;
         for (noises, into) in self.noises.chunks(width).zip(self.into.chunks_mut(width)) {
             let mut state = LoopState::at_rest(zero, self.simulator.longest_delay());
             // Lanes that are left over run without remnant.
@@ -405,7 +434,11 @@ impl SideBySide for Many<'_> {
                     }
                 }
             }
+            for lane in 0..into.len() {
+                finite &= state.is_finite(lane);
+            }
         }
+        finite
     }
 }
 
@@ -418,9 +451,9 @@ impl Matrices {
             Realisation::Output => (1.0, c.k_c),
         };
         Self {
-            operator: HeldStates::new(2.0 * o.zeta_nm * o.omega_nm_rad_s, w2, ts),
+            operator: Rows::of(&HeldStates::new(2.0 * o.zeta_nm * o.omega_nm_rad_s, w2, ts)),
             operator_output: [w2 * o.k_e, w2 * o.k_e_dot()],
-            element: HeldStates::new(c.omega_b_rad_s, 0.0, ts),
+            element: Rows::of(&HeldStates::new(c.omega_b_rad_s, 0.0, ts)),
             element_input,
             element_output,
             k_n: p.k_n,
