@@ -3,44 +3,20 @@
 
 mod common;
 
-use common::Noise;
+use common::{
+    Noise,
+    person::{self, S1, TS, diagonal},
+};
 use hoid_core::{
     adaptive::{Adaptive, Suppositions, delays::Delays, hypothesis::Hypothesis, response::Response},
     error_bars::Level,
     held_operator::held_operator,
 };
 
-const TS: f64 = 0.01;
-const S1: [f64; 4] = [0.09, 0.036, 11.25, 0.35];
 const S2: [f64; 4] = [0.07, 0.084, 11.25, 0.35];
 
 fn suppositions() -> Suppositions {
-    Suppositions {
-        sample_time: TS,
-        bounds: [
-            [f64::NEG_INFINITY, f64::INFINITY],
-            [f64::NEG_INFINITY, f64::INFINITY],
-            [0.5, 150.0],
-            [0.02, 5.0],
-        ],
-        spacing: 32,
-        hazard: TS / 60.0,
-        jump: [0.22, 0.5],
-        drift: 0.0005,
-        unrest: [0.005, 0.02, 0.02, 0.02],
-        unrest_for: 300.0,
-        neuromuscular: [0.25, 0.4],
-        whole_every: 4,
-        whole_odds: 0.3,
-        crossover: 2.0,
-        doubt: 100.0,
-        protected: 128,
-        limit: 5.0,
-        recent: 400,
-        settled: 50,
-        threshold: 4.0,
-        delays: Delays::KNOWN,
-    }
+    person::suppositions(Delays::KNOWN)
 }
 
 /// As the suppositions of a person who never changes.
@@ -52,10 +28,6 @@ fn steady() -> Suppositions {
         limit: f64::INFINITY,
         ..suppositions()
     }
-}
-
-fn diagonal(d: [f64; 4]) -> [[f64; 4]; 4] {
-    std::array::from_fn(|i| std::array::from_fn(|j| if i == j { d[i] } else { 0.0 }))
 }
 
 const WIDE: [f64; 4] = [1e-4, 1e-4, 0.5, 1e-3];

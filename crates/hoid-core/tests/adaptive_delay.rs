@@ -3,7 +3,10 @@
 
 mod common;
 
-use common::Noise;
+use common::{
+    Noise,
+    person::{S1, TS, diagonal, suppositions},
+};
 use hoid_core::{
     adaptive::{
         Adaptive, Suppositions,
@@ -14,43 +17,12 @@ use hoid_core::{
     error_bars::Level,
 };
 
-const TS: f64 = 0.01;
-const S1: [f64; 4] = [0.09, 0.036, 11.25, 0.35];
 /// Delays in question.
 const COUNT: usize = 16;
 const D: [f64; 1] = [-0.85];
 const DEVIATION: f64 = 0.02;
 
 type Bank = Adaptive<48, 4, Vec<Signals>>;
-
-fn suppositions(delays: Delays) -> Suppositions {
-    Suppositions {
-        sample_time: TS,
-        bounds: [
-            [f64::NEG_INFINITY, f64::INFINITY],
-            [f64::NEG_INFINITY, f64::INFINITY],
-            [0.5, 150.0],
-            [0.02, 5.0],
-        ],
-        spacing: 32,
-        hazard: TS / 60.0,
-        jump: [0.22, 0.5],
-        drift: 0.0005,
-        unrest: [0.005, 0.02, 0.02, 0.02],
-        unrest_for: 300.0,
-        neuromuscular: [0.25, 0.4],
-        whole_every: 4,
-        whole_odds: 0.3,
-        crossover: 2.0,
-        doubt: 100.0,
-        protected: 128,
-        limit: 5.0,
-        recent: 400,
-        settled: 50,
-        threshold: 4.0,
-        delays,
-    }
-}
 
 const OPEN: Delays = Delays {
     count: COUNT,
@@ -65,9 +37,8 @@ const OPEN: Delays = Delays {
 const SPREAD: [f64; 4] = [1e-5, 1e-5, 0.05, 1e-4];
 
 fn first(spread: [f64; 4]) -> Hypothesis {
-    let covariance = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { spread[i] } else { 0.0 }));
     let level = Level::new(DEVIATION * DEVIATION, 2000.0, 1.0 - 1.0 / 2000.0);
-    Hypothesis::new(S1, &covariance, level).unwrap()
+    Hypothesis::new(S1, &diagonal(spread), level).unwrap()
 }
 
 fn bank(later: usize, delays: Delays) -> Bank {

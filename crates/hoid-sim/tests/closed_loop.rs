@@ -26,6 +26,18 @@ fn silent_run(scenario: &Scenario) -> (Simulator, Signals) {
     (simulator, signals)
 }
 
+/// White noise for the first runs of a simulator.
+fn noises(simulator: &Simulator, runs: u64) -> Vec<Vec<f64>> {
+    let of = |replication| {
+        let stream = Stream {
+            replication,
+            ..Stream::default()
+        };
+        stream.white_noise(simulator.samples())
+    };
+    (0..runs).map(of).collect()
+}
+
 /// The loop in continuous time, without any hold: fourth-order Runge-Kutta, `steps` to a sample, the delay by a buffer (its
 /// value at half steps by the mean of its neighbours). Returns u and e at the samples.
 fn continuous_loop(scenario: &Scenario, steps: usize) -> (Vec<f64>, Vec<f64>) {
@@ -202,15 +214,7 @@ fn a_delay_that_changes_is_that_of_the_sample_at_which_the_response_arrives() {
     }
     // Many at a time have the same bits.
     let simulator = Simulator::new(&with(0.28, 0.34)).unwrap();
-    let noises: Vec<Vec<f64>> = (0..3)
-        .map(|replication| {
-            let stream = Stream {
-                replication,
-                ..Stream::default()
-            };
-            stream.white_noise(simulator.samples())
-        })
-        .collect();
+    let noises = noises(&simulator, 3);
     for (many, noise) in simulator
         .signals_of_many(&noises, Path::Best)
         .unwrap()
@@ -405,15 +409,7 @@ fn runs_side_by_side_have_the_bits_of_each_alone() {
         scenario.remnant.order = order;
         scenario.measurement_s = 20.0;
         let simulator = Simulator::new(&scenario).unwrap();
-        let noises: Vec<Vec<f64>> = (0..runs)
-            .map(|replication| {
-                let stream = Stream {
-                    replication,
-                    ..Stream::default()
-                };
-                stream.white_noise(simulator.samples())
-            })
-            .collect();
+        let noises = noises(&simulator, runs);
         let alone: Vec<Signals> = noises.iter().map(|noise| simulator.signals(noise).unwrap()).collect();
         for path in Path::available() {
             assert_eq!(

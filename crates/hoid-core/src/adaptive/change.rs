@@ -107,7 +107,13 @@ impl Watch {
             let settled = likeliest.filter(|h| now - h.born >= suppositions.settled);
             let others = recent + older - whole;
             let is_whole = libm::log((whole + LEAST) / (others.max(0.0) + LEAST)) > suppositions.threshold;
-            if let Some(h) = settled {
+            // What is only asked for while it may be declared: this stands in every sample after a change.
+            let unsaid = |h: &&Hypothesis| {
+                !self.raised
+                    || is_whole && h.whole && !self.raised_whole
+                    || suppositions.delays.count > 1 && !self.raised_delay
+            };
+            if let Some(h) = settled.filter(unsaid) {
                 let of_recent = |h: &&Hypothesis| is_recent(h, now, suppositions);
                 let delay = delay_of(hypotheses.iter().flatten().filter(of_recent));
                 let change = of(h, delay, now, self.odds);

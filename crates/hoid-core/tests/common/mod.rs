@@ -1,6 +1,8 @@
 //! Data and the plain form of the covariance that tests share.
 #![allow(dead_code)]
 
+pub mod person;
+
 use hoid_core::adaptation::Forgetting;
 
 /// Pseudo-random numbers, uniform with unit variance.

@@ -73,7 +73,7 @@ const NEIGHBOUR: f64 = 0.15;
 const WORTH: [f64; OPERATOR] = [0.01, 0.03, 0.04, 0.08];
 
 /// The delays in question, in samples of nk: nk itself, or those of the range that is tracked.
-pub(super) fn delays(options: &TrackOptions, sample_time: SampleTime) -> RangeInclusive<usize> {
+fn delays(options: &TrackOptions, sample_time: SampleTime) -> RangeInclusive<usize> {
     match options.track_delay_s {
         None => options.orders.nk..=options.orders.nk,
         Some((low, high)) => {

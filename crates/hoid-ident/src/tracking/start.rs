@@ -253,7 +253,6 @@ fn physical_values(options: &TrackOptions, theta: &[f64], sample_time: SampleTim
 
 type PhysicalStart = (Vec<f64>, Option<Vec<f64>>, Fit);
 
-/// The Box-Jenkins fit where it has physical parameters within the bounds, else the grey box, which always has.
 /// The fit of the start span, made where it is not known.
 fn polynomial_fit(options: &TrackOptions, record: &Record, known: Option<&Fit>) -> Result<Fit, IdentError> {
     match known {
@@ -262,6 +261,7 @@ fn polynomial_fit(options: &TrackOptions, record: &Record, known: Option<&Fit>) 
     }
 }
 
+/// The Box-Jenkins fit where it has physical parameters within the bounds, else the grey box, which always has.
 fn fit_physical(options: &TrackOptions, record: &Record, known: Option<&Fit>) -> Result<PhysicalStart, IdentError> {
     if options.delay_parameter_s().is_none()
         && let Some(start) = from_box_jenkins(options, record, known)?
