@@ -4,13 +4,15 @@
 //! recordings with the columns t, r, u and y that are joined in the middle
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
+mod evidence;
+
+use evidence::{CHANGE_S, START_S, median, on_all_cores, scenario};
 use hoid_ident::tracking::{
     ErrorThreshold, Memory, Method, Sample, Stable, StartAt, StartCovariance, TrackOptions, Tracker,
 };
 use hoid_model::{
     Channel, Record, SampleTime,
-    remnant_gain::NoiseDefinition,
-    scenario::{Condition, Realisation, RemnantStrength, Scenario},
+    scenario::{Condition, Scenario},
     schedule::Schedule,
 };
 use hoid_sim::{Simulator, Stream};
@@ -18,9 +20,7 @@ use hoid_sim::{Simulator, Stream};
 const NK: usize = 29;
 const COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
 const LEVELS: [f64; 4] = [0.01, 0.1, 0.2, 0.3];
-/// End of the start fit, change, and end of the search for it, s.
-const START_S: f64 = 30.72;
-const CHANGE_S: f64 = 40.96;
+/// End of the search for a change, s.
 const FOUND_UNTIL_S: f64 = CHANGE_S + 5.0;
 /// Alarms of one event: further ones within this time do not count, s.
 const ONE_EVENT_S: f64 = 4.0;
@@ -38,17 +38,6 @@ fn main() {
     }
 }
 
-fn scenario(condition: Condition, remnant_order: usize, level: f64) -> Scenario {
-    let mut scenario = Scenario::condition(condition);
-    scenario.remnant.order = remnant_order;
-    scenario.remnant.strength = RemnantStrength::Level {
-        level,
-        definition: NoiseDefinition::Response,
-    };
-    scenario.realisation = Realisation::Output;
-    scenario
-}
-
 fn simulator(condition: Condition, remnant_order: usize, level: f64) -> Simulator {
     Simulator::new(&scenario(condition, remnant_order, level)).unwrap()
 }
@@ -61,25 +50,6 @@ fn run(simulator: &Simulator, condition: Condition, order: usize, level: usize, 
         replication,
     };
     simulator.run(stream, false).unwrap()
-}
-
-/// Results of the runs in their order, on all cores.
-fn on_all_cores<T: Send>(runs: usize, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let mut results: Vec<(u64, T)> = std::thread::scope(|scope| {
-        let one = &one;
-        let threads: Vec<_> = (0..cores)
-            .map(|c| {
-                scope.spawn(move || {
-                    let mine = (c..runs).step_by(cores);
-                    mine.map(|r| (r as u64, one(r as u64))).collect::<Vec<_>>()
-                })
-            })
-            .collect();
-        threads.into_iter().flat_map(|t| t.join().unwrap()).collect()
-    });
-    results.sort_by_key(|(r, _)| *r);
-    results.into_iter().map(|(_, t)| t).collect()
 }
 
 fn options(method: Method) -> TrackOptions {
@@ -98,12 +68,6 @@ fn of_the_text(method: Method) -> TrackOptions {
         limit: Some(f64::INFINITY),
         ..options(method)
     }
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.filter(|v| !v.is_nan()).collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 /// What one run of one method gave.

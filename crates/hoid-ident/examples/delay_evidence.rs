@@ -3,19 +3,19 @@
 //! `cargo run --release -p hoid-ident --example delay_evidence -- [RUNS] [tune]`
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
+mod evidence;
+
+use evidence::{CHANGE_S, START_S, median, on_all_cores, scenario};
 use hoid_ident::tracking::{Method, StartAt, TrackOptions, track};
 use hoid_model::{
     Record,
-    remnant_gain::NoiseDefinition,
-    scenario::{Condition, Realisation, RemnantStrength, Scenario},
+    scenario::{Condition, Scenario},
     schedule::Schedule,
 };
 use hoid_sim::{Simulator, Stream};
 
 const COLUMNS: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 const LEVELS: [f64; 3] = [0.01, 0.1, 0.2];
-const START_S: f64 = 30.72;
-const CHANGE_S: f64 = 40.96;
 const FOUND_WITHIN_S: f64 = 5.0;
 /// nk of the start fit, and the delays that are tracked, s.
 const NK: usize = 29;
@@ -26,7 +26,7 @@ type Case = (&'static str, [Condition; 2], [f64; 2]);
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let runs: u64 = arguments.next().and_then(|n| n.parse().ok()).unwrap_or(20);
+    let runs: usize = arguments.next().and_then(|n| n.parse().ok()).unwrap_or(20);
     let tune = arguments.next().is_some_and(|word| word == "tune");
     let cases: Vec<Case> = if tune {
         vec![
@@ -64,9 +64,9 @@ fn main() {
         for condition in conditions {
             for &order in orders {
                 for (l, level) in LEVELS.into_iter().enumerate() {
-                    let simulator = Simulator::new(&scenario(condition, order, level, delays)).unwrap();
+                    let simulator = Simulator::new(&with_delay(condition, order, level, delays)).unwrap();
                     let changes = simulator.scenario().scenario().schedule != Schedule::Constant;
-                    let each = on_both_cores(runs, |replication| {
+                    let each = on_all_cores(runs, |replication| {
                         let stream = Stream {
                             seed: if tune { 9000 } else { 7000 },
                             cell: condition as u64 * 16 + order as u64 * 4 + l as u64,
@@ -112,9 +112,7 @@ fn main() {
 }
 
 fn of_all(found: &[Found], of: &dyn Fn(&Found) -> f64) -> f64 {
-    let mut values: Vec<f64> = found.iter().map(of).filter(|v| !v.is_nan()).collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    median(found.iter().map(of))
 }
 
 fn options(method: Method, track_delay_s: Option<(f64, f64)>) -> TrackOptions {
@@ -125,14 +123,8 @@ fn options(method: Method, track_delay_s: Option<(f64, f64)>) -> TrackOptions {
     }
 }
 
-fn scenario(condition: Condition, order: usize, level: f64, [before, after]: [f64; 2]) -> Scenario {
-    let mut scenario = Scenario::condition(condition);
-    scenario.remnant.order = order;
-    scenario.remnant.strength = RemnantStrength::Level {
-        level,
-        definition: NoiseDefinition::Response,
-    };
-    scenario.realisation = Realisation::Output;
+fn with_delay(condition: Condition, order: usize, level: f64, [before, after]: [f64; 2]) -> Scenario {
+    let mut scenario = scenario(condition, order, level);
     scenario.initial.operator.tau_e_s = before;
     scenario.last.operator.tau_e_s = after;
     if before != after && scenario.schedule == Schedule::Constant {
@@ -193,25 +185,4 @@ fn follow(record: &Record, options: &TrackOptions, changes: bool) -> Found {
         false_alarms: trace.changes().iter().filter(|(t, _)| !soon(*t)).count() as f64,
         hours: (51.2 - if changes { FOUND_WITHIN_S } else { 0.0 }) / 3600.0,
     }
-}
-
-/// Results of the runs in their order, on all cores.
-fn on_both_cores<T: Send>(runs: u64, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
-    let cores = std::thread::available_parallelism().map_or(1, |c| c.get() as u64);
-    let mut results: Vec<(u64, T)> = std::thread::scope(|scope| {
-        let one = &one;
-        let threads: Vec<_> = (0..cores)
-            .map(|c| {
-                scope.spawn(move || {
-                    (c..runs)
-                        .step_by(cores as usize)
-                        .map(|r| (r, one(r)))
-                        .collect::<Vec<_>>()
-                })
-            })
-            .collect();
-        threads.into_iter().flat_map(|t| t.join().unwrap()).collect()
-    });
-    results.sort_by_key(|(r, _)| *r);
-    results.into_iter().map(|(_, t)| t).collect()
 }

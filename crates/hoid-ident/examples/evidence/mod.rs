@@ -1,0 +1,48 @@
+//! Scenarios and runs that the examples with the numbers of the book share.
+
+use hoid_model::{
+    remnant_gain::NoiseDefinition,
+    scenario::{Condition, Realisation, RemnantStrength, Scenario},
+};
+
+/// End of the start fit, and the change, s.
+pub const START_S: f64 = 30.72;
+pub const CHANGE_S: f64 = 40.96;
+
+/// A condition with K_c in the output matrix, as in the reference text.
+pub fn scenario(condition: Condition, remnant_order: usize, level: f64) -> Scenario {
+    let mut scenario = Scenario::condition(condition);
+    scenario.remnant.order = remnant_order;
+    scenario.remnant.strength = RemnantStrength::Level {
+        level,
+        definition: NoiseDefinition::Response,
+    };
+    scenario.realisation = Realisation::Output;
+    scenario
+}
+
+/// Results of the runs in their order, on all cores.
+pub fn on_all_cores<T: Send>(runs: usize, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut results: Vec<(u64, T)> = std::thread::scope(|scope| {
+        let one = &one;
+        let threads: Vec<_> = (0..cores)
+            .map(|c| {
+                scope.spawn(move || {
+                    let mine = (c..runs).step_by(cores);
+                    mine.map(|r| (r as u64, one(r as u64))).collect::<Vec<_>>()
+                })
+            })
+            .collect();
+        threads.into_iter().flat_map(|t| t.join().unwrap()).collect()
+    });
+    results.sort_by_key(|(r, _)| *r);
+    results.into_iter().map(|(_, t)| t).collect()
+}
+
+/// Median of what is a number.
+pub fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.filter(|v| !v.is_nan()).collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
