@@ -359,12 +359,10 @@ impl Fit {
     }
 }
 
-fn output_less(record: &Record, errors: Series) -> Series {
+fn output_less(record: &Record, mut errors: Series) -> Series {
     let output = &record.output()[errors.first..];
-    Series {
-        first: errors.first,
-        values: output.iter().zip(&errors.values).map(|(u, e)| u - e).collect(),
-    }
+    errors.values.iter_mut().zip(output).for_each(|(e, u)| *e = u - *e);
+    errors
 }
 
 /// Orders and theta of the output-error model `u = B/(A F) q^-nk e + eps` with the same system: its residual is the

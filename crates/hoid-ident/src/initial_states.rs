@@ -159,6 +159,20 @@ impl FreeResponses {
         z
     }
 
+    /// True when all responses have fallen below `share` of their size at the end of so many rows.
+    pub fn have_died(&self, rows: usize, share: f64) -> bool {
+        /// Samples over which an oscillation shows its size.
+        const SWING: usize = 128;
+        let dead = |response: &[f64]| {
+            response.len() < rows
+                || response[response.len().saturating_sub(SWING)..]
+                    .iter()
+                    .all(|x| x.abs() < share)
+        };
+        // A basis vector has the size one, an impulse response begins with one.
+        self.h.len() < rows && self.basis().all(dead)
+    }
+
     /// The orthonormal basis in the rows of the residuals; a vector starts at the first residual, and what follows its end is
     /// zero.
     pub fn basis(&self) -> impl Iterator<Item = &[f64]> {

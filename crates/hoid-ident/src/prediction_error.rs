@@ -30,6 +30,8 @@
 //! residuals z. Where there is no input, A plays the part of D and the residuals start with the record.
 //!
 //! **Weights** multiply the squared residuals; they serve the robust loss.
+//!
+//! **A long record** passes span by span behind its first part ([`long`]), so that a fit needs no memory beside the record.
 
 use std::{
     borrow::Cow,
@@ -193,6 +195,7 @@ struct Column<'w> {
 }
 
 /// What a pass over a record found besides its signals.
+#[derive(Default)]
 struct Passed {
     free: FreeResponses,
     noise: Option<StationaryPast>,
@@ -243,13 +246,7 @@ impl Criterion<'_> {
             gram: vec![0.0; linear * linear],
         };
         for index in 0..self.data.len() {
-            let passed = self.residual_pass(&theta, index, workspace);
-            let data = &self.data[index];
-            let parts = Parts::split(&self.orders, &theta);
-            self.filter_output(&parts, *data, workspace);
-            self.whiten_input(&parts, workspace);
-            let columns = self.columns(&parts, data.u.len(), workspace, &[Block::A, Block::B]);
-            self.accumulate(&passed, &columns, index, workspace, &mut total);
+            self.add_record(&theta, &[Block::A, Block::B], index, workspace, &mut total);
         }
         let best = solve_symmetric(&total.gram, &total.descent)?;
         let gained = dot(&best, &total.descent);
@@ -266,17 +263,8 @@ impl Criterion<'_> {
             descent: vec![0.0; count],
             gram: vec![0.0; count * count],
         };
-        let parts = Parts::split(&self.orders, theta);
-        for (index, data) in self.data.iter().enumerate() {
-            let passed = self.residual_pass(theta, index, workspace);
-            match block {
-                Block::B => self.whiten_input(&parts, workspace),
-                // Without C its signal is v itself.
-                Block::D if self.orders.nc == 0 => {}
-                _ => self.gradient_pass(theta, *data, workspace),
-            }
-            let columns = self.columns(&parts, data.u.len(), workspace, &[block]);
-            self.accumulate(&passed, &columns, index, workspace, &mut part);
+        for index in 0..self.data.len() {
+            self.add_record(theta, &[block], index, workspace, &mut part);
         }
         let mut whole = Linearisation {
             sum_of_squares: part.sum_of_squares,
@@ -292,15 +280,18 @@ impl Criterion<'_> {
 
     /// Residuals of one record, from [`Criterion::first`] on.
     pub fn residuals_of(&self, theta: &[f64], record: usize, workspace: &mut Workspace) -> Vec<f64> {
-        self.residual_pass(theta, record, workspace);
+        if let Some(residuals) = self.residuals_of_long_record(theta, record, long::HEAD, workspace) {
+            return residuals;
+        }
+        self.residual_pass(theta, record, self.data[record], workspace);
         workspace.eps[workspace.pad + self.first..].to_vec()
     }
 
     /// Columns of psi in one record, from the first residual on, with the initial states projected out.
     pub fn jacobian(&self, theta: &[f64], record: usize, workspace: &mut Workspace) -> Vec<Vec<f64>> {
-        let passed = self.residual_pass(theta, record, workspace);
         let data = self.data[record];
-        self.gradient_pass(theta, data, workspace);
+        let passed = self.residual_pass(theta, record, data, workspace);
+        self.gradient_pass(theta, &Block::ALL, data, workspace);
         let parts = Parts::split(&self.orders, theta);
         let project = |column: Column<'_>| {
             let mut column: Vec<f64> = column.values.iter().map(|x| column.sign * x).collect();
@@ -310,10 +301,32 @@ impl Criterion<'_> {
             }
             column
         };
-        self.columns(&parts, data.u.len(), workspace, &Block::ALL)
+        let counted = workspace.pad + self.first..workspace.pad + data.u.len();
+        self.columns(&parts, counted, workspace, &Block::ALL)
             .into_iter()
             .map(project)
             .collect()
+    }
+
+    /// Adds one record to the normal equations of the coefficients of these polynomials.
+    fn add_record(
+        &self,
+        theta: &[f64],
+        blocks: &[Block],
+        record: usize,
+        ws: &mut Workspace,
+        total: &mut Linearisation,
+    ) -> Passed {
+        if let Some(passed) = self.add_long_record(theta, blocks, record, long::HEAD, ws, total) {
+            return passed;
+        }
+        let data = self.data[record];
+        let passed = self.residual_pass(theta, record, data, ws);
+        self.gradient_pass(theta, blocks, data, ws);
+        let counted = ws.pad + self.first..ws.pad + data.u.len();
+        let columns = self.columns(&Parts::split(&self.orders, theta), counted, ws, blocks);
+        self.accumulate(&passed, &columns, record, ws, total);
+        passed
     }
 
     /// First sample at which w and v are computed.
@@ -334,9 +347,9 @@ impl Criterion<'_> {
         }
     }
 
-    fn residual_pass(&self, theta: &[f64], record: usize, ws: &mut Workspace) -> Passed {
+    /// w, v and eps of a record, or of its first part, with the best initial states in them.
+    fn residual_pass(&self, theta: &[f64], record: usize, data: Data<'_>, ws: &mut Workspace) -> Passed {
         let parts = Parts::split(&self.orders, theta);
-        let data = self.data[record];
         let n = data.u.len();
         let o = &self.orders;
         ws.make_room(o, n);
@@ -384,11 +397,7 @@ impl Criterion<'_> {
         if let Some(weights) = weights {
             eps.iter_mut().zip(weights).for_each(|(x, w)| *x *= w);
         }
-        let mut passed = Passed {
-            free: FreeResponses::default(),
-            noise: None,
-            z: Vec::new(),
-        };
+        let mut passed = Passed::default();
         if self.initial != InitialState::Zero {
             if self.initial == InitialState::Backcast {
                 passed.noise = StationaryPast::of(parts.c, self.noise_poles(&parts));
@@ -413,23 +422,27 @@ impl Criterion<'_> {
     }
 
     /// The signals whose shifts are the columns of psi.
-    fn gradient_pass(&self, theta: &[f64], data: Data<'_>, ws: &mut Workspace) {
+    fn gradient_pass(&self, theta: &[f64], blocks: &[Block], data: Data<'_>, ws: &mut Workspace) {
         let parts = Parts::split(&self.orders, theta);
         let (o, pad) = (&self.orders, ws.pad);
         let regressed = self.first_regressed();
-        self.filter_output(&parts, data, ws);
-        self.whiten_input(&parts, ws);
+        if blocks.contains(&Block::A) {
+            self.filter_output(&parts, data, ws);
+        }
+        if blocks.contains(&Block::B) {
+            self.whiten_input(&parts, ws);
+        }
         let [_, _, xc, xd, xf] = &mut ws.filtered;
-        if o.nc > 0 {
+        if o.nc > 0 && blocks.contains(&Block::C) {
             xc[..pad].fill(0.0);
             divide(parts.c, &ws.eps[pad..], &mut xc[pad..]);
         }
         // Without C the signal of D is v itself.
-        if o.nd > 0 && o.nc > 0 {
+        if o.nd > 0 && o.nc > 0 && blocks.contains(&Block::D) {
             xd[..pad].fill(0.0);
             divide(parts.c, &ws.v[pad..], &mut xd[pad..]);
         }
-        if o.nf > 0 {
+        if o.nf > 0 && blocks.contains(&Block::F) {
             let from = pad + regressed;
             if passes_once(o) {
                 // w is zero before.
@@ -486,9 +499,15 @@ impl Criterion<'_> {
         }
     }
 
-    /// Columns of psi, in the order of theta, from the first residual on.
-    fn columns<'w>(&self, parts: &Parts<'_>, n: usize, ws: &'w Workspace, blocks: &[Block]) -> Vec<Column<'w>> {
-        let (first, end) = (ws.pad + self.first, ws.pad + n);
+    /// Columns of psi, in the order of theta, over these places of the workspace.
+    fn columns<'w>(
+        &self,
+        parts: &Parts<'_>,
+        counted: Range<usize>,
+        ws: &'w Workspace,
+        blocks: &[Block],
+    ) -> Vec<Column<'w>> {
+        let (first, end) = (counted.start, counted.end);
         let mut columns = Vec::with_capacity(self.orders.parameters());
         for &block in blocks {
             let (from, count, sign) = block.shifts(&self.orders);
@@ -610,11 +629,8 @@ impl Objective for Criterion<'_> {
             descent: vec![0.0; p],
             gram: vec![0.0; p * p],
         };
-        for (index, data) in self.data.iter().enumerate() {
-            let passed = self.residual_pass(theta, index, workspace);
-            self.gradient_pass(theta, *data, workspace);
-            let columns = self.columns(&Parts::split(&self.orders, theta), data.u.len(), workspace, &Block::ALL);
-            self.accumulate(&passed, &columns, index, workspace, &mut total);
+        for index in 0..self.data.len() {
+            let passed = self.add_record(theta, &Block::ALL, index, workspace, &mut total);
             self.add_penalty(&passed, &mut total);
         }
         total
@@ -673,7 +689,7 @@ impl Workspace {
     /// Makes room for a record, for the signals that these orders have; every pass writes all of a signal before it reads it, zeros in
     /// front included.
     fn make_room(&mut self, o: &Orders, n: usize) {
-        let pad = o.na.max(o.nb).max(o.nc).max(o.nd).max(o.nf);
+        let pad = o.na.max(o.nb).max(o.nd).max(o.nc + o.nf);
         self.pad = pad;
         let [a, b, c, d, f] = &mut self.filtered;
         for (signal, needed) in [
@@ -750,5 +766,6 @@ fn add_lags(d: &[f64], first_lag: usize, x: &[f64], y: &mut [f64], from: usize) 
     }
 }
 
+mod long;
 #[cfg(test)]
 mod tests;

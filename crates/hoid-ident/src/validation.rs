@@ -13,7 +13,7 @@
 use hoid_model::{Record, polynomial::product, polynomial_model::monic};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::{Fit, IdentError, Series, least_squares::dot};
+use crate::{Fit, IdentError, Series, least_squares::dot, products::variance};
 
 /// Largest lag of the residual tests, in samples.
 pub const LARGEST_LAG: usize = 50;
@@ -113,12 +113,9 @@ impl Fit {
     /// # Errors
     /// As [`Fit::residuals`].
     pub fn validate(&self, record: &Record) -> Result<Validation, IdentError> {
-        let (simulated, predicted) = (self.simulate(record)?, self.predict(record)?);
-        let first = simulated.first.max(predicted.first);
-        let simulated = simulated.values[first - simulated.first..].to_vec();
-        let predicted = predicted.values[first - predicted.first..].to_vec();
+        let (first, simulated, predicted) = self.model_outputs(record)?;
         let output = &record.output()[first..];
-        let residuals: Vec<f64> = output.iter().zip(&predicted).map(|(u, p)| u - p).collect();
+        let residuals = centred(output.iter().zip(&predicted).map(|(u, p)| u - p).collect());
         let autocorrelation = autocorrelation(&residuals, LARGEST_LAG);
         let o = self.orders();
         let of_noise = |name: &str| name.starts_with(['a', 'c', 'd']);
@@ -132,15 +129,10 @@ impl Fit {
         let free = if self.is_grey_box() { free.min(1) } else { free };
         Ok(Validation {
             ljung_box: ljung_box(&autocorrelation, residuals.len(), free),
-            quality: Quality {
-                vaf_simulation: vaf(output, &simulated),
-                vaf_prediction: vaf(output, &predicted),
-                nrmse_simulation: nrmse_fit(output, &simulated),
-                nrmse_prediction: nrmse_fit(output, &predicted),
-            },
+            quality: Squares::default().and(output, &simulated, &predicted).quality(),
             autocorrelation,
             cross_correlation: match record.input_channel() {
-                Some(input) => cross_correlation(&residuals, &input.values[first..], LARGEST_LAG),
+                Some(input) => cross_correlation(&residuals, &centred(input.values[first..].to_vec()), LARGEST_LAG),
                 None => Correlation {
                     lags: Vec::new(),
                     values: Vec::new(),
@@ -152,9 +144,18 @@ impl Fit {
             predicted,
         })
     }
-}
 
-impl Fit {
+    /// The first sample that both cover, and from there on the simulated output and the prediction one step ahead.
+    fn model_outputs(&self, record: &Record) -> Result<(usize, Vec<f64>, Vec<f64>), IdentError> {
+        let (simulated, predicted) = (self.simulate(record)?, self.predict(record)?);
+        let first = simulated.first.max(predicted.first);
+        let from_there = |mut series: Series| {
+            series.values.drain(..first - series.first);
+            series.values
+        };
+        Ok((first, from_there(simulated), from_there(predicted)))
+    }
+
     /// Prediction of the output k samples ahead, the input being known: `u - sum_{j<k} h_j eps(t-j)` with h the impulse response
     /// of the noise filter C/(A D) (L. Ljung, *System Identification*, 1999, eq. 3.31). k = 1 is [`Fit::predict`]; for large k,
     /// and a stable noise filter, it goes over into [`Fit::simulate`].
@@ -193,22 +194,52 @@ impl Fit {
     /// # Errors
     /// As [`Fit::residuals`].
     pub fn quality(&self, records: &[Record]) -> Result<Quality, IdentError> {
-        let (mut power, mut spread, mut of_simulation, mut of_prediction) = (0.0, 0.0, 0.0, 0.0);
-        for record in records {
-            let v = self.validate(record)?;
-            let output = &record.output()[v.first..];
-            let moved = centred(output);
-            power += dot(output, output);
-            spread += dot(&moved, &moved);
-            of_simulation += squared_distance(output, &v.simulated);
-            of_prediction += squared_distance(output, &v.predicted);
-        }
-        Ok(Quality {
-            vaf_simulation: vaf_of(of_simulation, power),
-            vaf_prediction: vaf_of(of_prediction, power),
-            nrmse_simulation: nrmse_of(of_simulation, spread),
-            nrmse_prediction: nrmse_of(of_prediction, spread),
+        let all = records.iter().try_fold(Squares::default(), |all, record| {
+            let (first, simulated, predicted) = self.model_outputs(record)?;
+            Ok::<_, IdentError>(all.and(&record.output()[first..], &simulated, &predicted))
+        });
+        all.map(|all| all.quality())
+    }
+}
+
+impl Quality {
+    /// That of several records together, as [`Fit::quality`], where their validations are at hand.
+    pub fn together(records: &[Record], validations: &[Validation]) -> Self {
+        let all = records.iter().zip(validations);
+        all.fold(Squares::default(), |all, (record, v)| {
+            all.and(&record.output()[v.first..], &v.simulated, &v.predicted)
         })
+        .quality()
+    }
+}
+
+/// Sums of squares over records.
+#[derive(Default)]
+struct Squares {
+    power: f64,
+    spread: f64,
+    of_simulation: f64,
+    of_prediction: f64,
+}
+
+impl Squares {
+    /// With one more record.
+    fn and(self, measured: &[f64], simulated: &[f64], predicted: &[f64]) -> Self {
+        Self {
+            power: self.power + dot(measured, measured),
+            spread: self.spread + spread_of(measured),
+            of_simulation: self.of_simulation + squared_distance(measured, simulated),
+            of_prediction: self.of_prediction + squared_distance(measured, predicted),
+        }
+    }
+
+    fn quality(&self) -> Quality {
+        Quality {
+            vaf_simulation: vaf_of(self.of_simulation, self.power),
+            vaf_prediction: vaf_of(self.of_prediction, self.power),
+            nrmse_simulation: nrmse_of(self.of_simulation, self.spread),
+            nrmse_prediction: nrmse_of(self.of_prediction, self.spread),
+        }
     }
 }
 
@@ -219,8 +250,16 @@ pub fn vaf(measured: &[f64], model: &[f64]) -> f64 {
 
 /// NRMSE fit, %. Zero where the measured signal is constant.
 pub fn nrmse_fit(measured: &[f64], model: &[f64]) -> f64 {
-    let moved = centred(measured);
-    nrmse_of(squared_distance(measured, model), dot(&moved, &moved))
+    nrmse_of(squared_distance(measured, model), spread_of(measured))
+}
+
+/// Sum of the squared distances from the mean; zero for a constant.
+fn spread_of(x: &[f64]) -> f64 {
+    if x.is_empty() {
+        0.0
+    } else {
+        variance(&[x]) * x.len() as f64
+    }
 }
 
 fn vaf_of(squared_error: f64, power: f64) -> f64 {
@@ -263,9 +302,10 @@ fn covariances_at(x: &[f64], y: &[f64], lags: &[i64]) -> Vec<f64> {
     sums
 }
 
-fn centred(x: &[f64]) -> Vec<f64> {
+fn centred(mut x: Vec<f64>) -> Vec<f64> {
     let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
-    x.iter().map(|v| v - mean).collect()
+    x.iter_mut().for_each(|v| *v -= mean);
+    x
 }
 
 /// Covariances over a size; zeros where that is zero.
@@ -276,12 +316,12 @@ fn relative_to(size: f64, mut covariances: Vec<f64>) -> Vec<f64> {
     covariances
 }
 
-fn autocorrelation(residuals: &[f64], largest: usize) -> Correlation {
-    let x = centred(residuals);
-    let power = covariances_at(&x, &x, &[0])[0];
+/// Of a signal with mean zero.
+fn autocorrelation(x: &[f64], largest: usize) -> Correlation {
+    let power = covariances_at(x, x, &[0])[0];
     let lags: Vec<i64> = (1..=largest.min(x.len().saturating_sub(1)) as i64).collect();
     Correlation {
-        values: relative_to(power, covariances_at(&x, &x, &lags)),
+        values: relative_to(power, covariances_at(x, x, &lags)),
         lags,
         bound_99: Z_99 / (x.len() as f64).sqrt(),
     }
@@ -289,7 +329,8 @@ fn autocorrelation(residuals: &[f64], largest: usize) -> Correlation {
 
 /// Test of Ljung and Box on residuals whose noise model has `free` coefficients; `None` when there are fewer lags than those.
 pub fn whiteness(residuals: &[f64], free: usize) -> Option<LjungBox> {
-    ljung_box(&autocorrelation(residuals, LARGEST_LAG), residuals.len(), free)
+    let residuals = centred(residuals.to_vec());
+    ljung_box(&autocorrelation(&residuals, LARGEST_LAG), residuals.len(), free)
 }
 
 fn ljung_box(correlation: &Correlation, n: usize, free: usize) -> Option<LjungBox> {
@@ -306,16 +347,16 @@ fn ljung_box(correlation: &Correlation, n: usize, free: usize) -> Option<LjungBo
     })
 }
 
-fn cross_correlation(residuals: &[f64], input: &[f64], largest: usize) -> Correlation {
-    let (x, y) = (centred(residuals), centred(input));
+/// Of residuals and an input, both with mean zero.
+fn cross_correlation(x: &[f64], y: &[f64], largest: usize) -> Correlation {
     let largest = largest.min(x.len().saturating_sub(1)) as i64;
     let lags: Vec<i64> = (-largest..=largest).collect();
     // The residuals are nearly white, so that few lags carry the sum, which has each of them on both sides of zero.
     let reach: Vec<i64> = (0..=(4 * largest).min(x.len() as i64 - 1)).collect();
-    let (of_x, of_y) = (covariances_at(&x, &x, &reach), covariances_at(&y, &y, &reach));
+    let (of_x, of_y) = (covariances_at(x, x, &reach), covariances_at(y, y, &reach));
     let zero = of_x.first().zip(of_y.first()).map_or(0.0, |(x, y)| x * y);
     let size = zero.sqrt();
-    let values = relative_to(size, covariances_at(&x, &y, &lags));
+    let values = relative_to(size, covariances_at(x, y, &lags));
     let sum: f64 = zero + 2.0 * of_x.iter().zip(&of_y).skip(1).map(|(x, y)| x * y).sum::<f64>();
     let variance = if size > 0.0 {
         (sum / (size * size)).max(0.0) / x.len() as f64
@@ -386,6 +427,7 @@ mod tests {
             (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
         let x: Vec<f64> = (0..20_000).map(|_| draw()).collect();
+        let x = centred(x);
         let own = autocorrelation(&x, 50);
         let outside = own.values.iter().filter(|v| v.abs() > own.bound_99).count();
         // 50 values at 1 %: more than four outside has probability 1e-4.

@@ -125,8 +125,8 @@ struct Grid {
     rows: Range<usize>,
     start_s: f64,
     sample_time: SampleTime,
-    /// The uneven t of the rows, and the number of samples to make out of them.
-    resampled: Option<(Vec<f64>, usize)>,
+    /// The number of samples to make out of rows whose t is uneven.
+    resampled: Option<usize>,
     /// The t of the rows where it is known to increase.
     t: Option<Vec<f64>>,
 }
@@ -269,7 +269,7 @@ impl Reader<'_> {
             rows,
             start_s,
             sample_time,
-            resampled: Some((t.clone(), samples as usize)),
+            resampled: Some(samples as usize),
             t: Some(t),
         })
     }
@@ -362,15 +362,18 @@ impl Reader<'_> {
 
     /// The values of a column in use: all finite, the missing ones bridged where that was asked for.
     fn values(&mut self, column: usize, rows: Range<usize>, t: Option<&[f64]>) -> Result<Vec<f64>, IoError> {
-        let source = &self.table.columns[column];
-        let mut values = source.values[rows.clone()].to_vec();
+        let source = &mut self.table.columns[column];
         let may_fill = self.options.repair.fill;
         let bridgeable =
-            |k: usize| may_fill && values[k].is_nan() && source.texts.binary_search(&(rows.start + k)).is_err();
-        let bad = |k: &usize| !values[*k].is_finite() && !bridgeable(*k);
-        if let Some(k) = (0..values.len()).find(bad) {
-            return Err(self.table.bad_value(column, rows.start + k, rows));
+            |row: &usize| may_fill && source.values[*row].is_nan() && source.texts.binary_search(row).is_err();
+        let bad = |row: &usize| !source.values[*row].is_finite() && !bridgeable(row);
+        if let Some(row) = rows.clone().find(bad) {
+            return Err(self.table.bad_value(column, row, rows));
         }
+        // Nobody reads a column twice: what a file of hours fills is not copied.
+        let mut values = std::mem::take(&mut source.values);
+        values.truncate(rows.end);
+        values.drain(..rows.start);
         let bridged = repair::fill(&mut values, t).map_err(|open| {
             let (row, end) = match open {
                 OpenEnd::Start => (rows.start, "start"),
@@ -410,11 +413,16 @@ impl Reader<'_> {
                 continue;
             }
             let unit = self.table.columns[column].unit.clone();
-            match self.values(column, grid.rows.clone(), grid.t.as_deref()) {
+            let of_time = grid.t.as_ref().filter(|_| Some(column) == time);
+            let values = match of_time {
+                Some(t) => Ok(t.clone()),
+                None => self.values(column, grid.rows.clone(), grid.t.as_deref()),
+            };
+            match values {
                 Ok(values) => {
-                    let values = match &grid.resampled {
+                    let values = match grid.t.as_ref().zip(grid.resampled) {
                         None => values,
-                        Some((t, n)) => repair::resample(t, &values, grid.start_s, grid.sample_time.s(), *n),
+                        Some((t, n)) => repair::resample(t, &values, grid.start_s, grid.sample_time.s(), n),
                     };
                     columns.push(Some(Channel::new(name, unit, values)));
                 }
@@ -425,16 +433,19 @@ impl Reader<'_> {
                 }
             }
         }
-        let of = |(signal, expression): (Signal, &ColumnExpression)| combine(signal, expression, &columns);
-        let channels = (input.map(of), of(output));
-        for (signal, _) in signals() {
+        // What is made of columns first: then a column that is a signal by itself can move.
+        let mut made: Vec<Channel> = signals()
+            .map(|(signal, expression)| combine(signal, expression, &columns))
+            .collect();
+        for ((signal, _), made) in signals().zip(&mut made) {
             if let Signal::Column(column) = signal {
-                columns[column] = None;
+                *made = columns[column].take().unwrap_or_else(nothing);
             }
         }
-        let record = match channels {
-            (Some(input), output) => Record::new(grid.sample_time, input, output),
-            (None, output) => Record::of_output(grid.sample_time, output),
+        let output = made.pop().unwrap_or_else(nothing);
+        let record = match made.pop() {
+            Some(input) => Record::new(grid.sample_time, input, output),
+            None => Record::of_output(grid.sample_time, output),
         };
         let mut record = record.map_err(|source| self.model(source))?.starting_at(grid.start_s);
         for channel in columns.into_iter().flatten() {
@@ -449,12 +460,18 @@ impl Reader<'_> {
     }
 }
 
-/// The signal that an expression stands for. Its name is the expression; a difference has a unit where both terms share it.
+/// A channel without samples, which no record takes.
+fn nothing() -> Channel {
+    Channel::new("", "", Vec::new())
+}
+
+/// The signal that an expression makes of columns; nothing where it is a column by itself. Its name is the expression; a difference has a unit
+/// where both terms share it.
 fn combine(signal: Signal, expression: &ColumnExpression, columns: &[Option<Channel>]) -> Channel {
-    let empty = Channel::new("", "", Vec::new());
-    let column = |index: usize| columns[index].as_ref().unwrap_or(&empty);
+    let nothing = nothing();
+    let column = |index: usize| columns[index].as_ref().unwrap_or(&nothing);
     match signal {
-        Signal::Column(a) => column(a).clone(),
+        Signal::Column(_) => nothing,
         Signal::Negative(a) => {
             let values = column(a).values.iter().map(|v| -v).collect();
             Channel::new(expression.to_string(), column(a).unit.clone(), values)

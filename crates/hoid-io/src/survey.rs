@@ -8,7 +8,7 @@ use std::path::Path;
 use crate::arrays::{Contents, Holds, TIMES};
 use crate::format::{Format, bytes_of};
 use crate::table::{Precision, Table};
-use crate::trouble::{self, Grid, Signal, Signals};
+use crate::trouble::{self, Grid, Levels, Signal, Signals};
 use crate::{IoError, Trouble, TroubleKind, csv_table, mat, npz, parquet_record, xdf};
 
 /// Characters of a sketch.
@@ -235,7 +235,8 @@ fn values(all: &[f64]) -> Option<ValueSurvey> {
     };
     let deviation = (finite.iter().map(|v| (v - mean).powi(2) / n).sum::<f64>()).sqrt();
     let constant = min == max;
-    let rails = trouble::rails(all);
+    let levels = Levels::of(all);
+    let rails = trouble::rails(all, &levels);
     let at_rail = |upper: bool| {
         let rail = rails.iter().find(|rail| rail.is_upper == upper);
         rail.map_or(0, |rail| rail.rows())
@@ -248,7 +249,7 @@ fn values(all: &[f64]) -> Option<ValueSurvey> {
         mean,
         deviation,
         constant,
-        quantum: trouble::quantum(&finite).map(|(step, _)| step),
+        quantum: levels.quantum().map(|(step, _)| step),
         saturated_low: low,
         saturated_high: high,
         sketch: sketch(all, min, max),

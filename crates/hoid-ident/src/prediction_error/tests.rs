@@ -301,3 +301,101 @@ fn a_later_first_residual_leaves_the_gradient_exact() {
     let slope = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
     assert!((slope + 2.0 * exact.descent[7]).abs() < 1e-6 * slope.abs());
 }
+
+#[test]
+fn long_records_pass_span_by_span_to_the_same_sums() {
+    // Heads of which the rest is whole spans and a part of one.
+    let (e, u) = record(9001);
+    let long = Data { e: &e, u: &u };
+    let head = 4096;
+    for initial in [InitialState::Zero, InitialState::Estimate] {
+        for (orders, theta) in cases() {
+            let c = criterion(orders, vec![long], initial);
+            let one_by_one = [Block::A, Block::B, Block::C, Block::D, Block::F].map(|block| vec![block]);
+            let sets = one_by_one
+                .into_iter()
+                .chain([Block::ALL.to_vec(), vec![Block::A, Block::B]]);
+            for blocks in sets {
+                let p: usize = blocks.iter().map(|block| block.place(&orders).len()).sum();
+                let nothing = Linearisation {
+                    sum_of_squares: 0.0,
+                    descent: vec![0.0; p],
+                    gram: vec![0.0; p * p],
+                };
+                let (mut whole, mut spans) = (nothing.clone(), nothing);
+                let mut ws = Workspace::default();
+                c.add_record(&theta, &blocks, 0, &mut ws, &mut whole);
+                let passed = c.add_long_record(&theta, &blocks, 0, head, &mut ws, &mut spans);
+                assert!(passed.is_some(), "{initial:?} {orders}");
+                assert!((whole.sum_of_squares - spans.sum_of_squares).abs() < 1e-12 * whole.sum_of_squares);
+                let residuals = c.residuals_of_long_record(&theta, 0, head, &mut ws).unwrap();
+                for (a, b) in residuals.iter().zip(c.residuals_of(&theta, 0, &mut ws)) {
+                    assert!((a - b).abs() < 1e-12, "{initial:?} {orders}: {a} and {b}");
+                }
+                // Each product beside the size that it can have.
+                let size = |i: usize| whole.gram[i * p + i].sqrt();
+                for i in 0..p {
+                    let scale = size(i) * whole.sum_of_squares.sqrt();
+                    assert!(
+                        (whole.descent[i] - spans.descent[i]).abs() < 1e-12 * scale,
+                        "{initial:?} {orders} {blocks:?}: {} and {}",
+                        whole.descent[i],
+                        spans.descent[i]
+                    );
+                    for j in 0..p {
+                        let off = whole.gram[i * p + j] - spans.gram[i * p + j];
+                        assert!(off.abs() < 1e-12 * size(i) * size(j), "{initial:?} {orders} {blocks:?}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_does_not_die_away_passes_whole() {
+    let (e, u) = record(9001);
+    let data = vec![Data { e: &e, u: &u }];
+    let orders = Orders {
+        nb: 1,
+        nk: 2,
+        nf: 1,
+        ..Orders::default()
+    };
+    let by_spans = |c: &Criterion<'_>, pole: f64, head: usize| {
+        let mut total = Linearisation {
+            sum_of_squares: 0.0,
+            descent: vec![0.0; 2],
+            gram: vec![0.0; 4],
+        };
+        let (theta, mut ws) = (vec![0.2, -pole], Workspace::default());
+        let passed = c.add_long_record(&theta, &Block::ALL, 0, head, &mut ws, &mut total);
+        assert_eq!(
+            passed.is_some(),
+            total.sum_of_squares > 0.0,
+            "nothing is added where nothing passes"
+        );
+        passed.is_some()
+    };
+    let c = criterion(orders, data.clone(), InitialState::Estimate);
+    assert!(by_spans(&c, 0.99, 4096));
+    assert!(!by_spans(&c, 0.9999, 4096), "a slow pole");
+    assert!(!by_spans(&c, 0.99, 8192), "a record of less than two heads");
+    let late = Orders { nk: 1500, ..orders };
+    assert!(!by_spans(
+        &criterion(late, data.clone(), InitialState::Estimate),
+        0.9,
+        4096
+    ));
+    assert!(!by_spans(
+        &criterion(orders, data.clone(), InitialState::Backcast),
+        0.9,
+        4096
+    ));
+    let weights = vec![vec![1.0; u.len()]];
+    let weighted = Criterion {
+        weights: Some(&weights),
+        ..c
+    };
+    assert!(!by_spans(&weighted, 0.9, 4096));
+}

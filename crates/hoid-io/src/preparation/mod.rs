@@ -80,12 +80,14 @@ struct Bench {
 
 impl Bench {
     fn new(record: Record) -> Self {
+        let (label, start_s, sample_time) = (record.label().to_owned(), record.time_s(0), record.sample_time());
+        let (input, output, others) = record.into_channels();
         Self {
-            label: record.label().to_owned(),
-            start_s: record.time_s(0),
-            sample_time: record.sample_time(),
-            has_input: record.input_channel().is_some(),
-            channels: record.channels().cloned().collect(),
+            label,
+            start_s,
+            sample_time,
+            has_input: input.is_some(),
+            channels: input.into_iter().chain([output]).chain(others).collect(),
             steps: Vec::new(),
         }
     }

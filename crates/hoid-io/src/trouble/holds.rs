@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use super::{Grid, Signal, Signals, Trouble, TroubleKind, at, counted, short, values::is_coarse};
+use super::{Grid, Levels, Signal, Signals, Trouble, TroubleKind, at, counted, short};
 
 /// Rows whose time does not advance: those that repeat the row before, and the others.
 pub(super) fn standing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Trouble>) {
@@ -61,14 +61,14 @@ fn runs(holds: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
     runs
 }
 
-pub(super) fn stalls(signals: &Signals<'_>, grid: Option<&Grid>, found: &mut Vec<Trouble>) {
+pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Grid>, found: &mut Vec<Trouble>) {
     let rows = signals.rows();
-    let moves = |signal: &&Signal<'_>| {
+    let moves = |(signal, _): &(&Signal<'_>, &Levels)| {
         let mut finite = signal.values.iter().filter(|v| v.is_finite());
         let first = finite.next();
         finite.any(|v| Some(v) != first)
     };
-    let moving: Vec<&Signal<'_>> = signals.columns.iter().filter(moves).collect();
+    let moving: Vec<(&Signal<'_>, &Levels)> = signals.columns.iter().zip(levels).filter(moves).collect();
     if moving.is_empty() || rows < 3 {
         return;
     }
@@ -76,21 +76,21 @@ pub(super) fn stalls(signals: &Signals<'_>, grid: Option<&Grid>, found: &mut Vec
     let advances = |row: usize| grid.is_none_or(|grid| grid.standing.binary_search(&row).is_err());
     let holds: Vec<Vec<bool>> = moving
         .iter()
-        .map(|signal| {
+        .map(|(signal, _)| {
             (0..rows)
                 .map(|row| row > 0 && advances(row) && signal.values[row] == signal.values[row - 1])
                 .collect()
         })
         .collect();
     let all: Vec<bool> = (0..rows).map(|row| holds.iter().all(|held| held[row])).collect();
-    let limit = if let [only] = moving.as_slice() {
-        if is_coarse(only.values) {
+    let limit = if let [(_, levels)] = moving.as_slice() {
+        if levels.is_coarse() {
             return;
         }
         0
     } else {
-        let natural = |(signal, held): (&&Signal<'_>, &Vec<bool>)| {
-            if is_coarse(signal.values) {
+        let natural = |((_, levels), held): (&(&Signal<'_>, &Levels), &Vec<bool>)| {
+            if levels.is_coarse() {
                 let mut lengths: Vec<usize> = runs(held.iter().copied()).iter().map(Range::len).collect();
                 lengths.sort_unstable();
                 lengths.get(lengths.len() * 9 / 10).map_or(0, |length| 10 * length)
@@ -100,7 +100,7 @@ pub(super) fn stalls(signals: &Signals<'_>, grid: Option<&Grid>, found: &mut Vec
             }
         };
         // Beside a channel in steps, which holds often, one printed with few digits meets it at a peak by chance.
-        let by_chance = usize::from(moving.iter().any(|signal| is_coarse(signal.values)));
+        let by_chance = usize::from(moving.iter().any(|(_, levels)| levels.is_coarse()));
         moving.iter().zip(&holds).map(natural).min().unwrap_or(0).max(by_chance)
     };
     let stalled: Vec<Range<usize>> = runs(all.into_iter())

@@ -22,7 +22,7 @@ use crate::preparation::decimal;
 use crate::table::{Precision, Table};
 
 pub(crate) use timing::Grid;
-pub(crate) use values::{quantum, rails};
+pub(crate) use values::{Levels, rails};
 
 /// Places of a finding that are written as JSON; all of them are counted.
 const PLACES_WRITTEN: usize = 100;
@@ -250,9 +250,10 @@ pub(crate) fn find(signals: &Signals<'_>) -> Vec<Trouble> {
         holds::standing(signals, grid, &mut found);
         timing::find(signals, grid, &mut found);
     }
-    holds::stalls(signals, grid.as_ref(), &mut found);
-    for signal in &signals.columns {
-        values::find(signals, *signal, &mut found);
+    let levels: Vec<Levels> = signals.columns.iter().map(|signal| Levels::of(signal.values)).collect();
+    holds::stalls(signals, &levels, grid.as_ref(), &mut found);
+    for (signal, levels) in signals.columns.iter().zip(&levels) {
+        values::find(signals, *signal, levels, &mut found);
     }
     found.sort_by(|a, b| (a.kind, &a.channel).cmp(&(b.kind, &b.channel)));
     found

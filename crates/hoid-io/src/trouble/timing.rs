@@ -71,13 +71,15 @@ impl Grid {
             (!spans.is_empty()).then(|| *spans.select_nth_unstable_by(middle, f64::total_cmp).1)
         };
         let mut sample_time_s = f64::NAN;
-        let mut steps = vec![1.0; rows.len()];
         if let Some(single) = median(1) {
             sample_time_s = median(16)
                 .filter(|many| (many / single - 1.0).abs() < 0.03)
                 .unwrap_or(single);
+        }
+        let mut steps = vec![1.0; rows.len()];
+        if sample_time_s.is_finite() {
             for pull in [0.1, 0.02] {
-                steps = follow(&times, sample_time_s, pull);
+                follow(&times, sample_time_s, pull, &mut steps);
                 let slope = slope(&times, &steps);
                 if slope.is_finite() && slope > 0.0 {
                     sample_time_s = slope;
@@ -133,9 +135,9 @@ impl Grid {
     }
 }
 
-/// Steps of the grid from row to row.
-fn follow(times: &[f64], ts: f64, pull: f64) -> Vec<f64> {
-    let mut steps = vec![1.0; times.len()];
+/// Steps of the grid from row to row, one of each time.
+fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
+    steps.fill(1.0);
     let mut owed: Option<usize> = None;
     // Where a grid begins, the first times together say where it lies: one alone is off by its jitter.
     let begin = |i: usize| {
@@ -170,28 +172,26 @@ fn follow(times: &[f64], ts: f64, pull: f64) -> Vec<f64> {
             steps[i] -= 1.0;
         }
     }
-    steps
 }
 
 /// Slope of least squares of the times over the grid.
 fn slope(times: &[f64], steps: &[f64]) -> f64 {
-    let mut index = 0.0;
-    let indices: Vec<f64> = (0..times.len())
-        .map(|i| {
+    // Counted anew for each sum: a record of hours has no room for its indices.
+    let indexed = || {
+        let mut index = 0.0;
+        times.iter().zip(steps).enumerate().map(move |(i, (time, step))| {
             if i > 0 {
-                index += steps[i];
+                index += step;
             }
-            index
+            (index, *time)
         })
-        .collect();
+    };
     let n = times.len() as f64;
     // Scaled by n before they are summed, so that nothing overflows that has a meaning.
-    let (x, y) = (
-        indices.iter().map(|k| k / n).sum::<f64>(),
-        times.iter().map(|t| t / n).sum::<f64>(),
-    );
-    let of = |f: &dyn Fn(usize) -> f64| (0..times.len()).map(f).sum::<f64>();
-    of(&|i| (indices[i] - x) * (times[i] - y)) / of(&|i| (indices[i] - x) * (indices[i] - x))
+    let x = indexed().map(|(index, _)| index / n).sum::<f64>();
+    let y = times.iter().map(|t| t / n).sum::<f64>();
+    let covariance: f64 = indexed().map(|(index, time)| (index - x) * (time - y)).sum();
+    covariance / indexed().map(|(index, _)| (index - x) * (index - x)).sum::<f64>()
 }
 
 /// How far rounding may move a time: one unit of the last printed digit, or of single precision.

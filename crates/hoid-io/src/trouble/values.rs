@@ -35,63 +35,83 @@ impl Rail {
     }
 }
 
-/// Distinct finite values in increasing order; those within rounding of the range are one.
-fn levels(values: &[f64]) -> Vec<f64> {
-    let mut levels: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    levels.sort_unstable_by(f64::total_cmp);
-    levels.dedup();
-    let range = match levels.as_slice() {
-        [first, .., last] => last - first,
-        _ => return levels,
-    };
-    let mut kept = 0.0;
-    let mut first = true;
-    levels.retain(|level| {
-        let keep = first || level - kept > 1e-12 * range;
-        if keep {
-            kept = *level;
+/// Distinct finite values of a channel; those within rounding of the range are one.
+pub(crate) struct Levels {
+    count: usize,
+    /// Rows of the channel, and those with a finite value.
+    rows: usize,
+    finite: usize,
+    /// In increasing order: all of a coarse channel, else those at both ends.
+    kept: Vec<f64>,
+}
+
+impl Levels {
+    /// Levels at each end that a channel in full precision keeps.
+    const END: usize = 4;
+
+    pub(crate) fn of(values: &[f64]) -> Self {
+        let mut levels: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+        let finite = levels.len();
+        levels.sort_unstable_by(f64::total_cmp);
+        levels.dedup();
+        if let [first, .., last] = levels.as_slice() {
+            let range = last - first;
+            let mut kept: Option<f64> = None;
+            levels.retain(|level| {
+                let keep = kept.is_none_or(|kept| level - kept > 1e-12 * range);
+                if keep {
+                    kept = Some(*level);
+                }
+                keep
+            });
         }
-        first = false;
-        keep
-    });
-    levels
-}
-
-/// Whether the values are fewer than half as many as the rows.
-pub(super) fn is_coarse(values: &[f64]) -> bool {
-    2 * levels(values).len() <= values.len()
-}
-
-/// The step of a grid on which all values lie, and the number of levels.
-pub(crate) fn quantum(values: &[f64]) -> Option<(f64, usize)> {
-    let levels = levels(values);
-    if levels.len() < 2 || 2 * levels.len() > values.len() {
-        return None;
+        let (count, rows) = (levels.len(), values.len());
+        if 2 * count > rows && count > 2 * Self::END {
+            levels.drain(Self::END..count - Self::END);
+            levels.shrink_to_fit();
+        }
+        Self {
+            count,
+            rows,
+            finite,
+            kept: levels,
+        }
     }
-    let inner = if levels.len() > 4 {
-        &levels[1..levels.len() - 1]
-    } else {
-        &levels[..]
-    };
-    let step = inner
-        .windows(2)
-        .map(|pair| pair[1] - pair[0])
-        .fold(f64::INFINITY, f64::min);
-    let off = |level: &f64| {
-        let steps = (level - inner[0]) / step;
-        (steps - steps.round()).abs()
-    };
-    (step > 0.0 && step.is_finite() && inner.iter().all(|level| off(level) < 1e-3)).then_some((step, levels.len()))
+
+    /// Whether they are fewer than half as many as the rows.
+    pub(super) fn is_coarse(&self) -> bool {
+        2 * self.count <= self.rows
+    }
+
+    /// The step of a grid on which all values lie, and the number of levels.
+    pub(crate) fn quantum(&self) -> Option<(f64, usize)> {
+        if self.count < 2 || 2 * self.count > self.finite {
+            return None;
+        }
+        let inner = if self.count > 4 {
+            &self.kept[1..self.count - 1]
+        } else {
+            &self.kept[..]
+        };
+        let step = inner
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .fold(f64::INFINITY, f64::min);
+        let off = |level: &f64| {
+            let steps = (level - inner[0]) / step;
+            (steps - steps.round()).abs()
+        };
+        (step > 0.0 && step.is_finite() && inner.iter().all(|level| off(level) < 1e-3)).then_some((step, self.count))
+    }
 }
 
 /// The rails of a channel, lower and upper.
-pub(crate) fn rails(values: &[f64]) -> Vec<Rail> {
-    let levels = levels(values);
-    if levels.len() < 4 {
+pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<Rail> {
+    if levels.count < 4 {
         // A switch or a constant stays at its ends by its nature.
         return Vec::new();
     }
-    let coarse = 2 * levels.len() <= values.len();
+    let (coarse, levels) = (levels.is_coarse(), &levels.kept);
     let count = |level: f64| values.iter().filter(|v| **v == level).count();
     let rail = |is_upper: bool| {
         let (extreme, next) = if is_upper {
@@ -131,7 +151,7 @@ pub(crate) fn rails(values: &[f64]) -> Vec<Rail> {
     [rail(false), rail(true)].into_iter().flatten().collect()
 }
 
-pub(super) fn find(signals: &Signals<'_>, signal: Signal<'_>, found: &mut Vec<Trouble>) {
+pub(super) fn find(signals: &Signals<'_>, signal: Signal<'_>, levels: &Levels, found: &mut Vec<Trouble>) {
     let values = signal.values;
     let n = values.len();
     let name = signal.name;
@@ -148,16 +168,16 @@ pub(super) fn find(signals: &Signals<'_>, signal: Signal<'_>, found: &mut Vec<Tr
         });
     };
     missing(signals, signal, &mut tell);
-    let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    let Some(first) = finite.first() else { return };
-    if finite.iter().all(|v| v == first) {
+    let finite = || values.iter().filter(|v| v.is_finite());
+    let Some(first) = finite().next() else { return };
+    if finite().all(|v| v == first) {
         if n > 1 {
             let text = format!("{name} is constant: {}", short(*first));
             tell(TroubleKind::Constant, n, 0.0, "", vec![signals.place(&(0..n))], text);
         }
         return;
     }
-    for rail in rails(values) {
+    for rail in rails(values, levels) {
         let places: Vec<super::Place> = rail.stays.iter().map(|stay| signals.place(stay)).collect();
         let seconds = |place: &super::Place| place.to_s.zip(place.from_s).map_or(0.0, |(to, from)| to - from);
         let longest = places.iter().map(seconds).fold(0.0, f64::max);
@@ -172,13 +192,10 @@ pub(super) fn find(signals: &Signals<'_>, signal: Signal<'_>, found: &mut Vec<Tr
         );
         tell(TroubleKind::Saturated, rail.rows(), longest, "s", places, text);
     }
-    let mean = finite.iter().map(|v| v / finite.len() as f64).sum::<f64>();
-    let deviation = finite
-        .iter()
-        .map(|v| (v - mean).powi(2) / finite.len() as f64)
-        .sum::<f64>()
-        .sqrt();
-    if let Some((step, count)) = quantum(&finite).filter(|(step, _)| *step >= COARSE * deviation) {
+    let count = levels.finite as f64;
+    let mean = finite().map(|v| v / count).sum::<f64>();
+    let deviation = finite().map(|v| (v - mean).powi(2) / count).sum::<f64>().sqrt();
+    if let Some((step, count)) = levels.quantum().filter(|(step, _)| *step >= COARSE * deviation) {
         let text = format!(
             "{name} is quantised: {count} levels in steps of {} ({} % of its deviation)",
             short(step),
