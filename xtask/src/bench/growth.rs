@@ -172,18 +172,24 @@ fn identify(tasks: &Path, hoid: &Path, work: &Path, n: usize) -> Result<String, 
         "\n`hoid identify` on a Parquet file of {n} samples (e and u: {}):\n\n| fit | time | peak memory | times e and u |\n|---|---:|---:|---:|\n",
         bytes(data)
     );
-    for (structure, orders) in [("arx", "na=2,nb=2"), ("bj", "nb=2,nd=1,nf=2")] {
-        eprintln!("identify {structure}");
+    for (name, structure, options) in [
+        ("ARX", "arx", &["--orders", "na=2,nb=2", "--nk", "29"][..]),
+        ("Box-Jenkins", "bj", &["--orders", "nb=2,nd=1,nf=2", "--nk", "29"]),
+        // Candidates are fitted on all cores at once.
+        ("Box-Jenkins, orders and delay chosen", "bj", &[]),
+    ] {
+        eprintln!("identify: {name}");
         let mut command = Command::new(hoid);
         command
             .arg("identify")
             .arg(&file)
-            .args(["--structure", structure, "--orders", orders, "--nk", "29"]);
+            .args(["--structure", structure])
+            .args(options);
         let (seconds, memory) = watched(&mut command)?;
         let (peak, factor) = memory.map_or(("-".to_owned(), "-".to_owned()), |m| {
             (bytes(m), plain(m as f64 / data as f64))
         });
-        let _ = writeln!(text, "| {structure} | {} | {peak} | {factor} |", time(seconds));
+        let _ = writeln!(text, "| {name} | {} | {peak} | {factor} |", time(seconds));
     }
     let _ = fs::remove_file(&file);
     Ok(text)
