@@ -14,9 +14,9 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::{
     IdentError,
-    least_squares::{LeastSquares, add_scaled, dot},
+    least_squares::{LeastSquares, add_scaled},
     prediction_error::Data,
-    products::{Lagged, gram, products, subtract},
+    products::{Lagged, OfResiduals, gram},
 };
 
 /// Condition of the scaled normal matrix (an upper bound, `p tr(G^-1)`) up to which it is used: refined, the solution keeps all digits but three, the
@@ -25,9 +25,6 @@ const WELL_CONDITIONED: f64 = 1e7;
 
 /// Share of the residuals in the power of the output below which the fit counts as exact here.
 const EXACT: f64 = 1e-12;
-
-/// Samples whose residuals are taken at a time: they stay in the fastest memory.
-const BLOCK: usize = 512;
 
 /// Solution of the regression with what its uncertainty needs.
 #[derive(Debug)]
@@ -122,26 +119,16 @@ fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Opti
     };
     let mut theta = solve(&|i| sign(i) * all[i + 1]);
     // Residuals, their power, and their products with the regressors.
-    let (mut squares, mut products_of_residual) = (0.0, vec![0.0; p]);
-    let mut residual = [0.0; BLOCK];
     let factors: Vec<f64> = (0..p).map(|i| sign(i) * theta[i]).collect();
+    let mut residuals = OfResiduals::new(p);
     for d in data {
-        let columns = columns(orders, d, first);
-        let rows = columns[0].values.len();
-        for from in (0..rows).step_by(BLOCK) {
-            let to = (from + BLOCK).min(rows);
-            let r = &mut residual[..to - from];
-            r.copy_from_slice(&columns[0].values[from..to]);
-            let block: Vec<&[f64]> = columns[1..].iter().map(|c| &c.values[from..to]).collect();
-            subtract(r, &factors, &block);
-            squares += dot(r, r);
-            add_scaled(&mut products_of_residual, 1.0, &products(r, &block));
-        }
+        residuals.add(&columns(orders, d, first), &factors);
     }
-    let correction = solve(&|i| sign(i) * products_of_residual[i]);
+    let mut squares = residuals.squares;
+    let correction = solve(&|i| sign(i) * residuals.products[i]);
     for i in 0..p {
         theta[i] += correction[i];
-        squares -= correction[i] * sign(i) * products_of_residual[i];
+        squares -= correction[i] * sign(i) * residuals.products[i];
     }
     // An exact fit leaves the rounding of the residuals, which QR says better.
     if !squares.is_finite() || squares < EXACT * power {

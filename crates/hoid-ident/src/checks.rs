@@ -6,8 +6,12 @@ use crate::{Estimator, Focus, IdentError, Loss, prediction_error::Criterion};
 
 /// Options that contradict each other, the structure or common sense.
 pub(crate) fn options(estimator: &Estimator) -> Result<(), IdentError> {
-    let names = estimator.orders.parameter_names();
-    for name in estimator.constraints.keys().chain(estimator.priors.keys()) {
+    let mut asked = estimator.constraints.keys().chain(estimator.priors.keys()).peekable();
+    // An ordinary fit asks for none, and its names are not made.
+    let names = asked
+        .peek()
+        .map_or_else(Vec::new, |_| estimator.orders.parameter_names());
+    for name in asked {
         if !names.contains(name) {
             return Err(IdentError::UnknownParameter {
                 name: name.clone(),

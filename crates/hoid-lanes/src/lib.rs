@@ -7,11 +7,14 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`Path`], [`SideBySide`] | the choice of the registers, and what runs in them |
+//! | [`Four`], [`by_fours`] | the partial sums of one record, four in one register or two |
 //! | [`track_many`] | recursive least squares and the prediction-error method over many runs |
 
+mod fours;
 mod path;
 mod track;
 mod wide;
 
+pub use fours::{ByFours, Four, by_fours};
 pub use path::{Path, SideBySide};
 pub use track::{Estimates, LanesError, Run, Task, track_many};

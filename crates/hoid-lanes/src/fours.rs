@@ -1,0 +1,135 @@
+//! Four numbers in one register or two.
+//!
+//! A sum over a record is a recursion too: each term waits for the sum of those before. Four partial sums, each of every fourth term, do not wait
+//! for one another. They are four whatever the registers, since their number is part of the last digits of the sum: with AVX2 they fill one
+//! register, elsewhere two. Products and sums are those of each number by itself, without contraction: the same bits on every path.
+
+use std::ops::{Add, Mul, Sub};
+
+use crate::Path;
+
+/// Four numbers, with the operations of each by itself.
+pub trait Four: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+    /// The same number four times, in registers of this kind.
+    fn like(self, value: f64) -> Self;
+    /// These numbers in registers of this kind.
+    fn load(self, values: &[f64; 4]) -> Self;
+    /// The numbers.
+    fn to_array(self) -> [f64; 4];
+}
+
+/// What is done with four numbers at a time.
+pub trait ByFours {
+    /// Its result.
+    type Output;
+    /// Does it with numbers of the kind of `zero`. To be marked `#[inline(always)]`, as all that it calls at every sample.
+    fn run<F: Four>(self, zero: F) -> Self::Output;
+}
+
+/// The registers that every processor has for which this was compiled.
+impl Four for wide::f64x4 {
+    #[inline(always)]
+    fn like(self, value: f64) -> Self {
+        Self::splat(value)
+    }
+
+    #[inline(always)]
+    fn load(self, values: &[f64; 4]) -> Self {
+        Self::new(*values)
+    }
+
+    #[inline(always)]
+    fn to_array(self) -> [f64; 4] {
+        self.to_array()
+    }
+}
+
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+mod avx2 {
+    use std::ops::{Add, Mul, Sub};
+
+    use pulp::{NullaryFnOnce, Simd, bytemuck, f64x4, x86::V3};
+
+    use super::{ByFours, Four};
+
+    /// Four numbers in a register of AVX2.
+    #[derive(Debug, Clone, Copy)]
+    pub(super) struct Register {
+        simd: V3,
+        numbers: f64x4,
+    }
+
+    macro_rules! operations {
+        ($($name:ident, $method:ident, $of_simd:ident);+) => {$(
+            impl $name for Register {
+                type Output = Self;
+
+                #[inline(always)]
+                fn $method(self, other: Self) -> Self {
+                    let numbers = self.simd.$of_simd(self.numbers, other.numbers);
+                    Self { numbers, ..self }
+                }
+            }
+        )+};
+    }
+    operations!(Add, add, add_f64s; Sub, sub, sub_f64s; Mul, mul, mul_f64s);
+
+    impl Four for Register {
+        #[inline(always)]
+        fn like(self, value: f64) -> Self {
+            let numbers = self.simd.splat_f64s(value);
+            Self { numbers, ..self }
+        }
+
+        #[inline(always)]
+        fn load(self, values: &[f64; 4]) -> Self {
+            let numbers = bytemuck::cast(*values);
+            Self { numbers, ..self }
+        }
+
+        #[inline(always)]
+        fn to_array(self) -> [f64; 4] {
+            bytemuck::cast(self.numbers)
+        }
+    }
+
+    pub(super) struct Do<T>(pub V3, pub T);
+
+    impl<T: ByFours> NullaryFnOnce for Do<T> {
+        type Output = T::Output;
+
+        #[inline(always)]
+        fn call(self) -> T::Output {
+            let Self(simd, task) = self;
+            let numbers = simd.splat_f64s(0.0);
+            task.run(Register { simd, numbers })
+        }
+    }
+}
+
+/// Four numbers at a time, in the best registers that this processor has.
+pub fn by_fours<T: ByFours>(task: T) -> T::Output {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    if let Some(simd) = pulp::x86::V3::try_new() {
+        return simd.vectorize(avx2::Do(simd, task));
+    }
+    task.run(wide::f64x4::ZERO)
+}
+
+impl Path {
+    /// As [`by_fours`] in these registers; `None` when this processor has none such. Four numbers fill half of a register of AVX-512, which stands
+    /// for AVX2 here; the scalar path is that of a processor without either.
+    pub fn by_fours<T: ByFours>(self, task: T) -> Option<T::Output> {
+        match self {
+            Self::Best => Some(by_fours(task)),
+            Self::Scalar => Some(task.run(wide::f64x4::ZERO)),
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            Self::Avx2 | Self::Avx512 => {
+                let simd = pulp::x86::V3::try_new()?;
+                Some(simd.vectorize(avx2::Do(simd, task)))
+            }
+            #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+            Self::Avx2 | Self::Avx512 => None,
+        }
+    }
+}
