@@ -16,5 +16,5 @@ mod track;
 mod wide;
 
 pub use fours::{ByFours, Four, by_fours};
-pub use path::{Path, SideBySide};
+pub use path::{Path, SideBySide, alone};
 pub use track::{Estimates, LanesError, Run, Task, track_many};

@@ -53,6 +53,27 @@ fn with<T: SideBySide, S: Simd>(simd: S, task: T) -> T::Output {
     simd.vectorize(DoWith(task, simd))
 }
 
+struct Alone<T>(T);
+
+impl<T: SideBySide> NullaryFnOnce for Alone<T> {
+    type Output = T::Output;
+
+    #[inline(always)]
+    fn call(self) -> T::Output {
+        self.0.run(0.0)
+    }
+}
+
+/// One run by itself, with the instructions of AVX2 where this processor has them: they name three registers, and what would be copied
+/// before it is overwritten stays where it is. Products and sums are not contracted: the same bits.
+pub fn alone<T: SideBySide>(task: T) -> T::Output {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    if let Some(simd) = pulp::x86::V3::try_new() {
+        return simd.vectorize(Alone(task));
+    }
+    task.run(0.0)
+}
+
 impl Path {
     /// All paths that this processor has, [`Path::Best`] among them.
     pub fn available() -> Vec<Self> {

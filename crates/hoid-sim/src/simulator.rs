@@ -17,7 +17,7 @@
 use std::ops::Range;
 
 use hoid_core::number::Number;
-use hoid_lanes::{Path, SideBySide};
+use hoid_lanes::{Path, SideBySide, alone};
 use hoid_model::{
     Channel, Record,
     scenario::{Realisation, ResolvedScenario, Scenario, TrueParameters},
@@ -157,12 +157,13 @@ impl Simulator {
     /// As [`Simulator::signals`]; the signals are then of no use.
     pub fn signals_into(&self, noise: &[f64], signals: &mut Signals) -> Result<(), SimError> {
         self.check_length(noise)?;
-        let samples = self.samples();
-        signals.make_room(samples);
-        let mut state = LoopState::at_rest(0.0, self.longest_delay());
-        let Signals { e, u, x, n } = &mut *signals;
-        self.pass(&mut state, 0..samples, noise, [e, u, x, n]);
-        if state.is_finite(0) {
+        signals.make_room(self.samples());
+        let one = One {
+            simulator: self,
+            noise,
+            into: signals,
+        };
+        if alone(one) {
             Ok(())
         } else {
             self.why_not_finite(noise, signals)
@@ -392,6 +393,28 @@ impl Signals {
 
 /// Samples that are laid side by side at a time.
 const BLOCK: usize = 64;
+
+/// One run.
+struct One<'a> {
+    simulator: &'a Simulator,
+    noise: &'a [f64],
+    /// Signals as long as the run.
+    into: &'a mut Signals,
+}
+
+impl SideBySide for One<'_> {
+    /// True when all was finite.
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<R: Number>(self, zero: R) -> bool {
+        let mut state = LoopState::at_rest(zero, self.simulator.longest_delay());
+        let Signals { e, u, x, n } = self.into;
+        let all = 0..self.simulator.samples();
+        self.simulator.pass(&mut state, all, self.noise, [e, u, x, n]);
+        state.is_finite(0)
+    }
+}
 
 /// Runs side by side.
 struct Many<'a> {
