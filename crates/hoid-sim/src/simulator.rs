@@ -242,12 +242,27 @@ impl Simulator {
         state: &mut LoopState<R>,
         range: Range<usize>,
         noise: &[f64],
+        out: [&mut [f64]; 4],
+    ) {
+        if self.matrices.len() == 1 {
+            self.pass_through::<R, M, false>(state, range, noise, out);
+        } else {
+            self.pass_through::<R, M, true>(state, range, noise, out);
+        }
+    }
+
+    /// Two programs, so that numbers that never change stay in the registers.
+    #[inline(always)]
+    fn pass_through<R: Number, const M: usize, const CHANGES: bool>(
+        &self,
+        state: &mut LoopState<R>,
+        range: Range<usize>,
+        noise: &[f64],
         [e_out, u_out, x_out, n_out]: [&mut [f64]; 4],
     ) {
         let zero = state.operator[0].like(0.0);
         let width = zero.lanes();
-        let constant = self.matrices.len() == 1;
-        let mut m = self.matrices[0];
+        let always = self.matrices[0];
         let (mut operator, mut element) = (state.operator, state.element);
         let mut remnant: [R; M] = [zero; M];
         remnant.copy_from_slice(&state.remnant[..M]);
@@ -262,9 +277,7 @@ impl Simulator {
         let memory = &mut state.memory[..];
         let last = memory.len() - 1;
         for (i, k) in range.enumerate() {
-            if !constant {
-                m = self.matrices[k];
-            }
+            let m = if CHANGES { self.matrices[k] } else { always };
             let at = i * width;
             let x = zero.like(m.element_output) * element[0];
             let e = zero.like(self.forcing_deg[k]) - x;
