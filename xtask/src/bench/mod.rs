@@ -183,14 +183,16 @@ fn run_ours(program: &Path, options: &Options, first: bool) -> Result<Vec<Line>,
 /// A peer that does not run is a line that says so.
 fn run_peer(script: &Path, python: &str, options: &Options) -> Vec<Line> {
     let record = data().join("record.csv");
-    let program = if script.extension().is_some_and(|e| e == "m") {
-        "octave-cli"
-    } else {
-        python
+    let (program, before, behind): (&str, &[&str], &[&str]) = match script.extension().and_then(|e| e.to_str()) {
+        Some("m") => ("octave-cli", &[], &[]),
+        Some("sce") => ("scilab-cli", &["-nb", "-f"], &["-args"]),
+        _ => (python, &[], &[]),
     };
     let mut command = Command::new(program);
     command
+        .args(before)
         .arg(script)
+        .args(behind)
         .arg(record)
         .args(["50", &options.only.join(",")])
         .envs(["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"].map(|name| (name, "1")))
@@ -225,7 +227,7 @@ fn scripts() -> Result<Vec<PathBuf>, String> {
     let entries = fs::read_dir(PEERS).map_err(|e| format!("{PEERS}: {e}"))?;
     let mut found: Vec<PathBuf> = entries
         .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|path| path.extension().is_some_and(|e| e == "py" || e == "m"))
+        .filter(|path| path.extension().is_some_and(|e| e == "py" || e == "m" || e == "sce"))
         .filter(|path| {
             !path.ends_with(OF_EVIDENCE) && !path.file_name().is_some_and(|n| n.to_string_lossy().starts_with('_'))
         })

@@ -8,7 +8,7 @@ use super::lines::{Line, Outcome, difference};
 const SAME: f64 = 1e-6;
 
 /// What the project demands of its own speed: the ratio to a peer whose name contains all the words, at least.
-const LIMITS: [(&str, &str, f64); 15] = [
+const LIMITS: [(&str, &str, f64); 16] = [
     ("arx", "normal equations", 10.0),
     ("arx", "numba", 2.0),
     ("bj", "own LM", 7.0),
@@ -20,6 +20,7 @@ const LIMITS: [(&str, &str, f64); 15] = [
     ("rls", "numba", 1.0),
     ("rpem", "numpy", 350.0),
     ("rpem", "numba", 1.0),
+    ("rpem", "scilab", 2.0),
     ("loop with noise", "numba", 6.0),
     ("cell", "numba", 4.0),
     ("cell", "own LM", 20.0),
