@@ -159,15 +159,17 @@ impl FreeResponses {
         z
     }
 
-    /// True when all responses have fallen below `share` of their size at the end of so many rows.
-    pub fn have_died(&self, rows: usize, share: f64) -> bool {
+    /// True when nothing of the responses is left at the end of so many rows.
+    pub fn have_died(&self, rows: usize) -> bool {
+        /// A response below this share of its size has died away.
+        const DEAD: f64 = 1e-15;
         /// Samples over which an oscillation shows its size.
         const SWING: usize = 128;
         let dead = |response: &[f64]| {
             response.len() < rows
                 || response[response.len().saturating_sub(SWING)..]
                     .iter()
-                    .all(|x| x.abs() < share)
+                    .all(|x| x.abs() < DEAD)
         };
         // A basis vector has the size one, an impulse response begins with one.
         self.h.len() < rows && self.basis().all(dead)

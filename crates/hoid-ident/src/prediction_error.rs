@@ -40,7 +40,7 @@ use std::{
 };
 
 use hoid_core::{
-    filter::{SecondOrder, divide, divide_in_place},
+    filter::{SecondOrder, divide, divide_on},
     stability::roots_inside,
 };
 use hoid_model::{Orders, Record};
@@ -280,11 +280,13 @@ impl Criterion<'_> {
 
     /// Residuals of one record, from [`Criterion::first`] on.
     pub fn residuals_of(&self, theta: &[f64], record: usize, workspace: &mut Workspace) -> Vec<f64> {
-        if let Some(residuals) = self.residuals_of_long_record(theta, record, long::HEAD, workspace) {
-            return residuals;
-        }
-        self.residual_pass(theta, record, self.data[record], workspace);
-        workspace.eps[workspace.pad + self.first..].to_vec()
+        let mut residuals = Vec::new();
+        self.pass(theta, &[], record, workspace, |_, counted, ws| {
+            // The whole of a short record at once; of a long one no more than it needs.
+            residuals.reserve_exact(self.data[record].u.len() - self.first - residuals.len());
+            residuals.extend_from_slice(&ws.eps[counted]);
+        });
+        residuals
     }
 
     /// Columns of psi in one record, from the first residual on, with the initial states projected out.
@@ -317,15 +319,30 @@ impl Criterion<'_> {
         ws: &mut Workspace,
         total: &mut Linearisation,
     ) -> Passed {
-        if let Some(passed) = self.add_long_record(theta, blocks, record, long::HEAD, ws, total) {
+        let parts = Parts::split(&self.orders, theta);
+        self.pass(theta, blocks, record, ws, |passed, counted, ws| {
+            let columns = self.columns(&parts, counted.clone(), ws, blocks);
+            self.accumulate(passed, &columns, record, &ws.eps[counted], total);
+        })
+    }
+
+    /// Passes a record, a long one span by span ([`long`]), and shows its residuals and the signals of these polynomials: where in the workspace those
+    /// stand that count, with what the pass has found besides. Gives that of the initial states back.
+    fn pass(
+        &self,
+        theta: &[f64],
+        blocks: &[Block],
+        record: usize,
+        ws: &mut Workspace,
+        mut show: impl FnMut(&Passed, Range<usize>, &Workspace),
+    ) -> Passed {
+        if let Some(passed) = self.pass_in_spans(theta, blocks, record, long::HEAD, ws, &mut show) {
             return passed;
         }
         let data = self.data[record];
         let passed = self.residual_pass(theta, record, data, ws);
         self.gradient_pass(theta, blocks, data, ws);
-        let counted = ws.pad + self.first..ws.pad + data.u.len();
-        let columns = self.columns(&Parts::split(&self.orders, theta), counted, ws, blocks);
-        self.accumulate(&passed, &columns, record, ws, total);
+        show(&passed, ws.pad + self.first..ws.pad + data.u.len(), ws);
         passed
     }
 
@@ -361,35 +378,10 @@ impl Criterion<'_> {
         };
 
         self.filter_input(&parts, data, ws);
-        let (from, to) = (pad + regressed, pad + n);
+        let from = pad + regressed;
         ws.w[..from].fill(0.0);
         ws.v[..from].fill(0.0);
-        match *parts.b {
-            // The orders of the operator in one pass.
-            [b0, b1] => {
-                let (s0, s1) = (&ws.s[from..to], &ws.s[from - 1..to - 1]);
-                let inputs = s0.iter().zip(s1).zip(&data.u[regressed..]);
-                for ((w, v), ((s0, s1), u)) in ws.w[from..].iter_mut().zip(&mut ws.v[from..]).zip(inputs) {
-                    *w = b0 * s0 + b1 * s1;
-                    *v = u - *w;
-                }
-            }
-            _ => {
-                ws.w[from..].fill(0.0);
-                for (j, &bj) in parts.b.iter().enumerate() {
-                    add_scaled(&mut ws.w[from..], bj, &ws.s[from - j..to - j]);
-                }
-                for ((v, w), u) in ws.v[from..].iter_mut().zip(&ws.w[from..]).zip(&data.u[regressed..]) {
-                    *v = u - w;
-                }
-            }
-        }
-        for (i, &ai) in parts.a.iter().enumerate() {
-            let from = regressed.max(i + 1);
-            if from < n {
-                add_scaled(&mut ws.v[pad + from..], ai, &data.u[from - i - 1..n - i - 1]);
-            }
-        }
+        self.response(&parts, data, regressed..n, from, ws);
         whiten(parts.c, parts.d, &ws.v, &mut ws.eps, pad + start);
 
         let weights = self.weights.map(|all| all[record].as_slice());
@@ -419,6 +411,42 @@ impl Criterion<'_> {
             eps.iter_mut().zip(weights).for_each(|(x, w)| *x /= w);
         }
         passed
+    }
+
+    /// `w = B s` and `v = A u - w` of these samples, the first of which stands at `from` in the workspace.
+    fn response(&self, parts: &Parts<'_>, data: Data<'_>, samples: Range<usize>, from: usize, ws: &mut Workspace) {
+        let to = from + samples.len();
+        let u = &data.u[samples.clone()];
+        let (w, v) = (&mut ws.w[from..to], &mut ws.v[from..to]);
+        match *parts.b {
+            // The orders of the operator in one pass.
+            [b0, b1] => {
+                let inputs = ws.s[from..to].iter().zip(&ws.s[from - 1..to - 1]).zip(u);
+                for ((w, v), ((s0, s1), u)) in w.iter_mut().zip(&mut *v).zip(inputs) {
+                    *w = b0 * s0 + b1 * s1;
+                    *v = u - *w;
+                }
+            }
+            _ => {
+                w.fill(0.0);
+                for (j, &bj) in parts.b.iter().enumerate() {
+                    add_scaled(w, bj, &ws.s[from - j..to - j]);
+                }
+                for ((v, w), u) in v.iter_mut().zip(&*w).zip(u) {
+                    *v = u - w;
+                }
+            }
+        }
+        for (i, &ai) in parts.a.iter().enumerate() {
+            let first = samples.start.max(i + 1);
+            if first < samples.end {
+                add_scaled(
+                    &mut v[first - samples.start..],
+                    ai,
+                    &data.u[first - i - 1..samples.end - i - 1],
+                );
+            }
+        }
     }
 
     /// The signals whose shifts are the columns of psi.
@@ -541,11 +569,11 @@ impl Criterion<'_> {
         passed: &Passed,
         columns: &[Column<'_>],
         record: usize,
-        ws: &Workspace,
+        eps: &[f64],
         total: &mut Linearisation,
     ) {
         let Some(all) = self.weights else {
-            return add_products(passed, columns, &ws.eps[ws.pad + self.first..], total);
+            return add_products(passed, columns, eps, total);
         };
         let weighted = |x: &[f64]| -> Vec<f64> { x.iter().zip(&all[record]).map(|(x, w)| x * w).collect() };
         let columns: Vec<Column<'_>> = columns
@@ -556,7 +584,7 @@ impl Criterion<'_> {
                 follows: false,
             })
             .collect();
-        add_products(passed, &columns, &weighted(&ws.eps[ws.pad + self.first..]), total);
+        add_products(passed, &columns, &weighted(eps), total);
     }
 
     /// What the penalty on the stationary past adds to the descent.
@@ -739,6 +767,11 @@ fn whiten(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
         return;
     }
     y[..from].fill(0.0);
+    whiten_on(c, d, x, y, from);
+}
+
+/// `y = (D/C) x` from index `from` on; what stands before is what has gone into the filter and come out of it so far.
+fn whiten_on(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
     match *d {
         // The first lag in the same pass as the copy.
         [d1, ref rest @ ..] if from > 0 => {
@@ -752,7 +785,7 @@ fn whiten(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
             add_lags(d, 1, x, y, from);
         }
     }
-    divide_in_place(c, &mut y[from..]);
+    divide_on(c, y, from);
 }
 
 /// `y(t) += sum_i d_i x(t - first_lag - i)` from index `from` on.

@@ -107,13 +107,18 @@ mod avx2 {
     }
 }
 
-/// Four numbers at a time, in the best registers that this processor has.
-pub fn by_fours<T: ByFours>(task: T) -> T::Output {
+/// The task done in registers of AVX2, or the task itself where this processor has none.
+fn in_avx2<T: ByFours>(task: T) -> Result<T::Output, T> {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     if let Some(simd) = pulp::x86::V3::try_new() {
-        return simd.vectorize(avx2::Do(simd, task));
+        return Ok(simd.vectorize(avx2::Do(simd, task)));
     }
-    task.run(wide::f64x4::ZERO)
+    Err(task)
+}
+
+/// Four numbers at a time, in the best registers that this processor has.
+pub fn by_fours<T: ByFours>(task: T) -> T::Output {
+    in_avx2(task).unwrap_or_else(|task| task.run(wide::f64x4::ZERO))
 }
 
 impl Path {
@@ -123,13 +128,7 @@ impl Path {
         match self {
             Self::Best => Some(by_fours(task)),
             Self::Scalar => Some(task.run(wide::f64x4::ZERO)),
-            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-            Self::Avx2 | Self::Avx512 => {
-                let simd = pulp::x86::V3::try_new()?;
-                Some(simd.vectorize(avx2::Do(simd, task)))
-            }
-            #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-            Self::Avx2 | Self::Avx512 => None,
+            Self::Avx2 | Self::Avx512 => in_avx2(task).ok(),
         }
     }
 }

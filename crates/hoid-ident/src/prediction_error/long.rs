@@ -4,7 +4,7 @@
 //! first part of the record ([`HEAD`]) is passed as any record, the rest in spans that stay in the memory near the processor, each with
 //! the last samples of the span before in front of it. Nothing then grows with the record, and a sample costs the same in a long one.
 //!
-//! The initial states act on the beginning alone. Their responses must have died away within the head ([`Passed::ends_within`]); where a pole is so
+//! The initial states act on the beginning alone. Their responses must have died away within the head ([`FreeResponses::have_died`](crate::initial_states::FreeResponses::have_died)); where a pole is so
 //! near the circle that they have not, the record is passed whole. So it is with weights, of which there is one a sample, and with a stationary
 //! past, whose columns are whitened one by one. The sums differ from those over the whole by rounding alone.
 
@@ -13,8 +13,7 @@ use std::ops::Range;
 use hoid_core::filter::divide_on;
 use hoid_model::{polynomial::product, polynomial_model::monic};
 
-use super::{Block, Criterion, Data, InitialState, Linearisation, Parts, Passed, Workspace, add_lags, add_products};
-use crate::least_squares::add_scaled;
+use super::{Block, Criterion, Data, InitialState, Parts, Passed, Workspace, whiten_on};
 
 /// Samples of the first part. A record twice as long counts as long: others, all of some minutes, pass whole.
 pub(super) const HEAD: usize = 1 << 15;
@@ -22,52 +21,17 @@ pub(super) const HEAD: usize = 1 << 15;
 /// Samples of a span: its signals fill a quarter of the second cache.
 const SPAN: usize = 1 << 11;
 
-/// A response below this share of its size has died away.
-const DEAD: f64 = 1e-15;
-
 impl Criterion<'_> {
-    /// Adds a record to the normal equations span by span; `None`, and nothing added, where it has to pass whole.
-    pub(super) fn add_long_record(
+    /// As [`Criterion::pass`] span after span, with what the pass over the head has found (for the other spans nothing); `None`, and nothing shown,
+    /// where the record has to pass whole.
+    pub(super) fn pass_in_spans(
         &self,
         theta: &[f64],
         blocks: &[Block],
         record: usize,
         head: usize,
         ws: &mut Workspace,
-        total: &mut Linearisation,
-    ) -> Option<Passed> {
-        let parts = Parts::split(&self.orders, theta);
-        self.in_spans(theta, blocks, record, head, ws, |passed, counted, ws| {
-            let columns = self.columns(&parts, counted.clone(), ws, blocks);
-            add_products(passed, &columns, &ws.eps[counted], total);
-        })
-    }
-
-    /// Residuals of a long record, from [`Criterion::first`] on; `None` where it has to pass whole.
-    pub(super) fn residuals_of_long_record(
-        &self,
-        theta: &[f64],
-        record: usize,
-        head: usize,
-        ws: &mut Workspace,
-    ) -> Option<Vec<f64>> {
-        let mut residuals = Vec::with_capacity(self.data[record].u.len() - self.first);
-        let passed = self.in_spans(theta, &[], record, head, ws, |_, counted, ws| {
-            residuals.extend_from_slice(&ws.eps[counted]);
-        });
-        passed.map(|_| residuals)
-    }
-
-    /// Shows the residuals and the signals of these polynomials, span after span: where they stand, with what the pass over the head found (for the
-    /// others nothing). Gives that back; `None`, and nothing shown, where the record has to pass whole.
-    fn in_spans(
-        &self,
-        theta: &[f64],
-        blocks: &[Block],
-        record: usize,
-        head: usize,
-        ws: &mut Workspace,
-        mut show: impl FnMut(&Passed, Range<usize>, &Workspace),
+        show: &mut dyn FnMut(&Passed, Range<usize>, &Workspace),
     ) -> Option<Passed> {
         let Data { e, u } = self.data[record];
         let plain = self.weights.is_none() && self.initial != InitialState::Backcast;
@@ -81,7 +45,7 @@ impl Criterion<'_> {
             u: &u[..head],
         };
         let passed = self.residual_pass(theta, record, begin, ws);
-        if !passed.ends_within(head - self.first) {
+        if !passed.free.have_died(head - self.first) {
             return None;
         }
         self.gradient_pass(theta, blocks, begin, ws);
@@ -103,24 +67,12 @@ impl Criterion<'_> {
     fn go_on(&self, parts: &Parts<'_>, blocks: &[Block], data: Data<'_>, span: Range<usize>, ws: &mut Workspace) {
         let o = &self.orders;
         let (pad, end) = (ws.pad, ws.pad + span.len());
-        let output = |lag: usize| &data.u[span.start - lag..span.end - lag];
-        let w = &mut ws.w[pad..end];
-        w.fill(0.0);
         if o.nb > 0 {
             let s = &mut ws.s[..end];
             s[pad..].copy_from_slice(&data.e[span.start - o.nk..span.end - o.nk]);
             divide_on(parts.f, s, pad);
-            for (j, bj) in parts.b.iter().enumerate() {
-                add_scaled(w, *bj, &s[pad - j..end - j]);
-            }
         }
-        let v = &mut ws.v[pad..end];
-        for ((v, u), w) in v.iter_mut().zip(output(0)).zip(&*w) {
-            *v = u - w;
-        }
-        for (i, ai) in parts.a.iter().enumerate() {
-            add_scaled(v, *ai, output(i + 1));
-        }
+        self.response(parts, data, span.clone(), pad, ws);
         let Workspace {
             s,
             w,
@@ -131,21 +83,21 @@ impl Criterion<'_> {
             ..
         } = ws;
         let (v, w) = (&v[..end], &w[..end]);
-        filter_on(parts.d, parts.c, v, &mut eps[..end], pad);
+        whiten_on(parts.c, parts.d, v, &mut eps[..end], pad);
         for block in blocks {
             match block {
                 Block::A if o.na > 0 => {
                     let u = &mut scratch[..end];
                     u.copy_from_slice(&data.u[span.start - pad..span.end]);
-                    filter_on(parts.d, parts.c, u, &mut xa[..end], pad);
+                    whiten_on(parts.c, parts.d, u, &mut xa[..end], pad);
                 }
-                Block::B if o.nb > 0 => filter_on(parts.d, parts.c, &s[..end], &mut xb[..end], pad),
-                Block::C if o.nc > 0 => filter_on(&[], parts.c, &eps[..end], &mut xc[..end], pad),
+                Block::B if o.nb > 0 => whiten_on(parts.c, parts.d, &s[..end], &mut xb[..end], pad),
+                Block::C if o.nc > 0 => whiten_on(parts.c, &[], &eps[..end], &mut xc[..end], pad),
                 // Without C its signal is v itself.
-                Block::D if o.nd > 0 && o.nc > 0 => filter_on(&[], parts.c, v, &mut xd[..end], pad),
+                Block::D if o.nd > 0 && o.nc > 0 => whiten_on(parts.c, &[], v, &mut xd[..end], pad),
                 Block::F if o.nf > 0 => {
                     let poles = product(&monic(parts.c), &monic(parts.f));
-                    filter_on(parts.d, &poles[1..], w, &mut xf[..end], pad);
+                    whiten_on(&poles[1..], parts.d, w, &mut xf[..end], pad);
                 }
                 _ => {}
             }
@@ -166,18 +118,4 @@ impl Workspace {
             }
         }
     }
-}
-
-impl Passed {
-    /// True when nothing of the initial states is left behind so many residuals.
-    fn ends_within(&self, residuals: usize) -> bool {
-        self.free.have_died(residuals, DEAD)
-    }
-}
-
-/// `y = (D/C) x` from index `from` on; what stands before are the last samples of both.
-fn filter_on(d: &[f64], c: &[f64], x: &[f64], y: &mut [f64], from: usize) {
-    y[from..].copy_from_slice(&x[from..]);
-    add_lags(d, 1, x, y, from);
-    divide_on(c, y, from);
 }
