@@ -204,12 +204,11 @@ impl Fit {
 
 impl Quality {
     /// That of several records together, as [`Fit::quality`], where their validations are at hand.
-    pub fn together(records: &[Record], validations: &[Validation]) -> Self {
-        let all = records.iter().zip(validations);
-        all.fold(Squares::default(), |all, (record, v)| {
+    pub fn together<'a>(validated: impl Iterator<Item = (&'a Record, &'a Validation)>) -> Self {
+        let with = |all: Squares, (record, v): (&'a Record, &'a Validation)| {
             all.and(&record.output()[v.first..], &v.simulated, &v.predicted)
-        })
-        .quality()
+        };
+        validated.fold(Squares::default(), with).quality()
     }
 }
 

@@ -56,7 +56,12 @@ impl Report<'_> {
             return Err(ReportError::NoModels);
         }
         let validations: Vec<Vec<Result<Validation, String>>> = self.models.iter().map(validate).collect();
-        let qualities: Vec<Result<Quality, String>> = self.models.iter().map(quality_of).collect();
+        let qualities: Vec<Result<Quality, String>> = self
+            .models
+            .iter()
+            .zip(&validations)
+            .map(|(model, validations)| quality_of(model, validations))
+            .collect();
         let sections: Vec<Value> = self
             .models
             .iter()
@@ -127,11 +132,13 @@ fn validate(model: &ModelSection<'_>) -> Vec<Result<Validation, String>> {
 }
 
 /// VAF and NRMSE over all records together, or the reason why there are none.
-fn quality_of(model: &ModelSection<'_>) -> Result<Quality, String> {
+fn quality_of(model: &ModelSection<'_>, validations: &[Result<Validation, String>]) -> Result<Quality, String> {
     if model.records.is_empty() {
         return Err("no record was given".to_owned());
     }
-    model.fit.quality(model.records).map_err(|e| e.to_string())
+    let validations = validations.iter().map(|v| v.as_ref().map_err(Clone::clone));
+    let validations: Vec<&Validation> = validations.collect::<Result<_, _>>()?;
+    Ok(Quality::together(model.records.iter().zip(validations)))
 }
 
 fn section(index: usize, model: &ModelSection<'_>, validations: &[Result<Validation, String>]) -> Value {
@@ -157,7 +164,7 @@ fn section(index: usize, model: &ModelSection<'_>, validations: &[Result<Validat
     let tests = match tested {
         Some((k, record, validation)) => residual_tests(index, &tables::record_name(record, k), record, validation),
         None => {
-            let reason = quality_of(model).err().unwrap_or_default();
+            let reason = quality_of(model, validations).err().unwrap_or_default();
             context! { reason }
         }
     };

@@ -15,6 +15,7 @@ use hoid::{
     },
     prelude::*,
 };
+use rayon::prelude::*;
 
 const NK: usize = 29;
 const COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
@@ -52,21 +53,7 @@ fn run(simulator: &Simulator, cell: u64, replication: u64) -> Record {
 
 /// Results of the runs in their order, on all cores.
 fn on_all_cores<T: Send>(runs: usize, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let mut results: Vec<(u64, T)> = std::thread::scope(|scope| {
-        let one = &one;
-        let threads: Vec<_> = (0..cores)
-            .map(|c| {
-                scope.spawn(move || {
-                    let mine = (c..runs).step_by(cores);
-                    mine.map(|r| (r as u64, one(r as u64))).collect::<Vec<_>>()
-                })
-            })
-            .collect();
-        threads.into_iter().flat_map(|t| t.join().unwrap()).collect()
-    });
-    results.sort_by_key(|(r, _)| *r);
-    results.into_iter().map(|(_, t)| t).collect()
+    (0..runs).into_par_iter().map(|r| one(r as u64)).collect()
 }
 
 fn options(method: Method) -> TrackOptions {

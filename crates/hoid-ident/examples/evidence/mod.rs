@@ -4,6 +4,7 @@ use hoid_model::{
     remnant_gain::NoiseDefinition,
     scenario::{Condition, Realisation, RemnantStrength, Scenario},
 };
+use rayon::prelude::*;
 
 /// End of the start fit, and the change, s.
 pub const START_S: f64 = 30.72;
@@ -23,21 +24,7 @@ pub fn scenario(condition: Condition, remnant_order: usize, level: f64) -> Scena
 
 /// Results of the runs in their order, on all cores.
 pub fn on_all_cores<T: Send>(runs: usize, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let mut results: Vec<(u64, T)> = std::thread::scope(|scope| {
-        let one = &one;
-        let threads: Vec<_> = (0..cores)
-            .map(|c| {
-                scope.spawn(move || {
-                    let mine = (c..runs).step_by(cores);
-                    mine.map(|r| (r as u64, one(r as u64))).collect::<Vec<_>>()
-                })
-            })
-            .collect();
-        threads.into_iter().flat_map(|t| t.join().unwrap()).collect()
-    });
-    results.sort_by_key(|(r, _)| *r);
-    results.into_iter().map(|(_, t)| t).collect()
+    (0..runs).into_par_iter().map(|r| one(r as u64)).collect()
 }
 
 /// Median of what is a number.

@@ -61,7 +61,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         files: &files,
         records: &records,
         accounts: &accounts,
-        quality: Quality::together(&records, &validations),
+        quality: Quality::together(records.iter().zip(&validations)),
         fit: &fit,
         choice: choice.as_ref(),
         grey_box: grey_box.as_ref(),

@@ -332,6 +332,7 @@ impl Tracked<'_> {
     /// The start fit as `identify` gives it.
     fn start_json(&self, fit: &Fit, span: &Record) -> Result<Value, CliError> {
         let records = std::slice::from_ref(span);
+        let validation = fit.validate(span)?;
         let operator = fit.operator();
         let remnant = (fit.orders().nd > 0).then(|| fit.remnant(RemnantDiscretisation::ZeroOrderHold));
         Ok(Identified {
@@ -341,11 +342,11 @@ impl Tracked<'_> {
             fit,
             choice: self.choice,
             grey_box: None,
-            quality: fit.quality(records)?,
+            quality: validation.quality,
             operator: &operator,
             remnant: remnant.as_ref(),
             margins: None,
-            validations: &[fit.validate(span)?],
+            validations: std::slice::from_ref(&validation),
             ahead: None,
             validation: None,
             settings: &[(
