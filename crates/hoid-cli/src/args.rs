@@ -3,7 +3,7 @@
 use std::{ops::RangeInclusive, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use hoid_ident::{Focus, InitialState, IvMethod, SearchMethod, order_search::Criterion};
+use hoid_ident::{Focus, InitialState, IvMethod, SearchMethod, order_selection::Criterion};
 use hoid_model::{
     ContinuousTransferFunction, Detrend, Structure, discretise,
     remnant::RemnantDiscretisation,

@@ -6,6 +6,7 @@ use hoid_model::ModelError;
 use hoid_report::ReportError;
 use hoid_sim::SimError;
 use hoid_study::StudyError;
+use hoid_thesis::ThesisError;
 use thiserror::Error;
 
 /// Everything that a command can run into.
@@ -34,6 +35,9 @@ pub enum CliError {
     Sim(#[from] SimError),
     #[error(transparent)]
     Report(#[from] ReportError),
+    /// The reproduction cannot be made.
+    #[error(transparent)]
+    Thesis(#[from] ThesisError),
 }
 
 impl CliError {

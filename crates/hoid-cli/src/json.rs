@@ -3,7 +3,6 @@
 use hoid_ident::{
     Choice, Fit, GreyBoxFit, IdentError, MarginEstimates, Root,
     grey_box::OrderCandidate,
-    tracking::Change,
     validation::{LjungBox, Quality, Validation},
 };
 use hoid_model::{
@@ -11,6 +10,7 @@ use hoid_model::{
     margins::Margins,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
+use hoid_track::Change;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 

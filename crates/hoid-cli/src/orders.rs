@@ -60,7 +60,7 @@ pub fn ranges(
     nk: Option<&RangeInclusive<usize>>,
     sample_time: SampleTime,
 ) -> Result<OrderRanges, CliError> {
-    let mut ranges = hoid_ident::order_search::default_operator_ranges(structure, sample_time);
+    let mut ranges = hoid_ident::order_selection::default_operator_ranges(structure, sample_time);
     for (name, value) in parse_pairs(orders.unwrap_or_default()).map_err(CliError::Usage)? {
         let range = parse_range(&value).map_err(|e| CliError::Usage(format!("--orders {name}: {e}")))?;
         let place = match name.as_str() {

@@ -2,13 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use hoid_ident::{
-    Choice, IdentError, OrderRanges,
-    tracking::{
-        ForgettingRule, Memory, Method, Regressor, Stable, StartAt, StartCovariance, TrackOptions, TrackPlan, narrowed,
-    },
-};
+use hoid_ident::{Choice, IdentError, OrderRanges};
 use hoid_model::{Record, SampleTime, Structure};
+use hoid_track::{
+    ForgettingRule, Memory, Method, Regressor, Stable, StartAt, StartCovariance, TrackOptions, TrackPlan, narrowed,
+};
 
 use crate::{
     args::{ForgettingName, RecursionArgs},

@@ -3,7 +3,7 @@
 use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 use hoid_ident::{
     Choice, Fit, GreyBoxFit, MarginEstimates,
-    order_search::Criterion,
+    order_selection::Criterion,
     validation::{Quality, Validation},
 };
 use hoid_model::{
@@ -333,7 +333,7 @@ pub fn candidates(choice: &Choice) -> String {
         .collect();
     let key = choice.criterion.name();
     good.sort_by(|a, b| {
-        let value = |f: &hoid_ident::order_search::CandidateFigures| f.value(choice.criterion);
+        let value = |f: &hoid_ident::order_selection::CandidateFigures| f.value(choice.criterion);
         value(a.1).total_cmp(&value(b.1))
     });
     // The usual columns, and the one that decided where it is another.

@@ -2,7 +2,7 @@
 
 use hoid_model::{Orders, Record, SampleTime, Structure};
 
-use crate::{Estimator, Focus, IdentError, Loss, prediction_error::Criterion};
+use crate::{Estimator, Focus, IdentError, Loss, pem::criterion::Criterion};
 
 /// Options that contradict each other, the structure or common sense.
 pub(crate) fn options(estimator: &Estimator) -> Result<(), IdentError> {

@@ -3,20 +3,22 @@
 use std::collections::BTreeMap;
 
 use hoid_lanes::Path;
-use hoid_model::{Orders, PolynomialModel, Record, SampleTime, Structure};
+use hoid_model::{Orders, PolynomialModel, Record, SampleTime, Structure, polynomial::reflected_inside};
 
 use crate::{
-    Constraint, Fit, IdentError, InitialState, Loss, Prior, Reason, SearchOptions, Termination, arx, checks,
-    information::inverse_of_free,
-    least_squares::dot,
-    objective::Informed,
-    prediction_error::{Criterion, Data, Workspace, first_residual, output_variance},
-    quest::Quest,
-    robust::{ROUNDS, Reweighting},
-    search::{Minimum, Objective, free_parameters, minimise},
-    searches::Asks,
-    side_by_side, simulation_focus,
-    starts::{self, Start},
+    Constraint, Fit, IdentError, InitialState, Loss, Prior, Reason, SearchOptions, Termination, checks,
+    initial_guess::{guesses::initial_guesses, start::Start},
+    linalg::information::inverse_of_free,
+    linalg::least_squares::dot,
+    optimize::{Minimum, Objective, free_parameters, minimise},
+    pem::arx,
+    pem::batched::{self},
+    pem::constraints::ConstrainedCriterion,
+    pem::criterion::{Criterion, Data, Workspace, first_residual, output_variance},
+    pem::fit_problem::FitProblem,
+    pem::linearisation_client::LinearisationClient,
+    pem::robust::{ROUNDS, Reweighting},
+    pem::simulation_focus,
 };
 
 /// Rounds of the robust loss end when theta moves by less than this share of its standard errors.
@@ -88,6 +90,15 @@ impl Estimator {
         }
     }
 
+    /// Checks structure, orders and options against each other.
+    ///
+    /// # Errors
+    /// [`IdentError`] with what is wrong.
+    pub fn check(&self) -> Result<(), IdentError> {
+        self.orders.check(self.structure)?;
+        checks::options(self)
+    }
+
     /// The rule for initial states, the automatic one decided.
     pub fn initial_state_in_use(&self) -> InitialState {
         self.initial_state.unwrap_or(if self.structure.has_input() {
@@ -112,8 +123,7 @@ impl Estimator {
     /// As [`Estimator::fit`].
     pub fn fit_from(&self, records: &[Record], first: usize) -> Result<Fit, IdentError> {
         if self.focus == Focus::Simulation && self.structure != Structure::OutputError {
-            self.orders.check(self.structure)?;
-            checks::options(self)?;
+            self.check()?;
             return simulation_focus::fit(self, records, first);
         }
         let (criterion, sample_time) = self.criterion(records, first)?;
@@ -133,7 +143,7 @@ impl Estimator {
     /// # Errors
     /// Those of [`Estimator::fit`], for each record by itself.
     pub fn fit_each(&self, records: &[&Record]) -> Vec<Result<Fit, IdentError>> {
-        side_by_side::fit_each(self, records, Path::Best).unwrap_or_else(|| {
+        batched::fit_each(self, records, Path::Best).unwrap_or_else(|| {
             let alone = |record: &&Record| self.fit(std::slice::from_ref(*record));
             records.iter().map(alone).collect()
         })
@@ -145,8 +155,7 @@ impl Estimator {
         records: &'r [Record],
         first: usize,
     ) -> Result<(Criterion<'r>, SampleTime), IdentError> {
-        self.orders.check(self.structure)?;
-        checks::options(self)?;
+        self.check()?;
         let sample_time = checks::common_sample_time(records)?;
         let initial = self.initial_state_in_use();
         let first = first.max(first_residual(&self.orders, initial));
@@ -200,8 +209,8 @@ impl Estimator {
     fn fit_iteratively(&self, criterion: &Criterion<'_>, sample_time: SampleTime) -> Result<Fit, IdentError> {
         let mut workspace = Workspace::of_thread();
         let informed = self.inform(criterion);
-        let own = || starts::propose(criterion, sample_time, &mut workspace);
-        let mut quest = Quest::new(self, &informed, sample_time, own)?;
+        let own = || initial_guesses(criterion, sample_time, &mut workspace);
+        let mut quest = FitProblem::new(self, &informed, sample_time, own)?;
         while let Some(theta) = quest.asked() {
             let there = match quest.block() {
                 Some(block) => criterion.linearise_block(theta, block, &mut workspace),
@@ -215,7 +224,7 @@ impl Estimator {
     /// Rounds of reweighted searches from the minimum of the squares.
     pub(crate) fn fit_robustly(
         &self,
-        informed: &Informed<'_, '_>,
+        informed: &ConstrainedCriterion<'_, '_>,
         sample_time: SampleTime,
         mut minimum: Minimum,
         threshold: f64,
@@ -231,7 +240,7 @@ impl Estimator {
                 weights: Some(&weights),
                 ..criterion.clone()
             };
-            let objective = Informed {
+            let objective = ConstrainedCriterion {
                 criterion: &weighted,
                 limits: informed.limits.clone(),
                 prior: informed.prior.clone(),
@@ -273,7 +282,7 @@ impl Estimator {
         })
     }
 
-    pub(crate) fn inform<'c, 'a>(&self, criterion: &'c Criterion<'a>) -> Informed<'c, 'a> {
+    pub(crate) fn inform<'c, 'a>(&self, criterion: &'c Criterion<'a>) -> ConstrainedCriterion<'c, 'a> {
         let names = self.orders.parameter_names();
         let unlimited = (f64::NEG_INFINITY, f64::INFINITY);
         let limit = |name: &String| self.constraints.get(name).map_or(unlimited, |c| c.limits());
@@ -288,7 +297,7 @@ impl Estimator {
                 },
             ))
         };
-        Informed {
+        ConstrainedCriterion {
             criterion,
             limits: (!self.constraints.is_empty()).then(|| names.iter().map(limit).collect()),
             prior: names.iter().enumerate().filter_map(guess).collect(),
@@ -328,13 +337,17 @@ impl Estimator {
     /// The start with a stable A where that was asked for.
     pub(crate) fn stabilised(&self, mut start: Start) -> Option<Start> {
         if self.stable {
-            let a = starts::reflected_inside(&start.theta[..self.orders.na])?;
+            let a = reflected_inside(&start.theta[..self.orders.na])?;
             start.theta[..self.orders.na].copy_from_slice(&a);
         }
         Some(start)
     }
 
-    pub(crate) fn check_start(&self, theta: &[f64], objective: &Informed<'_, '_>) -> Result<Vec<f64>, IdentError> {
+    pub(crate) fn check_start(
+        &self,
+        theta: &[f64],
+        objective: &ConstrainedCriterion<'_, '_>,
+    ) -> Result<Vec<f64>, IdentError> {
         let bad = |reason: &str| IdentError::BadStart {
             reason: reason.to_owned(),
         };

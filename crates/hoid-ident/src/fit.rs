@@ -10,7 +10,7 @@ use hoid_model::{
 
 use crate::{
     IdentError, InitialState, Termination,
-    prediction_error::{Criterion, Data, Workspace, first_residual},
+    pem::criterion::{Criterion, Data, Workspace, first_residual},
 };
 
 /// A fitted model.

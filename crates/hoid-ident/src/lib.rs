@@ -14,43 +14,27 @@
 //! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
 //! | [`instrumental`] | instrumental variables, in open and closed loop |
 //! | [`TimeVarying`] | gains that follow a sigmoid, with the time and the rate of the change |
-//! | [`tracking`] | recursive estimates: traces, streaming |
 //! | [`describing`] | describing function, coherence, remnant spectrum and margins by Fourier coefficients |
 //! | [`order_search`] | ranges of orders and delay, criteria, the chosen model |
 //! | [`validation`] | VAF, NRMSE, residual tests |
 //! | `derived` | poles, zeros, crossover and margins with standard errors |
 //! | [`Fit`] | model, covariance, how it ended; prediction, simulation, frequency response |
 
-mod arx;
 mod checks;
 mod constraint;
-mod continuation;
 mod derived;
-pub mod describing;
 mod error;
 mod estimator;
 mod fit;
+pub mod frequency;
 pub mod grey_box;
-mod information;
-mod initial_states;
-pub mod instrumental;
-mod least_squares;
-mod objective;
-pub mod order_search;
-mod prediction_error;
-mod products;
-mod quest;
-mod robust;
-mod search;
-mod searches;
-mod shared_poles;
-mod side_by_side;
-mod simulation_focus;
-mod stable_coordinates;
-mod starts;
-mod stationary_past;
-mod time_varying;
-pub mod tracking;
+mod initial_guess;
+pub mod iv;
+pub mod linalg;
+mod optimize;
+pub mod order_selection;
+mod pem;
+mod sigmoid;
 pub mod validation;
 
 pub use constraint::{Constraint, Prior};
@@ -59,11 +43,11 @@ pub use error::IdentError;
 pub use estimator::{Estimator, Focus};
 pub use fit::{Fit, ResponsePoint, Series};
 pub use grey_box::{GreyBox, GreyBoxFit};
-pub use instrumental::{InstrumentalVariable, Instruments, IvMethod};
-pub use order_search::{Candidate, Choice, OrderRanges, choose_orders};
-pub use prediction_error::InitialState;
-pub use robust::Loss;
-pub use search::{Reason, SearchMethod, SearchOptions, Termination};
-pub use time_varying::{
+pub use iv::{InstrumentalVariable, Instruments, IvMethod};
+pub use optimize::{Reason, SearchMethod, SearchOptions, Termination};
+pub use order_selection::{Candidate, Choice, OrderRanges, choose_orders};
+pub use pem::criterion::{InitialState, first_residual};
+pub use pem::robust::Loss;
+pub use sigmoid::{
     ChangeParameter, Comparison, GainsAt, NoiseLevel, Remark, TIME_VARYING_NAMES, TimeVarying, TimeVaryingFit,
 };

@@ -13,7 +13,7 @@
 use hoid_model::{Record, polynomial::product, polynomial_model::monic};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::{Fit, IdentError, Series, least_squares::dot, products::variance};
+use crate::{Fit, IdentError, Series, linalg::least_squares::dot, linalg::products::variance};
 
 /// Largest lag of the residual tests, in samples.
 pub const LARGEST_LAG: usize = 50;

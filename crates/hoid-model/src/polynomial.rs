@@ -4,6 +4,7 @@
 //! functions in s store descending powers and say so. Roots come from the eigenvalues of the balanced companion matrix
 //! (Edelman and Murakami, 1995) and one Newton step each.
 
+use hoid_core::stability::roots_inside;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
@@ -119,6 +120,26 @@ fn newton_step(p: &[f64], z: Complex64) -> Complex64 {
         better.im = 0.0;
     }
     if horner(better).0.norm() < f.norm() { better } else { z }
+}
+
+/// Monic `[p_1, ..., p_n]` with each root outside the unit circle replaced by the inverse of its conjugate, which leaves the shape of the
+/// spectrum as it is. `None` where the roots cannot be found.
+pub fn reflected_inside(coefficients: &[f64]) -> Option<Vec<f64>> {
+    if roots_inside(coefficients, 1.0) {
+        return Some(coefficients.to_vec());
+    }
+    let roots: Vec<Complex64> = roots(&[&[1.0], coefficients].concat())?
+        .into_iter()
+        .map(|z| match z.norm() {
+            r if r > 1.0 => 1.0 / z.conj(),
+            // On the circle: pulled in a little, or the filter would never forget.
+            r if r > 0.999 => z * (0.999 / r),
+            _ => z,
+        })
+        .collect();
+    let mut inside = from_roots(&roots)[1..].to_vec();
+    inside.resize(coefficients.len(), 0.0);
+    roots_inside(&inside, 1.0).then_some(inside)
 }
 
 #[cfg(test)]

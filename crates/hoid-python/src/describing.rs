@@ -1,6 +1,6 @@
 //! `hoid.describing_function`: what a person answers at the lines of the excitation.
 
-use hoid_ident::describing::{
+use hoid_ident::frequency::{
     Averaging, DescribingFunction, DescribingOptions, Excitation, GainLeadDelayOptions, LineSearch, LineWeights,
     Realisation, describe,
 };
@@ -98,7 +98,7 @@ impl PyDescribingFunction {
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let lines = &self.found.lines;
         let all = PyDict::new(py);
-        let column = |of: &dyn Fn(&hoid_ident::describing::Line) -> f64| array(py, lines.iter().map(of).collect());
+        let column = |of: &dyn Fn(&hoid_ident::frequency::Line) -> f64| array(py, lines.iter().map(of).collect());
         all.set_item("omega", column(&|l| l.omega_rad_s))?;
         all.set_item(
             "harmonic",
@@ -107,7 +107,7 @@ impl PyDescribingFunction {
         all.set_item("response", PyArray1::from_iter(py, lines.iter().map(|l| l.response)))?;
         all.set_item("response_se", column(&|l| l.standard_error.unwrap_or(f64::NAN)))?;
         all.set_item("coherence", column(&|l| l.coherence.unwrap_or(f64::NAN)))?;
-        type Of = fn(&hoid_ident::describing::Line) -> Estimate;
+        type Of = fn(&hoid_ident::frequency::Line) -> Estimate;
         let both: [(&str, Of); 2] = [("magnitude_db", |l| l.magnitude_db()), ("phase_deg", |l| l.phase_deg())];
         for (name, of) in both {
             all.set_item(name, column(&|l| of(l).value))?;

@@ -8,6 +8,7 @@ use hoid_model::{ModelError, NotConvertible};
 use hoid_report::ReportError;
 use hoid_sim::SimError;
 use hoid_study::StudyError;
+use hoid_thesis::ThesisError;
 use pyo3::{PyErr, import_exception};
 
 import_exception!(hoid.errors, Error);
@@ -155,12 +156,23 @@ impl From<StudyError> for Failure {
     }
 }
 
+impl From<ThesisError> for Failure {
+    fn from(error: ThesisError) -> Self {
+        match error {
+            ThesisError::Io(error) => error.into(),
+            ThesisError::Report(error) => (*error).into(),
+            ThesisError::Study(error) => (*error).into(),
+            ThesisError::UnknownItem { .. } => Self(OptionError::new_err(error.to_string())),
+            other => Self(DataError::new_err(other.to_string())),
+        }
+    }
+}
+
 impl From<ReportError> for Failure {
     fn from(error: ReportError) -> Self {
         match error {
             ReportError::Io(error) => error.into(),
             ReportError::Study(error) => (*error).into(),
-            ReportError::UnknownItem { .. } => Self(OptionError::new_err(error.to_string())),
             other => Self(DataError::new_err(other.to_string())),
         }
     }

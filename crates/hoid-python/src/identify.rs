@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use hoid_ident::{
     Choice, Estimator, Fit, GreyBox, GreyBoxFit, IdentError, InitialState, InstrumentalVariable, Instruments, Loss,
     SearchOptions, TimeVarying, TimeVaryingFit,
-    order_search::{default_operator_ranges, fit_or_choose},
+    order_selection::{default_operator_ranges, fit_or_choose},
 };
 use hoid_model::Record;
 use pyo3::prelude::*;

@@ -3,15 +3,14 @@
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
 use hoid_ident::{
-    Constraint, Focus, InitialState, IvMethod, OrderRanges, Prior, SearchMethod,
-    order_search::Criterion,
-    tracking::{Method, Stable},
+    Constraint, Focus, InitialState, IvMethod, OrderRanges, Prior, SearchMethod, order_selection::Criterion,
 };
 use hoid_io::TroubleKind;
 use hoid_model::{
     Detrend, Structure, discretise, remnant::RemnantDiscretisation, remnant_gain::NoiseDefinition,
     scenario::Realisation,
 };
+use hoid_track::{Method, Stable};
 
 use crate::errors::{Outcome, bad_option};
 

@@ -2,13 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use hoid_ident::{
-    order_search::default_operator_ranges,
-    tracking::{
-        ForgettingRule, Memory, Method, Regressor, StartAt, StartCovariance, TrackOptions, TrackPlan, narrowed,
-    },
-};
+use hoid_ident::order_selection::default_operator_ranges;
 use hoid_model::SampleTime;
+use hoid_track::{
+    ForgettingRule, Memory, Method, Regressor, StartAt, StartCovariance, TrackOptions, TrackPlan, narrowed,
+};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{

@@ -2,10 +2,9 @@
 
 use std::path::PathBuf;
 
-use hoid_report::reproduction::{Reproduction, Told, reproduce as reproduce_into};
-use hoid_study::{
-    FURTHER_PLANS, NAMED_PLANS, NamedPlan, Outcome as StudyOutcome, Plan, RunOptions, StudyError, merge, run,
-};
+use hoid_study::{NamedPlan, Outcome as StudyOutcome, Plan, RunOptions, StudyError, merge, run};
+use hoid_thesis::plans::{find as find_plan, named_plans};
+use hoid_thesis::reproduction::{Reproduction, Told, reproduce as reproduce_into};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
@@ -35,10 +34,10 @@ impl PyPlan {
         let mut plan = match (path, text, name) {
             (Some(path), None, None) => Plan::read(&path)?,
             (None, Some(text), None) => Plan::parse(text, "(text)")?,
-            (None, None, Some(name)) => match NamedPlan::find(name) {
+            (None, None, Some(name)) => match find_plan(name) {
                 Some(named) => named.plan()?,
                 None => {
-                    let known: Vec<&str> = NAMED_PLANS.iter().chain(FURTHER_PLANS).map(|p| p.name).collect();
+                    let known: Vec<&str> = named_plans().map(|p| p.name).collect();
                     return Err(bad_option(format!(
                         "there is no file and no plan of the name {name}; the plans are {}",
                         known.join(", ")
@@ -162,11 +161,7 @@ pub fn plan_names() -> Outcome<Vec<(String, String)>> {
     let one = |named: &NamedPlan| -> Result<(String, String), StudyError> {
         Ok((named.name.to_owned(), named.plan()?.title))
     };
-    Ok(NAMED_PLANS
-        .iter()
-        .chain(FURTHER_PLANS)
-        .map(one)
-        .collect::<Result<_, _>>()?)
+    Ok(named_plans().map(one).collect::<Result<_, _>>()?)
 }
 
 /// Joins the shards of a study.

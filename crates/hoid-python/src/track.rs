@@ -2,12 +2,10 @@
 
 use std::path::PathBuf;
 
-use hoid_ident::{
-    Choice, IdentError,
-    tracking::{StartAt, Trace, TrackOptions, track as track_record},
-};
+use hoid_ident::{Choice, IdentError};
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 use hoid_report::{BatchLine, TraceSection, TrackReport, usual_batch_fits, write_report};
+use hoid_track::{StartAt, Trace, TrackOptions, track as track_record};
 use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyDict};
 
@@ -114,7 +112,7 @@ impl PyTrace {
     /// The changes that were declared, for the method adaptive.
     #[getter]
     fn changes<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let one = |(t, c): &(f64, hoid_ident::tracking::Change)| {
+        let one = |(t, c): &(f64, hoid_track::Change)| {
             let all = PyDict::new(py);
             all.set_item("t", t)?;
             all.set_item("seconds_ago", c.seconds_ago)?;

@@ -1,10 +1,8 @@
 //! `hoid.Tracker`: a recursive estimate, live.
 
-use hoid_ident::{
-    Choice, IdentError,
-    tracking::{Live, Sample, TrackPlan, Tracker, WarmUp},
-};
+use hoid_ident::{Choice, IdentError};
 use hoid_model::{Record, SampleTime};
+use hoid_track::{Live, Sample, TrackPlan, Tracker, WarmUp};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
 

@@ -3,7 +3,7 @@
 
 use std::error::Error;
 
-use hoid_ident::{Estimator, OrderRanges, choose_orders, order_search::Criterion};
+use hoid_ident::{Estimator, OrderRanges, choose_orders, order_selection::Criterion};
 use hoid_model::{
     Structure,
     margins::{MANUAL_CONTROL_RANGE_RAD_S, margins},

@@ -3,16 +3,14 @@
 
 use std::error::Error;
 
-use hoid_ident::{
-    Estimator, Fit,
-    tracking::{Method, StartAt, Trace, TrackOptions, track},
-};
+use hoid_ident::{Estimator, Fit};
 use hoid_model::{
     Record, Structure,
     scenario::{Condition, Scenario},
 };
 use hoid_report::{BatchLine, TraceSection, TrackReport};
 use hoid_sim::{Simulator, Stream};
+use hoid_track::{Method, StartAt, Trace, TrackOptions, track};
 
 /// Spans of the batch fits, s: before and after the change at 40.96 s.
 const SPANS: [(f64, f64); 2] = [(0.0, 30.72), (51.20, 81.92)];

@@ -32,18 +32,10 @@ pub enum ReportError {
         /// Name of the trace.
         name: String,
     },
-    /// A name that is neither a table nor a figure of the reproduction.
-    #[error("{name}: no table, figure or study is called so; expected {CLAIMS}, or a name, study or appendix of: {known}", CLAIMS = crate::reproduction::CLAIMS)]
-    UnknownItem {
-        /// The name.
-        name: String,
-        /// All names, separated by commas.
-        known: String,
-    },
     /// Tables that cannot be read, or a page that cannot be written.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// A study of the reproduction that failed.
+    /// A study that failed.
     #[error(transparent)]
     Study(Box<StudyError>),
     /// The page template could not be filled: a defect of this crate.

@@ -1,5 +1,5 @@
-//! Figures and the report of an identification. Data in, text out, but for two that work in directories: [`write_group_pages`] and
-//! [`reproduction::reproduce`]. Nothing here prints.
+//! Figures and the report of an identification. Data in, text out, but for [`write_group_pages`], which works in a directory. Nothing
+//! here prints.
 //!
 //! | module | what it holds |
 //! |---|---|
@@ -7,7 +7,6 @@
 //! | [`TrackReport`], [`TraceSection`], [`BatchLine`], [`batch_fit`], [`usual_batch_fits`] | one such page about recursive estimates over a record |
 //! | [`GroupReport`], [`GroupTables`] | one such page about a group of recorded runs |
 //! | [`figures`] | the figures of these pages, each as an SVG text of its own |
-//! | [`reproduction`] | tables, figures and claims of the reference text, from the results of studies |
 //! | [`numbers`] | numbers with as many digits as their standard error allows |
 
 mod error;
@@ -16,12 +15,11 @@ mod group;
 pub mod numbers;
 mod page;
 mod report;
-pub mod reproduction;
 mod tables;
 mod track;
 
 pub use error::ReportError;
 pub use group::{FrequencyTables, GroupReport, GroupTables, write_group_pages};
-pub use page::write_report;
+pub use page::{render_with, write_page, write_report};
 pub use report::{ModelSection, Report, known_operator};
 pub use track::{BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, usual_batch_fits};

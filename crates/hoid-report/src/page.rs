@@ -7,25 +7,35 @@ use minijinja::{Environment, UndefinedBehavior, Value, context};
 
 use crate::ReportError;
 
-const TEMPLATES: [(&str, &str); 6] = [
+const TEMPLATES: [(&str, &str); 5] = [
     ("report.html", include_str!("../templates/report.html")),
     ("track.html", include_str!("../templates/track.html")),
     ("group.html", include_str!("../templates/group.html")),
-    ("reproduction.html", include_str!("../templates/reproduction.html")),
     ("parts.html", include_str!("../templates/parts.html")),
     ("style.css", include_str!("../templates/style.css")),
 ];
 
-/// The page of a template with its values.
+/// The page of a template of this crate with its values.
 ///
 /// # Errors
 /// [`ReportError::Template`] for a defect of this crate.
-pub fn render(name: &str, values: Value) -> Result<String, ReportError> {
+pub(crate) fn render(name: &str, values: Value) -> Result<String, ReportError> {
+    render_with(&[], name, values)
+}
+
+/// The page of a template, which may be one of `own`: name and text of templates beside those of this crate, whose parts and style they
+/// can use.
+///
+/// # Errors
+/// [`ReportError::Template`] where the template cannot be filled.
+pub fn render_with(own: &[(&str, &str)], name: &str, values: Value) -> Result<String, ReportError> {
     let defect = |e: minijinja::Error| ReportError::Template { reason: e.to_string() };
     let mut environment = Environment::new();
     environment.set_undefined_behavior(UndefinedBehavior::SemiStrict);
-    for (name, source) in TEMPLATES {
-        environment.add_template(name, source).map_err(defect)?;
+    for &(name, source) in TEMPLATES.iter().chain(own) {
+        environment
+            .add_template_owned(name.to_owned(), source.to_owned())
+            .map_err(defect)?;
     }
     environment
         .get_template(name)
@@ -35,12 +45,15 @@ pub fn render(name: &str, values: Value) -> Result<String, ReportError> {
 }
 
 /// Names and values for the table of settings.
-pub fn facts(pairs: &[(String, String)]) -> Vec<Value> {
+pub(crate) fn facts(pairs: &[(String, String)]) -> Vec<Value> {
     pairs.iter().map(|(label, text)| context! { label, text }).collect()
 }
 
 /// Writes a page into a directory.
-pub fn write(directory: &Path, name: &str, html: &str) -> Result<PathBuf, ReportError> {
+///
+/// # Errors
+/// [`ReportError::Io`] when it cannot be written.
+pub fn write_page(directory: &Path, name: &str, html: &str) -> Result<PathBuf, ReportError> {
     let path = directory.join(name);
     write_atomically(&path, |file| file.write_all(html.as_bytes()))?;
     Ok(path)
@@ -52,5 +65,5 @@ pub fn write(directory: &Path, name: &str, html: &str) -> Result<PathBuf, Report
 /// [`ReportError::Io`] when it cannot be written.
 pub fn write_report(directory: &Path, html: &str) -> Result<PathBuf, ReportError> {
     make_directory(directory)?;
-    write(directory, "report.html", html)
+    write_page(directory, "report.html", html)
 }

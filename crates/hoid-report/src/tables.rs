@@ -2,7 +2,7 @@
 
 use hoid_ident::{
     Choice, Fit, InitialState, MarginEstimates,
-    order_search::Criterion,
+    order_selection::Criterion,
     validation::{Quality, Validation},
 };
 use hoid_model::{OperatorParameters, Record, remnant::RemnantDiscretisation, uncertainty::Estimate};

@@ -3,8 +3,8 @@
 
 use hoid_ident::{
     Choice, Estimator, Fit, MarginEstimates, OrderRanges, choose_orders,
-    describing::{Averaging, DescribingOptions, Excitation, describe},
-    order_search::Criterion,
+    frequency::{Averaging, DescribingOptions, Excitation, describe},
+    order_selection::Criterion,
 };
 use hoid_model::{
     Channel, OperatorParameters, Orders, Record, SampleTime, Structure,

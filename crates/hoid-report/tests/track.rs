@@ -1,16 +1,14 @@
 //! The page of recursive estimates, from simulated runs.
 #![allow(clippy::unwrap_used)]
 
-use hoid_ident::{
-    Estimator, Fit,
-    tracking::{Method, StartAt, StartCovariance, Trace, TrackOptions, track},
-};
+use hoid_ident::{Estimator, Fit};
 use hoid_model::{
     Channel, Orders, Record, Structure,
     scenario::{Condition, Scenario},
 };
 use hoid_report::{BatchLine, ReportError, TraceSection, TrackReport, batch_fit};
 use hoid_sim::{Simulator, Stream};
+use hoid_track::{Method, StartAt, StartCovariance, Trace, TrackOptions, track};
 
 const SPANS: [(f64, f64); 2] = [(0.0, 30.72), (51.20, 81.92)];
 

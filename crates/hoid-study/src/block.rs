@@ -1,9 +1,6 @@
 //! One block of a study: some replications of a cell, with all estimators of the cell.
 
-use hoid_ident::{
-    Fit, IdentError,
-    tracking::{Trace, track_from},
-};
+use hoid_ident::{Fit, IdentError};
 use hoid_io::OutputTable;
 use hoid_model::{
     Record,
@@ -13,6 +10,7 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate},
 };
 use hoid_sim::{Simulator, Stream};
+use hoid_track::{Trace, track_from};
 
 use crate::{
     batch_fits::BatchFits,

@@ -9,7 +9,6 @@
 //! | `run` | [`run`], [`merge`]: blocks over threads, parts on disk |
 //! | `summary`, [`statistics`] | what the replications of a cell say together |
 //! | `results`, `query`, `tables` | [`Results`]: a finished study read back, [`Query`]: which rows of it |
-//! | [`claims`] | statements of the reference text, tested by the results of the named plans |
 //! | [`group`] | recorded runs by subject and condition |
 //! | `manifest` | what stands beside the results, [`Shard`] |
 //!
@@ -24,7 +23,6 @@
 
 mod batch_fits;
 mod block;
-pub mod claims;
 mod columns;
 mod error;
 pub mod group;
@@ -45,7 +43,7 @@ pub use columns::OPERATOR;
 pub use error::StudyError;
 pub use manifest::Shard;
 pub use plan::{Plan, plan_schema};
-pub use plans::{FURTHER_PLANS, NAMED_PLANS, NamedPlan};
+pub use plans::{NamedPlan, PLANS};
 pub use query::Query;
 pub use results::{Bands, Results, SummaryRow, TraceSummary};
 pub use run::{Outcome, Progress, RunOptions, merge, run};

@@ -15,11 +15,9 @@
 //! - `noise_level_obtained`: `(var u - var u0) / var u` with u0 of the run without remnant (A.4), `noise_level_response`:
 //!   `var(u - u0) / var u`, which lacks the chance correlation of the two, and `noise_level_remnant`: `var n / var u`.
 
-use hoid_ident::{
-    Fit,
-    tracking::{StartAt, Trace},
-};
+use hoid_ident::Fit;
 use hoid_model::{Complex64, Orders, PolynomialModel, Record, Structure, uncertainty::OperatorEstimate};
+use hoid_track::{StartAt, Trace};
 
 use crate::{columns::TRACED, plan::Cell};
 

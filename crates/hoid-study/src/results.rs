@@ -121,7 +121,7 @@ pub struct Bands {
 
 impl Bands {
     /// Monte Carlo error of the median of a point, taken as that of a normal sample of the same interquartile range.
-    pub(crate) fn error_of_median(&self, point: usize, replications: u64) -> f64 {
+    pub fn error_of_median(&self, point: usize, replications: u64) -> f64 {
         match replications {
             0 | 1 => 0.0,
             n => 0.93 * (self.upper_quartile[point] - self.lower_quartile[point]) / (n as f64).sqrt(),
@@ -253,12 +253,12 @@ impl Results {
     }
 
     /// How many estimators in how many cells a query describes, whatever their quantities.
-    pub(crate) fn describes(&self, query: &Query) -> usize {
+    pub fn describes(&self, query: &Query) -> usize {
         self.pairs.iter().filter(|pair| query.takes(&pair.subject)).count()
     }
 
     /// Whether there are values of the quantity of a query.
-    pub(crate) fn has_quantity(&self, query: &Query) -> bool {
+    pub fn has_quantity(&self, query: &Query) -> bool {
         let column = query
             .quantity()
             .map(|quantity| quantity.strip_prefix("bias_").unwrap_or(quantity));
@@ -266,7 +266,7 @@ impl Results {
     }
 
     /// The first estimator that a query describes.
-    pub(crate) fn estimator(&self, query: &Query) -> Option<&EstimatorCell> {
+    pub fn estimator(&self, query: &Query) -> Option<&EstimatorCell> {
         let pair = self.pairs.iter().find(|pair| query.takes(&pair.subject));
         pair.map(|pair| &self.plan.estimators[pair.estimator])
     }
@@ -433,6 +433,9 @@ fn subject(cell: &Cell, estimator: &EstimatorCell) -> Subject {
         decimate: estimator.decimate,
     }
 }
+
+#[cfg(any(test, feature = "synthetic"))]
+mod synthetic;
 
 #[cfg(test)]
 #[path = "results_tests.rs"]

@@ -1,7 +1,7 @@
 //! What a study measures of a person who changes.
 #![allow(clippy::unwrap_used)]
 
-use hoid_study::{NamedPlan, Plan, Query, Results, RunOptions, run};
+use hoid_study::{PLANS, Plan, Query, Results, RunOptions, run};
 
 const PLAN: &str = r#"
 name = "changes"
@@ -67,7 +67,12 @@ fn changes_there_and_back_are_found_and_measured() {
 
 #[test]
 fn the_comparison_has_nine_methods_in_all_kinds_of_change() {
-    let plan = NamedPlan::find("adaptation").unwrap().plan().unwrap();
+    let plan = PLANS
+        .iter()
+        .find(|plan| plan.name == "adaptation")
+        .unwrap()
+        .plan()
+        .unwrap();
     // Two of the methods once more with the delay tracked.
     assert_eq!((plan.cells.len(), plan.estimators.len()), (133, 11));
 }

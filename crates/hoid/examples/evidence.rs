@@ -10,7 +10,7 @@
 mod textbook;
 
 use hoid::{
-    ident::{GreyBox, OrderRanges, choose_orders, order_search::Criterion},
+    ident::{GreyBox, OrderRanges, choose_orders, order_selection::Criterion},
     model::{
         remnant::RemnantDiscretisation,
         remnant_gain::NoiseDefinition,

@@ -9,8 +9,8 @@
 use std::{hint::black_box, time::Instant};
 
 use hoid::{
-    ident::tracking::{Method, StartAt, TrackOptions, Tracker},
     prelude::*,
+    track::{Method, StartAt, TrackOptions, Tracker},
 };
 
 fn main() {

@@ -8,12 +8,12 @@
 use std::collections::BTreeMap;
 
 use hoid::{
-    ident::tracking::{Memory, Method, Stable, StartAt, StartCovariance, Trace, TrackOptions, Tracker, track},
     model::{
         remnant_gain::NoiseDefinition,
         scenario::{Realisation, RemnantStrength},
     },
     prelude::*,
+    track::{Memory, Method, Stable, StartAt, StartCovariance, Trace, TrackOptions, Tracker, track},
 };
 use rayon::prelude::*;
 

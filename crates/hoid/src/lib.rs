@@ -27,6 +27,8 @@ pub use hoid_model as model;
 pub use hoid_report as report;
 pub use hoid_sim as sim;
 pub use hoid_study as study;
+pub use hoid_thesis as thesis;
+pub use hoid_track as track;
 
 /// What most programs use.
 pub mod prelude {

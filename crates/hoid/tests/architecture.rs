@@ -6,15 +6,26 @@ use std::{collections::BTreeMap, process::Command};
 use serde_json::Value;
 
 /// What each crate may depend on within the workspace.
-const ALLOWED: [(&str, &[&str]); 12] = [
+const ALLOWED: [(&str, &[&str]); 14] = [
     ("hoid-core", &[]),
     ("hoid-model", &["hoid-core"]),
     ("hoid-ident", &["hoid-core", "hoid-lanes", "hoid-model"]),
     ("hoid-lanes", &["hoid-core"]),
+    ("hoid-track", &["hoid-core", "hoid-ident", "hoid-model"]),
     ("hoid-sim", &["hoid-core", "hoid-lanes", "hoid-model"]),
     ("hoid-io", &["hoid-model"]),
-    ("hoid-study", &["hoid-model", "hoid-ident", "hoid-sim", "hoid-io"]),
-    ("hoid-report", &["hoid-model", "hoid-ident", "hoid-io", "hoid-study"]),
+    (
+        "hoid-thesis",
+        &["hoid-model", "hoid-io", "hoid-track", "hoid-study", "hoid-report"],
+    ),
+    (
+        "hoid-study",
+        &["hoid-model", "hoid-ident", "hoid-sim", "hoid-track", "hoid-io"],
+    ),
+    (
+        "hoid-report",
+        &["hoid-model", "hoid-ident", "hoid-io", "hoid-study", "hoid-track"],
+    ),
     (
         "hoid",
         &[
@@ -25,6 +36,8 @@ const ALLOWED: [(&str, &[&str]); 12] = [
             "hoid-sim",
             "hoid-io",
             "hoid-study",
+            "hoid-thesis",
+            "hoid-track",
             "hoid-report",
         ],
     ),
@@ -36,6 +49,8 @@ const ALLOWED: [(&str, &[&str]); 12] = [
             "hoid-sim",
             "hoid-io",
             "hoid-study",
+            "hoid-thesis",
+            "hoid-track",
             "hoid-report",
         ],
     ),
@@ -48,6 +63,8 @@ const ALLOWED: [(&str, &[&str]); 12] = [
             "hoid-study",
             "hoid-io",
             "hoid-report",
+            "hoid-thesis",
+            "hoid-track",
         ],
     ),
     ("xtask", &[]),

@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid::{
-    ident::tracking::{Method, StartAt, TrackOptions, track},
     model::{remnant_gain::NoiseDefinition, scenario::RemnantStrength},
     prelude::*,
+    track::{Method, StartAt, TrackOptions, track},
 };
 
 const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
@@ -139,9 +139,7 @@ fn a_delay_that_changes_is_followed_and_named() {
         assert_eq!((delay[0], delay[8191]), (0.28, 0.34));
         let trace = track(&record, &tracked, 8).unwrap();
         assert_eq!(trace.operator_columns()[5], "tau_e");
-        let named = |(t, c): &&(f64, hoid::ident::tracking::Change)| {
-            (40.96..46.0).contains(t) && c.changed().contains(&"tau_e")
-        };
+        let named = |(t, c): &&(f64, hoid::track::Change)| (40.96..46.0).contains(t) && c.changed().contains(&"tau_e");
         let (_, change) = trace.changes().iter().find(named).unwrap();
         assert!(change.tau_e_s[1].value - change.tau_e_s[0].value > 0.04, "{change:?}");
         for t in [35.0, 60.0, 81.0] {
@@ -177,7 +175,7 @@ fn a_delay_that_changes_is_followed_and_named() {
 
 #[test]
 fn what_has_a_model_of_the_change_takes_no_memory() {
-    use hoid::ident::tracking::{Memory, StartCovariance};
+    use hoid::track::{Memory, StartCovariance};
     for method in [Method::Ekf, Method::Ukf, Method::Adaptive] {
         let with_memory = TrackOptions {
             memory: Some(Memory::Samples(256.0)),

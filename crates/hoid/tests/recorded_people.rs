@@ -7,7 +7,7 @@
 use std::{env, path::PathBuf};
 
 use hoid::{
-    ident::order_search::Criterion,
+    ident::order_selection::Criterion,
     io::{ReadOptions, read_record},
     model::{
         ContinuousTransferFunction,

@@ -7,7 +7,7 @@
 use std::{env, path::Path};
 
 use hoid::{
-    ident::describing::{
+    ident::frequency::{
         Averaging, DescribingOptions, Excitation, GainLeadDelayOptions, LineSearch, MeasuredElement, describe,
     },
     io::{ReadOptions, read_record},

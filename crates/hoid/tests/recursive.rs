@@ -5,9 +5,9 @@
 use std::collections::BTreeMap;
 
 use hoid::{
-    ident::tracking::{ForgettingRule, Memory, Method, Stable, StartAt, StartCovariance, TrackOptions, Tracker, track},
     model::{remnant_gain::NoiseDefinition, scenario::RemnantStrength},
     prelude::*,
+    track::{ForgettingRule, Memory, Method, Stable, StartAt, StartCovariance, TrackOptions, Tracker, track},
 };
 
 const NK: usize = 29;

@@ -3,9 +3,9 @@
 use std::{ops::RangeInclusive, path::PathBuf};
 
 use clap::{Args, ValueEnum};
-use hoid_ident::tracking::{Memory, Method, Stable};
 use hoid_io::Scaling;
 use hoid_model::Structure;
+use hoid_track::{Memory, Method, Stable};
 
 use super::{CriterionName, ReadArgs, parse_span};
 use crate::orders::parse_range;

@@ -3,10 +3,7 @@
 
 use std::path::PathBuf;
 
-use hoid_ident::{
-    Choice, Estimator, Fit, choose_orders, order_search,
-    tracking::{Method, OPERATOR_COLUMNS, StartAt, Trace, TrackOptions, track},
-};
+use hoid_ident::{Choice, Estimator, Fit, choose_orders, order_selection};
 use hoid_io::{make_directory, write_record};
 use hoid_model::{
     Record, Structure,
@@ -15,6 +12,7 @@ use hoid_model::{
 };
 use hoid_report::{BatchLine, ModelSection, Report, TraceSection, TrackReport, known_operator, numbers, write_report};
 use hoid_sim::{Simulator, Stream};
+use hoid_track::{Method, OPERATOR_COLUMNS, StartAt, Trace, TrackOptions, track};
 
 use crate::{args::DemoArgs, commands::track::relative_errors, error::CliError, output, text};
 
@@ -156,10 +154,10 @@ fn report_of_traces(
 /// Box-Jenkins with nk and nd searched as `hoid identify` does by default, and ARX with the same delay.
 fn identify(name: &'static str, record: Record) -> Result<Stage, CliError> {
     let structure = Structure::BoxJenkins;
-    let ranges = order_search::default_operator_ranges(structure, record.sample_time());
+    let ranges = order_selection::default_operator_ranges(structure, record.sample_time());
     let records = [record];
     let template = Estimator::new(structure, structure.operator_orders(1));
-    let choice = choose_orders(&template, &ranges, order_search::Criterion::Bic, &records)?;
+    let choice = choose_orders(&template, &ranges, order_selection::Criterion::Bic, &records)?;
     let nk = choice.fit.orders().nk;
     let arx = Estimator::new(Structure::Arx, Structure::Arx.operator_orders(nk)).fit(&records)?;
     let [record] = records;

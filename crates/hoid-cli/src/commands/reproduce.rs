@@ -2,8 +2,8 @@
 
 use std::sync::atomic::Ordering;
 
-use hoid_report::{
-    ReportError,
+use hoid_thesis::{
+    ThesisError,
     reproduction::{CLAIMS, Reproduction, Told, items, reproduce},
 };
 
@@ -44,7 +44,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
     let found = reproduce(&wanted, &args.out, &tell, &|| !stopped.load(Ordering::Relaxed));
     bar.finish_and_clear();
     let found = found.map_err(|error| match error {
-        ReportError::UnknownItem { name, .. } => CliError::Usage(format!(
+        ThesisError::UnknownItem { name, .. } => CliError::Usage(format!(
             "--only {name}: no table, figure or study is called so; `hoid reproduce --list` lists them"
         )),
         other => other.into(),

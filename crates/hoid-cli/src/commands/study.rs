@@ -8,7 +8,8 @@ use std::{
     },
 };
 
-use hoid_study::{FURTHER_PLANS, NAMED_PLANS, NamedPlan, Outcome, Plan, RunOptions, merge, plan_schema, run};
+use hoid_study::{Outcome, Plan, RunOptions, merge, plan_schema, run};
+use hoid_thesis::plans::{find as find_plan, named_plans};
 use serde_json::json;
 
 use crate::{
@@ -36,7 +37,7 @@ pub fn run_command(command: &StudyCommand) -> Result<(), CliError> {
 /// A plan by its file, or else by its name.
 fn plan_of(path: &Path) -> Result<Plan, CliError> {
     if !path.exists()
-        && let Some(named) = path.to_str().and_then(NamedPlan::find)
+        && let Some(named) = path.to_str().and_then(find_plan)
     {
         return Ok(named.plan()?);
     }
@@ -187,7 +188,7 @@ fn description(plan: &Plan) -> String {
 fn list(name: Option<&str>) -> Result<(), CliError> {
     let Some(name) = name else {
         let mut text = String::new();
-        for named in NAMED_PLANS.iter().chain(FURTHER_PLANS) {
+        for named in named_plans() {
             let plan = named.plan()?;
             text.push_str(&format!(
                 "{:22} {} ({} estimates)\n",
@@ -199,8 +200,8 @@ fn list(name: Option<&str>) -> Result<(), CliError> {
         output::print(&text);
         return Ok(());
     };
-    let named = NamedPlan::find(name).ok_or_else(|| {
-        let known: Vec<&str> = NAMED_PLANS.iter().chain(FURTHER_PLANS).map(|p| p.name).collect();
+    let named = find_plan(name).ok_or_else(|| {
+        let known: Vec<&str> = named_plans().map(|p| p.name).collect();
         CliError::Usage(format!(
             "no plan is called {name}; expected one of {}",
             known.join(", ")

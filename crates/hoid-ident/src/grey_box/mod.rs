@@ -24,9 +24,9 @@ use hoid_model::{PolynomialModel, Record, SampleTime, Structure, remnant::HIGHES
 use crate::{
     Constraint, Fit, IdentError, InitialState, Reason, SearchOptions, checks,
     fit::Physical,
-    information::inverse_of_free,
-    prediction_error::{Data, Workspace, first_residual, output_variance},
-    search::{Minimum, Objective, lies_in_basin},
+    linalg::information::inverse_of_free,
+    optimize::{Minimum, Objective, lies_in_basin},
+    pem::criterion::{Data, Workspace, first_residual, output_variance},
 };
 
 pub use layout::GREY_BOX_NAMES;

@@ -6,9 +6,10 @@
 
 use crate::{
     IdentError, InitialState,
-    least_squares::dot,
-    prediction_error::{Criterion, Data, Linearisation, Workspace},
-    search::{Minimum, Objective, SearchOptions, minimise},
+    linalg::least_squares::dot,
+    optimize::Linearisation,
+    optimize::{Minimum, Objective, SearchOptions, minimise},
+    pem::criterion::{Criterion, Data, Workspace},
 };
 
 use super::layout::{DELAY, Layout, Polynomials};
@@ -164,7 +165,7 @@ impl<'a> PhysicalCriterion<'a> {
 
     /// Elements of eta with a variance: not fixed, and not held at a bound of the user. A kink of the loss is no bound.
     pub fn free(&self, eta: &[f64], descent: &[f64]) -> Vec<usize> {
-        crate::search::free_parameters(self, eta, descent)
+        crate::optimize::free_parameters(self, eta, descent)
     }
 
     /// What the polynomials of a record are at eta.
@@ -177,6 +178,8 @@ impl<'a> PhysicalCriterion<'a> {
 const NEAR_BORDER: f64 = 1e-6;
 
 impl Objective for PhysicalCriterion<'_> {
+    type Workspace = Workspace;
+
     fn is_feasible(&self, eta: &[f64]) -> bool {
         eta.iter().all(|v| v.is_finite())
             && (0..self.data.len()).all(|record| {
@@ -235,7 +238,7 @@ mod tests {
     use hoid_model::SampleTime;
 
     use super::*;
-    use crate::{Constraint, prediction_error::first_residual};
+    use crate::{Constraint, pem::criterion::first_residual};
 
     fn signals(n: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
         let mut state = 7_u64;

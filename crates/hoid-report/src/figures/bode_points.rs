@@ -3,7 +3,7 @@
 //! The phase of a point is known but for whole turns. It is drawn on the branch that is nearest to the first curve, and without a
 //! curve unwrapped from point to point with the delay of the points taken out.
 
-use hoid_ident::describing::DescribingFunction;
+use hoid_ident::frequency::DescribingFunction;
 use hoid_model::uncertainty::Estimate;
 use kuva::render::render::Scene;
 

@@ -1,6 +1,7 @@
 //! Coefficients by name, across structures: the poles of the operator stand in A of an ARX model and in F of a Box-Jenkins model.
 
-use hoid_ident::{Fit, tracking::Trace};
+use hoid_ident::Fit;
+use hoid_track::Trace;
 
 /// A coefficient such as b0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

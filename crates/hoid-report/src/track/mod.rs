@@ -6,11 +6,9 @@ mod panels;
 mod tables;
 mod truth;
 
-use hoid_ident::{
-    Estimator, Fit, IdentError,
-    tracking::{StartAt, Trace},
-};
+use hoid_ident::{Estimator, Fit, IdentError};
 use hoid_model::{Orders, Record};
+use hoid_track::{StartAt, Trace};
 use minijinja::{Value, context};
 
 use crate::{ReportError, figures, page, tables as of_fits};

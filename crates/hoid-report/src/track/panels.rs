@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use hoid_ident::tracking::{OPERATOR_COLUMNS, StartAt};
 use hoid_model::{NotConvertible, Record, uncertainty::Estimate, uncertainty::OperatorEstimate};
+use hoid_track::{OPERATOR_COLUMNS, StartAt};
 
 use super::{
     TraceSection,

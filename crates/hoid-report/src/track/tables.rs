@@ -2,8 +2,8 @@
 
 use std::mem::discriminant;
 
-use hoid_ident::tracking::{Change, ForgettingRule, Memory, Method, StartAt, StartCovariance, TrackOptions};
 use hoid_model::{NotConvertible, Record, uncertainty::Estimate};
+use hoid_track::{Change, ForgettingRule, Memory, Method, StartAt, StartCovariance, TrackOptions};
 use minijinja::{Value, context};
 
 use super::{

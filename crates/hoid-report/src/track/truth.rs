@@ -1,7 +1,7 @@
 //! What the recursion should have found, where the record says it: the columns of a simulation.
 
-use hoid_ident::tracking::Trace;
 use hoid_model::{OperatorParameters, Record};
+use hoid_track::Trace;
 
 use super::coefficients::{Coefficient, of_trace};
 

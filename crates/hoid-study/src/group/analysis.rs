@@ -11,15 +11,13 @@
 use std::path::Path;
 
 use hoid_ident::{
-    Estimator, Fit, GreyBox, OrderRanges, choose_orders,
-    describing::Crossover,
-    order_search::Criterion,
-    tracking::{Method, StartAt, TrackOptions, track},
+    Estimator, Fit, GreyBox, OrderRanges, choose_orders, frequency::Crossover, order_selection::Criterion,
 };
 use hoid_io::{OutputTable, TableSchema};
 use hoid_model::{
     Complex64, ContinuousTransferFunction, Record, Structure, remnant::RemnantDiscretisation, uncertainty::Estimate,
 };
+use hoid_track::{Method, StartAt, TrackOptions, track};
 
 use super::{
     frequency::transfer_function,

@@ -1,4 +1,4 @@
-//! Describing functions of a group, by Fourier coefficients at the lines of the excitation (see [`hoid_ident::describing`]).
+//! Describing functions of a group, by Fourier coefficients at the lines of the excitation (see [`hoid_ident::frequency`]).
 //!
 //! For each subject and each condition whose excitation the manifest names: the describing function over the runs that can be read, crossover and
 //! phase margin with the controlled element, and gain, lead and delay. They stand beside the parametric fits and assume nothing of their structure.
@@ -14,7 +14,7 @@
 
 use std::path::Path;
 
-use hoid_ident::describing::{
+use hoid_ident::frequency::{
     Averaging, DescribingFunction, DescribingOptions, Excitation, GainLeadDelayOptions, Line, LineSearch, describe,
 };
 use hoid_io::OutputTable;

@@ -34,8 +34,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use hoid_ident::tracking::Method;
 use hoid_io::Preparation;
+use hoid_track::Method;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

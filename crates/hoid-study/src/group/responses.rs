@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_ident::describing::Crossover;
+use hoid_ident::frequency::Crossover;
 use hoid_io::{OutputTable, TableSchema};
 use hoid_model::{Complex64, ContinuousTransferFunction};
 

@@ -4,9 +4,9 @@
 //! The covariance of the errors of two coefficients is their correlation times both standard errors; the figures of appendix I of the reference text show it
 //! for RPEM. The response at a frequency between the lines of the excitation is determined where single parameters are not.
 
-use hoid_ident::tracking::{Method, Trace};
 use hoid_io::TableSchema;
 use hoid_model::PolynomialModel;
+use hoid_track::{Method, Trace};
 
 use super::{
     manifest::{Analysis, RunEntry},

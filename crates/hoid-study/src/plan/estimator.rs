@@ -13,11 +13,9 @@
 
 use std::collections::BTreeMap;
 
-use hoid_ident::{
-    Estimator, GreyBox,
-    tracking::{Method, StartAt, TrackOptions},
-};
+use hoid_ident::{Estimator, GreyBox};
 use hoid_model::{Detrend, Orders, SampleTime, Structure, scenario::ResolvedScenario};
+use hoid_track::{Method, StartAt, TrackOptions};
 
 use super::{
     PlanProblem,

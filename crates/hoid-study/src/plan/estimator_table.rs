@@ -2,11 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use hoid_ident::{
-    Estimator, GreyBox, IdentError, InitialState, SearchOptions,
-    tracking::{ForgettingRule, Memory, Method, Stable, StartAt, StartCovariance, TrackOptions},
-};
+use hoid_ident::{Estimator, GreyBox, IdentError, InitialState, SearchOptions};
 use hoid_model::{Detrend, Orders, Structure};
+use hoid_track::{ForgettingRule, Memory, Method, Stable, StartAt, StartCovariance, TrackOptions};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

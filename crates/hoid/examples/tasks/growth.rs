@@ -12,8 +12,8 @@
 use std::{hint::black_box, time::Instant};
 
 use hoid::{
-    ident::tracking::{Method, StartAt, StartCovariance, TrackOptions, track},
     prelude::*,
+    track::{Method, StartAt, StartCovariance, TrackOptions, track},
 };
 
 use super::{data::NK, traced};

@@ -38,14 +38,12 @@ use hoid::{
         rls::Rls,
         rpem::Rpem,
     },
-    ident::{
-        order_search::Criterion,
-        tracking::{Memory, Method, StartAt, StartCovariance, TrackOptions, track},
-    },
+    ident::order_selection::Criterion,
     lanes::Path as LanesPath,
     prelude::*,
-    report::reproduction::{Reproduction, reproduce},
     sim::Signals,
+    thesis::reproduction::{Reproduction, reproduce},
+    track::{Memory, Method, StartAt, StartCovariance, TrackOptions, track},
 };
 
 /// Start of the recursive prediction-error method: b0, b1, d1, f1, f2.

@@ -3,7 +3,7 @@
 use hoid_ident::{
     Choice, Estimator, Fit, GreyBox, GreyBoxFit, InitialState, InstrumentalVariable, Instruments, IvMethod, Loss,
     SearchOptions,
-    order_search::{OrderRanges, fit_or_choose},
+    order_selection::{OrderRanges, fit_or_choose},
 };
 use hoid_model::{Record, Structure};
 

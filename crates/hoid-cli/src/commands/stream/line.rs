@@ -1,10 +1,10 @@
 //! One line of the output.
 
-use hoid_ident::tracking::{Change, Live, Tracker};
 use hoid_model::{
     NotConvertible,
     uncertainty::{Estimate, OperatorEstimate},
 };
+use hoid_track::{Change, Live, Tracker};
 use serde::{Serialize, Serializer, ser::SerializeMap};
 use serde_json::Value;
 

@@ -14,11 +14,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use hoid_ident::{
-    Choice,
-    tracking::{Change, Live, LiveOutcome, Sample, TrackOptions},
-};
+use hoid_ident::Choice;
 use hoid_model::SampleTime;
+use hoid_track::{Change, Live, LiveOutcome, Sample, TrackOptions};
 
 use crate::{
     args::StreamArgs,

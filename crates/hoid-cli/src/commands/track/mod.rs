@@ -5,9 +5,9 @@ mod result;
 
 pub use result::relative_errors;
 
-use hoid_ident::tracking::{Method, StartAt, TrackOptions, track};
 use hoid_io::{check_table_path, write_table};
 use hoid_model::Record;
+use hoid_track::{Method, StartAt, TrackOptions, track};
 
 use crate::{args::TrackArgs, error::CliError, json, output, recursion, recursion::Plan};
 use result::Tracked;

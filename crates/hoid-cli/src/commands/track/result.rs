@@ -2,10 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_ident::{
-    Choice, Fit,
-    tracking::{Trace, value_of},
-};
+use hoid_ident::{Choice, Fit};
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 use hoid_model::{
     NotConvertible, Record,
@@ -13,6 +10,7 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate},
 };
 use hoid_report::numbers;
+use hoid_track::{Trace, value_of};
 use serde_json::{Map, Value, json};
 
 use crate::{

@@ -1,0 +1,99 @@
+//! Poles by linear least squares: of an ARX model, of one of high order, and by the iteration of Steiglitz and McBride.
+
+use hoid_core::{
+    filter::{divide_in_place, moving_sum},
+    stability::MAX_ORDER,
+};
+use hoid_model::{Orders, polynomial::reflected_inside};
+
+use crate::pem::criterion::{Criterion, Data, InitialState, Workspace, first_residual};
+
+/// Steps of Steiglitz and McBride.
+const STEIGLITZ_MCBRIDE_STEPS: usize = 4;
+
+/// A of an ARX fit with as many poles as F has, unstable ones reflected into the circle.
+pub(crate) fn arx_poles(criterion: &Criterion<'_>, data: &[Data<'_>], workspace: &mut Workspace) -> Option<Vec<f64>> {
+    let orders = Orders {
+        na: criterion.orders.nf,
+        nb: criterion.orders.nb,
+        nk: criterion.orders.nk,
+        ..Orders::default()
+    };
+    let equation_error = Criterion {
+        orders,
+        data: data.to_vec(),
+        initial: InitialState::Estimate,
+        first: criterion.first.max(first_residual(&orders, InitialState::Estimate)),
+        weights: None,
+    };
+    if data.iter().any(|d| d.u.len() <= equation_error.first) {
+        return None;
+    }
+    let (theta, _) = equation_error.best_linear_part(&vec![0.0; orders.parameters()], workspace)?;
+    reflected_inside(&theta[..orders.na])
+}
+
+/// F of the noise-free response of an ARX model of high order.
+pub(crate) fn reduced_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Option<Vec<f64>> {
+    let o = criterion.orders;
+    let orders = Orders {
+        na: (o.nf + HIGHER).min(MAX_ORDER),
+        nb: (o.nb + HIGHER).min(MAX_ORDER),
+        nk: o.nk,
+        ..Orders::default()
+    };
+    let high = Criterion {
+        orders,
+        initial: InitialState::Estimate,
+        first: criterion.first.max(first_residual(&orders, InitialState::Estimate)),
+        ..criterion.clone()
+    };
+    if high.data.iter().any(|d| d.u.len() <= high.first + orders.parameters()) {
+        return None;
+    }
+    let (theta, _) = high.best_linear_part(&vec![0.0; orders.parameters()], workspace)?;
+    let a = reflected_inside(&theta[..orders.na])?;
+    let responses: Vec<Vec<f64>> = high
+        .data
+        .iter()
+        .map(|d| {
+            let mut w = vec![0.0; d.u.len()];
+            moving_sum(&theta[orders.na..], o.nk, d.e, &mut w);
+            divide_in_place(&a, &mut w);
+            w
+        })
+        .collect();
+    let clean = Criterion {
+        data: high
+            .data
+            .iter()
+            .zip(&responses)
+            .map(|(d, w)| Data { e: d.e, u: w })
+            .collect(),
+        ..criterion.clone()
+    };
+    let f = arx_poles(&clean, &clean.data, workspace)?;
+    steiglitz_mcbride(&clean, f, workspace)
+}
+
+/// Coefficients that the high-order ARX model has more in A and in B.
+const HIGHER: usize = 8;
+
+pub(crate) fn steiglitz_mcbride(
+    criterion: &Criterion<'_>,
+    mut f: Vec<f64>,
+    workspace: &mut Workspace,
+) -> Option<Vec<f64>> {
+    let mut filtered: Vec<(Vec<f64>, Vec<f64>)> = criterion.data.iter().map(|d| (d.e.to_vec(), d.u.to_vec())).collect();
+    for _ in 0..STEIGLITZ_MCBRIDE_STEPS {
+        for ((e, u), d) in filtered.iter_mut().zip(&criterion.data) {
+            e.copy_from_slice(d.e);
+            u.copy_from_slice(d.u);
+            divide_in_place(&f, e);
+            divide_in_place(&f, u);
+        }
+        let data: Vec<Data<'_>> = filtered.iter().map(|(e, u)| Data { e, u }).collect();
+        f = arx_poles(criterion, &data, workspace)?;
+    }
+    Some(f)
+}

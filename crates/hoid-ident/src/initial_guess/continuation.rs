@@ -1,0 +1,284 @@
+//! A start from the low-passed record: few samples, and a loss with few minima.
+//!
+//! Input and output pass the same moving average over K samples and are taken every K samples; the system between them is, at
+//! low frequencies, the same with its poles raised to the power K. There the search runs to its end from each of a few poles
+//! of the grid for about 1/K of the cost, and the poles of the minimum that it finds, taken back by the K-th root, start the
+//! search on the record itself. The delay becomes a fraction of a sample, so that B gets one coefficient more.
+//!
+//! Only a start: where the system is fast beside K samples it is a bad one, and others are asked as well.
+
+use hoid_model::{Complex64, Orders, SampleTime, polynomial, polynomial_model::monic};
+
+use crate::{
+    initial_guess::{pole_grid::pole_grid, start::Start},
+    optimize::Linearisation,
+    optimize::multistart::MultiStart,
+    optimize::{Objective, SearchMethod, SearchOptions},
+    pem::criterion::{Block, Criterion, Data, InitialState, Workspace, first_residual},
+    pem::linearisation_client::LinearisationClient,
+};
+
+/// Samples that each record keeps at least.
+const SAMPLES_LEFT: usize = 800;
+/// Largest K.
+const LARGEST_FACTOR: usize = 8;
+/// Coefficients of D that a start needs at most.
+const LARGEST_ND: usize = 2;
+/// Poles of the grid from which the search runs.
+const SEARCHED: usize = 2;
+/// The search on the averaged record.
+const SEARCH: SearchOptions = SearchOptions {
+    method: SearchMethod::LevenbergMarquardt,
+    max_iterations: 30,
+    tolerance: 1e-6,
+};
+
+/// `|ln z|` of a pole of the averaged record below which it lies well inside what the average leaves (its Nyquist frequency
+/// is pi).
+const SLOW: f64 = 1.3;
+
+/// What the averaged record proposes.
+#[derive(Debug, Default)]
+pub(crate) struct Slow {
+    /// Polynomials F, best first; none where the records are short or the model has no poles in F alone.
+    pub f: Vec<Vec<f64>>,
+    /// True when all poles of the best one are slow beside the average, so that it says nearly all that the record does.
+    pub complete: bool,
+}
+
+/// Proposals for F.
+pub(crate) fn slow_poles(criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> Slow {
+    let Some(averaged) = Averaged::of(criterion, sample_time) else {
+        return Slow::default();
+    };
+    let low = averaged.criterion();
+    let mut continuation = Continuation::new(&averaged, &low);
+    while let Some(theta) = continuation.asked() {
+        let there = match continuation.block() {
+            Some(block) => low.linearise_block(theta, block, workspace),
+            None => low.linearise(theta, workspace),
+        };
+        continuation.take(there, workspace);
+    }
+    continuation.slow()
+}
+
+/// The averaged records of a criterion.
+pub(crate) struct Averaged {
+    factor: usize,
+    orders: Orders,
+    sample_time: SampleTime,
+    records: Vec<[Vec<f64>; 2]>,
+}
+
+impl Averaged {
+    /// `None` where the records are too short, or the model has no poles in F alone.
+    pub fn of(criterion: &Criterion<'_>, sample_time: SampleTime) -> Option<Self> {
+        let shortest = criterion.data.iter().map(|d| d.u.len()).min().unwrap_or(0);
+        let factor = (shortest / SAMPLES_LEFT).min(LARGEST_FACTOR);
+        let o = criterion.orders;
+        if factor < 2 || o.nf == 0 || o.na > 0 {
+            return None;
+        }
+        let orders = Orders {
+            nb: o.nb + 1,
+            nd: (o.nc + o.nd).min(LARGEST_ND),
+            nf: o.nf,
+            nk: o.nk / factor,
+            ..Orders::default()
+        };
+        let needed = first_residual(&orders, InitialState::Estimate) + orders.parameters() + orders.nf;
+        let sample_time = SampleTime::new(sample_time.s() * factor as f64).ok()?;
+        (shortest / factor > needed).then(|| Self {
+            factor,
+            orders,
+            sample_time,
+            records: (criterion.data.iter())
+                .map(|d| [averaged(d.e, factor), averaged(d.u, factor)])
+                .collect(),
+        })
+    }
+
+    /// The criterion over them.
+    pub fn criterion(&self) -> Criterion<'_> {
+        Criterion {
+            orders: self.orders,
+            data: self.records.iter().map(|[e, u]| Data { e, u }).collect(),
+            initial: InitialState::Estimate,
+            first: first_residual(&self.orders, InitialState::Estimate),
+            weights: None,
+        }
+    }
+}
+
+/// The search on the averaged records: the places of the pole grid are ranked with one noise model, that of the first of them, and the best
+/// are searched from.
+pub(crate) struct Continuation<'c> {
+    low: &'c Criterion<'c>,
+    factor: usize,
+    grid: Vec<Vec<f64>>,
+    /// The noise model of the ranking, once it is known.
+    noise: Option<Vec<f64>>,
+    /// The place of the grid that is tried, and its number.
+    trial: Option<Start>,
+    tried: usize,
+    ranked: Vec<Start>,
+    searches: Option<MultiStart<'c, Criterion<'c>>>,
+}
+
+impl<'c> Continuation<'c> {
+    /// On these records, of which `low` is the criterion.
+    pub fn new(averaged: &Averaged, low: &'c Criterion<'c>) -> Self {
+        let grid = pole_grid(low.orders.nf, averaged.sample_time);
+        let mut continuation = Self {
+            low,
+            factor: averaged.factor,
+            grid: grid.into_iter().map(|(_, f)| f).collect(),
+            noise: (low.orders.nd == 0).then(Vec::new),
+            trial: None,
+            tried: 0,
+            ranked: Vec::new(),
+            searches: None,
+        };
+        continuation.go_on();
+        continuation
+    }
+
+    /// To the next place of the grid, and from the last to the searches.
+    fn go_on(&mut self) {
+        let o = &self.low.orders;
+        let start = |noise: &[f64], f: &[f64], left| {
+            Start::to_be_found("pole grid", [&vec![0.0; o.nb], noise, f].concat(), left)
+        };
+        self.trial = match (&self.noise, self.grid.get(self.tried)) {
+            (None, Some(f)) => Some(start(&vec![0.0; o.nd], f, vec![Block::D, Block::B])),
+            (Some(noise), Some(f)) => Some(start(noise, f, vec![Block::B])),
+            (_, None) => None,
+        };
+        if self.trial.is_none() {
+            let mut ranked = std::mem::take(&mut self.ranked);
+            ranked.sort_by(|a, b| a.value.total_cmp(&b.value));
+            ranked.truncate(SEARCHED);
+            let starts = ranked.into_iter().map(|start| start.with_own_noise(o)).collect();
+            self.searches = Some(MultiStart::new(self.low, *o, &SEARCH, SEARCHED, starts));
+        }
+    }
+
+    /// What it has come to.
+    pub fn slow(self) -> Slow {
+        let o = &self.low.orders;
+        let mut minima = self.searches.map(|searches| searches.minima).unwrap_or_default();
+        minima.sort_by(|(_, a), (_, b)| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares));
+        let f: Vec<Vec<f64>> = minima
+            .into_iter()
+            .filter_map(|(_, minimum)| root_of_poles(&minimum.theta[o.parameters() - o.nf..], self.factor))
+            .filter(|f| hoid_core::stability::roots_inside(f, 1.0))
+            .collect();
+        let slow = |f: &Vec<f64>| {
+            polynomial::roots(&monic(f)).is_some_and(|z| z.iter().all(|z| z.ln().norm() * (self.factor as f64) < SLOW))
+        };
+        Slow {
+            complete: f.first().is_some_and(slow),
+            f,
+        }
+    }
+}
+
+impl LinearisationClient for Continuation<'_> {
+    fn criterion(&self) -> &Criterion<'_> {
+        self.low
+    }
+
+    fn asked(&self) -> Option<&[f64]> {
+        match (&self.trial, &self.searches) {
+            (Some(trial), _) => Some(&trial.theta),
+            (None, Some(searches)) => searches.asked(),
+            (None, None) => None,
+        }
+    }
+
+    fn block(&self) -> Option<Block> {
+        match (&self.trial, &self.searches) {
+            (Some(trial), _) => trial.wanted(),
+            (None, Some(searches)) => searches.block(),
+            (None, None) => None,
+        }
+    }
+
+    fn take(&mut self, there: Linearisation, workspace: &mut Workspace) {
+        let o = &self.low.orders;
+        let Some(mut trial) = self.trial.take() else {
+            if let Some(searches) = &mut self.searches {
+                searches.take(there, workspace);
+            }
+            return;
+        };
+        trial.take(o, &there);
+        if trial.wanted().is_some() {
+            self.trial = Some(trial);
+            return;
+        }
+        let known = trial.value.is_finite();
+        if self.noise.is_none() && known {
+            // From the first place again, now with the noise model.
+            self.noise = Some(trial.theta[Block::D.place(o)].to_vec());
+            self.tried = 0;
+        } else {
+            self.ranked.extend(known.then_some(trial));
+            self.tried += 1;
+        }
+        self.go_on();
+    }
+}
+
+/// Means of consecutive groups of samples; a remainder at the end is left out.
+fn averaged(x: &[f64], factor: usize) -> Vec<f64> {
+    let scale = 1.0 / factor as f64;
+    x.chunks_exact(factor)
+        .map(|group| group.iter().sum::<f64>() * scale)
+        .collect()
+}
+
+/// The polynomial whose roots are the principal K-th roots; `None` where a root has none that is real with it (on the closed
+/// negative axis).
+fn root_of_poles(f: &[f64], factor: usize) -> Option<Vec<f64>> {
+    let k = factor as f64;
+    let roots: Option<Vec<Complex64>> = polynomial::roots(&monic(f))?
+        .into_iter()
+        .map(|z| {
+            let usable = z.norm() > 1e-6 && (z.re > 0.0 || z.im.abs() > 1e-9 * z.norm());
+            usable.then(|| Complex64::from_polar(z.norm().powf(1.0 / k), z.arg() / k))
+        })
+        .collect();
+    let coefficients = polynomial::from_roots(&roots?);
+    (coefficients.len() == f.len() + 1).then(|| coefficients[1..].to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_root_of_the_poles_undoes_their_power() {
+        let poles = [
+            Complex64::new(0.95, 0.06),
+            Complex64::new(0.95, -0.06),
+            Complex64::new(0.8, 0.0),
+        ];
+        let f = polynomial::from_roots(&poles);
+        let slow = polynomial::from_roots(&poles.map(|z| z.powu(8)));
+        let back = root_of_poles(&slow[1..], 8).unwrap();
+        for (a, b) in back.iter().zip(&f[1..]) {
+            assert!((a - b).abs() < 1e-9);
+        }
+        // A pole on the negative axis and one at the origin have no root that is a model.
+        assert!(root_of_poles(&[0.5], 8).is_none());
+        assert!(root_of_poles(&[-0.5, 0.0], 8).is_none());
+    }
+
+    #[test]
+    fn averages_leave_the_remainder_out() {
+        assert_eq!(averaged(&[1.0, 3.0, 5.0, 7.0, 9.0], 2), [2.0, 6.0]);
+        assert!(averaged(&[1.0], 2).is_empty());
+    }
+}

@@ -1,0 +1,177 @@
+//! Starts for models whose A stands beside a noise model or beside F: which poles belong to A?
+//!
+//! A belongs to the system and to the noise, F to the system and D to the noise alone, and the loss has a minimum at many a
+//! confusion of them: ARARX with a1 = -0.65, a2 = 0.11, d1 = -0.93 ends 40 % too high from least squares, the pole of D in A.
+//! So the poles come from fits that know nothing of the division, and every way to deal them out is a start:
+//!
+//! - the poles of the system, A F, from instruments, which no coloured noise biases in an open loop
+//!   ([`crate::iv`]): any na of them are A, the rest F, and the noise model follows from what is left;
+//! - all poles, A D F, from an ARX model with nd more coefficients in A and in B, which is ARARX without its common factor: any nd
+//!   of them are D, any nf of the rest F, and A and B follow by least squares.
+//!
+//! A few steps of the search from each tell which of them lead down.
+
+use hoid_model::{Complex64, Orders, polynomial, polynomial_model::monic};
+
+use crate::{
+    initial_guess::{arx_poles::arx_poles, noise_model::noise_model, start::Start},
+    iv::instrument_chain,
+    optimize::{SearchOptions, minimise},
+    pem::criterion::{Criterion, Workspace},
+};
+
+/// Starts that are tried by a few steps, the best by their loss.
+const TRIED: usize = 8;
+/// Steps of the search from each.
+const STEPS: usize = 8;
+/// Poles, or pairs of them, that are dealt out at most.
+const MAX_GROUPS: usize = 6;
+
+/// True where A stands beside other polynomials that could take its poles.
+pub(crate) fn concerns(o: &Orders) -> bool {
+    o.na > 0 && o.nb > 0 && o.nc + o.nd + o.nf > 0
+}
+
+/// The best starts of both kinds and of `others`, after a few steps of the search, with their sums of squares.
+pub(crate) fn initial_guesses(criterion: &Criterion<'_>, others: Vec<Start>, workspace: &mut Workspace) -> Vec<Start> {
+    let mut starts = others;
+    starts.extend(from_instruments(criterion, workspace));
+    starts.extend(from_long_arx(criterion, workspace));
+    starts.sort_by(|a, b| a.value.total_cmp(&b.value));
+    let options = SearchOptions {
+        max_iterations: STEPS,
+        ..SearchOptions::default()
+    };
+    starts
+        .into_iter()
+        .take(TRIED)
+        .filter_map(|start| {
+            let end = minimise(criterion, start.theta, &options, None, workspace)?;
+            Some(Start::complete(&start.label, end.theta, end.at.sum_of_squares))
+        })
+        .collect()
+}
+
+fn from_instruments(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Start> {
+    let o = criterion.orders;
+    let pooled = Criterion {
+        orders: Orders {
+            na: 0,
+            nf: o.na + o.nf,
+            ..o
+        },
+        ..criterion.clone()
+    };
+    let Some(system) = instrument_chain(&pooled) else {
+        return Vec::new();
+    };
+    let (b, f) = (&system[..o.nb], &system[system.len() - pooled.orders.nf..]);
+    let Some(poles) = polynomial::roots(&monic(f)) else {
+        return Vec::new();
+    };
+    dealt(&poles, o.na)
+        .into_iter()
+        .filter_map(|(a, f)| {
+            let linear = [&coefficients(&a), b].concat();
+            start("instruments", criterion, linear, &coefficients(&f), workspace)
+        })
+        .collect()
+}
+
+fn from_long_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Start> {
+    let o = criterion.orders;
+    if o.nd == 0 {
+        return Vec::new();
+    }
+    let long = Criterion {
+        orders: Orders {
+            nf: o.na + o.nd + o.nf,
+            nb: o.nb + o.nd,
+            ..o
+        },
+        ..criterion.clone()
+    };
+    let Some(poles) = arx_poles(&long, &criterion.data, workspace).and_then(|a| polynomial::roots(&monic(&a))) else {
+        return Vec::new();
+    };
+    let coloured = Criterion {
+        orders: Orders { nc: 0, ..o },
+        ..criterion.clone()
+    };
+    let mut starts = Vec::new();
+    for (d, rest) in dealt(&poles, o.nd) {
+        for (f, _) in dealt(&rest, o.nf) {
+            let f = coefficients(&f);
+            let whitening = [&vec![0.0; o.na + o.nb], &coefficients(&d)[..], &f].concat();
+            let solved = coloured.best_linear_part(&whitening, workspace);
+            starts.extend(solved.and_then(|(linear, _)| start("long arx", criterion, linear, &f, workspace)));
+        }
+    }
+    starts
+}
+
+/// A start with given A, B and F: the noise model from the residual, and A and B once more with that noise model.
+fn start(
+    label: &str,
+    criterion: &Criterion<'_>,
+    linear: Vec<f64>,
+    f: &[f64],
+    workspace: &mut Workspace,
+) -> Option<Start> {
+    let o = criterion.orders;
+    let white = Criterion {
+        orders: Orders { nc: 0, nd: 0, ..o },
+        ..criterion.clone()
+    };
+    let system = [&linear, f].concat();
+    let left: Vec<Vec<f64>> = (0..white.data.len())
+        .map(|record| white.residuals_of(&system, record, workspace))
+        .collect();
+    let (c, d) = noise_model(&left, o.nc, o.nd);
+    let mut theta = [&linear, &c[..], &d, f].concat();
+    let (linear, value) = criterion.best_linear_part(&theta, workspace)?;
+    theta[..o.na + o.nb].copy_from_slice(&linear);
+    Some(Start::complete(label, theta, value))
+}
+
+fn coefficients(roots: &[Complex64]) -> Vec<f64> {
+    polynomial::from_roots(roots)[1..].to_vec()
+}
+
+/// All ways to choose `count` of these poles, conjugates together: the chosen ones and the rest.
+fn dealt(poles: &[Complex64], count: usize) -> Vec<(Vec<Complex64>, Vec<Complex64>)> {
+    let mut groups: Vec<&[Complex64]> = Vec::new();
+    let mut left = poles;
+    while !left.is_empty() {
+        let (group, others) = left.split_at(if left[0].im == 0.0 { 1 } else { 2.min(left.len()) });
+        groups.push(group);
+        left = others;
+    }
+    (0..1_usize << groups.len().min(MAX_GROUPS))
+        .filter_map(|choice| {
+            let (mut chosen, mut rest) = (Vec::new(), Vec::new());
+            for (i, group) in groups.iter().enumerate() {
+                if choice >> i & 1 == 1 { &mut chosen } else { &mut rest }.extend_from_slice(group);
+            }
+            (chosen.len() == count).then_some((chosen, rest))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn poles_are_dealt_out_in_every_way_with_conjugates_together() {
+        let pair = [Complex64::new(0.5, 0.3), Complex64::new(0.5, -0.3)];
+        let poles = [pair[0], pair[1], Complex64::new(0.9, 0.0), Complex64::new(-0.2, 0.0)];
+        let chosen: Vec<Vec<Complex64>> = dealt(&poles, 2).into_iter().map(|(chosen, _)| chosen).collect();
+        assert_eq!(chosen, [pair.to_vec(), poles[2..].to_vec()]);
+        assert_eq!(dealt(&poles, 1).len(), 2);
+        assert_eq!(dealt(&poles, 0), [(vec![], poles.to_vec())]);
+        assert!(dealt(&pair, 1).is_empty());
+        assert_eq!(coefficients(&pair).len(), 2);
+        assert!(coefficients(&[]).is_empty());
+    }
+}

@@ -1,0 +1,81 @@
+//! A start of the search, and what is still to be found of it.
+
+use hoid_model::Orders;
+
+use crate::{
+    linalg::least_squares::{add_scaled, dot, solve_symmetric},
+    optimize::Linearisation,
+    pem::criterion::Block,
+};
+
+/// A start of the search, with its name.
+#[derive(Debug, Clone)]
+pub(crate) struct Start {
+    pub label: String,
+    pub theta: Vec<f64>,
+    /// The sum of squares there, once nothing is left to find; not finite where a regression was singular.
+    pub value: f64,
+    /// Polynomials that are still to be found, the next one last.
+    left: Vec<Block>,
+}
+
+impl Start {
+    /// Of which nothing is left to find.
+    pub fn complete(label: &str, theta: Vec<f64>, value: f64) -> Self {
+        Self {
+            label: label.to_owned(),
+            theta,
+            value,
+            left: Vec::new(),
+        }
+    }
+
+    /// With B and the noise model still to be found for its F, without A and C: B with white noise, D of what is left, and B once more with
+    /// that noise model.
+    pub fn of_poles(label: &str, o: &Orders, f: &[f64]) -> Self {
+        let left = if o.nd > 0 {
+            vec![Block::B, Block::D, Block::B]
+        } else {
+            vec![Block::B]
+        };
+        Self::to_be_found(label, [&vec![0.0; o.nb + o.nd], f].concat(), left)
+    }
+
+    /// With some polynomials still to be found, the next one last.
+    pub fn to_be_found(label: &str, theta: Vec<f64>, left: Vec<Block>) -> Self {
+        Self {
+            label: label.to_owned(),
+            theta,
+            value: f64::NAN,
+            left,
+        }
+    }
+
+    /// With a noise model of its own, and B once more with that.
+    pub fn with_own_noise(mut self, o: &Orders) -> Self {
+        if o.nd > 0 {
+            self.left = vec![Block::B, Block::D];
+        }
+        self
+    }
+
+    /// The polynomial that is to be found next.
+    pub fn wanted(&self) -> Option<Block> {
+        self.left.last().copied()
+    }
+
+    /// Takes the criterion at theta. The residual is affine in B, and in D: one step of least squares finds either with the rest as it is.
+    pub fn take(&mut self, o: &Orders, there: &Linearisation) {
+        let Some(block) = self.left.pop() else { return };
+        let (p, place) = (self.theta.len(), block.place(o));
+        let rows = place.clone().map(|i| &there.gram[i * p..(i + 1) * p]);
+        let gram: Vec<f64> = rows.flat_map(|row| &row[place.clone()]).copied().collect();
+        let descent = &there.descent[place.clone()];
+        if let Some(step) = solve_symmetric(&gram, descent) {
+            self.value = there.sum_of_squares - dot(&step, descent);
+            add_scaled(&mut self.theta[place], 1.0, &step);
+        } else if block == Block::B {
+            (self.value, self.left) = (f64::NAN, Vec::new());
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! A start for the prediction error method by a chain of instrumental variables (L. Ljung, *System Identification*, 1999, section
+//! 10.6): ARX by least squares, instruments simulated with it, the IV estimate, instruments and estimate once more, the residual of
+//! that system, a long autoregression of it, and C and D by regression on past residuals and past innovations.
+//!
+//! Consistent in an open loop for any noise; in a closed loop biased by as much as the input follows the noise, which is little where
+//! the loop has a delay longer than the memory of the noise. About ten passes over the data.
+
+use hoid_model::Orders;
+
+use crate::{
+    InitialState,
+    initial_guess::noise_model::noise_model,
+    optimize::Objective,
+    pem::criterion::{Criterion, Workspace, first_residual},
+};
+
+use super::equation::{Prefilter, Problem, Source};
+
+/// Theta for the orders of the criterion; `None` where A and F are both there (the chain does not tell their poles apart), where
+/// there is no input, and where the data do not carry it.
+pub(crate) fn instrument_chain(criterion: &Criterion<'_>) -> Option<Vec<f64>> {
+    let o = criterion.orders;
+    if o.nb == 0 || (o.na > 0 && o.nf > 0) {
+        return None;
+    }
+    let problem = Problem::new(&o, criterion.data.clone(), Source::measured(&criterion.data));
+    let white_orders = Orders { nc: 0, nd: 0, ..o };
+    let white = Criterion {
+        orders: white_orders,
+        initial: InitialState::Estimate,
+        first: first_residual(&white_orders, InitialState::Estimate).max(problem.first),
+        weights: None,
+        ..criterion.clone()
+    };
+    let needed = white.first + 2 * o.parameters();
+    if criterion.data.iter().any(|d| d.u.len() <= needed) {
+        return None;
+    }
+    let mut system = problem.least_squares(Prefilter::default()).ok()?;
+    for _ in 0..2 {
+        let (stable, _) = problem.stabilised(&system).ok()?;
+        let equation = problem.equation(Prefilter::default(), &stable);
+        system = problem.solve(&equation).ok()?;
+    }
+    if o.nf > 0 {
+        (system, _) = problem.stabilised(&system).ok()?;
+    }
+    let (poles, b) = system.split_at(problem.poles);
+    let (a, f) = if o.na > 0 { (poles, &[][..]) } else { (&[][..], poles) };
+    let mut workspace = Workspace::of_thread();
+    let left: Vec<Vec<f64>> = (0..white.data.len())
+        .map(|record| white.residuals_of(&[a, b, f].concat(), record, &mut workspace))
+        .collect();
+    let (c, d) = noise_model(&left, o.nc, o.nd);
+    let theta = [a, b, &c, &d, f].concat();
+    criterion.is_feasible(&theta).then_some(theta)
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_core::filter::{divide_in_place, moving_sum, multiply};
+
+    use super::*;
+    use crate::pem::criterion::Data;
+
+    /// Zero-mean numbers of a linear congruential generator (D. E. Knuth, MMIX).
+    fn white(n: usize, mut state: u64) -> Vec<f64> {
+        (0..n)
+            .map(|_| {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
+                (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+            })
+            .collect()
+    }
+
+    fn chain(orders: Orders, data: Data<'_>) -> Option<Vec<f64>> {
+        instrument_chain(&Criterion {
+            orders,
+            data: vec![data],
+            initial: InitialState::Estimate,
+            first: first_residual(&orders, InitialState::Estimate),
+            weights: None,
+        })
+    }
+
+    #[test]
+    fn comes_near_the_truth_of_a_box_jenkins_model_and_of_an_armax_model() {
+        let n = 20_000;
+        let (e, eps) = (white(n, 1), white(n, 2));
+        let (b, f, c, d) = ([1.0, 0.5], [-1.5, 0.7], [0.5], [-0.8]);
+        let mut w = vec![0.0; n];
+        moving_sum(&b, 2, &e, &mut w);
+        let mut v = vec![0.0; n];
+        multiply(&c, &eps, &mut v);
+        let armax: Vec<f64> = {
+            let mut u: Vec<f64> = w.iter().zip(&v).map(|(w, v)| w + v).collect();
+            divide_in_place(&f, &mut u);
+            u
+        };
+        divide_in_place(&f, &mut w);
+        divide_in_place(&d, &mut v);
+        let bj: Vec<f64> = w.iter().zip(&v).map(|(w, v)| w + v).collect();
+        let base = Orders {
+            nb: 2,
+            nc: 1,
+            nk: 2,
+            ..Orders::default()
+        };
+        let cases = [
+            (Orders { nd: 1, nf: 2, ..base }, bj, [&b[..], &c, &d, &f].concat()),
+            (Orders { na: 2, ..base }, armax, [&f[..], &b, &c].concat()),
+        ];
+        for (orders, u, truth) in cases {
+            let theta = chain(orders, Data { e: &e, u: &u }).unwrap();
+            for (found, truth) in theta.iter().zip(truth) {
+                // 20 000 samples leave 2 % on these coefficients by instruments that are not the best.
+                assert!((found - truth).abs() < 0.08, "{orders}: {found} {truth}");
+            }
+        }
+    }
+
+    #[test]
+    fn says_nothing_where_it_cannot() {
+        let (e, u) = (white(50, 1), white(50, 2));
+        let base = Orders {
+            nb: 1,
+            nd: 1,
+            nf: 1,
+            nk: 1,
+            ..Orders::default()
+        };
+        assert!(chain(base, Data { e: &e, u: &u }).is_some());
+        assert!(chain(Orders { na: 1, ..base }, Data { e: &e, u: &u }).is_none());
+        assert!(chain(Orders { nk: 60, ..base }, Data { e: &e, u: &u }).is_none());
+        let still = vec![0.0; 50];
+        assert!(chain(base, Data { e: &still, u: &u }).is_none());
+        let output_alone = Orders {
+            na: 2,
+            ..Orders::default()
+        };
+        assert!(chain(output_alone, Data { e: &[], u: &u }).is_none());
+    }
+}

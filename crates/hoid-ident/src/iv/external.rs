@@ -1,0 +1,204 @@
+//! The part of the input that follows an external signal.
+//!
+//! In a closed loop `e = S f_t + (a response to the noise)`. The response to f_t is estimated as an expansion in Laguerre filters
+//!
+//! `L_0 = sqrt(1 - p^2) / (1 - p q^-1)`,  `L_k = L_{k-1} (q^-1 - p) / (1 - p q^-1)`
+//!
+//! whose weights are found by least squares (B. Wahlberg, *IEEE Trans. Automatic Control* 36 (1991) 551-562). A few dozen of them
+//! span the seconds that a loop remembers, where a finite impulse response would need hundreds of lags; the expansion is always
+//! stable; and for a sum of sinusoids it is the projection on their lines.
+//!
+//! The sum is made of f_t alone, so that the noise can reach it only through the weights: the noise of the record at the very
+//! lines of f_t, which is a good part of it where noise and f_t are both slow. So the record is cut into blocks, and the instruments
+//! of a block are made with weights from the other blocks (split-sample instruments, J. D. Angrist and A. B. Krueger, *J. Business
+//! Econ. Stat.* 13 (1995) 225-235), whose noise is independent of that in the block. Poor weights then cost variance, not bias.
+//!
+//! The construction of instruments from an external signal is that of M. Gilson, H. Garnier, P. C. Young and P. Van den Hof, *IET
+//! Control Theory Appl.* 5 (2011) 1147-1154; they use the known controller, which a person in the loop does not offer.
+
+use std::{borrow::Cow, ops::Range};
+
+use hoid_core::filter::divide_in_place;
+use hoid_model::Record;
+
+use crate::{
+    IdentError,
+    linalg::least_squares::{add_scaled, dot, solve_symmetric},
+    pem::criterion::Data,
+};
+
+use super::equation::{Source, cut, orthonormal, with_past};
+
+/// Time constants of the filters in samples; the one with the smallest rest is taken.
+const TIME_CONSTANTS: [f64; 3] = [4.0, 16.0, 64.0];
+/// Number of filters, where the records are long enough.
+const FILTERS: usize = 24;
+/// Samples for each filter.
+const SAMPLES_EACH: usize = 10;
+/// Blocks whose input is made with weights from the others.
+const BLOCKS: usize = 4;
+/// Pull of the weights to zero, against filters whose output lies in one block alone. The scale of an instrument does not matter.
+const RIDGE: f64 = 0.02;
+
+/// The external signal of each record.
+///
+/// # Errors
+/// [`IdentError::NoChannel`], [`IdentError::NoExcitation`].
+pub(super) fn signals<'a>(records: &'a [Record], name: &str) -> Result<Vec<&'a [f64]>, IdentError> {
+    let found: Vec<&[f64]> = records
+        .iter()
+        .map(|record| {
+            record.channel(name).ok_or_else(|| IdentError::NoChannel {
+                channel: name.to_owned(),
+                label: record.label().to_owned(),
+                available: record
+                    .channels()
+                    .map(|c| c.name.as_str())
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            })
+        })
+        .collect::<Result<_, _>>()?;
+    for (signal, record) in found.iter().zip(records) {
+        if signal.iter().all(|v| *v == signal[0]) {
+            return Err(IdentError::NoExcitation {
+                channel: name.to_owned(),
+                label: record.label().to_owned(),
+                value: signal[0],
+            });
+        }
+        let of_loop = [record.input_channel(), Some(record.output_channel())];
+        if let Some(same) = of_loop.into_iter().flatten().find(|c| c.name == name) {
+            return Err(IdentError::BadOption {
+                option: "the channel of the instruments".to_owned(),
+                found: format!("{}, which is in the loop", same.name),
+                expected: "a signal from outside, such as the forcing function".to_owned(),
+            });
+        }
+    }
+    Ok(found)
+}
+
+/// The part of each input that follows the external signals, once for each block of samples with weights from the others.
+pub(super) fn noise_free<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Source<'a>> {
+    let inputs: Vec<&[f64]> = data.iter().map(|d| d.e).collect();
+    let lengths: Vec<usize> = inputs.iter().map(|e| e.len()).collect();
+    let samples: usize = lengths.iter().sum();
+    let target = inputs.concat();
+    let basis = best_basis(external, &inputs);
+    let whole: Vec<f64> = basis.iter().map(|q| dot(q, &target)).collect();
+    (0..BLOCKS)
+        .map(|k| {
+            let block = k * samples / BLOCKS..(k + 1) * samples / BLOCKS;
+            let weights = weights_of_others(&basis, &whole, &target, block.clone()).unwrap_or_else(|| whole.clone());
+            let sum = combination(&basis, &weights, samples);
+            Source {
+                inputs: cut(&sum, &lengths).into_iter().map(Cow::Owned).collect(),
+                samples: block,
+            }
+        })
+        .collect()
+}
+
+/// Weights of least squares on the samples outside of a block, drawn a little to zero.
+fn weights_of_others(basis: &[Vec<f64>], whole: &[f64], target: &[f64], block: Range<usize>) -> Option<Vec<f64>> {
+    let p = basis.len();
+    let mut gram = vec![0.0; p * p];
+    let mut right = whole.to_vec();
+    for i in 0..p {
+        let inside = &basis[i][block.clone()];
+        right[i] -= dot(inside, &target[block.clone()]);
+        for j in 0..p {
+            let unit = if i == j { 1.0 + RIDGE } else { 0.0 };
+            gram[i * p + j] = unit - dot(inside, &basis[j][block.clone()]);
+        }
+    }
+    solve_symmetric(&gram, &right)
+}
+
+/// The part of each target that follows its driving signal, through one filter for all records.
+pub(super) fn following(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
+    let lengths: Vec<usize> = targets.iter().map(|t| t.len()).collect();
+    let target = targets.concat();
+    let basis = best_basis(driving, targets);
+    let weights: Vec<f64> = basis.iter().map(|q| dot(q, &target)).collect();
+    cut(&combination(&basis, &weights, target.len()), &lengths)
+}
+
+fn combination(basis: &[Vec<f64>], weights: &[f64], samples: usize) -> Vec<f64> {
+    let mut sum = vec![0.0; samples];
+    for (q, weight) in basis.iter().zip(weights) {
+        add_scaled(&mut sum, *weight, q);
+    }
+    sum
+}
+
+/// Orthonormal basis of the filters' outputs, over all records, with the time constant that explains most of the targets.
+fn best_basis(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
+    let target = targets.concat();
+    let filters = FILTERS.min(target.len() / SAMPLES_EACH).max(1);
+    let mut best = (-1.0, Vec::new());
+    for time_constant in TIME_CONSTANTS {
+        let (basis, _) = orthonormal(&laguerre(driving, (-1.0 / time_constant).exp(), filters));
+        let explained: f64 = basis.iter().map(|q| dot(q, &target).powi(2)).sum();
+        if explained > best.0 {
+            best = (explained, basis);
+        }
+    }
+    best.1
+}
+
+/// Outputs of the filters with the pole p, over all records.
+fn laguerre(driving: &[&[f64]], p: f64, filters: usize) -> Vec<Vec<f64>> {
+    let mut columns: Vec<Vec<f64>> = vec![Vec::new(); filters];
+    for x in driving {
+        let gain = (1.0 - p * p).sqrt();
+        let (mut state, before) = with_past(x);
+        state.iter_mut().for_each(|v| *v *= gain);
+        divide_in_place(&[-p], &mut state);
+        for column in &mut columns {
+            column.extend_from_slice(&state[before..]);
+            let mut past = 0.0;
+            for v in &mut state {
+                let now = *v;
+                *v = past - p * now;
+                past = now;
+            }
+            divide_in_place(&[-p], &mut state);
+        }
+    }
+    columns
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn filters_are_orthonormal() {
+        let mut impulse = vec![0.0; 4000];
+        // Behind the samples that the invented past is made of.
+        impulse[300] = 1.0;
+        let columns = laguerre(&[&impulse], 0.9, 12);
+        for (i, a) in columns.iter().enumerate() {
+            for (j, b) in columns.iter().enumerate() {
+                // 0.9^4000 is beyond rounding.
+                assert!((dot(a, b) - f64::from(u8::from(i == j))).abs() < 1e-12, "{i} {j}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_part_of_a_delayed_response_is_found() {
+        let n = 4000;
+        let x: Vec<f64> = (0..n)
+            .map(|t| (0.05 * f64::from(t)).sin() + (0.31 * f64::from(t)).sin())
+            .collect();
+        let mut y = vec![0.0; x.len()];
+        hoid_core::filter::moving_sum(&[0.1], 20, &x, &mut y);
+        divide_in_place(&[-1.7, 0.8], &mut y);
+        let found = following(&[&x], &[&y]);
+        let rest: f64 = found[0].iter().zip(&y).skip(200).map(|(a, b)| (a - b).powi(2)).sum();
+        assert!(rest < 1e-4 * dot(&y, &y), "{}", rest / dot(&y, &y));
+    }
+}

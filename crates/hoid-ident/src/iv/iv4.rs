@@ -1,0 +1,48 @@
+//! The four-step instrumental variable method (L. Ljung, *System Identification*, 1999, section 15.3, eq. 15.21-15.26).
+//!
+//! 1. Least squares of `A u = B q^-nk e + v`.
+//! 2. Instruments simulated with that A and B; first IV estimate.
+//! 3. Autoregression `L v = eps` of what is left.
+//! 4. Instruments simulated with the second A and B; IV estimate of the equation filtered with L.
+//!
+//! Consistent whatever v is; of the smallest variance where L makes v white. In the closed-loop form the simulations start from the
+//! noise-free input. The book takes L of the order na + nb, as an example; here it is four times that, because v of a process that
+//! is sampled fast (`A = F`, `v = F n` with noise n) has zeros near the unit circle, which an autoregression needs many terms for.
+
+use crate::{IdentError, Reason, Termination, initial_guess::noise_model::noise_model};
+
+use super::{
+    Solution,
+    equation::{self, Prefilter, Problem, cut},
+};
+
+/// Order of the autoregression, as a multiple of na + nb.
+const ORDERS: usize = 4;
+/// Rows for each term of the autoregression, at least.
+const ROWS_EACH: usize = 10;
+
+pub(super) fn solve(problem: &Problem<'_>) -> Result<Solution, IdentError> {
+    let (start, _) = problem.stabilised(&problem.least_squares(Prefilter::default())?)?;
+    let second = problem.equation(Prefilter::default(), &start);
+    let system = problem.solve(&second)?;
+    let rows = problem.rows(0);
+    let shortest = rows.iter().min().copied().unwrap_or(0);
+    let order = (ORDERS * (problem.poles + problem.nb)).min(shortest / ROWS_EACH);
+    let (_, whitening) = noise_model(&cut(&second.residual(&system), &rows), 0, order);
+    let filter = Prefilter {
+        d: &whitening,
+        ..Prefilter::default()
+    };
+    let (stable, _) = problem.stabilised(&system)?;
+    let last = problem.equation(filter, &stable);
+    let theta = problem.solve(&last)?;
+    let residual = cut(&last.residual(&theta), &problem.rows(order));
+    Ok(Solution {
+        covariance: equation::covariance(&last.z, &last.phi, |_| true, &residual),
+        theta,
+        termination: Termination {
+            reason: Reason::Direct,
+            iterations: 0,
+        },
+    })
+}

@@ -1,0 +1,141 @@
+//! Refined instrumental variable for `u = (B/F) q^-nk e + (C/D) eps` (P. C. Young, *Recursive Estimation and Time-Series Analysis*,
+//! 2nd ed. 2011, ch. 7).
+//!
+//! The equation is filtered with `D/(C F)` of the iteration before, so that its noise is eps; C and D are those of the ARMA model of
+//! `u - (B/F) q^-nk e`, fitted by the prediction error method (with nc = 0, by least squares) in each iteration.
+//!
+//! **Covariance.** B and F solve `Z' eps = 0`, C and D `psi' eps = 0` with psi their negative gradient. With both stacked, psi_theta the
+//! gradient for all parameters and `W = [Z, psi]`, the covariance is `sigma^2 (W' psi_theta)^-1 W' W (psi_theta' W)^-1`. In an open
+//! loop it falls into Young's `sigma^2 (Z'Z)^-1` and the covariance of the ARMA model; in a closed loop C and D inherit errors of
+//! the system. Where the noise model is too small, the colour that is left in eps is taken into account for B and F.
+
+use crate::{
+    IdentError, InitialState, Reason, SearchOptions,
+    initial_guess::noise_model::noise_model,
+    optimize::minimise,
+    pem::criterion::{Criterion, Data, Workspace, first_residual},
+};
+use hoid_model::Orders;
+
+use super::{
+    InstrumentalVariable, Solution,
+    equation::{self, Problem},
+    refined::{self, Noise, Rest},
+};
+
+pub(super) fn solve(
+    settings: &InstrumentalVariable,
+    problem: &Problem<'_>,
+    criterion: &Criterion<'_>,
+) -> Result<Solution, IdentError> {
+    let mut noise_before: Option<Noise> = None;
+    let rest = refined::iterate(settings, problem, |system| {
+        let noise = noise_of(system, problem, criterion, noise_before.as_ref());
+        noise_before = Some(noise.clone());
+        noise
+    })?;
+    let (poles, b) = rest.system.split_at(problem.poles);
+    let theta = [b, &rest.noise.c, &rest.noise.d, poles].concat();
+    let covariance = if rest.termination.reason == Reason::UnstableEstimate {
+        None
+    } else {
+        covariance(&theta, &rest, problem, criterion)
+    };
+    Ok(Solution {
+        theta,
+        covariance,
+        termination: rest.termination,
+    })
+}
+
+/// C and D for a system with stable F.
+fn noise_of(system: &[f64], problem: &Problem<'_>, criterion: &Criterion<'_>, before: Option<&Noise>) -> Noise {
+    let Orders { nc, nd, .. } = criterion.orders;
+    if nc + nd == 0 {
+        return Noise::default();
+    }
+    let (poles, b) = system.split_at(problem.poles);
+    let left = simulation_error(&[b, poles].concat(), criterion);
+    let (c, d) = noise_model(&left, nc, nd);
+    if nc == 0 {
+        return Noise { c, d };
+    }
+    let orders = Orders {
+        na: nd,
+        nc,
+        ..Orders::default()
+    };
+    let arma = Criterion {
+        orders,
+        data: left.iter().map(|u| Data { e: &[], u }).collect(),
+        initial: InitialState::Estimate,
+        first: first_residual(&orders, InitialState::Estimate),
+        weights: None,
+    };
+    let start = before.map_or_else(|| [d.as_slice(), &c].concat(), |n| [n.d.as_slice(), &n.c].concat());
+    match minimise(
+        &arma,
+        start,
+        &SearchOptions::default(),
+        None,
+        &mut Workspace::of_thread(),
+    ) {
+        Some(minimum) => {
+            let (d, c) = minimum.theta.split_at(nd);
+            Noise {
+                c: c.to_vec(),
+                d: d.to_vec(),
+            }
+        }
+        None => Noise { c, d },
+    }
+}
+
+/// `u - (B/F) q^-nk e` of each record, the initial states of 1/F eliminated.
+fn simulation_error(theta: &[f64], criterion: &Criterion<'_>) -> Vec<Vec<f64>> {
+    let orders = Orders {
+        nc: 0,
+        nd: 0,
+        ..criterion.orders
+    };
+    let simulating = Criterion {
+        orders,
+        first: first_residual(&orders, InitialState::Estimate),
+        ..criterion.clone()
+    };
+    let mut workspace = Workspace::of_thread();
+    (0..criterion.data.len())
+        .map(|record| simulating.residuals_of(theta, record, &mut workspace))
+        .collect()
+}
+
+fn covariance(theta: &[f64], rest: &Rest, problem: &Problem<'_>, criterion: &Criterion<'_>) -> Option<Vec<f64>> {
+    let o = criterion.orders;
+    let noise = o.nb..o.nb + o.nc + o.nd;
+    // Rows that both the equation and the residuals have.
+    let nd = o.nd;
+    let first = (problem.first + nd).max(criterion.first);
+    let mut workspace = Workspace::of_thread();
+    let mut residual = Vec::new();
+    let mut psi: Vec<Vec<f64>> = vec![Vec::new(); theta.len()];
+    let mut w: Vec<Vec<f64>> = vec![Vec::new(); theta.len()];
+    let mut end = 0;
+    for (record, rows) in problem.rows(nd).into_iter().enumerate() {
+        let eps = criterion.residuals_of(theta, record, &mut workspace);
+        residual.push(eps[first - criterion.first..].to_vec());
+        let gradient = criterion.jacobian(theta, record, &mut workspace);
+        end += rows;
+        let from = end - rows + (first - problem.first - nd);
+        for (i, column) in gradient.iter().enumerate() {
+            let column = &column[first - criterion.first..];
+            psi[i].extend_from_slice(column);
+            if noise.contains(&i) {
+                w[i].extend_from_slice(column);
+            } else {
+                let z = if i < o.nb { problem.poles + i } else { i - noise.end };
+                w[i].extend_from_slice(&rest.equation.z[z][from..end]);
+            }
+        }
+    }
+    equation::covariance(&w, &psi, |i| !noise.contains(&i), &residual)
+}

@@ -1,0 +1,13 @@
+//! Linear algebra of the estimators.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | `products` | sums of products of long signals |
+//! | `least_squares` | linear regression by QR with column pivoting |
+//! | `information` | the inverse of the information matrix of the free parameters |
+
+pub(crate) mod information;
+pub(crate) mod least_squares;
+pub(crate) mod products;
+
+pub use least_squares::dot;

@@ -1,0 +1,393 @@
+//! Sums of products of many columns, in one pass over each.
+//!
+//! A normal matrix needs the product of each pair of its columns. One column against four others at a time reads five numbers for
+//! four products, where single products read eight; and a column that is the one before it, a sample later, needs no pass:
+//! `sum x(t-1) y(t-1)` over a span is `sum x(t) y(t)` but for the samples at both ends.
+//!
+//! Each product has partial sums of a fixed number and order, in registers that are chosen when the program runs ([`hoid_lanes::by_fours`]): the bits
+//! are the same whatever the registers, whatever is summed beside, and in whatever stretches the record is read.
+
+use std::ops::Range;
+
+use hoid_lanes::{ByFours, Four, by_fours};
+
+use crate::linalg::least_squares::add_scaled;
+
+/// Samples that are read at a time: those of all columns stay in the nearest memory. A multiple of eight, the most partial sums of a product. For
+/// residuals the number is part of the last digits, since their sums are closed behind each stretch.
+const STRETCH: usize = 512;
+
+/// Products of one column with four, two or one other.
+#[derive(Debug, Clone, Copy)]
+struct Tile<F> {
+    x: usize,
+    ys: [usize; 4],
+    count: usize,
+    /// Four partial sums of each product. A product alone has eight, in the first two.
+    sums: [F; 4],
+}
+
+impl<F: Four> Tile<F> {
+    /// Tiles for the products of x with each of ys, nothing summed yet.
+    fn cover(x: usize, mut ys: &[usize], zero: F, tiles: &mut Vec<Self>) {
+        while !ys.is_empty() {
+            let count = match ys.len() {
+                1 => 1,
+                2 | 3 => 2,
+                _ => 4,
+            };
+            let (now, later) = ys.split_at(count);
+            let mut tile = Self {
+                x,
+                ys: [x; 4],
+                count,
+                sums: [zero; 4],
+            };
+            tile.ys[..count].copy_from_slice(now);
+            tiles.push(tile);
+            ys = later;
+        }
+    }
+
+    /// Adds the products over the whole blocks of a stretch. Named sums, because those of an array are kept in memory.
+    #[inline(always)]
+    fn add<'a>(&mut self, column: impl Fn(usize) -> &'a [f64]) {
+        let x = column(self.x);
+        let [a, b, c, d] = self.ys;
+        let [mut s0, mut s1, mut s2, mut s3] = self.sums;
+        let kind = s0;
+        match self.count {
+            4 => {
+                let blocks = fours(x).iter().zip(fours(column(a))).zip(fours(column(b)));
+                for ((((x, a), b), c), d) in blocks.zip(fours(column(c))).zip(fours(column(d))) {
+                    let x = kind.load(x);
+                    s0 = s0 + x * kind.load(a);
+                    s1 = s1 + x * kind.load(b);
+                    s2 = s2 + x * kind.load(c);
+                    s3 = s3 + x * kind.load(d);
+                }
+            }
+            2 => {
+                for ((x, a), b) in fours(x).iter().zip(fours(column(a))).zip(fours(column(b))) {
+                    let x = kind.load(x);
+                    s0 = s0 + x * kind.load(a);
+                    s1 = s1 + x * kind.load(b);
+                }
+            }
+            _ => {
+                for ([x, later_x], [a, later_a]) in eights(x).iter().zip(eights(column(a))) {
+                    s0 = s0 + kind.load(x) * kind.load(a);
+                    s1 = s1 + kind.load(later_x) * kind.load(later_a);
+                }
+            }
+        }
+        self.sums = [s0, s1, s2, s3];
+    }
+
+    /// The product of x with the k-th of ys over whole columns: the sums, and what lies behind the last whole block.
+    #[inline(always)]
+    fn total<'a>(&self, k: usize, column: impl Fn(usize) -> &'a [f64]) -> f64 {
+        let (x, y) = (column(self.x), column(self.ys[k]));
+        let (sums, block) = match self.count {
+            1 => (self.sums[0] + self.sums[1], 8),
+            _ => (self.sums[k], 4),
+        };
+        let from = x.len() - x.len() % block;
+        let rest: f64 = x[from..].iter().zip(&y[from..]).map(|(x, y)| x * y).sum();
+        in_order(sums) + rest
+    }
+}
+
+/// The partial sums in a fixed order.
+#[inline(always)]
+fn in_order<F: Four>(sums: F) -> f64 {
+    let s = sums.to_array();
+    (s[0] + s[2]) + (s[1] + s[3])
+}
+
+#[inline(always)]
+fn fours(x: &[f64]) -> &[[f64; 4]] {
+    x.as_chunks().0
+}
+
+#[inline(always)]
+fn eights(x: &[f64]) -> &[[[f64; 4]; 2]] {
+    fours(x).as_chunks().0
+}
+
+/// Where the stretches of n samples begin and end.
+fn stretches(n: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..n).step_by(STRETCH).map(move |from| from..n.min(from + STRETCH))
+}
+
+/// Sum over all of x.
+#[inline(always)]
+fn sum<F: Four>(x: &[f64], zero: F) -> f64 {
+    let (mut s0, mut s1) = (zero, zero);
+    for [a, b] in eights(x) {
+        s0 = s0 + zero.load(a);
+        s1 = s1 + zero.load(b);
+    }
+    let tail = &x[x.len() - x.len() % 8..];
+    let sums = [s0.to_array(), s1.to_array()];
+    sums.as_flattened().iter().chain(tail).sum()
+}
+
+/// Sum of the squared distances from the mean.
+#[inline(always)]
+fn squares<F: Four>(x: &[f64], mean: f64, zero: F) -> f64 {
+    let (mut s0, mut s1) = (zero, zero);
+    let means = zero.like(mean);
+    for [a, b] in eights(x) {
+        let (a, b) = (zero.load(a) - means, zero.load(b) - means);
+        s0 = s0 + a * a;
+        s1 = s1 + b * b;
+    }
+    let tail = &x[x.len() - x.len() % 8..];
+    let sums = [s0.to_array(), s1.to_array()];
+    sums.as_flattened().iter().sum::<f64>() + tail.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>()
+}
+
+/// Variance around the common mean of some spans.
+pub(crate) fn variance(spans: &[&[f64]]) -> f64 {
+    by_fours(Variance(spans))
+}
+
+struct Variance<'c, 'a>(&'c [&'a [f64]]);
+
+impl ByFours for Variance<'_, '_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<F: Four>(self, zero: F) -> f64 {
+        let Self(spans) = self;
+        let n = spans.iter().map(|x| x.len()).sum::<usize>() as f64;
+        let (mut total, mut squared) = (0.0, 0.0);
+        for x in spans {
+            total += sum(x, zero);
+        }
+        for x in spans {
+            squared += squares(x, total / n, zero);
+        }
+        squared / n
+    }
+}
+
+/// A column of a regression.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lagged<'a> {
+    pub values: &'a [f64],
+    /// True when this is the column before it, one sample later.
+    pub follows: bool,
+}
+
+/// The symmetric matrix of the products of all columns, by rows.
+///
+/// A column that follows none leads: it is multiplied with all columns at once. What is left are pairs of columns that both follow, which come
+/// from the pair before them.
+pub(crate) fn gram(columns: &[Lagged<'_>]) -> Vec<f64> {
+    by_fours(Gram(columns))
+}
+
+struct Gram<'c, 'a>(&'c [Lagged<'a>]);
+
+impl ByFours for Gram<'_, '_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn run<F: Four>(self, zero: F) -> Vec<f64> {
+        let Self(columns) = self;
+        let p = columns.len();
+        let (mut tiles, mut others) = (Vec::with_capacity(p), Vec::with_capacity(p));
+        for (i, _) in columns.iter().enumerate().filter(|(_, column)| !column.follows) {
+            others.clear();
+            // Leaders before this one have met it already.
+            others.extend((0..p).filter(|j| *j >= i || columns[*j].follows));
+            Tile::cover(i, &others, zero, &mut tiles);
+        }
+        match columns {
+            &[u, u1, u2, e, e1] if [u, u1, u2, e, e1].map(|c| c.follows) == TWO_OF_EACH => {
+                add_two_of_each(&mut tiles, [u, u1, u2, e, e1].map(|c| c.values));
+            }
+            _ => {
+                for stretch in stretches(columns.first().map_or(0, |column| column.values.len())) {
+                    for tile in &mut tiles {
+                        tile.add(|j| &columns[j].values[stretch.clone()]);
+                    }
+                }
+            }
+        }
+        let mut gram = vec![0.0; p * p];
+        for tile in &tiles {
+            for (k, &j) in tile.ys[..tile.count].iter().enumerate() {
+                let product = tile.total(k, |j| columns[j].values);
+                (gram[tile.x * p + j], gram[j * p + tile.x]) = (product, product);
+            }
+        }
+        for i in 0..p {
+            for j in (0..=i).filter(|j| columns[i].follows && columns[*j].follows) {
+                let product = gram[(i - 1) * p + j - 1] + ends(columns, i, j);
+                (gram[i * p + j], gram[j * p + i]) = (product, product);
+            }
+        }
+        gram
+    }
+}
+
+/// What the product of columns i and j has more than that of the columns before them.
+fn ends(columns: &[Lagged<'_>], i: usize, j: usize) -> f64 {
+    let (x, y) = (columns[i - 1].values, columns[j - 1].values);
+    let last = x.len() - 1;
+    columns[i].values[0] * columns[j].values[0] - x[last] * y[last]
+}
+
+/// Which columns follow in the regression that is made most often: an output with two lags, an input with two.
+const TWO_OF_EACH: [bool; 5] = [false, true, true, false, true];
+
+/// The tiles of such a regression in one pass, which reads five numbers for nine products; tile by tile it would read twelve.
+#[inline(always)]
+fn add_two_of_each<F: Four>(tiles: &mut [Tile<F>], columns: [&[f64]; 5]) {
+    // u with the first four columns, u with the last, e with the last four.
+    let [by_u, by_u_alone, by_e] = tiles else { return };
+    let [mut uu, mut uu1, mut uu2, mut ue] = by_u.sums;
+    let [mut ue1, mut ue1_later, ..] = by_u_alone.sums;
+    let [mut eu1, mut eu2, mut ee, mut ee1] = by_e.sums;
+    let kind = uu;
+    let [u, u1, u2, e, e1] = columns;
+    let whole = u.len() - u.len() % 8;
+    let blocks = fours(&u[..whole]).iter().zip(fours(u1)).zip(fours(u2));
+    for ((((u, u1), u2), e), e1) in blocks.zip(fours(e)).zip(fours(e1)) {
+        let (u, e) = (kind.load(u), kind.load(e));
+        uu = uu + u * u;
+        ue = ue + u * e;
+        ee = ee + e * e;
+        let u1 = kind.load(u1);
+        uu1 = uu1 + u * u1;
+        eu1 = eu1 + e * u1;
+        let u2 = kind.load(u2);
+        uu2 = uu2 + u * u2;
+        eu2 = eu2 + e * u2;
+        let e1 = kind.load(e1);
+        ee1 = ee1 + e * e1;
+        // The product alone has eight partial sums, in turn: with two blocks written out the sums would not fit in sixteen registers.
+        (ue1, ue1_later) = (ue1_later, ue1 + u * e1);
+    }
+    by_u.sums = [uu, uu1, uu2, ue];
+    (by_u_alone.sums[0], by_u_alone.sums[1]) = (ue1, ue1_later);
+    by_e.sums = [eu1, eu2, ee, ee1];
+    for tile in [by_u, by_u_alone, by_e] {
+        tile.add(|j| &columns[j][whole..]);
+    }
+}
+
+/// Residuals of a combination of columns: their power, and their products with the columns.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct OfResiduals {
+    pub squares: f64,
+    pub products: Vec<f64>,
+}
+
+impl OfResiduals {
+    /// None yet, of p columns.
+    pub fn new(p: usize) -> Self {
+        Self {
+            squares: 0.0,
+            products: vec![0.0; p],
+        }
+    }
+
+    /// Adds those of `y - sum_k factors_k x_k`, of which a stretch at a time is in memory. The first column is y.
+    pub fn add(&mut self, columns: &[Lagged<'_>], factors: &[f64]) {
+        by_fours(Residuals {
+            columns,
+            factors,
+            of: self,
+        });
+    }
+}
+
+struct Residuals<'c, 'a> {
+    columns: &'c [Lagged<'a>],
+    factors: &'c [f64],
+    of: &'c mut OfResiduals,
+}
+
+impl ByFours for Residuals<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<F: Four>(self, zero: F) {
+        let Self { columns, factors, of } = self;
+        let inputs: Vec<usize> = (1..columns.len()).collect();
+        // The residual stands in the place of y.
+        let mut tiles = Vec::with_capacity(columns.len());
+        Tile::cover(0, &[0], zero, &mut tiles);
+        Tile::cover(0, &inputs, zero, &mut tiles);
+        let mut residual = [0.0; STRETCH];
+        for stretch in stretches(columns[0].values.len()) {
+            let measured = |j: usize| &columns[j].values[stretch.clone()];
+            if let (STRETCH, &[a, b, c, d]) = (stretch.len(), factors) {
+                let five = [measured(0), measured(1), measured(2), measured(3), measured(4)];
+                let (squares, products) = of_four_inputs(five, [a, b, c, d], zero);
+                of.squares += squares;
+                add_scaled(&mut of.products, 1.0, &products);
+                continue;
+            }
+            let r = &mut residual[..stretch.len()];
+            r.copy_from_slice(measured(0));
+            subtract(r, factors, |k| measured(k + 1));
+            let column = |j: usize| if j == 0 { &*r } else { measured(j) };
+            for tile in &mut tiles {
+                tile.sums = [zero; 4];
+                tile.add(column);
+                for (k, &j) in tile.ys[..tile.count].iter().enumerate() {
+                    let product = tile.total(k, column);
+                    match j {
+                        0 => of.squares += product,
+                        _ => of.products[j - 1] += product,
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Power and products of the residuals of four inputs over a whole stretch, which never leave the registers.
+#[inline(always)]
+fn of_four_inputs<F: Four>(columns: [&[f64]; 5], factors: [f64; 4], zero: F) -> (f64, [f64; 4]) {
+    let [y, a, b, c, d] = columns;
+    let [ka, kb, kc, kd] = factors;
+    let (ka, kb, kc, kd) = (zero.like(ka), zero.like(kb), zero.like(kc), zero.like(kd));
+    let (mut rr, mut rr_later) = (zero, zero);
+    let (mut ra, mut rb, mut rc, mut rd) = (zero, zero, zero, zero);
+    let blocks = fours(y).iter().zip(fours(a)).zip(fours(b));
+    for ((((y, a), b), c), d) in blocks.zip(fours(c)).zip(fours(d)) {
+        let (a, b, c, d) = (zero.load(a), zero.load(b), zero.load(c), zero.load(d));
+        let r = zero.load(y) - ((ka * a + kb * b) + (kc * c + kd * d));
+        (rr, rr_later) = (rr_later, rr + r * r);
+        ra = ra + r * a;
+        rb = rb + r * b;
+        rc = rc + r * c;
+        rd = rd + r * d;
+    }
+    let products = [in_order(ra), in_order(rb), in_order(rc), in_order(rd)];
+    (in_order(rr + rr_later), products)
+}
+
+/// `y -= sum_k factors_k x_k`.
+#[inline(always)]
+fn subtract<'a>(y: &mut [f64], factors: &[f64], x: impl Fn(usize) -> &'a [f64]) {
+    let (by_four, alone) = factors.as_chunks::<4>();
+    for (i, k) in by_four.iter().enumerate() {
+        let inputs = x(4 * i).iter().zip(x(4 * i + 1)).zip(x(4 * i + 2)).zip(x(4 * i + 3));
+        for (y, (((a, b), c), d)) in y.iter_mut().zip(inputs) {
+            *y -= (k[0] * a + k[1] * b) + (k[2] * c + k[3] * d);
+        }
+    }
+    for (i, k) in alone.iter().enumerate() {
+        add_scaled(y, -k, x(4 * by_four.len() + i));
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,19 @@
+//! Whether a start leads to a minimum that is known.
+
+use super::objective::Minimum;
+use crate::linalg::least_squares::dot;
+
+/// True when a start of that loss lies in the basin of a minimum that is known: its loss is what the quadratic model around the minimum
+/// says of it, so that a search from there would end in the same place.
+pub(crate) fn lies_in_basin(minimum: &Minimum, start: &[f64], sum_of_squares: f64) -> bool {
+    let p = start.len();
+    let delta: Vec<f64> = start.iter().zip(&minimum.theta).map(|(a, b)| a - b).collect();
+    let rise: f64 = (0..p)
+        .map(|i| delta[i] * dot(&minimum.at.gram[i * p..(i + 1) * p], &delta))
+        .sum();
+    let found = sum_of_squares - minimum.at.sum_of_squares;
+    rise <= BASIN * minimum.at.sum_of_squares && (found - rise).abs() <= 0.1 * rise
+}
+
+/// Relative rise of the loss up to which a start is held against the quadratic model of a minimum.
+const BASIN: f64 = 0.05;

@@ -1,0 +1,66 @@
+//! Where a search comes to rest, and how it goes on along the border of stability.
+
+use super::{
+    gauss_newton::GaussNewton,
+    objective::{Minimum, Objective},
+    reflection_coefficients::StableCoordinates,
+    search_options::{SearchMethod, SearchOptions},
+    termination::{Reason, Termination},
+};
+
+/// Searches from `theta`. `None` when the start is unstable or its loss is not finite, or when the search comes close to
+/// `rival`, the sum of squares of a minimum that is known already, and promises to end no lower.
+pub(crate) fn minimise<O: Objective>(
+    objective: &O,
+    theta: Vec<f64>,
+    options: &SearchOptions,
+    rival: Option<f64>,
+    workspace: &mut O::Workspace,
+) -> Option<Minimum> {
+    let mut descent = GaussNewton::new(objective, theta, options, rival)?;
+    let reason = descent.run(workspace)?;
+    descent.finish(reason, workspace)
+}
+
+impl<O: Objective> GaussNewton<'_, O> {
+    /// Where it came to rest, once it has ended for this reason; the automatic search may go on along the border of stability.
+    pub fn finish(mut self, reason: Reason, workspace: &mut O::Workspace) -> Option<Minimum> {
+        let reason = if self.options.method == SearchMethod::Automatic && reason == Reason::NoDescent {
+            self.follow_the_border(workspace)?
+        } else {
+            reason
+        };
+        Some(Minimum {
+            theta: self.theta,
+            at: self.at,
+            termination: Termination {
+                reason,
+                iterations: self.iterations,
+            },
+        })
+    }
+
+    /// Goes on in coordinates in which the border of stability is a bound. `None` where the loss is not finite or the rival will
+    /// not be beaten.
+    fn follow_the_border(&mut self, workspace: &mut O::Workspace) -> Option<Reason> {
+        let Some((coordinates, kappa)) = StableCoordinates::of(self.objective, &self.theta) else {
+            return Some(Reason::NoDescent);
+        };
+        let Some(mut along) = GaussNewton::new(&coordinates, kappa, self.options, self.rival) else {
+            return Some(Reason::NoDescent);
+        };
+        along.iterations = self.iterations;
+        let reason = along.run(workspace)?;
+        let (kappa, iterations) = (along.theta, along.iterations);
+        let theta = coordinates.theta(&kappa);
+        let there = self.objective.linearise(&theta, workspace);
+        self.iterations = iterations;
+        if there.sum_of_squares <= self.at.sum_of_squares {
+            (self.theta, self.at) = (theta, there);
+        }
+        Some(match reason {
+            Reason::SmallDecrease if coordinates.is_on_border(&kappa) => Reason::Border,
+            reason => reason,
+        })
+    }
+}

@@ -1,0 +1,389 @@
+//! A search that asks for one linearisation after the other.
+
+use super::{
+    objective::{Linearisation, Objective},
+    search_options::{SearchMethod, SearchOptions},
+    termination::Reason,
+};
+use crate::linalg::least_squares::{dot, solve_symmetric};
+
+/// Relative decrease of the loss that a step promises from which on the second derivative is learnt from the gradients.
+const NEAR: f64 = 1e-2;
+
+/// Relative decrease of the loss that its rounding may hide: filters with poles near the unit circle lose five of the sixteen
+/// digits.
+const ROUNDING: f64 = 1e-10;
+
+/// A search that asks for one linearisation after the other, so that several can go on side by side.
+pub(crate) struct GaussNewton<'s, O> {
+    pub(super) objective: &'s O,
+    pub(super) options: &'s SearchOptions,
+    pub(super) rival: Option<f64>,
+    output_power: f64,
+    pub(super) theta: Vec<f64>,
+    pub(super) at: Linearisation,
+    pub(super) iterations: usize,
+    mu: f64,
+    growth: f64,
+    /// Decrease that the undamped step of this iteration promises.
+    promise: f64,
+    /// What the Gauss-Newton matrix lacks of half the second derivative, from the gradients of the last steps; empty where that is not
+    /// used.
+    secant: Vec<f64>,
+    trial: Trial,
+    /// Where the derivatives are wanted next.
+    asked: Vec<f64>,
+}
+
+/// What the linearisation that is asked for decides.
+enum Trial {
+    /// Whether the start is any good.
+    Start,
+    /// A step of Levenberg and Marquardt, and the decrease that it promises.
+    Damped { promised: f64 },
+    /// A share of a step that is halved until the loss falls.
+    Share { delta: Vec<f64>, factor: f64 },
+    /// The step that is left when the search has converged.
+    Last,
+}
+
+/// Whether a search goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Progress {
+    /// It asks for another linearisation.
+    GoesOn,
+    /// It has ended; without a reason where the loss is not finite or the rival will not be beaten.
+    Ended(Option<Reason>),
+}
+
+impl<'s, O: Objective> GaussNewton<'s, O> {
+    /// A search from `theta`, drawn inside the limits; `None` when the predictor does not exist there.
+    pub fn new(objective: &'s O, mut theta: Vec<f64>, options: &'s SearchOptions, rival: Option<f64>) -> Option<Self> {
+        if let Some(limits) = objective.limits() {
+            for (t, (low, high)) in theta.iter_mut().zip(limits) {
+                *t = t.max(*low).min(*high);
+            }
+        }
+        objective.is_feasible(&theta).then(|| Self {
+            objective,
+            options,
+            rival,
+            output_power: objective.output_power(),
+            asked: theta.clone(),
+            theta,
+            at: Linearisation::default(),
+            iterations: 0,
+            mu: 1e-6,
+            growth: 8.0,
+            promise: f64::INFINITY,
+            secant: Vec::new(),
+            trial: Trial::Start,
+        })
+    }
+
+    /// Where the derivatives are wanted.
+    pub fn asked(&self) -> &[f64] {
+        &self.asked
+    }
+
+    /// True while nothing is known of it but its start.
+    pub fn is_at_its_start(&self) -> bool {
+        matches!(self.trial, Trial::Start)
+    }
+
+    /// Until it ends, alone.
+    pub(super) fn run(&mut self, workspace: &mut O::Workspace) -> Option<Reason> {
+        loop {
+            let there = self.objective.linearise(&self.asked, workspace);
+            if let Progress::Ended(reason) = self.take(there) {
+                return reason;
+            }
+        }
+    }
+
+    /// Takes what was found where it was asked for.
+    pub fn take(&mut self, there: Linearisation) -> Progress {
+        let finite = there.sum_of_squares.is_finite();
+        match std::mem::replace(&mut self.trial, Trial::Last) {
+            Trial::Start => {
+                self.at = there;
+                self.iterate()
+            }
+            Trial::Damped { promised } => {
+                if finite && there.sum_of_squares < self.at.sum_of_squares {
+                    let ratio = (self.at.sum_of_squares - there.sum_of_squares) / promised;
+                    self.mu = (self.mu * (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(1.0 / 3.0, 2.0)).max(1e-12);
+                    self.growth = 2.0;
+                    self.move_to(there);
+                    self.iterate()
+                } else if self.secant.is_empty() {
+                    self.damp();
+                    self.try_damped()
+                } else {
+                    self.secant.clear();
+                    self.try_damped()
+                }
+            }
+            Trial::Share { delta, factor } => {
+                if finite && there.sum_of_squares < self.at.sum_of_squares {
+                    self.move_to(there);
+                    self.iterate()
+                } else {
+                    self.try_share(delta, 0.5 * factor)
+                }
+            }
+            Trial::Last => {
+                // It promises less than the rounding of the loss may hide, which must not decide about it.
+                if finite && there.sum_of_squares <= self.at.sum_of_squares * (1.0 + ROUNDING) {
+                    self.move_to(there);
+                }
+                Progress::Ended(Some(Reason::SmallDecrease))
+            }
+        }
+    }
+
+    fn move_to(&mut self, there: Linearisation) {
+        if self.options.method == SearchMethod::Automatic && self.promise <= NEAR * self.at.sum_of_squares {
+            self.learn(&there);
+        } else {
+            self.secant.clear();
+        }
+        std::mem::swap(&mut self.theta, &mut self.asked);
+        self.at = there;
+    }
+
+    /// Symmetric rank-one correction of the secant, so that `(H + S) s = g - g'` for the step s just made.
+    fn learn(&mut self, there: &Linearisation) {
+        let p = self.theta.len();
+        self.secant.resize(p * p, 0.0);
+        let step: Vec<f64> = self.asked.iter().zip(&self.theta).map(|(new, old)| new - old).collect();
+        let missing: Vec<f64> = (0..p)
+            .map(|i| {
+                let known = dot(&there.gram[i * p..(i + 1) * p], &step) + dot(&self.secant[i * p..(i + 1) * p], &step);
+                self.at.descent[i] - there.descent[i] - known
+            })
+            .collect();
+        let along = dot(&missing, &step);
+        let scale = |i: usize| there.gram[i * p + i];
+        let size_of_step: f64 = (0..p).map(|i| scale(i) * step[i] * step[i]).sum();
+        let size_of_missing: f64 = (0..p).map(|i| missing[i] * missing[i] / scale(i)).sum();
+        // Nearly orthogonal to the step: rounding would decide.
+        if along.is_nan() || along * along <= 1e-16 * size_of_step * size_of_missing {
+            return;
+        }
+        for i in 0..p {
+            for j in 0..p {
+                self.secant[i * p + j] += missing[i] * missing[j] / along;
+            }
+        }
+    }
+
+    /// The first trial of the next step, or the end.
+    fn iterate(&mut self) -> Progress {
+        if !self.at.sum_of_squares.is_finite() {
+            return Progress::Ended(None);
+        }
+        // Rounding leaves residuals of about 1e-15 of the output.
+        if self.at.sum_of_squares <= 1e-26 * self.output_power {
+            return Progress::Ended(Some(Reason::ExactFit));
+        }
+        let undamped = self.damped_step(0.0, &[]);
+        if let (Some(rival), Some(step)) = (self.rival, &undamped) {
+            let close = self.at.sum_of_squares < rival * (1.0 + 1e-3);
+            if close && self.at.sum_of_squares - step.promised > rival * (1.0 - 1e-7) {
+                return Progress::Ended(None);
+            }
+        }
+        if let Some(step) = &undamped
+            && step.promised <= self.options.tolerance * self.at.sum_of_squares
+        {
+            return if self.ask(&step.delta, 1.0) {
+                self.trial = Trial::Last;
+                Progress::GoesOn
+            } else {
+                Progress::Ended(Some(Reason::SmallDecrease))
+            };
+        }
+        if self.iterations >= self.options.max_iterations {
+            return Progress::Ended(Some(Reason::IterationLimit));
+        }
+        self.promise = undamped.as_ref().map_or(f64::INFINITY, |step| step.promised);
+        self.iterations += 1;
+        let delta = match self.options.method {
+            SearchMethod::Automatic | SearchMethod::LevenbergMarquardt => return self.try_damped(),
+            SearchMethod::GaussNewton => undamped.map(|step| step.delta),
+            SearchMethod::SteepestDescent => self.scaled_gradient(),
+        };
+        match delta {
+            Some(delta) => self.try_share(delta, 1.0),
+            None => self.give_up(),
+        }
+    }
+
+    /// Steps with more and more damping until one can be tried.
+    fn try_damped(&mut self) -> Progress {
+        while self.mu <= 1e16 {
+            let step = match &self.secant[..] {
+                [] => None,
+                secant => self.damped_step(self.mu, secant),
+            };
+            if step.is_none() {
+                self.secant.clear();
+            }
+            if let Some(step) = step.or_else(|| self.damped_step(self.mu, &[]))
+                && self.ask(&step.delta, 1.0)
+            {
+                // Most trials are accepted: derivatives at once cost less than a second pass.
+                self.trial = Trial::Damped {
+                    promised: step.promised,
+                };
+                return Progress::GoesOn;
+            }
+            self.damp();
+        }
+        self.give_up()
+    }
+
+    fn damp(&mut self) {
+        self.mu *= self.growth;
+        self.growth *= 2.0;
+    }
+
+    /// Shares of a step, halved until one can be tried.
+    fn try_share(&mut self, delta: Vec<f64>, mut factor: f64) -> Progress {
+        while factor > 1e-12 {
+            if self.ask(&delta, factor) {
+                self.trial = Trial::Share { delta, factor };
+                return Progress::GoesOn;
+            }
+            factor *= 0.5;
+        }
+        self.give_up()
+    }
+
+    fn give_up(&self) -> Progress {
+        // What is promised may be lost in the rounding of the loss.
+        let lost = self.promise <= ROUNDING * self.at.sum_of_squares;
+        Progress::Ended(Some(if lost { Reason::SmallDecrease } else { Reason::NoDescent }))
+    }
+
+    /// Asks for theta behind a step; false where there is no predictor.
+    fn ask(&mut self, delta: &[f64], factor: f64) -> bool {
+        self.asked.clear();
+        self.asked
+            .extend(self.theta.iter().zip(delta).map(|(t, s)| t + factor * s));
+        if let Some(limits) = self.objective.limits() {
+            // Against rounding: a step that was cut at a bound ends on it.
+            for (t, (low, high)) in self.asked.iter_mut().zip(limits) {
+                *t = t.max(*low).min(*high);
+            }
+        }
+        self.objective.is_feasible(&self.asked)
+    }
+
+    /// `(H + S + mu diag H)^-1 g` of the free parameters, cut where it meets a bound, and the decrease of the sum of squares that
+    /// the quadratic model promises for it. `None` when the matrix is not positive definite.
+    fn damped_step(&self, mu: f64, secant: &[f64]) -> Option<Step> {
+        let p = self.theta.len();
+        let mut free = self.free();
+        loop {
+            let mut delta = vec![0.0; p];
+            if !free.is_empty() {
+                let lacking = |i: usize, j: usize| secant.get(i * p + j).copied().unwrap_or(0.0);
+                let gram =
+                    |i: usize, j: usize| self.at.gram[i * p + j] * if i == j { 1.0 + mu } else { 1.0 } + lacking(i, j);
+                let damped: Vec<f64> = free
+                    .iter()
+                    .flat_map(|&i| free.iter().map(move |&j| gram(i, j)))
+                    .collect();
+                let descent: Vec<f64> = free.iter().map(|&i| self.at.descent[i]).collect();
+                for (&i, value) in free.iter().zip(solve_symmetric(&damped, &descent)?) {
+                    delta[i] = value;
+                }
+            }
+            if let Some(limits) = self.objective.limits() {
+                let leaves = |i: usize| {
+                    let ((low, high), t, d) = (limits[i], self.theta[i], delta[i]);
+                    (t <= low && d < 0.0) || (t >= high && d > 0.0)
+                };
+                let before = free.len();
+                free.retain(|&i| !leaves(i));
+                if free.len() < before {
+                    continue;
+                }
+                let room = cut(&self.theta, &delta, limits);
+                delta.iter_mut().for_each(|d| *d *= room);
+            }
+            return self.promise(delta, secant);
+        }
+    }
+
+    /// `alpha (diag H)^-1 g` with the alpha that is best for the quadratic model.
+    fn scaled_gradient(&self) -> Option<Vec<f64>> {
+        let p = self.theta.len();
+        let mut delta = vec![0.0; p];
+        for i in self.free() {
+            let curvature = self.at.gram[i * p + i];
+            if curvature > 0.0 {
+                delta[i] = self.at.descent[i] / curvature;
+            }
+        }
+        let mut alpha = dot(&self.at.descent, &delta) / curvature(&self.at.gram, &delta);
+        if !(alpha.is_finite() && alpha > 0.0) {
+            return None;
+        }
+        delta.iter_mut().for_each(|d| *d *= alpha);
+        if let Some(limits) = self.objective.limits() {
+            alpha = cut(&self.theta, &delta, limits);
+            delta.iter_mut().for_each(|d| *d *= alpha);
+        }
+        Some(delta)
+    }
+
+    /// `V(theta + step) ~ V - 2 g' step + step' H step`.
+    fn promise(&self, delta: Vec<f64>, secant: &[f64]) -> Option<Step> {
+        let mut promised = 2.0 * dot(&self.at.descent, &delta) - curvature(&self.at.gram, &delta);
+        if !secant.is_empty() {
+            promised -= curvature(secant, &delta);
+        }
+        (promised >= 0.0 && delta.iter().all(|s| s.is_finite())).then_some(Step { delta, promised })
+    }
+
+    fn free(&self) -> Vec<usize> {
+        free_parameters(self.objective, &self.theta, &self.at.descent)
+    }
+}
+
+/// `delta' M delta`.
+fn curvature(matrix: &[f64], delta: &[f64]) -> f64 {
+    let p = delta.len();
+    (0..p).map(|i| delta[i] * dot(&matrix[i * p..(i + 1) * p], delta)).sum()
+}
+
+/// Parameters that may move: neither fixed nor at a bound beyond which the loss falls.
+pub(crate) fn free_parameters(objective: &impl Objective, theta: &[f64], descent: &[f64]) -> Vec<usize> {
+    let Some(limits) = objective.limits() else {
+        return (0..theta.len()).collect();
+    };
+    (0..theta.len())
+        .filter(|&i| {
+            let ((low, high), t, outward) = (limits[i], theta[i], descent[i]);
+            low < high && !(t <= low && outward < 0.0) && !(t >= high && outward > 0.0)
+        })
+        .collect()
+}
+
+/// The share of a step that stays within the limits.
+fn cut(theta: &[f64], delta: &[f64], limits: &[(f64, f64)]) -> f64 {
+    let room = |((t, d), (low, high)): ((&f64, &f64), &(f64, f64))| match *d {
+        d if d > 0.0 => (high - t) / d,
+        d if d < 0.0 => (low - t) / d,
+        _ => f64::INFINITY,
+    };
+    theta.iter().zip(delta).zip(limits).map(room).fold(1.0, f64::min)
+}
+
+struct Step {
+    delta: Vec<f64>,
+    promised: f64,
+}

@@ -1,0 +1,36 @@
+//! Method and limits of a search.
+
+/// How a step is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SearchMethod {
+    /// Levenberg-Marquardt, along the border of stability where that is in the way.
+    #[default]
+    Automatic,
+    /// Gauss-Newton with halved steps.
+    GaussNewton,
+    /// Levenberg-Marquardt.
+    LevenbergMarquardt,
+    /// Steepest descent, scaled by the diagonal of the Gauss-Newton matrix.
+    SteepestDescent,
+}
+
+/// Method and limits of the search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SearchOptions {
+    /// How a step is made. Default automatic.
+    pub method: SearchMethod,
+    /// Largest number of steps from each start. Default 100.
+    pub max_iterations: usize,
+    /// Relative decrease of the loss below which the search has converged. Default 1e-12.
+    pub tolerance: f64,
+}
+
+impl Default for SearchOptions {
+    fn default() -> Self {
+        Self {
+            method: SearchMethod::Automatic,
+            max_iterations: 100,
+            tolerance: 1e-12,
+        }
+    }
+}

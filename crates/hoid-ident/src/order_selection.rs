@@ -1,0 +1,430 @@
+//! Choice of orders and delay.
+//!
+//! Every combination of the given ranges is fitted on the same samples (the residuals of all candidates start where the most
+//! demanding one can), and the criterion decides: the loss for the delay alone, BIC where the number of parameters differs.
+//! The chosen model is then fitted once more on all the samples that its own orders leave.
+
+use std::{fmt, ops::RangeInclusive};
+
+use hoid_model::{Orders, Record, Structure};
+use rayon::prelude::*;
+
+use crate::{Estimator, Fit, IdentError, SearchOptions, pem::criterion::first_residual};
+
+/// A range for each order and for the delay.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OrderRanges {
+    /// Coefficients of A.
+    pub na: RangeInclusive<usize>,
+    /// Coefficients of B.
+    pub nb: RangeInclusive<usize>,
+    /// Coefficients of C.
+    pub nc: RangeInclusive<usize>,
+    /// Coefficients of D.
+    pub nd: RangeInclusive<usize>,
+    /// Coefficients of F.
+    pub nf: RangeInclusive<usize>,
+    /// Delay of b0 in samples.
+    pub nk: RangeInclusive<usize>,
+}
+
+impl From<Orders> for OrderRanges {
+    fn from(o: Orders) -> Self {
+        let one = |n: usize| n..=n;
+        Self {
+            na: one(o.na),
+            nb: one(o.nb),
+            nc: one(o.nc),
+            nd: one(o.nd),
+            nf: one(o.nf),
+            nk: one(o.nk),
+        }
+    }
+}
+
+impl fmt::Display for OrderRanges {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut separator = "";
+        for (name, range) in self.named() {
+            match (*range.start(), *range.end()) {
+                (0, 0) if name != "nk" || *self.nb.end() == 0 => continue,
+                (low, high) if low == high => write!(f, "{separator}{name}={low}")?,
+                (low, high) => write!(f, "{separator}{name}={low}..{high}")?,
+            }
+            separator = ", ";
+        }
+        Ok(())
+    }
+}
+
+impl OrderRanges {
+    fn named(&self) -> [(&'static str, &RangeInclusive<usize>); 6] {
+        [
+            ("na", &self.na),
+            ("nb", &self.nb),
+            ("nc", &self.nc),
+            ("nd", &self.nd),
+            ("nf", &self.nf),
+            ("nk", &self.nk),
+        ]
+    }
+
+    /// All combinations, the delay running fastest.
+    ///
+    /// # Errors
+    /// [`IdentError::EmptyRange`].
+    pub fn combinations(&self) -> Result<Vec<Orders>, IdentError> {
+        if let Some((name, range)) = self.named().into_iter().find(|(_, r)| r.is_empty()) {
+            return Err(IdentError::EmptyRange {
+                range: format!("{name}={}..{}", range.start(), range.end()),
+            });
+        }
+        let mut all = vec![Orders::default()];
+        let mut vary = |range: &RangeInclusive<usize>, set: fn(&mut Orders, usize)| {
+            all = all
+                .iter()
+                .flat_map(|o| {
+                    range.clone().map(move |n| {
+                        let mut next = *o;
+                        set(&mut next, n);
+                        next
+                    })
+                })
+                .collect();
+        };
+        vary(&self.na, |o, n| o.na = n);
+        vary(&self.nb, |o, n| o.nb = n);
+        vary(&self.nc, |o, n| o.nc = n);
+        vary(&self.nd, |o, n| o.nd = n);
+        vary(&self.nf, |o, n| o.nf = n);
+        vary(&self.nk, |o, n| o.nk = n);
+        Ok(all)
+    }
+}
+
+/// What decides between candidates; the smallest value wins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Criterion {
+    /// The loss itself: right only for candidates with the same number of parameters.
+    Loss,
+    /// Akaike.
+    Aic,
+    /// Akaike with the correction for short records.
+    Aicc,
+    /// Schwarz.
+    #[default]
+    Bic,
+    /// Akaike's final prediction error.
+    Fpe,
+    /// Rissanen's minimum description length.
+    Mdl,
+    /// Young's criterion: the fit against the relative errors of the coefficients.
+    Yic,
+}
+
+impl Criterion {
+    /// Name as in print.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Loss => "loss",
+            Self::Aic => "AIC",
+            Self::Aicc => "AICc",
+            Self::Bic => "BIC",
+            Self::Fpe => "FPE",
+            Self::Mdl => "MDL",
+            Self::Yic => "YIC",
+        }
+    }
+}
+
+/// One candidate of a search.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Its orders.
+    pub orders: Orders,
+    /// Its figures, or why it could not be fitted.
+    pub outcome: Result<CandidateFigures, IdentError>,
+}
+
+/// What candidates are compared by, all on the same samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CandidateFigures {
+    /// Loss V.
+    pub loss: f64,
+    /// Akaike's criterion.
+    pub aic: f64,
+    /// Akaike's criterion corrected.
+    pub aicc: f64,
+    /// Schwarz's criterion.
+    pub bic: f64,
+    /// Final prediction error.
+    pub fpe: f64,
+    /// Minimum description length.
+    pub mdl: f64,
+    /// Young's criterion; `None` without standard errors.
+    pub yic: Option<f64>,
+    /// Number of residuals, the same for all candidates.
+    pub residuals: usize,
+    /// True when the search reached a minimum.
+    pub converged: bool,
+}
+
+impl CandidateFigures {
+    fn of(fit: &Fit) -> Self {
+        Self {
+            loss: fit.loss(),
+            aic: fit.aic(),
+            aicc: fit.aicc(),
+            bic: fit.bic(),
+            fpe: fit.fpe(),
+            mdl: fit.mdl(),
+            yic: fit.yic(),
+            residuals: fit.residual_count(),
+            converged: fit.termination().converged(),
+        }
+    }
+
+    /// The figure that the criterion compares.
+    pub fn value(&self, criterion: Criterion) -> f64 {
+        match criterion {
+            Criterion::Loss => self.loss,
+            Criterion::Aic => self.aic,
+            Criterion::Aicc => self.aicc,
+            Criterion::Bic => self.bic,
+            Criterion::Fpe => self.fpe,
+            Criterion::Mdl => self.mdl,
+            Criterion::Yic => self.yic.unwrap_or(f64::INFINITY),
+        }
+    }
+}
+
+/// The chosen fit and the table it was chosen from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// The chosen model, fitted on all its samples.
+    pub fit: Fit,
+    /// All candidates in the order of [`OrderRanges::combinations`].
+    pub candidates: Vec<Candidate>,
+    /// What decided.
+    pub criterion: Criterion,
+}
+
+/// Fits every combination of orders and returns the best. `template` gives the options; its orders and start are not used.
+///
+/// # Errors
+/// [`IdentError::EmptyRange`]; the error of the first candidate when none could be fitted.
+pub fn choose_orders(
+    template: &Estimator,
+    ranges: &OrderRanges,
+    criterion: Criterion,
+    records: &[Record],
+) -> Result<Choice, IdentError> {
+    choose_orders_with(template, ranges, criterion, records, &|| {})
+}
+
+/// As [`choose_orders`], calling `each` after every candidate, from any thread, so that a long search can show how far it is.
+///
+/// # Errors
+/// As [`choose_orders`].
+pub fn choose_orders_with(
+    template: &Estimator,
+    ranges: &OrderRanges,
+    criterion: Criterion,
+    records: &[Record],
+    each: &(dyn Fn() + Sync),
+) -> Result<Choice, IdentError> {
+    let combinations = ranges.combinations()?;
+    for orders in &combinations {
+        orders.check(template.structure)?;
+    }
+    let first = combinations
+        .iter()
+        .map(|o| first_residual(o, template.initial_state_in_use()))
+        .max()
+        .unwrap_or(0);
+    // To rank candidates the loss need not be known to the last digit; the chosen one is fitted again with all care.
+    let quick = Estimator {
+        search: SearchOptions {
+            tolerance: template.search.tolerance.max(1e-8),
+            max_iterations: template.search.max_iterations.min(50),
+            ..template.search
+        },
+        starts: 1,
+        ..template.clone()
+    };
+    // Delays in blocks: within one, each delay starts from its neighbour. The blocks are the same for any number of threads, and
+    // the results are collected by index, so that the table does not depend on them.
+    let delays = ranges.nk.clone().count();
+    let blocks: Vec<&[Orders]> = combinations
+        .chunks(delays)
+        .flat_map(|row| row.chunks(NEIGHBOURS))
+        .collect();
+    let candidates: Vec<Candidate> = blocks
+        .into_par_iter()
+        .flat_map_iter(|block| fit_neighbours(&quick, block, records, first, each))
+        .collect();
+    let best = candidates
+        .iter()
+        .filter_map(|c| c.outcome.as_ref().ok().map(|f| (c.orders, f.value(criterion))))
+        .min_by(|a, b| a.1.total_cmp(&b.1));
+    let orders = match best {
+        Some((orders, _)) => orders,
+        None => {
+            let reason = candidates.into_iter().find_map(|c| c.outcome.err());
+            return Err(reason.unwrap_or(IdentError::NoFiniteLoss));
+        }
+    };
+    Ok(Choice {
+        fit: template.with_orders(orders).fit(records)?,
+        candidates,
+        criterion,
+    })
+}
+
+/// Delays that are fitted one from the other.
+const NEIGHBOURS: usize = 12;
+
+/// Fits orders that differ by their delay alone, each from the coefficients of the one before.
+fn fit_neighbours(
+    quick: &Estimator,
+    block: &[Orders],
+    records: &[Record],
+    first: usize,
+    each: &(dyn Fn() + Sync),
+) -> Vec<Candidate> {
+    let mut neighbour: Option<Vec<f64>> = None;
+    block
+        .iter()
+        .map(|&orders| {
+            let own = quick.with_orders(orders);
+            let from_neighbour = neighbour.take().and_then(|theta| {
+                let fit = Estimator {
+                    start: Some(theta),
+                    ..own.clone()
+                }
+                .fit_from(records, first);
+                fit.ok().filter(|fit| fit.termination().converged())
+            });
+            let fit = from_neighbour.map_or_else(|| own.fit_from(records, first), Ok);
+            neighbour = fit.as_ref().ok().map(|fit| fit.model().theta().to_vec());
+            each();
+            Candidate {
+                orders,
+                outcome: fit.as_ref().map(CandidateFigures::of).map_err(Clone::clone),
+            }
+        })
+        .collect()
+}
+
+/// The fit of one model where the ranges leave nothing open, else that of the best of them with the table it was chosen from. `template` gives
+/// the options; its start belongs to the first case alone.
+///
+/// # Errors
+/// Those of [`Estimator::fit`] and [`choose_orders`]; [`IdentError::BadStart`] for a start where several models are tried.
+pub fn fit_or_choose(
+    template: &Estimator,
+    ranges: &OrderRanges,
+    criterion: Criterion,
+    records: &[Record],
+    each: &(dyn Fn() + Sync),
+) -> Result<(Fit, Option<Choice>), IdentError> {
+    let combinations = ranges.combinations()?;
+    if let [orders] = combinations.as_slice() {
+        let estimator = Estimator {
+            orders: *orders,
+            ..template.clone()
+        };
+        return Ok((estimator.fit(records)?, None));
+    }
+    if template.start.is_some() {
+        return Err(IdentError::BadStart {
+            reason: "it belongs to one model, but a range of orders or delays is searched; give nk and the orders as single numbers"
+                .to_owned(),
+        });
+    }
+    let choice = choose_orders_with(template, ranges, criterion, records, each)?;
+    Ok((choice.fit.clone(), Some(choice)))
+}
+
+impl Choice {
+    /// Delays nk that the data do not tell from the best one, the other orders being those of the chosen model: the smallest
+    /// and the largest with `n ln(V/V_min) <= 3.84`, the 95 % point of chi-square with one degree of freedom (a profile
+    /// likelihood interval; nk moves in whole samples, so that it is coarse where one sample changes the loss much). `None`
+    /// when fewer than two delays were fitted.
+    pub fn delay_interval(&self) -> Option<(usize, usize)> {
+        let chosen = self.fit.orders();
+        let profile: Vec<(usize, f64, usize)> = self
+            .candidates
+            .iter()
+            .filter(|c| {
+                Orders {
+                    nk: chosen.nk,
+                    ..c.orders
+                } == chosen
+            })
+            .filter_map(|c| c.outcome.as_ref().ok().map(|f| (c.orders.nk, f.loss, f.residuals)))
+            .collect();
+        let smallest = profile.iter().map(|p| p.1).reduce(f64::min)?;
+        let inside = || {
+            profile
+                .iter()
+                .filter(|(_, loss, n)| *n as f64 * (loss / smallest).ln() <= CHI_SQUARE_95)
+                .map(|p| p.0)
+        };
+        (profile.len() > 1).then_some((inside().min()?, inside().max()?))
+    }
+}
+
+/// 95 % point of chi-square with one degree of freedom.
+const CHI_SQUARE_95: f64 = 3.841_458_820_694_124;
+
+/// Delays from 0.05 to 0.6 s, as people have them, in samples: the default range of nk.
+pub fn default_delay_range(sample_time: hoid_model::SampleTime) -> RangeInclusive<usize> {
+    // tau_e = (nk - 1) Ts.
+    let samples = |delay_s: f64| (delay_s / sample_time.s()).round() as usize + 1;
+    samples(0.05)..=samples(0.6)
+}
+
+/// The operator's orders with the defaults of the command line: nk searched, and nd over 1 to 4 for Box-Jenkins.
+pub fn default_operator_ranges(structure: Structure, sample_time: hoid_model::SampleTime) -> OrderRanges {
+    let mut ranges = OrderRanges::from(structure.operator_orders(1));
+    if structure.has_input() {
+        ranges.nk = default_delay_range(sample_time);
+    }
+    if structure == Structure::BoxJenkins {
+        ranges.nd = 1..=4;
+    }
+    ranges
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::SampleTime;
+
+    use super::*;
+
+    #[test]
+    fn combinations_run_through_all_and_empty_ranges_are_refused() {
+        let mut ranges = OrderRanges::from(Structure::BoxJenkins.operator_orders(29));
+        assert_eq!(
+            ranges.combinations().unwrap(),
+            [Structure::BoxJenkins.operator_orders(29)]
+        );
+        ranges.nk = 27..=30;
+        ranges.nd = 1..=3;
+        let all = ranges.combinations().unwrap();
+        assert_eq!(all.len(), 12);
+        assert_eq!(
+            (all[0].nd, all[0].nk, all[1].nk, all[11].nd, all[11].nk),
+            (1, 27, 28, 3, 30)
+        );
+        ranges.nk = RangeInclusive::new(5, 4);
+        assert!(matches!(ranges.combinations(), Err(IdentError::EmptyRange { range }) if range == "nk=5..4"));
+    }
+
+    #[test]
+    fn default_delays_are_those_of_people() {
+        assert_eq!(default_delay_range(SampleTime::new(0.01).unwrap()), 6..=61);
+        assert_eq!(default_delay_range(SampleTime::new(1.0 / 60.0).unwrap()), 4..=37);
+    }
+}

@@ -1,0 +1,166 @@
+//! Products of eps and the columns of psi, for a record in each lane.
+//!
+//! A column that is the one before it, a sample later, needs no pass of its own: `sum x(t-1) y(t-1)` over a span is `sum x(t) y(t)` but for the
+//! samples at both ends, as in [`crate::linalg::products`].
+
+use hoid_core::number::Number;
+
+use super::pass::Room;
+
+/// The columns whose products are summed: `[eps, x_b(t).., v(t-1).., x_f(t-1)..]`.
+pub(super) struct Columns {
+    pub nb: usize,
+    pub nd: usize,
+    pub nf: usize,
+}
+
+impl Columns {
+    pub fn count(&self) -> usize {
+        1 + self.nb + self.nd + self.nf
+    }
+
+    /// True for a column that is the one before it, a sample later.
+    fn follows(&self, column: usize) -> bool {
+        column > 1 && column != 1 + self.nb && column != 1 + self.nb + self.nd
+    }
+
+    /// The values of a column in these rows of the span.
+    #[inline(always)]
+    pub fn rows<'r>(&self, room: &'r Room, column: usize, from: usize, to: usize, width: usize) -> &'r [f64] {
+        let (signal, lag) = if column == 0 {
+            (&*room.eps, 0)
+        } else if column <= self.nb {
+            (&*room.x_b, column - 1)
+        } else if column <= self.nb + self.nd {
+            (&*room.v, column - self.nb)
+        } else {
+            (&*room.x_f, column - self.nb - self.nd)
+        };
+        &signal[(from - lag) * width..(to - lag) * width]
+    }
+
+    /// Adds the products over these rows for which a pass is needed: those of a column that follows none with all others.
+    #[inline(always)]
+    pub fn add_products<R: Number>(&self, zero: R, room: &Room, from: usize, to: usize, products: &mut [f64]) {
+        let (p1, width) = (self.count(), zero.lanes());
+        for i in 0..p1 {
+            if self.follows(i) {
+                continue;
+            }
+            let x = self.rows(room, i, from, to, width);
+            let mut others = [0; 4];
+            let mut count = 0;
+            for j in 0..p1 {
+                // Those before this one have met it already.
+                if j >= i || self.follows(j) {
+                    others[count] = j;
+                    count += 1;
+                }
+                if count == 4 || (j == p1 - 1 && count > 0) {
+                    let mut sums = [zero; 4];
+                    if count <= 2 {
+                        let last = self.rows(room, others[count - 1], from, to, width);
+                        let pair = [self.rows(room, others[0], from, to, width), last];
+                        [sums[0], sums[1]] = two_products(zero, x, pair);
+                    } else {
+                        // Three: the last is multiplied twice.
+                        let last = self.rows(room, others[count - 1], from, to, width);
+                        let a = self.rows(room, others[0], from, to, width);
+                        let b = self.rows(room, others[1], from, to, width);
+                        let c = self.rows(room, others[2], from, to, width);
+                        sums = four_products(zero, x, [a, b, c, last]);
+                    }
+                    for k in 0..count {
+                        let at = (i * p1 + others[k]) * width;
+                        let place = &mut products[at..at + width];
+                        (zero.load(place) + sums[k]).store(place);
+                    }
+                    count = 0;
+                }
+            }
+        }
+    }
+
+    /// The products of the columns that both follow others: those of the columns before them over the same rows, `sign` times their
+    /// products in one row more.
+    #[inline(always)]
+    pub fn add_row<R: Number>(&self, zero: R, room: &Room, row: usize, sign: f64, products: &mut [f64]) {
+        let (p1, width) = (self.count(), zero.lanes());
+        for i in 0..p1 {
+            for j in 0..=i {
+                if self.follows(i) && self.follows(j) {
+                    let x = zero.load(self.rows(room, i, row, row + 1, width));
+                    let y = zero.load(self.rows(room, j, row, row + 1, width));
+                    let at = (i * p1 + j) * width;
+                    let place = &mut products[at..at + width];
+                    (zero.load(place) + zero.like(sign) * (x * y)).store(place);
+                }
+            }
+        }
+    }
+
+    /// All products from those that were summed, with what lies in the space of the initial states taken away.
+    #[inline(always)]
+    pub fn complete<R: Number>(&self, zero: R, inside: &[R], nf: usize, products: &mut [f64]) {
+        let (p1, width) = (self.count(), zero.lanes());
+        for i in 0..p1 {
+            for j in 0..=i {
+                let at = (i * p1 + j) * width;
+                let value = if self.follows(i) && self.follows(j) {
+                    zero.load(&products[at..]) + zero.load(&products[((i - 1) * p1 + j - 1) * width..])
+                } else if self.follows(i) || !self.follows(j) {
+                    // The one that follows none was multiplied with all others, the earlier one of two such.
+                    zero.load(&products[(j * p1 + i) * width..])
+                } else {
+                    zero.load(&products[at..])
+                };
+                value.store(&mut products[at..]);
+                value.store(&mut products[(j * p1 + i) * width..]);
+            }
+        }
+        for i in 1..p1 {
+            for j in 1..p1 {
+                let place = &mut products[(i * p1 + j) * width..(i * p1 + j + 1) * width];
+                let mut value = zero.load(place);
+                for k in 0..nf {
+                    value = value - inside[i * nf + k] * inside[j * nf + k];
+                }
+                value.store(place);
+            }
+        }
+    }
+}
+
+/// `x' y` for four y.
+#[inline(always)]
+pub(super) fn four_products<R: Number>(zero: R, x: &[f64], [a, b, c, d]: [&[f64]; 4]) -> [R; 4] {
+    let width = zero.lanes();
+    let mut sums = (zero, zero, zero, zero);
+    let others =
+        (a.chunks_exact(width).zip(b.chunks_exact(width))).zip(c.chunks_exact(width).zip(d.chunks_exact(width)));
+    for (x, ((a, b), (c, d))) in x.chunks_exact(width).zip(others) {
+        let x = zero.load(x);
+        sums.0 = sums.0 + x * zero.load(a);
+        sums.1 = sums.1 + x * zero.load(b);
+        sums.2 = sums.2 + x * zero.load(c);
+        sums.3 = sums.3 + x * zero.load(d);
+    }
+    [sums.0, sums.1, sums.2, sums.3]
+}
+
+/// `x' y` for two y.
+#[inline(always)]
+pub(super) fn two_products<R: Number>(zero: R, x: &[f64], [a, b]: [&[f64]; 2]) -> [R; 2] {
+    let width = zero.lanes();
+    let mut sums = (zero, zero);
+    for ((x, a), b) in x
+        .chunks_exact(width)
+        .zip(a.chunks_exact(width))
+        .zip(b.chunks_exact(width))
+    {
+        let x = zero.load(x);
+        sums.0 = sums.0 + x * zero.load(a);
+        sums.1 = sums.1 + x * zero.load(b);
+    }
+    [sums.0, sums.1]
+}

@@ -1,0 +1,294 @@
+//! The responses to the initial states of 1/F, of a record in each lane, and what is best said of the states.
+//!
+//! With h the impulse response of 1/F and g that of D/F, a state that enters w k samples after its first value adds `x_k h(t-k)` to w and takes
+//! `x_k g(t-k)` from the residuals. The columns `g(t-k)` over the residuals are made orthogonal by the factor of Cholesky of their products, twice, as
+//! once leaves what rounding makes of columns that are nearly parallel (Y. Yamamoto et al., *Electronic Trans. Numerical Analysis* 44 (2015) 306-326). As
+//! they are shifts of one, the first matrix takes nf products. The criterion alone has an orthonormal basis by Gram and Schmidt
+//! ([`crate::pem::initial_states`]), the same but for rounding; a lane whose columns depend on each other is left to it.
+
+use hoid_core::number::Number;
+
+use super::{
+    columns::{Columns, four_products, two_products},
+    pass::{Room, add_scaled},
+};
+
+/// Samples of an impulse response between two looks at whether it has died away.
+const LOOK: usize = 128;
+/// Size of the last values of a response that has died away; it began with 1.
+const NOTHING: f64 = 1e-17;
+/// Share of a column's square that must not lie in the space of those before it.
+const OWN: f64 = 1e-12;
+
+/// The responses: h and g stand in [`Room::h`] and [`Room::g`] with nf zeros before and behind, the orthogonal columns q in [`Room::q`].
+pub(super) struct FreeResponses<R> {
+    /// Rows of a column, from the first residual on.
+    pub rows: usize,
+    nd: usize,
+    nf: usize,
+    /// Samples of h.
+    length: usize,
+    /// Factors by rows: that of the columns, each row over the diagonal element of its column, and that of q.
+    first: Vec<R>,
+    second: Vec<R>,
+}
+
+impl<R: Number> FreeResponses<R> {
+    /// Those of so many residuals.
+    #[inline(always)]
+    pub fn of(zero: R, [d, f]: [&[f64]; 2], residuals: usize, room: &mut Room, dependent: &mut Vec<bool>) -> Self {
+        let width = zero.lanes();
+        let (nd, nf) = (d.len() / width, f.len() / width);
+        let longest = residuals + nd;
+        room.h.make_room((longest + 2 * nf) * width);
+        room.g.make_room((longest + nd + 2 * nf) * width);
+        let length = impulse_response(zero, f, longest, &mut room.h);
+        let (from, to) = (nf * width, (nf + length + nd + nf) * width);
+        let g = &mut room.g[..to];
+        g[..from].fill(0.0);
+        g[from..to].fill(0.0);
+        g[from..from + length * width].copy_from_slice(&room.h[from..from + length * width]);
+        for (i, di) in d.chunks_exact(width).enumerate() {
+            let at = from + (i + 1) * width;
+            add_scaled(zero.load(di), &room.h[from..from + length * width], &mut g[at..]);
+        }
+        let mut responses = Self {
+            rows: (length + nf - 1).min(residuals),
+            nd,
+            nf,
+            length,
+            first: Vec::new(),
+            second: Vec::new(),
+        };
+        dependent.clear();
+        dependent.resize(width, false);
+        responses.make_orthogonal(zero, room, dependent);
+        responses
+    }
+
+    #[inline(always)]
+    fn make_orthogonal(&mut self, zero: R, room: &mut Room, dependent: &mut [bool]) {
+        let (width, nf, rows) = (zero.lanes(), self.nf, self.rows);
+        let mut s = vec![zero; nf * nf];
+        for j in (0..nf).step_by(2) {
+            let last = (j + 1).min(nf - 1);
+            let pair = [self.shift(room, j, width), self.shift(room, last, width)];
+            [s[j * nf], s[last * nf]] = two_products(zero, self.shift(room, 0, width), pair);
+        }
+        for k in 1..nf {
+            for i in k..nf {
+                // The row that enters in front, and the last that leaves, of the columns before these.
+                let entering = self.at(zero, room, k - 1, -1) * self.at(zero, room, i - 1, -1);
+                let last = rows as isize - 1;
+                let leaving = self.at(zero, room, k - 1, last) * self.at(zero, room, i - 1, last);
+                s[i * nf + k] = s[(i - 1) * nf + k - 1] + entering - leaving;
+            }
+        }
+        factor(zero, nf, &mut s, dependent);
+        for k in 0..nf {
+            let diagonal = s[k * nf + k];
+            for i in k..nf {
+                s[i * nf + k] = s[i * nf + k] / diagonal;
+            }
+        }
+        self.first = s;
+
+        room.q.make_room(nf * rows * width);
+        for k in 0..nf {
+            let from = (nf + self.nd - k) * width;
+            let (before, rest) = room.q.split_at_mut(k * rows * width);
+            let column = &mut rest[..rows * width];
+            column.copy_from_slice(&room.g[from..from + rows * width]);
+            for (j, q) in before.chunks_exact(rows * width).enumerate() {
+                add_scaled(-self.first[k * nf + j], q, column);
+            }
+        }
+        let mut s = vec![zero; nf * nf];
+        for k in 0..nf {
+            for i in (k..nf).step_by(2) {
+                let last = (i + 1).min(nf - 1);
+                let pair = [self.column(room, i, width), self.column(room, last, width)];
+                [s[i * nf + k], s[last * nf + k]] = two_products(zero, self.column(room, k, width), pair);
+            }
+        }
+        factor(zero, nf, &mut s, dependent);
+        self.second = s;
+    }
+
+    /// Column k as it was: g, k samples later.
+    #[inline(always)]
+    fn shift<'r>(&self, room: &'r Room, k: usize, width: usize) -> &'r [f64] {
+        let first = self.nf + self.nd - k;
+        &room.g[first * width..(first + self.rows) * width]
+    }
+
+    /// Its element in a row, which may be the one before the first.
+    #[inline(always)]
+    fn at(&self, zero: R, room: &Room, k: usize, row: isize) -> R {
+        zero.load(&room.g[(self.nf + self.nd - k).wrapping_add_signed(row) * zero.lanes()..])
+    }
+
+    /// Column k, orthogonal to those before it.
+    #[inline(always)]
+    fn column<'r>(&self, room: &'r Room, k: usize, width: usize) -> &'r [f64] {
+        &room.q[k * self.rows * width..(k + 1) * self.rows * width]
+    }
+
+    /// Takes the best initial states into w (in the place of r), v and eps: w begins in row `regressed` of the span, the residuals in row
+    /// `counted`.
+    #[inline(always)]
+    pub fn eliminate(&self, zero: R, room: &mut Room, regressed: usize, counted: usize) {
+        let (width, nf) = (zero.lanes(), self.nf);
+        let (from, to) = (counted * width, (counted + self.rows) * width);
+        let eps = &room.eps[from..to];
+        let mut x = Vec::with_capacity(nf);
+        for k in (0..nf).step_by(2) {
+            let last = (k + 1).min(nf - 1);
+            let pair = [self.column(room, k, width), self.column(room, last, width)];
+            x.extend_from_slice(&two_products(zero, eps, pair)[..=last - k]);
+        }
+        self.forward(&mut x);
+        for k in (0..nf).rev() {
+            for i in k + 1..nf {
+                x[k] = x[k] - self.second[i * nf + k] * x[i];
+            }
+            x[k] = x[k] / self.second[k * nf + k];
+        }
+        for k in 0..nf {
+            let q = &room.q[k * self.rows * width..(k + 1) * self.rows * width];
+            add_scaled(-x[k], q, &mut room.eps[from..to]);
+        }
+        // From the share of each q to that of the columns as they were.
+        for k in (0..nf).rev() {
+            for j in 0..k {
+                x[j] = x[j] - self.first[k * nf + j] * x[k];
+            }
+        }
+        let mut minus = Vec::with_capacity(nf);
+        for k in 0..nf {
+            minus.push(-x[k]);
+        }
+        let count = (self.length + nf).min(room.r.len() / width - regressed);
+        let (from, to) = (regressed * width, (regressed + count) * width);
+        add_shifts(zero, &x, &room.h, nf, &mut room.r[from..to]);
+        add_shifts(zero, &minus, &room.h, nf, &mut room.v[from..to]);
+    }
+
+    /// Components of each column of psi in the space of the responses, a row for each column. eps, the first, has none left.
+    #[inline(always)]
+    pub fn components(&self, zero: R, columns: &Columns, room: &Room, counted: usize) -> Vec<R> {
+        let (width, nf, count) = (zero.lanes(), self.nf, columns.count());
+        let mut inside = vec![zero; count * nf];
+        let end = counted + self.rows;
+        for k in 0..nf {
+            let x = self.column(room, k, width);
+            for i in (1..count).step_by(4) {
+                let a = columns.rows(room, i, counted, end, width);
+                let b = columns.rows(room, (i + 1).min(count - 1), counted, end, width);
+                let c = columns.rows(room, (i + 2).min(count - 1), counted, end, width);
+                let d = columns.rows(room, (i + 3).min(count - 1), counted, end, width);
+                let sums = four_products(zero, x, [a, b, c, d]);
+                for j in i..(i + 4).min(count) {
+                    inside[j * nf + k] = sums[j - i];
+                }
+            }
+        }
+        for of_column in inside.chunks_exact_mut(nf) {
+            self.forward(of_column);
+        }
+        inside
+    }
+
+    /// `y <- L^-1 y` with the second factor.
+    #[inline(always)]
+    fn forward(&self, y: &mut [R]) {
+        for k in 0..self.nf {
+            for j in 0..k {
+                y[k] = y[k] - self.second[k * self.nf + j] * y[j];
+            }
+            y[k] = y[k] / self.second[k * self.nf + k];
+        }
+    }
+}
+
+/// The factor of Cholesky in the place of the lower triangle of s, and the lanes without one.
+#[inline(always)]
+fn factor<R: Number>(zero: R, nf: usize, s: &mut [R], dependent: &mut [bool]) {
+    for k in 0..nf {
+        for i in k..nf {
+            let mut rest = s[i * nf + k];
+            for j in 0..k {
+                rest = rest - s[i * nf + j] * s[k * nf + j];
+            }
+            if i > k {
+                s[i * nf + k] = rest / s[k * nf + k];
+                continue;
+            }
+            let square = s[k * nf + k];
+            for lane in 0..zero.lanes() {
+                let own = rest.lane(lane);
+                let independent = own > OWN * square.lane(lane);
+                dependent[lane] |= !independent;
+                rest.set_lane(lane, own.sqrt());
+            }
+            s[k * nf + k] = rest;
+        }
+    }
+}
+
+/// `y(t) += sum_k x_k s(t-k)`; row `at` of s is that of t = 0.
+#[inline(always)]
+fn add_shifts<R: Number>(zero: R, x: &[R], s: &[f64], at: usize, y: &mut [f64]) {
+    let width = zero.lanes();
+    let (from, count) = (at * width, y.len());
+    if let [x0, x1] = *x {
+        let rows = s[from..from + count]
+            .chunks_exact(width)
+            .zip(s[from - width..].chunks_exact(width));
+        for (y, (s0, s1)) in y.chunks_exact_mut(width).zip(rows) {
+            (zero.load(y) + x0 * zero.load(s0) + x1 * zero.load(s1)).store(y);
+        }
+        return;
+    }
+    for (k, x) in x.iter().enumerate() {
+        let from = from - k * width;
+        add_scaled(*x, &s[from..from + count], y);
+    }
+}
+
+/// Impulse response of 1/F until it has died away in all lanes or `longest` is reached, with nf zeros before and behind; zero in a lane in which it
+/// has died away before. Returns its length.
+#[inline(always)]
+fn impulse_response<R: Number>(zero: R, f: &[f64], longest: usize, h: &mut [f64]) -> usize {
+    let (width, nf) = (zero.lanes(), f.len() / zero.lanes());
+    h[..nf * width].fill(0.0);
+    let mut impulse = zero.like(1.0);
+    let mut ends = vec![usize::MAX; width];
+    let mut rows = nf;
+    while rows < nf + longest && ends.contains(&usize::MAX) {
+        let to = (rows + LOOK).min(nf + longest);
+        for row in rows..to {
+            let mut y = impulse;
+            impulse = zero;
+            for i in (0..nf).rev() {
+                y = y - zero.load(&f[i * width..]) * zero.load(&h[(row - 1 - i) * width..]);
+            }
+            y.store(&mut h[row * width..]);
+        }
+        rows = to;
+        for (lane, end) in ends.iter_mut().enumerate() {
+            // All that follows comes from the last nf values.
+            let gone = (rows - nf..rows).all(|row| h[row * width + lane].abs() < NOTHING);
+            if gone {
+                *end = rows.min(*end);
+            }
+        }
+    }
+    for (lane, end) in ends.iter().enumerate() {
+        for row in *end.min(&rows)..rows {
+            h[row * width + lane] = 0.0;
+        }
+    }
+    h[rows * width..(rows + nf) * width].fill(0.0);
+    rows - nf
+}

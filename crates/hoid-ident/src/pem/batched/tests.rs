@@ -1,0 +1,219 @@
+use hoid_model::scenario::{Condition, RemnantStrength, Scenario};
+use hoid_sim::{Simulator, Stream};
+
+use super::*;
+use crate::pem::criterion::{Criterion, Data, first_residual};
+
+/// Runs of C1, each with another remnant.
+fn runs(count: u64, samples: usize) -> Vec<Record> {
+    let run = |replication: u64| {
+        let mut scenario = Scenario::condition(Condition::C1);
+        scenario.remnant.order = 1 + (replication % 4) as usize;
+        scenario.remnant.strength = RemnantStrength::Level {
+            level: 0.05 * (1 + replication % 5) as f64,
+            definition: Default::default(),
+        };
+        let stream = Stream {
+            seed: 17,
+            replication,
+            ..Stream::default()
+        };
+        let run = Simulator::new(&scenario).unwrap().run(stream, false).unwrap();
+        run.span(0.0, samples as f64 * 0.01).unwrap()
+    };
+    (0..count).map(run).collect()
+}
+
+fn by_reference(records: &[Record]) -> Vec<&Record> {
+    records.iter().collect()
+}
+
+fn orders(nb: usize, nd: usize, nf: usize, nk: usize) -> Orders {
+    Orders {
+        nb,
+        nd,
+        nf,
+        nk,
+        ..Orders::default()
+    }
+}
+
+/// The criterion of each record in a lane, at a theta of its own.
+fn pass(o: Orders, records: &[Record], thetas: &[Vec<f64>], path: Path) -> Vec<(Linearisation, bool)> {
+    let first = first_residual(&o, InitialState::Estimate);
+    let mut lanes = Lanes::new(o, first, records[0].len(), path.lanes().unwrap());
+    for (lane, (record, theta)) in records.iter().zip(thetas).enumerate().take(lanes.width) {
+        lanes.put(lane, Data::of(std::slice::from_ref(record))[0]);
+        for (i, value) in theta.iter().enumerate() {
+            lanes.memory.theta[i * lanes.width + lane] = *value;
+        }
+    }
+    lanes.pass(path);
+    (0..lanes.width.min(records.len()))
+        .map(|lane| (lanes.linearisation(lane), lanes.memory.sums.dependent[lane]))
+        .collect()
+}
+
+fn all(there: &Linearisation) -> Vec<f64> {
+    let mut all = vec![there.sum_of_squares];
+    all.extend(&there.descent);
+    all.extend(&there.gram);
+    all
+}
+
+/// theta with poles somewhere near those of a person, different in each lane.
+fn theta(o: &Orders, lane: usize) -> Vec<f64> {
+    let shift = 0.003 * lane as f64;
+    let mut theta: Vec<f64> = (0..o.nb).map(|j| 0.06 - 0.05 * j as f64 + shift).collect();
+    theta.extend((0..o.nd).map(|i| (-0.7 + 10.0 * shift) / f64::powi(2.0, i as i32)));
+    let f: &[f64] = match o.nf {
+        1 => &[-0.93],
+        2 => &[-1.91, 0.92],
+        3 => &[-2.2, 1.5, -0.28],
+        _ => &[-2.2, 1.5, -0.28, 0.01],
+    };
+    theta.extend(f.iter().map(|f| f * (1.0 - 0.2 * shift)));
+    theta
+}
+
+#[test]
+fn a_lane_has_the_criterion_of_its_record_alone() {
+    let records = runs(8, 1500);
+    for o in [
+        orders(2, 1, 2, 29),
+        orders(2, 0, 2, 29),
+        orders(2, 4, 2, 25),
+        orders(1, 2, 1, 3),
+        orders(4, 1, 4, 1),
+        orders(3, 6, 3, 0),
+    ] {
+        let thetas: Vec<Vec<f64>> = (0..8).map(|lane| theta(&o, lane)).collect();
+        for (lane, (found, dependent)) in pass(o, &records, &thetas, Path::Best).into_iter().enumerate() {
+            assert!(!dependent);
+            let criterion = Criterion {
+                orders: o,
+                data: Data::of(&records[lane..=lane]),
+                initial: InitialState::Estimate,
+                first: first_residual(&o, InitialState::Estimate),
+                weights: None,
+            };
+            let alone = criterion.linearise(&thetas[lane], &mut Workspace::default());
+            let p = o.parameters();
+            let size = |i: usize| match i {
+                0 => alone.sum_of_squares,
+                i if i <= p => (alone.sum_of_squares * alone.gram[(i - 1) * (p + 1)]).sqrt(),
+                i => {
+                    let (j, k) = ((i - 1 - p) / p, (i - 1 - p) % p);
+                    (alone.gram[j * (p + 1)] * alone.gram[k * (p + 1)]).sqrt()
+                }
+            };
+            for (i, (a, b)) in all(&found).into_iter().zip(all(&alone)).enumerate() {
+                // Rounding of filters with poles near the circle, against the sizes of the columns.
+                assert!(
+                    (a - b).abs() <= 1e-11 * size(i),
+                    "{o} lane {lane} number {i}: {a} for {b}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_lane_has_the_same_bits_on_every_path_and_beside_anything() {
+    let (records, o) = (runs(8, 1200), orders(2, 2, 2, 29));
+    let thetas: Vec<Vec<f64>> = (0..8).map(|lane| theta(&o, lane)).collect();
+    let bits = |there: &Linearisation| -> Vec<u64> { all(there).into_iter().map(f64::to_bits).collect() };
+    let best = pass(o, &records, &thetas, Path::Best);
+    for path in Path::available() {
+        for lane in 0..best.len() {
+            let (alone, _) = &pass(o, &records[lane..=lane], &thetas[lane..=lane], path)[0];
+            assert_eq!(bits(alone), bits(&best[lane].0), "lane {lane} on {path:?}");
+        }
+    }
+}
+
+#[test]
+fn fits_side_by_side_are_those_alone() {
+    let records = runs(11, 3072);
+    for (nd, start) in [
+        (1, None),
+        (2, Some(vec![0.075, -0.075, 0.0, 0.0, -1.912, 0.924])),
+        (4, None),
+    ] {
+        let estimator = Estimator {
+            start,
+            ..Estimator::new(Structure::BoxJenkins, orders(2, nd, 2, 29))
+        };
+        let each = fit_each(&estimator, &by_reference(&records), Path::Best).unwrap();
+        for (record, found) in records.iter().zip(each) {
+            let (found, alone) = (found.unwrap(), estimator.fit(std::slice::from_ref(record)).unwrap());
+            assert_eq!(found.start(), alone.start());
+            assert_eq!(found.termination().reason, alone.termination().reason);
+            for (a, b) in found.parameters().iter().zip(alone.parameters()) {
+                let (a, b) = (&a.1, b.1);
+                let (se_a, se_b) = (a.standard_error.unwrap(), b.standard_error.unwrap());
+                assert!((a.value - b.value).abs() <= 1e-7 * se_b, "{a:?} for {b:?}");
+                assert!((se_a - se_b).abs() <= 1e-8 * se_b);
+            }
+        }
+    }
+}
+
+#[test]
+fn fits_from_no_start_have_the_same_bits_on_every_path_and_beside_anything() {
+    let records = runs(5, 2048);
+    let estimator = Estimator::new(Structure::BoxJenkins, orders(2, 1, 2, 29));
+    let bits = |records: &[Record], path: Path| -> Vec<Vec<u64>> {
+        let fits = fit_each(&estimator, &by_reference(records), path).unwrap();
+        let theta = |fit: Result<Fit, IdentError>| fit.unwrap().model().theta().iter().map(|t| t.to_bits()).collect();
+        fits.into_iter().map(theta).collect()
+    };
+    let best = bits(&records, Path::Best);
+    for path in Path::available() {
+        assert_eq!(bits(&records, path), best, "{path:?}");
+        for (lane, alone) in best.iter().enumerate() {
+            assert_eq!(
+                bits(&records[lane..=lane], path)[0],
+                *alone,
+                "record {lane} on {path:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn bad_records_fail_alone() {
+    let mut records = runs(3, 1024);
+    let silent = Record::new(
+        records[0].sample_time(),
+        hoid_model::Channel::new("e", "", vec![0.0; 1024]),
+        hoid_model::Channel::new("u", "", vec![0.0; 1024]),
+    );
+    records[1] = silent.unwrap();
+    let estimator = Estimator::new(Structure::BoxJenkins, orders(2, 1, 2, 29));
+    let each = estimator.fit_each(&by_reference(&records));
+    for (record, found) in records.iter().zip(each) {
+        match (found, estimator.fit(std::slice::from_ref(record))) {
+            (Ok(found), Ok(alone)) => assert!((found.loss() - alone.loss()).abs() <= 1e-12 * alone.loss()),
+            (Err(found), Err(alone)) => assert_eq!(found.to_string(), alone.to_string()),
+            (found, alone) => panic!("{found:?} for {alone:?}"),
+        }
+    }
+    assert!(estimator.fit_each(&[]).is_empty());
+}
+
+#[test]
+fn other_models_and_records_of_different_lengths_are_fitted_one_after_the_other() {
+    let mut records = runs(2, 1024);
+    let bj = Estimator::new(Structure::BoxJenkins, orders(2, 1, 2, 29));
+    let arx = Estimator::new(Structure::Arx, Structure::Arx.operator_orders(29));
+    assert!(fit_each(&arx, &by_reference(&records), Path::Best).is_none());
+    // The pass has no C.
+    let with_c = Orders { nc: 1, ..bj.orders };
+    let with_c = Estimator::new(Structure::BoxJenkins, with_c);
+    assert!(fit_each(&with_c, &by_reference(&records), Path::Best).is_none());
+    assert!(arx.fit_each(&by_reference(&records)).into_iter().all(|fit| fit.is_ok()));
+    records[1] = records[1].span(0.0, 9.0).unwrap();
+    assert!(fit_each(&bj, &by_reference(&records), Path::Best).is_none());
+    assert!(bj.fit_each(&by_reference(&records)).into_iter().all(|fit| fit.is_ok()));
+}

@@ -1,0 +1,78 @@
+//! A prediction-error criterion with what is known beforehand.
+//!
+//! `N V(theta) = sum eps^2 + N sum_i w_i (theta_i - theta*_i)^2` (the regularised criterion of L. Ljung, *System
+//! Identification*, 1999, eq. 7.107), with bounds on each parameter, and on request only models that are stable from e to u.
+
+use std::ops::Range;
+
+use hoid_core::stability::roots_inside;
+
+use crate::{
+    constraint::Prior,
+    optimize::Linearisation,
+    optimize::Objective,
+    pem::criterion::{Criterion, Workspace},
+};
+
+/// The criterion, its limits and its prior.
+pub(crate) struct ConstrainedCriterion<'c, 'a> {
+    pub criterion: &'c Criterion<'a>,
+    /// Lower and upper bound of each parameter.
+    pub limits: Option<Vec<(f64, f64)>>,
+    /// The guess for each parameter that has one, with its weight in the sum of squares.
+    pub prior: Vec<(usize, Prior)>,
+    /// True when the roots of A must lie inside the unit circle as well.
+    pub stable: bool,
+}
+
+impl ConstrainedCriterion<'_, '_> {
+    /// The sum of squared residuals without the prior.
+    pub fn without_prior(&self, theta: &[f64], at: &Linearisation) -> f64 {
+        at.sum_of_squares - self.penalty(theta)
+    }
+
+    fn penalty(&self, theta: &[f64]) -> f64 {
+        let off = |(i, prior): &(usize, Prior)| prior.weight * (theta[*i] - prior.value).powi(2);
+        self.prior.iter().map(off).sum()
+    }
+}
+
+impl Objective for ConstrainedCriterion<'_, '_> {
+    type Workspace = Workspace;
+
+    fn is_feasible(&self, theta: &[f64]) -> bool {
+        self.criterion.is_feasible(theta) && (!self.stable || roots_inside(&theta[..self.criterion.orders.na], 1.0))
+    }
+
+    fn linearise(&self, theta: &[f64], workspace: &mut Workspace) -> Linearisation {
+        let mut at = self.criterion.linearise(theta, workspace);
+        at.sum_of_squares += self.penalty(theta);
+        let p = theta.len();
+        for (i, prior) in &self.prior {
+            at.descent[*i] += prior.weight * (prior.value - theta[*i]);
+            at.gram[i * p + i] += prior.weight;
+        }
+        at
+    }
+
+    fn output_power(&self) -> f64 {
+        self.criterion.output_power()
+    }
+
+    fn stable_blocks(&self) -> Vec<Range<usize>> {
+        let mut blocks = self.criterion.stable_blocks();
+        let of_a = 0..self.criterion.orders.na;
+        if self.stable && !of_a.is_empty() && !blocks.contains(&of_a) {
+            blocks.push(of_a);
+        }
+        if let Some(limits) = &self.limits {
+            let unlimited = |i: usize| limits[i] == (f64::NEG_INFINITY, f64::INFINITY);
+            blocks.retain(|block| block.clone().all(unlimited));
+        }
+        blocks
+    }
+
+    fn limits(&self) -> Option<&[(f64, f64)]> {
+        self.limits.as_deref()
+    }
+}

@@ -1,0 +1,178 @@
+//! Fits whose system is to simulate well.
+//!
+//! First the system `B/(A F)`, by the output-error criterion: the simulation error is all that counts. Then C and D, by the
+//! prediction error with that system held.
+//!
+//! **Covariance.** The simulation error is `v = H eps` with `H = C/(A D)`, not white. With psi the gradient of the simulation
+//! error (initial states projected out) the estimate of the system has, to first order,
+//! `(psi' psi)^-1 psi' (sigma^2 H H') psi (psi' psi)^-1` (L. Ljung, *System Identification*, 1999, section 9.4), with
+//! `H' psi` the filter H run backwards in time. It holds in an open loop; in a closed loop the input is correlated with the
+//! noise and the system is biased besides. C and D have the covariance of their own search, and no correlation with the
+//! system is reckoned.
+
+use std::collections::BTreeMap;
+
+use hoid_core::filter::divide_in_place;
+use hoid_model::{Orders, PolynomialModel, Record, Structure, polynomial::product, polynomial_model::monic};
+
+use crate::{
+    Constraint, Estimator, Fit, Focus, IdentError,
+    linalg::information::inverse_information,
+    linalg::least_squares::dot,
+    pem::criterion::{Criterion, Data, Workspace, first_residual},
+};
+
+/// Fits the structure of the estimator with the focus on simulation.
+pub(crate) fn fit(estimator: &Estimator, records: &[Record], first: usize) -> Result<Fit, IdentError> {
+    let o = estimator.orders;
+    let simulating = Orders {
+        nb: o.nb,
+        nf: o.na + o.nf,
+        nk: o.nk,
+        ..Orders::default()
+    };
+    let system = Estimator {
+        focus: Focus::Prediction,
+        start: None,
+        constraints: as_poles_of_f(&estimator.constraints),
+        priors: as_poles_of_f(&estimator.priors),
+        ..Estimator::new(Structure::OutputError, simulating)
+    };
+    let system = Estimator {
+        initial_state: estimator.initial_state,
+        search: estimator.search,
+        starts: estimator.starts,
+        loss: estimator.loss,
+        ..system
+    };
+    let simulated = system.fit_from(records, first)?;
+    let held = hold(simulated.model(), &o);
+    let noise = Estimator {
+        focus: Focus::Prediction,
+        constraints: estimator
+            .constraints
+            .iter()
+            .filter(|(name, _)| name.starts_with(['c', 'd']))
+            .map(|(name, c)| (name.clone(), *c))
+            .chain(held)
+            .collect(),
+        priors: estimator
+            .priors
+            .iter()
+            .filter(|(name, _)| name.starts_with(['c', 'd']))
+            .map(|(name, p)| (name.clone(), *p))
+            .collect(),
+        start: None,
+        ..estimator.clone()
+    };
+    let fit = noise.fit_from(records, first)?;
+    let covariance = covariance(&simulated, &fit, records, first)?;
+    let start = simulated.start().to_owned();
+    let mut iterations = fit.termination();
+    iterations.iterations += simulated.termination().iterations;
+    if !simulated.termination().converged() {
+        iterations.reason = simulated.termination().reason;
+    }
+    let of_noise = |i: usize| i >= o.na + o.nb && i < o.na + o.nb + o.nc + o.nd;
+    let fixed = fit
+        .held
+        .iter()
+        .enumerate()
+        .map(|(i, held)| of_noise(i) && *held)
+        .collect();
+    Ok(Fit {
+        covariance,
+        held: fixed,
+        start,
+        termination: iterations,
+        states: simulated.state_count().max(fit.state_count()),
+        ..fit
+    })
+}
+
+/// Names of A become those of F, where the simulation has its poles; C and D have no part in it.
+fn as_poles_of_f<T: Copy>(named: &BTreeMap<String, T>) -> BTreeMap<String, T> {
+    named
+        .iter()
+        .filter(|(name, _)| !name.starts_with(['c', 'd']))
+        .map(|(name, value)| (name.replace('a', "f"), *value))
+        .collect()
+}
+
+/// The system's coefficients, held at their values.
+fn hold(system: &PolynomialModel, orders: &Orders) -> Vec<(String, Constraint)> {
+    let pole = if orders.na > 0 { 'a' } else { 'f' };
+    let poles = (1..).zip(system.f()).map(|(i, f)| (format!("{pole}{i}"), *f));
+    let gains = (0..).zip(system.b()).map(|(i, b)| (format!("b{i}"), *b));
+    poles
+        .chain(gains)
+        .map(|(name, value)| (name, Constraint::Fixed(value)))
+        .collect()
+}
+
+/// Covariance of theta; `None` when the noise model is not stable, or where there is no noise.
+fn covariance(simulated: &Fit, fit: &Fit, records: &[Record], first: usize) -> Result<Option<Vec<f64>>, IdentError> {
+    let (Some(_), Some(of_noise)) = (&simulated.covariance, &fit.covariance) else {
+        return Ok(None);
+    };
+    let model = fit.model();
+    let poles = product(&monic(model.a()), &monic(model.d()));
+    if !hoid_core::stability::roots_inside(&poles[1..], 1.0) {
+        return Ok(None);
+    }
+    let orders = simulated.orders();
+    let criterion = Criterion {
+        orders,
+        data: Data::of(records),
+        initial: simulated.initial_state(),
+        first: first.max(first_residual(&orders, simulated.initial_state())),
+        weights: None,
+    };
+    let theta = simulated.model().theta();
+    let q = theta.len();
+    let (mut gram, mut coloured) = (vec![0.0; q * q], vec![0.0; q * q]);
+    let mut workspace = Workspace::of_thread();
+    for record in 0..records.len() {
+        let psi = criterion.jacobian(theta, record, &mut workspace);
+        let filtered: Vec<Vec<f64>> = psi.iter().map(|x| backwards(model.c(), &poles[1..], x)).collect();
+        for i in 0..q {
+            for j in 0..q {
+                gram[i * q + j] += dot(&psi[i], &psi[j]);
+                coloured[i * q + j] += dot(&filtered[i], &filtered[j]);
+            }
+        }
+    }
+    let inverse = inverse_information(&gram, &orders.parameter_names())?;
+    let times = |a: &[f64], b: &[f64]| -> Vec<f64> {
+        (0..q * q)
+            .map(|k| (0..q).map(|l| a[(k / q) * q + l] * b[l * q + k % q]).sum())
+            .collect()
+    };
+    let sandwich = times(&times(&inverse, &coloured), &inverse);
+    // theta of the simulation is [b, f]; that of the structure [a, b, c, d, f].
+    let o = fit.orders();
+    let p = o.parameters();
+    let pole_at = if o.na > 0 { 0 } else { p - o.nf };
+    let place = |i: usize| if i < o.nb { o.na + i } else { pole_at + i - o.nb };
+    let mut covariance = of_noise.clone();
+    for i in 0..q {
+        for j in 0..q {
+            covariance[place(i) * p + place(j)] = fit.innovation_variance() * sandwich[i * q + j];
+        }
+    }
+    Ok(Some(covariance))
+}
+
+/// `(C/D)` applied to x backwards in time.
+fn backwards(c: &[f64], d: &[f64], x: &[f64]) -> Vec<f64> {
+    let mut reversed: Vec<f64> = x.iter().rev().copied().collect();
+    divide_in_place(d, &mut reversed);
+    let mut y = reversed.clone();
+    for (i, ci) in c.iter().enumerate() {
+        for t in i + 1..y.len() {
+            y[t] += ci * reversed[t - i - 1];
+        }
+    }
+    y.reverse();
+    y
+}

@@ -1,0 +1,149 @@
+//! Likelihood intervals of t_M and G.
+//!
+//! An interval holds the values at which the other parameters, searched anew, lose little: `n ln(V(x)/V) <= q`. It needs no
+//! parabola. For G, and for t_M where the change is resolved (two standard errors are less than the width 1/G of the change), the
+//! loss is chi-square with one degree of freedom: q = 3.84 for 95 %. An abrupt change is a change point instead: the loss at the
+//! true t_M is distributed as the larger of two exponential variables, `P(loss <= q) = (1 - e^{-q/2})^2`, q = 7.35 for 95 %
+//! (B. E. Hansen, *Econometrica* 68 (2000) 575-603, theorem 2).
+
+use super::{
+    layout::{LOG_RATE, MIDPOINT},
+    objective::ChangeCriterion,
+    search,
+};
+use crate::optimize::{Minimum, SearchMethod, SearchOptions};
+
+/// 95 % quantile of chi-square with one degree of freedom.
+const REGULAR: f64 = 3.841;
+/// 95 % quantile of the larger of two exponential variables with mean 2.
+const CHANGE_POINT: f64 = 7.352;
+/// The walk goes on to this multiple of the quantile: the loss need not grow steadily.
+const WELL_OUTSIDE: f64 = 2.0;
+/// Each step of the walk is longer than the one before.
+const GROWTH: f64 = 1.5;
+/// First step in standard errors.
+const FIRST_STEP: f64 = 0.5;
+/// Points of the walk to either side; the longest step is then hundreds of times the first.
+const MOST_POINTS: usize = 40;
+/// Halvings of the last step: the end is known to a sixteenth of it.
+const HALVINGS: usize = 4;
+
+/// Ends of a 95 % interval; the bound of the parameter, or infinity for a rate, where it is open.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Interval {
+    pub low: f64,
+    pub high: f64,
+}
+
+/// What a walk came to.
+#[derive(Debug)]
+pub(crate) enum Walk {
+    /// An interval.
+    Found(Interval),
+    /// A lower loss than that of the minimum, here.
+    Lower(Vec<f64>),
+}
+
+/// Whether t_M, with this standard error of a regular parameter, is a change point.
+pub(crate) fn is_change_point(theta: &[f64], standard_error: f64) -> bool {
+    // Derivatives at one t_M say nothing about another one a width of the change away: the ends of a 95 % interval.
+    2.0 * standard_error >= (-theta[LOG_RATE]).exp()
+}
+
+/// 95 % interval of t_M or ln G around a minimum, `standard_error` its own where it has one; with `stay` a lower loss on the
+/// way only counts as inside.
+pub(crate) fn likelihood_interval(
+    criterion: &ChangeCriterion<'_>,
+    minimum: &Minimum,
+    place: usize,
+    standard_error: Option<f64>,
+    change_point: bool,
+    stay: bool,
+) -> Walk {
+    let quantile = if change_point && place == MIDPOINT {
+        CHANGE_POINT
+    } else {
+        REGULAR
+    };
+    let n = criterion.residuals() as f64;
+    let options = SearchOptions {
+        method: SearchMethod::LevenbergMarquardt,
+        max_iterations: 30,
+        // Of the statistic, n times this: a thousandth of the quantile.
+        tolerance: 1e-3 * quantile / n,
+    };
+    let (low, high) = criterion.limits[place];
+    let at = |value: f64, from: &[f64]| {
+        let mut held = criterion.clone();
+        held.limits[place] = (value, value);
+        let found = search(&held, from.to_vec(), &options, None)?;
+        Some((
+            n * (found.at.sum_of_squares / minimum.at.sum_of_squares).ln(),
+            found.theta,
+        ))
+    };
+    let finest = if place == MIDPOINT {
+        criterion.sample_time.s()
+    } else {
+        0.05
+    };
+    let first_step = FIRST_STEP * standard_error.unwrap_or(finest).max(finest).min(0.1 * (high - low));
+    let mut ends = [low, high];
+    let (mut lowest, mut lower) = (-0.1 * quantile, None);
+    for (end, sign) in ends.iter_mut().zip([-1.0, 1.0]) {
+        let bound = *end;
+        let (mut inside, mut outside) = (minimum.theta.clone(), None);
+        let mut from = minimum.theta.clone();
+        let mut step = first_step;
+        for _ in 0..MOST_POINTS {
+            let value = (from[place] + sign * step).clamp(low, high);
+            step *= GROWTH;
+            let Some((loss, theta)) = at(value, &from) else { break };
+            // A lower minimum than the one that was found, by a tenth of what matters: the walk goes on to the lowest.
+            if loss < lowest && !stay {
+                lowest = loss;
+                lower = Some(theta.clone());
+            }
+            if loss <= quantile {
+                (inside, outside) = (theta.clone(), None);
+            } else if outside.is_none() {
+                outside = Some(value);
+            }
+            if loss > WELL_OUTSIDE * quantile || value == bound {
+                break;
+            }
+            from = theta;
+        }
+        if lower.is_some() {
+            continue;
+        }
+        let Some(mut beyond) = outside else { continue };
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (inside[place] + beyond);
+            match at(middle, &inside) {
+                Some((loss, theta)) if loss <= quantile => inside = theta,
+                _ => beyond = middle,
+            }
+        }
+        *end = 0.5 * (inside[place] + beyond);
+    }
+    if let Some(theta) = lower {
+        return Walk::Lower(theta);
+    }
+    let [low_end, high_end] = ends;
+    Walk::Found(if place == LOG_RATE {
+        Interval {
+            low: low_end.exp(),
+            high: if high_end >= high {
+                f64::INFINITY
+            } else {
+                high_end.exp()
+            },
+        }
+    } else {
+        Interval {
+            low: low_end,
+            high: high_end,
+        }
+    })
+}

@@ -1,0 +1,120 @@
+//! Noise that grows or fades with the change.
+//!
+//! A remnant with another gain after the change gives innovations of another size: `sigma(t) = sigma_1 + (sigma_2 - sigma_1) s(t)`
+//! with the sigmoid s of the gains, without their delay. Given the residuals, sigma_1 and sigma_2 minimise
+//! `sum of ln sigma(t) + eps(t)^2/(2 sigma(t)^2)` (Fisher scoring); the residuals are then weighted by 1/sigma(t), and the fit and
+//! the levels are found in turn. Source: R. J. Carroll and D. Ruppert, *Transformation and Weighting in Regression*, 1988, ch. 3.
+
+use crate::linalg::least_squares::dot;
+
+/// Smallest ratio of the two levels: what lies below is a record without noise on one side.
+const SMALLEST_RATIO: f64 = 1e-3;
+
+/// `[sigma_1, sigma_2]` for the residuals and the share of the change at each; `None` where they have no size.
+pub(crate) fn levels(residuals: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<[f64; 2]> {
+    let pairs = || residuals.iter().flatten().zip(shares.iter().flatten());
+    // From the weighted mean squares on either side.
+    let side = |weight: &dyn Fn(f64) -> f64| {
+        let (sum, total) = pairs().fold((0.0, 0.0), |(sum, total), (eps, share)| {
+            (sum + weight(*share) * eps * eps, total + weight(*share))
+        });
+        (sum / total).sqrt()
+    };
+    let mut sigma = [side(&|s| 1.0 - s), side(&|s| s)];
+    if !sigma.iter().all(|s| s.is_finite() && *s > 0.0) {
+        return None;
+    }
+    for _ in 0..50 {
+        let (mut slope, mut information) = ([0.0; 2], [[0.0; 2]; 2]);
+        for (eps, share) in pairs() {
+            let basis = [1.0 - share, *share];
+            let here = dot(&sigma, &basis);
+            let pull = (eps * eps / (here * here) - 1.0) / here;
+            for i in 0..2 {
+                slope[i] += basis[i] * pull;
+                for j in 0..2 {
+                    information[i][j] += 2.0 * basis[i] * basis[j] / (here * here);
+                }
+            }
+        }
+        let [[a, b], [_, c]] = information;
+        let determinant = a * c - b * b;
+        if determinant <= 1e-12 * a * c {
+            return None;
+        }
+        let step = [
+            (c * slope[0] - b * slope[1]) / determinant,
+            (a * slope[1] - b * slope[0]) / determinant,
+        ];
+        let mut largest = 0.0_f64;
+        for (s, d) in sigma.iter_mut().zip(step) {
+            // At most to the half or the double of a level in one step.
+            let moved = (*s + d).clamp(0.5 * *s, 2.0 * *s);
+            largest = largest.max((moved - *s).abs() / *s);
+            *s = moved;
+        }
+        if largest < 1e-10 {
+            break;
+        }
+    }
+    let ratio = sigma[0].min(sigma[1]) / sigma[0].max(sigma[1]);
+    (ratio >= SMALLEST_RATIO).then_some(sigma)
+}
+
+/// Weights `1/sigma(t)`, scaled to the geometric mean 1 over all residuals: the sum of weighted squares then takes the place
+/// of the sum of squares in the likelihood.
+pub(crate) fn weights(sigma: [f64; 2], shares: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let level = |share: f64| sigma[0] + (sigma[1] - sigma[0]) * share;
+    let count: usize = shares.iter().map(Vec::len).sum();
+    let mean = shares.iter().flatten().map(|s| level(*s).ln()).sum::<f64>() / count as f64;
+    shares
+        .iter()
+        .map(|all| all.iter().map(|s| mean.exp() / level(*s)).collect())
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers with the moments of a normal distribution: equal shares at +-1 have the mean square 1.
+    fn record(sigma: [f64; 2]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
+        let shares: Vec<f64> = (0..400).map(|t| f64::from(t / 2) / 199.0).collect();
+        let eps = shares
+            .iter()
+            .enumerate()
+            .map(|(t, s)| (sigma[0] + (sigma[1] - sigma[0]) * s) * if t % 2 == 0 { 1.0 } else { -1.0 })
+            .collect();
+        (vec![eps], vec![shares])
+    }
+
+    #[test]
+    fn levels_of_residuals_that_have_them_exactly() {
+        for sigma in [[0.01, 0.02], [3.0, 1.0], [1.0, 1.0]] {
+            let (eps, shares) = record(sigma);
+            let found = levels(&eps, &shares).unwrap();
+            for (a, b) in found.iter().zip(sigma) {
+                assert!((a - b).abs() < 1e-8 * b, "{found:?} {sigma:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn weights_have_the_geometric_mean_one() {
+        let (eps, shares) = record([0.01, 0.02]);
+        let weights = weights(levels(&eps, &shares).unwrap(), &shares);
+        let sum: f64 = weights[0].iter().map(|w| w.ln()).sum();
+        assert!(sum.abs() < 1e-9);
+        // What is weighted has the same size throughout.
+        let sizes: Vec<f64> = eps[0].iter().zip(&weights[0]).map(|(e, w)| (e * w).abs()).collect();
+        assert!(sizes.iter().all(|s| (s / sizes[0] - 1.0).abs() < 1e-8));
+    }
+
+    #[test]
+    fn no_levels_without_noise_or_without_a_side() {
+        let (eps, shares) = record([0.01, 0.02]);
+        assert_eq!(levels(&[vec![0.0; 400]], &shares), None);
+        assert_eq!(levels(&eps, &[vec![0.0; 400]]), None);
+        assert_eq!(levels(&[vec![f64::NAN; 400]], &shares), None);
+    }
+}

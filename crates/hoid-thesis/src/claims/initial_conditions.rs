@@ -1,0 +1,195 @@
+//! Claims on the start of Box-Jenkins searches (Table 6.1), m* = m0, condition C1.
+
+use super::{
+    At, Claim, DISCRETE, Evidence, LEVELS, ORDERS, Part, Source, Theme, Value, bias_of, each,
+    measure::{Study, jackknife, median_of, share_of},
+    recursive_arx::RECURSIVE_LEVELS,
+    rules::{CLOSE, LARGE, MATTERS},
+    with_f,
+};
+use hoid_study::Query;
+
+const PLANS: &[&str] = &["initial-conditions"];
+
+pub(super) const CLAIMS: &[Claim] = &[
+    Claim {
+        id: "ic-medians-close-to-zero",
+        theme: Theme::InitialConditions,
+        statement: "\"The medians of relative bias differences are null or close to zero\" for all starts.",
+        place: "6.1.4, Figs. F.1 to F.8",
+        measure: "Median of the paired difference of the bias to that from the base start, points of %, all starts, coefficients, n_k* = 26 to 30, m0 and noise levels.",
+        plans: PLANS,
+        source: Source::Data(medians),
+    },
+    Claim {
+        id: "ic-single-runs-differ",
+        theme: Theme::InitialConditions,
+        statement: "\"Several particular simulations can lead to considerable differences with respect to the base case.\"",
+        place: "6.1.4, Figs. F.1 to F.8",
+        measure: "Share of fits whose b0 differs by more than 25 points of % of the true value from that of the base start, over all cells, by start: more than 1 in 1000.",
+        plans: PLANS,
+        source: Source::Data(single_runs),
+    },
+    Claim {
+        id: "ic-poles-matter-more",
+        theme: Theme::InitialConditions,
+        statement: "\"The BJ model optimization is more sensitive to high initial deviations for the poles than for the zero location.\"",
+        place: "6.1.4, Figs. F.1 to F.8; Conclusions of Part II",
+        measure: "Mean |difference| of the bias of b0 and b1 to that of the base start: IC1 and IC2 (a changed) less IC3 and IC6 (b changed), at least 0.1 points of %.",
+        plans: PLANS,
+        source: Source::Data(poles_matter),
+    },
+    Claim {
+        id: "ic3-improves",
+        theme: Theme::InitialConditions,
+        statement: "IC3, closest to the reference: \"relative bias results are even improved when compared to the base case\".",
+        place: "6.1.4, Fig. F.3",
+        measure: "Mean of the paired difference of |bias|, IC3 less base, at least 0.1 points of % smaller, n_k* = 29, by coefficient, m0 and noise level.",
+        plans: PLANS,
+        source: Source::Data(third_improves),
+    },
+    Claim {
+        id: "ic-convergence-fails",
+        theme: Theme::InitialConditions,
+        statement: "\"Initial conditions with high deviations from real values may lead to convergence failure.\"",
+        place: "VII; 6.1.4",
+        measure: "Share of searches that do not converge, over all cells with remnant, by start IC1 to IC8: more than 1 in 100.",
+        plans: PLANS,
+        source: Source::Data(convergence),
+    },
+    Claim {
+        id: "ic-from-ols-fails",
+        theme: Theme::InitialConditions,
+        statement: "Convergence failure is \"quite relevant regarding PEM initialization by a prior OLS estimation\", which may be highly biased.",
+        place: "VII",
+        measure: "Share of PEM fits from OLS that fail, do not converge or have a1 off by more than 25 %, m0 = 1, C1 to C6 and all noise levels, first and last 30.72 s: more than 1 in 100. The search here takes zero initial states first, then estimates them.",
+        plans: &["recursive"],
+        source: Source::Data(from_ols),
+    },
+];
+
+const STARTS: [&str; 8] = ["IC1", "IC2", "IC3", "IC4", "IC5", "IC6", "IC7", "IC8"];
+const IC_DELAYS: [usize; 5] = [26, 27, 28, 29, 30];
+
+fn fit(at: At, quantity: &str, nk: usize, start: &str) -> Query {
+    at.query(&with_f(quantity)).name("BJ").nk(nk).start(start)
+}
+
+/// Differences of the bias to that of the base start, points of %.
+fn differences(study: Study<'_>, at: At, name: &str, nk: usize, start: &str) -> Result<Vec<f64>, String> {
+    let of = |start: &str| study.sample(&fit(at, &bias_of(name), nk, start));
+    Ok(of(start)?.iter().zip(&of("base")?).map(|(a, b)| a - b).collect())
+}
+
+fn medians(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("initial-conditions")?;
+    let mut part = Part::new("|median difference| within 5 points");
+    for at in each(&["C1"], &ORDERS, &LEVELS) {
+        for start in STARTS {
+            for nk in IC_DELAYS {
+                for name in DISCRETE {
+                    let found = median_of(&differences(study, at, name, nk, start)?);
+                    part.below(at.label(&format!("{start}, n_k* = {nk}, {name}")), found.abs(), CLOSE);
+                }
+            }
+        }
+    }
+    Ok(vec![part])
+}
+
+fn single_runs(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("initial-conditions")?;
+    let mut part = Part::new("share of differences beyond 25 points above 0.001");
+    for start in STARTS {
+        let mut beyond = Vec::new();
+        for at in each(&["C1"], &ORDERS, &LEVELS) {
+            for nk in IC_DELAYS {
+                let found = differences(study, at, "b0", nk, start)?;
+                beyond.extend(found.iter().map(|d| f64::from(u8::from(d.abs() > LARGE))));
+            }
+        }
+        part.above(start.to_owned(), share_of(&beyond), 1e-3);
+    }
+    Ok(vec![part])
+}
+
+fn mean_size(values: &[f64]) -> f64 {
+    let finite: Vec<f64> = values.iter().filter(|v| v.is_finite()).map(|v| v.abs()).collect();
+    finite.iter().sum::<f64>() / finite.len() as f64
+}
+
+fn poles_matter(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("initial-conditions")?;
+    let mut part = Part::new("mean |difference| from starts with other a less that with other b above 0.1 points");
+    for at in each(&["C1"], &ORDERS, &LEVELS) {
+        for nk in IC_DELAYS {
+            for name in ["b0", "b1"] {
+                let of = |start| differences(study, at, name, nk, start);
+                let samples = [of("IC1")?, of("IC2")?, of("IC3")?, of("IC6")?];
+                let found = jackknife(&samples, &|s| {
+                    let each: Vec<f64> = s.iter().map(|v| mean_size(v)).collect();
+                    0.5 * (each[0] + each[1] - each[2] - each[3])
+                });
+                part.above(at.label(&format!("n_k* = {nk}, {name}")), found, MATTERS);
+            }
+        }
+    }
+    Ok(vec![part])
+}
+
+fn third_improves(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("initial-conditions")?;
+    let mut part = Part::new("mean difference of |bias|, IC3 less base, below -0.1 points");
+    for at in each(&["C1"], &ORDERS, &LEVELS) {
+        for name in DISCRETE {
+            let of = |start| fit(at, &bias_of(name), 29, start);
+            let found = study.of(&[of("IC3"), of("base")], &|s| mean_size(&s[0]) - mean_size(&s[1]))?;
+            part.below(at.label(name), found, -MATTERS);
+        }
+    }
+    Ok(vec![part])
+}
+
+fn convergence(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("initial-conditions")?;
+    let mut part = Part::new("share of searches that do not converge above 0.01");
+    for start in STARTS {
+        let mut open = Vec::new();
+        for at in each(&["C1"], &ORDERS, &LEVELS) {
+            for nk in IC_DELAYS {
+                open.extend(
+                    study
+                        .sample(&fit(at, "converged", nk, start))?
+                        .iter()
+                        .map(|converged| 1.0 - converged),
+                );
+            }
+        }
+        let share: Value = share_of(&open);
+        part.above(start.to_owned(), share, 0.01);
+    }
+    Ok(vec![part])
+}
+
+fn from_ols(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut part = Part::new("share of fits from OLS that go wrong above 0.01");
+    for name in ["PEM first", "PEM last"] {
+        let mut wrong = Vec::new();
+        for at in each(&["C1", "C2", "C3", "C4", "C5", "C6"], &[1], &RECURSIVE_LEVELS) {
+            let converged = study.sample(&at.query("converged").name(name))?;
+            let f1 = study.sample(&at.query("f1").name(name))?;
+            // No condition changes the poles.
+            let truth = study.truth(&at.query("f1").name(name))?.discrete[0];
+            let off = |f1: f64| f1.is_nan() || (f1 - truth).abs() > LARGE / 100.0 * truth.abs();
+            wrong.extend(
+                converged
+                    .iter()
+                    .zip(&f1)
+                    .map(|(c, f1)| f64::from(u8::from(*c != 1.0 || off(*f1)))),
+            );
+        }
+        part.above(name.to_owned(), share_of(&wrong), 0.01);
+    }
+    Ok(vec![part])
+}

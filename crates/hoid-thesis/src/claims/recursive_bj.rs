@@ -1,0 +1,333 @@
+//! Claims on the recursive prediction-error method of BJ(m* = 1), and against recursive least squares.
+
+use super::{
+    At, Claim, DISCRETE, Evidence, HIGHER, NMS, ORDERS, Part, Source, Theme, each, measure::share_of,
+    recursive_arx::RECURSIVE_LEVELS, rules::ACCEPTABLE, with_f,
+};
+use hoid_study::Query;
+
+const PLANS: &[&str] = &["recursive"];
+const GAINS: [&str; 3] = ["K_e", "T_L", "K_e_dot"];
+
+pub(super) const CLAIMS: &[Claim] = &[
+    Claim {
+        id: "rpem-less-bias",
+        theme: Theme::Recursive,
+        statement: "For m0 >= 2 RLS \"still shows a considerable bias with respect to BJ outcome\".",
+        place: "V.B, Fig. 11",
+        measure: "Magnitude of the bias of the median trace over the last 30.72 s, RLS less RPEM, C4, by coefficient, m0 and noise level, points of %.",
+        plans: PLANS,
+        source: Source::Data(less_bias),
+    },
+    Claim {
+        id: "rpem-5-times-slower",
+        theme: Theme::Recursive,
+        statement: "\"ARX converges to its final estimation 5 times faster\"; \"the BJ structure needs 500 % more time to process\".",
+        place: "V.B; VII; VIII, Figs. 11, 12",
+        measure: "Settling time (90 % of its own step) of the median trace of RPEM over that of RLS, C4, by parameter, m0 and noise level: from 2.5 to 7.5.",
+        plans: PLANS,
+        source: Source::Data(five_times),
+    },
+    Claim {
+        id: "rpem-slower",
+        theme: Theme::Recursive,
+        statement: "\"The RPEM algorithm denotes a slower adaptation capacity.\"",
+        place: "V.B, Figs. 11, 12",
+        measure: "Settling time (90 % of its own step) of the median trace, RPEM less RLS, C4, by parameter, m0 and noise level, s.",
+        plans: PLANS,
+        source: Source::Data(slower),
+    },
+    Claim {
+        id: "rpem-diverges",
+        theme: Theme::Recursive,
+        statement: "RPEM \"may turn into divergence problems due to excessive oscillations in some cases\".",
+        place: "V.B",
+        measure: "Share of runs of RPEM with a coefficient beyond 10 or no number, and with an RMS error of T_L beyond 100 %, C1 to C6, all m0 and noise levels: more than 1 in 1000.",
+        plans: PLANS,
+        source: Source::Data(diverges),
+    },
+    Claim {
+        id: "rls-better-gain-and-zero",
+        theme: Theme::Recursive,
+        statement: "For m0 >= 2 \"ARX offers more stable, precise results than BJ in K_e, T_L and K_e_dot, BJ a more adequate outcome in NMS\".",
+        place: "V.B, Fig. 12; VII",
+        measure: "Median of the paired difference of the RMS error of the trace, RPEM less RLS, C4, m0 = 2 to 4, by parameter and noise level.",
+        plans: PLANS,
+        source: Source::Data(better_gain),
+    },
+    Claim {
+        id: "rls-0-to-5-percent",
+        theme: Theme::Recursive,
+        statement: "\"Except for a first-order remnant, RLS usually captures the HO gain and zero with 0-5 % less bias.\"",
+        place: "VIII",
+        measure: "Magnitude of the bias of the median trace of K_e and T_L over the last 30.72 s, RPEM less RLS, C4, m0 = 2 to 4: from 0 to 5 points; RMS error of the trace likewise.",
+        plans: PLANS,
+        source: Source::Data(zero_to_five),
+    },
+    Claim {
+        id: "rpem-nms-25-percent",
+        theme: Theme::Recursive,
+        statement: "\"BJ is able to approximate the real NMS dynamics with 25 % less error.\"",
+        place: "VIII",
+        measure: "Magnitude of the bias of the median trace of omega_nm and zeta_nm over the last 30.72 s, RPEM less RLS, C4, m0 = 2 to 4: 12.5 to 37.5 points smaller; RMS error of the trace likewise.",
+        plans: PLANS,
+        source: Source::Data(nms_error),
+    },
+    Claim {
+        id: "rpem-outperforms-at-m1",
+        theme: Theme::Recursive,
+        statement: "\"When a m0 = 1 simulation is conducted, the BJ model clearly outperforms ARX.\"",
+        place: "VIII; 6.2.2",
+        measure: "Median of the paired difference of the RMS error of the trace, RPEM less RLS, m0 = 1, C1 to C6, all parameters and noise levels.",
+        plans: PLANS,
+        source: Source::Data(first_order),
+    },
+    Claim {
+        id: "rpem-t-l-oscillates",
+        theme: Theme::Recursive,
+        statement: "\"Great oscillations are given in T_L estimations from BJ structures\" (recursive).",
+        place: "V.B, Fig. 12; VII",
+        measure: "Median RMS error of T_L less the larger of K_e and K_e_dot, RPEM, C4, m0 = 2 to 4, by noise level, points of %.",
+        plans: PLANS,
+        source: Source::Data(oscillates),
+    },
+    Claim {
+        id: "rpem-m2-coupling",
+        theme: Theme::Recursive,
+        statement: "\"An additional error is produced when m0 = 2 in BJ estimations since coupling can occur in poles.\"",
+        place: "V.B, Fig. 12",
+        measure: "Median RMS error of the trace at m0 = 2 less the larger of m0 = 3 and 4, RPEM, C4, by parameter and noise level, points of %.",
+        plans: PLANS,
+        source: Source::Data(coupling),
+    },
+    Claim {
+        id: "rpem-tracks",
+        theme: Theme::Recursive,
+        statement: "RPEM \"is able to correctly track HO adaptations to CE dynamics transitions\".",
+        place: "VII",
+        measure: "Magnitude of the bias of the median trace of K_e, T_L and K_e_dot over the last 30.72 s, C3 to C6, RPEM, by m0 and noise level.",
+        plans: PLANS,
+        source: Source::Data(tracks),
+    },
+    Claim {
+        id: "rpem-noisier-in-s2",
+        theme: Theme::Recursive,
+        statement: "RPEM has \"strong oscillations that are given in state s2\".",
+        place: "VII",
+        measure: "Median RMS error of K_e and T_L in C2 less that in C1, RPEM, by m0 and noise level, points of %.",
+        plans: PLANS,
+        source: Source::Data(second_state),
+    },
+    Claim {
+        id: "rpem-matrix-helps",
+        theme: Theme::Recursive,
+        statement: "\"RPEM could be implemented with a forgetting matrix ... diminishing the persistent bias\" in NMS coefficients.",
+        place: "VII",
+        measure: "Median of the paired difference of the RMS error of omega_nm and zeta_nm, RPEM with matrix less RPEM with factor, C3 to C6, P_n = 0.1.",
+        plans: &["forgetting"],
+        source: Source::Data(matrix),
+    },
+];
+
+fn less_bias(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut part = Part::new("|bias| of RLS less that of RPEM above 0");
+    for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+        for name in DISCRETE {
+            let rls = study.trace_bias(&at.rls(""), name)?.abs();
+            let rpem = study.trace_bias(&at.rpem(""), &with_f(name))?.abs();
+            part.above(at.label(name), rls.minus(rpem), 0.0);
+        }
+    }
+    Ok(vec![part])
+}
+
+fn five_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut parts = Vec::new();
+    for name in GAINS {
+        let mut part = Part::new(&format!("settling time of {name}, RPEM over RLS, from 2.5 to 7.5"));
+        for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+            let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.settling(&query, name));
+            let (rls, rpem) = (rls?, rpem?);
+            part.around(at.label(""), rpem.over(rls), 5.0);
+            if at.m0 == 2 && at.level == 0.1 {
+                part.show(format!("settling time of {name} by RLS, {}, s", at.label("")), rls);
+                part.show(format!("settling time of {name} by RPEM, {}, s", at.label("")), rpem);
+            }
+        }
+        parts.push(part);
+    }
+    Ok(parts)
+}
+
+fn slower(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut parts = Vec::new();
+    for name in GAINS {
+        let mut part = Part::new(&format!("settling time of {name}, RPEM less RLS, above 0 s"));
+        for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+            let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.settling(&query, name));
+            part.above(at.label(""), rpem?.minus(rls?), 0.0);
+        }
+        parts.push(part);
+    }
+    Ok(parts)
+}
+
+fn diverges(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut diverged = Part::new("share of diverged runs above 0.001");
+    diverged.above(
+        "all conditions, orders and levels".to_owned(),
+        study.share(&Query::of("diverged").name("RPEM"))?,
+        1e-3,
+    );
+    let mut oscillates = Part::new("share of runs with an RMS error of T_L beyond 100 % above 0.001");
+    let mut beyond = Vec::new();
+    for at in each(&["C1", "C2", "C3", "C4", "C5", "C6"], &ORDERS, &RECURSIVE_LEVELS) {
+        let errors = study.sample(&at.rpem("rms_T_L"))?;
+        beyond.extend(
+            errors
+                .iter()
+                .map(|error| f64::from(u8::from(*error > 100.0 || error.is_nan()))),
+        );
+    }
+    oscillates.above("all conditions, orders and levels".to_owned(), share_of(&beyond), 1e-3);
+    Ok(vec![diverged, oscillates])
+}
+
+/// RMS error of a trace by RPEM less that by RLS, of the same runs.
+fn rms(study: super::measure::Study<'_>, at: At, name: &str) -> Result<super::Value, String> {
+    let quantity = format!("rms_{name}");
+    study.difference(&at.rpem(&quantity), &at.rls(&quantity))
+}
+
+fn better_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut gains = Part::new("K_e, T_L, K_e_dot: RMS error of RPEM less that of RLS above 0");
+    let mut nms = Part::new("omega_nm, zeta_nm: RMS error of RPEM less that of RLS below 0");
+    for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+        for name in GAINS {
+            gains.above(at.label(name), rms(study, at, name)?, 0.0);
+        }
+        for name in NMS {
+            nms.below(at.label(name), rms(study, at, name)?, 0.0);
+        }
+    }
+    Ok(vec![gains, nms])
+}
+
+fn zero_to_five(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut bias = Part::new("|bias| of RPEM less that of RLS from 0 to 5 points");
+    let mut error = Part::new("RMS error of RPEM less that of RLS from 0 to 5 points");
+    for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+        for name in ["K_e", "T_L"] {
+            let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.trace_bias(&query, name));
+            bias.between(at.label(name), rpem?.abs().minus(rls?.abs()), 0.0, 5.0);
+            error.between(at.label(name), rms(study, at, name)?, 0.0, 5.0);
+        }
+    }
+    Ok(vec![bias, error])
+}
+
+fn nms_error(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut bias = Part::new("|bias| of RPEM less that of RLS from -37.5 to -12.5 points");
+    let mut error = Part::new("RMS error of RPEM less that of RLS from -37.5 to -12.5 points");
+    for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+        for name in NMS {
+            let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.trace_bias(&query, name));
+            bias.between(at.label(name), rpem?.abs().minus(rls?.abs()), -37.5, -12.5);
+            error.between(at.label(name), rms(study, at, name)?, -37.5, -12.5);
+        }
+    }
+    Ok(vec![bias, error])
+}
+
+fn first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut parts = Vec::new();
+    for (names, label) in [(&GAINS[..], "K_e, T_L, K_e_dot"), (&NMS[..], "omega_nm, zeta_nm")] {
+        let mut part = Part::new(&format!("{label}: RMS error of RPEM less that of RLS below 0"));
+        for at in each(&["C1", "C2", "C3", "C4", "C5", "C6"], &[1], &RECURSIVE_LEVELS) {
+            for name in names {
+                part.below(at.label(name), rms(study, at, name)?, 0.0);
+            }
+        }
+        parts.push(part);
+    }
+    Ok(parts)
+}
+
+fn oscillates(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut part = Part::new("RMS error of T_L less the larger of K_e and K_e_dot above 0");
+    for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+        let queries = ["rms_T_L", "rms_K_e", "rms_K_e_dot"].map(|quantity| at.rpem(quantity));
+        let med = super::measure::med;
+        part.above(
+            at.label(""),
+            study.of(&queries, &|s| med(&s[0]) - med(&s[1]).max(med(&s[2])))?,
+            0.0,
+        );
+    }
+    Ok(vec![part])
+}
+
+fn coupling(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut part = Part::new("RMS error at m0 = 2 less the larger of m0 = 3 and 4 above 0");
+    for at in each(&["C4"], &[2], &RECURSIVE_LEVELS) {
+        for name in GAINS.into_iter().chain(NMS) {
+            let queries = HIGHER.map(|m0| At { m0, ..at }.rpem(&format!("rms_{name}")));
+            let med = super::measure::med;
+            part.above(
+                at.label(name),
+                study.of(&queries, &|s| med(&s[0]) - med(&s[1]).max(med(&s[2])))?,
+                0.0,
+            );
+        }
+    }
+    Ok(vec![part])
+}
+
+fn tracks(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut parts = Vec::new();
+    for name in GAINS {
+        let mut part = Part::new(&format!("{name}: |bias of the median trace| within 10 %"));
+        for at in each(&["C3", "C4", "C5", "C6"], &[1, 2, 3, 4], &RECURSIVE_LEVELS) {
+            part.below(at.label(""), study.trace_bias(&at.rpem(""), name)?.abs(), ACCEPTABLE);
+        }
+        parts.push(part);
+    }
+    Ok(parts)
+}
+
+fn second_state(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut part = Part::new("RMS error in C2 less that in C1 above 0");
+    for at in each(&["C1"], &[1, 2, 3, 4], &RECURSIVE_LEVELS) {
+        for name in ["K_e", "T_L"] {
+            let quantity = format!("rms_{name}");
+            let [first, second] = ["C1", "C2"].map(|condition| study.median(&At { condition, ..at }.rpem(&quantity)));
+            part.above(at.label(name), second?.minus(first?), 0.0);
+        }
+    }
+    Ok(vec![part])
+}
+
+fn matrix(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("forgetting")?;
+    let mut part = Part::new("RMS error with matrix less that with factor below 0");
+    for at in each(&["C3", "C4", "C5", "C6"], &[1, 2, 3, 4], &[0.1]) {
+        for name in NMS {
+            let quantity = format!("rms_{name}");
+            let [matrix, factor] = ["RPEM, matrix", "RPEM, factor"].map(|of| at.query(&quantity).name(of));
+            part.below(at.label(name), study.difference(&matrix, &factor)?, 0.0);
+        }
+    }
+    Ok(vec![part])
+}

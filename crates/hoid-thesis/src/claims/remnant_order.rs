@@ -1,0 +1,367 @@
+//! Claims on the order m* of the noise model of Box-Jenkins models.
+
+use super::{
+    At, Claim, DELAYS, DISCRETE, Evidence, HIGHER, LEVELS, NMS, ORDERS, Part, Source, TRUE_DELAY, Theme, Value,
+    bias_of, each,
+    measure::{bias, med, range, size, spread},
+    rules::{CLOSE, LARGE, MATTERS},
+};
+
+const PLANS: &[&str] = &["bias"];
+
+pub(super) const CLAIMS: &[Claim] = &[
+    Claim {
+        id: "vaf-same-for-all-m",
+        theme: Theme::RemnantOrder,
+        statement: "\"The BJ estimator presents a homogeneous average VAF value for all model remnant orders\" (m0 = 3).",
+        place: "V.A.2, Fig. 7; 6.1.3, Fig. E.5",
+        measure: "Spread of the mean VAF over m* = 1 to 4 in C1, m0 = 3, by n_k* = 25 to 30 and noise level, points of %.",
+        plans: PLANS,
+        source: Source::Data(vaf_same),
+    },
+    Claim {
+        id: "vaf-lower-with-m4-at-m1",
+        theme: Theme::RemnantOrder,
+        statement: "At m0 = 1 \"a model remnant order equal to 4 provides lower VAF results\".",
+        place: "V.A.2; 6.1.3, Figs. E.1, E.9",
+        measure: "Mean of the paired difference of VAF, m* = 4 less m* = 1, m0 = 1, C1 and C2, by n_k* and noise level: lower by more than 0.1 points.",
+        plans: PLANS,
+        source: Source::Data(vaf_lower),
+    },
+    Claim {
+        id: "vaf-bj-as-arx",
+        theme: Theme::RemnantOrder,
+        statement: "VAF: \"no significant differences are found between BJ and ARX for a time delay close to n_k* = 29\".",
+        place: "V.A.2, Fig. 8",
+        measure: "Magnitude of the mean of the paired difference of VAF, BJ less ARX, C1, m0 = 3, n_k* = 28 to 30, m* = 1 to 4.",
+        plans: PLANS,
+        source: Source::Data(vaf_of_arx),
+    },
+    Claim {
+        id: "vaf-does-not-find-delay",
+        theme: Theme::RemnantOrder,
+        statement: "There are \"limitations in the VAF metric to find the actual n_k\".",
+        place: "Conclusions of Part II; 6.1.3",
+        measure: "Share of records in which BJ(m* = 1) has its largest VAF at n_k* = 29 of 25 to 30, C1 and C2, by m0 and noise level: below 0.9.",
+        plans: PLANS,
+        source: Source::Data(vaf_and_delay),
+    },
+    Claim {
+        id: "m1-same-bias",
+        theme: Theme::RemnantOrder,
+        statement: "\"The use of a fixed model remnant order m* = 1 does not change the bias obtained by BJ.\"",
+        place: "V.A.2, Fig. 9; VIII; 6.1.3, Figs. C.6, C.14",
+        measure: "Median of the paired difference of the bias, m* = 1 less m* = m0, m0 = 2 to 4, C1 and C2, n_k* = 29, points of %.",
+        plans: PLANS,
+        source: Source::Data(same_bias),
+    },
+    Claim {
+        id: "m1-better-at-m4",
+        theme: Theme::RemnantOrder,
+        statement: "With m* = 1 \"the bias in m0 = 4 is even slightly diminished\".",
+        place: "V.A.2, Fig. 9",
+        measure: "Magnitude of the median bias of b0 and b1, m* = 1 less m* = 4, m0 = 4, C1, n_k* = 29, by noise level: at least 0.1 points of % smaller.",
+        plans: PLANS,
+        source: Source::Data(better_at_fourth),
+    },
+    Claim {
+        id: "m1-small-loss-at-high-orders",
+        theme: Theme::RemnantOrder,
+        statement: "m* = 1 \"could imply a small decrease in accuracy estimation for high simulation remnant orders\".",
+        place: "6.1.3",
+        measure: "Median of the paired difference of response_error, m* = 1 less m* = m0, mean over the noise levels, m0 = 3 and 4, C1 and C2, n_k* = 29: at least 0.1 points of %.",
+        plans: PLANS,
+        source: Source::Data(loss_at_high_orders),
+    },
+    Claim {
+        id: "m1-wider-boxes",
+        theme: Theme::RemnantOrder,
+        statement: "With m* = 1 \"the interquartile range may increase slightly\".",
+        place: "6.1.3, Figs. C.6, C.14",
+        measure: "Interquartile range of the bias with m* = 1 over that with m* = m0, mean over the noise levels, m0 = 2 to 4, C1 and C2, n_k* = 29: from 1 to 1.5.",
+        plans: PLANS,
+        source: Source::Data(wider_boxes),
+    },
+    Claim {
+        id: "m1-gain-and-zero-by-delay",
+        theme: Theme::RemnantOrder,
+        statement: "With m* = 1 NMS values are very similar, \"although bias in K_e and T_L become noticeably higher when the delay differs\".",
+        place: "6.1.3, Figs. C.7, C.15",
+        measure: "Median |bias| with m* = 1 less that with m* = m0 at n_k* = 25 to 28 and 30, m0 = 2 to 4, C1: growth for K_e, T_L; within 5 points for NMS.",
+        plans: PLANS,
+        source: Source::Data(by_delay),
+    },
+    Claim {
+        id: "m1-remnant-wrong",
+        theme: Theme::RemnantOrder,
+        statement: "\"The remnant parameters are obviously wrongly estimated for the m* = 1 case.\"",
+        place: "6.1.3, Figs. C.8, C.16",
+        measure: "Magnitude of the median bias of T_n and K_n with m* = 1, m0 = 2 to 4, C1, n_k* = 29, backward Euler.",
+        plans: PLANS,
+        source: Source::Data(remnant_wrong),
+    },
+    Claim {
+        id: "delay-over-order",
+        theme: Theme::RemnantOrder,
+        statement: "\"The time delay is a more determinant factor than the remnant order in terms of relative bias reduction.\"",
+        place: "6.1.3, Figs. E.2, E.4, E.6, E.8",
+        measure: "Spread of the median |bias| over n_k* (m* = m0) less that over m* (n_k* = 29), C1, by coefficient, m0 and noise level, points of %.",
+        plans: PLANS,
+        source: Source::Data(delay_over_order),
+    },
+    Claim {
+        id: "match-matters-at-m1",
+        theme: Theme::RemnantOrder,
+        statement: "Only at m0 = 1 a \"model remnant order that matches the simulation one reduces the bias significantly\".",
+        place: "6.1.3, Fig. E.2",
+        measure: "Median |bias| with m* = m0 over the mean of the other orders, n_k* = 29, C1, by coefficient and noise level: below 1/2 at m0 = 1, above at m0 = 2 to 4.",
+        plans: PLANS,
+        source: Source::Data(match_matters),
+    },
+    Claim {
+        id: "order-over-delay-for-remnant",
+        theme: Theme::RemnantOrder,
+        statement: "Innovation variance and d1: \"the time delay becomes irrelevant, while the remnant order is fundamental\".",
+        place: "6.1.3, Figs. E.2, E.4, E.6, E.8",
+        measure: "Spread of the medians over m* (n_k* = 29) over that over n_k* (m* = m0), C1, by m0 and noise level: above 1.",
+        plans: PLANS,
+        source: Source::Data(order_over_delay),
+    },
+];
+
+fn vaf_same(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut parts = Vec::new();
+    for delays in [&DELAYS[..3], &DELAYS[3..]] {
+        let mut part = Part::new(&format!(
+            "spread of the mean VAF over m* within 1 point, n_k* = {} to {}",
+            delays[0], delays[2]
+        ));
+        for at in each(&["C1"], &[3], &LEVELS) {
+            for nk in delays {
+                let queries = ORDERS.map(|m| at.bj("vaf", m, *nk));
+                part.below(
+                    at.label(&format!("n_k* = {nk}")),
+                    study.of(&queries, &|s| spread(s.iter().map(|v| mean(v))))?,
+                    1.0,
+                );
+            }
+        }
+        parts.push(part);
+    }
+    Ok(parts)
+}
+
+fn vaf_and_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("share of records with the largest VAF at n_k* = 29 below 0.9");
+    for at in each(&["C1", "C2"], &ORDERS, &LEVELS) {
+        let queries = DELAYS.map(|nk| at.bj("vaf", 1, nk));
+        let found = study.of(&queries, &|s| {
+            let best = |i: usize| {
+                DELAYS
+                    .iter()
+                    .zip(s)
+                    .max_by(|a, b| a.1[i].total_cmp(&b.1[i]))
+                    .map(|(nk, _)| *nk)
+            };
+            let hits = (0..s[0].len()).filter(|i| best(*i) == Some(TRUE_DELAY)).count();
+            hits as f64 / s[0].len() as f64
+        })?;
+        part.below(at.label(""), found, 0.9);
+    }
+    Ok(vec![part])
+}
+
+fn mean(values: &[f64]) -> f64 {
+    super::measure::mean_of(values).value
+}
+
+fn vaf_lower(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("VAF of m* = 4 less that of m* = 1 below -0.1 points");
+    for at in each(&["C1", "C2"], &[1], &LEVELS) {
+        for nk in DELAYS {
+            let queries = [at.bj("vaf", 4, nk), at.bj("vaf", 1, nk)];
+            let found = study.of(&queries, &|s| mean(&s[0]) - mean(&s[1]))?;
+            part.below(at.label(&format!("n_k* = {nk}")), found, -MATTERS);
+        }
+    }
+    Ok(vec![part])
+}
+
+fn vaf_of_arx(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("|VAF of BJ less that of ARX| within 1 point");
+    for at in each(&["C1"], &[3], &LEVELS) {
+        for nk in 28..=30 {
+            for m in ORDERS {
+                let queries = [at.bj("vaf", m, nk), at.arx("vaf", nk)];
+                let found = study.of(&queries, &|s| mean(&s[0]) - mean(&s[1]))?;
+                part.below(at.label(&format!("n_k* = {nk}, m* = {m}")), found.abs(), 1.0);
+            }
+        }
+    }
+    Ok(vec![part])
+}
+
+fn same_bias(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("|paired difference of the bias, m* = 1 less m* = m0| within 5 points");
+    for at in each(&["C1", "C2"], &HIGHER, &LEVELS) {
+        for name in DISCRETE {
+            let fit = |m| at.bj(&bias_of(name), m, TRUE_DELAY);
+            part.below(at.label(name), study.difference(&fit(1), &fit(at.m0))?.abs(), CLOSE);
+        }
+    }
+    Ok(vec![part])
+}
+
+fn better_at_fourth(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("|median bias| with m* = 1 less that with m* = 4 below -0.1 points");
+    for at in each(&["C1"], &[4], &LEVELS) {
+        for name in ["b0", "b1"] {
+            let queries = [1, 4].map(|m| at.bj(&bias_of(name), m, TRUE_DELAY));
+            part.below(
+                at.label(name),
+                study.of(&queries, &|s| bias(&s[0]) - bias(&s[1]))?,
+                -MATTERS,
+            );
+        }
+    }
+    Ok(vec![part])
+}
+
+fn loss_at_high_orders(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("response_error with m* = 1 less that with m* = m0, mean over P_n, above 0.1 points");
+    for at in each(&["C1", "C2"], &[3, 4], &[0.1]) {
+        let mut levels = Vec::new();
+        for level in LEVELS {
+            let fit = |m| At { level, ..at }.bj("response_error", m, TRUE_DELAY);
+            levels.push(study.difference(&fit(1), &fit(at.m0))?);
+        }
+        part.above(
+            format!("{}, m0 = {}", at.condition, at.m0),
+            Value::mean(&levels),
+            MATTERS,
+        );
+    }
+    Ok(vec![part])
+}
+
+fn wider_boxes(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("interquartile range with m* = 1 over that with m* = m0, mean over P_n, from 1 to 1.5");
+    for at in each(&["C1", "C2"], &HIGHER, &[0.1]) {
+        for name in DISCRETE {
+            let fits = LEVELS.map(|level| [1, at.m0].map(|m| At { level, ..at }.bj(&bias_of(name), m, TRUE_DELAY)));
+            let found = study.of(&fits.concat(), &|s| {
+                s.chunks(2).map(|pair| range(&pair[0]) / range(&pair[1])).sum::<f64>() / LEVELS.len() as f64
+            })?;
+            part.between(format!("{}, m0 = {}, {name}", at.condition, at.m0), found, 1.0, 1.5);
+        }
+    }
+    Ok(vec![part])
+}
+
+fn by_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut higher = Part::new("K_e and T_L: growth of the median |bias| with m* = 1 above 0");
+    let mut same = Part::new("omega_nm and zeta_nm: |change of the median |bias| with m* = 1| within 5 points");
+    for at in each(&["C1"], &HIGHER, &LEVELS) {
+        for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
+            let change = |name: &str| {
+                let queries = [1, at.m0].map(|m| at.bj(&bias_of(name), m, nk));
+                study.of(&queries, &|s| size(&s[0]) - size(&s[1]))
+            };
+            for name in ["K_e", "T_L"] {
+                higher.above(at.label(&format!("n_k* = {nk}, {name}")), change(name)?, 0.0);
+            }
+            for name in NMS {
+                same.below(at.label(&format!("n_k* = {nk}, {name}")), change(name)?.abs(), CLOSE);
+            }
+        }
+    }
+    Ok(vec![higher, same])
+}
+
+fn remnant_wrong(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut parts = Vec::new();
+    for name in ["T_n", "K_n"] {
+        let mut part = Part::new(&format!("|median bias| of {name} beyond 25 %"));
+        for at in each(&["C1"], &HIGHER, &LEVELS) {
+            let found = study.median(&at.bj(&format!("bias_{name}_backward_euler"), 1, TRUE_DELAY))?;
+            part.above(at.label(""), found.abs(), LARGE);
+        }
+        parts.push(part);
+    }
+    Ok(parts)
+}
+
+/// Queries of a quantity over all delays with m* = m0, then over all orders at the true delay.
+fn over_both(at: At, quantity: &str) -> Vec<hoid_study::Query> {
+    let delays = DELAYS.map(|nk| at.bj(quantity, at.m0, nk));
+    delays
+        .into_iter()
+        .chain(ORDERS.map(|m| at.bj(quantity, m, TRUE_DELAY)))
+        .collect()
+}
+
+fn delay_over_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut part = Part::new("spread over n_k* less that over m* above 0");
+    for at in each(&["C1"], &ORDERS, &LEVELS) {
+        for name in DISCRETE {
+            let found = study.of(&over_both(at, &bias_of(name)), &|s| {
+                let (delays, orders) = s.split_at(DELAYS.len());
+                spread(delays.iter().map(|v| size(v))) - spread(orders.iter().map(|v| size(v)))
+            })?;
+            part.above(at.label(name), found, 0.0);
+        }
+    }
+    Ok(vec![part])
+}
+
+fn match_matters(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut first = Part::new("m0 = 1: median |bias| with m* = 1 over that of the others below 1/2");
+    let mut others = Part::new("m0 >= 2: median |bias| with m* = m0 over that of the others above 1/2");
+    for at in each(&["C1"], &ORDERS, &LEVELS) {
+        for name in DISCRETE {
+            let queries = ORDERS.map(|m| at.bj(&bias_of(name), m, TRUE_DELAY));
+            let found = study.of(&queries, &|s| {
+                let rest = s
+                    .iter()
+                    .enumerate()
+                    .filter(|(i, _)| i + 1 != at.m0)
+                    .map(|(_, v)| size(v));
+                3.0 * size(&s[at.m0 - 1]) / rest.sum::<f64>()
+            })?;
+            match at.m0 {
+                1 => first.below(at.label(name), found, 0.5),
+                _ => others.above(at.label(name), found, 0.5),
+            }
+        }
+    }
+    Ok(vec![first, others])
+}
+
+fn order_over_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("bias")?;
+    let mut parts = Vec::new();
+    for name in ["innovation_variance", "d1"] {
+        let mut part = Part::new(&format!("{name}: spread over m* over that over n_k* above 1"));
+        for at in each(&["C1"], &ORDERS, &LEVELS) {
+            let found = study.of(&over_both(at, name), &|s| {
+                let (delays, orders) = s.split_at(DELAYS.len());
+                spread(orders.iter().map(|v| med(v))) / spread(delays.iter().map(|v| med(v)))
+            })?;
+            part.above(at.label(""), found, 1.0);
+        }
+        parts.push(part);
+    }
+    Ok(parts)
+}

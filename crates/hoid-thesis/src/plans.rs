@@ -1,0 +1,53 @@
+//! The studies of the reference text, as named plans, beside those that come with the program anyway.
+
+use hoid_study::{NamedPlan, PLANS};
+
+macro_rules! named {
+    ($($name:literal),+ $(,)?) => {
+        &[$(NamedPlan {
+            name: $name,
+            text: include_str!(concat!("../plans/", $name, ".toml")),
+        }),+]
+    };
+}
+
+/// The named plans of the reproduction, in the order in which they are run.
+pub const TEXT_PLANS: &[NamedPlan] = named![
+    "noise-level",
+    "bias",
+    "initial-conditions",
+    "recursive",
+    "recursive-arx",
+    "decimation",
+    "remnant-time-constant",
+    "noise-definition",
+    "memory",
+    "forgetting",
+    "lead-change",
+];
+
+/// All named plans: those of the reference text, and those of what goes beyond it.
+pub fn named_plans() -> impl Iterator<Item = &'static NamedPlan> {
+    TEXT_PLANS.iter().chain(PLANS)
+}
+
+/// The named plan of a name.
+pub fn find(name: &str) -> Option<&'static NamedPlan> {
+    named_plans().find(|plan| plan.name == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn named_plans_are_right_and_called_as_their_files() {
+        for named in TEXT_PLANS {
+            let plan = named.plan().unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(plan.name, named.name);
+            assert!(!plan.title.is_empty() && !plan.description.is_empty(), "{}", plan.name);
+            assert_eq!(plan.replications, NamedPlan::REPLICATIONS, "{}", plan.name);
+        }
+        assert!(find("adaptation").is_some() && find("none").is_none());
+    }
+}

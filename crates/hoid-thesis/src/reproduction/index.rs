@@ -1,0 +1,163 @@
+//! The page that shows the reproduction: tables, figures with their data, claims, studies with their plans.
+
+use crate::claims::{Claim, Finding, Measured, Verdict};
+use hoid_io::{ColumnValues, OutputTable};
+use minijinja::{Value, context};
+
+use super::Item;
+use hoid_report::{numbers, render_with};
+
+use crate::ThesisError;
+
+/// The page.
+#[derive(Debug, Default)]
+pub struct IndexPage {
+    /// What was done and with what, as name and value.
+    pub settings: Vec<(String, String)>,
+    /// Remarks for the reader.
+    pub notes: Vec<String>,
+    entries: Vec<Value>,
+    claims: Vec<Value>,
+    /// Claims that hold, hold in part, do not hold, cannot be tested.
+    tally: [usize; 4],
+    studies: Vec<Value>,
+}
+
+/// A study of the page.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StudyEntry {
+    /// Its name.
+    pub name: String,
+    /// Its title.
+    pub title: String,
+    /// Where its directory is, from the page.
+    pub directory: String,
+    /// Estimates that were made.
+    pub estimates: u64,
+    /// Time that it took, s; none when it was there already.
+    pub seconds: Option<f64>,
+}
+
+impl IndexPage {
+    /// Adds a table or figure: where its picture and its data are, from the page.
+    pub fn add(&mut self, item: &Item, svg: Option<&str>, data: &str, table: &OutputTable) {
+        let rows = if svg.is_none() { table_rows(table) } else { Vec::new() };
+        let header: Vec<String> = table.columns.iter().map(|c| c.name.clone()).collect();
+        self.entries.push(context! {
+            name => &item.name, title => &item.title, caption => &item.caption, plan => item.plan,
+            svg, data, header, rows,
+        });
+    }
+
+    /// Adds the claims of the text with what the data say of them.
+    pub fn add_claims(&mut self, findings: &[(Claim, Finding)]) {
+        let mut theme = "";
+        for (claim, finding) in findings {
+            // The heading stands before the first claim of its theme.
+            let heading = (claim.theme.title() != theme).then(|| claim.theme.title());
+            theme = claim.theme.title();
+            let class = match finding.verdict {
+                Verdict::Holds => "holds",
+                Verdict::HoldsInPart => "part",
+                Verdict::DoesNotHold => "not",
+                Verdict::CannotBeTested(_) => "open",
+            };
+            let measured: Vec<String> = finding.measured.iter().map(measured).collect();
+            self.claims.push(context! {
+                heading, class, measured, id => claim.id, statement => claim.statement, place => claim.place, measure => claim.measure,
+                found => &finding.text, verdict => finding.verdict.to_string(),
+            });
+        }
+        let count = |of: fn(&Verdict) -> bool| findings.iter().filter(|(_, finding)| of(&finding.verdict)).count();
+        self.tally = [
+            count(|v| *v == Verdict::Holds),
+            count(|v| *v == Verdict::HoldsInPart),
+            count(|v| *v == Verdict::DoesNotHold),
+            count(|v| matches!(v, Verdict::CannotBeTested(_))),
+        ];
+    }
+
+    /// Claims that hold, hold in part, do not hold, cannot be tested.
+    pub fn tally(&self) -> [usize; 4] {
+        self.tally
+    }
+
+    /// Adds a study.
+    pub fn add_study(&mut self, study: &StudyEntry) {
+        let seconds = study.seconds.map(|s| format!("{s:.1}"));
+        self.studies.push(context! {
+            name => &study.name, title => &study.title, directory => &study.directory, estimates => study.estimates, seconds,
+        });
+    }
+
+    /// The page as HTML text.
+    ///
+    /// # Errors
+    /// [`ThesisError::Report`] for a defect of the template.
+    pub fn html(&self) -> Result<String, ThesisError> {
+        let facts: Vec<_> = self
+            .settings
+            .iter()
+            .map(|(label, text)| context! { label, text })
+            .collect();
+        let page = render_with(
+            &[("reproduction.html", include_str!("../../templates/reproduction.html"))],
+            "reproduction.html",
+            context! {
+                title => "Reproduction of the reference text",
+                settings => facts,
+                notes => &self.notes,
+                entries => &self.entries,
+                claims => &self.claims,
+                tally => self.tally,
+                studies => &self.studies,
+            },
+        )?;
+        Ok(page)
+    }
+}
+
+/// A measured value in words: with its error, and its range over the cells where there are several.
+fn measured(of: &Measured) -> String {
+    let (value, error) = numbers::with_uncertainty(of.value, Some(of.error).filter(|error| *error > 0.0));
+    let error = if of.error > 0.0 {
+        format!(" \u{b1} {error}")
+    } else {
+        String::new()
+    };
+    let range = if of.cells > 1 {
+        format!(" ({} to {} in {} cells)", number(of.least), number(of.most), of.cells)
+    } else {
+        String::new()
+    };
+    format!("{}: {value}{error}{range}", of.label)
+}
+
+/// Cells of a table as text.
+fn table_rows(table: &OutputTable) -> Vec<Vec<String>> {
+    let rows = table.columns.first().map_or(0, |c| c.values.len());
+    let cell = |values: &ColumnValues, row: usize| match values {
+        ColumnValues::Real(v) if v[row].is_nan() => "\u{2013}".to_owned(),
+        ColumnValues::Real(v) => number(v[row]),
+        ColumnValues::Whole(v) => v[row].to_string(),
+        ColumnValues::Text(v) => v[row].clone(),
+    };
+    (0..rows)
+        .map(|row| table.columns.iter().map(|c| cell(&c.values, row)).collect())
+        .collect()
+}
+
+/// Up to six significant digits.
+fn number(value: f64) -> String {
+    if !value.is_finite() {
+        return "\u{2013}".to_owned();
+    }
+    if value == value.round() && value.abs() < 1e6 {
+        return format!("{value}");
+    }
+    let digits = (5 - value.abs().log10().floor() as i32).clamp(0, 10) as usize;
+    format!("{value:.digits$}")
+        .trim_end_matches('0')
+        .trim_end_matches('.')
+        .to_owned()
+}

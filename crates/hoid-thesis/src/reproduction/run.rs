@@ -1,0 +1,237 @@
+//! The whole reproduction in a directory: runs the plans that are needed, draws tables and figures, judges the claims, writes the index page.
+//!
+//! Studies stand in `studies/NAME`, pictures and numbers in `figures` and `tables`. A study that is there already is taken as it is, so that
+//! a reproduction that was stopped goes on.
+
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use hoid_io::{OutputTable, make_directory, write_atomically, write_table};
+use hoid_study::{NamedPlan, Progress, Results, RunOptions, run};
+use rayon::prelude::*;
+
+use super::{IndexPage, Item, Studies, StudyEntry, items};
+use hoid_report::write_page;
+
+use crate::{
+    ThesisError,
+    claims::{Evidence, claims, claims_table, findings},
+    plans::TEXT_PLANS,
+};
+
+/// Name of the claims among tables and figures.
+pub const CLAIMS: &str = "claims";
+
+/// What is to be reproduced.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Reproduction {
+    /// Tables, figures, appendices, studies, or [`CLAIMS`]; all of them where nothing is named.
+    pub only: Vec<String>,
+    /// Replications of each cell.
+    pub replications: u64,
+    /// Threads; none for one a core.
+    pub jobs: Option<usize>,
+}
+
+impl Default for Reproduction {
+    fn default() -> Self {
+        Self {
+            only: Vec::new(),
+            replications: NamedPlan::REPLICATIONS,
+            jobs: None,
+        }
+    }
+}
+
+/// What is told on the way.
+#[derive(Debug, Clone, Copy)]
+pub enum Told<'a> {
+    /// How far a study is.
+    Progress(Progress),
+    /// A study has its results.
+    Study(&'a StudyEntry),
+}
+
+/// What has been reproduced.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reproduced {
+    /// The page that shows it all.
+    pub index: PathBuf,
+    /// Tables and figures.
+    pub items: usize,
+    /// Claims that hold, hold in part, do not hold, cannot be tested; none where they were not asked for.
+    pub tally: Option<[usize; 4]>,
+    /// Time that the studies took, s.
+    pub simulated_s: f64,
+    /// Time that the drawing took, s.
+    pub drawn_s: f64,
+}
+
+/// Reproduces into a directory; none when `goes_on` has stopped it, and then it can be called again to go on.
+///
+/// # Errors
+/// [`ThesisError::UnknownItem`]; [`ThesisError::Study`] and [`ThesisError::Io`] for what cannot be run, read or written.
+pub fn reproduce(
+    wanted: &Reproduction,
+    directory: &Path,
+    tell: &(dyn Fn(Told<'_>) + Sync),
+    goes_on: &(dyn Fn() -> bool + Sync),
+) -> Result<Option<Reproduced>, ThesisError> {
+    let begin = Instant::now();
+    let (chosen, with_claims) = chosen(items(), &wanted.only)?;
+    let mut plans: BTreeSet<&str> = chosen.iter().filter_map(|item| item.plan).collect();
+    if with_claims {
+        plans.extend(claims().iter().flat_map(|claim| claim.plans.iter().copied()));
+    }
+    let mut index = IndexPage::default();
+    let mut studies = Studies::new();
+    for named in TEXT_PLANS.iter().filter(|named| plans.contains(named.name)) {
+        let Some((entry, results)) = study(named, wanted, directory, tell, goes_on)? else {
+            return Ok(None);
+        };
+        tell(Told::Study(&entry));
+        index.add_study(&entry);
+        studies.insert(named.name.to_owned(), results);
+    }
+    let simulated_s = begin.elapsed().as_secs_f64();
+    for name in ["figures", "tables"] {
+        make_directory(&directory.join(name))?;
+    }
+    // Collected by place, so that the page does not depend on which is drawn first.
+    let made: Vec<_> = chosen
+        .par_iter()
+        .map(|item| write(item, &studies, directory))
+        .collect::<Result<_, ThesisError>>()?;
+    for (item, made) in chosen.iter().zip(&made) {
+        index.add(item, made.svg.as_deref(), &made.data, &made.table);
+    }
+    let tally = if with_claims {
+        Some(judge(&studies, &mut index, directory)?)
+    } else {
+        None
+    };
+    index.settings = vec![
+        ("made by".to_owned(), format!("hoid {}", env!("CARGO_PKG_VERSION"))),
+        ("replications of each cell".to_owned(), wanted.replications.to_string()),
+        ("tables and figures".to_owned(), chosen.len().to_string()),
+    ];
+    if wanted.replications < NamedPlan::REPLICATIONS {
+        index.notes.push(format!(
+            "A quick look: with {} replications instead of {} many claims are not decided.",
+            wanted.replications,
+            NamedPlan::REPLICATIONS
+        ));
+    }
+    let index = write_page(directory, "index.html", &index.html()?)?;
+    Ok(Some(Reproduced {
+        index,
+        items: chosen.len(),
+        tally,
+        simulated_s,
+        drawn_s: begin.elapsed().as_secs_f64() - simulated_s,
+    }))
+}
+
+/// The items that were asked for, by their name, their plan or the letter of an appendix, and whether the claims were.
+fn chosen(all: Vec<Item>, only: &[String]) -> Result<(Vec<Item>, bool), ThesisError> {
+    if only.is_empty() {
+        return Ok((all, true));
+    }
+    let means = |item: &Item, name: &str| {
+        let letter = format!("{}.", name.to_ascii_uppercase());
+        item.name.eq_ignore_ascii_case(name)
+            || item.plan.is_some_and(|plan| plan == name)
+            || (name.len() == 1 && item.name.starts_with(&letter))
+    };
+    let names: Vec<&str> = only.iter().map(|name| name.trim()).collect();
+    if let Some(name) = names
+        .iter()
+        .find(|name| **name != CLAIMS && !all.iter().any(|item| means(item, name)))
+    {
+        let known: Vec<&str> = all.iter().map(|item| item.name.as_str()).collect();
+        return Err(ThesisError::UnknownItem {
+            name: (*name).to_owned(),
+            known: known.join(", "),
+        });
+    }
+    let items = all
+        .into_iter()
+        .filter(|item| names.iter().any(|name| means(item, name)));
+    Ok((items.collect(), names.contains(&CLAIMS)))
+}
+
+/// Judges the claims of the text: their table, their part of the page, and how many hold.
+fn judge(studies: &Studies, index: &mut IndexPage, directory: &Path) -> Result<[usize; 4], ThesisError> {
+    let mut evidence = Evidence::new();
+    for results in studies.values() {
+        evidence.add(results);
+    }
+    let findings = findings(&evidence);
+    write_table(&directory.join("tables/claims.csv"), &claims_table(&findings))?;
+    index.add_claims(&findings);
+    Ok(index.tally())
+}
+
+/// Runs a named plan, or takes what is there; none when it was stopped.
+fn study(
+    named: &NamedPlan,
+    wanted: &Reproduction,
+    directory: &Path,
+    tell: &(dyn Fn(Told<'_>) + Sync),
+    goes_on: &(dyn Fn() -> bool + Sync),
+) -> Result<Option<(StudyEntry, Results)>, ThesisError> {
+    let plan = named.plan()?.with_replications(wanted.replications)?;
+    let directory = directory.join("studies").join(named.name);
+    let begin = Instant::now();
+    let options = RunOptions {
+        jobs: wanted.jobs,
+        resume: true,
+        ..RunOptions::default()
+    };
+    let outcome = run(
+        &plan,
+        &directory,
+        &options,
+        &|progress| tell(Told::Progress(progress)),
+        goes_on,
+    )?;
+    if !outcome.finished {
+        return Ok(None);
+    }
+    let entry = StudyEntry {
+        name: plan.name.clone(),
+        title: plan.title.clone(),
+        directory: format!("studies/{}", plan.name),
+        estimates: plan.estimates(),
+        seconds: (outcome.estimates > 0).then(|| begin.elapsed().as_secs_f64()),
+    };
+    Ok(Some((entry, Results::read(&directory)?)))
+}
+
+/// Where the parts of an item were written, from the page.
+struct Written {
+    svg: Option<String>,
+    data: String,
+    table: OutputTable,
+}
+
+fn write(item: &Item, studies: &Studies, directory: &Path) -> Result<Written, ThesisError> {
+    let made = item.make(studies);
+    let folder = if made.svg.is_some() { "figures" } else { "tables" };
+    let data = format!("{folder}/{}.csv", item.name);
+    write_table(&directory.join(&data), &made.data)?;
+    let mut written = Written {
+        svg: None,
+        data,
+        table: made.data,
+    };
+    if let Some(svg) = made.svg {
+        let path = format!("{folder}/{}.svg", item.name);
+        write_atomically(&directory.join(&path), |file| file.write_all(svg.as_bytes()))?;
+        written.svg = Some(path);
+    }
+    Ok(written)
+}

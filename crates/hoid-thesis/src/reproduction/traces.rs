@@ -1,0 +1,266 @@
+//! Recursive estimates over time, the middle of all runs: Figs. 11, 12, G.1 to G.8 and H.1 to H.12.
+
+use hoid_study::{Query, Results, plan::Cell, statistics::quantile};
+
+use super::{Data, Item, Made, REMNANT_ORDERS, level_name, order_titles};
+use hoid_report::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels};
+
+/// Which parameters a figure shows: the column of RLS, that of RPEM, name and unit of the panel.
+type Row = (&'static str, &'static str, &'static str, &'static str);
+
+const DISCRETE: [Row; 4] = [
+    ("a1", "f1", "a1", ""),
+    ("a2", "f2", "a2", ""),
+    ("b0", "b0", "b0", ""),
+    ("b1", "b1", "b1", ""),
+];
+const OPERATOR: [Row; 5] = [
+    ("K_e", "K_e", "K_e", "deg/deg"),
+    ("T_L", "T_L", "T_L", "s"),
+    ("K_e_dot", "K_e_dot", "K_e_dot", "s"),
+    ("omega_nm", "omega_nm", "omega_nm", "rad/s"),
+    ("zeta_nm", "zeta_nm", "zeta_nm", ""),
+];
+
+/// An estimator of a figure: method of the colour language, name in the plan, batch fits beside it.
+type Curves = (usize, &'static str, &'static [(&'static str, f64, f64)]);
+
+const RLS: Curves = (0, "RLS", &[("OLS first", 0.0, 30.72), ("OLS last", 51.2, 81.92)]);
+const RPEM: Curves = (1, "RPEM", &[("PEM first", 0.0, 30.72), ("PEM last", 51.2, 81.92)]);
+
+const CAPTION: &str = "Median over the runs at each time: the text averages, but one run in which K_e nearly vanishes would decide the average of \
+                       T_L. Dashed in colour: batch fits of [0, 30.72] and [51.20, 81.92] s; dashed black: the simulated operator.";
+
+pub(super) fn items() -> Vec<Item> {
+    let mut all = vec![
+        recursive("fig-11".to_owned(), "C4", &DISCRETE, "discrete parameters"),
+        recursive("fig-12".to_owned(), "C4", &OPERATOR, "operator parameters"),
+    ];
+    for (i, condition) in ["C1", "C2", "C3", "C4", "C5", "C6"].into_iter().enumerate() {
+        all.push(recursive(
+            format!("H.{}", 2 * i + 1),
+            condition,
+            &DISCRETE,
+            "discrete parameters",
+        ));
+        all.push(recursive(
+            format!("H.{}", 2 * i + 2),
+            condition,
+            &OPERATOR,
+            "operator parameters",
+        ));
+    }
+    for (rows, what, first) in [
+        (&DISCRETE[..], "discrete parameters", 1),
+        (&OPERATOR[..], "operator parameters", 5),
+    ] {
+        for m0 in REMNANT_ORDERS {
+            all.push(Item::of_study(
+                format!("G.{}", first + m0 - 1),
+                format!("RLS with a forgetting matrix, {what}, condition C3, m0 = {m0}"),
+                "Median over the runs at each time, by noise level; a1 and a2 forget nothing, b0 and b1 remember 256 samples. Dashed: the \
+                 simulated operator.",
+                "recursive-arx",
+                move |item, results| {
+                    let levels = [0.0, 0.1, 0.2, 0.3];
+                    make(item, results, "C3", rows, &[m0], &levels, &[(0, "RLS", &[])])
+                },
+            ));
+        }
+    }
+    all
+}
+
+fn recursive(name: String, condition: &'static str, rows: &'static [Row], what: &str) -> Item {
+    Item::of_study(
+        name,
+        format!("Recursive ARX and Box-Jenkins (m* = 1) estimates, {what}, condition {condition}"),
+        CAPTION,
+        "recursive",
+        move |item, results| {
+            make(
+                item,
+                results,
+                condition,
+                rows,
+                &REMNANT_ORDERS,
+                &[0.01, 0.1, 0.2],
+                &[RLS, RPEM],
+            )
+        },
+    )
+}
+
+fn make(
+    item: &Item,
+    results: &Results,
+    condition: &str,
+    rows: &[Row],
+    orders: &[usize],
+    levels: &[f64],
+    estimators: &[Curves],
+) -> Made {
+    let mut data = Data::new(
+        &["parameter", "estimator"],
+        &[
+            "remnant_order",
+            "noise_level",
+            "t",
+            "lower_quartile",
+            "median",
+            "mean",
+            "upper_quartile",
+        ],
+    );
+    let mut panels = Vec::new();
+    for (of_rls, of_rpem, name, unit) in rows {
+        for m0 in orders {
+            let mut curves = Vec::new();
+            for (level_at, level) in levels.iter().enumerate() {
+                let base = Query::default()
+                    .condition(condition)
+                    .remnant_order(*m0)
+                    .noise_level(*level);
+                let Some(cell) = results.cells(&base).first().copied() else {
+                    continue;
+                };
+                for (method, estimator, batch) in estimators {
+                    let column = if *method == 0 { of_rls } else { of_rpem };
+                    if let Some(trace) = results.traces(cell.index, estimator)
+                        && let Some(bands) = trace.parameters.get(*column)
+                    {
+                        for (k, t) in trace.times_s.iter().enumerate() {
+                            data.row(
+                                &[name, estimator],
+                                &[
+                                    *m0 as f64,
+                                    *level,
+                                    *t,
+                                    bands.lower_quartile[k],
+                                    bands.median[k],
+                                    bands.mean[k],
+                                    bands.upper_quartile[k],
+                                ],
+                            );
+                        }
+                        curves.push(TraceCurve {
+                            kind: CurveKind::Estimate,
+                            method: *method,
+                            level: level_at,
+                            times_s: trace.times_s.clone(),
+                            values: bands.median.clone(),
+                            band: Vec::new(),
+                        });
+                    }
+                    for (fit, from, to) in *batch {
+                        let query = base.clone().name(fit);
+                        let row = results.find(&query).into_iter().find(|row| row.quantity == *column);
+                        if let Some(row) = row {
+                            let s = &row.statistics;
+                            for t in [*from, *to] {
+                                data.row(
+                                    &[name, fit],
+                                    &[
+                                        *m0 as f64,
+                                        *level,
+                                        t,
+                                        s.lower_quartile,
+                                        s.median,
+                                        s.mean,
+                                        s.upper_quartile,
+                                    ],
+                                );
+                            }
+                            curves.push(TraceCurve {
+                                kind: CurveKind::Batch,
+                                method: *method,
+                                level: level_at,
+                                times_s: vec![*from, *to],
+                                values: vec![s.median; 2],
+                                band: Vec::new(),
+                            });
+                        }
+                    }
+                }
+                if level_at + 1 == levels.len() {
+                    curves.push(truth(cell, name));
+                }
+            }
+            panels.push(TracePanel {
+                name: (*name).to_owned(),
+                unit: (*unit).to_owned(),
+                ordinate: ordinate(&curves),
+                curves,
+            });
+        }
+    }
+    let alone = orders.len() == 1;
+    let grid = TraceGrid {
+        panels,
+        columns: if alone { 2 } else { orders.len() },
+        titles: if alone { Vec::new() } else { order_titles() },
+        methods: estimators
+            .iter()
+            .map(|(method, name, _)| format!("{} ({name})", if *method == 0 { "ARX" } else { "BJ" }))
+            .collect(),
+        levels: levels.iter().map(|level| level_name(*level)).collect(),
+        shaded_s: Vec::new(),
+        marks_s: Vec::new(),
+        shared_ordinates: false,
+    };
+    Made {
+        svg: Some(trace_panels(&item.name, &item.title, &grid)),
+        data: data.table(&item.title),
+    }
+}
+
+/// Every curve but for its highest and lowest three per cent: no estimator is missing because another is better.
+fn ordinate(curves: &[TraceCurve]) -> Ordinate {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for curve in curves {
+        let mut sorted: Vec<f64> = curve.values.iter().copied().filter(|v| v.is_finite()).collect();
+        sorted.sort_by(f64::total_cmp);
+        let share = if curve.kind == CurveKind::Estimate { 0.03 } else { 0.0 };
+        for p in [share, 1.0 - share] {
+            let value = quantile(&sorted, p);
+            low = low.min(value);
+            high = high.max(value);
+        }
+    }
+    if low < high {
+        Ordinate::Within(low, high)
+    } else {
+        Ordinate::Robust
+    }
+}
+
+/// The simulated operator over time.
+fn truth(cell: &Cell, name: &str) -> TraceCurve {
+    let scenario = cell.resolved.scenario();
+    let times_s: Vec<f64> = (0..=512)
+        .map(|k| scenario.measurement_s * f64::from(k) / 512.0)
+        .collect();
+    let value = |t: &f64| {
+        let operator = cell.resolved.parameters_at(*t).operator;
+        let held = operator.discretise(scenario.sample_time).map(|d| d.held).ok();
+        match name {
+            "K_e" => operator.k_e,
+            "T_L" => operator.t_l_s,
+            "K_e_dot" => operator.k_e_dot(),
+            "omega_nm" => operator.omega_nm_rad_s,
+            "zeta_nm" => operator.zeta_nm,
+            "a1" => held.map_or(f64::NAN, |h| h.f1),
+            "a2" => held.map_or(f64::NAN, |h| h.f2),
+            "b0" => held.map_or(f64::NAN, |h| h.b0),
+            _ => held.map_or(f64::NAN, |h| h.b1),
+        }
+    };
+    TraceCurve {
+        kind: CurveKind::Truth,
+        method: 0,
+        level: 0,
+        values: times_s.iter().map(value).collect(),
+        times_s,
+        band: Vec::new(),
+    }
+}

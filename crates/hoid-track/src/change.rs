@@ -1,0 +1,138 @@
+//! When a person changed: by the odds of the hypotheses of [`super::Method::Adaptive`], and the published baseline.
+//!
+//! The baseline looks at the loop from outside: an adaptation is taken to be needed while the tracking error or its rate is larger than k of its
+//! standard deviations before the change (R. A. Hess, *Journal of Guidance, Control, and Dynamics* 32 (2009): three; here either
+//! signal raises the alarm, the rate by the difference of neighbouring samples).
+
+use hoid_core::adaptive::{change as kernel_change, hypothesis as kernel};
+use hoid_model::{SampleTime, uncertainty::Estimate};
+
+/// A change of the person that was declared.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Change {
+    /// How long ago the person changed when it was declared, s; to a third of a second.
+    pub seconds_ago: f64,
+    /// Logarithm of the odds of a change within the last seconds.
+    pub odds: f64,
+    /// K_e before and after.
+    pub k_e: [Estimate; 2],
+    /// K_e_dot before and after, s.
+    pub k_e_dot: [Estimate; 2],
+    /// omega_nm before and after, rad/s.
+    pub omega_nm_rad_s: [Estimate; 2],
+    /// zeta_nm before and after.
+    pub zeta_nm: [Estimate; 2],
+    /// Delay tau_e before and after, s; the same where it is known.
+    pub tau_e_s: [Estimate; 2],
+    /// T_L before and after, s.
+    pub t_l_s: [f64; 2],
+    /// Innovation variance before and after.
+    pub innovation_variance: [f64; 2],
+    /// Change of K_e, K_e_dot, omega_nm, zeta_nm, the logarithm of the innovation variance and tau_e, each over its standard error.
+    pub z: [f64; 6],
+}
+
+/// Change over its standard error from which a quantity is said to have changed.
+const CHANGED: f64 = 2.0;
+/// What [`Change::z`] is of.
+const QUANTITIES: [&str; 6] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "remnant", "tau_e"];
+
+impl Change {
+    pub(crate) fn new(change: &kernel_change::Change, tau_e_s: [Estimate; 2], sample_time: SampleTime) -> Self {
+        let (before, now) = (&change.before, &change.now);
+        let pair = |i: usize| {
+            let of = |b: &kernel::Before| if i < 2 { b.gains[i] } else { b.neuromuscular[i - 2] };
+            [before, now].map(|b| Estimate::with_variance(b.eta[i], of(b)))
+        };
+        let lead = |b: &kernel::Before| (b.eta[0] * b.eta[1] + b.gains[2]) / (b.eta[0] * b.eta[0] + b.gains[0]);
+        Self {
+            seconds_ago: change.samples_ago as f64 * sample_time.s(),
+            odds: change.odds,
+            k_e: pair(0),
+            k_e_dot: pair(1),
+            omega_nm_rad_s: pair(2),
+            zeta_nm: pair(3),
+            tau_e_s,
+            t_l_s: [lead(before), lead(now)],
+            innovation_variance: [before.variance, now.variance],
+            z: change.z,
+        }
+    }
+
+    /// Posterior probability of a change.
+    pub fn probability(&self) -> f64 {
+        1.0 / (1.0 + (-self.odds).exp())
+    }
+
+    /// Names of what changed by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`, `zeta_nm`, `remnant`, `tau_e`.
+    pub fn changed(&self) -> Vec<&'static str> {
+        let each = QUANTITIES.into_iter().zip(self.z);
+        each.filter(|(_, z)| z.abs() > CHANGED).map(|(name, _)| name).collect()
+    }
+}
+
+/// The published baseline: k standard deviations of the tracking error and of its rate before the change.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorThreshold {
+    /// Mean and standard deviation of the error, and of its rate in 1/s.
+    levels: [[f64; 2]; 2],
+    sample_time_s: f64,
+    last: Option<f64>,
+}
+
+impl ErrorThreshold {
+    /// From the error of a span without a change; `None` with fewer than three samples, or values that are not finite.
+    pub fn new(error: &[f64], sample_time: SampleTime) -> Option<Self> {
+        let ts = sample_time.s();
+        let rate: Vec<f64> = error.windows(2).map(|w| (w[1] - w[0]) / ts).collect();
+        if error.len() < 3 || error.iter().any(|e| !e.is_finite()) {
+            return None;
+        }
+        let level = |values: &[f64]| {
+            let n = values.len() as f64;
+            let mean = values.iter().sum::<f64>() / n;
+            let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+            [mean, variance.sqrt()]
+        };
+        Some(Self {
+            levels: [level(error), level(&rate)],
+            sample_time_s: ts,
+            last: None,
+        })
+    }
+
+    /// The larger distance of error and error rate from their means, in standard deviations: an alarm where it is above k. The rate counts from the second
+    /// sample on.
+    pub fn step(&mut self, error: f64) -> f64 {
+        let distance = |[mean, deviation]: [f64; 2], v: f64| ((v - mean) / deviation).abs();
+        let by_error = distance(self.levels[0], error);
+        let rate = self.last.map(|last| (error - last) / self.sample_time_s);
+        self.last = Some(error);
+        let by_rate = rate.map_or(0.0, |r| distance(self.levels[1], r));
+        by_error.max(by_rate)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn the_baseline_is_the_distance_in_standard_deviations() {
+        let ts = SampleTime::HUNDREDTH;
+        // Mean 0, variance 8/7; rates +-200 and 0.
+        let error = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0];
+        let mut baseline = ErrorThreshold::new(&error, ts).unwrap();
+        let deviation = (8.0_f64 / 7.0).sqrt();
+        assert!((baseline.step(3.0) - 3.0 / deviation).abs() < 1e-12);
+        // The rate of 1 in 0.01 s: its mean is -200/7, its deviation sqrt(6/7 * ... ) by definition.
+        let rates = [-200.0, 200.0, -200.0, 200.0, -200.0, 200.0, -200.0];
+        let mean = rates.iter().sum::<f64>() / 7.0;
+        let spread = (rates.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>() / 6.0).sqrt();
+        let expected = (4.0 / deviation).max((100.0 - mean) / spread);
+        assert!((baseline.step(4.0) - expected).abs() < 1e-12);
+        assert!(ErrorThreshold::new(&[0.0, 1.0], ts).is_none());
+        assert!(ErrorThreshold::new(&[0.0, f64::NAN, 1.0], ts).is_none());
+    }
+}

@@ -1,0 +1,55 @@
+//! A trace as named columns: the form in which it is written and handed to other programs.
+
+use hoid_model::{
+    NotConvertible,
+    uncertainty::{Estimate, OperatorEstimate},
+};
+
+use crate::{OPERATOR_COLUMNS, Trace};
+
+/// Named columns of one length.
+pub type Columns = Vec<(String, Vec<f64>)>;
+
+impl Trace {
+    /// The operator of every row.
+    pub fn operators(&self) -> Vec<Result<OperatorEstimate, NotConvertible>> {
+        (0..self.len()).map(|row| self.operator(row)).collect()
+    }
+
+    /// Names of the operator's columns: those of every trace, and the delay where it is tracked.
+    pub fn operator_columns(&self) -> Vec<&'static str> {
+        let mut names = OPERATOR_COLUMNS.to_vec();
+        if self.options().track_delay_s.is_some() {
+            names.push("tau_e");
+        }
+        names
+    }
+
+    /// `t`, each coefficient and each parameter of the operator, with their standard errors behind each (`_se`). NaN stands where a row has
+    /// no operator, or a value no standard error. `operators` are those of [`Trace::operators`].
+    pub fn estimate_columns(&self, operators: &[Result<OperatorEstimate, NotConvertible>]) -> Columns {
+        let mut columns: Columns = vec![("t".to_owned(), self.times_s().to_vec())];
+        let mut add = |name: &str, estimates: &[Option<Estimate>]| {
+            let value = |e: &Option<Estimate>| e.map_or(f64::NAN, |e| e.value);
+            let error = |e: &Option<Estimate>| e.and_then(|e| e.standard_error).unwrap_or(f64::NAN);
+            columns.push((name.to_owned(), estimates.iter().map(value).collect()));
+            columns.push((format!("{name}_se"), estimates.iter().map(error).collect()));
+        };
+        let coefficients: Vec<Vec<Estimate>> = (0..self.len()).map(|row| self.parameters(row)).collect();
+        for (i, name) in self.parameter_names().iter().enumerate() {
+            let each: Vec<Option<Estimate>> = coefficients.iter().map(|c| Some(c[i])).collect();
+            add(name, &each);
+        }
+        for name in self.operator_columns() {
+            let each: Vec<Option<Estimate>> = operators.iter().map(|o| value_of(o, name)).collect();
+            add(name, &each);
+        }
+        columns
+    }
+}
+
+/// A parameter of an operator by its name.
+pub fn value_of(operator: &Result<OperatorEstimate, NotConvertible>, name: &str) -> Option<Estimate> {
+    let rows = operator.as_ref().ok()?.rows();
+    rows.into_iter().find(|(n, _, _)| *n == name).map(|(_, _, e)| e)
+}

@@ -1,0 +1,193 @@
+//! The adaptation that the options ask for.
+
+use hoid_core::{
+    adaptation::{Adaptation, Covariance, Forgetting, Move},
+    error_bars::{Bars, ErrorBars, Level},
+    factored::Factored,
+    state::State,
+    window::Window,
+};
+use hoid_model::SampleTime;
+
+use crate::{
+    options::{ForgettingRule, Method, StartCovariance, TrackOptions},
+    start::StartState,
+};
+use hoid_ident::IdentError;
+
+/// Where nothing excites a parameter, its variance in P may grow to this multiple of the level that it has with the excitation of
+/// the start fit: the gain after a silence is that of three times the usual standard error.
+const ROOM_TO_GROW: f64 = 10.0;
+/// The same for a start covariance that comes from no fit, as a multiple of it.
+pub(crate) const ROOM_WITHOUT_FIT: f64 = 1e4;
+/// Growing memory of a start without a fit: what the first sample forgets, and the share of it that the next one forgets still.
+const EARLY_FORGETTING: f64 = 0.01;
+const EARLY_SHARE: f64 = 0.9993;
+/// Smallest factor of variable forgetting: a memory of ten samples.
+const SMALLEST_FACTOR: f64 = 0.9;
+/// Memory of the innovation variance in units of the shortest memory of a parameter.
+const LEVEL_MEMORIES: f64 = 4.0;
+
+/// The adaptations of the kernel as one type, so that each recursion is compiled once.
+pub(crate) enum Gain<const N: usize> {
+    Covariance(Covariance<N>),
+    Window(Window<N, Vec<f64>>),
+}
+
+impl<const N: usize> State for Gain<N> {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        match self {
+            Self::Covariance(c) => c.visit(each),
+            Self::Window(w) => w.visit(each),
+        }
+    }
+}
+
+impl<const N: usize> Gain<N> {
+    /// The adaptation with room for N parameters.
+    ///
+    /// # Errors
+    /// [`IdentError`] for options that contradict each other, or a start covariance that is not positive.
+    pub(crate) fn new(options: &TrackOptions, from: &StartState, sample_time: SampleTime) -> Result<Self, IdentError> {
+        let p = from.values.len();
+        let lambda = options
+            .memories()?
+            .into_iter()
+            .map(|m| m.lambda(sample_time))
+            .collect::<Result<Vec<f64>, _>>()?;
+        let shortest = lambda.iter().copied().fold(1.0, f64::min);
+        // Where no fit says what the innovation variance is, P and drift are in the units of the parameters.
+        let unit = if from.variance > 0.0 { from.variance } else { 1.0 };
+        let padded =
+            |values: &[f64], fill: f64| -> [f64; N] { std::array::from_fn(|i| values.get(i).copied().unwrap_or(fill)) };
+        let square = |values: &[f64]| -> [[f64; N]; N] {
+            std::array::from_fn(|i| std::array::from_fn(|j| if i < p && j < p { values[i * p + j] } else { 0.0 }))
+        };
+        let forgetting = match &options.forgetting {
+            ForgettingRule::Exponential => Forgetting::Exponential {
+                lambda: padded(&lambda, 1.0),
+            },
+            ForgettingRule::RandomWalk(drift) => {
+                let names = options.parameter_names();
+                if let Some(unknown) = drift.keys().find(|k| !names.contains(k)) {
+                    return Err(IdentError::UnknownParameter {
+                        name: unknown.clone(),
+                        available: names.join(", "),
+                    });
+                }
+                let variance = |name: &String| drift.get(name).map_or(0.0, |d| d * d * sample_time.s() / unit);
+                let each: Vec<f64> = names.iter().map(variance).collect();
+                Forgetting::RandomWalk {
+                    drift: padded(&each, 0.0),
+                }
+            }
+            ForgettingRule::Window => {
+                let samples = (1.0 / (1.0 - shortest)).round();
+                if !samples.is_finite() {
+                    return Err(IdentError::BadOption {
+                        option: "the sliding window".to_owned(),
+                        found: "a memory without end".to_owned(),
+                        expected: "a memory in samples or seconds".to_owned(),
+                    });
+                }
+                let memory = vec![0.0; Window::<N, Vec<f64>>::numbers(samples as usize)];
+                let Some(window) = Window::<N, Vec<f64>>::new(memory, p) else {
+                    return Err(IdentError::BadOption {
+                        option: "the sliding window".to_owned(),
+                        found: format!("{samples} samples"),
+                        expected: "at least one sample".to_owned(),
+                    });
+                };
+                return Ok(Self::Window(window));
+            }
+            ForgettingRule::Variable => Forgetting::Variable {
+                memory: 1.0 / (1.0 - shortest),
+                smallest: SMALLEST_FACTOR,
+            },
+            ForgettingRule::Directional => Forgetting::Directional { lambda: shortest },
+            ForgettingRule::Gradient(rate) => Forgetting::Gradient { rate: *rate },
+        };
+        let matrix = square(&from.covariance);
+        let Some(factors) = Factored::of(&matrix) else {
+            return Err(IdentError::BadStart {
+                reason: "its covariance is not positive; give a start covariance, such as 0.1".to_owned(),
+            });
+        };
+        let bound = std::array::from_fn(|i| {
+            let room = match options.covariance {
+                // N samples of the start leave 1/N of the information of a sample, a memory 1 - lambda of it.
+                StartCovariance::OfFit if from.from_fit && i < p => {
+                    ROOM_TO_GROW * (from.residuals * (1.0 - lambda[i])).max(1.0)
+                }
+                _ => ROOM_WITHOUT_FIT,
+            };
+            room * matrix[i][i]
+        });
+        let covariance = Covariance::new(factors, forgetting, bound);
+        // Gradients on the way from a start that no data speak for must not be remembered for ever; least squares has none.
+        Ok(Self::Covariance(if from.from_fit || options.method == Method::Rls {
+            covariance
+        } else {
+            covariance.with_growing_memory(EARLY_FORGETTING, EARLY_SHARE)
+        }))
+    }
+}
+
+impl<const N: usize> Adaptation<N> for Gain<N> {
+    #[inline]
+    fn advance(&mut self, psi: &[f64; N], eps: f64, theta: &[f64; N], variance: f64) -> Move<N> {
+        match self {
+            Self::Covariance(c) => c.advance(psi, eps, theta, variance),
+            Self::Window(w) => w.advance(psi, eps, theta, variance),
+        }
+    }
+
+    fn spread(&self) -> Option<[[f64; N]; N]> {
+        match self {
+            Self::Covariance(c) => c.spread(),
+            Self::Window(w) => w.spread(),
+        }
+    }
+
+    #[inline]
+    fn drift_into<const K: usize, B: Bars<N, K>>(&self, bars: &mut B) {
+        match self {
+            Self::Covariance(c) => c.drift_into(bars),
+            Self::Window(w) => w.drift_into(bars),
+        }
+    }
+
+    fn needs_variance(&self) -> bool {
+        match self {
+            Self::Covariance(c) => c.needs_variance(),
+            Self::Window(w) => w.needs_variance(),
+        }
+    }
+
+    fn is_sound(&self) -> bool {
+        match self {
+            Self::Covariance(c) => c.is_sound(),
+            Self::Window(w) => w.is_sound(),
+        }
+    }
+}
+
+/// The error bars at the start, with room for N parameters and the errors of K filters.
+///
+/// # Errors
+/// As [`TrackOptions::memories`].
+pub(crate) fn error_bars<const N: usize, const K: usize>(
+    options: &TrackOptions,
+    from: &StartState,
+    sample_time: SampleTime,
+) -> Result<ErrorBars<N, K>, IdentError> {
+    let mut shortest = 1.0_f64;
+    for memory in options.memories()? {
+        shortest = shortest.min(memory.lambda(sample_time)?);
+    }
+    let level = Level::new(from.variance, from.residuals, 1.0 - (1.0 - shortest) / LEVEL_MEMORIES);
+    let p = from.values.len();
+    let start: [[f64; N]; N] =
+        std::array::from_fn(|i| std::array::from_fn(|j| if i < p && j < p { from.spread[i * p + j] } else { 0.0 }));
+    Ok(ErrorBars::new(&start, level, options.limit_in_use()))
+}

@@ -1,0 +1,58 @@
+//! Recursive estimates: sample by sample, over a record or live.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | `options` | what is to be tracked, and how |
+//! | `start` | where a recursion starts: batch fit, theta, nothing |
+//! | `gain` | the way of forgetting |
+//! | `kernel` | RLS, RPEM and the physical recursion of the real-time kernel |
+//! | `adaptive`, `change` | the bank of hypotheses of the real-time kernel, and the changes that it declares |
+//! | `reported`, `smooth` | what a recursion with a noise model that stays reports; the two-sided estimate of a recorded run |
+//! | `fused` | least squares with the poles of RPEM |
+//! | `joint` | extended and unscented Kalman filter of state and parameters |
+//! | `window`, `predictor` | the batch fit over a sliding window |
+//! | `refined`, `laguerre`, `forgetting` | recursive refined instrumental variable |
+//! | `plan` | orders that are still open, searched on the start span |
+//! | `live` | the warm-up of a stream, then its tracker |
+//! | `saved` | a tracker as numbers, to go on elsewhere |
+//! | `trace`, `columns` | the estimate at every sample |
+//!
+//! **A recursion starts with what is known.** By default it is the batch fit of the first third of a record, with the covariance of that
+//! fit; until the end of that span the filters follow and the estimate stays, so that no sample counts twice and the error bars hold. With
+//! the text's own start, `P_0 = 0.1 I` (eq. 38, 5.41, 5.55), the estimate moves from the first sample on.
+//!
+//! **Samples that are not as they should be** never reach the filters. A value is a fault when it is not a finite number or larger than
+//! [`TrackOptions::largest`]. An error e is then replaced by the last good one, an output u by the one-step prediction, and the estimate
+//! stays at that sample. Each is counted.
+
+mod change;
+mod columns;
+mod gain;
+mod kernel;
+mod live;
+mod methods;
+mod options;
+mod over_record;
+mod past;
+mod plan;
+mod predictor;
+mod recursion;
+mod reported;
+mod saved;
+mod smoother;
+mod start;
+mod trace;
+mod tracker;
+
+pub use change::{Change, ErrorThreshold};
+pub use columns::{Columns, value_of};
+pub use live::{Choose, Live, LiveOutcome, WarmUp};
+pub use options::{ForgettingRule, Memory, Method, StartAt, StartCovariance, TrackOptions};
+pub use over_record::{track, track_from};
+pub use plan::{TrackPlan, narrowed};
+pub use recursion::Sample;
+pub use trace::{OPERATOR_COLUMNS, Trace};
+pub use tracker::{Counts, Outcome, Tracker};
+
+/// Regressor and stability of the recursions, options of the kernel.
+pub use hoid_core::{predictor::Regressor, recursion::Stable};

@@ -1,0 +1,212 @@
+//! The recursion of a stream: the warm-up that its start fit is made of, then the tracker.
+
+use std::collections::VecDeque;
+
+use hoid_core::state::{State, visit_all};
+use hoid_model::{Channel, Record, SampleTime};
+
+use crate::{Outcome, Sample, StartAt, TrackOptions, Tracker};
+use hoid_ident::{Choice, IdentError};
+
+/// What makes the options of a record of the warm-up, with what was searched for them.
+pub type Choose<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice>), IdentError>;
+
+/// Share of the warm-up that is collected besides after a fit that failed.
+const QUARTER: usize = 4;
+/// Of a warm-up that goes on, so many times its length is kept.
+const KEPT: usize = 2;
+/// Longest run of faulty samples within a warm-up, s; after a longer one it begins anew.
+const LONGEST_FAULT_S: f64 = 1.0;
+
+/// Where the recursion is.
+#[derive(Debug)]
+pub enum Live {
+    /// The samples of the start fit are being collected.
+    Collecting(WarmUp),
+    /// The estimate is there.
+    Tracking(Box<Tracker>),
+}
+
+/// What a sample led to.
+#[derive(Debug, Default)]
+pub struct LiveOutcome {
+    /// What the tracker says, once there is one.
+    pub outcome: Option<Outcome>,
+    /// Options and search of a start fit that has just been made.
+    pub started: Option<(TrackOptions, Option<Choice>)>,
+}
+
+impl Live {
+    /// A recursion that begins at once where its start is given, else with a warm-up of so many samples.
+    ///
+    /// # Errors
+    /// [`IdentError`] for a start that cannot be used.
+    pub fn new(options: &TrackOptions, warm_up: usize, sample_time: SampleTime) -> Result<Self, IdentError> {
+        Ok(match options.start {
+            StartAt::Span(_) => Self::Collecting(WarmUp::new(warm_up, sample_time)),
+            _ => Self::Tracking(Box::new(Tracker::new(options, None, sample_time)?)),
+        })
+    }
+
+    /// Takes a sample; NaN stands for what is faulty or missing. The fit of the warm-up is made when its last sample comes, with the options
+    /// that `choose` gives for it.
+    pub fn take(&mut self, sample: Sample, choose: Choose<'_>) -> LiveOutcome {
+        let warm_up = match self {
+            Self::Tracking(tracker) => {
+                return LiveOutcome {
+                    outcome: Some(tracker.take(sample, true)),
+                    started: None,
+                };
+            }
+            Self::Collecting(warm_up) => warm_up,
+        };
+        warm_up.collect(sample);
+        if warm_up.collected < warm_up.needed {
+            return LiveOutcome::default();
+        }
+        match warm_up.start(choose) {
+            Ok((tracker, choice)) => {
+                let options = tracker.options().clone();
+                *self = Self::Tracking(Box::new(tracker));
+                LiveOutcome {
+                    outcome: None,
+                    started: Some((options, choice)),
+                }
+            }
+            Err(error) => {
+                warm_up.needed = warm_up.collected + (warm_up.length / QUARTER).max(1);
+                warm_up.trouble = Some(error.to_string());
+                LiveOutcome::default()
+            }
+        }
+    }
+}
+
+/// Samples that are collected for the start fit.
+#[derive(Debug)]
+pub struct WarmUp {
+    length: usize,
+    sample_time: SampleTime,
+    samples: VecDeque<Sample>,
+    /// Samples since the collection began.
+    pub collected: usize,
+    /// How many there are to be when the fit is tried.
+    pub needed: usize,
+    /// Why the last start fit failed, or the collection began anew.
+    pub trouble: Option<String>,
+    /// Faulty samples at the end.
+    faulty: usize,
+}
+
+impl State for WarmUp {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        visit_all(
+            &mut [
+                &mut self.length,
+                &mut self.collected,
+                &mut self.needed,
+                &mut self.faulty,
+            ],
+            each,
+        );
+        let mut kept = self.samples.len();
+        kept.visit(each);
+        let nothing = Sample {
+            e: 0.0,
+            u: 0.0,
+            reference: None,
+        };
+        self.samples.resize(kept.min(KEPT.saturating_mul(self.length)), nothing);
+        for sample in &mut self.samples {
+            let mut known = sample.reference.is_some();
+            let mut reference = sample.reference.unwrap_or(f64::NAN);
+            visit_all(&mut [&mut sample.e, &mut sample.u, &mut known, &mut reference], each);
+            sample.reference = known.then_some(reference);
+        }
+    }
+}
+
+impl WarmUp {
+    /// The warm-up as numbers, for [`WarmUp::restored`]; the trouble of the last fit is not among them.
+    pub fn saved(&mut self) -> Vec<f64> {
+        let mut numbers = Vec::new();
+        self.visit(&mut |number| numbers.push(*number));
+        numbers
+    }
+
+    /// The warm-up that [`WarmUp::saved`] was asked of. `None` for the numbers of something else.
+    pub fn restored(sample_time: SampleTime, numbers: &[f64]) -> Option<Self> {
+        let mut warm_up = Self::new(0, sample_time);
+        let mut left = numbers.iter();
+        let mut lacking = false;
+        warm_up.visit(&mut |number| match left.next() {
+            Some(saved) => *number = *saved,
+            None => lacking = true,
+        });
+        (!lacking && left.next().is_none()).then_some(warm_up)
+    }
+
+    fn new(length: usize, sample_time: SampleTime) -> Self {
+        Self {
+            length,
+            sample_time,
+            samples: VecDeque::new(),
+            collected: 0,
+            needed: length,
+            trouble: None,
+            faulty: 0,
+        }
+    }
+
+    /// Takes a sample. The collection begins with a sound one, and begins anew after a long fault.
+    fn collect(&mut self, sample: Sample) {
+        let sound = sample.e.is_finite() && sample.u.is_finite();
+        self.faulty = if sound { 0 } else { self.faulty + 1 };
+        if self.samples.is_empty() && !sound {
+            return;
+        }
+        if self.faulty as f64 * self.sample_time.s() > LONGEST_FAULT_S {
+            *self = Self::new(self.length, self.sample_time);
+            self.trouble = Some(format!(
+                "more than {LONGEST_FAULT_S} s of faulty samples: the warm-up began anew"
+            ));
+            return;
+        }
+        if self.samples.len() == KEPT * self.length {
+            self.samples.pop_front();
+        }
+        self.samples.push_back(sample);
+        self.collected += 1;
+    }
+
+    /// The tracker with the batch fit of what was collected, its filters warm.
+    fn start(&self, choose: Choose<'_>) -> Result<(Tracker, Option<Choice>), IdentError> {
+        let record = self.record()?;
+        let (options, choice) = choose(&record)?;
+        let mut tracker = Tracker::new(&options, Some(&record), self.sample_time)?;
+        for sample in &self.samples {
+            tracker.take(*sample, false);
+        }
+        Ok((tracker, choice))
+    }
+
+    /// What was collected as a record; a faulty value is the last good one.
+    fn record(&self) -> Result<Record, IdentError> {
+        let channel = |name: &str, of: fn(&Sample) -> f64| {
+            let mut last = self.samples.iter().map(of).find(|v| v.is_finite()).unwrap_or(0.0);
+            let values = self.samples.iter().map(|s| {
+                let v = of(s);
+                last = if v.is_finite() { v } else { last };
+                last
+            });
+            Channel::new(name, "", values.collect())
+        };
+        let (input, output) = (channel("e", |s| s.e), channel("u", |s| s.u));
+        let record = Record::new(self.sample_time, input, output)?.labelled("of the warm-up");
+        if self.samples.iter().any(|s| s.reference.is_none()) {
+            return Ok(record);
+        }
+        let reference = channel("f_t", |s| s.reference.unwrap_or(f64::NAN));
+        Ok(record.with_channel(reference)?)
+    }
+}

@@ -1,0 +1,284 @@
+//! The bank of hypotheses of the real-time kernel ([`hoid_core::adaptive`]) behind the face of a recursion: what it supposes of a person, in
+//! seconds.
+//!
+//! Where the delay is tracked, other delays are proposed every 1.28 s.
+//!
+//! The numbers were set on conditions C3 and C5 with remnants of order 2 and 3; the errors change by a tenth or less when any of them is halved or doubled.
+
+use std::ops::RangeInclusive;
+
+use hoid_core::{
+    adaptive::{
+        Adaptive, Suppositions,
+        delays::Delays,
+        hypothesis::{Hypothesis, OPERATOR},
+        response::Signals,
+    },
+    delay::DelayLine,
+    error_bars::Level,
+    state::{State, visit_all},
+};
+use hoid_model::{
+    SampleTime,
+    uncertainty::{Estimate, OperatorEstimate},
+};
+
+use crate::{
+    Change,
+    options::TrackOptions,
+    recursion::{Recursion, Sample, StepOutcome},
+    reported::Reported,
+    start::{self, StartState},
+};
+use hoid_ident::IdentError;
+
+/// Room for hypotheses where the delay is known, where it is not, and the largest order of the noise model.
+const HYPOTHESES: usize = 16;
+const WITH_DELAYS: usize = 48;
+pub(crate) const LARGEST_ND: usize = 8;
+/// Time between two births, s.
+const SPACING_S: f64 = 0.32;
+/// Mean time between two changes, s.
+const BETWEEN_CHANGES_S: f64 = 60.0;
+/// Change of K_e and of K_e_dot to be expected, in the units of [`Suppositions::jump`].
+const JUMP: [f64; 2] = [0.15, 0.5];
+/// Drift of the gains in one second, in the same units.
+const DRIFT: f64 = 0.005;
+/// The drift just after a change, for K_e and K_e_dot in the same units, for omega_nm and zeta_nm in those of a change of them; and how long it lasts, s.
+const UNREST: [f64; OPERATOR] = [0.05, 0.25, 0.2, 0.2];
+const UNREST_FOR_S: f64 = 3.0;
+/// Relative change of omega_nm and of zeta_nm to be expected, how many births there are for one of this kind, and its odds against the other.
+const NEUROMUSCULAR: [f64; 2] = [0.25, 0.4];
+const WHOLE_EVERY: u32 = 4;
+const WHOLE_ODDS: f64 = 0.3;
+/// Crossover at which the gains are compared, rad/s.
+const CROSSOVER_RAD_S: f64 = 2.0;
+/// Memory of the innovation variance, and what of it is left after a change, s.
+const LEVEL_MEMORY_S: f64 = 20.0;
+const DOUBT_S: f64 = 1.0;
+/// Births for which a hypothesis is kept whatever it foretells.
+const PROTECTED_BIRTHS: f64 = 4.0;
+/// Age from which a hypothesis can say what changed, s.
+const SETTLED_S: f64 = 0.5;
+/// A hypothesis of up to this age stands for a change, s.
+const RECENT_S: f64 = 4.0;
+
+/// Births for one time at which other delays are proposed, how many of them, the odds of a change of the delay against one of the gains alone, its
+/// standard deviation in s, and the probability of a delay next to the likeliest.
+const DELAYS_EVERY: u32 = 4;
+const DELAYS_PROPOSED: usize = 8;
+const DELAY_ODDS: f64 = 1.0;
+const DELAY_JUMP_S: f64 = 0.05;
+const NEIGHBOUR: f64 = 0.15;
+/// What 0.01 s of delay is worth in K_e, K_e_dot, omega_nm and zeta_nm, in the units of [`Delays::worth`].
+const WORTH: [f64; OPERATOR] = [0.01, 0.03, 0.04, 0.08];
+
+/// The delays in question, in samples of nk: nk itself, or those of the range that is tracked.
+fn delays(options: &TrackOptions, sample_time: SampleTime) -> RangeInclusive<usize> {
+    match options.track_delay_s {
+        None => options.orders.nk..=options.orders.nk,
+        Some((low, high)) => {
+            let nk = |delay_s: f64| (delay_s / sample_time.s()).round().max(0.0) as usize + 1;
+            nk(low)..=nk(high)
+        }
+    }
+}
+
+/// The suppositions in samples.
+///
+/// # Errors
+/// As [`start::physical_bounds`].
+pub(crate) fn suppositions(options: &TrackOptions, sample_time: SampleTime) -> Result<Suppositions, IdentError> {
+    let ts = sample_time.s();
+    let spacing = (SPACING_S / ts).round().max(1.0);
+    Ok(Suppositions {
+        sample_time: ts,
+        bounds: start::physical_bounds::<OPERATOR>(options, sample_time)?,
+        spacing: spacing as u32,
+        // Where samples are further apart than changes are supposed to be, half of them.
+        hazard: (ts / BETWEEN_CHANGES_S).min(0.5 / spacing),
+        jump: JUMP,
+        drift: DRIFT * ts.sqrt(),
+        unrest: UNREST.map(|u| u * ts.sqrt()),
+        unrest_for: UNREST_FOR_S / ts,
+        neuromuscular: NEUROMUSCULAR,
+        whole_every: WHOLE_EVERY,
+        whole_odds: WHOLE_ODDS,
+        crossover: CROSSOVER_RAD_S,
+        doubt: (DOUBT_S / ts).max(4.0),
+        protected: (PROTECTED_BIRTHS * spacing) as u64,
+        limit: options.limit_in_use(),
+        settled: (SETTLED_S / ts).round() as u64,
+        recent: (RECENT_S / ts).round().max(2.0 * spacing) as u64,
+        threshold: options.alarm,
+        delays: match delays(options, sample_time).count() {
+            1 => Delays::KNOWN,
+            count => Delays {
+                count,
+                every: DELAYS_EVERY,
+                odds: DELAY_ODDS,
+                births: DELAYS_PROPOSED,
+                jump: DELAY_JUMP_S / ts,
+                neighbour: NEIGHBOUR,
+                worth: WORTH.map(|w| w * ts / 0.01),
+            },
+        },
+    })
+}
+
+/// The first hypothesis, from the batch fit of the start span, its covariance so many times larger.
+///
+/// # Errors
+/// [`IdentError::BadStart`] without a fit, or where it lies outside the bounds.
+pub(crate) fn first_hypothesis(
+    from: &StartState,
+    times: f64,
+    sample_time: SampleTime,
+) -> Result<Hypothesis, IdentError> {
+    if !from.from_fit {
+        return Err(bad(
+            "adaptive needs the noise model of a batch fit; start it from the fit of a span",
+        ));
+    }
+    let p = from.values.len();
+    let covariance = std::array::from_fn(|i| std::array::from_fn(|j| times * from.variance * from.spread[i * p + j]));
+    let memory = (LEVEL_MEMORY_S / sample_time.s()).max(10.0);
+    let level = Level::new(from.variance, from.residuals.clamp(1.0, memory), 1.0 - 1.0 / memory);
+    Hypothesis::new(std::array::from_fn(|i| from.values[i]), &covariance, level).ok_or_else(outside)
+}
+
+fn bad(reason: &str) -> IdentError {
+    IdentError::BadStart {
+        reason: reason.to_owned(),
+    }
+}
+
+pub(crate) fn outside() -> IdentError {
+    bad("it lies outside the bounds of the physical parameters, or its covariance is not positive")
+}
+
+/// The recursion, from the batch fit of the start span.
+///
+/// # Errors
+/// [`IdentError::BadStart`] without a fit, or with a delay that is not in question.
+pub(crate) fn build(
+    options: &TrackOptions,
+    from: &StartState,
+    sample_time: SampleTime,
+) -> Result<Box<dyn Recursion>, IdentError> {
+    match options.track_delay_s {
+        None => Ok(Box::new(AdaptiveRecursion::<HYPOTHESES>::new(
+            options,
+            from,
+            sample_time,
+        )?)),
+        Some(_) => Ok(Box::new(AdaptiveRecursion::<WITH_DELAYS>::new(
+            options,
+            from,
+            sample_time,
+        )?)),
+    }
+}
+
+/// The bank with its filters and its delay line, which is as long as the shortest delay.
+struct AdaptiveRecursion<const M: usize> {
+    model: Box<Adaptive<M, LARGEST_ND, Vec<Signals>>>,
+    delay: DelayLine<Vec<f64>>,
+    shortest: usize,
+    sample_time: SampleTime,
+    reported: Reported,
+}
+
+impl<const M: usize> AdaptiveRecursion<M> {
+    fn new(options: &TrackOptions, from: &StartState, sample_time: SampleTime) -> Result<Self, IdentError> {
+        let (nk, delays) = (options.orders.nk, delays(options, sample_time));
+        let shortest = *delays.start();
+        if !delays.contains(&nk) {
+            return Err(bad(&format!(
+                "its delay of nk = {nk} is not among those that are tracked, {shortest} to {}",
+                delays.end()
+            )));
+        }
+        let first = first_hypothesis(from, 1.0, sample_time)?.delayed(nk - shortest);
+        let d = &from.values[OPERATOR..];
+        let memory = vec![[0.0; 6]; delays.count()];
+        let model = Adaptive::with_delays(first, d, suppositions(options, sample_time)?, memory).ok_or_else(outside)?;
+        Ok(Self {
+            model: Box::new(model),
+            delay: DelayLine::new(vec![0.0; shortest]),
+            shortest,
+            sample_time,
+            reported: Reported::new(from, nk, sample_time),
+        })
+    }
+
+    /// tau_e in s from a mean and a variance of the delay in samples beyond the shortest; no variance where it is known.
+    fn delay_s(&self, [later, variance]: [f64; 2]) -> Estimate {
+        let ts = self.sample_time.s();
+        let tau_e_s = (self.shortest as f64 - 1.0 + later) * ts;
+        match self.model.bank().delays() {
+            1 => Estimate::fixed(tau_e_s),
+            _ => Estimate::with_variance(tau_e_s, variance * ts * ts),
+        }
+    }
+}
+
+impl<const M: usize> State for AdaptiveRecursion<M> {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        visit_all(&mut [&mut *self.model, &mut self.delay, &mut self.reported], each);
+    }
+}
+
+impl<const M: usize> Recursion for AdaptiveRecursion<M> {
+    fn step(&mut self, sample: Sample) -> StepOutcome {
+        let x = self.delay.step(sample.e);
+        let step = self.model.step(x, sample.u);
+        self.reported.set(self.model.bank().mixture().eta);
+        step.into()
+    }
+
+    fn follow(&mut self, sample: Sample) -> StepOutcome {
+        let x = self.delay.step(sample.e);
+        self.model.follow(x, sample.u).into()
+    }
+
+    fn bridge(&mut self, sample: Sample) {
+        let x = self.delay.step(sample.e);
+        self.model.bridge(x);
+    }
+
+    fn theta(&self) -> &[f64] {
+        self.reported.theta()
+    }
+
+    fn covariance(&self, into: &mut [f64]) -> bool {
+        self.reported.covariance(&self.model.bank().covariance(), into);
+        true
+    }
+
+    fn innovation_variance(&self) -> f64 {
+        self.model.bank().mixture().variance
+    }
+
+    fn operator(&self) -> Option<OperatorEstimate> {
+        let bank = self.model.bank();
+        let covariance = bank.covariance();
+        let operator = self
+            .reported
+            .operator(bank.mixture().eta, &covariance, bank.lead(&covariance));
+        Some(OperatorEstimate {
+            tau_e_s: self.delay_s(bank.delay()),
+            ..operator
+        })
+    }
+
+    fn change_odds(&self) -> Option<f64> {
+        Some(self.model.bank().odds())
+    }
+
+    fn change(&self) -> Option<Change> {
+        let change = self.model.bank().change()?;
+        let tau_e_s = [change.before, change.now].map(|b| self.delay_s(b.delay));
+        Some(Change::new(&change, tau_e_s, self.sample_time))
+    }
+}

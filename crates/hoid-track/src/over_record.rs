@@ -1,0 +1,128 @@
+//! A recursive estimate over a record.
+
+use hoid_ident::{Fit, IdentError, iv::FORCING_CHANNEL};
+use hoid_model::Record;
+
+use crate::{
+    options::{Method, StartCovariance, TrackOptions},
+    recursion::Sample,
+    smoother,
+    trace::{self, Trace, pack, packed_len, polynomial_orders},
+    tracker::{Counts, Tracker},
+};
+
+/// Tracks a record: the estimate after every `every`-th sample.
+///
+/// # Errors
+/// [`IdentError`] when the options contradict each other or the record, or the start fit fails.
+pub fn track(record: &Record, options: &TrackOptions, every: usize) -> Result<Trace, IdentError> {
+    track_from(record, options, every, None)
+}
+
+/// As [`track`], from a fit that is known: that of [`TrackOptions::start_estimator`] to the start span. Several methods that start from the
+/// same fit need it only once.
+///
+/// # Errors
+/// As [`track`].
+pub fn track_from(
+    record: &Record,
+    options: &TrackOptions,
+    every: usize,
+    start: Option<&Fit>,
+) -> Result<Trace, IdentError> {
+    trace::check_every(every)?;
+    options.check()?;
+    let sample_time = record.sample_time();
+    if options.structure.has_input() && record.input_channel().is_none() {
+        return Err(IdentError::NoInput {
+            structure: options.structure.to_string(),
+            label: record.label().to_owned(),
+        });
+    }
+    let (span, end_s) = match options.start_span(record) {
+        Some((from, to)) => (Some(record.span(from, to)?), to),
+        None => (None, f64::NEG_INFINITY),
+    };
+    let mut options = options.clone();
+    if options.method == Method::Refined && options.instruments.is_none() && record.channel(FORCING_CHANNEL).is_some() {
+        options.instruments = Some(FORCING_CHANNEL.to_owned());
+    }
+    let options = &options;
+    let reference = match &options.instruments {
+        None => None,
+        Some(name) => Some(record.channel(name).ok_or_else(|| {
+            IdentError::NoChannel {
+                channel: name.clone(),
+                label: record.label().to_owned(),
+                available: record
+                    .channels()
+                    .map(|c| c.name.as_str())
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            }
+        })?),
+    };
+    let mut tracker = Tracker::from_fit(options, span.as_ref(), start, sample_time)?;
+    let known = span.is_some() && options.covariance == StartCovariance::OfFit;
+    let from_s = options
+        .update_from_s
+        .unwrap_or(if known { end_s } else { f64::NEG_INFINITY })
+        .max(record.time_s(0));
+    let p = polynomial_orders(options).parameters();
+    let rows = record.len().div_ceil(every);
+    let mut trace = Trace {
+        options: options.clone(),
+        sample_time,
+        times_s: Vec::with_capacity(rows),
+        theta: Vec::with_capacity(rows * p),
+        covariance: Vec::with_capacity(rows * packed_len(p)),
+        operator: Vec::new(),
+        innovation: Vec::with_capacity(rows),
+        innovation_variance: Vec::with_capacity(rows),
+        shortened: Vec::with_capacity(rows),
+        change_odds: Vec::new(),
+        changes: Vec::new(),
+        counts: Counts::default(),
+        start: tracker.start.fit.clone(),
+        failures: None,
+        every,
+        averaged: 1,
+        updated_from_s: from_s,
+    };
+    let (input, output) = (record.input(), record.output());
+    let mut covariance = vec![0.0; p * p];
+    // Half a sample, so that rounding of the times does not decide.
+    let first_update = from_s - sample_time.s() / 2.0;
+    for k in 0..record.len() {
+        let t = record.time_s(k);
+        let sample = Sample {
+            e: input.get(k).copied().unwrap_or(0.0),
+            u: output[k],
+            reference: reference.map(|r| r[k]),
+        };
+        let outcome = tracker.take(sample, t >= first_update);
+        if let Some(change) = tracker.change() {
+            trace.changes.push((t, change));
+        }
+        if (k + 1) % every != 0 && k + 1 != record.len() {
+            continue;
+        }
+        trace.times_s.push(t);
+        trace.theta.extend_from_slice(tracker.theta());
+        if !tracker.recursion.covariance(&mut covariance) {
+            covariance.fill(f64::NAN);
+        }
+        pack(&covariance, p, &mut trace.covariance);
+        trace.operator.extend(tracker.recursion.operator());
+        trace.innovation.push(outcome.innovation.unwrap_or(f64::NAN));
+        trace.innovation_variance.push(tracker.innovation_variance());
+        trace.shortened.push(tracker.counts.shortened);
+        trace.change_odds.extend(tracker.change_odds());
+    }
+    trace.counts = tracker.counts;
+    trace.failures = tracker.failures();
+    if options.smooth {
+        smoother::smooth(record, &mut trace, &tracker.start)?;
+    }
+    Ok(trace)
+}

@@ -1,0 +1,216 @@
+//! What is to be tracked while some orders may still be open: they are searched on the start span or the warm-up.
+
+use std::collections::BTreeMap;
+
+use hoid_model::{Orders, Record, SampleTime};
+
+use crate::{ForgettingRule, Memory, StartAt, TrackOptions};
+use hoid_ident::{
+    Choice, Estimator, IdentError, OrderRanges,
+    order_selection::{Criterion, choose_orders_with},
+};
+
+/// A recursion whose orders may still be ranges.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackPlan {
+    options: TrackOptions,
+    ranges: OrderRanges,
+    criterion: Criterion,
+}
+
+impl TrackPlan {
+    /// A plan; the orders of the options are replaced by the largest of the ranges. Everything is checked that can be before there are data.
+    ///
+    /// # Errors
+    /// [`IdentError`] for options that contradict each other, name what is not there, or give a start for one of several models.
+    pub fn new(
+        options: TrackOptions,
+        ranges: OrderRanges,
+        criterion: Criterion,
+        sample_time: SampleTime,
+    ) -> Result<Self, IdentError> {
+        let combinations = ranges.combinations()?;
+        if matches!(options.start, StartAt::Theta(_)) && combinations.len() > 1 {
+            return Err(IdentError::BadStart {
+                reason: "it belongs to one model, but a range of orders or delays is searched; give nk and the orders as single numbers"
+                    .to_owned(),
+            });
+        }
+        let options = TrackOptions {
+            // What is not known there is not known at all.
+            orders: combinations[combinations.len() - 1],
+            ..options
+        };
+        check(&options, sample_time)?;
+        Ok(Self {
+            options,
+            ranges,
+            criterion,
+        })
+    }
+
+    /// True when no order is left to be searched.
+    pub fn is_settled(&self) -> bool {
+        self.ranges.combinations().is_ok_and(|all| all.len() == 1)
+    }
+
+    /// The options; until [`TrackPlan::choose`] with the largest orders of the ranges.
+    pub fn options(&self) -> &TrackOptions {
+        &self.options
+    }
+
+    /// The ranges that are searched.
+    pub fn ranges(&self) -> &OrderRanges {
+        &self.ranges
+    }
+
+    /// Searches what is left open on a record, nothing when all is settled; `each` is called after every candidate.
+    ///
+    /// # Errors
+    /// Those of the search.
+    pub fn choose(
+        &self,
+        span: &Record,
+        each: &(dyn Fn() + Sync),
+    ) -> Result<(TrackOptions, Option<Choice>), IdentError> {
+        if self.is_settled() {
+            return Ok((self.options.clone(), None));
+        }
+        let template = Estimator {
+            search: self.options.search,
+            ..Estimator::new(self.options.structure, self.options.orders)
+        };
+        let records = std::slice::from_ref(span);
+        let choice = choose_orders_with(&template, &self.ranges, self.criterion, records, each)?;
+        Ok((self.with_orders(choice.fit.orders()), Some(choice)))
+    }
+
+    /// The options for orders within the ranges; what was said of coefficients that these orders do not have is left out.
+    pub fn with_orders(&self, orders: Orders) -> TrackOptions {
+        let mut options = TrackOptions {
+            orders,
+            ..self.options.clone()
+        };
+        let names = options.parameter_names();
+        options.memory_of.retain(|key, _| is_known(&names, key));
+        options.bounds.retain(|key, _| is_known(&names, key));
+        if let ForgettingRule::RandomWalk(drift) = &mut options.forgetting {
+            drift.retain(|key, _| is_known(&names, key));
+        }
+        options
+    }
+}
+
+/// Narrows ranges to what is known besides: the delay lies within the range that is tracked (unless nk was given), and orders that are still
+/// open are those of the coefficients of a start, named as f1 or b0.
+pub fn narrowed(
+    mut ranges: OrderRanges,
+    track_delay_s: Option<(f64, f64)>,
+    start_names: &[String],
+    sample_time: SampleTime,
+) -> OrderRanges {
+    if let Some((low, high)) = track_delay_s {
+        let samples = |delay_s: f64| (delay_s.max(0.0) / sample_time.s()).round() as usize + 1;
+        ranges.nk = samples(low)..=samples(high);
+    }
+    if start_names.is_empty() {
+        return ranges;
+    }
+    let count = |letter: char| start_names.iter().filter(|name| name.starts_with(letter)).count();
+    for (range, letter) in [
+        (&mut ranges.na, 'a'),
+        (&mut ranges.nb, 'b'),
+        (&mut ranges.nc, 'c'),
+        (&mut ranges.nd, 'd'),
+        (&mut ranges.nf, 'f'),
+    ] {
+        if range.start() != range.end() {
+            *range = count(letter)..=count(letter);
+        }
+    }
+    ranges
+}
+
+/// What the recursion checks when it starts, before anything is read or searched.
+fn check(options: &TrackOptions, sample_time: SampleTime) -> Result<(), IdentError> {
+    options.check()?;
+    for memory in options.memories()? {
+        memory.lambda(sample_time)?;
+    }
+    options.window.lambda(sample_time)?;
+    let names = options.parameter_names();
+    let drift = match &options.forgetting {
+        ForgettingRule::RandomWalk(drift) => Some(drift),
+        _ => None,
+    };
+    let named = drift.into_iter().flat_map(BTreeMap::keys).chain(options.bounds.keys());
+    for name in named {
+        if !names.contains(name) {
+            return Err(IdentError::UnknownParameter {
+                name: name.clone(),
+                available: names.join(", "),
+            });
+        }
+    }
+    if options.window == Memory::Infinite {
+        return Err(IdentError::BadOption {
+            option: "the window".to_owned(),
+            found: "inf".to_owned(),
+            expected: "samples or seconds".to_owned(),
+        });
+    }
+    Ok(())
+}
+
+/// True for the name of a parameter, or the letter of its polynomial.
+fn is_known(names: &[String], key: &str) -> bool {
+    let is = |rest: &str| rest.bytes().all(|b| b.is_ascii_digit());
+    names.iter().any(|n| n.strip_prefix(key).is_some_and(is))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::Structure;
+
+    use super::*;
+    use crate::Method;
+    use hoid_ident::order_selection::default_operator_ranges;
+
+    #[test]
+    fn names_and_letters() {
+        let names: Vec<String> = ["K_e", "K_e_dot", "b0", "b1", "f2"].map(str::to_owned).to_vec();
+        for known in ["K_e", "K_e_dot", "b", "b1", "f"] {
+            assert!(is_known(&names, known), "{known}");
+        }
+        for unknown in ["K", "d", "b2", "f1", "x"] {
+            assert!(!is_known(&names, unknown), "{unknown}");
+        }
+    }
+
+    #[test]
+    fn a_start_settles_the_orders_and_the_delay_those_of_the_input() {
+        let ts = SampleTime::HUNDREDTH;
+        let usual = default_operator_ranges(Structure::BoxJenkins, ts);
+        let start: Vec<String> = ["b0", "b1", "d1", "d2", "f1", "f2"].map(str::to_owned).to_vec();
+        let found = narrowed(usual.clone(), Some((0.2, 0.3)), &start, ts);
+        assert_eq!((found.nd.clone(), found.nk.clone()), (2..=2, 21..=31));
+        assert_eq!(narrowed(usual.clone(), None, &[], ts), usual);
+    }
+
+    #[test]
+    fn a_start_belongs_to_one_model() {
+        let ts = SampleTime::HUNDREDTH;
+        let usual = default_operator_ranges(Structure::BoxJenkins, ts);
+        let options = TrackOptions {
+            start: StartAt::Theta(vec![0.0; 5]),
+            ..TrackOptions::new(
+                Method::Rpem,
+                Structure::BoxJenkins,
+                Structure::BoxJenkins.operator_orders(29),
+            )
+        };
+        let refused = TrackPlan::new(options, usual, Criterion::Bic, ts).unwrap_err();
+        assert!(refused.to_string().contains("one model"), "{refused}");
+    }
+}

@@ -1,0 +1,102 @@
+//! What a trace reports of a recursion in physical parameters whose noise model stays: the polynomials of the exact hold and the operator.
+
+use hoid_core::{
+    adaptive::hypothesis::OPERATOR,
+    held_operator::held_operator,
+    state::{State, visit_all},
+};
+use hoid_model::{
+    SampleTime,
+    uncertainty::{Estimate, OperatorEstimate},
+};
+
+use crate::start::StartState;
+
+/// `[b0, b1, d.., f1, f2]` with the Jacobian of the operator's part, and the covariance of d, which stays that of the start fit.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Reported {
+    sample_time_s: f64,
+    tau_s: f64,
+    theta: Vec<f64>,
+    of_d: Vec<f64>,
+    by: [[f64; OPERATOR]; OPERATOR],
+}
+
+impl State for Reported {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        visit_all(&mut [&mut self.theta.as_mut_slice(), &mut self.by], each);
+    }
+}
+
+impl Reported {
+    /// From a start in physical parameters, `[K_e, K_e_dot, omega_nm, zeta_nm, d..]`.
+    pub(crate) fn new(from: &StartState, nk: usize, sample_time: SampleTime) -> Self {
+        let p = from.values.len();
+        let (nd, ts) = (p - OPERATOR, sample_time.s());
+        let element = |i: usize, j: usize| from.variance * from.spread[(OPERATOR + i) * p + OPERATOR + j];
+        let mut theta = vec![0.0; p];
+        theta[2..p - 2].copy_from_slice(&from.values[OPERATOR..]);
+        let mut reported = Self {
+            sample_time_s: ts,
+            tau_s: (nk as f64 - 1.0) * ts,
+            theta,
+            of_d: (0..nd * nd).map(|k| element(k / nd, k % nd)).collect(),
+            by: [[0.0; OPERATOR]; OPERATOR],
+        };
+        reported.set(std::array::from_fn(|i| from.values[i]));
+        reported
+    }
+
+    /// Takes an estimate.
+    pub(crate) fn set(&mut self, eta: [f64; OPERATOR]) {
+        let (values, by) = held_operator(eta, self.sample_time_s);
+        let p = self.theta.len();
+        self.theta[..2].copy_from_slice(&values[..2]);
+        self.theta[p - 2..].copy_from_slice(&values[2..]);
+        self.by = by;
+    }
+
+    pub(crate) fn theta(&self) -> &[f64] {
+        &self.theta
+    }
+
+    /// `J C J'` of the operator, and that of d, by rows.
+    pub(crate) fn covariance(&self, of_eta: &[[f64; OPERATOR]; OPERATOR], into: &mut [f64]) {
+        let p = self.theta.len();
+        let nd = p - OPERATOR;
+        into.fill(0.0);
+        let place = |k: usize| if k < 2 { k } else { nd + k };
+        for i in 0..OPERATOR {
+            for j in 0..OPERATOR {
+                let mut sum = 0.0;
+                for k in 0..OPERATOR {
+                    for l in 0..OPERATOR {
+                        sum += self.by[i][k] * of_eta[k][l] * self.by[j][l];
+                    }
+                }
+                into[place(i) * p + place(j)] = sum;
+            }
+        }
+        for i in 0..nd {
+            into[(2 + i) * p + 2..(2 + i) * p + 2 + nd].copy_from_slice(&self.of_d[i * nd..(i + 1) * nd]);
+        }
+    }
+
+    /// The operator, with T_L in s and its variance as given.
+    pub(crate) fn operator(
+        &self,
+        eta: [f64; OPERATOR],
+        covariance: &[[f64; OPERATOR]; OPERATOR],
+        [lead, variance]: [f64; 2],
+    ) -> OperatorEstimate {
+        let estimate = |i: usize| Estimate::with_variance(eta[i], covariance[i][i]);
+        OperatorEstimate {
+            k_e: estimate(0),
+            t_l_s: Estimate::with_variance(lead, variance),
+            k_e_dot: estimate(1),
+            omega_nm_rad_s: estimate(2),
+            zeta_nm: estimate(3),
+            tau_e_s: Estimate::fixed(self.tau_s),
+        }
+    }
+}

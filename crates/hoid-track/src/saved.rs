@@ -1,0 +1,197 @@
+//! A tracker as numbers, to go on elsewhere: in another process, or after a restart.
+//!
+//! The numbers are those of the start, of which gains and bounds are made, and then all that changes ([`hoid_core::state`]). A tracker that
+//! was restored goes on with the same digits. It does not have the start fit any more.
+
+use hoid_core::state::{State, visit_all};
+use hoid_model::SampleTime;
+
+use crate::{Counts, Tracker, methods, options::TrackOptions, start::StartState};
+use hoid_ident::IdentError;
+
+impl State for Tracker {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        visit_all(
+            &mut [
+                &mut self.last_e,
+                &mut self.counts.samples,
+                &mut self.counts.skipped,
+                &mut self.counts.shortened,
+                &mut *self.recursion,
+            ],
+            each,
+        );
+    }
+}
+
+impl State for StartState {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        visit_all(
+            &mut [
+                &mut self.values.as_mut_slice(),
+                &mut self.covariance.as_mut_slice(),
+                &mut self.spread.as_mut_slice(),
+                &mut self.variance,
+                &mut self.residuals,
+                &mut self.from_fit,
+            ],
+            each,
+        );
+    }
+}
+
+impl Tracker {
+    /// The tracker as numbers, for [`Tracker::restored`]. It does not change.
+    pub fn saved(&mut self) -> Vec<f64> {
+        let mut numbers = Vec::new();
+        let mut save = |number: &mut f64| numbers.push(*number);
+        self.start.visit(&mut save);
+        self.visit(&mut save);
+        numbers
+    }
+
+    /// The tracker that [`Tracker::saved`] was asked of, from its options and its numbers.
+    ///
+    /// # Errors
+    /// [`IdentError::BadStart`] for numbers of another tracker; those of [`Tracker::new`].
+    pub fn restored(options: &TrackOptions, sample_time: SampleTime, numbers: &[f64]) -> Result<Self, IdentError> {
+        options.check()?;
+        let wrong = || IdentError::BadStart {
+            reason: "the numbers are those of a tracker with other options; save it again".to_owned(),
+        };
+        let p = options.parameter_names().len();
+        let mut start = StartState {
+            values: vec![0.0; p],
+            covariance: vec![0.0; p * p],
+            spread: vec![0.0; p * p],
+            variance: 0.0,
+            residuals: 0.0,
+            from_fit: false,
+            fit: None,
+        };
+        let mut left = numbers.iter();
+        let mut lacking = false;
+        let mut restore = |number: &mut f64| match left.next() {
+            Some(saved) => *number = *saved,
+            None => lacking = true,
+        };
+        start.visit(&mut restore);
+        let mut tracker = Self {
+            recursion: methods::build(options, &start, sample_time)?,
+            options: options.clone(),
+            sample_time,
+            last_e: 0.0,
+            counts: Counts::default(),
+            start,
+        };
+        tracker.visit(&mut restore);
+        if lacking || left.next().is_some() {
+            return Err(wrong());
+        }
+        Ok(tracker)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::collections::BTreeMap;
+
+    use hoid_model::{
+        Record, Structure,
+        scenario::{Condition, Scenario},
+    };
+    use hoid_sim::{Simulator, Stream};
+
+    use super::*;
+    use crate::{ForgettingRule, Method, Sample};
+
+    fn record() -> Record {
+        let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
+        simulator
+            .run(
+                Stream {
+                    seed: 4,
+                    ..Stream::default()
+                },
+                false,
+            )
+            .unwrap()
+    }
+
+    /// Bit for bit the same after a stop in the middle, for every method and way of forgetting.
+    #[test]
+    fn a_restored_tracker_goes_on_with_the_same_digits() {
+        let record = record();
+        let span = record.span(0.0, 20.0).unwrap();
+        let bj = Structure::BoxJenkins;
+        let orders = bj.operator_orders(29);
+        let of = |method| TrackOptions::new(method, bj, orders);
+        let drift: BTreeMap<String, f64> = [("b0".to_owned(), 0.01)].into();
+        let mut cases = vec![
+            TrackOptions::new(Method::Rls, Structure::Arx, Structure::Arx.operator_orders(29)),
+            of(Method::Physical),
+            of(Method::Adaptive),
+            of(Method::Fused),
+            of(Method::Ekf),
+            of(Method::Ukf),
+            of(Method::Window),
+            of(Method::Refined),
+            TrackOptions {
+                track_delay_s: Some((0.2, 0.35)),
+                ..of(Method::Physical)
+            },
+            TrackOptions {
+                track_delay_s: Some((0.2, 0.35)),
+                ..of(Method::Adaptive)
+            },
+        ];
+        for forgetting in [
+            ForgettingRule::Exponential,
+            ForgettingRule::RandomWalk(drift),
+            ForgettingRule::Window,
+            ForgettingRule::Variable,
+            ForgettingRule::Directional,
+            ForgettingRule::Gradient(0.1),
+        ] {
+            cases.push(TrackOptions {
+                forgetting,
+                ..of(Method::Rpem)
+            });
+        }
+        for mut options in cases {
+            options.every = 400;
+            let reference = record.channel("f_t").filter(|_| options.method == Method::Refined);
+            if reference.is_some() {
+                options.instruments = Some("f_t".to_owned());
+            }
+            let sample = |k: usize| Sample {
+                e: record.input()[k],
+                u: record.output()[k],
+                reference: reference.map(|r| r[k]),
+            };
+            let mut first = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
+            (0..3000).for_each(|k| {
+                first.take(sample(k), true);
+            });
+            let numbers = first.saved();
+            let mut second = Tracker::restored(&options, record.sample_time(), &numbers).unwrap();
+            let name = format!("{} {:?}", options.method.name(), options.forgetting);
+            for k in 3000..5000 {
+                assert_eq!(
+                    first.take(sample(k), true),
+                    second.take(sample(k), true),
+                    "{name} at {k}"
+                );
+            }
+            assert_eq!(first.theta(), second.theta(), "{name}");
+            assert_eq!(first.covariance(), second.covariance(), "{name}");
+            assert_eq!(first.counts(), second.counts(), "{name}");
+            assert_eq!(first.operator(), second.operator(), "{name}");
+            assert!(
+                Tracker::restored(&options, record.sample_time(), &numbers[1..]).is_err(),
+                "{name}"
+            );
+        }
+    }
+}

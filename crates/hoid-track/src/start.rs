@@ -1,0 +1,390 @@
+//! Where a recursion starts: values, covariance and innovation variance.
+//!
+//! From a batch fit, P is its covariance over sigma^2, which is the inverse of the information matrix; in physical parameters
+//! `P_eta = T^{-1} P_theta T^{-T}` with the Jacobian T of theta(eta). A multiple of the unit matrix instead (the text's `0.1 I`) is the
+//! gain that the user wants; the error bars then still begin with the covariance of the fit.
+
+use std::collections::BTreeMap;
+
+use hoid_core::{recursion::Stable, stability::roots_inside};
+use hoid_model::{Record, SampleTime, operator::retrieval_jacobian};
+
+use crate::options::{PHYSICAL_NAMES, StartAt, StartCovariance, TrackOptions};
+use hoid_ident::{Constraint, Fit, GreyBox, IdentError};
+
+/// Variance of P for a start from nothing, in units of the innovation variance.
+const UNKNOWN: f64 = 1e6;
+/// Operator of a start from nothing: K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm, tau_e (s), those of the reference text's order.
+const TYPICAL_OPERATOR: [f64; 5] = [0.1, 0.05, 10.0, 0.4, 0.25];
+/// First noise pole of a start from nothing.
+const TYPICAL_NOISE_POLE: f64 = -0.8;
+/// Bounds of omega_nm in rad/s (the upper one as a share of the Nyquist frequency) and of zeta_nm.
+const SLOWEST_OMEGA: f64 = 0.5;
+const FASTEST_SHARE: f64 = 0.5;
+const DAMPING: [f64; 2] = [0.02, 5.0];
+/// Factor by which the roots of an unstable noise model are drawn inside, until they are.
+const DRAWN_INSIDE: f64 = 0.99;
+
+/// The start in the coordinates of the recursion.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct StartState {
+    /// theta, or eta.
+    pub values: Vec<f64>,
+    /// P by rows, over the innovation variance.
+    pub covariance: Vec<f64>,
+    /// Covariance of the values by rows, over the innovation variance.
+    pub spread: Vec<f64>,
+    /// Innovation variance; zero when unknown.
+    pub variance: f64,
+    /// Residuals that gave it.
+    pub residuals: f64,
+    /// True where a fit gave it.
+    pub from_fit: bool,
+    /// The fit, where it is at hand.
+    pub fit: Option<Fit>,
+}
+
+impl StartState {
+    /// The start that the options ask for, from a record of the start span where a fit is wanted, and that fit where it is known.
+    ///
+    /// # Errors
+    /// Those of the batch fit; [`IdentError::BadStart`].
+    pub fn new(
+        options: &TrackOptions,
+        span: Option<&Record>,
+        known: Option<&Fit>,
+        sample_time: SampleTime,
+    ) -> Result<Self, IdentError> {
+        match (&options.start, span) {
+            (StartAt::Theta(theta), _) => Self::given(options, theta, sample_time),
+            (StartAt::Span(_), Some(record)) => Self::fitted(options, record, known),
+            _ => Self::nothing(options, sample_time),
+        }
+    }
+
+    /// From a theta.
+    fn given(options: &TrackOptions, theta: &[f64], sample_time: SampleTime) -> Result<Self, IdentError> {
+        let names = options.orders.parameter_names();
+        if theta.len() != names.len() || theta.iter().any(|t| !t.is_finite()) {
+            return Err(IdentError::BadStart {
+                reason: format!("found {theta:?}; expected finite values of {}", names.join(", ")),
+            });
+        }
+        let values = if options.method.is_physical() {
+            physical_values(options, theta, sample_time)?
+        } else {
+            theta.to_vec()
+        };
+        Ok(Self::without_fit(options, values))
+    }
+
+    fn nothing(options: &TrackOptions, sample_time: SampleTime) -> Result<Self, IdentError> {
+        let o = &options.orders;
+        let mut values = vec![0.0; options.parameter_names().len()];
+        if options.method.is_physical() {
+            let first = if options.delay_parameter_s().is_some() { 5 } else { 4 };
+            values[..first].copy_from_slice(&TYPICAL_OPERATOR[..first]);
+            if let Some((low, high)) = options.delay_parameter_s() {
+                values[4] = TYPICAL_OPERATOR[4].clamp(low.min(high), high.max(low));
+            }
+            let limits = bounds(options, sample_time)?;
+            for (value, [low, high]) in values.iter_mut().zip(limits) {
+                *value = value.clamp(low, high);
+            }
+            if o.nd > 0 {
+                values[first + o.nc] = TYPICAL_NOISE_POLE;
+            }
+        }
+        Ok(Self::without_fit(options, values))
+    }
+
+    fn without_fit(options: &TrackOptions, values: Vec<f64>) -> Self {
+        let size = match options.covariance {
+            StartCovariance::Multiple(size) => size,
+            StartCovariance::OfFit => UNKNOWN,
+        };
+        let covariance = multiple(size, values.len());
+        Self {
+            spread: covariance.clone(),
+            covariance,
+            values,
+            variance: 0.0,
+            residuals: 0.0,
+            from_fit: false,
+            fit: None,
+        }
+    }
+
+    /// From the batch fit of a record.
+    fn fitted(options: &TrackOptions, record: &Record, known: Option<&Fit>) -> Result<Self, IdentError> {
+        let (values, covariance, fit) = if options.method.is_physical() {
+            fit_physical(options, record, known)?
+        } else {
+            let fit = polynomial_fit(options, record, known)?;
+            (fit.model().theta().to_vec(), fit.covariance().map(<[f64]>::to_vec), fit)
+        };
+        let values = stabilised(options, values);
+        let variance = fit.innovation_variance();
+        let p = values.len();
+        let spread = match &covariance {
+            Some(c) if variance > 0.0 => c.iter().map(|c| c / variance).collect(),
+            _ => multiple(UNKNOWN, p),
+        };
+        let covariance = match options.covariance {
+            StartCovariance::OfFit => spread.clone(),
+            StartCovariance::Multiple(size) => multiple(size, p),
+        };
+        Ok(Self {
+            values,
+            covariance,
+            spread,
+            variance,
+            residuals: (fit.residual_count() - fit.free_count() - fit.state_count()) as f64,
+            from_fit: true,
+            fit: Some(fit),
+        })
+    }
+}
+
+/// The bounds of a recursion with room for N parameters.
+///
+/// # Errors
+/// As [`bounds`].
+pub(crate) fn physical_bounds<const N: usize>(
+    options: &TrackOptions,
+    sample_time: SampleTime,
+) -> Result<[[f64; 2]; N], IdentError> {
+    let limits = bounds(options, sample_time)?;
+    let free = [f64::NEG_INFINITY, f64::INFINITY];
+    Ok(std::array::from_fn(|i| limits.get(i).copied().unwrap_or(free)))
+}
+
+/// Least and largest value of each physical parameter and of c and d.
+///
+/// # Errors
+/// [`IdentError::UnknownParameter`], [`IdentError::BadOption`].
+pub(crate) fn bounds(options: &TrackOptions, sample_time: SampleTime) -> Result<Vec<[f64; 2]>, IdentError> {
+    let names = options.parameter_names();
+    if let Some(unknown) = options.bounds.keys().find(|k| !names.contains(k)) {
+        return Err(IdentError::UnknownParameter {
+            name: unknown.clone(),
+            available: names.join(", "),
+        });
+    }
+    let usual = |name: &str| match name {
+        "omega_nm" => [SLOWEST_OMEGA, FASTEST_SHARE * sample_time.nyquist_rad_s()],
+        "zeta_nm" => DAMPING,
+        "tau_e" => options
+            .delay_parameter_s()
+            .map_or([0.0, 0.0], |(low, high)| [low, high]),
+        _ => [f64::NEG_INFINITY, f64::INFINITY],
+    };
+    names
+        .iter()
+        .map(|name| {
+            let [low, high] = usual(name);
+            let Some(constraint) = options.bounds.get(name) else {
+                return Ok([low, high]);
+            };
+            let (a, b) = constraint.limits();
+            let both = [a.max(low), b.min(high)];
+            if constraint.is_sound() && both[0] <= both[1] {
+                Ok(both)
+            } else {
+                Err(IdentError::BadOption {
+                    option: format!("the bounds of {name}"),
+                    found: format!("{a} to {b}"),
+                    expected: format!("a range within {low} to {high}"),
+                })
+            }
+        })
+        .collect()
+}
+
+fn multiple(size: f64, p: usize) -> Vec<f64> {
+    let mut matrix = vec![0.0; p * p];
+    matrix.iter_mut().step_by(p + 1).for_each(|m| *m = size);
+    matrix
+}
+
+/// Values with a noise model that is as stable as the options ask.
+fn stabilised(options: &TrackOptions, mut values: Vec<f64>) -> Vec<f64> {
+    let o = &options.orders;
+    if options.stable == Stable::Predictor || o.nd == 0 {
+        return values;
+    }
+    let first = match options.method {
+        m if m.is_physical() => values.len() - o.nd,
+        _ => o.na + o.nb + o.nc,
+    };
+    let d = &mut values[first..first + o.nd];
+    while d.iter().all(|v| v.is_finite()) && !roots_inside(d, 1.0) {
+        let mut factor = 1.0;
+        for v in d.iter_mut() {
+            factor *= DRAWN_INSIDE;
+            *v *= factor;
+        }
+    }
+    values
+}
+
+/// eta of a theta `[b0, b1, c.., d.., f1, f2]`.
+fn physical_values(options: &TrackOptions, theta: &[f64], sample_time: SampleTime) -> Result<Vec<f64>, IdentError> {
+    let model = hoid_model::PolynomialModel::new(options.structure, options.orders, sample_time, theta.to_vec())?;
+    let operator = model
+        .discrete_operator()
+        .and_then(|o| o.parameters())
+        .map_err(|reason| IdentError::BadStart {
+            reason: format!("it has no operator parameters: {reason}"),
+        })?;
+    let mut eta = vec![
+        operator.k_e,
+        operator.k_e_dot(),
+        operator.omega_nm_rad_s,
+        operator.zeta_nm,
+    ];
+    if options.delay_parameter_s().is_some() {
+        eta.push(operator.tau_e_s);
+    }
+    eta.extend_from_slice(model.c());
+    eta.extend_from_slice(model.d());
+    Ok(eta)
+}
+
+type PhysicalStart = (Vec<f64>, Option<Vec<f64>>, Fit);
+
+/// The fit of the start span, made where it is not known.
+fn polynomial_fit(options: &TrackOptions, record: &Record, known: Option<&Fit>) -> Result<Fit, IdentError> {
+    match known {
+        Some(fit) => Ok(fit.clone()),
+        None => options.start_estimator().fit(std::slice::from_ref(record)),
+    }
+}
+
+/// The Box-Jenkins fit where it has physical parameters within the bounds, else the grey box, which always has.
+fn fit_physical(options: &TrackOptions, record: &Record, known: Option<&Fit>) -> Result<PhysicalStart, IdentError> {
+    if options.delay_parameter_s().is_none()
+        && let Some(start) = from_box_jenkins(options, record, known)?
+    {
+        return Ok(start);
+    }
+    from_grey_box(options, record)
+}
+
+fn from_box_jenkins(
+    options: &TrackOptions,
+    record: &Record,
+    known: Option<&Fit>,
+) -> Result<Option<PhysicalStart>, IdentError> {
+    let sample_time = record.sample_time();
+    let Ok(fit) = polynomial_fit(options, record, known) else {
+        return Ok(None);
+    };
+    let Ok(eta) = physical_values(options, fit.model().theta(), sample_time) else {
+        return Ok(None);
+    };
+    let limits = bounds(options, sample_time)?;
+    let inside = eta.iter().zip(&limits).all(|(e, [low, high])| low < e && e < high);
+    let operator = fit.model().discrete_operator().and_then(|o| o.parameters());
+    let inverse = operator.ok().and_then(|o| retrieval_jacobian(&o, sample_time));
+    let Some(inverse) = inverse.filter(|_| inside) else {
+        return Ok(None);
+    };
+    let covariance = fit.covariance().map(|c| {
+        let p = eta.len();
+        let (noise, places) = (p - 4, fit.model().operator_positions());
+        let row = |i: usize| -> Vec<(usize, f64)> {
+            if i < 4 {
+                (0..4).map(|j| (places[j], inverse[i][j])).collect()
+            } else {
+                // c and d stand behind b.
+                vec![(2 + i - 4, 1.0)]
+            }
+        };
+        debug_assert_eq!(noise, options.orders.nc + options.orders.nd);
+        congruence(&(0..p).map(row).collect::<Vec<_>>(), c, p)
+    });
+    Ok(Some((eta, covariance, fit)))
+}
+
+/// `T C T'` for sparse rows of T.
+fn congruence(rows: &[Vec<(usize, f64)>], c: &[f64], width: usize) -> Vec<f64> {
+    let product = |a: &[(usize, f64)], b: &[(usize, f64)]| -> f64 {
+        let pairs = a.iter().flat_map(|x| b.iter().map(move |y| (x, y)));
+        pairs.map(|((k, x), (l, y))| x * c[k * width + l] * y).sum()
+    };
+    rows.iter()
+        .flat_map(|a| rows.iter().map(move |b| product(a, b)))
+        .collect()
+}
+
+fn from_grey_box(options: &TrackOptions, record: &Record) -> Result<PhysicalStart, IdentError> {
+    let ts = record.sample_time().s();
+    let o = &options.orders;
+    let names = options.parameter_names();
+    let limits = bounds(options, record.sample_time())?;
+    let mut constraints: BTreeMap<String, Constraint> = BTreeMap::new();
+    for (name, [low, high]) in names.iter().zip(&limits).take(4) {
+        if low.is_finite() || high.is_finite() {
+            constraints.insert(name.clone(), Constraint::Between(*low, *high));
+        }
+    }
+    let order = usize::from(o.nd > 0);
+    let mut grey = GreyBox {
+        search: options.search,
+        ..GreyBox::new(order..=order)
+    };
+    match options.delay_parameter_s() {
+        Some(range) => grey.delay_range_s = range,
+        None => {
+            let tau = (o.nk as f64 - 1.0) * ts;
+            grey.delay_range_s = (tau, tau);
+            constraints.insert(PHYSICAL_NAMES[4].to_owned(), Constraint::Fixed(tau));
+        }
+    }
+    grey.constraints = constraints;
+    let found = grey.fit(std::slice::from_ref(record))?;
+    let parameters = found.parameters();
+    let value = |name: &str| parameters.iter().position(|(n, _)| n == name);
+    let operator = if options.delay_parameter_s().is_some() { 5 } else { 4 };
+    let variance = found.innovation_variance();
+    let width = parameters.len();
+    let (mut eta, mut rows) = (Vec::new(), Vec::new());
+    for (name, [low, high]) in PHYSICAL_NAMES[..operator].iter().zip(&limits) {
+        let Some(place) = value(name) else {
+            return Err(IdentError::BadStart {
+                reason: format!("the grey box has no {name}"),
+            });
+        };
+        eta.push(parameters[place].1.value.clamp(*low, *high));
+        rows.push(vec![(place, 1.0)]);
+    }
+    for i in 0..o.nc + o.nd {
+        match value("T_n") {
+            // d1 = -exp(-Ts/T_n).
+            Some(place) if i == o.nc => {
+                let t_n = parameters[place].1.value;
+                let pole = (-ts / t_n).exp();
+                eta.push(-pole);
+                rows.push(vec![(place, -pole * ts / (t_n * t_n))]);
+            }
+            _ => {
+                eta.push(0.0);
+                rows.push(Vec::new());
+            }
+        }
+    }
+    let p = eta.len();
+    let mut covariance = found.covariance().map(|c| congruence(&rows, c, width));
+    if let Some(covariance) = &mut covariance {
+        for i in 0..p {
+            // What the grey box did not have, or held, is not known: coefficients are of the size of 1, gains may change as they are.
+            if covariance[i * p + i] == 0.0 {
+                let size = if i < operator { eta[i] * eta[i] } else { 1.0 };
+                covariance[i * p + i] = size.max(variance);
+            }
+        }
+    }
+    let fit = found.polynomial_fit(0).clone();
+    Ok((eta, covariance, fit))
+}

@@ -1,0 +1,392 @@
+//! The estimate at every sample.
+
+use hoid_model::{
+    NotConvertible, Orders, PolynomialModel, SampleTime, Structure,
+    uncertainty::{Estimate, OperatorEstimate, operator_estimate},
+};
+
+use crate::{Change, Counts, options::TrackOptions};
+use hoid_ident::{Fit, IdentError};
+
+/// The estimate at every sample that was kept, with its uncertainty.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trace {
+    pub(crate) options: TrackOptions,
+    pub(crate) sample_time: SampleTime,
+    /// Time of each row, s.
+    pub(crate) times_s: Vec<f64>,
+    /// theta by rows.
+    pub(crate) theta: Vec<f64>,
+    /// Covariance of theta by rows and the upper triangle of each; NaN where there is none.
+    pub(crate) covariance: Vec<f64>,
+    /// The operator itself, for a recursion in physical parameters.
+    pub(crate) operator: Vec<OperatorEstimate>,
+    pub(crate) innovation: Vec<f64>,
+    pub(crate) innovation_variance: Vec<f64>,
+    pub(crate) shortened: Vec<u64>,
+    /// Logarithm of the odds of a recent change, where the method has them.
+    pub(crate) change_odds: Vec<f64>,
+    /// Times at which changes were declared, s, with the changes.
+    pub(crate) changes: Vec<(f64, Change)>,
+    pub(crate) counts: Counts,
+    /// The batch fit that the recursion started from.
+    pub(crate) start: Option<Fit>,
+    pub(crate) failures: Option<(usize, String)>,
+    /// Samples between two rows.
+    pub(crate) every: usize,
+    /// Rows of the moving average, 1 for none.
+    pub(crate) averaged: usize,
+    /// Time from which the estimate moved, s.
+    pub(crate) updated_from_s: f64,
+}
+
+/// Names of the operator's columns.
+pub const OPERATOR_COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
+
+impl Trace {
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.times_s.len()
+    }
+
+    /// True without a row.
+    pub fn is_empty(&self) -> bool {
+        self.times_s.is_empty()
+    }
+
+    /// The options that made it.
+    pub fn options(&self) -> &TrackOptions {
+        &self.options
+    }
+
+    /// Sample time of the record.
+    pub fn sample_time(&self) -> SampleTime {
+        self.sample_time
+    }
+
+    /// Times of the rows, s.
+    pub fn times_s(&self) -> &[f64] {
+        &self.times_s
+    }
+
+    /// Names of the coefficients. With the delay as a parameter B has three, from the smallest delay that is tracked on.
+    pub fn parameter_names(&self) -> Vec<String> {
+        polynomial_orders(&self.options).parameter_names()
+    }
+
+    fn width(&self) -> usize {
+        polynomial_orders(&self.options).parameters()
+    }
+
+    /// theta of a row.
+    ///
+    /// # Panics
+    /// Beyond the last row, here and below.
+    pub fn theta(&self, row: usize) -> &[f64] {
+        let p = self.width();
+        &self.theta[row * p..(row + 1) * p]
+    }
+
+    /// Covariance of theta in a row, by rows; `None` while there is none.
+    pub fn covariance(&self, row: usize) -> Option<Vec<f64>> {
+        let p = self.width();
+        let packed = &self.covariance[row * packed_len(p)..(row + 1) * packed_len(p)];
+        let whole = unpack(packed, p);
+        whole.iter().all(|c| c.is_finite()).then_some(whole)
+    }
+
+    /// Each coefficient of a row with its standard error.
+    pub fn parameters(&self, row: usize) -> Vec<Estimate> {
+        let p = self.width();
+        let packed = &self.covariance[row * packed_len(p)..(row + 1) * packed_len(p)];
+        let mut at = 0;
+        self.theta(row)
+            .iter()
+            .enumerate()
+            .map(|(i, &value)| {
+                let variance = packed[at];
+                at += p - i;
+                Estimate::with_variance(value, variance)
+            })
+            .collect()
+    }
+
+    /// The operator of a row with standard errors.
+    ///
+    /// # Errors
+    /// [`NotConvertible`] with the reason.
+    pub fn operator(&self, row: usize) -> Result<OperatorEstimate, NotConvertible> {
+        if let Some(operator) = self.operator.get(row) {
+            return if operator.t_l_s.value.is_finite() {
+                Ok(*operator)
+            } else {
+                Err(NotConvertible::ZeroGain)
+            };
+        }
+        operator_of(
+            self.options.structure,
+            self.options.orders,
+            self.sample_time,
+            self.theta(row),
+            self.covariance(row).as_deref(),
+        )
+    }
+
+    /// The operator of a row without standard errors, which take most of the time of [`Trace::operator`].
+    ///
+    /// # Errors
+    /// [`NotConvertible`] with the reason.
+    pub fn operator_values(&self, row: usize) -> Result<OperatorEstimate, NotConvertible> {
+        if self.operator.is_empty() {
+            operator_of(
+                self.options.structure,
+                self.options.orders,
+                self.sample_time,
+                self.theta(row),
+                None,
+            )
+        } else {
+            self.operator(row)
+        }
+    }
+
+    /// A-priori innovation of each row.
+    pub fn innovation(&self) -> &[f64] {
+        &self.innovation
+    }
+
+    /// Innovation variance of each row, as tracked.
+    pub fn innovation_variance(&self) -> &[f64] {
+        &self.innovation_variance
+    }
+
+    /// How often stability or a bound had made a step shorter, up to each row.
+    pub fn steps_shortened(&self) -> &[u64] {
+        &self.shortened
+    }
+
+    /// Logarithm of the odds that the person changed within the last four seconds, in each row; empty for methods without hypotheses.
+    pub fn change_odds(&self) -> &[f64] {
+        &self.change_odds
+    }
+
+    /// The changes that were declared, each with the time in s at which it was; rows that are not kept included.
+    pub fn changes(&self) -> &[(f64, Change)] {
+        &self.changes
+    }
+
+    /// Samples that were not as they should be.
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// The batch fit that the recursion started from.
+    pub fn start(&self) -> Option<&Fit> {
+        self.start.as_ref()
+    }
+
+    /// Number of fits that failed, and why the last did, for the method window.
+    pub fn failures(&self) -> Option<&(usize, String)> {
+        self.failures.as_ref()
+    }
+
+    /// Time from which the estimate moved, s.
+    pub fn updated_from_s(&self) -> f64 {
+        self.updated_from_s
+    }
+
+    /// Samples between two rows.
+    pub fn every(&self) -> usize {
+        self.every
+    }
+
+    /// Rows of the moving average, 1 for none.
+    pub fn averaged(&self) -> usize {
+        self.averaged
+    }
+
+    /// Delay of the rows behind the estimates by the moving average, s: half its length.
+    pub fn averaging_delay_s(&self) -> f64 {
+        (self.averaged - 1) as f64 / 2.0 * self.every as f64 * self.sample_time.s()
+    }
+
+    /// The mean of the last `rows` rows in place of each: theta, the operator of a physical recursion, and their covariance.
+    ///
+    /// The mean lags by `(rows - 1)/2`. Estimates of neighbouring samples have nearly the same error, so that the mean of the covariances is
+    /// close to, and never below, the covariance of the mean.
+    #[must_use]
+    pub fn moving_average(mut self, rows: usize) -> Self {
+        let p = self.width();
+        if rows <= 1 || self.averaged > 1 {
+            return self;
+        }
+        self.theta = causal_mean(&self.theta, p, rows);
+        self.covariance = causal_mean(&self.covariance, packed_len(p), rows);
+        let numbers: Vec<f64> = self
+            .operator
+            .iter()
+            .flat_map(|o| {
+                o.rows()
+                    .map(|(_, _, e)| [e.value, e.standard_error.map_or(f64::NAN, |s| s * s)])
+            })
+            .flatten()
+            .collect();
+        let means = causal_mean(&numbers, 12, rows);
+        let of = |pair: &[f64]| Estimate::with_variance(pair[0], pair[1]);
+        self.operator = means
+            .chunks_exact(12)
+            .map(|m| OperatorEstimate {
+                k_e: of(&m[0..2]),
+                t_l_s: of(&m[2..4]),
+                k_e_dot: of(&m[4..6]),
+                omega_nm_rad_s: of(&m[6..8]),
+                zeta_nm: of(&m[8..10]),
+                tau_e_s: of(&m[10..12]),
+            })
+            .collect();
+        self.averaged = rows;
+        self
+    }
+}
+
+/// Orders of the polynomials that the method reports.
+pub(crate) fn polynomial_orders(options: &TrackOptions) -> Orders {
+    match options.delay_parameter_s() {
+        Some(_) => Orders {
+            nb: 3,
+            ..options.orders
+        },
+        None => options.orders,
+    }
+}
+
+/// The operator of a theta, with standard errors where there is a covariance.
+pub(crate) fn operator_of(
+    structure: Structure,
+    orders: Orders,
+    sample_time: SampleTime,
+    theta: &[f64],
+    covariance: Option<&[f64]>,
+) -> Result<OperatorEstimate, NotConvertible> {
+    let model = PolynomialModel::new(structure, orders, sample_time, theta.to_vec()).map_err(|_| {
+        NotConvertible::OtherOrders {
+            nb: orders.nb,
+            poles: orders.na + orders.nf,
+        }
+    })?;
+    match covariance {
+        Some(covariance) => operator_estimate(&model, covariance),
+        None => Ok(OperatorEstimate::from(model.discrete_operator()?.parameters()?)),
+    }
+}
+
+/// Length of the upper triangle of a p x p matrix.
+pub(crate) fn packed_len(p: usize) -> usize {
+    p * (p + 1) / 2
+}
+
+/// Appends the upper triangle by rows.
+pub(crate) fn pack(whole: &[f64], p: usize, into: &mut Vec<f64>) {
+    for i in 0..p {
+        into.extend_from_slice(&whole[i * p + i..(i + 1) * p]);
+    }
+}
+
+fn unpack(packed: &[f64], p: usize) -> Vec<f64> {
+    let mut whole = vec![0.0; p * p];
+    let mut at = 0;
+    for i in 0..p {
+        for j in i..p {
+            whole[i * p + j] = packed[at];
+            whole[j * p + i] = packed[at];
+            at += 1;
+        }
+    }
+    whole
+}
+
+/// Mean of each column over the last `rows` rows, over those that there are in the beginning. NaN stays within its reach.
+fn causal_mean(values: &[f64], width: usize, rows: usize) -> Vec<f64> {
+    if width == 0 {
+        return Vec::new();
+    }
+    let n = values.len() / width;
+    let mut means = vec![0.0; values.len()];
+    for column in 0..width {
+        let (mut sum, mut unknown) = (0.0, 0usize);
+        for t in 0..n {
+            // The sum starts anew with each window, so that rounding does not pile up.
+            if t % rows == 0 {
+                let window = t.saturating_sub(rows - 1)..t;
+                let known = window.map(|s| values[s * width + column]).filter(|v| !v.is_nan());
+                sum = known.sum();
+                unknown = (t.saturating_sub(rows - 1)..t)
+                    .filter(|s| values[s * width + column].is_nan())
+                    .count();
+            } else if t >= rows {
+                match values[(t - rows) * width + column] {
+                    v if v.is_nan() => unknown -= 1,
+                    v => sum -= v,
+                }
+            }
+            match values[t * width + column] {
+                v if v.is_nan() => unknown += 1,
+                v => sum += v,
+            }
+            let count = rows.min(t + 1);
+            means[t * width + column] = if unknown > 0 { f64::NAN } else { sum / count as f64 };
+        }
+    }
+    means
+}
+
+/// Refuses a trace that would have no row.
+pub(crate) fn check_every(every: usize) -> Result<(), IdentError> {
+    if every > 0 {
+        return Ok(());
+    }
+    Err(IdentError::BadOption {
+        option: "the rows of the trace".to_owned(),
+        found: "every 0 samples".to_owned(),
+        expected: "1 or more".to_owned(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn causal_mean_is_the_mean_of_the_last_rows() {
+        let values: Vec<f64> = (0..40).map(|t| f64::from(t * t % 17)).collect();
+        for rows in 1..9 {
+            let means = causal_mean(&values, 2, rows);
+            for t in 0..20 {
+                let from = (t + 1usize).saturating_sub(rows);
+                for column in 0..2 {
+                    let direct: f64 = (from..=t).map(|s| values[s * 2 + column]).sum::<f64>() / (t + 1 - from) as f64;
+                    assert!((means[t * 2 + column] - direct).abs() < 1e-12, "{rows} {t}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn unknown_rows_reach_as_far_as_the_mean() {
+        let mut values = vec![1.0; 12];
+        values[4] = f64::NAN;
+        let means = causal_mean(&values, 1, 3);
+        let unknown: Vec<usize> = (0..12).filter(|t| means[*t].is_nan()).collect();
+        assert_eq!(unknown, [4, 5, 6]);
+        assert!((0..12).filter(|t| !means[*t].is_nan()).all(|t| means[t] == 1.0));
+    }
+
+    #[test]
+    fn triangles_come_back_whole() {
+        let whole = [1.0, 2.0, 3.0, 2.0, 4.0, 5.0, 3.0, 5.0, 6.0];
+        let mut packed = Vec::new();
+        pack(&whole, 3, &mut packed);
+        assert_eq!(packed.len(), packed_len(3));
+        assert_eq!(unpack(&packed, 3), whole);
+    }
+}

@@ -1,0 +1,209 @@
+//! A recursive estimate that takes one sample at a time.
+
+use hoid_ident::{Fit, IdentError};
+use hoid_model::{
+    NotConvertible, Record, SampleTime,
+    uncertainty::{Estimate, OperatorEstimate},
+};
+
+use crate::{
+    change::Change,
+    methods,
+    options::TrackOptions,
+    recursion::{Recursion, Sample},
+    start::StartState,
+    trace::{operator_of, polynomial_orders},
+};
+
+/// Samples that were not as they should be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// Samples given.
+    pub samples: u64,
+    /// Samples with a fault in e or u, at which the estimate stayed.
+    pub skipped: u64,
+    /// Steps that stability or a bound made shorter.
+    pub shortened: u64,
+}
+
+/// What a tracker says of a sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// A-priori innovation; `None` at a skipped sample.
+    pub innovation: Option<f64>,
+    /// True when e or u was a fault.
+    pub skipped: bool,
+    /// True when stability or a bound made the step shorter.
+    pub shortened: bool,
+}
+
+/// A recursive estimate that takes one sample at a time.
+pub struct Tracker {
+    pub(crate) options: TrackOptions,
+    pub(crate) sample_time: SampleTime,
+    pub(crate) recursion: Box<dyn Recursion>,
+    pub(crate) last_e: f64,
+    pub(crate) counts: Counts,
+    pub(crate) start: StartState,
+}
+
+impl std::fmt::Debug for Tracker {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Tracker")
+            .field("options", &self.options)
+            .field("theta", &self.theta())
+            .field("counts", &self.counts)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Tracker {
+    /// A tracker with filters at rest. `span` is the record of the start fit; without it the tracker starts from theta or from
+    /// nothing, as the options say.
+    ///
+    /// # Errors
+    /// [`IdentError`] when options contradict each other, or the start fit fails.
+    pub fn new(options: &TrackOptions, span: Option<&Record>, sample_time: SampleTime) -> Result<Self, IdentError> {
+        Self::from_fit(options, span, None, sample_time)
+    }
+
+    /// As [`Tracker::new`], with the fit of the span where it is known.
+    pub(crate) fn from_fit(
+        options: &TrackOptions,
+        span: Option<&Record>,
+        known: Option<&Fit>,
+        sample_time: SampleTime,
+    ) -> Result<Self, IdentError> {
+        options.check()?;
+        let start = StartState::new(options, span, known, sample_time)?;
+        Ok(Self {
+            recursion: methods::build(options, &start, sample_time)?,
+            options: options.clone(),
+            sample_time,
+            last_e: 0.0,
+            counts: Counts::default(),
+            start,
+        })
+    }
+
+    /// Takes a sample.
+    pub fn step(&mut self, e: f64, u: f64) -> Outcome {
+        self.take(Sample { e, u, reference: None }, true)
+    }
+
+    /// Takes a sample, with the external signal where it is known. With `update` false only the filters follow.
+    pub fn take(&mut self, sample: Sample, update: bool) -> Outcome {
+        self.counts.samples += 1;
+        let sound = |v: f64| v.abs() <= self.options.largest;
+        let (e_sound, u_sound) = (sound(sample.e), sound(sample.u));
+        let sample = Sample {
+            e: if e_sound { sample.e } else { self.last_e },
+            reference: sample.reference.filter(|r| sound(*r)),
+            ..sample
+        };
+        self.last_e = sample.e;
+        let skipped = !(e_sound && u_sound);
+        if !u_sound {
+            self.recursion.bridge(sample);
+            self.counts.skipped += 1;
+            return Outcome {
+                innovation: None,
+                skipped,
+                shortened: false,
+            };
+        }
+        let taken = if update && !skipped {
+            self.recursion.step(sample)
+        } else {
+            self.recursion.follow(sample)
+        };
+        self.counts.skipped += u64::from(skipped);
+        self.counts.shortened += u64::from(taken.shortened);
+        Outcome {
+            innovation: (!skipped).then_some(taken.innovation),
+            skipped,
+            shortened: taken.shortened,
+        }
+    }
+
+    /// theta in the order of [`Tracker::parameter_names`].
+    pub fn theta(&self) -> &[f64] {
+        self.recursion.theta()
+    }
+
+    /// Names of the coefficients.
+    pub fn parameter_names(&self) -> Vec<String> {
+        polynomial_orders(&self.options).parameter_names()
+    }
+
+    /// Covariance of theta by rows; `None` while there is none.
+    pub fn covariance(&self) -> Option<Vec<f64>> {
+        let p = self.theta().len();
+        let mut covariance = vec![0.0; p * p];
+        self.recursion.covariance(&mut covariance).then_some(covariance)
+    }
+
+    /// Each coefficient with its standard error.
+    pub fn parameters(&self) -> Vec<Estimate> {
+        let p = self.theta().len();
+        let covariance = self.covariance();
+        let of = |(i, &value): (usize, &f64)| match &covariance {
+            Some(c) => Estimate::with_variance(value, c[i * p + i]),
+            None => Estimate::fixed(value),
+        };
+        self.theta().iter().enumerate().map(of).collect()
+    }
+
+    /// The operator with standard errors.
+    ///
+    /// # Errors
+    /// [`NotConvertible`] with the reason.
+    pub fn operator(&self) -> Result<OperatorEstimate, NotConvertible> {
+        match self.recursion.operator() {
+            Some(operator) if operator.t_l_s.value.is_finite() => Ok(operator),
+            Some(_) => Err(NotConvertible::ZeroGain),
+            None => operator_of(
+                self.options.structure,
+                self.options.orders,
+                self.sample_time,
+                self.theta(),
+                self.covariance().as_deref(),
+            ),
+        }
+    }
+
+    /// Logarithm of the odds that the person changed within the last four seconds, by [`Method::Adaptive`].
+    pub fn change_odds(&self) -> Option<f64> {
+        self.recursion.change_odds()
+    }
+
+    /// The change that was declared at the last sample, if one was.
+    pub fn change(&self) -> Option<Change> {
+        self.recursion.change()
+    }
+
+    /// Innovation variance as tracked.
+    pub fn innovation_variance(&self) -> f64 {
+        self.recursion.innovation_variance()
+    }
+
+    /// Samples that were not as they should be.
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// Number of fits that failed, and why the last did, for the method window.
+    pub fn failures(&self) -> Option<(usize, String)> {
+        self.recursion.failures()
+    }
+
+    /// The batch fit that the tracker started from.
+    pub fn start(&self) -> Option<&Fit> {
+        self.start.fit.as_ref()
+    }
+
+    /// The options.
+    pub fn options(&self) -> &TrackOptions {
+        &self.options
+    }
+}
