@@ -34,6 +34,7 @@ pub mod linalg;
 mod optimize;
 pub mod order_selection;
 mod pem;
+pub mod settings;
 mod sigmoid;
 pub mod validation;
 

@@ -1,0 +1,269 @@
+//! Types of values, each with its one reader.
+
+use std::collections::BTreeMap;
+
+use hoid_core::recursion::Stable;
+
+use super::Kind;
+use crate::Constraint;
+
+/// A type of values: its name, how it is read and written.
+pub trait Value: Sized {
+    /// The type as users know it.
+    const KIND: Kind;
+
+    /// Reads a text.
+    ///
+    /// # Errors
+    /// What was expected, in words.
+    fn read(text: &str) -> Result<Self, String>;
+
+    /// The value as text; `None` for one that stands for nothing.
+    fn text(&self) -> Option<String>;
+
+    /// The numbers in it, which bounds are held against.
+    fn numbers(&self) -> Vec<f64> {
+        Vec::new()
+    }
+}
+
+impl Value for bool {
+    const KIND: Kind = Kind::Flag;
+
+    fn read(text: &str) -> Result<Self, String> {
+        text.parse().map_err(|_| "true or false".to_owned())
+    }
+
+    fn text(&self) -> Option<String> {
+        Some(self.to_string())
+    }
+}
+
+impl Value for usize {
+    const KIND: Kind = Kind::Count;
+
+    fn read(text: &str) -> Result<Self, String> {
+        text.parse().map_err(|_| "a whole number".to_owned())
+    }
+
+    fn text(&self) -> Option<String> {
+        Some(self.to_string())
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        vec![*self as f64]
+    }
+}
+
+impl Value for f64 {
+    const KIND: Kind = Kind::Number;
+
+    fn read(text: &str) -> Result<Self, String> {
+        let number = text.parse::<Self>().ok().filter(|x| !x.is_nan());
+        number.ok_or_else(|| "a number".to_owned())
+    }
+
+    fn text(&self) -> Option<String> {
+        // 1e6 and not 1000000.
+        let (plain, short) = (self.to_string(), format!("{self:e}"));
+        Some(if short.len() < plain.len() { short } else { plain })
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        vec![*self]
+    }
+}
+
+impl Value for String {
+    const KIND: Kind = Kind::Channel;
+
+    fn read(text: &str) -> Result<Self, String> {
+        match text.is_empty() {
+            true => Err("a name".to_owned()),
+            false => Ok(text.to_owned()),
+        }
+    }
+
+    fn text(&self) -> Option<String> {
+        Some(self.clone())
+    }
+}
+
+impl<V: Value> Value for Option<V> {
+    const KIND: Kind = V::KIND;
+
+    fn read(text: &str) -> Result<Self, String> {
+        V::read(text).map(Some)
+    }
+
+    fn text(&self) -> Option<String> {
+        self.as_ref()?.text()
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        self.as_ref().map(V::numbers).unwrap_or_default()
+    }
+}
+
+/// A span `LO..HI` of finite numbers in order.
+impl Value for (f64, f64) {
+    const KIND: Kind = Kind::Span;
+
+    fn read(text: &str) -> Result<Self, String> {
+        let number = |part: &str| part.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+        let ends = text.split_once("..").and_then(|(a, b)| Some((number(a)?, number(b)?)));
+        ends.filter(|(low, high)| low <= high)
+            .ok_or_else(|| "LO..HI with LO <= HI, as 0.05..0.6".to_owned())
+    }
+
+    fn text(&self) -> Option<String> {
+        Some(format!("{}..{}", self.0, self.1))
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        vec![self.0, self.1]
+    }
+}
+
+/// Bounds `LO..HI` of a parameter, of which either end may be left out.
+impl Value for Constraint {
+    const KIND: Kind = Kind::OpenSpan;
+
+    fn read(text: &str) -> Result<Self, String> {
+        let end = |part: &str, open: f64| match part.trim() {
+            "" => Some(open),
+            text => text.parse::<f64>().ok().filter(|x| !x.is_nan()),
+        };
+        let ends = text.split_once("..");
+        ends.and_then(|(low, high)| Some((end(low, f64::NEG_INFINITY)?, end(high, f64::INFINITY)?)))
+            .filter(|(low, high)| low <= high)
+            .map(|(low, high)| Self::Between(low, high))
+            .ok_or_else(|| "LO..HI, of which either end may be left out".to_owned())
+    }
+
+    fn text(&self) -> Option<String> {
+        let (low, high) = self.limits();
+        let end = |x: f64| if x.is_finite() { x.to_string() } else { String::new() };
+        Some(format!("{}..{}", end(low), end(high)))
+    }
+}
+
+/// `NAME=VALUE,NAME=VALUE`, each name once.
+///
+/// # Errors
+/// What was expected, in words.
+pub fn named_pairs(text: &str) -> Result<Vec<(String, String)>, String> {
+    let mut pairs: Vec<(String, String)> = Vec::new();
+    for item in text.split(',').map(str::trim).filter(|item| !item.is_empty()) {
+        let (name, value) = item
+            .split_once('=')
+            .map(|(name, value)| (name.trim(), value.trim()))
+            .filter(|(name, value)| !name.is_empty() && !value.is_empty())
+            .ok_or_else(|| format!("NAME=VALUE in place of {item:?}"))?;
+        if pairs.iter().any(|(known, _)| known == name) {
+            return Err(format!("{name} once"));
+        }
+        pairs.push((name.to_owned(), value.to_owned()));
+    }
+    match pairs.is_empty() {
+        true => Err("NAME=VALUE,NAME=VALUE,...".to_owned()),
+        false => Ok(pairs),
+    }
+}
+
+impl<V: Value> Value for BTreeMap<String, V> {
+    const KIND: Kind = Kind::Named(&V::KIND);
+
+    fn read(text: &str) -> Result<Self, String> {
+        let value = |(name, text): (String, String)| match V::read(&text) {
+            Ok(value) => Ok((name, value)),
+            Err(expected) => Err(format!("for {name}: {expected}")),
+        };
+        named_pairs(text)?.into_iter().map(value).collect()
+    }
+
+    fn text(&self) -> Option<String> {
+        let each: Vec<String> = self
+            .iter()
+            .filter_map(|(name, value)| Some(format!("{name}={}", value.text()?)))
+            .collect();
+        (!each.is_empty()).then(|| each.join(","))
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        self.values().flat_map(V::numbers).collect()
+    }
+}
+
+/// One of a list of words.
+pub(crate) fn choice<T: Copy>(text: &str, words: &[(&str, T)]) -> Result<T, String> {
+    let plain = text.to_ascii_lowercase().replace('_', "-");
+    let known = || words.iter().map(|(word, _)| *word).collect::<Vec<_>>().join(", ");
+    words
+        .iter()
+        .find(|(word, _)| *word == plain)
+        .map(|(_, value)| *value)
+        .ok_or_else(|| format!("one of {}", known()))
+}
+
+/// Makes an enum a choice of words.
+macro_rules! choices {
+    ($target:ty { $($word:literal = $value:path),+ $(,)? }) => {
+        impl Value for $target {
+            const KIND: Kind = Kind::Choice(&[$($word),+]);
+
+            fn read(text: &str) -> Result<Self, String> {
+                choice(text, &[$(($word, $value)),+])
+            }
+
+            fn text(&self) -> Option<String> {
+                Some(match self { $($value => $word),+ }.to_owned())
+            }
+        }
+    };
+}
+
+choices!(Stable { "predictor" = Stable::Predictor, "noise" = Stable::PredictorAndNoise });
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is written is read back as the same value.
+    fn returns<V: Value + PartialEq + std::fmt::Debug>(text: &str, value: V) {
+        assert_eq!(V::read(text), Ok(value));
+        let read = V::read(text).ok().and_then(|v| v.text()).unwrap_or_default();
+        assert_eq!(V::read(&read), V::read(text), "{text} {read}");
+    }
+
+    #[test]
+    fn values_come_back_as_they_were_written() {
+        returns("true", true);
+        returns("17", 17_usize);
+        returns("0.1", 0.1);
+        returns("1e6", 1e6);
+        returns("inf", f64::INFINITY);
+        returns("-3..4.5", (-3.0, 4.5));
+        returns("5..", Constraint::Between(5.0, f64::INFINITY));
+        returns("..0.99", Constraint::Between(f64::NEG_INFINITY, 0.99));
+        returns("noise", Stable::PredictorAndNoise);
+        returns(
+            "K_e=0.01, f1=2",
+            BTreeMap::from([("K_e".to_owned(), 0.01), ("f1".to_owned(), 2.0)]),
+        );
+        returns("2", Some(2_usize));
+        assert_eq!(1e6.text().as_deref(), Some("1e6"));
+        assert_eq!(None::<f64>.text(), None);
+    }
+
+    #[test]
+    fn what_is_no_value_says_what_was_expected() {
+        assert!(bool::read("yes").is_err() && usize::read("-1").is_err() && f64::read("nan").is_err());
+        assert!(<(f64, f64)>::read("3..1").is_err() && <(f64, f64)>::read("1").is_err());
+        assert!(Constraint::read("5").is_err() && Constraint::read("5..1").is_err());
+        assert_eq!(Stable::read("all"), Err("one of predictor, noise".to_owned()));
+        let named = |text| BTreeMap::<String, f64>::read(text);
+        assert!(named("").is_err() && named("b0").is_err() && named("b0=1,b0=2").is_err());
+        assert_eq!(named("b0=x"), Err("for b0: a number".to_owned()));
+    }
+}
