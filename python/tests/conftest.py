@@ -11,24 +11,24 @@ from typing import Any
 
 import pytest
 
-import hoid
+import pyhoid
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 
 @pytest.fixture(scope="session")
-def c1() -> hoid.Record:
-    return hoid.simulate("C1", seed=1)
+def c1() -> pyhoid.Record:
+    return pyhoid.simulate("C1", seed=1)
 
 
 @pytest.fixture(scope="session")
-def c4() -> hoid.Record:
-    return hoid.simulate("C4", seed=1)
+def c4() -> pyhoid.Record:
+    return pyhoid.simulate("C4", seed=1)
 
 
 @pytest.fixture(scope="session")
-def fit(c1: hoid.Record) -> hoid.Fit:
-    return hoid.identify(c1, "bj", nb=2, nd=1, nf=2, nk=29)
+def fit(c1: pyhoid.Record) -> pyhoid.Fit:
+    return pyhoid.identify(c1, "bj", nb=2, nd=1, nf=2, nk=29)
 
 
 class CommandLine:

@@ -24,7 +24,7 @@ def check(*arguments: str) -> None:
 
 
 def test_the_stubs_are_those_of_the_module() -> None:
-    check("mypy.stubtest", "hoid._hoid")
+    check("mypy.stubtest", "pyhoid._pyhoid")
 
 
 def test_mypy_accepts_the_package_and_its_use(cache: list[str]) -> None:

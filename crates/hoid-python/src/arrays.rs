@@ -33,7 +33,7 @@ pub enum Wanted<'a> {
     Only(&'a [&'a str]),
 }
 
-/// The record of the library from one of `hoid.Record`.
+/// The record of the library from one of `pyhoid.Record`.
 pub fn record(found: &Bound<'_, PyAny>, wanted: Wanted<'_>) -> Outcome<Record> {
     let text = |name: &str| -> PyResult<String> { found.getattr(name)?.extract() };
     let sample_time = SampleTime::new(found.getattr("sample_time")?.extract()?)?;
@@ -72,7 +72,7 @@ pub fn record(found: &Bound<'_, PyAny>, wanted: Wanted<'_>) -> Outcome<Record> {
     Ok(record)
 }
 
-/// Checks what `hoid.Record` is made of as [`record`] would, without a copy of the arrays.
+/// Checks what `pyhoid.Record` is made of as [`record`] would, without a copy of the arrays.
 pub fn check(found: &Bound<'_, PyAny>) -> Outcome<()> {
     SampleTime::new(found.getattr("sample_time")?.extract()?)?;
     let mut named: Vec<(String, Bound<'_, PyAny>)> = Vec::new();
@@ -128,7 +128,7 @@ pub fn records(found: &[Bound<'_, PyAny>], wanted: Wanted<'_>) -> Outcome<Vec<Re
     found.iter().map(|one| record(one, wanted)).collect()
 }
 
-/// What `hoid.Record` is made of, of a record of the library. Each vector becomes an array without a copy.
+/// What `pyhoid.Record` is made of, of a record of the library. Each vector becomes an array without a copy.
 pub fn parts<'py>(py: Python<'py>, record: Record) -> PyResult<Bound<'py, PyDict>> {
     let parts = PyDict::new(py);
     parts.set_item("sample_time", record.sample_time().s())?;

@@ -1,4 +1,4 @@
-//! `hoid.describing_function`: what a person answers at the lines of the excitation.
+//! `pyhoid.describing_function`: what a person answers at the lines of the excitation.
 
 use hoid_ident::describing::{
     Averaging, DescribingFunction, DescribingOptions, Excitation, GainLeadDelayOptions, LineSearch, LineWeights,
@@ -15,8 +15,8 @@ use crate::{
     names,
 };
 
-/// The describing function; the package wraps it in `hoid.DescribingFunction`.
-#[pyclass(name = "DescribingFunction", module = "hoid._hoid", frozen)]
+/// The describing function; the package wraps it in `pyhoid.DescribingFunction`.
+#[pyclass(name = "DescribingFunction", module = "pyhoid._pyhoid", frozen)]
 pub struct PyDescribingFunction {
     found: DescribingFunction,
 }

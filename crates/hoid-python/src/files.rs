@@ -1,4 +1,4 @@
-//! `hoid.read`, `hoid.read_stretches`, `hoid.write` and tables of results.
+//! `pyhoid.read`, `pyhoid.read_stretches`, `pyhoid.write` and tables of results.
 
 use std::{collections::BTreeMap, path::PathBuf, str::FromStr};
 

@@ -18,8 +18,8 @@ use crate::{
     names,
 };
 
-/// A fitted model; the package wraps it in `hoid.Fit`.
-#[pyclass(name = "Fit", module = "hoid._hoid", frozen)]
+/// A fitted model; the package wraps it in `pyhoid.Fit`.
+#[pyclass(name = "Fit", module = "pyhoid._pyhoid", frozen)]
 pub struct PyFit {
     fit: Fit,
     choice: Option<Choice>,
@@ -321,7 +321,7 @@ impl PyFit {
     }
 
     fn __repr__(&self) -> String {
-        format!("<hoid._hoid.Fit {}>", self.fit.title())
+        format!("<pyhoid._pyhoid.Fit {}>", self.fit.title())
     }
 }
 

@@ -1,4 +1,4 @@
-//! `hoid.group` and `hoid.simulate_group`: recorded runs by subject and condition, and a virtual experiment to try it on.
+//! `pyhoid.group` and `pyhoid.simulate_group`: recorded runs by subject and condition, and a virtual experiment to try it on.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! `hoid.identify`: from records and options to a fit.
+//! `pyhoid.identify`: from records and options to a fit.
 
 use std::collections::BTreeMap;
 

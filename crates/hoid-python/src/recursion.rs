@@ -1,4 +1,4 @@
-//! The options of `hoid.track` and `hoid.Tracker`, from their plain form to that of the library.
+//! The options of `pyhoid.track` and `pyhoid.Tracker`, from their plain form to that of the library.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! `hoid.simulate`, `hoid.margins` and `hoid.convert`: scenarios and the operator's conversions.
+//! `pyhoid.simulate`, `pyhoid.margins` and `pyhoid.convert`: scenarios and the operator's conversions.
 
 use std::path::PathBuf;
 

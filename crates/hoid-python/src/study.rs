@@ -1,4 +1,4 @@
-//! `hoid.study` and `hoid.reproduce`: plans, shards, merged tables.
+//! `pyhoid.study` and `pyhoid.reproduce`: plans, shards, merged tables.
 
 use std::path::PathBuf;
 
@@ -21,7 +21,7 @@ fn left(outcome: StudyOutcome) -> Left {
 }
 
 /// A plan of Monte Carlo runs.
-#[pyclass(name = "Plan", module = "hoid._hoid", frozen)]
+#[pyclass(name = "Plan", module = "pyhoid._pyhoid", frozen)]
 pub struct PyPlan {
     plan: Plan,
 }
@@ -117,7 +117,7 @@ impl PyPlan {
     fn __repr__(&self) -> String {
         let p = &self.plan;
         format!(
-            "<hoid.Plan {}: {} cells, {} estimators, {} replications, {} estimates>",
+            "<pyhoid.Plan {}: {} cells, {} estimators, {} replications, {} estimates>",
             p.name,
             p.cells.len(),
             p.estimators.len(),

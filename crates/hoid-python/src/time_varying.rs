@@ -11,8 +11,8 @@ use crate::{
     figures::{self, Pair, error_or_nan, pair},
 };
 
-/// The package wraps it in `hoid.TimeVaryingFit`.
-#[pyclass(name = "TimeVaryingFit", module = "hoid._hoid", frozen)]
+/// The package wraps it in `pyhoid.TimeVaryingFit`.
+#[pyclass(name = "TimeVaryingFit", module = "pyhoid._pyhoid", frozen)]
 pub struct PyTimeVaryingFit {
     fit: TimeVaryingFit,
 }

@@ -1,4 +1,4 @@
-//! `hoid.track`: a recursive estimate over a record.
+//! `pyhoid.track`: a recursive estimate over a record.
 
 use std::path::PathBuf;
 
@@ -59,8 +59,8 @@ pub fn track<'py>(
     Ok(PyTrace { trace, choice })
 }
 
-/// The estimate at every sample that was kept; the package wraps it in `hoid.Trace`.
-#[pyclass(name = "Trace", module = "hoid._hoid", frozen)]
+/// The estimate at every sample that was kept; the package wraps it in `pyhoid.Trace`.
+#[pyclass(name = "Trace", module = "pyhoid._pyhoid", frozen)]
 pub struct PyTrace {
     trace: Trace,
     choice: Option<Choice>,

@@ -1,4 +1,4 @@
-//! `hoid.Tracker`: a recursive estimate, live.
+//! `pyhoid.Tracker`: a recursive estimate, live.
 
 use hoid_ident::{
     Choice, IdentError,
@@ -22,8 +22,8 @@ const LONGEST_WARM_UP: usize = 10_000_000;
 /// What a tracker was, to be made again: orders, numbers of the tracker, numbers of the warm-up.
 type Saved<'py> = (Option<Bound<'py, PyDict>>, Bound<'py, PyArray1<f64>>);
 
-/// The package derives `hoid.Tracker` from it.
-#[pyclass(name = "Tracker", module = "hoid._hoid", subclass)]
+/// The package derives `pyhoid.Tracker` from it.
+#[pyclass(name = "Tracker", module = "pyhoid._pyhoid", subclass)]
 pub struct PyTracker {
     plan: TrackPlan,
     live: Live,

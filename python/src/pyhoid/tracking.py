@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from . import _hoid, _options, _recursion
+from . import _options, _pyhoid, _recursion
 from ._options import Order, Progress
 from ._recursion import Memory
 from .errors import DataError, OptionError
@@ -124,7 +124,7 @@ def track(
     """
     settings = {name: value for name, value in locals().items() if name not in ("record", "progress")}
     if not isinstance(record, Record):
-        raise DataError(f"expected a hoid.Record, found {type(record).__name__}")
+        raise DataError(f"expected a pyhoid.Record, found {type(record).__name__}")
     options = _recursion.plain(settings) | {"smooth": bool(smooth)}
     if smooth and options["method"] != "adaptive":
         raise OptionError('smooth belongs to method="adaptive"')
@@ -141,7 +141,7 @@ def track(
             raise OptionError(f"moving_average is {moving_average}, expected a length in s up to that of the record")
         # Half away from zero, as the command line rounds.
         rows = max(int(np.floor(moving_average / (every * record.sample_time) + 0.5)), 1)
-    native = _hoid.track(
+    native = _pyhoid.track(
         record,
         options,
         start_span=_options.span("start_span", start_span),

@@ -6,7 +6,7 @@ interrupted goes on with the shards that it has. The merged tables are the same 
 
 >>> from dask.distributed import Client
 >>> client = Client("tcp://scheduler:8786")            # or Client(LocalCluster()), or one of dask-jobqueue
->>> results = hoid.dask.study("plan.toml", "out", client, shards=100)
+>>> results = pyhoid.dask.study("plan.toml", "out", client, shards=100)
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def study(
     Parameters
     ----------
     source : path, str or Plan
-        As in `hoid.plan`. Workers get its text, and need nothing but hoid.
+        As in `pyhoid.plan`. Workers get its text, and need nothing but hoid.
     directory : path
         Where the tables are written, on the machine of the client. A study that was stopped goes on there.
     client : distributed.Client

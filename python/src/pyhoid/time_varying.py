@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _hoid, _text
+from . import _pyhoid, _text
 from ._arrays import FloatArray, signal
 from .estimates import Estimate, Operator
 from .fit import Series
@@ -23,7 +23,7 @@ class TimeVaryingFit:
     """A fitted operator whose gains change once, by a sigmoid. `identify` makes it with ``structure="time-varying"``."""
 
     def __init__(
-        self, native: _hoid.TimeVaryingFit, records: Sequence[Record], settings: Mapping[str, Any] | None = None
+        self, native: _pyhoid.TimeVaryingFit, records: Sequence[Record], settings: Mapping[str, Any] | None = None
     ) -> None:
         self._native = native
         self.records: tuple[Record, ...] = tuple(records)

@@ -1,4 +1,4 @@
-"""The native module. Users find its parts, wrapped, in `hoid`; a test compares these stubs with it."""
+"""The native module. Users find its parts, wrapped, in `pyhoid`; a test compares these stubs with it."""
 
 from collections.abc import Callable, Sequence
 from os import PathLike
@@ -207,7 +207,7 @@ class Trace:
 
 @disjoint_base
 class Tracker:
-    # `hoid.Tracker` has the keywords that people write.
+    # `pyhoid.Tracker` has the keywords that people write.
     def __new__(cls, options: dict[str, Any], sample_time: float, warm_up: int, record: Record | None) -> Any: ...
     def step(self, e: float, u: float, f_t: float | None = None, update: bool = True) -> float:
         """Take one sample; returns the innovation, NaN at a fault and during the warm-up."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import _hoid, _options, _text
+from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
 from .estimates import Estimate, estimates
 from .record import Record
@@ -26,7 +26,7 @@ class DescribingFunction:
     ``coherence``, ``magnitude_db``, ``phase_deg``, with ``_se`` for standard errors (NaN where one run gives none).
     """
 
-    def __init__(self, native: _hoid.DescribingFunction) -> None:
+    def __init__(self, native: _pyhoid.DescribingFunction) -> None:
         self._native = native
         self.columns: dict[str, npt.NDArray[Any]] = native.columns()
 
@@ -166,7 +166,7 @@ def describing_function(
     """
     given = harmonics is not None or omega is not None
     return DescribingFunction(
-        _hoid.describing_function(
+        _pyhoid.describing_function(
             _options.as_records(records),
             harmonics=None if harmonics is None else [int(h) for h in harmonics],
             omega=None if omega is None else [float(w) for w in omega],

@@ -1,6 +1,6 @@
 """Exceptions of hoid, by kind.
 
-Every one is a `hoid.Error`; where Python people expect another base as well (`ValueError` for a wrong value, `OSError` for files), it is
+Every one is a `pyhoid.Error`; where Python people expect another base as well (`ValueError` for a wrong value, `OSError` for files), it is
 that too. The messages name the quantity, what was found, what was expected, and the remedy.
 """
 

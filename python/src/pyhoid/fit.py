@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from . import _hoid, _options, _text
+from . import _options, _pyhoid, _text
 from ._arrays import FloatArray, signal
 from .errors import DataError, NotConvertibleError
 from .estimates import UNITS, Estimate, Operator, Remnant, estimates
@@ -82,7 +82,7 @@ class Fit:
         The keywords that it was made with, defaults included.
     """
 
-    def __init__(self, native: _hoid.Fit, records: Sequence[Record], settings: Mapping[str, Any] | None = None) -> None:
+    def __init__(self, native: _pyhoid.Fit, records: Sequence[Record], settings: Mapping[str, Any] | None = None) -> None:
         self._native = native
         self.records: tuple[Record, ...] = tuple(records)
         self.settings: dict[str, Any] = dict(settings or {})
@@ -300,7 +300,7 @@ class Fit:
         return xr.Dataset(variables, coords=coordinates, attrs={"structure": self.structure, **self.orders})
 
     def plot(self, record: Record | None = None, ax: Axes | None = None) -> Axes:
-        """The time response on a record, by default the first of the fit; see `hoid.plots`."""
+        """The time response on a record, by default the first of the fit; see `pyhoid.plots`."""
         from . import plots
 
         return plots.time_response(self, record or self.records[0], ax=ax)
@@ -346,7 +346,7 @@ class Fit:
                 list(self.records),
                 Path(directory),
                 title=title or f"Identification of {what}",
-                settings=[("hoid", _hoid.__version__), ("records", ", ".join(labels)), *_options.settings(self.settings)],
+                settings=[("hoid", _pyhoid.__version__), ("records", ", ".join(labels)), *_options.settings(self.settings)],
                 controlled_element=element,
             )
         )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _hoid, _text
+from . import _pyhoid, _text
 from ._arrays import FloatArray, signal
 from .errors import DataError, OptionError
 
@@ -53,8 +53,8 @@ class Record:
 
     Examples
     --------
-    >>> record = hoid.Record(e=error, u=control, sample_time=0.01)
-    >>> fit = hoid.identify(record)
+    >>> record = pyhoid.Record(e=error, u=control, sample_time=0.01)
+    >>> fit = pyhoid.identify(record)
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class Record:
             units=dict(units or {}),
             channels={name: signal(values, name) for name, values in channels.items()},
         )
-        _hoid.check_record(self)
+        _pyhoid.check_record(self)
 
     def _fill(
         self,
@@ -151,7 +151,7 @@ class Record:
             units={},
             channels={name: signal(values, name) for name, values in named.items()},
         )
-        _hoid.check_record(record)
+        _pyhoid.check_record(record)
         return record
 
     @property
@@ -216,7 +216,7 @@ class Record:
 
     def detrended(self, how: str = "mean") -> Record:
         """The same record with the ``"mean"`` or the ``"linear"`` trend taken out of input and output."""
-        return Record._of(_hoid.detrended(self, how))
+        return Record._of(_pyhoid.detrended(self, how))
 
     def to_pandas(self) -> pd.DataFrame:
         """All channels as a table with the time in s as index."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from . import _hoid
+from . import _pyhoid
 from .record import Record
 
 __all__ = ["info", "read", "read_stretches", "write"]
@@ -150,7 +150,7 @@ def read_stretches(
 
     Examples
     --------
-    >>> fit = hoid.identify(hoid.read_stretches("run1.csv", ["missing", "stalled"]))
+    >>> fit = pyhoid.identify(pyhoid.read_stretches("run1.csv", ["missing", "stalled"]))
     """
     return _read(path, [mask] if isinstance(mask, str) else mask, shortest, **options)
 
@@ -175,7 +175,7 @@ def _read(
     run_in: float = 0.0,
     detrend: str = "none",
 ) -> list[Record]:
-    found = _hoid.read(
+    found = _pyhoid.read(
         path,
         input=input,
         output=output,
@@ -215,7 +215,7 @@ def write(path: str | PathLike[str], record: Record) -> None:
     ------
     FileError, FormatError
     """
-    _hoid.write(path, record)
+    _pyhoid.write(path, record)
 
 
 def info(path: str | PathLike[str]) -> dict[str, Any]:
@@ -231,4 +231,4 @@ def info(path: str | PathLike[str]) -> dict[str, Any]:
     ------
     FileError, FormatError
     """
-    return _hoid.info(path)
+    return _pyhoid.info(path)

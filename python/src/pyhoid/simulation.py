@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from os import PathLike
 from typing import Any
 
-from . import _hoid
+from . import _pyhoid
 from .errors import OptionError
 from .record import Record
 
@@ -74,7 +74,7 @@ def simulate(
     ------
     OptionError
     """
-    parts = _hoid.simulate(
+    parts = _pyhoid.simulate(
         **_base(condition, scenario),
         remnant_order=remnant_order,
         noise_level=noise_level,
@@ -116,7 +116,7 @@ def margins(
         ``crossover_rad_s``, ``phase_margin_deg``, ``gain_margin_db``, ``phase_crossover_rad_s`` (None where there is none), and
         ``remnant_gain``, a list of dicts with ``remnant_order``, ``noise_level``, ``definition`` and ``K_n``.
     """
-    return _hoid.margins(
+    return _pyhoid.margins(
         **_base(condition, scenario),
         state=state,
         noise_levels=[float(level) for level in noise_levels],

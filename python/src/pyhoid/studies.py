@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _hoid, _options
+from . import _options, _pyhoid
 from .errors import StudyStateError
 from ._options import Progress
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Plan", "Results", "Table", "merge", "plan", "plans", "results", "study"]
 
-Plan = _hoid.Plan
+Plan = _pyhoid.Plan
 
 
 class Table(Mapping[str, Any]):
@@ -42,7 +42,7 @@ class Table(Mapping[str, Any]):
         if self._columns is None:
             self._columns = {
                 name: np.asarray(values, dtype=object) if isinstance(values, list) else values
-                for name, values in _hoid.read_table(self.path).items()
+                for name, values in _pyhoid.read_table(self.path).items()
             }
         return self._columns
 
@@ -79,7 +79,7 @@ class Table(Mapping[str, Any]):
     def __repr__(self) -> str:
         columns = self.to_dict()
         rows = len(next(iter(columns.values()))) if columns else 0
-        return f"<hoid.Table {self.path.name}: {rows} rows, columns {', '.join(columns)}>"
+        return f"<pyhoid.Table {self.path.name}: {rows} rows, columns {', '.join(columns)}>"
 
 
 def _listed(values: Any) -> Any:
@@ -127,7 +127,7 @@ class Results(Mapping[str, Table]):
         return len(self._tables)
 
     def __repr__(self) -> str:
-        return f"<hoid.Results {self.directory}: tables {', '.join(self._tables) or 'none yet'}>"
+        return f"<pyhoid.Results {self.directory}: tables {', '.join(self._tables) or 'none yet'}>"
 
 
 def plan(source: str | PathLike[str] | Plan, *, replications: int | None = None) -> Plan:
@@ -159,7 +159,7 @@ def plan(source: str | PathLike[str] | Plan, *, replications: int | None = None)
 
 def plans() -> dict[str, str]:
     """Names and titles of the plans that come with hoid."""
-    return dict(_hoid.plan_names())
+    return dict(_pyhoid.plan_names())
 
 
 def study(
@@ -229,7 +229,7 @@ def merge(shards: Sequence[str | PathLike[str]], directory: str | PathLike[str],
     StudyStateError
         For shards of different plans, or when some are missing or there twice.
     """
-    finished, estimates, _ = _hoid.merge_shards([Path(shard) for shard in shards], Path(directory), csv)
+    finished, estimates, _ = _pyhoid.merge_shards([Path(shard) for shard in shards], Path(directory), csv)
     return Results(directory, finished=finished, estimates=estimates)
 
 

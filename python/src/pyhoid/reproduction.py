@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
 
-from . import _hoid, _options
+from . import _options, _pyhoid
 from ._options import Progress
 from .errors import StudyStateError
 from .studies import Results, Table
@@ -20,7 +20,7 @@ class Reproduction(NamedTuple):
 
     #: The page that shows it all.
     page: Path
-    #: Pictures by name, as ``figures["fig-11"]``; `hoid.plots.reference` draws them anew.
+    #: Pictures by name, as ``figures["fig-11"]``; `pyhoid.plots.reference` draws them anew.
     figures: dict[str, Path]
     #: Tables, and the numbers of each figure, by name.
     tables: dict[str, Table]
@@ -67,7 +67,7 @@ def reproduce(
     if isinstance(only, str):
         only = [only]
     target = Path(directory)
-    made = _hoid.reproduce(
+    made = _pyhoid.reproduce(
         target,
         only=list(only),
         replications=int(replications),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from . import _hoid, _recursion, _text
+from . import _pyhoid, _recursion, _text
 from ._arrays import FloatArray, signal
 from ._options import Order
 from ._recursion import Memory
@@ -16,7 +16,7 @@ from .record import Record
 __all__ = ["Tracker"]
 
 
-class Tracker(_hoid.Tracker):
+class Tracker(_pyhoid.Tracker):
     """A recursive estimate that takes one sample at a time. It can be pickled, and goes on with the same digits.
 
     Without a start it collects `warm_up` seconds, fits them, and goes on from there; until then `ready` is False.
@@ -34,7 +34,7 @@ class Tracker(_hoid.Tracker):
 
     Examples
     --------
-    >>> tracker = hoid.Tracker("rpem", nk=29, nd=1, sample_time=0.01)
+    >>> tracker = pyhoid.Tracker("rpem", nk=29, nd=1, sample_time=0.01)
     >>> for e, u in samples:
     ...     innovation = tracker.step(e, u)
     """

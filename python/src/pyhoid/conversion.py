@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from . import _hoid
+from . import _pyhoid
 from ._arrays import FloatArray
 from .errors import OptionError
 from .estimates import Operator
@@ -75,9 +75,9 @@ def convert(
         pairs = [(str(name), float(getattr(value, "value", value))) for name, value in operator.items()]
         if isinstance(operator, Operator):
             pairs = [(name, value) for name, value in pairs if name != "K_e_dot"]
-        found = _hoid.convert_operator(pairs, sample_time)
+        found = _pyhoid.convert_operator(pairs, sample_time)
     elif f is not None and b is not None:
-        found = _hoid.convert_discrete(_two(f, "F"), _two(b, "B"), nk, sample_time)
+        found = _pyhoid.convert_discrete(_two(f, "F"), _two(b, "B"), nk, sample_time)
     else:
         raise OptionError("give f and b, or operator")
     discrete = found["discrete"]
@@ -117,5 +117,5 @@ def discretise(
     """
     if method == "prewarped" and prewarp is None:
         raise OptionError('method="prewarped" needs prewarp, a frequency in rad/s')
-    found = _hoid.discretise_transfer_function([float(v) for v in num], [float(v) for v in den], sample_time, method, prewarp)
+    found = _pyhoid.discretise_transfer_function([float(v) for v in num], [float(v) for v in den], sample_time, method, prewarp)
     return DiscreteTransferFunction(found[0], found[1], sample_time)

@@ -82,7 +82,7 @@ SYMBOLS: Mapping[str, str] = {
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Draw in the style of the reports: ``with hoid.plots.style(): ...``."""
+    """Draw in the style of the reports: ``with pyhoid.plots.style(): ...``."""
     # Of the style alone: matplotlib.rc_context would also take back what the backend of a notebook sets at the first figure.
     settings: Any = rcParams
     before = {name: settings[name] for name in STYLE}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from . import _hoid, _options
+from . import _options, _pyhoid
 from ._options import Order, Progress
 from .errors import OptionError
 from .fit import Fit
@@ -178,7 +178,7 @@ def identify(
 
     Examples
     --------
-    >>> fit = hoid.identify(record, "bj", nb=2, nd=1, nf=2, nk=29)
+    >>> fit = pyhoid.identify(record, "bj", nb=2, nd=1, nf=2, nk=29)
     >>> fit.operator.K_e
     0.0920 ± 0.0023
     """
@@ -211,7 +211,7 @@ def identify(
     given = {key: value for key, (value, default) in usual.items() if value != default}
     _check(name, method.lower(), {**given, **orders})
     several = _options.as_records(records)
-    found = _hoid.identify(
+    found = _pyhoid.identify(
         several,
         name,
         orders=orders,
@@ -234,7 +234,7 @@ def identify(
         tolerance=float(tolerance),
         progress=_options.reporter(progress, "candidates"),
     )
-    if isinstance(found, _hoid.TimeVaryingFit):
+    if isinstance(found, _pyhoid.TimeVaryingFit):
         return TimeVaryingFit(found, several, settings)
     return Fit(found, several, settings)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
-from . import _hoid, _options
+from . import _options, _pyhoid
 from ._options import Progress
 from .errors import StudyStateError
 from .studies import Results
@@ -46,7 +46,7 @@ def group(
     """
     file = Path(manifest)
     file = file / "group.toml" if file.is_dir() else file
-    finished, estimates = _hoid.group(
+    finished, estimates = _pyhoid.group(
         file, Path(directory), jobs=jobs, resume=resume, csv=csv, progress=_options.reporter(progress, "runs")
     )
     if not finished:
@@ -56,7 +56,7 @@ def group(
 
 def group_manifest(directory: str | PathLike[str], pattern: str = "{subject}_{condition}_{run}.csv") -> tuple[str, list[str]]:
     """The manifest (TOML text) of the files of a directory whose names match a pattern, and the files that do not."""
-    return _hoid.group_manifest(Path(directory), pattern)
+    return _pyhoid.group_manifest(Path(directory), pattern)
 
 
 def simulate_group(
@@ -103,7 +103,7 @@ def simulate_group(
     StudyStateError
         When the directory holds one.
     """
-    return _hoid.simulate_group(
+    return _pyhoid.simulate_group(
         Path(directory),
         subjects=int(subjects),
         conditions=list(conditions),

@@ -81,11 +81,11 @@ def as_records(records: Record | Sequence[Record]) -> list[Record]:
     """One record or several, as a list."""
     several = [records] if isinstance(records, Record) else records
     if not isinstance(several, Iterable) or isinstance(several, (str, bytes)):
-        raise DataError(f"expected a hoid.Record or a sequence of them, found {type(records).__name__}; make one by hoid.Record(e=, u=, sample_time=)")
+        raise DataError(f"expected a pyhoid.Record or a sequence of them, found {type(records).__name__}; make one by pyhoid.Record(e=, u=, sample_time=)")
     several = list(several)
     for one in several:
         if not isinstance(one, Record):
-            raise DataError(f"expected a hoid.Record, found {type(one).__name__}; make one by hoid.Record(e=, u=, sample_time=)")
+            raise DataError(f"expected a pyhoid.Record, found {type(one).__name__}; make one by pyhoid.Record(e=, u=, sample_time=)")
     if not several:
         raise DataError("there is no record; give one or several")
     return several

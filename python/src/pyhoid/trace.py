@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import _hoid, _options, _text
+from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
 from .estimates import UNITS, Estimate, Operator
 from .fit import Fit
@@ -39,7 +39,7 @@ class Trace:
         The keywords that it was made with, defaults included.
     """
 
-    def __init__(self, native: _hoid.Trace, record: Record, settings: Mapping[str, Any] | None = None) -> None:
+    def __init__(self, native: _pyhoid.Trace, record: Record, settings: Mapping[str, Any] | None = None) -> None:
         self._native = native
         self.record = record
         self.settings: dict[str, Any] = dict(settings or {})
@@ -157,7 +157,7 @@ class Trace:
         self._native.write(path, list(comments))
 
     def plot(self, names: Sequence[str] | None = None, axes: Sequence[Axes] | None = None) -> Sequence[Axes]:
-        """The parameters over time with their bands; see `hoid.plots`."""
+        """The parameters over time with their bands; see `pyhoid.plots`."""
         from . import plots
 
         return plots.trace(self, names, axes=axes)
@@ -185,7 +185,7 @@ class Trace:
             When it cannot be written.
         """
         label = self.record.label or "(unnamed)"
-        facts = [("hoid", _hoid.__version__), ("record", label), *_options.settings(self.settings)]
+        facts = [("hoid", _pyhoid.__version__), ("record", label), *_options.settings(self.settings)]
         title = title or f"{label} tracked by {self.method}"
         return Path(self._native.report(self.record, Path(directory), title=title, settings=facts))
 

@@ -29,7 +29,7 @@ def from_control(system: control.TransferFunction | Any) -> Conversion:
         For another form.
     """
     if not system.isdtime(strict=True) or not isinstance(system.dt, float) or system.dt <= 0:
-        raise NotConvertibleError("the system has no sample time; discretise it first, by hoid.discretise or control.sample_system")
+        raise NotConvertibleError("the system has no sample time; discretise it first, by pyhoid.discretise or control.sample_system")
     num = np.asarray(system.num[0][0], dtype=float)
     den = np.asarray(system.den[0][0], dtype=float)
     # By powers of z, the highest first: z^n over the denominator's order is q^-delay.
