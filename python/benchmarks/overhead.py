@@ -1,7 +1,7 @@
 """What Python adds: a fit and a step, two threads, and the memory of large arrays.
 
-Compare the first lines with those of ``cargo run --release -p hoid --example overhead``, on a machine at rest, with a release build of the
-module (``pip install ./python``).
+Compare the first lines with those of ``cargo run --release -p hoid --example overhead``, on a
+machine at rest, with a release build of the module (``pip install ./python``).
 """
 
 from __future__ import annotations
@@ -61,7 +61,9 @@ def main() -> None:
     one = best(7, lambda: fits(0))
     with ThreadPoolExecutor(2) as pool:
         two = best(7, lambda: list(pool.map(fits, range(2))))
-    print(f"200 fits in one thread {one:.3f} s, 200 in each of two {two:.3f} s: {two / one:.2f} times")
+    print(
+        f"200 fits in one thread {one:.3f} s, 200 in each of two {two:.3f} s: {two / one:.2f} times"
+    )
 
     n = 10_000_000
     e, u = (np.random.default_rng(k).normal(size=n) for k in (0, 1))
@@ -70,7 +72,10 @@ def main() -> None:
     pyhoid.Record(e=e, u=u, sample_time=0.01)
     made = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     tracker.update(e[: n // 2], u[: n // 2])
-    print(f"arrays of {2 * e.nbytes / 1e6:.0f} MB: resident memory grows by {(made - before) / 1e3:.0f} MB while a record is made (its check)")
+    print(
+        f"arrays of {2 * e.nbytes / 1e6:.0f} MB: resident memory grows by"
+        f" {(made - before) / 1e3:.0f} MB while a record is made (its check)"
+    )
 
 
 if __name__ == "__main__":

@@ -69,11 +69,27 @@ def test_simulate(run: Path) -> None:
         ({}, []),
         ({"structure": "bj", "nk": 29, "nd": 2}, ["--nk", 29, "--orders", "nd=2"]),
         ({"structure": "arx", "nk": (20, 35)}, ["--structure", "arx", "--nk", "20..35"]),
-        ({"structure": "armax", "na": 2, "nb": 2, "nc": 1, "nk": 29}, ["--structure", "armax", "--orders", "na=2,nb=2,nc=1", "--nk", 29]),
-        ({"method": "rivbj", "nk": 29, "nd": 1}, ["--method", "rivbj", "--nk", 29, "--orders", "nd=1"]),
-        ({"structure": "grey-box", "remnant_order": 1}, ["--structure", "grey-box", "--remnant-order", 1]),
         (
-            {"structure": "bj", "nk": 29, "nd": 1, "robust": True, "fix": {"d1": -0.85}, "bound": {"b0": (0, None)}},
+            {"structure": "armax", "na": 2, "nb": 2, "nc": 1, "nk": 29},
+            ["--structure", "armax", "--orders", "na=2,nb=2,nc=1", "--nk", 29],
+        ),
+        (
+            {"method": "rivbj", "nk": 29, "nd": 1},
+            ["--method", "rivbj", "--nk", 29, "--orders", "nd=1"],
+        ),
+        (
+            {"structure": "grey-box", "remnant_order": 1},
+            ["--structure", "grey-box", "--remnant-order", 1],
+        ),
+        (
+            {
+                "structure": "bj",
+                "nk": 29,
+                "nd": 1,
+                "robust": True,
+                "fix": {"d1": -0.85},
+                "bound": {"b0": (0, None)},
+            },
             ["--nk", 29, "--orders", "nd=1", "--robust", "--fix", "d1=-0.85", "--bound", "b0=0.."],
         ),
     ],
@@ -102,32 +118,53 @@ def test_identify_a_change(run: Path, cli: Any) -> None:
     ("keywords", "options"),
     [
         ({}, []),
-        ({"method": "rls", "nk": 29, "memory": 256}, ["--method", "rls", "--nk", 29, "--memory", 256]),
         (
-            {"method": "rpem", "nk": 29, "nd": 1, "memory_of": {"b": "2.56s", "f": "inf"}, "covariance": 0.1, "moving_average": 0.5},
-            ["--method", "rpem", "--nk", 29, "--orders", "nd=1", "--memory-of", "b=2.56s,f=inf", "--covariance", 0.1,
-             "--moving-average", 0.5],
+            {"method": "rls", "nk": 29, "memory": 256},
+            ["--method", "rls", "--nk", 29, "--memory", 256],
+        ),
+        (
+            {
+                "method": "rpem",
+                "nk": 29,
+                "nd": 1,
+                "memory_of": {"b": "2.56s", "f": "inf"},
+                "covariance": 0.1,
+                "moving_average": 0.5,
+            },
+            [
+                *("--method", "rpem", "--nk", 29, "--orders", "nd=1"),
+                *("--memory-of", "b=2.56s,f=inf", "--covariance", 0.1, "--moving-average", 0.5),
+            ],
         ),
         ({"method": "adaptive", "nk": 29}, ["--method", "adaptive", "--nk", 29]),
-        ({"method": "adaptive", "nk": 29, "smooth": True}, ["--method", "adaptive", "--nk", 29, "--smooth"]),
+        (
+            {"method": "adaptive", "nk": 29, "smooth": True},
+            ["--method", "adaptive", "--nk", 29, "--smooth"],
+        ),
         (
             {"method": "rriv", "nk": 29, "nd": 1, "every": 7},
             ["--method", "rriv", "--nk", 29, "--orders", "nd=1", "--every", 7],
         ),
     ],
 )
-def test_track(run: Path, cli: Any, tmp_path: Path, keywords: dict[str, Any], options: list[Any]) -> None:
+def test_track(
+    run: Path, cli: Any, tmp_path: Path, keywords: dict[str, Any], options: list[Any]
+) -> None:
     trace = pyhoid.track(pyhoid.read(run), **keywords)
     file = tmp_path / "trace.csv"
     found = cli.json("track", run, *options, "--out", file)
-    rows = list(csv.reader(line for line in file.read_text().splitlines() if not line.startswith("#")))
+    rows = list(
+        csv.reader(line for line in file.read_text().splitlines() if not line.startswith("#"))
+    )
     assert rows[0] == list(trace.columns)
     assert len(rows) - 1 == len(trace) == found["rows"]
     for i, name in enumerate(rows[0]):
         column = np.array([float(row[i]) if row[i] else math.nan for row in rows[1:]])
         np.testing.assert_array_equal(trace[name], column, err_msg=name)
     assert trace.counts["steps_shortened"] == found["steps_shortened"]
-    assert [change["t"] for change in trace.changes] == [change["t"] for change in found.get("changes", [])]
+    assert [change["t"] for change in trace.changes] == [
+        change["t"] for change in found.get("changes", [])
+    ]
     assert trace.start is not None and found["start"]["orders"] == trace.start.orders
 
 
@@ -136,13 +173,22 @@ def test_convert_and_margins(cli: Any) -> None:
     here = pyhoid.convert(f=(-1.91, 0.92), b=(0.044, -0.043), nk=29)
     for name, pair in here.operator.items():
         assert pair.value == found["operator"][name]["value"]
-    back = cli.json("convert", "--operator", "K_e=.09,K_e_dot=.036,omega_nm=11.25,zeta_nm=.35,tau_e=.28")
-    discrete = pyhoid.convert(operator={"K_e": 0.09, "K_e_dot": 0.036, "omega_nm": 11.25, "zeta_nm": 0.35, "tau_e": 0.28})
+    back = cli.json(
+        "convert", "--operator", "K_e=.09,K_e_dot=.036,omega_nm=11.25,zeta_nm=.35,tau_e=.28"
+    )
+    discrete = pyhoid.convert(
+        operator={"K_e": 0.09, "K_e_dot": 0.036, "omega_nm": 11.25, "zeta_nm": 0.35, "tau_e": 0.28}
+    )
     assert [*discrete.f] == back["discrete"]["f"] and [*discrete.b] == back["discrete"]["b"]
     transfer = cli.json("convert", "--transfer-function", "1,2/1,3,4", "--method", "tustin")
     num, den, _ = pyhoid.discretise([1, 2], [1, 3, 4], method="tustin")
-    assert num.tolist() == transfer["transfer_function"]["num"] and den.tolist() == transfer["transfer_function"]["den"]
-    assert pyhoid.margins("C2", noise_levels=[0.1, 0.5]) == cli.json("margins", "--condition", "C2", "--noise-levels", "0.1,0.5")
+    assert (
+        num.tolist() == transfer["transfer_function"]["num"]
+        and den.tolist() == transfer["transfer_function"]["den"]
+    )
+    assert pyhoid.margins("C2", noise_levels=[0.1, 0.5]) == cli.json(
+        "margins", "--condition", "C2", "--noise-levels", "0.1,0.5"
+    )
 
 
 def test_stream_and_tracker(run: Path, cli: Any) -> None:
@@ -154,8 +200,11 @@ def test_stream_and_tracker(run: Path, cli: Any) -> None:
 
     lines = "".join(f"{e!r},{u!r}\n" for e, u in zip(record.e.tolist(), record.u.tolist()))
     done = subprocess.run(
-        [cli.binary, "stream", "--method", "rpem", "--nk", "29", "--orders", "nd=1", "--fs", "100", "--every", "1000"],
-        input=lines, capture_output=True, text=True, check=True,
+        [cli.binary, *"stream --method rpem --nk 29 --orders nd=1 --fs 100 --every 1000".split()],
+        input=lines,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     last = json.loads(done.stdout.splitlines()[-1])
     again = pyhoid.Tracker("rpem", nk=29, nd=1, sample_time=0.01)

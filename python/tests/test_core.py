@@ -35,10 +35,15 @@ def test_a_fit_and_its_parts(fit: pyhoid.Fit, c1: pyhoid.Record) -> None:
     validation = fit.validate(c1)
     assert validation.quality == fit.quality
     correlation = validation.autocorrelation
-    assert correlation.lags[0] == 1 and np.mean(np.abs(correlation.values) > correlation.bound_99) < 0.1
+    assert (
+        correlation.lags[0] == 1
+        and np.mean(np.abs(correlation.values) > correlation.bound_99) < 0.1
+    )
     margins = fit.margins([90], [1, 6, 0])
     crossover = margins["crossover_rad_s"]
-    assert crossover is not None and crossover.value == pytest.approx(pyhoid.margins("C1")["crossover_rad_s"], rel=0.1)
+    assert crossover is not None and crossover.value == pytest.approx(
+        pyhoid.margins("C1")["crossover_rad_s"], rel=0.1
+    )
     assert fit.predict(c1, horizon=10).values.std() < c1.u.std()
 
 
@@ -57,7 +62,10 @@ def test_texts(fit: pyhoid.Fit, c1: pyhoid.Record) -> None:
     for word in ("BJ(nb=2", "f1", "K_e", "deg/deg", "T_n", "VAF", "BIC"):
         assert word in text
     assert "<table>" in fit._repr_html_() and "<table>" in c1._repr_html_()
-    assert "±" in repr(pyhoid.Estimate(0.09201, 0.0023)) and repr(pyhoid.Estimate(0.28, None)) == "0.28"
+    assert (
+        "±" in repr(pyhoid.Estimate(0.09201, 0.0023))
+        and repr(pyhoid.Estimate(0.28, None)) == "0.28"
+    )
 
 
 def test_what_does_not_convert_says_why() -> None:
@@ -106,13 +114,21 @@ def test_several_records_share_a_model(c1: pyhoid.Record) -> None:
     one = pyhoid.identify(c1, nk=29, nd=1)
     ratio = both.standard_errors["f1"] / one.standard_errors["f1"]  # type: ignore[operator]
     assert ratio == pytest.approx(1 / np.sqrt(2), rel=0.15)
-    grey = pyhoid.identify([c1, other], "grey-box", remnant_order=1, delay=(0.28, 0.28), individual=["K_e"])
+    grey = pyhoid.identify(
+        [c1, other], "grey-box", remnant_order=1, delay=(0.28, 0.28), individual=["K_e"]
+    )
     operators = grey.operators
-    assert len(operators) == 2 and operators[0]["K_e"].value != operators[1]["K_e"].value  # type: ignore[index]
+    assert len(operators) == 2
+    assert operators[0]["K_e"].value != operators[1]["K_e"].value  # type: ignore[index]
 
 
 def test_a_tracker_goes_on_out_of_a_pickle(c4: pyhoid.Record) -> None:
-    for keywords in ({"method": "physical"}, {"method": "rls"}, {"method": "window", "window": "10s"}, {"method": "rpem", "nd": (1, 2)}):
+    for keywords in (
+        {"method": "physical"},
+        {"method": "rls"},
+        {"method": "window", "window": "10s"},
+        {"method": "rpem", "nd": (1, 2)},
+    ):
         tracker = pyhoid.Tracker(sample_time=0.01, nk=29, **keywords)
         # In the warm-up as well as behind it.
         for first, last in ((0, 1500), (1500, 4000), (4000, 5000)):
@@ -151,8 +167,12 @@ def test_files(tmp_path: Path, c1: pyhoid.Record) -> None:
             np.testing.assert_array_equal(again[channel], c1[channel])
     negative = pyhoid.read(tmp_path / "a.csv", input="-e", start=10, stop=20)
     np.testing.assert_array_equal(negative.e, -c1.span(10, 20).e)
-    prepared = pyhoid.read(tmp_path / "a.csv", scale={"u": "2:rad"}, decimate=2, run_in=10, detrend="mean")
-    assert prepared.sample_time == 0.02 and prepared.units["u"] == "rad" and len(prepared.steps) == 4
+    prepared = pyhoid.read(
+        tmp_path / "a.csv", scale={"u": "2:rad"}, decimate=2, run_in=10, detrend="mean"
+    )
+    assert (
+        prepared.sample_time == 0.02 and prepared.units["u"] == "rad" and len(prepared.steps) == 4
+    )
     assert abs(prepared.u.mean()) < 1e-12
     trace = pyhoid.track(c1, "rls", nk=29, every=100)
     trace.write(tmp_path / "trace.csv", ["a comment"])
@@ -227,6 +247,8 @@ try:
 except AttributeError as error:
     print(error)
 """
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "module 'pyhoid' has no attribute 'nothing'"

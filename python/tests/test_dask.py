@@ -1,4 +1,4 @@
-"""A study over a cluster: the same bytes as on one machine, and a lost worker costs its shard alone."""
+"""A study on a cluster: the same bytes as on one machine; a lost worker costs only its shard."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import pyhoid
 import pyhoid.dask
 
 pytestmark = [
-    # Of the cluster's own making, as it comes and goes.
+    # The cluster itself causes these as it starts and stops.
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
@@ -39,7 +39,13 @@ def client() -> Iterator[Any]:
 
 def test_the_cluster_gives_the_same_bytes(client: Any, tmp_path: Path) -> None:
     seen: list[tuple[int, int]] = []
-    result = pyhoid.dask.study(PLAN, tmp_path / "cluster", client, shards=3, progress=lambda done, n: seen.append((done, n)))
+    result = pyhoid.dask.study(
+        PLAN,
+        tmp_path / "cluster",
+        client,
+        shards=3,
+        progress=lambda done, n: seen.append((done, n)),
+    )
     local = pyhoid.study(PLAN, tmp_path / "local")
     assert digests(result.directory) == digests(local.directory)
     assert seen == [(1, 3), (2, 3), (3, 3)]
@@ -75,6 +81,8 @@ def test_a_study_goes_on_with_the_shards_that_it_has(client: Any, tmp_path: Path
     with pytest.raises(Stopped):
         pyhoid.dask.study(PLAN, tmp_path / "cluster", client, shards=6, progress=stop)
     left: list[int] = []
-    result = pyhoid.dask.study(PLAN, tmp_path / "cluster", client, shards=6, progress=lambda count, of: left.append(count))
+    result = pyhoid.dask.study(
+        PLAN, tmp_path / "cluster", client, shards=6, progress=lambda count, of: left.append(count)
+    )
     assert left == [3, 4, 5, 6]
     assert digests(result.directory) == digests(pyhoid.study(PLAN, tmp_path / "local").directory)

@@ -39,7 +39,18 @@ def expected() -> pyhoid.Record:
         lambda x: np.ma.masked_invalid(x),
         lambda x: x.astype(object),
     ],
-    ids=["list", "tuple", "big-endian", "strided", "column", "reversed twice", "series", "series with times", "unmasked", "objects"],
+    ids=[
+        "list",
+        "tuple",
+        "big-endian",
+        "strided",
+        "column",
+        "reversed twice",
+        "series",
+        "series with times",
+        "unmasked",
+        "objects",
+    ],
 )
 def test_each_of_these_is_the_same_signal(of: Any) -> None:
     record = pyhoid.Record(e=of(values()), u=of(values(1)), sample_time=0.01)
@@ -68,7 +79,7 @@ def test_other_numbers_are_converted() -> None:
         (np.where(np.arange(N) == 7, np.nan, values()), "channel e: the value at sample 7 is NaN"),
         (np.where(np.arange(N) == 7, np.inf, values()), "channel e: the value at sample 7 is inf"),
         ([None] * N, "at sample 0 is NaN"),
-        ([object()] * N, "no number"),
+        ([object()] * N, "not a number"),
         ([], "no samples"),
         (3.0, "expected one dimension"),
     ],
@@ -94,11 +105,13 @@ def test_what_is_wrong_is_said(e: Any, message: str) -> None:
         ({"fix": {"d1": "x"}}, "numbers by name"),
         ({"fix": {"q7": 0.0}, "nk": 29, "nd": 1}, "q7"),
         ({"bound": {"b0": (1, 0)}, "nk": 29, "nd": 1}, "bound: b0"),
-        ({"criterion": "best"}, "criterion is \"best\""),
+        ({"criterion": "best"}, 'criterion is "best"'),
         ({"progress": 3}, "progress is 3"),
     ],
 )
-def test_options_that_have_no_meaning(c1: pyhoid.Record, keywords: dict[str, Any], message: str) -> None:
+def test_options_that_have_no_meaning(
+    c1: pyhoid.Record, keywords: dict[str, Any], message: str
+) -> None:
     with pytest.raises(pyhoid.OptionError, match=message) as caught:
         pyhoid.identify(c1, **keywords)
     assert isinstance(caught.value, ValueError)
@@ -109,7 +122,7 @@ def test_options_that_have_no_meaning(c1: pyhoid.Record, keywords: dict[str, Any
 @pytest.mark.parametrize(
     ("keywords", "message"),
     [
-        ({"method": "nothing"}, "method is \"nothing\""),
+        ({"method": "nothing"}, 'method is "nothing"'),
         ({"method": "rls", "bound": {"K_e": (0, 1)}}, "bound belongs to"),
         ({"method": "rpem", "memory": 0.5}, "memory"),
         ({"method": "rpem", "forgetting_factor": 1.5}, "above 0 and up to 1"),
@@ -120,7 +133,9 @@ def test_options_that_have_no_meaning(c1: pyhoid.Record, keywords: dict[str, Any
         ({"moving_average": -1.0}, "moving_average"),
     ],
 )
-def test_recursions_that_have_no_meaning(c1: pyhoid.Record, keywords: dict[str, Any], message: str) -> None:
+def test_recursions_that_have_no_meaning(
+    c1: pyhoid.Record, keywords: dict[str, Any], message: str
+) -> None:
     with pytest.raises(pyhoid.OptionError, match=message):
         pyhoid.track(c1, **keywords)
 
@@ -143,7 +158,9 @@ def test_other_errors(c1: pyhoid.Record, tmp_path: Path) -> None:
     with pytest.raises(pyhoid.DataError):
         pyhoid.identify(c1.span(0, 0.1), nk=3)
     with pytest.raises(pyhoid.Error):
-        pyhoid.identify(pyhoid.Record(e=np.zeros(500), u=np.zeros(500), sample_time=0.01), "arx", nk=1)
+        pyhoid.identify(
+            pyhoid.Record(e=np.zeros(500), u=np.zeros(500), sample_time=0.01), "arx", nk=1
+        )
     with pytest.raises(pyhoid.OptionError):
         pyhoid.Record(e=values(), u=values(1), sample_time=-1)
     with pytest.raises(pyhoid.OptionError):
@@ -155,12 +172,14 @@ def test_other_errors(c1: pyhoid.Record, tmp_path: Path) -> None:
     with pytest.raises(KeyError, match="there is no channel"):
         _ = c1["nothing"]
     with pytest.warns(UserWarning, match="text.csv"):
-        (tmp_path / "text.csv").write_text("t,e,u,who\n" + "".join(f"{k / 100},{k % 7},{k % 5},me\n" for k in range(50)))
+        (tmp_path / "text.csv").write_text(
+            "t,e,u,who\n" + "".join(f"{k / 100},{k % 7},{k % 5},me\n" for k in range(50))
+        )
         pyhoid.read(tmp_path / "text.csv")
 
 
 def test_arrays_are_not_copied() -> None:
-    """Where the layout allows: a record is a view, a span of it too, and an update reads the arrays themselves."""
+    """Where the layout allows: records and spans are views, and an update reads the arrays."""
     n = 2_000_000
     e, u = (np.random.default_rng(k).normal(size=n) for k in (0, 1))
     tracker = pyhoid.Tracker("rls", structure="arx", na=1, nb=1, nk=1, start="nothing")
@@ -174,7 +193,8 @@ def test_arrays_are_not_copied() -> None:
         updated = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    # What the module itself allocates, the interpreter does not see: the largest resident size of a process of its own tells it.
+    # The interpreter does not see what the module itself allocates. The largest resident size of a
+    # separate process tells.
     program = (
         "import resource, numpy, pyhoid\n"
         "e, u = (numpy.random.default_rng(k).normal(size=4_000_000) for k in (0, 1))\n"
@@ -185,7 +205,11 @@ def test_arrays_are_not_copied() -> None:
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)\n"
     )
     if sys.platform == "linux":
-        grown = int(subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout)
+        grown = int(
+            subprocess.run(
+                [sys.executable, "-c", program], capture_output=True, text=True, check=True
+            ).stdout
+        )
         assert grown < 8_000, "kB; a copy of one array would be 32 000"
     assert np.shares_memory(record.e, e) and np.shares_memory(part.u, u)
     assert not record.u.flags.writeable

@@ -44,7 +44,9 @@ def test_bode_and_describing_function(fit: pyhoid.Fit, c1: pyhoid.Record, tmp_pa
     magnitude, phase = plots.bode(fit, np.geomspace(0.1, 50, 40))
     assert magnitude.get_xscale() == "log" and phase.get_ylabel() == "phase (deg)"
     assert len(magnitude.collections) == 1
-    found = pyhoid.describing_function([pyhoid.simulate("C1", seed=2, replication=k) for k in range(3)])
+    found = pyhoid.describing_function(
+        [pyhoid.simulate("C1", seed=2, replication=k) for k in range(3)]
+    )
     axes = plots.describing(found, {"BJ": fit})
     assert "describing function" in axes[0].get_legend_handles_labels()[1]
     drawn(axes[0], tmp_path)

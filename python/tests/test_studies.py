@@ -44,7 +44,10 @@ orders.nk = 29
 
 
 def digests(directory: Path) -> dict[str, str]:
-    return {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in sorted(directory.glob("*.parquet"))}
+    return {
+        file.name: hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in sorted(directory.glob("*.parquet"))
+    }
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +78,9 @@ def test_tables(whole: pyhoid.Results) -> None:
         pyhoid.results(whole.directory / "nothing")
 
 
-def test_the_command_line_writes_the_same_bytes(whole: pyhoid.Results, cli: Any, tmp_path: Path) -> None:
+def test_the_command_line_writes_the_same_bytes(
+    whole: pyhoid.Results, cli: Any, tmp_path: Path
+) -> None:
     plan = tmp_path / "plan.toml"
     plan.write_text(PLAN)
     cli.run("study", "run", plan, "--out", tmp_path / "out")
@@ -104,13 +109,16 @@ def test_an_interrupt_stops_within_a_second_and_nothing_is_lost(tmp_path: Path) 
         "import pyhoid, sys\n"
         "print('begun', flush=True)\n"
         "plan = open(sys.argv[1]).read()\n"
-        "pyhoid.study(plan, sys.argv[2], resume=True, progress=lambda done, total: print(done, flush=True))\n"
+        "show = lambda done, total: print(done, flush=True)\n"
+        "pyhoid.study(plan, sys.argv[2], resume=True, progress=show)\n"
     )
     plan = PLAN.replace("replications = 12", "replications = 400")
     (tmp_path / "plan.toml").write_text(plan)
     running = subprocess.Popen(
         [sys.executable, "-c", program, str(tmp_path / "plan.toml"), str(tmp_path / "out")],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     assert running.stdout is not None
     for line in running.stdout:
@@ -128,7 +136,9 @@ def test_an_interrupt_stops_within_a_second_and_nothing_is_lost(tmp_path: Path) 
 
 
 def test_a_group(cli: Any, tmp_path: Path) -> None:
-    cli.run("simulate-group", "--subjects", 2, "--runs", 2, "--conditions", "C1", "--out", tmp_path / "runs")
+    cli.run(
+        *"simulate-group --subjects 2 --runs 2 --conditions C1 --out".split(), tmp_path / "runs"
+    )
     text, others = pyhoid.group_manifest(tmp_path / "runs")
     assert "[[runs]]" in text and "truth.csv" in others
     found = pyhoid.group(tmp_path / "runs", tmp_path / "group")

@@ -20,4 +20,11 @@ def use(e: npt.NDArray[np.float64], u: list[float]) -> float:
     tracker = pyhoid.Tracker("rpem", nk=29, sample_time=0.01)
     innovation: float = tracker.step(0.1, 0.2)
     change = pyhoid.identify([record], "time-varying", delay=(0.2, 0.3)).change
-    return gain + innovation + float(column[0]) + float(abs(response[0])) + len(change) + (0 if covariance is None else 1)
+    return (
+        gain
+        + innovation
+        + float(column[0])
+        + float(abs(response[0]))
+        + len(change)
+        + (0 if covariance is None else 1)
+    )

@@ -1,7 +1,8 @@
 //! The native module of the Python package `pyhoid`: conversion only.
 //!
-//! What is computed is computed in the libraries; what a person writes and reads is in `python/src/pyhoid`, which brings arguments into a plain
-//! form (floats, contiguous arrays, dictionaries) and wraps the results. Long work runs without the interpreter.
+//! The libraries compute; what people write and read is in `python/src/pyhoid`, which brings
+//! arguments into plain form (floats, contiguous arrays, dictionaries) and wraps the results. Long
+//! work runs without the interpreter.
 //!
 //! | module | what it holds |
 //! |---|---|

@@ -126,7 +126,7 @@ impl PyPlan {
         )
     }
 
-    /// Runs it, or a share of it, into a directory.
+    /// Runs the plan, or a share of it, and writes its tables into a directory.
     #[pyo3(signature = (directory, *, shard, jobs, resume, csv, progress))]
     #[allow(clippy::too_many_arguments)]
     fn run(
@@ -179,7 +179,7 @@ pub fn merge_shards(py: Python<'_>, shards: Vec<PathBuf>, directory: PathBuf, cs
 /// Index page, number of tables and figures, tally of the claims.
 type Reproduced = (PathBuf, usize, Option<[usize; 4]>);
 
-/// Makes the tables, figures and claims of the reference text; nothing where an interrupt came first.
+/// Makes the tables, figures and claims of the reference text; `None` after an interrupt.
 #[pyfunction]
 #[pyo3(signature = (directory, *, only, replications, jobs, progress))]
 pub fn reproduce(

@@ -61,7 +61,7 @@ impl PyTimeVaryingFit {
         Ok(all)
     }
 
-    /// Whether there is a change, and its comparison with the operator that does not change.
+    /// Whether there is a change, and the comparison with an operator that does not change.
     #[getter]
     fn change<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (c, all) = (self.fit.comparison(), PyDict::new(py));

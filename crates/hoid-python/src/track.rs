@@ -19,7 +19,7 @@ use crate::{
     interrupt, recursion,
 };
 
-/// Tracks a record; `options` are those of the recursion, all besides concern the record.
+/// Tracks a record; `options` are those of the recursion, the others concern the record.
 #[pyfunction]
 #[pyo3(signature = (record, options, *, start_span, update_from, moving_average, every, progress))]
 #[allow(clippy::too_many_arguments)]
@@ -145,7 +145,7 @@ impl PyTrace {
         Some(PyFit::new(fit, self.choice.clone(), None, 1))
     }
 
-    /// All columns by name, as in the file of a trace: numbers, and whole numbers as such.
+    /// All columns by name, as in a trace file; whole numbers stay whole.
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let trace = &self.trace;
         let (columns, convertible) = py.detach(|| {
@@ -182,7 +182,8 @@ impl PyTrace {
         figures::operator(py, &self.trace.operator(row))
     }
 
-    /// Writes the page about the trace into a directory, with the batch fits of the start and of the last third.
+    /// Writes the page about the trace into a directory, with the batch fits of the start and of
+    /// the last third.
     #[pyo3(signature = (record, directory, *, title, settings))]
     fn report(
         &self,
@@ -217,7 +218,7 @@ impl PyTrace {
         Ok(page)
     }
 
-    /// Writes the columns into a file, with comments above them where the format has such.
+    /// Writes the columns into a file, with comments where the format has them.
     fn write(&self, py: Python<'_>, path: PathBuf, comments: Vec<String>) -> Outcome<()> {
         let trace = &self.trace;
         py.detach(|| {

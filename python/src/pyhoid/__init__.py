@@ -36,8 +36,8 @@ from .estimates import Estimate, Operator, Remnant
 from .fit import Fit, FrequencyResponse, Series, Validation
 from .groups import group, group_manifest, simulate_group
 from .identification import identify
-from .record import Record
 from .reading import info, read, read_stretches, write
+from .record import Record
 from .reproduction import Reproduction, reproduce
 from .simulation import margins, simulate
 from .studies import Plan, Results, Table, merge, plan, plans, results, study

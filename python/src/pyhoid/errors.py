@@ -1,7 +1,7 @@
-"""Exceptions of hoid, by kind.
+"""Exceptions of pyhoid, by kind.
 
-Every one is a `pyhoid.Error`; where Python people expect another base as well (`ValueError` for a wrong value, `OSError` for files), it is
-that too. The messages name the quantity, what was found, what was expected, and the remedy.
+Each is a `pyhoid.Error`, and also a `ValueError` for a wrong value or an `OSError` for a file. The
+messages name the quantity, what was found, what was expected, and the remedy.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ __all__ = [
 
 
 class Error(Exception):
-    """Base of all exceptions of hoid."""
+    """Base of all exceptions of pyhoid."""
 
 
 class OptionError(Error, ValueError):
-    """An option out of its range, unknown, or without meaning beside the others."""
+    """An option that is out of range, unknown, or does not fit the other options."""
 
 
 class DataError(Error, ValueError):
-    """Data that cannot give a result: not finite, of unequal length, too short, without excitation."""
+    """Data that cannot give a result: not finite, unequal lengths, too short, no excitation."""
 
 
 class EstimationError(Error, ArithmeticError):
-    """An estimation that has no result: singular regressors, no finite loss."""
+    """An estimation without a result: singular regressors, no finite loss."""
 
 
 class NotConvertibleError(Error, ValueError):
-    """A model that stands for no operator; the message says why."""
+    """A model that does not represent an operator; the message says why."""
 
 
 class FileError(Error, OSError):
@@ -48,8 +48,11 @@ class FileMissingError(FileError, FileNotFoundError):
 
 
 class FormatError(Error, ValueError):
-    """A file whose content is not what was expected; the message names the place in it."""
+    """A file with unexpected content; the message names the place in it."""
 
 
 class StudyStateError(Error, RuntimeError):
-    """A directory of a study that does not allow what was asked for: occupied, of another plan, with shards missing."""
+    """A study directory in which the request is not possible.
+
+    It is occupied, belongs to another plan, or lacks shards.
+    """
