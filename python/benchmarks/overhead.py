@@ -1,7 +1,7 @@
 """What Python adds: a fit and a step, two threads, and the memory of large arrays.
 
-Compare the first lines with those of ``cargo run --release -p hoid --example overhead``, on a machine at rest, with a release build of the
-module (``pip install ./python``).
+Compare the first lines with those of ``cargo run --release -p hoid --example overhead``, on a
+machine at rest, with a release build of the module (``pip install ./python``).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-import hoid
+import pyhoid
 
 
 def times(runs: int, work: Callable[[], object]) -> list[float]:
@@ -35,14 +35,14 @@ def best(runs: int, work: Callable[[], object]) -> float:
 
 
 def main() -> None:
-    record = hoid.simulate("C1", seed=1)
+    record = pyhoid.simulate("C1", seed=1)
     for structure, runs, orders in (("arx", 400, {}), ("bj", 200, {"nd": 1})):
-        seconds = median(runs, lambda: hoid.identify(record, structure, nk=29, **orders))
+        seconds = median(runs, lambda: pyhoid.identify(record, structure, nk=29, **orders))
         print(f"identify {structure:4}  {seconds * 1e6:9.1f} us")
-    start = hoid.identify(record, nk=29, nd=1).parameters
+    start = pyhoid.identify(record, nk=29, nd=1).parameters
     e, u = record.e.tolist(), record.u.tolist()
     for method in ("rpem", "physical"):
-        tracker = hoid.Tracker(method, nk=29, start=start)
+        tracker = pyhoid.Tracker(method, nk=29, start=start)
         step = tracker.step
 
         def steps() -> None:
@@ -55,22 +55,27 @@ def main() -> None:
 
     def fits(_: int) -> None:
         for _ in range(200):
-            hoid.identify(record, nk=29, nd=1)
+            pyhoid.identify(record, nk=29, nd=1)
 
     # The best of some: what else runs on the machine takes from two threads more than from one.
     one = best(7, lambda: fits(0))
     with ThreadPoolExecutor(2) as pool:
         two = best(7, lambda: list(pool.map(fits, range(2))))
-    print(f"200 fits in one thread {one:.3f} s, 200 in each of two {two:.3f} s: {two / one:.2f} times")
+    print(
+        f"200 fits in one thread {one:.3f} s, 200 in each of two {two:.3f} s: {two / one:.2f} times"
+    )
 
     n = 10_000_000
     e, u = (np.random.default_rng(k).normal(size=n) for k in (0, 1))
-    tracker = hoid.Tracker("rls", structure="arx", na=1, nb=1, nk=1, start="nothing")
+    tracker = pyhoid.Tracker("rls", structure="arx", na=1, nb=1, nk=1, start="nothing")
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    hoid.Record(e=e, u=u, sample_time=0.01)
+    pyhoid.Record(e=e, u=u, sample_time=0.01)
     made = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     tracker.update(e[: n // 2], u[: n // 2])
-    print(f"arrays of {2 * e.nbytes / 1e6:.0f} MB: resident memory grows by {(made - before) / 1e3:.0f} MB while a record is made (its check)")
+    print(
+        f"arrays of {2 * e.nbytes / 1e6:.0f} MB: resident memory grows by"
+        f" {(made - before) / 1e3:.0f} MB while a record is made (its check)"
+    )
 
 
 if __name__ == "__main__":

@@ -11,24 +11,24 @@ from typing import Any
 
 import pytest
 
-import hoid
+import pyhoid
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 
 @pytest.fixture(scope="session")
-def c1() -> hoid.Record:
-    return hoid.simulate("C1", seed=1)
+def c1() -> pyhoid.Record:
+    return pyhoid.simulate("C1", seed=1)
 
 
 @pytest.fixture(scope="session")
-def c4() -> hoid.Record:
-    return hoid.simulate("C4", seed=1)
+def c4() -> pyhoid.Record:
+    return pyhoid.simulate("C4", seed=1)
 
 
 @pytest.fixture(scope="session")
-def fit(c1: hoid.Record) -> hoid.Fit:
-    return hoid.identify(c1, "bj", nb=2, nd=1, nf=2, nk=29)
+def fit(c1: pyhoid.Record) -> pyhoid.Fit:
+    return pyhoid.identify(c1, "bj", nb=2, nd=1, nf=2, nk=29)
 
 
 class CommandLine:
@@ -38,7 +38,9 @@ class CommandLine:
         self.binary = binary
 
     def run(self, *arguments: Any) -> str:
-        done = subprocess.run([self.binary, *map(str, arguments)], capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [self.binary, *map(str, arguments)], capture_output=True, text=True, check=False
+        )
         assert done.returncode == 0, done.stderr
         return done.stdout
 
@@ -49,7 +51,11 @@ class CommandLine:
 @pytest.fixture(scope="session")
 def cli() -> CommandLine:
     built = Path(__file__).parents[2] / "target" / "debug" / "hoid"
-    binary = os.environ.get("HOID_BINARY") or (str(built) if built.exists() else shutil.which("hoid"))
+    binary = os.environ.get("HOID_BINARY") or (
+        str(built) if built.exists() else shutil.which("hoid")
+    )
     if not binary:
-        pytest.skip("no hoid binary: build it by cargo build -p hoid-cli, or name it in HOID_BINARY")
+        pytest.skip(
+            "no hoid binary: build it by cargo build -p hoid-cli, or name it in HOID_BINARY"
+        )
     return CommandLine(binary)

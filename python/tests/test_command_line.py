@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import hoid
+import pyhoid
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def same(pair: Any, found: dict[str, Any]) -> None:
     assert pair.standard_error == found["standard_error"]
 
 
-def same_fit(fit: hoid.Fit, found: dict[str, Any]) -> None:
+def same_fit(fit: pyhoid.Fit, found: dict[str, Any]) -> None:
     assert fit.structure == found["structure"]
     assert fit.orders == found["orders"]
     assert list(fit.parameters) == [p["name"] for p in found["parameters"]]
@@ -56,7 +56,7 @@ def same_fit(fit: hoid.Fit, found: dict[str, Any]) -> None:
 
 
 def test_simulate(run: Path) -> None:
-    record, simulated = hoid.read(run), hoid.simulate("C4", seed=3)
+    record, simulated = pyhoid.read(run), pyhoid.simulate("C4", seed=3)
     assert record.names[:2] == ["e", "u"] and set(record.names) == set(simulated.names)
     for name in simulated.names:
         np.testing.assert_array_equal(record[name], simulated[name], err_msg=name)
@@ -69,17 +69,33 @@ def test_simulate(run: Path) -> None:
         ({}, []),
         ({"structure": "bj", "nk": 29, "nd": 2}, ["--nk", 29, "--orders", "nd=2"]),
         ({"structure": "arx", "nk": (20, 35)}, ["--structure", "arx", "--nk", "20..35"]),
-        ({"structure": "armax", "na": 2, "nb": 2, "nc": 1, "nk": 29}, ["--structure", "armax", "--orders", "na=2,nb=2,nc=1", "--nk", 29]),
-        ({"method": "rivbj", "nk": 29, "nd": 1}, ["--method", "rivbj", "--nk", 29, "--orders", "nd=1"]),
-        ({"structure": "grey-box", "remnant_order": 1}, ["--structure", "grey-box", "--remnant-order", 1]),
         (
-            {"structure": "bj", "nk": 29, "nd": 1, "robust": True, "fix": {"d1": -0.85}, "bound": {"b0": (0, None)}},
+            {"structure": "armax", "na": 2, "nb": 2, "nc": 1, "nk": 29},
+            ["--structure", "armax", "--orders", "na=2,nb=2,nc=1", "--nk", 29],
+        ),
+        (
+            {"method": "rivbj", "nk": 29, "nd": 1},
+            ["--method", "rivbj", "--nk", 29, "--orders", "nd=1"],
+        ),
+        (
+            {"structure": "grey-box", "remnant_order": 1},
+            ["--structure", "grey-box", "--remnant-order", 1],
+        ),
+        (
+            {
+                "structure": "bj",
+                "nk": 29,
+                "nd": 1,
+                "robust": True,
+                "fix": {"d1": -0.85},
+                "bound": {"b0": (0, None)},
+            },
             ["--nk", 29, "--orders", "nd=1", "--robust", "--fix", "d1=-0.85", "--bound", "b0=0.."],
         ),
     ],
 )
 def test_identify(run: Path, cli: Any, keywords: dict[str, Any], options: list[Any]) -> None:
-    fit = hoid.identify(hoid.read(run), **keywords)
+    fit = pyhoid.identify(pyhoid.read(run), **keywords)
     found = cli.json("identify", run, *options)
     same_fit(fit, found)
     if not keywords:
@@ -88,9 +104,9 @@ def test_identify(run: Path, cli: Any, keywords: dict[str, Any], options: list[A
 
 
 def test_identify_a_change(run: Path, cli: Any) -> None:
-    fit = hoid.identify(hoid.read(run), "time-varying", delay=(0.27, 0.29))
+    fit = pyhoid.identify(pyhoid.read(run), "time-varying", delay=(0.27, 0.29))
     found = cli.json("identify", run, "--structure", "time-varying", "--delay", "0.27..0.29")
-    assert isinstance(fit, hoid.TimeVaryingFit)
+    assert isinstance(fit, pyhoid.TimeVaryingFit)
     for p in found["parameters"]:
         same(fit.estimates[p["name"]], p)
     assert fit.change["found"] == found["change"]["found"] is True
@@ -102,63 +118,96 @@ def test_identify_a_change(run: Path, cli: Any) -> None:
     ("keywords", "options"),
     [
         ({}, []),
-        ({"method": "rls", "nk": 29, "memory": 256}, ["--method", "rls", "--nk", 29, "--memory", 256]),
         (
-            {"method": "rpem", "nk": 29, "nd": 1, "memory_of": {"b": "2.56s", "f": "inf"}, "covariance": 0.1, "moving_average": 0.5},
-            ["--method", "rpem", "--nk", 29, "--orders", "nd=1", "--memory-of", "b=2.56s,f=inf", "--covariance", 0.1,
-             "--moving-average", 0.5],
+            {"method": "rls", "nk": 29, "memory": 256},
+            ["--method", "rls", "--nk", 29, "--memory", 256],
+        ),
+        (
+            {
+                "method": "rpem",
+                "nk": 29,
+                "nd": 1,
+                "memory_of": {"b": "2.56s", "f": "inf"},
+                "covariance": 0.1,
+                "moving_average": 0.5,
+            },
+            [
+                *("--method", "rpem", "--nk", 29, "--orders", "nd=1"),
+                *("--memory-of", "b=2.56s,f=inf", "--covariance", 0.1, "--moving-average", 0.5),
+            ],
         ),
         ({"method": "adaptive", "nk": 29}, ["--method", "adaptive", "--nk", 29]),
-        ({"method": "adaptive", "nk": 29, "smooth": True}, ["--method", "adaptive", "--nk", 29, "--smooth"]),
+        (
+            {"method": "adaptive", "nk": 29, "smooth": True},
+            ["--method", "adaptive", "--nk", 29, "--smooth"],
+        ),
         (
             {"method": "rriv", "nk": 29, "nd": 1, "every": 7},
             ["--method", "rriv", "--nk", 29, "--orders", "nd=1", "--every", 7],
         ),
     ],
 )
-def test_track(run: Path, cli: Any, tmp_path: Path, keywords: dict[str, Any], options: list[Any]) -> None:
-    trace = hoid.track(hoid.read(run), **keywords)
+def test_track(
+    run: Path, cli: Any, tmp_path: Path, keywords: dict[str, Any], options: list[Any]
+) -> None:
+    trace = pyhoid.track(pyhoid.read(run), **keywords)
     file = tmp_path / "trace.csv"
     found = cli.json("track", run, *options, "--out", file)
-    rows = list(csv.reader(line for line in file.read_text().splitlines() if not line.startswith("#")))
+    rows = list(
+        csv.reader(line for line in file.read_text().splitlines() if not line.startswith("#"))
+    )
     assert rows[0] == list(trace.columns)
     assert len(rows) - 1 == len(trace) == found["rows"]
     for i, name in enumerate(rows[0]):
         column = np.array([float(row[i]) if row[i] else math.nan for row in rows[1:]])
         np.testing.assert_array_equal(trace[name], column, err_msg=name)
     assert trace.counts["steps_shortened"] == found["steps_shortened"]
-    assert [change["t"] for change in trace.changes] == [change["t"] for change in found.get("changes", [])]
+    assert [change["t"] for change in trace.changes] == [
+        change["t"] for change in found.get("changes", [])
+    ]
     assert trace.start is not None and found["start"]["orders"] == trace.start.orders
 
 
 def test_convert_and_margins(cli: Any) -> None:
     found = cli.json("convert", "--f", "-1.91,0.92", "--b", "0.044,-0.043", "--nk", 29)
-    here = hoid.convert(f=(-1.91, 0.92), b=(0.044, -0.043), nk=29)
+    here = pyhoid.convert(f=(-1.91, 0.92), b=(0.044, -0.043), nk=29)
     for name, pair in here.operator.items():
         assert pair.value == found["operator"][name]["value"]
-    back = cli.json("convert", "--operator", "K_e=.09,K_e_dot=.036,omega_nm=11.25,zeta_nm=.35,tau_e=.28")
-    discrete = hoid.convert(operator={"K_e": 0.09, "K_e_dot": 0.036, "omega_nm": 11.25, "zeta_nm": 0.35, "tau_e": 0.28})
+    back = cli.json(
+        "convert", "--operator", "K_e=.09,K_e_dot=.036,omega_nm=11.25,zeta_nm=.35,tau_e=.28"
+    )
+    discrete = pyhoid.convert(
+        operator={"K_e": 0.09, "K_e_dot": 0.036, "omega_nm": 11.25, "zeta_nm": 0.35, "tau_e": 0.28}
+    )
     assert [*discrete.f] == back["discrete"]["f"] and [*discrete.b] == back["discrete"]["b"]
     transfer = cli.json("convert", "--transfer-function", "1,2/1,3,4", "--method", "tustin")
-    num, den, _ = hoid.discretise([1, 2], [1, 3, 4], method="tustin")
-    assert num.tolist() == transfer["transfer_function"]["num"] and den.tolist() == transfer["transfer_function"]["den"]
-    assert hoid.margins("C2", noise_levels=[0.1, 0.5]) == cli.json("margins", "--condition", "C2", "--noise-levels", "0.1,0.5")
+    num, den, _ = pyhoid.discretise([1, 2], [1, 3, 4], method="tustin")
+    assert (
+        num.tolist() == transfer["transfer_function"]["num"]
+        and den.tolist() == transfer["transfer_function"]["den"]
+    )
+    assert pyhoid.margins("C2", noise_levels=[0.1, 0.5]) == cli.json(
+        "margins", "--condition", "C2", "--noise-levels", "0.1,0.5"
+    )
 
 
 def test_stream_and_tracker(run: Path, cli: Any) -> None:
-    record = hoid.read(run)
-    tracker = hoid.Tracker("rpem", nk=29, nd=1, sample_time=0.01)
+    record = pyhoid.read(run)
+    tracker = pyhoid.Tracker("rpem", nk=29, nd=1, sample_time=0.01)
     tracker.update(record.e, record.u)
     import json
     import subprocess
 
     lines = "".join(f"{e!r},{u!r}\n" for e, u in zip(record.e.tolist(), record.u.tolist()))
     done = subprocess.run(
-        [cli.binary, "stream", "--method", "rpem", "--nk", "29", "--orders", "nd=1", "--fs", "100", "--every", "1000"],
-        input=lines, capture_output=True, text=True, check=True,
+        [cli.binary, *"stream --method rpem --nk 29 --orders nd=1 --fs 100 --every 1000".split()],
+        input=lines,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     last = json.loads(done.stdout.splitlines()[-1])
-    again = hoid.Tracker("rpem", nk=29, nd=1, sample_time=0.01)
+    again = pyhoid.Tracker("rpem", nk=29, nd=1, sample_time=0.01)
     again.update(record.e[:8000], record.u[:8000])
     for name, value in last["parameters"].items():
         number = value["value"] if isinstance(value, dict) else value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import subprocess
 import sys
 import threading
 import time
@@ -11,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import hoid
+import pyhoid
 
 
-def test_a_fit_and_its_parts(fit: hoid.Fit, c1: hoid.Record) -> None:
+def test_a_fit_and_its_parts(fit: pyhoid.Fit, c1: pyhoid.Record) -> None:
     assert fit.orders == {"na": 0, "nb": 2, "nc": 0, "nd": 1, "nf": 2, "nk": 29}
     covariance = fit.covariance
     assert covariance is not None and covariance.shape == (5, 5) and covariance.dtype == np.float64
@@ -34,14 +35,19 @@ def test_a_fit_and_its_parts(fit: hoid.Fit, c1: hoid.Record) -> None:
     validation = fit.validate(c1)
     assert validation.quality == fit.quality
     correlation = validation.autocorrelation
-    assert correlation.lags[0] == 1 and np.mean(np.abs(correlation.values) > correlation.bound_99) < 0.1
+    assert (
+        correlation.lags[0] == 1
+        and np.mean(np.abs(correlation.values) > correlation.bound_99) < 0.1
+    )
     margins = fit.margins([90], [1, 6, 0])
     crossover = margins["crossover_rad_s"]
-    assert crossover is not None and crossover.value == pytest.approx(hoid.margins("C1")["crossover_rad_s"], rel=0.1)
+    assert crossover is not None and crossover.value == pytest.approx(
+        pyhoid.margins("C1")["crossover_rad_s"], rel=0.1
+    )
     assert fit.predict(c1, horizon=10).values.std() < c1.u.std()
 
 
-def test_a_response_is_that_of_the_polynomials(fit: hoid.Fit) -> None:
+def test_a_response_is_that_of_the_polynomials(fit: pyhoid.Fit) -> None:
     omega = np.array([0.3, 1.0, 5.0, 20.0])
     found = fit.frequency_response(omega)
     z = np.exp(1j * omega * fit.sample_time)
@@ -51,68 +57,79 @@ def test_a_response_is_that_of_the_polynomials(fit: hoid.Fit) -> None:
     assert np.all(found.magnitude_db_se > 0)
 
 
-def test_texts(fit: hoid.Fit, c1: hoid.Record) -> None:
+def test_texts(fit: pyhoid.Fit, c1: pyhoid.Record) -> None:
     text = repr(fit)
     for word in ("BJ(nb=2", "f1", "K_e", "deg/deg", "T_n", "VAF", "BIC"):
         assert word in text
     assert "<table>" in fit._repr_html_() and "<table>" in c1._repr_html_()
-    assert "±" in repr(hoid.Estimate(0.09201, 0.0023)) and repr(hoid.Estimate(0.28, None)) == "0.28"
+    assert (
+        "±" in repr(pyhoid.Estimate(0.09201, 0.0023))
+        and repr(pyhoid.Estimate(0.28, None)) == "0.28"
+    )
 
 
 def test_what_does_not_convert_says_why() -> None:
-    found = hoid.convert(f=(0.5, 0.01), b=(0.1, 0.1), nk=3).operator
+    found = pyhoid.convert(f=(0.5, 0.01), b=(0.1, 0.1), nk=3).operator
     assert not found.convertible and found.reason
-    with pytest.raises(hoid.NotConvertibleError, match="not convertible"):
+    with pytest.raises(pyhoid.NotConvertibleError, match="not convertible"):
         _ = found.K_e
     with pytest.raises(ValueError):
         _ = found["K_e"]
     assert "not convertible" in repr(found)
 
 
-def test_tables(fit: hoid.Fit, c1: hoid.Record, c4: hoid.Record) -> None:
+def test_tables(fit: pyhoid.Fit, c1: pyhoid.Record, c4: pyhoid.Record) -> None:
     table = fit.to_pandas()
     assert table.loc["K_e", "unit"] == "deg/deg" and np.isnan(table.loc["tau_e", "standard_error"])
     dataset = fit.to_xarray()
     assert float(dataset.value.sel(parameter="f1")) == fit.parameters["f1"]
     frame = c1.to_pandas()
-    again = hoid.Record.from_pandas(frame)
+    again = pyhoid.Record.from_pandas(frame)
     assert len(again) == len(c1) and again.sample_time == pytest.approx(0.01)
     np.testing.assert_array_equal(again.u, c1.u)
     assert c1.to_xarray().u.attrs["units"] == "deg"
-    trace = hoid.track(c4, "rls", nk=29, every=10)
+    trace = pyhoid.track(c4, "rls", nk=29, every=10)
     assert trace.to_pandas().index.name == "t" and trace.to_polars().height == len(trace)
     assert trace.to_xarray().K_e.attrs["units"] == "deg/deg"
 
 
-def test_control_there_and_back(fit: hoid.Fit) -> None:
+def test_control_there_and_back(fit: pyhoid.Fit) -> None:
     import control
 
     system = fit.to_control()
     omega = np.array([0.5, 2.0, 8.0])
     response = np.array([complex(control.evalfr(system, np.exp(1j * w * 0.01))) for w in omega])
     np.testing.assert_allclose(response, fit.frequency_response(omega).response, rtol=1e-8)
-    back = hoid.from_control(system)
+    back = pyhoid.from_control(system)
     assert back.nk == 29 and fit.operator is not None
     for name, pair in fit.operator.items():
         assert back.operator[name].value == pytest.approx(pair.value, rel=1e-9)
-    with pytest.raises(hoid.NotConvertibleError):
-        hoid.from_control(control.tf([1], [1, 2]))
+    with pytest.raises(pyhoid.NotConvertibleError):
+        pyhoid.from_control(control.tf([1], [1, 2]))
 
 
-def test_several_records_share_a_model(c1: hoid.Record) -> None:
-    other = hoid.simulate("C1", seed=1, replication=1)
-    both = hoid.identify([c1, other], nk=29, nd=1)
-    one = hoid.identify(c1, nk=29, nd=1)
+def test_several_records_share_a_model(c1: pyhoid.Record) -> None:
+    other = pyhoid.simulate("C1", seed=1, replication=1)
+    both = pyhoid.identify([c1, other], nk=29, nd=1)
+    one = pyhoid.identify(c1, nk=29, nd=1)
     ratio = both.standard_errors["f1"] / one.standard_errors["f1"]  # type: ignore[operator]
     assert ratio == pytest.approx(1 / np.sqrt(2), rel=0.15)
-    grey = hoid.identify([c1, other], "grey-box", remnant_order=1, delay=(0.28, 0.28), individual=["K_e"])
+    grey = pyhoid.identify(
+        [c1, other], "grey-box", remnant_order=1, delay=(0.28, 0.28), individual=["K_e"]
+    )
     operators = grey.operators
-    assert len(operators) == 2 and operators[0]["K_e"].value != operators[1]["K_e"].value  # type: ignore[index]
+    assert len(operators) == 2
+    assert operators[0]["K_e"].value != operators[1]["K_e"].value  # type: ignore[index]
 
 
-def test_a_tracker_goes_on_out_of_a_pickle(c4: hoid.Record) -> None:
-    for keywords in ({"method": "physical"}, {"method": "rls"}, {"method": "window", "window": "10s"}, {"method": "rpem", "nd": (1, 2)}):
-        tracker = hoid.Tracker(sample_time=0.01, nk=29, **keywords)
+def test_a_tracker_goes_on_out_of_a_pickle(c4: pyhoid.Record) -> None:
+    for keywords in (
+        {"method": "physical"},
+        {"method": "rls"},
+        {"method": "window", "window": "10s"},
+        {"method": "rpem", "nd": (1, 2)},
+    ):
+        tracker = pyhoid.Tracker(sample_time=0.01, nk=29, **keywords)
         # In the warm-up as well as behind it.
         for first, last in ((0, 1500), (1500, 4000), (4000, 5000)):
             copy = pickle.loads(pickle.dumps(tracker))
@@ -124,9 +141,9 @@ def test_a_tracker_goes_on_out_of_a_pickle(c4: hoid.Record) -> None:
         assert tracker.start_fit is not None and copy.start_fit is None
 
 
-def test_a_tracker_steps_as_it_updates_and_bridges_faults(c4: hoid.Record) -> None:
-    start = hoid.identify(c4.span(0, 30), nk=29, nd=1).parameters
-    one, other = (hoid.Tracker("rpem", nk=29, start=start, covariance=0.1) for _ in range(2))
+def test_a_tracker_steps_as_it_updates_and_bridges_faults(c4: pyhoid.Record) -> None:
+    start = pyhoid.identify(c4.span(0, 30), nk=29, nd=1).parameters
+    one, other = (pyhoid.Tracker("rpem", nk=29, start=start, covariance=0.1) for _ in range(2))
     assert one.ready
     e, u = c4.e[:500].copy(), c4.u[:500].copy()
     e[100], u[200], u[300] = np.nan, np.inf, 1e9
@@ -135,32 +152,36 @@ def test_a_tracker_steps_as_it_updates_and_bridges_faults(c4: hoid.Record) -> No
     assert np.isnan(stepped)[[100, 200, 300]].all() and one.counts["skipped"] == 3
     operator = one.operator_estimate()
     assert operator is not None
-    with pytest.raises(hoid.OptionError, match="warming up"):
-        _ = hoid.Tracker("rpem").theta
-    recorded = hoid.Tracker("rpem", nk=29, nd=1, record=c4.span(0, 30))
+    with pytest.raises(pyhoid.OptionError, match="warming up"):
+        _ = pyhoid.Tracker("rpem").theta
+    recorded = pyhoid.Tracker("rpem", nk=29, nd=1, record=c4.span(0, 30))
     assert recorded.ready and recorded.start_fit is not None
 
 
-def test_files(tmp_path: Path, c1: hoid.Record) -> None:
+def test_files(tmp_path: Path, c1: pyhoid.Record) -> None:
     for name in ("a.csv", "a.parquet", "a.npz", "a.mat"):
-        hoid.write(tmp_path / name, c1)
-        again = hoid.read(tmp_path / name)
+        pyhoid.write(tmp_path / name, c1)
+        again = pyhoid.read(tmp_path / name)
         assert again.names == c1.names and again.label == "a"
         for channel in c1.names:
             np.testing.assert_array_equal(again[channel], c1[channel])
-    negative = hoid.read(tmp_path / "a.csv", input="-e", start=10, stop=20)
+    negative = pyhoid.read(tmp_path / "a.csv", input="-e", start=10, stop=20)
     np.testing.assert_array_equal(negative.e, -c1.span(10, 20).e)
-    prepared = hoid.read(tmp_path / "a.csv", scale={"u": "2:rad"}, decimate=2, run_in=10, detrend="mean")
-    assert prepared.sample_time == 0.02 and prepared.units["u"] == "rad" and len(prepared.steps) == 4
+    prepared = pyhoid.read(
+        tmp_path / "a.csv", scale={"u": "2:rad"}, decimate=2, run_in=10, detrend="mean"
+    )
+    assert (
+        prepared.sample_time == 0.02 and prepared.units["u"] == "rad" and len(prepared.steps) == 4
+    )
     assert abs(prepared.u.mean()) < 1e-12
-    trace = hoid.track(c1, "rls", nk=29, every=100)
+    trace = pyhoid.track(c1, "rls", nk=29, every=100)
     trace.write(tmp_path / "trace.csv", ["a comment"])
     assert (tmp_path / "trace.csv").read_text().startswith("# a comment")
 
 
-def test_a_describing_function(c1: hoid.Record, fit: hoid.Fit) -> None:
-    runs = [hoid.simulate("C1", seed=1, replication=k) for k in range(8)]
-    found = hoid.describing_function(runs)
+def test_a_describing_function(c1: pyhoid.Record, fit: pyhoid.Fit) -> None:
+    runs = [pyhoid.simulate("C1", seed=1, replication=k) for k in range(8)]
+    found = pyhoid.describing_function(runs)
     model = fit.frequency_response(found.omega).response
     # Within four standard errors of eight runs.
     assert np.all(np.abs(found.response - model) < 4 * found["response_se"] + 0.05 * np.abs(model))
@@ -169,25 +190,25 @@ def test_a_describing_function(c1: hoid.Record, fit: hoid.Fit) -> None:
     assert 0.2 < simple["delay_s"].value < 0.5
     crossover = found.margins([90], [1, 6, 0])["crossover_rad_s"]
     assert crossover is not None and 0.5 < crossover.value < 4
-    with pytest.raises(hoid.DataError):
-        hoid.describing_function(c1, start=0, stop=50)
+    with pytest.raises(pyhoid.DataError):
+        pyhoid.describing_function(c1, start=0, stop=50)
 
 
-def test_progress_and_interrupt(c1: hoid.Record) -> None:
+def test_progress_and_interrupt(c1: pyhoid.Record) -> None:
     calls: list[tuple[int, int]] = []
-    hoid.identify(c1, nk=(27, 31), nd=1, progress=lambda done, total: calls.append((done, total)))
+    pyhoid.identify(c1, nk=(27, 31), nd=1, progress=lambda done, total: calls.append((done, total)))
     assert calls[-1] == (5, 5)
 
     def stop(done: int, total: int) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        hoid.identify(c1, progress=stop)
+        pyhoid.identify(c1, progress=stop)
 
 
 def test_fits_run_side_by_side() -> None:
     """The interpreter is free while a fit runs: another thread counts meanwhile."""
-    record = hoid.simulate("C1", seed=2)
+    record = pyhoid.simulate("C1", seed=2)
     counted, done = 0, threading.Event()
 
     def count() -> None:
@@ -199,7 +220,7 @@ def test_fits_run_side_by_side() -> None:
     thread = threading.Thread(target=count)
     thread.start()
     try:
-        hoid.identify(record, nk=(20, 40), nd=(1, 2))
+        pyhoid.identify(record, nk=(20, 40), nd=(1, 2))
         during = counted
     finally:
         done.set()
@@ -210,5 +231,24 @@ def test_fits_run_side_by_side() -> None:
 def test_the_version_is_that_of_the_package() -> None:
     from importlib.metadata import version
 
-    assert version("hoid") == hoid.__version__
+    assert version("pyhoid") == pyhoid.__version__
     assert sys.version_info >= (3, 10)
+
+
+def test_figures_and_clusters_are_loaded_at_their_first_use() -> None:
+    program = """
+import sys, pyhoid
+assert {"plots", "dask"} <= set(dir(pyhoid))
+assert not {"matplotlib", "pandas", "dask", "distributed"} & set(sys.modules)
+assert callable(pyhoid.plots.bode) and "matplotlib" in sys.modules
+assert callable(pyhoid.dask.study)
+try:
+    pyhoid.nothing
+except AttributeError as error:
+    print(error)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "module 'pyhoid' has no attribute 'nothing'"

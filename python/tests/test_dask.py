@@ -1,4 +1,4 @@
-"""A study over a cluster: the same bytes as on one machine, and a lost worker costs its shard alone."""
+"""A study on a cluster: the same bytes as on one machine; a lost worker costs only its shard."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from typing import Any
 import pytest
 from test_studies import PLAN, digests
 
-import hoid
-import hoid.dask
+import pyhoid
+import pyhoid.dask
 
 pytestmark = [
-    # Of the cluster's own making, as it comes and goes.
+    # The cluster itself causes these as it starts and stops.
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
@@ -39,8 +39,14 @@ def client() -> Iterator[Any]:
 
 def test_the_cluster_gives_the_same_bytes(client: Any, tmp_path: Path) -> None:
     seen: list[tuple[int, int]] = []
-    result = hoid.dask.study(PLAN, tmp_path / "cluster", client, shards=3, progress=lambda done, n: seen.append((done, n)))
-    local = hoid.study(PLAN, tmp_path / "local")
+    result = pyhoid.dask.study(
+        PLAN,
+        tmp_path / "cluster",
+        client,
+        shards=3,
+        progress=lambda done, n: seen.append((done, n)),
+    )
+    local = pyhoid.study(PLAN, tmp_path / "local")
     assert digests(result.directory) == digests(local.directory)
     assert seen == [(1, 3), (2, 3), (3, 3)]
     assert not (tmp_path / "cluster" / "shards").exists()
@@ -57,10 +63,10 @@ def test_a_lost_worker_costs_its_shard(client: Any, tmp_path: Path) -> None:
             os.kill(victim, signal.SIGKILL)
 
     plan = PLAN.replace("replications = 12", "replications = 200")
-    result = hoid.dask.study(plan, tmp_path / "cluster", client, shards=6, progress=lose_one)
+    result = pyhoid.dask.study(plan, tmp_path / "cluster", client, shards=6, progress=lose_one)
     # What was done was not done again.
     assert done == [1, 2, 3, 4, 5, 6]
-    local = hoid.study(plan, tmp_path / "local")
+    local = pyhoid.study(plan, tmp_path / "local")
     assert digests(result.directory) == digests(local.directory)
 
 
@@ -73,8 +79,10 @@ def test_a_study_goes_on_with_the_shards_that_it_has(client: Any, tmp_path: Path
             raise Stopped
 
     with pytest.raises(Stopped):
-        hoid.dask.study(PLAN, tmp_path / "cluster", client, shards=6, progress=stop)
+        pyhoid.dask.study(PLAN, tmp_path / "cluster", client, shards=6, progress=stop)
     left: list[int] = []
-    result = hoid.dask.study(PLAN, tmp_path / "cluster", client, shards=6, progress=lambda count, of: left.append(count))
+    result = pyhoid.dask.study(
+        PLAN, tmp_path / "cluster", client, shards=6, progress=lambda count, of: left.append(count)
+    )
     assert left == [3, 4, 5, 6]
-    assert digests(result.directory) == digests(hoid.study(PLAN, tmp_path / "local").directory)
+    assert digests(result.directory) == digests(pyhoid.study(PLAN, tmp_path / "local").directory)

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import hoid
+import pyhoid
 
 N = 600
 
@@ -21,8 +21,8 @@ def values(seed: int = 0) -> Any:
     return np.random.default_rng(seed).normal(size=N)
 
 
-def expected() -> hoid.Record:
-    return hoid.Record(e=values(), u=values(1), sample_time=0.01)
+def expected() -> pyhoid.Record:
+    return pyhoid.Record(e=values(), u=values(1), sample_time=0.01)
 
 
 @pytest.mark.parametrize(
@@ -39,20 +39,31 @@ def expected() -> hoid.Record:
         lambda x: np.ma.masked_invalid(x),
         lambda x: x.astype(object),
     ],
-    ids=["list", "tuple", "big-endian", "strided", "column", "reversed twice", "series", "series with times", "unmasked", "objects"],
+    ids=[
+        "list",
+        "tuple",
+        "big-endian",
+        "strided",
+        "column",
+        "reversed twice",
+        "series",
+        "series with times",
+        "unmasked",
+        "objects",
+    ],
 )
 def test_each_of_these_is_the_same_signal(of: Any) -> None:
-    record = hoid.Record(e=of(values()), u=of(values(1)), sample_time=0.01)
+    record = pyhoid.Record(e=of(values()), u=of(values(1)), sample_time=0.01)
     known = expected()
     np.testing.assert_array_equal(record.e, known.e)
-    a, b = (hoid.identify(r, "arx", na=2, nb=2, nk=1) for r in (record, known))
+    a, b = (pyhoid.identify(r, "arx", na=2, nb=2, nk=1) for r in (record, known))
     assert a.parameters == b.parameters
 
 
 def test_other_numbers_are_converted() -> None:
     whole = (values() * 100).round()
     for dtype in (np.float32, np.int16, np.int64, np.float16):
-        record = hoid.Record(e=whole.astype(dtype), u=values(1), sample_time=0.01)
+        record = pyhoid.Record(e=whole.astype(dtype), u=values(1), sample_time=0.01)
         np.testing.assert_array_equal(record.e, whole)
 
 
@@ -68,15 +79,15 @@ def test_other_numbers_are_converted() -> None:
         (np.where(np.arange(N) == 7, np.nan, values()), "channel e: the value at sample 7 is NaN"),
         (np.where(np.arange(N) == 7, np.inf, values()), "channel e: the value at sample 7 is inf"),
         ([None] * N, "at sample 0 is NaN"),
-        ([object()] * N, "no number"),
+        ([object()] * N, "not a number"),
         ([], "no samples"),
         (3.0, "expected one dimension"),
     ],
 )
 def test_what_is_wrong_is_said(e: Any, message: str) -> None:
-    with pytest.raises(hoid.DataError, match=message) as caught:
-        hoid.Record(e=e, u=values(1), sample_time=0.01)
-    assert isinstance(caught.value, ValueError) and isinstance(caught.value, hoid.Error)
+    with pytest.raises(pyhoid.DataError, match=message) as caught:
+        pyhoid.Record(e=e, u=values(1), sample_time=0.01)
+    assert isinstance(caught.value, ValueError) and isinstance(caught.value, pyhoid.Error)
 
 
 @pytest.mark.parametrize(
@@ -94,13 +105,15 @@ def test_what_is_wrong_is_said(e: Any, message: str) -> None:
         ({"fix": {"d1": "x"}}, "numbers by name"),
         ({"fix": {"q7": 0.0}, "nk": 29, "nd": 1}, "q7"),
         ({"bound": {"b0": (1, 0)}, "nk": 29, "nd": 1}, "bound: b0"),
-        ({"criterion": "best"}, "criterion is \"best\""),
+        ({"criterion": "best"}, 'criterion is "best"'),
         ({"progress": 3}, "progress is 3"),
     ],
 )
-def test_options_that_have_no_meaning(c1: hoid.Record, keywords: dict[str, Any], message: str) -> None:
-    with pytest.raises(hoid.OptionError, match=message) as caught:
-        hoid.identify(c1, **keywords)
+def test_options_that_have_no_meaning(
+    c1: pyhoid.Record, keywords: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(pyhoid.OptionError, match=message) as caught:
+        pyhoid.identify(c1, **keywords)
     assert isinstance(caught.value, ValueError)
     # No word of the command line.
     assert "--" not in str(caught.value)
@@ -109,7 +122,7 @@ def test_options_that_have_no_meaning(c1: hoid.Record, keywords: dict[str, Any],
 @pytest.mark.parametrize(
     ("keywords", "message"),
     [
-        ({"method": "nothing"}, "method is \"nothing\""),
+        ({"method": "nothing"}, 'method is "nothing"'),
         ({"method": "rls", "bound": {"K_e": (0, 1)}}, "bound belongs to"),
         ({"method": "rpem", "memory": 0.5}, "memory"),
         ({"method": "rpem", "forgetting_factor": 1.5}, "above 0 and up to 1"),
@@ -120,53 +133,59 @@ def test_options_that_have_no_meaning(c1: hoid.Record, keywords: dict[str, Any],
         ({"moving_average": -1.0}, "moving_average"),
     ],
 )
-def test_recursions_that_have_no_meaning(c1: hoid.Record, keywords: dict[str, Any], message: str) -> None:
-    with pytest.raises(hoid.OptionError, match=message):
-        hoid.track(c1, **keywords)
+def test_recursions_that_have_no_meaning(
+    c1: pyhoid.Record, keywords: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(pyhoid.OptionError, match=message):
+        pyhoid.track(c1, **keywords)
 
 
-def test_other_errors(c1: hoid.Record, tmp_path: Path) -> None:
+def test_other_errors(c1: pyhoid.Record, tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError) as missing:
-        hoid.read(tmp_path / "nothing.csv")
-    assert isinstance(missing.value, hoid.FileError) and isinstance(missing.value, OSError)
-    with pytest.raises(hoid.FileError):
-        hoid.write(tmp_path / "no" / "where.csv", c1)
-    with pytest.raises(hoid.FormatError):
-        hoid.write(tmp_path / "a.xyz", c1)
+        pyhoid.read(tmp_path / "nothing.csv")
+    assert isinstance(missing.value, pyhoid.FileError) and isinstance(missing.value, OSError)
+    with pytest.raises(pyhoid.FileError):
+        pyhoid.write(tmp_path / "no" / "where.csv", c1)
+    with pytest.raises(pyhoid.FormatError):
+        pyhoid.write(tmp_path / "a.xyz", c1)
     (tmp_path / "gap.csv").write_text("t,e,u\n0,1,2\n0.01,,3\n0.02,1,2\n")
-    with pytest.raises(hoid.FormatError, match="fill=True"):
-        hoid.read(tmp_path / "gap.csv")
-    with pytest.raises(hoid.DataError, match="expected a hoid.Record"):
-        hoid.identify([np.zeros(3)])  # type: ignore[list-item]
-    with pytest.raises(hoid.DataError, match="expected a hoid.Record"):
-        hoid.identify(3)  # type: ignore[arg-type]
-    with pytest.raises(hoid.DataError):
-        hoid.identify(c1.span(0, 0.1), nk=3)
-    with pytest.raises(hoid.Error):
-        hoid.identify(hoid.Record(e=np.zeros(500), u=np.zeros(500), sample_time=0.01), "arx", nk=1)
-    with pytest.raises(hoid.OptionError):
-        hoid.Record(e=values(), u=values(1), sample_time=-1)
-    with pytest.raises(hoid.OptionError):
-        hoid.simulate("C9")
-    with pytest.raises(hoid.OptionError):
-        hoid.simulate()
-    with pytest.raises(hoid.DataError, match="there are no samples"):
+    with pytest.raises(pyhoid.FormatError, match="fill=True"):
+        pyhoid.read(tmp_path / "gap.csv")
+    with pytest.raises(pyhoid.DataError, match="expected a pyhoid.Record"):
+        pyhoid.identify([np.zeros(3)])  # type: ignore[list-item]
+    with pytest.raises(pyhoid.DataError, match="expected a pyhoid.Record"):
+        pyhoid.identify(3)  # type: ignore[arg-type]
+    with pytest.raises(pyhoid.DataError):
+        pyhoid.identify(c1.span(0, 0.1), nk=3)
+    with pytest.raises(pyhoid.Error):
+        pyhoid.identify(
+            pyhoid.Record(e=np.zeros(500), u=np.zeros(500), sample_time=0.01), "arx", nk=1
+        )
+    with pytest.raises(pyhoid.OptionError):
+        pyhoid.Record(e=values(), u=values(1), sample_time=-1)
+    with pytest.raises(pyhoid.OptionError):
+        pyhoid.simulate("C9")
+    with pytest.raises(pyhoid.OptionError):
+        pyhoid.simulate()
+    with pytest.raises(pyhoid.DataError, match="there are no samples"):
         c1.span(100, 200)
     with pytest.raises(KeyError, match="there is no channel"):
         _ = c1["nothing"]
     with pytest.warns(UserWarning, match="text.csv"):
-        (tmp_path / "text.csv").write_text("t,e,u,who\n" + "".join(f"{k / 100},{k % 7},{k % 5},me\n" for k in range(50)))
-        hoid.read(tmp_path / "text.csv")
+        (tmp_path / "text.csv").write_text(
+            "t,e,u,who\n" + "".join(f"{k / 100},{k % 7},{k % 5},me\n" for k in range(50))
+        )
+        pyhoid.read(tmp_path / "text.csv")
 
 
 def test_arrays_are_not_copied() -> None:
-    """Where the layout allows: a record is a view, a span of it too, and an update reads the arrays themselves."""
+    """Where the layout allows: records and spans are views, and an update reads the arrays."""
     n = 2_000_000
     e, u = (np.random.default_rng(k).normal(size=n) for k in (0, 1))
-    tracker = hoid.Tracker("rls", structure="arx", na=1, nb=1, nk=1, start="nothing")
+    tracker = pyhoid.Tracker("rls", structure="arx", na=1, nb=1, nk=1, start="nothing")
     tracemalloc.start()
     try:
-        record = hoid.Record(e=e, u=u, sample_time=0.01)
+        record = pyhoid.Record(e=e, u=u, sample_time=0.01)
         part = record.span(10, 19_000)
         made = tracemalloc.get_traced_memory()[1]
         tracemalloc.reset_peak()
@@ -174,18 +193,23 @@ def test_arrays_are_not_copied() -> None:
         updated = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    # What the module itself allocates, the interpreter does not see: the largest resident size of a process of its own tells it.
+    # The interpreter does not see what the module itself allocates. The largest resident size of a
+    # separate process tells.
     program = (
-        "import resource, numpy, hoid\n"
+        "import resource, numpy, pyhoid\n"
         "e, u = (numpy.random.default_rng(k).normal(size=4_000_000) for k in (0, 1))\n"
-        "t = hoid.Tracker('rls', structure='arx', na=1, nb=1, nk=1, start='nothing')\n"
+        "t = pyhoid.Tracker('rls', structure='arx', na=1, nb=1, nk=1, start='nothing')\n"
         "t.update(e[:9], u[:9])\n"
         "before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
-        "hoid.Record(e=e, u=u, sample_time=0.01)\n"
+        "pyhoid.Record(e=e, u=u, sample_time=0.01)\n"
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)\n"
     )
     if sys.platform == "linux":
-        grown = int(subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout)
+        grown = int(
+            subprocess.run(
+                [sys.executable, "-c", program], capture_output=True, text=True, check=True
+            ).stdout
+        )
         assert grown < 8_000, "kB; a copy of one array would be 32 000"
     assert np.shares_memory(record.e, e) and np.shares_memory(part.u, u)
     assert not record.u.flags.writeable
@@ -194,6 +218,6 @@ def test_arrays_are_not_copied() -> None:
     assert updated < 1.2 * e.nbytes
 
 
-def test_a_record_does_not_change_under_a_fit(c1: hoid.Record) -> None:
+def test_a_record_does_not_change_under_a_fit(c1: pyhoid.Record) -> None:
     with pytest.raises(ValueError, match="read-only"):
         c1.u[0] = 1.0

@@ -10,8 +10,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-import hoid
-from hoid import plots
+import pyhoid
+from pyhoid import plots
 
 
 @pytest.fixture(autouse=True)
@@ -30,8 +30,8 @@ def drawn(ax: Any, tmp_path: Path) -> None:
     assert file.stat().st_size > 5000
 
 
-def test_time_response(fit: hoid.Fit, c1: hoid.Record, tmp_path: Path) -> None:
-    arx = hoid.identify(c1, "arx", nk=29)
+def test_time_response(fit: pyhoid.Fit, c1: pyhoid.Record, tmp_path: Path) -> None:
+    arx = pyhoid.identify(c1, "arx", nk=29)
     ax = plots.time_response({"ARX": arx, "Box-Jenkins": fit}, c1.span(10, 30))
     assert lines(ax)[0] == "measured" and lines(ax)[1].startswith("ARX, VAF")
     assert [line.get_color() for line in ax.get_lines()[1:]] == list(plots.COLOURS[:2])
@@ -40,26 +40,28 @@ def test_time_response(fit: hoid.Fit, c1: hoid.Record, tmp_path: Path) -> None:
     assert fit.plot(ax=given) is given
 
 
-def test_bode_and_describing_function(fit: hoid.Fit, c1: hoid.Record, tmp_path: Path) -> None:
+def test_bode_and_describing_function(fit: pyhoid.Fit, c1: pyhoid.Record, tmp_path: Path) -> None:
     magnitude, phase = plots.bode(fit, np.geomspace(0.1, 50, 40))
     assert magnitude.get_xscale() == "log" and phase.get_ylabel() == "phase (deg)"
     assert len(magnitude.collections) == 1
-    found = hoid.describing_function([hoid.simulate("C1", seed=2, replication=k) for k in range(3)])
+    found = pyhoid.describing_function(
+        [pyhoid.simulate("C1", seed=2, replication=k) for k in range(3)]
+    )
     axes = plots.describing(found, {"BJ": fit})
     assert "describing function" in axes[0].get_legend_handles_labels()[1]
     drawn(axes[0], tmp_path)
-    with pytest.raises(hoid.OptionError):
+    with pytest.raises(pyhoid.OptionError):
         plots.bode(fit, axes=[magnitude])
 
 
-def test_residuals(fit: hoid.Fit, tmp_path: Path) -> None:
+def test_residuals(fit: pyhoid.Fit, tmp_path: Path) -> None:
     axes = plots.residual_tests(fit)
     assert "Ljung-Box" in axes[0].get_title(loc="left")
     drawn(axes[1], tmp_path)
 
 
-def test_traces(c4: hoid.Record, tmp_path: Path) -> None:
-    both = {name: hoid.track(c4, name, nk=29, nd=1, every=10) for name in ("physical", "rpem")}
+def test_traces(c4: pyhoid.Record, tmp_path: Path) -> None:
+    both = {name: pyhoid.track(c4, name, nk=29, nd=1, every=10) for name in ("physical", "rpem")}
     axes = plots.trace(both, ["K_e", "K_e_dot"])
     assert lines(axes[0]) == ["physical", "rpem", "truth"] and "K_e" in axes[0].get_ylabel()
     low, high = axes[0].get_ylim()
@@ -77,7 +79,7 @@ def test_boxes(tmp_path: Path) -> None:
     drawn(ax, tmp_path)
 
 
-def test_the_style_stays_where_it_belongs(fit: hoid.Fit) -> None:
+def test_the_style_stays_where_it_belongs(fit: pyhoid.Fit) -> None:
     before = plt.rcParams["font.size"]
     plots.bode(fit)
     assert plt.rcParams["font.size"] == before

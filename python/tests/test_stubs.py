@@ -1,4 +1,7 @@
-"""Types: the stubs are those of the module, and type checkers accept what people write, also as the oldest Python reads it."""
+"""Types: the stubs match the module, and type checkers accept what people write.
+
+They check as the oldest supported Python would read it.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +22,19 @@ def cache(tmp_path: Path) -> list[str]:
 
 def check(*arguments: str) -> None:
     quiet = {**os.environ, "PYTHONWARNINGS": "default"}
-    done = subprocess.run([sys.executable, "-m", *arguments], capture_output=True, text=True, check=False, cwd=PACKAGE, env=quiet)
+    done = subprocess.run(
+        [sys.executable, "-m", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=PACKAGE,
+        env=quiet,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_the_stubs_are_those_of_the_module() -> None:
-    check("mypy.stubtest", "hoid._hoid")
+    check("mypy.stubtest", "pyhoid._pyhoid")
 
 
 def test_mypy_accepts_the_package_and_its_use(cache: list[str]) -> None:

@@ -1,7 +1,8 @@
 //! Arrays and records in and out.
 //!
-//! A Python record holds NumPy arrays; a call makes a record of the library of the channels that it needs, while it holds the interpreter, so
-//! that what another thread writes into the arrays afterwards cannot be seen. Vectors that the library gives become arrays without a copy.
+//! A Python record holds NumPy arrays. A call makes a record of the library from the channels that
+//! it needs while it holds the interpreter, so that it does not see what another thread writes into
+//! the arrays afterwards. Vectors from the library become arrays without a copy.
 
 use hoid_model::{Channel, ModelError, Record, SampleTime};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
@@ -9,18 +10,18 @@ use pyo3::{prelude::*, types::PyDict};
 
 use crate::errors::{Outcome, bad_option};
 
-/// One-dimensional array of a vector, without a copy.
+/// One-dimensional array from a vector, without a copy.
 pub fn array<'py>(py: Python<'py>, values: Vec<f64>) -> Bound<'py, PyArray1<f64>> {
     values.into_pyarray(py)
 }
 
-/// Two-dimensional array of a matrix by rows, without a copy.
+/// Two-dimensional array from a matrix by rows, without a copy.
 pub fn matrix<'py>(py: Python<'py>, values: Vec<f64>, columns: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let rows = values.len().checked_div(columns).unwrap_or(0);
     values.into_pyarray(py).reshape([rows, columns])
 }
 
-/// A vector of a contiguous array of float64; the package has made it one.
+/// A vector from a contiguous array of float64, which the package has made.
 fn vector(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let array: PyReadonlyArray1<'_, f64> = values.extract()?;
     Ok(array.as_slice()?.to_vec())
@@ -33,7 +34,7 @@ pub enum Wanted<'a> {
     Only(&'a [&'a str]),
 }
 
-/// The record of the library from one of `hoid.Record`.
+/// The record of the library from a `pyhoid.Record`.
 pub fn record(found: &Bound<'_, PyAny>, wanted: Wanted<'_>) -> Outcome<Record> {
     let text = |name: &str| -> PyResult<String> { found.getattr(name)?.extract() };
     let sample_time = SampleTime::new(found.getattr("sample_time")?.extract()?)?;
@@ -72,7 +73,7 @@ pub fn record(found: &Bound<'_, PyAny>, wanted: Wanted<'_>) -> Outcome<Record> {
     Ok(record)
 }
 
-/// Checks what `hoid.Record` is made of as [`record`] would, without a copy of the arrays.
+/// Checks the parts of a `pyhoid.Record` as [`record`] would, without a copy of the arrays.
 pub fn check(found: &Bound<'_, PyAny>) -> Outcome<()> {
     SampleTime::new(found.getattr("sample_time")?.extract()?)?;
     let mut named: Vec<(String, Bound<'_, PyAny>)> = Vec::new();
@@ -120,15 +121,15 @@ pub fn check(found: &Bound<'_, PyAny>) -> Outcome<()> {
     Ok(())
 }
 
-/// The records of one, or of a sequence of them.
+/// The records from one, or from a sequence of them.
 pub fn records(found: &[Bound<'_, PyAny>], wanted: Wanted<'_>) -> Outcome<Vec<Record>> {
     if found.is_empty() {
-        return Err(bad_option("there is no record; give one or several"));
+        return Err(bad_option("there is no record; give one or more"));
     }
     found.iter().map(|one| record(one, wanted)).collect()
 }
 
-/// What `hoid.Record` is made of, of a record of the library. Each vector becomes an array without a copy.
+/// The parts of a `pyhoid.Record` from a record of the library. No vector is copied.
 pub fn parts<'py>(py: Python<'py>, record: Record) -> PyResult<Bound<'py, PyDict>> {
     let parts = PyDict::new(py);
     parts.set_item("sample_time", record.sample_time().s())?;

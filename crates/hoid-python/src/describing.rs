@@ -1,4 +1,4 @@
-//! `hoid.describing_function`: what a person answers at the lines of the excitation.
+//! `pyhoid.describing_function`: how a person responds at the lines of the excitation.
 
 use hoid_ident::frequency::{
     Averaging, DescribingFunction, DescribingOptions, Excitation, GainLeadDelayOptions, LineSearch, LineWeights,
@@ -15,8 +15,8 @@ use crate::{
     names,
 };
 
-/// The describing function; the package wraps it in `hoid.DescribingFunction`.
-#[pyclass(name = "DescribingFunction", module = "hoid._hoid", frozen)]
+/// The describing function; the package wraps it in `pyhoid.DescribingFunction`.
+#[pyclass(name = "DescribingFunction", module = "pyhoid._pyhoid", frozen)]
 pub struct PyDescribingFunction {
     found: DescribingFunction,
 }
@@ -56,7 +56,8 @@ pub fn describing_function<'py>(
         }
         (None, None, None, _) => {
             return Err(bad_option(
-                "there is no excitation: give the channel that it stands in, or harmonics or omega with the period",
+                "there is no excitation: give the channel that holds it, \
+                 or harmonics or omega with the period",
             ));
         }
         (Some(_), Some(_), _, _) => return Err(bad_option("give harmonics or omega, not both")),
@@ -66,7 +67,7 @@ pub fn describing_function<'py>(
     let averaging = match (names::word("averaging", averaging, &words)?, reference) {
         (0, _) => Averaging::Ratios,
         (1, Some(channel)) => Averaging::Reference { channel },
-        (1, None) => return Err(bad_option("averaging=\"reference\" needs the channel of the reference")),
+        (1, None) => return Err(bad_option("averaging=\"reference\" needs reference, a channel")),
         _ => Averaging::SameExcitation,
     };
     let realisation = [("record", Realisation::Record), ("period", Realisation::Period)]
@@ -94,7 +95,7 @@ pub fn describing_function<'py>(
 
 #[pymethods]
 impl PyDescribingFunction {
-    /// Columns over the lines, by name.
+    /// Columns by name, with one value for each line.
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let lines = &self.found.lines;
         let all = PyDict::new(py);
@@ -174,7 +175,7 @@ impl PyDescribingFunction {
         Ok(all)
     }
 
-    /// Crossover frequency and phase margin with a controlled element NUM/DEN by descending powers of s.
+    /// Crossover frequency and phase margin with a controlled element, by descending powers of s.
     fn margins<'py>(&self, py: Python<'py>, num: Vec<f64>, den: Vec<f64>) -> Outcome<Bound<'py, PyDict>> {
         let element = ContinuousTransferFunction::new(&num, &den)?;
         let margins = self.found.open_loop(&element).margins();

@@ -1,6 +1,6 @@
-//! Errors of the libraries as exceptions of `hoid.errors`, by kind.
+//! Errors of the libraries as exceptions of `pyhoid.errors`, by kind.
 //!
-//! The messages are those of the libraries; where they name an option of the command line, its keyword here takes its place.
+//! The messages are those of the libraries, with keywords in place of command-line options.
 
 use hoid_ident::IdentError;
 use hoid_io::{IoError, ScenarioFileError};
@@ -11,20 +11,20 @@ use hoid_study::StudyError;
 use hoid_thesis::ThesisError;
 use pyo3::{PyErr, import_exception};
 
-import_exception!(hoid.errors, Error);
-import_exception!(hoid.errors, DataError);
-import_exception!(hoid.errors, OptionError);
-import_exception!(hoid.errors, EstimationError);
-import_exception!(hoid.errors, NotConvertibleError);
-import_exception!(hoid.errors, FileError);
-import_exception!(hoid.errors, FileMissingError);
-import_exception!(hoid.errors, FormatError);
-import_exception!(hoid.errors, StudyStateError);
+import_exception!(pyhoid.errors, Error);
+import_exception!(pyhoid.errors, DataError);
+import_exception!(pyhoid.errors, OptionError);
+import_exception!(pyhoid.errors, EstimationError);
+import_exception!(pyhoid.errors, NotConvertibleError);
+import_exception!(pyhoid.errors, FileError);
+import_exception!(pyhoid.errors, FileMissingError);
+import_exception!(pyhoid.errors, FormatError);
+import_exception!(pyhoid.errors, StudyStateError);
 
-/// What a call gives, or why not.
+/// What a call gives, or why it fails.
 pub type Outcome<T> = Result<T, Failure>;
 
-/// An exception to be, so that `?` takes every error of the libraries.
+/// An exception to raise; `?` converts every error of the libraries into one.
 pub struct Failure(PyErr);
 
 impl From<Failure> for PyErr {

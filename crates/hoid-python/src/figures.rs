@@ -19,7 +19,7 @@ pub fn pair(e: Estimate) -> Pair {
     (e.value, e.standard_error)
 }
 
-/// NaN where there is no standard error, as arrays have it.
+/// The standard error for an array: NaN where there is none.
 pub fn error_or_nan(e: Estimate) -> f64 {
     e.standard_error.unwrap_or(f64::NAN)
 }
@@ -39,7 +39,7 @@ pub fn orders<'py>(py: Python<'py>, o: &Orders) -> PyResult<Bound<'py, PyDict>> 
     Ok(all)
 }
 
-/// The operator, the reason why there is none, or None where another order has no meaning as an operator at all.
+/// The operator, or the reason why there is none; None where the orders cannot represent one.
 pub fn operator<'py>(
     py: Python<'py>,
     found: &Result<OperatorEstimate, NotConvertible>,

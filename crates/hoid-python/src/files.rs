@@ -1,4 +1,4 @@
-//! `hoid.read`, `hoid.read_stretches`, `hoid.write` and tables of results.
+//! `pyhoid.read`, `pyhoid.read_stretches`, `pyhoid.write` and tables of results.
 
 use std::{collections::BTreeMap, path::PathBuf, str::FromStr};
 
@@ -12,10 +12,10 @@ use crate::{
     names,
 };
 
-/// What a record is made of, what was done to the numbers of the file, and the notes of its reading.
+/// The parts of a record, what was done to the numbers of the file, and notes on reading it.
 type Read<'py> = (Bound<'py, PyDict>, Vec<String>, Vec<String>);
 
-/// The record of a file, or those between what is masked.
+/// The record of a file, or the records between what is masked.
 #[pyfunction]
 #[pyo3(signature = (path, *, input, output, sampling_frequency, start, stop, resample, fill, detrend, drop_repeated, scale, offset, decimate,
     new_sampling_frequency, run_in, mask, shortest))]
@@ -95,14 +95,14 @@ pub fn write(py: Python<'_>, path: PathBuf, record: &Bound<'_, PyAny>) -> Outcom
     Ok(())
 }
 
-/// Checks what a record of the package is made of.
+/// Checks the parts of a record of the package.
 #[pyfunction]
 #[pyo3(signature = (record))]
 pub fn check_record(record: &Bound<'_, PyAny>) -> Outcome<()> {
     arrays::check(record)
 }
 
-/// What is left after the mean or a straight line has been taken out of input and output.
+/// The record without the mean or the linear trend of input and output.
 #[pyfunction]
 #[pyo3(signature = (record, how))]
 pub fn detrended<'py>(py: Python<'py>, record: &Bound<'py, PyAny>, how: &str) -> Outcome<Bound<'py, PyDict>> {

@@ -18,13 +18,13 @@ use crate::{
     names,
 };
 
-/// A fitted model; the package wraps it in `hoid.Fit`.
-#[pyclass(name = "Fit", module = "hoid._hoid", frozen)]
+/// A fitted model; the package wraps it in `pyhoid.Fit`.
+#[pyclass(name = "Fit", module = "pyhoid._pyhoid", frozen)]
 pub struct PyFit {
     fit: Fit,
     choice: Option<Choice>,
     grey_box: Option<GreyBoxFit>,
-    /// Number of records that it was fitted to.
+    /// Number of records that the model was fitted to.
     records: usize,
 }
 
@@ -111,7 +111,9 @@ impl PyFit {
         matrix(py, c.to_vec(), columns).map(Some)
     }
 
-    /// A, B, C, D and F by ascending powers of q^-1; A, C, D and F begin with 1, B with its delay.
+    /// A, B, C, D and F by ascending powers of q^-1.
+    ///
+    /// A, C, D and F begin with 1, B with the zeros of its delay.
     #[getter]
     fn polynomials<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let model = self.fit.model();
@@ -163,7 +165,7 @@ impl PyFit {
         figures::operator(py, &self.fit.operator())
     }
 
-    /// The operator of each record of a grey box, nothing for another fit.
+    /// The operator of each record of a grey box; empty for other fits.
     #[getter]
     fn operators<'py>(&self, py: Python<'py>) -> PyResult<Vec<Option<Bound<'py, PyDict>>>> {
         let Some(grey_box) = &self.grey_box else {
@@ -226,7 +228,8 @@ impl PyFit {
         Ok(all)
     }
 
-    /// Magnitude in dB and phase in deg at these frequencies, each with its standard error (NaN where there is none).
+    /// Magnitude in dB and phase in deg at these frequencies, each with its standard error (NaN
+    /// where there is none).
     fn frequency_response<'py>(
         &self,
         py: Python<'py>,
@@ -258,7 +261,8 @@ impl PyFit {
         self.fit.roots().into_iter().map(one).collect()
     }
 
-    /// Crossover and margins of the operator in series with a controlled element NUM/DEN by descending powers of s.
+    /// Crossover and margins of the operator in series with a controlled element, by descending
+    /// powers of s.
     fn margins<'py>(&self, py: Python<'py>, num: Vec<f64>, den: Vec<f64>) -> Outcome<Bound<'py, PyDict>> {
         Ok(figures::margins(py, &self.margins_with(&num, &den)?)?)
     }
@@ -321,7 +325,7 @@ impl PyFit {
     }
 
     fn __repr__(&self) -> String {
-        format!("<hoid._hoid.Fit {}>", self.fit.title())
+        format!("<pyhoid._pyhoid.Fit {}>", self.fit.title())
     }
 }
 

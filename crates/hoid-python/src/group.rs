@@ -1,4 +1,5 @@
-//! `hoid.group` and `hoid.simulate_group`: recorded runs by subject and condition, and a virtual experiment to try it on.
+//! `pyhoid.group` and `pyhoid.simulate_group`: recorded runs by subject and condition, and virtual
+//! experiments.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +13,9 @@ use pyo3::prelude::*;
 
 use crate::{errors::Outcome, interrupt, names};
 
-/// Analyses the runs of a manifest and writes tables and pages: whether it was finished, and the estimates made.
+/// Analyses the runs of a manifest and writes tables and pages.
+///
+/// Returns whether it was finished, and the number of estimates made.
 #[pyfunction]
 #[pyo3(signature = (manifest, directory, *, jobs, resume, csv, progress))]
 pub fn group(
@@ -50,7 +53,7 @@ pub fn group(
     Ok((outcome.finished, outcome.estimates))
 }
 
-/// The manifest of the files of a directory whose names match a pattern, and the files that do not.
+/// The manifest of the files whose names match a pattern, and the other files of the directory.
 #[pyfunction]
 #[pyo3(signature = (directory, pattern))]
 pub fn group_manifest(directory: PathBuf, pattern: &str) -> Outcome<(String, Vec<String>)> {
@@ -58,7 +61,7 @@ pub fn group_manifest(directory: PathBuf, pattern: &str) -> Outcome<(String, Vec
     Ok((manifest.text(), others))
 }
 
-/// Simulates the runs of a virtual experiment into a directory; their number.
+/// Simulates the runs of a virtual experiment into a directory; returns their number.
 #[pyfunction]
 #[pyo3(signature = (directory, *, subjects, conditions, runs, between_subjects, between_runs, remnant_order, noise_level, seed, trouble))]
 #[allow(clippy::too_many_arguments)]

@@ -1,4 +1,4 @@
-//! `hoid.identify`: from records and options to a fit.
+//! `pyhoid.identify`: from records and options to a fit.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ use crate::{
     time_varying::PyTimeVaryingFit,
 };
 
-/// Samples times models from which a fit takes long enough to be worth a thread that an interrupt can leave.
+/// Samples times models from which a fit is long enough to get a thread of its own, for interrupts.
 const LONG: usize = 50_000;
 
 /// What a fit gave.
@@ -28,7 +28,7 @@ enum Found {
     Change(Box<TimeVaryingFit>),
 }
 
-/// Fits a model to records. All options have been brought into their plain form by the package.
+/// Fits a model to records. The package has brought all options into plain form.
 #[pyfunction]
 #[pyo3(signature = (records, structure, *, orders, method, instruments, remnant_order, delay, individual, criterion, initial_state, start, fix,
     bound, prior, robust, focus, stable, search_method, max_iterations, tolerance, progress))]
@@ -94,7 +94,8 @@ pub fn identify<'py>(
             estimator.start = match &start {
                 Some(_) if combinations.len() > 1 => {
                     return Err(bad_option(
-                        "start belongs to one model, but a range of orders or delays is searched; give nk and the orders as single numbers",
+                        "start belongs to one model, but a range of orders or delays is searched; \
+                         give nk and the orders as single numbers",
                     ));
                 }
                 Some(start) => Some(names::theta(&combinations[0].parameter_names(), start)?),
@@ -144,14 +145,15 @@ pub fn identify<'py>(
         Kind::TimeVarying => {
             if initial_state.is_some_and(|rule| rule != InitialState::Estimate) {
                 return Err(bad_option(
-                    "initial_state: the time-varying fit estimates the initial states; give \"auto\" or \"estimate\"",
+                    "initial_state: the time-varying fit estimates the initial states; \
+                     give \"auto\" or \"estimate\"",
                 ));
             }
             let usual = TimeVarying::default();
             let nd = match orders.iter().next() {
                 None => usual.nd,
                 Some((name, (low, high))) if orders.len() == 1 && name == "nd" && low == high => *low,
-                Some(_) => return Err(bad_option("the time-varying fit takes nd alone, as a single number")),
+                Some(_) => return Err(bad_option("the time-varying fit takes only nd, a single number")),
             };
             let mut estimator = TimeVarying {
                 nd,

@@ -1,4 +1,6 @@
-//! Long work that an interrupt can end: it runs in a thread of its own, while this one asks the interpreter for signals.
+//! Long work that an interrupt can end.
+//!
+//! It runs in a thread of its own, while this one asks the interpreter for signals.
 
 use std::{
     sync::{
@@ -13,7 +15,7 @@ use pyo3::prelude::*;
 
 use crate::errors::{Failure, Outcome, bad_option};
 
-/// Time between two looks at signals.
+/// Time between two checks for signals.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// What the work and the waiting thread share.
@@ -25,12 +27,12 @@ pub struct Standing {
 }
 
 impl Standing {
-    /// False once the work is to stop.
+    /// False once the work has to stop.
     pub fn goes_on(&self) -> bool {
         !self.stopped.load(Ordering::Relaxed)
     }
 
-    /// So much of the whole is done.
+    /// This much of the whole work is done.
     pub fn set(&self, done: u64, total: u64) {
         self.total.store(total, Ordering::Relaxed);
         self.done.store(done, Ordering::Relaxed);
@@ -42,8 +44,11 @@ impl Standing {
     }
 }
 
-/// Runs the work without the interpreter and returns what it gives. `progress` is called with what is done and the whole. An interrupt asks the
-/// work to stop; `patient` says that it listens, and is waited for, so that files are whole. Else the work is left to its end in its thread.
+/// Runs the work without the interpreter and returns its result.
+///
+/// `progress` is called with the work done and the whole work. An interrupt asks the work to stop.
+/// `patient` work listens and is waited for, so that files are complete; other work is left to end
+/// in its thread.
 pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
     py: Python<'_>,
     total: u64,
@@ -58,10 +63,10 @@ pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
     let thread = std::thread::Builder::new().name("hoid".to_owned());
     thread
         .spawn(move || {
-            // Nobody listens any more when an interrupt came first.
+            // After an interrupt nobody listens any more.
             let _ = send.send(work(&shared));
         })
-        .map_err(|error| bad_option(format!("the system gives no thread: {error}")))?;
+        .map_err(|error| bad_option(format!("the system cannot start a thread: {error}")))?;
     let mut told = u64::MAX;
     let mut tell = || -> PyResult<()> {
         let done = standing.done.load(Ordering::Relaxed);

@@ -1,7 +1,8 @@
-//! The native module of the Python package `hoid`: conversion only.
+//! The native module of the Python package `pyhoid`: conversion only.
 //!
-//! What is computed is computed in the libraries; what a person writes and reads is in `python/src/hoid`, which brings arguments into a plain
-//! form (floats, contiguous arrays, dictionaries) and wraps the results. Long work runs without the interpreter.
+//! The libraries compute; what people write and read is in `python/src/pyhoid`, which brings
+//! arguments into plain form (floats, contiguous arrays, dictionaries) and wraps the results. Long
+//! work runs without the interpreter.
 //!
 //! | module | what it holds |
 //! |---|---|
@@ -42,7 +43,7 @@ mod tracker;
 use pyo3::prelude::*;
 
 #[pymodule(gil_used = true)]
-fn _hoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
+fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<describing::PyDescribingFunction>()?;
     module.add_class::<fit::PyFit>()?;

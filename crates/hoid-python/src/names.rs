@@ -1,4 +1,4 @@
-//! Words of Python and what they stand for in the libraries: those of the command line.
+//! The words of Python, those of the command line, and what they stand for in the libraries.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -14,7 +14,7 @@ use hoid_track::{Method, Stable};
 
 use crate::errors::{Outcome, bad_option};
 
-/// A word out of a list.
+/// The meaning of a word from a list.
 pub fn word<T: Clone>(option: &str, found: &str, words: &[(&str, T)]) -> Outcome<T> {
     let lower = found.to_ascii_lowercase().replace('_', "-");
     match words.iter().find(|(word, _)| *word == lower) {
@@ -203,7 +203,7 @@ pub fn range(option: &str, ends: (usize, usize)) -> Outcome<RangeInclusive<usize
     Ok(ends.0..=ends.1)
 }
 
-/// Orders by name, each a range, in the place of the usual ones.
+/// Orders by name, each a range, instead of the default ones.
 pub fn with_orders(mut ranges: OrderRanges, orders: &BTreeMap<String, (usize, usize)>) -> Outcome<OrderRanges> {
     for (name, ends) in orders {
         let place = match name.as_str() {
@@ -224,7 +224,7 @@ pub fn with_orders(mut ranges: OrderRanges, orders: &BTreeMap<String, (usize, us
     Ok(ranges)
 }
 
-/// Values that are held and bounds, by name.
+/// Fixed values and bounds, by name.
 pub fn constraints(
     fixed: BTreeMap<String, f64>,
     bounds: BTreeMap<String, (f64, f64)>,
@@ -239,7 +239,7 @@ pub fn constraints(
     for (name, (low, high)) in bounds {
         if low.is_nan() || high.is_nan() || low > high {
             return Err(bad_option(format!(
-                "bound: {name} is {low} to {high}, expected a lower and an upper end in this order"
+                "bound: {name} is {low} to {high}, expected the lower bound first"
             )));
         }
         if all.insert(name.clone(), Constraint::Between(low, high)).is_some() {
@@ -256,7 +256,8 @@ pub fn priors(guesses: BTreeMap<String, (f64, f64)>) -> Outcome<BTreeMap<String,
             Ok((name, Prior { value, weight }))
         } else {
             Err(bad_option(format!(
-                "prior: {name} is {value} with the weight {weight}, expected finite numbers and a weight that is not negative"
+                "prior: {name} is {value} with the weight {weight}, \
+                 expected finite numbers and a weight of zero or more"
             )))
         }
     };

@@ -1,4 +1,4 @@
-//! The options of `hoid.track` and `hoid.Tracker`, from their plain form to that of the library.
+//! The options of `pyhoid.track` and `pyhoid.Tracker`: from plain form to that of the library.
 
 use std::collections::BTreeMap;
 
@@ -76,7 +76,7 @@ pub fn plan(options: &Bound<'_, PyDict>, sample_time: SampleTime) -> Outcome<Tra
         (None, Some(lambda)) if lambda > 0.0 && lambda < 1.0 => Some(Memory::Samples(1.0 / (1.0 - lambda))),
         (None, Some(lambda)) => {
             return Err(bad_option(format!(
-                "forgetting_factor is {lambda}, expected a number above 0 and up to 1, as 0.996"
+                "forgetting_factor is {lambda}, expected above 0 and up to 1, such as 0.996"
             )));
         }
     };
@@ -141,7 +141,8 @@ fn forgetting(options: &Bound<'_, PyDict>) -> Outcome<ForgettingRule> {
         0 => ForgettingRule::Exponential,
         1 => ForgettingRule::RandomWalk(drift.ok_or_else(|| {
             bad_option(
-                "forgetting=\"random-walk\" needs drift, as {\"K_e\": 0.01}: the standard deviation of the drift in one second",
+                "forgetting=\"random-walk\" needs drift, such as {\"K_e\": 0.01}: \
+                 the standard deviation of the drift in one second",
             )
         })?),
         2 => ForgettingRule::Window,

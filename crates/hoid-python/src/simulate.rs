@@ -1,4 +1,4 @@
-//! `hoid.simulate`, `hoid.margins` and `hoid.convert`: scenarios and the operator's conversions.
+//! `pyhoid.simulate`, `pyhoid.margins`, `pyhoid.convert`: scenarios and the operator's conversions.
 
 use std::path::PathBuf;
 
@@ -31,7 +31,7 @@ fn scenario(condition: Option<&str>, file: Option<PathBuf>, text: Option<&str>) 
         (Some(condition), None, None) => Ok(Scenario::condition(condition.parse::<Condition>()?)),
         (None, Some(file), None) => Ok(read_scenario(&file)?),
         (None, None, Some(text)) => Ok(parse_scenario(text, "(text)", "scenario")?),
-        _ => Err(bad_option("give condition, as \"C4\", or scenario, one of the two")),
+        _ => Err(bad_option("give either condition, such as \"C4\", or scenario")),
     }
 }
 
@@ -74,7 +74,7 @@ pub fn simulate<'py>(
         .remnant
         .strength
         .changed(noise_level, definition)
-        .ok_or_else(|| bad_option("noise_definition needs noise_level: the scenario gives the gain K_n itself"))?;
+        .ok_or_else(|| bad_option("noise_definition needs noise_level: the scenario gives K_n itself"))?;
     let stream = Stream {
         seed,
         cell,
@@ -113,7 +113,7 @@ pub fn margins<'py>(
             row.set_item("remnant_order", order)?;
             row.set_item("noise_level", level)?;
             row.set_item("definition", noise_definition)?;
-            // A level that cannot be reached is a row of the table; anything else is wrong for all of them.
+            // A level out of reach is a row of the table; any other error concerns all of them.
             match scenario.remnant_gain_for(&state, order, level, definition) {
                 Ok(k_n) => row.set_item("K_n", k_n)?,
                 Err(reason @ ModelError::UnreachableNoiseLevel { .. }) => {
@@ -148,7 +148,7 @@ fn conversion<'py>(
     Ok(all)
 }
 
-/// Operator parameters of discrete coefficients.
+/// Operator parameters from discrete coefficients.
 #[pyfunction]
 #[pyo3(signature = (f, b, nk, sample_time))]
 pub fn convert_discrete<'py>(
@@ -171,7 +171,7 @@ pub fn convert_discrete<'py>(
     Ok(conversion(py, discrete, discrete.parameters())?)
 }
 
-/// Discrete coefficients of operator parameters.
+/// Discrete coefficients from operator parameters.
 #[pyfunction]
 #[pyo3(signature = (operator, sample_time))]
 pub fn convert_operator<'py>(
@@ -184,7 +184,7 @@ pub fn convert_operator<'py>(
     Ok(conversion(py, discrete, Ok(operator))?)
 }
 
-/// A transfer function NUM/DEN by descending powers of s in discrete time: both by ascending powers of q^-1.
+/// Discretises a transfer function: descending powers of s to ascending powers of q^-1.
 #[pyfunction]
 #[pyo3(signature = (num, den, sample_time, method, prewarp))]
 pub fn discretise_transfer_function<'py>(

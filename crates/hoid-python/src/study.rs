@@ -1,4 +1,4 @@
-//! `hoid.study` and `hoid.reproduce`: plans, shards, merged tables.
+//! `pyhoid.study` and `pyhoid.reproduce`: plans, shards, merged tables.
 
 use std::path::PathBuf;
 
@@ -20,7 +20,7 @@ fn left(outcome: StudyOutcome) -> Left {
 }
 
 /// A plan of Monte Carlo runs.
-#[pyclass(name = "Plan", module = "hoid._hoid", frozen)]
+#[pyclass(name = "Plan", module = "pyhoid._pyhoid", frozen)]
 pub struct PyPlan {
     plan: Plan,
 }
@@ -116,7 +116,7 @@ impl PyPlan {
     fn __repr__(&self) -> String {
         let p = &self.plan;
         format!(
-            "<hoid.Plan {}: {} cells, {} estimators, {} replications, {} estimates>",
+            "<pyhoid.Plan {}: {} cells, {} estimators, {} replications, {} estimates>",
             p.name,
             p.cells.len(),
             p.estimators.len(),
@@ -125,7 +125,7 @@ impl PyPlan {
         )
     }
 
-    /// Runs it, or a share of it, into a directory.
+    /// Runs the plan, or a share of it, and writes its tables into a directory.
     #[pyo3(signature = (directory, *, shard, jobs, resume, csv, progress))]
     #[allow(clippy::too_many_arguments)]
     fn run(
@@ -174,7 +174,7 @@ pub fn merge_shards(py: Python<'_>, shards: Vec<PathBuf>, directory: PathBuf, cs
 /// Index page, number of tables and figures, tally of the claims.
 type Reproduced = (PathBuf, usize, Option<[usize; 4]>);
 
-/// Makes the tables, figures and claims of the reference text; nothing where an interrupt came first.
+/// Makes the tables, figures and claims of the reference text; `None` after an interrupt.
 #[pyfunction]
 #[pyo3(signature = (directory, *, only, replications, jobs, progress))]
 pub fn reproduce(

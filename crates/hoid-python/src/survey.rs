@@ -1,4 +1,4 @@
-//! `hoid.info`: what is inside of a file, as `hoid info --json` has it.
+//! `pyhoid.info`: what is in a file, as `hoid info --json` tells it.
 
 use std::path::PathBuf;
 

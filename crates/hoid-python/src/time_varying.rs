@@ -11,8 +11,8 @@ use crate::{
     figures::{self, Pair, error_or_nan, pair},
 };
 
-/// The package wraps it in `hoid.TimeVaryingFit`.
-#[pyclass(name = "TimeVaryingFit", module = "hoid._hoid", frozen)]
+/// The package wraps it in `pyhoid.TimeVaryingFit`.
+#[pyclass(name = "TimeVaryingFit", module = "pyhoid._pyhoid", frozen)]
 pub struct PyTimeVaryingFit {
     fit: TimeVaryingFit,
 }
@@ -61,7 +61,7 @@ impl PyTimeVaryingFit {
         Ok(all)
     }
 
-    /// Whether there is a change, and its comparison with the operator that does not change.
+    /// Whether there is a change, and the comparison with an operator that does not change.
     #[getter]
     fn change<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (c, all) = (self.fit.comparison(), PyDict::new(py));

@@ -1,4 +1,4 @@
-//! `hoid.track`: a recursive estimate over a record.
+//! `pyhoid.track`: a recursive estimate over a record.
 
 use std::path::PathBuf;
 
@@ -17,7 +17,7 @@ use crate::{
     interrupt, recursion,
 };
 
-/// Tracks a record; `options` are those of the recursion, all besides concern the record.
+/// Tracks a record; `options` are those of the recursion, the others concern the record.
 #[pyfunction]
 #[pyo3(signature = (record, options, *, start_span, update_from, moving_average, every, progress))]
 #[allow(clippy::too_many_arguments)]
@@ -57,8 +57,8 @@ pub fn track<'py>(
     Ok(PyTrace { trace, choice })
 }
 
-/// The estimate at every sample that was kept; the package wraps it in `hoid.Trace`.
-#[pyclass(name = "Trace", module = "hoid._hoid", frozen)]
+/// The estimate at every sample that was kept; the package wraps it in `pyhoid.Trace`.
+#[pyclass(name = "Trace", module = "pyhoid._pyhoid", frozen)]
 pub struct PyTrace {
     trace: Trace,
     choice: Option<Choice>,
@@ -143,7 +143,7 @@ impl PyTrace {
         Some(PyFit::new(fit, self.choice.clone(), None, 1))
     }
 
-    /// All columns by name, as in the file of a trace: numbers, and whole numbers as such.
+    /// All columns by name, as in a trace file; whole numbers stay whole.
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let trace = &self.trace;
         let (columns, convertible) = py.detach(|| {
@@ -180,7 +180,8 @@ impl PyTrace {
         figures::operator(py, &self.trace.operator(row))
     }
 
-    /// Writes the page about the trace into a directory, with the batch fits of the start and of the last third.
+    /// Writes the page about the trace into a directory, with the batch fits of the start and of
+    /// the last third.
     #[pyo3(signature = (record, directory, *, title, settings))]
     fn report(
         &self,
@@ -215,7 +216,7 @@ impl PyTrace {
         Ok(page)
     }
 
-    /// Writes the columns into a file, with comments above them where the format has such.
+    /// Writes the columns into a file, with comments where the format has them.
     fn write(&self, py: Python<'_>, path: PathBuf, comments: Vec<String>) -> Outcome<()> {
         let trace = &self.trace;
         py.detach(|| {

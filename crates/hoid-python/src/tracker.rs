@@ -1,4 +1,4 @@
-//! `hoid.Tracker`: a recursive estimate, live.
+//! `pyhoid.Tracker`: a recursive estimate, live.
 
 use hoid_ident::{Choice, IdentError};
 use hoid_model::{Record, SampleTime};
@@ -17,11 +17,11 @@ use crate::{
 /// Longest warm-up in samples.
 const LONGEST_WARM_UP: usize = 10_000_000;
 
-/// What a tracker was, to be made again: orders, numbers of the tracker, numbers of the warm-up.
+/// The state of a tracker, to restore it: orders, numbers of the tracker, numbers of the warm-up.
 type Saved<'py> = (Option<Bound<'py, PyDict>>, Bound<'py, PyArray1<f64>>);
 
-/// The package derives `hoid.Tracker` from it.
-#[pyclass(name = "Tracker", module = "hoid._hoid", subclass)]
+/// The package derives `pyhoid.Tracker` from it.
+#[pyclass(name = "Tracker", module = "pyhoid._pyhoid", subclass)]
 pub struct PyTracker {
     plan: TrackPlan,
     live: Live,
@@ -29,7 +29,7 @@ pub struct PyTracker {
     sample_time: SampleTime,
 }
 
-/// Searches what is open on the record of the start, and warms the filters with it.
+/// Searches the open orders on the start record, and runs the filters over it.
 fn started(plan: &TrackPlan, record: &Record) -> Result<(Tracker, Option<Choice>), IdentError> {
     let (options, choice) = plan.choose(record, &|| {})?;
     let mut tracker = Tracker::new(&options, Some(record), record.sample_time())?;
@@ -50,7 +50,7 @@ impl PyTracker {
         match &self.live {
             Live::Tracking(tracker) => Ok(tracker),
             Live::Collecting(warm_up) => Err(bad_option(format!(
-                "the tracker is warming up: it has {} of {} samples; look at .ready first",
+                "the tracker is warming up: it has {} of {} samples; check .ready first",
                 warm_up.collected, warm_up.needed
             ))),
         }
@@ -91,7 +91,7 @@ impl PyTracker {
             let record = arrays::record(&record, Wanted::Only(&["f_t"]))?;
             if !record.sample_time().matches(sample_time) {
                 return Err(bad_option(format!(
-                    "the record of the start has a sample time of {} s, the tracker one of {} s",
+                    "the start record has a sample time of {} s, the tracker one of {} s",
                     record.sample_time().s(),
                     sample_time.s()
                 )));
@@ -112,13 +112,13 @@ impl PyTracker {
         })
     }
 
-    /// Takes one sample; returns the innovation, NaN at a fault and during the warm-up.
+    /// Takes one sample. Returns the innovation: NaN at a fault and during the warm-up.
     #[pyo3(signature = (e, u, f_t=None, update=true))]
     fn step(&mut self, py: Python<'_>, e: f64, u: f64, f_t: Option<f64>, update: bool) -> f64 {
         let sample = Sample { e, u, reference: f_t };
         match self.live {
             Live::Tracking(_) => self.take(sample, update),
-            // The last sample of the warm-up brings the fit.
+            // The last sample of the warm-up starts the fit.
             Live::Collecting(_) => py.detach(|| self.take(sample, update)),
         }
     }
@@ -169,7 +169,7 @@ impl PyTracker {
         matches!(self.live, Live::Tracking(_))
     }
 
-    /// Why the last start fit failed, or the warm-up began anew.
+    /// Why the last start fit failed, or why the warm-up began again.
     #[getter]
     fn trouble(&self) -> Option<String> {
         match &self.live {
@@ -251,7 +251,7 @@ impl PyTracker {
         Ok(all)
     }
 
-    /// The batch fit that it started from; None when it was given a start, or came out of a pickle.
+    /// The batch fit that the tracker started from; None with a given start, or from a pickle.
     #[getter]
     fn start(&self) -> Option<PyFit> {
         let Live::Tracking(tracker) = &self.live else {
@@ -271,7 +271,7 @@ impl PyTracker {
         })
     }
 
-    /// Makes it what `saved` was asked of.
+    /// Restores the state that `saved` returned.
     fn restore(
         &mut self,
         orders: Option<std::collections::BTreeMap<String, usize>>,

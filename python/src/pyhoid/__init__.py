@@ -1,17 +1,23 @@
-"""Human-operator identification: how a person controls a machine, from the tracking error e and the control output u.
+"""Human-operator identification: how a person controls a machine, from the tracking error e and
+the control output u.
 
->>> import hoid
->>> record = hoid.simulate(condition="C1", seed=1)     # or hoid.read("run1.csv"), or hoid.Record(e=, u=, sample_time=)
->>> fit = hoid.identify(record)                        # Box-Jenkins; delay and order of the noise searched
->>> trace = hoid.track(record)                         # the operator from sample to sample
+>>> import pyhoid
+>>> record = pyhoid.simulate("C1", seed=1)  # or pyhoid.read("run1.csv"), or pyhoid.Record(...)
+>>> fit = pyhoid.identify(record)           # Box-Jenkins; searches the delay and the noise order
+>>> trace = pyhoid.track(record)            # the operator from sample to sample
+>>> pyhoid.plots.bode(fit)                  # matplotlib is imported here, not before
 
-Everything that the command line does is here under the same names and with the same defaults, and gives the same digits.
+Everything that the command line does is here under the same names and with the same defaults, and
+gives the same digits.
 """
 
 from __future__ import annotations
 
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from . import errors
-from ._hoid import __version__
+from ._pyhoid import __version__
 from .control_models import from_control
 from .conversion import Conversion, DiscreteTransferFunction, convert, discretise
 from .description import DescribingFunction, describing_function
@@ -30,8 +36,8 @@ from .estimates import Estimate, Operator, Remnant
 from .fit import Fit, FrequencyResponse, Series, Validation
 from .groups import group, group_manifest, simulate_group
 from .identification import identify
-from .record import Record
 from .reading import info, read, read_stretches, write
+from .record import Record
 from .reproduction import Reproduction, reproduce
 from .simulation import margins, simulate
 from .studies import Plan, Results, Table, merge, plan, plans, results, study
@@ -39,6 +45,10 @@ from .time_varying import TimeVaryingFit
 from .trace import Trace
 from .tracker import Tracker
 from .tracking import track
+
+if TYPE_CHECKING:
+    from . import dask as dask
+    from . import plots as plots
 
 __all__ = [
     "Conversion",
@@ -92,3 +102,16 @@ __all__ = [
     "track",
     "write",
 ]
+
+#: Modules that are imported at their first use, because of what they import themselves.
+_LAZY = ("dask", "plots")
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        return importlib.import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LAZY})

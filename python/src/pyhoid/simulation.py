@@ -1,4 +1,4 @@
-"""Closed-loop runs of a scenario, and what its loop is like."""
+"""Closed-loop runs of a scenario, and the margins of its loop."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from os import PathLike
 from typing import Any
 
-from . import _hoid
+from . import _pyhoid
 from .errors import OptionError
 from .record import Record
 
@@ -15,8 +15,8 @@ __all__ = ["margins", "simulate"]
 
 def _base(condition: str | None, scenario: str | PathLike[str] | None) -> dict[str, Any]:
     if (condition is None) == (scenario is None):
-        raise OptionError('give condition, as "C4", or scenario, one of the two')
-    # A text with lines is a scenario itself, anything else the name of its file.
+        raise OptionError('give either condition, such as "C4", or scenario')
+    # A text of several lines is a scenario itself; anything else is the name of its file.
     text = scenario if isinstance(scenario, str) and "\n" in scenario else None
     return {
         "condition": condition,
@@ -51,7 +51,7 @@ def simulate(
     remnant_order : int, optional
         Order m of the remnant filter, 1 to 4; default 1 or the scenario's.
     noise_level : float, optional
-        Noise level P_n; 0 is a run without remnant. Default 0.1 or the scenario's.
+        Noise level P_n, 0 for a run without remnant; default 0.1 or the scenario's.
     noise_definition : {"response", "remnant"}, optional
         What P_n is a share of: var(u_n)/var(u) or var(n)/var(u).
     remnant_time_constant : float, optional
@@ -59,22 +59,22 @@ def simulate(
     sample_time : float, optional
         Ts in s; default 0.01.
     realisation : {"input", "output"}, optional
-        Where K_c stands when it changes.
+        Where K_c stands in the controlled element, which matters when it changes.
     seed, cell, replication : int
-        They name the random stream; runs with another replication are independent.
+        They select the random stream; runs with different replications are independent.
     keep_run_in : bool
         Keep the samples with t < 0.
 
     Returns
     -------
     Record
-        e, u, x, n, f_t and the true parameters at every sample.
+        e, u, x, n, f_t, and the true parameters at every sample.
 
     Raises
     ------
     OptionError
     """
-    parts = _hoid.simulate(
+    parts = _pyhoid.simulate(
         **_base(condition, scenario),
         remnant_order=remnant_order,
         noise_level=noise_level,
@@ -105,7 +105,7 @@ def margins(
     condition, scenario
         As in `simulate`.
     state : {"initial", "last"}
-        Which state of a scenario that changes.
+        Which state, for a scenario that changes.
     noise_levels : sequence of float
         Noise levels P_n for the remnant gains.
     noise_definition : {"response", "remnant"}
@@ -113,10 +113,11 @@ def margins(
     Returns
     -------
     dict
-        ``crossover_rad_s``, ``phase_margin_deg``, ``gain_margin_db``, ``phase_crossover_rad_s`` (None where there is none), and
-        ``remnant_gain``, a list of dicts with ``remnant_order``, ``noise_level``, ``definition`` and ``K_n``.
+        ``crossover_rad_s``, ``phase_margin_deg``, ``gain_margin_db``, ``phase_crossover_rad_s``
+        (None where there is none), and ``remnant_gain``, a list of dicts with ``remnant_order``,
+        ``noise_level``, ``definition`` and ``K_n``.
     """
-    return _hoid.margins(
+    return _pyhoid.margins(
         **_base(condition, scenario),
         state=state,
         noise_levels=[float(level) for level in noise_levels],

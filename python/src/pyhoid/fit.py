@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from . import _hoid, _options, _text
+from . import _options, _pyhoid, _text
 from ._arrays import FloatArray, signal
 from .errors import DataError, NotConvertibleError
 from .estimates import UNITS, Estimate, Operator, Remnant, estimates
@@ -26,14 +26,20 @@ __all__ = ["Correlation", "Fit", "FrequencyResponse", "Series", "Validation"]
 
 
 class Series(NamedTuple):
-    """Values on the time axis of a record, from sample `first` on: ``record.u[first:]`` belongs to `values`."""
+    """Values on the time axis of a record, from sample `first` on.
+
+    ``record.u[first:]`` has the same times as `values`.
+    """
 
     first: int
     values: FloatArray
 
 
 class FrequencyResponse(NamedTuple):
-    """Frequency response from e to u with its standard errors (NaN where there are none), all of shape (n,)."""
+    """Frequency response from e to u with its standard errors.
+
+    All arrays have shape (n,). Standard errors are NaN where there are none.
+    """
 
     omega: FloatArray
     magnitude_db: FloatArray
@@ -45,11 +51,14 @@ class FrequencyResponse(NamedTuple):
     def response(self) -> npt.NDArray[np.complex128]:
         """The complex response."""
         phase = np.deg2rad(self.phase_deg)
-        return np.asarray(10.0 ** (self.magnitude_db / 20.0) * (np.cos(phase) + 1j * np.sin(phase)), dtype=np.complex128)
+        return np.asarray(
+            10.0 ** (self.magnitude_db / 20.0) * (np.cos(phase) + 1j * np.sin(phase)),
+            dtype=np.complex128,
+        )
 
 
 class Correlation(NamedTuple):
-    """Correlation over lags, with the bound that 99 % of white residuals keep."""
+    """Correlation by lag, with the bound that 99 % of white residuals stay within."""
 
     lags: npt.NDArray[np.int64]
     values: FloatArray
@@ -57,7 +66,7 @@ class Correlation(NamedTuple):
 
 
 class Validation(NamedTuple):
-    """A model judged on a record: simulation, prediction, and tests of the residuals."""
+    """A model validated on a record: simulation, prediction, and tests of the residuals."""
 
     first: int
     simulated: FloatArray
@@ -77,12 +86,17 @@ class Fit:
     Attributes
     ----------
     records : tuple of Record
-        The records that it was fitted to.
+        The records that the model was fitted to.
     settings : dict
-        The keywords that it was made with, defaults included.
+        The keywords of the call, defaults included.
     """
 
-    def __init__(self, native: _hoid.Fit, records: Sequence[Record], settings: Mapping[str, Any] | None = None) -> None:
+    def __init__(
+        self,
+        native: _pyhoid.Fit,
+        records: Sequence[Record],
+        settings: Mapping[str, Any] | None = None,
+    ) -> None:
         self._native = native
         self.records: tuple[Record, ...] = tuple(records)
         self.settings: dict[str, Any] = dict(settings or {})
@@ -90,7 +104,7 @@ class Fit:
 
     @property
     def structure(self) -> str:
-        """Name of the structure, as ``"bj"`` or ``"grey-box"``."""
+        """Name of the structure, such as ``"bj"`` or ``"grey-box"``."""
         return self._native.structure
 
     @property
@@ -100,7 +114,7 @@ class Fit:
 
     @property
     def sample_time(self) -> float:
-        """Ts in s."""
+        """Sample time Ts in s."""
         return self._native.sample_time
 
     @property
@@ -110,22 +124,31 @@ class Fit:
 
     @property
     def standard_errors(self) -> dict[str, float | None]:
-        """Standard errors by name; None for what was fixed, rests at a bound, or was fitted exactly."""
+        """Standard errors by name.
+
+        None for a parameter that was fixed, lies at a bound, or was fitted exactly.
+        """
         return {name: error for name, (_, error) in self._native.parameters}
 
     @property
     def estimates(self) -> dict[str, Estimate]:
-        """Both together."""
+        """Values and standard errors by name."""
         return {name: Estimate(*pair) for name, pair in self._native.parameters}
 
     @property
     def covariance(self) -> FloatArray | None:
-        """Covariance of the parameters, shape (p, p), in the order of `parameters`; None for an exact fit."""
+        """Covariance of the parameters, shape (p, p), in the order of `parameters`.
+
+        None for an exact fit.
+        """
         return self._native.covariance
 
     @property
     def polynomials(self) -> dict[str, FloatArray]:
-        """A, B, C, D and F by ascending powers of q^-1; B begins with its delay, the others with 1."""
+        """A, B, C, D and F by ascending powers of q^-1.
+
+        B begins with the zeros of its delay, the others with 1.
+        """
         return self._native.polynomials
 
     @property
@@ -135,13 +158,15 @@ class Fit:
 
     @property
     def innovation_variance(self) -> float:
-        """Variance of the innovations, freed of the bias by the number of parameters."""
+        """Variance of the innovations, corrected for the number of parameters."""
         return float(self._native.figures["innovation_variance"])
 
     @property
     def criteria(self) -> dict[str, float | None]:
         """aic, aicc, bic, fpe, mdl and yic."""
-        return {name: self._native.figures[name] for name in ("aic", "aicc", "bic", "fpe", "mdl", "yic")}
+        return {
+            name: self._native.figures[name] for name in ("aic", "aicc", "bic", "fpe", "mdl", "yic")
+        }
 
     @property
     def termination(self) -> dict[str, Any]:
@@ -160,18 +185,24 @@ class Fit:
 
     @property
     def operator(self) -> Operator | None:
-        """The human operator; None where the structure has no meaning as one."""
+        """The human operator; None where the structure cannot represent one."""
         found = self._native.operator
         return None if found is None else Operator(found)
 
     @property
     def operators(self) -> list[Operator | None]:
-        """The operator of each record of a grey box, whose individual parameters differ; empty for another fit."""
+        """The operator of each record, for a grey box with individual parameters.
+
+        Empty for other fits.
+        """
         return [None if found is None else Operator(found) for found in self._native.operators]
 
     @property
     def remnant(self) -> Remnant | None:
-        """T_n and K_n by the inverse of the zero-order hold; None without a noise model D. See `remnant_by`."""
+        """T_n and K_n by the inverse of the zero-order hold; see `remnant_by`.
+
+        None without a noise model D.
+        """
         return self.remnant_by("zoh")
 
     def remnant_by(self, discretisation: str) -> Remnant | None:
@@ -181,19 +212,22 @@ class Fit:
 
     @property
     def quality(self) -> dict[str, float]:
-        """VAF and NRMSE fit (both in %) of simulation and one-step prediction, over the records of the fit."""
+        """VAF and NRMSE fit (both in %) of simulation and one-step prediction.
+
+        They are taken over the records of the fit.
+        """
         if self._quality is None:
             self._quality = self._native.quality(list(self.records))
         return self._quality
 
     @property
     def candidates(self) -> list[dict[str, Any]]:
-        """The table that the model was chosen from; empty when nothing was searched."""
+        """The table that the model was chosen from; empty without a search."""
         return self._native.candidates
 
     @property
     def delay_interval(self) -> tuple[int, int] | None:
-        """nk of the candidates that the data do not tell apart, where nk was searched."""
+        """Range of nk among the candidates that the data cannot tell apart, if nk was searched."""
         return self._native.delay_interval
 
     @property
@@ -207,12 +241,12 @@ class Fit:
         Raises
         ------
         DataError
-            For a record that is too short or sampled otherwise.
+            For a record that is too short or has another sample time.
         """
         return Series(*self._native.predict(record, horizon))
 
     def simulate(self, record: Record) -> Series:
-        """Response to e alone, from initial states that fit the record best."""
+        """Response to e alone, from the initial states that fit the record best."""
         return Series(*self._native.simulate(record))
 
     def residuals(self, record: Record) -> Series:
@@ -236,7 +270,7 @@ class Fit:
         Parameters
         ----------
         omega : array_like, shape (n,), optional
-            Frequencies in rad/s; default 200 from 0.1 rad/s to the Nyquist frequency.
+            Frequencies in rad/s; default 200 of them, from 0.1 rad/s to the Nyquist frequency.
         """
         if omega is None:
             omega = np.geomspace(0.1, np.pi / self.sample_time, 200)
@@ -244,7 +278,10 @@ class Fit:
         return FrequencyResponse(frequencies, *self._native.frequency_response(frequencies))
 
     def margins(self, num: Sequence[float], den: Sequence[float]) -> dict[str, Estimate | None]:
-        """Crossover frequency and margins with a controlled element NUM/DEN by descending powers of s."""
+        """Crossover frequency and margins with a controlled element.
+
+        `num` and `den` are its coefficients by descending powers of s.
+        """
         return estimates(self._native.margins([float(v) for v in num], [float(v) for v in den]))
 
     def to_control(self) -> control.TransferFunction:
@@ -259,12 +296,14 @@ class Fit:
 
         parts = self.polynomials
         if not parts["B"].size:
-            raise NotConvertibleError("the model has no input, so that it has no transfer function from e to u")
+            raise NotConvertibleError(
+                "the model has no input, and so no transfer function from e to u"
+            )
         num = parts["B"]
         den = np.convolve(parts["A"], parts["F"])
         length = max(len(num), len(den))
         num, den = (np.pad(p, (0, length - len(p))) for p in (num, den))
-        # Zeros at the front of the numerator are the delay; equal zeros at both ends cancel.
+        # Zeros at the front of the numerator are the delay; those at the end of both cancel.
         while length > 1 and num[-1] == 0 and den[-1] == 0:
             num, den, length = num[:-1], den[:-1], length - 1
         return control.TransferFunction(num, den, self.sample_time)
@@ -277,7 +316,9 @@ class Fit:
         return pd.DataFrame(
             {
                 "value": [estimate.value for _, estimate in rows],
-                "standard_error": [np.nan if e.standard_error is None else e.standard_error for _, e in rows],
+                "standard_error": [
+                    np.nan if e.standard_error is None else e.standard_error for _, e in rows
+                ],
                 "unit": [UNITS.get(name, "") for name, _ in rows],
             },
             index=pd.Index([name for name, _ in rows], name="parameter"),
@@ -297,10 +338,12 @@ class Fit:
         if covariance is not None:
             variables["covariance"] = (("parameter", "parameter_"), covariance)
         coordinates = {"parameter": names, "parameter_": names}
-        return xr.Dataset(variables, coords=coordinates, attrs={"structure": self.structure, **self.orders})
+        return xr.Dataset(
+            variables, coords=coordinates, attrs={"structure": self.structure, **self.orders}
+        )
 
     def plot(self, record: Record | None = None, ax: Axes | None = None) -> Axes:
-        """The time response on a record, by default the first of the fit; see `hoid.plots`."""
+        """Plot the time response on a record, by default the first; see `pyhoid.plots`."""
         from . import plots
 
         return plots.time_response(self, record or self.records[0], ax=ax)
@@ -312,16 +355,19 @@ class Fit:
         title: str | None = None,
         controlled_element: tuple[Sequence[float], Sequence[float]] | None = None,
     ) -> Path:
-        """Write the page about the model, ``report.html``, into a directory, as ``hoid identify --report`` does.
+        """Write the page about the model, ``report.html``, into a directory.
+
+        It is the page that ``hoid identify --report`` writes.
 
         Parameters
         ----------
         directory : path
-            It is made if it is not there.
+            Created if it does not exist.
         title : str, optional
             Heading of the page.
         controlled_element : (array_like, array_like), optional
-            NUM and DEN by descending powers of s: the page then has the margins of the loop.
+            Numerator and denominator by descending powers of s. The page then has the margins of
+            the loop.
 
         Returns
         -------
@@ -331,10 +377,12 @@ class Fit:
         Raises
         ------
         FileError
-            When it cannot be written.
+            When the page cannot be written.
         """
         if not self.records:
-            raise DataError("the fit has no records, which the page is about; identify makes one that has")
+            raise DataError(
+                "the fit has no records for the page to show; a fit by identify has them"
+            )
         labels = [record.label or "(unnamed)" for record in self.records]
         what = labels[0] if len(labels) == 1 else f"{len(labels)} records"
         element = None
@@ -346,7 +394,11 @@ class Fit:
                 list(self.records),
                 Path(directory),
                 title=title or f"Identification of {what}",
-                settings=[("hoid", _hoid.__version__), ("records", ", ".join(labels)), *_options.settings(self.settings)],
+                settings=[
+                    ("hoid", _pyhoid.__version__),
+                    ("records", ", ".join(labels)),
+                    *_options.settings(self.settings),
+                ],
                 controlled_element=element,
             )
         )
@@ -355,11 +407,15 @@ class Fit:
         rows = list(self.estimates.items())
         for part in (self.operator, self.remnant):
             if part is not None and part.convertible:
-                rows.extend((name, estimate) for name, estimate in part.items() if name not in self.parameters)
+                rows.extend(
+                    (name, estimate)
+                    for name, estimate in part.items()
+                    if name not in self.parameters
+                )
         return rows
 
     def summary(self) -> str:
-        """The fit as a text of tables."""
+        """The fit as tables in plain text."""
         header = ["parameter", "value", "standard error", "unit"]
         rows = [
             [name, *_text.with_uncertainty(e.value, e.standard_error), UNITS.get(name, "")]
@@ -393,7 +449,10 @@ class Fit:
         from html import escape
 
         header = ["", "value", "standard error", "unit"]
-        rows = [[name, *_text.with_uncertainty(e.value, e.standard_error), UNITS.get(name, "")] for name, e in self.estimates.items()]
+        rows = [
+            [name, *_text.with_uncertainty(e.value, e.standard_error), UNITS.get(name, "")]
+            for name, e in self.estimates.items()
+        ]
         parts = [_text.html_table(self._headline(), header, rows)]
         for part in (self.operator, self.remnant):
             if part is not None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import _hoid, _options, _text
+from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
 from .estimates import UNITS, Estimate, Operator
 from .fit import Fit
@@ -28,18 +28,20 @@ __all__ = ["Trace"]
 class Trace:
     """The estimate at every sample that was kept, with its uncertainty. `track` makes it.
 
-    Columns are read by name: ``trace["K_e"]``, ``trace["K_e_se"]`` for its standard errors; all have the shape (N,). NaN stands where a
-    row has no operator.
+    Columns are read by name: ``trace["K_e"]``, and ``trace["K_e_se"]`` for its standard errors. All
+    have shape (N,), and NaN where a row has no operator.
 
     Attributes
     ----------
     record : Record
         The record that was tracked.
     settings : dict
-        The keywords that it was made with, defaults included.
+        The keywords of the call, defaults included.
     """
 
-    def __init__(self, native: _hoid.Trace, record: Record, settings: Mapping[str, Any] | None = None) -> None:
+    def __init__(
+        self, native: _pyhoid.Trace, record: Record, settings: Mapping[str, Any] | None = None
+    ) -> None:
         self._native = native
         self.record = record
         self.settings: dict[str, Any] = dict(settings or {})
@@ -47,7 +49,7 @@ class Trace:
 
     @property
     def columns(self) -> dict[str, npt.NDArray[Any]]:
-        """All columns by name, in the order of the file of a trace."""
+        """All columns by name, in the order of a trace file."""
         if self._columns is None:
             self._columns = self._native.columns()
         return self._columns
@@ -56,7 +58,9 @@ class Trace:
         try:
             return self.columns[name]
         except KeyError:
-            raise KeyError(f"there is no column {name}; the trace has {', '.join(self.columns)}") from None
+            raise KeyError(
+                f"there is no column {name}; the trace has {', '.join(self.columns)}"
+            ) from None
 
     def __contains__(self, name: object) -> bool:
         return name in self.columns
@@ -96,7 +100,7 @@ class Trace:
 
     @property
     def updated_from(self) -> float:
-        """Time in s from which the estimate moved."""
+        """Time in s from which the estimate was updated."""
         return self._native.updated_from
 
     @property
@@ -106,12 +110,16 @@ class Trace:
 
     @property
     def changes(self) -> list[dict[str, Any]]:
-        """The changes that ``"adaptive"`` declared: when, how long ago, the odds, and the gains before and after with standard errors."""
+        """The changes that ``"adaptive"`` declared.
+
+        Each has its time, how long ago it was, the odds, and the gains before and after with their
+        standard errors.
+        """
         return self._native.changes
 
     @property
     def innovation_variance(self) -> FloatArray:
-        """Innovation variance of each row, as tracked."""
+        """The tracked innovation variance of each row."""
         return self._native.innovation_variance
 
     @property
@@ -150,27 +158,32 @@ class Trace:
             if name != "t"
         }
         attributes = {"method": self.method, "structure": self.structure}
-        return xr.Dataset(variables, coords={"t": ("t", self.time, {"units": "s"})}, attrs=attributes)
+        return xr.Dataset(
+            variables, coords={"t": ("t", self.time, {"units": "s"})}, attrs=attributes
+        )
 
     def write(self, path: str | PathLike[str], comments: Sequence[str] = ()) -> None:
         """Write the columns as CSV, Parquet, NPZ or .mat, as ``hoid track`` does."""
         self._native.write(path, list(comments))
 
-    def plot(self, names: Sequence[str] | None = None, axes: Sequence[Axes] | None = None) -> Sequence[Axes]:
-        """The parameters over time with their bands; see `hoid.plots`."""
+    def plot(
+        self, names: Sequence[str] | None = None, axes: Sequence[Axes] | None = None
+    ) -> Sequence[Axes]:
+        """Plot the parameters over time with their bands; see `pyhoid.plots`."""
         from . import plots
 
         return plots.trace(self, names, axes=axes)
 
     def report(self, directory: str | PathLike[str], *, title: str | None = None) -> Path:
-        """Write the page about the trace, ``report.html``, into a directory, as ``hoid track --report`` does.
+        """Write the page about the trace, ``report.html``, into a directory.
 
-        It compares with batch fits of the start and of the last third of the record, and with the truth where the record has it.
+        It is the page that ``hoid track --report`` writes. It compares the trace with batch fits of
+        the start and of the last third of the record, and with the truth if the record has it.
 
         Parameters
         ----------
         directory : path
-            It is made if it is not there.
+            Created if it does not exist.
         title : str, optional
             Heading of the page.
 
@@ -182,10 +195,14 @@ class Trace:
         Raises
         ------
         FileError
-            When it cannot be written.
+            When the page cannot be written.
         """
         label = self.record.label or "(unnamed)"
-        facts = [("hoid", _hoid.__version__), ("record", label), *_options.settings(self.settings)]
+        facts = [
+            ("hoid", _pyhoid.__version__),
+            ("record", label),
+            *_options.settings(self.settings),
+        ]
         title = title or f"{label} tracked by {self.method}"
         return Path(self._native.report(self.record, Path(directory), title=title, settings=facts))
 
@@ -193,10 +210,14 @@ class Trace:
         moved = np.flatnonzero(self.time >= self.updated_from)
         first = int(moved[0]) if moved.size else 0
         picked = np.unique(np.linspace(first, len(self) - 1, 8).round().astype(int))
-        names = self.operator_names if bool(np.any(self["convertible"])) else self.parameter_names[:6]
+        names = (
+            self.operator_names if bool(np.any(self["convertible"])) else self.parameter_names[:6]
+        )
         rows = []
         for row in picked:
-            cells = [repr(Estimate(float(self[n][row]), float(self[f"{n}_se"][row]))) for n in names]
+            cells = [
+                repr(Estimate(float(self[n][row]), float(self[f"{n}_se"][row]))) for n in names
+            ]
             rows.append([f"{self.time[row]:.2f}", *cells])
         return [["t in s", *names], *rows]
 
@@ -204,8 +225,11 @@ class Trace:
         if not len(self):
             return f"Trace by {self.method}: no rows"
         header, *rows = self._rows()
-        return f"Trace by {self.method}, {self.structure}: {len(self)} rows\n{_text.plain_table(header, rows)}"
+        title = f"Trace by {self.method}, {self.structure}: {len(self)} rows"
+        return f"{title}\n{_text.plain_table(header, rows)}"
 
     def _repr_html_(self) -> str:
         header, *rows = self._rows()
-        return _text.html_table(f"Trace by {self.method}, {self.structure}: {len(self)} rows", header, rows)
+        return _text.html_table(
+            f"Trace by {self.method}, {self.structure}: {len(self)} rows", header, rows
+        )

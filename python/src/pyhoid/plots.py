@@ -1,7 +1,8 @@
-"""Figures by matplotlib, on axes that are given or made, in the style of the reports of hoid.
+"""Figures with matplotlib in the style of hoid's reports, on new axes or on yours.
 
-The hue tells the model or method (blue, vermillion, green, ... of Okabe and Ito), black the truth or the measurement; bands are one
-standard error unless said otherwise. Every function returns the axes that it has drawn on.
+The hue tells the model or method (blue, vermillion, green, ... of Okabe and Ito); black is the
+truth or the measurement. Bands are two standard errors wide on each side (`deviations`), error bars
+one. Every function returns the axes that it has drawn on.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ STYLE: Mapping[str, Any] = {
     "savefig.dpi": 150,
 }
 
-#: Symbols of parameters as they are written.
+#: Symbols of the parameters in figures.
 SYMBOLS: Mapping[str, str] = {
     "K_e": r"$K_e$",
     "T_L": r"$T_L$",
@@ -82,8 +83,9 @@ SYMBOLS: Mapping[str, str] = {
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Draw in the style of the reports: ``with hoid.plots.style(): ...``."""
-    # Of the style alone: matplotlib.rc_context would also take back what the backend of a notebook sets at the first figure.
+    """Draw in the style of the reports: ``with pyhoid.plots.style(): ...``."""
+    # Only the style's settings: matplotlib.rc_context would also take back what the backend of a
+    # notebook sets at the first figure.
     settings: Any = rcParams
     before = {name: settings[name] for name in STYLE}
     settings.update(STYLE)
@@ -121,15 +123,15 @@ def time_response(
     predict: bool = False,
     ax: Axes | None = None,
 ) -> Axes:
-    """Measured output and the response of one or several models.
+    """The measured output and the response of one or more models.
 
     Parameters
     ----------
     fits : Fit, sequence or mapping from names to Fit
     record : Record, optional
-        Default the first of the first fit.
+        Default the first record of the first fit.
     predict : bool
-        One-step prediction in place of the simulation.
+        Show the one-step prediction instead of the simulation.
     """
     named = _fits(fits)
     record = record or next(iter(named.values())).records[0]
@@ -139,7 +141,12 @@ def time_response(
         for colour, (name, fit) in zip(_cycle(), named.items()):
             found = fit.predict(record) if predict else fit.simulate(record)
             vaf = fit.quality_on(record)["vaf_prediction" if predict else "vaf_simulation"]
-            ax.plot(record.time[found.first :], found.values, color=colour, label=f"{name}, VAF {vaf:.1f} %")
+            ax.plot(
+                record.time[found.first :],
+                found.values,
+                color=colour,
+                label=f"{name}, VAF {vaf:.1f} %",
+            )
         ax.set_xlabel("t (s)")
         unit = record.units.get(record.output_name, "")
         ax.set_ylabel(f"{record.output_name} ({unit})" if unit else record.output_name)
@@ -149,7 +156,7 @@ def time_response(
 
 
 def _legend(ax: Axes) -> None:
-    """Above the axes, where it hides nothing."""
+    """A legend above the axes, where it hides nothing."""
     handles, labels = ax.get_legend_handles_labels()
     if handles:
         columns = 1 if max(map(len, labels)) > 34 and len(labels) > 2 else min(len(handles), 3)
@@ -172,7 +179,10 @@ def bode(
     axes: Sequence[Axes] | None = None,
     deviations: float = 2.0,
 ) -> Sequence[Axes]:
-    """Bode plot from e to u with bands of `deviations` standard errors; `axes` are two, for magnitude and phase."""
+    """Bode plot from e to u with bands of `deviations` standard errors.
+
+    `axes` are two, for magnitude and phase.
+    """
     with style():
         pair = _pair(axes)
         for colour, (name, fit) in zip(_cycle(), _fits(fits).items()):
@@ -184,7 +194,9 @@ def bode(
             ):
                 ax.plot(found.omega, middle, color=colour, label=label)
                 band = deviations * np.nan_to_num(error)
-                ax.fill_between(found.omega, middle - band, middle + band, color=colour, alpha=BAND, linewidth=0)
+                ax.fill_between(
+                    found.omega, middle - band, middle + band, color=colour, alpha=BAND, linewidth=0
+                )
         _dress_bode(pair)
     return pair
 
@@ -214,17 +226,29 @@ def describing(
     *,
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:
-    """The describing function as points with error bars, over the Bode plot of one or several models."""
+    """The describing function as points with error bars, over the Bode plot of the models."""
     with style():
         pair = _pair(axes)
         if model is not None:
             omega = np.geomspace(found.omega.min() / 1.5, found.omega.max() * 1.5, 200)
             bode(model, omega, axes=pair)
-        for ax, name, label in ((pair[0], "magnitude_db", "describing function"), (pair[1], "phase_deg", None)):
+        for ax, name, label in (
+            (pair[0], "magnitude_db", "describing function"),
+            (pair[1], "phase_deg", None),
+        ):
             values = found[name] if name == "magnitude_db" else _unwrapped(found[name])
             bars = np.nan_to_num(found[f"{name}_se"])
             ax.errorbar(
-                found.omega, values, yerr=bars, fmt="o", color="black", markersize=3.5, linewidth=0.9, capsize=2, label=label, zorder=3
+                found.omega,
+                values,
+                yerr=bars,
+                fmt="o",
+                color="black",
+                markersize=3.5,
+                linewidth=0.9,
+                capsize=2,
+                label=label,
+                zorder=3,
             )
         _dress_bode(pair)
     return pair
@@ -233,7 +257,10 @@ def describing(
 def residual_tests(
     fit: Fit, record: Record | None = None, *, axes: Sequence[Axes] | None = None
 ) -> Sequence[Axes]:
-    """Autocorrelation of the residuals and their cross-correlation with e, with the bounds that 99 % of white residuals keep."""
+    """Autocorrelation of the residuals and their cross-correlation with e.
+
+    The grey bands are the bounds that 99 % of white residuals stay within.
+    """
     record = record or fit.records[0]
     found = fit.validate(record)
     with style():
@@ -245,7 +272,9 @@ def residual_tests(
             (axes[1], found.cross_correlation, "correlation of ε with e"),
         )
         for ax, correlation, name in panels:
-            ax.axhspan(-correlation.bound_99, correlation.bound_99, color=GREY, alpha=BAND, linewidth=0)
+            ax.axhspan(
+                -correlation.bound_99, correlation.bound_99, color=GREY, alpha=BAND, linewidth=0
+            )
             ax.vlines(correlation.lags, 0, correlation.values, color=COLOURS[0], linewidth=1.0)
             ax.axhline(0, color="black", linewidth=0.8)
             ax.set_ylabel(name)
@@ -254,7 +283,8 @@ def residual_tests(
         test = found.ljung_box
         if test is not None:
             axes[0].set_title(
-                f"Ljung-Box Q = {test['statistic']:.1f}, {test['degrees_of_freedom']} degrees of freedom, p = {test['p_value']:.3f}",
+                f"Ljung-Box Q = {test['statistic']:.1f}, {test['degrees_of_freedom']} degrees of"
+                f" freedom, p = {test['p_value']:.3f}",
                 loc="left",
             )
     return axes
@@ -268,13 +298,13 @@ def trace(
     truth: bool = True,
     deviations: float = 2.0,
 ) -> Sequence[Axes]:
-    """Parameters over time, a panel each, with bands of `deviations` standard errors.
+    """Parameters over time, each in a panel, with bands of `deviations` standard errors.
 
     Parameters
     ----------
     traces : Trace, sequence or mapping from names to Trace
     names : sequence of str, optional
-        Columns; default the operator's parameters.
+        Columns to show; default the operator's parameters.
     truth : bool
         Draw the true values in black where the record has them.
     """
@@ -289,22 +319,39 @@ def trace(
     with style():
         if axes is None:
             _, made = plt.subplots(
-                len(shown), 1, figsize=(5.6, 1.35 * len(shown) + 0.5), sharex=True, layout="constrained", squeeze=False
+                len(shown),
+                1,
+                figsize=(5.6, 1.35 * len(shown) + 0.5),
+                sharex=True,
+                layout="constrained",
+                squeeze=False,
             )
             axes = list(made[:, 0])
         if len(axes) != len(shown):
-            raise OptionError(f"axes has {len(axes)} axes, expected {len(shown)}: one for each of {', '.join(shown)}")
+            raise OptionError(
+                f"axes has {len(axes)} axes, expected {len(shown)}:"
+                f" one for each of {', '.join(shown)}"
+            )
         for ax, name in zip(axes, shown):
             extent: list[Any] = []
             for colour, (label, one) in zip(_cycle(), named.items()):
                 middle, band = one[name], deviations * np.nan_to_num(one[f"{name}_se"])
                 ax.plot(one.time, middle, color=colour, label=label)
-                ax.fill_between(one.time, middle - band, middle + band, color=colour, alpha=BAND, linewidth=0)
+                ax.fill_between(
+                    one.time, middle - band, middle + band, color=colour, alpha=BAND, linewidth=0
+                )
                 moved = one.time >= one.updated_from
                 extent.append(middle[moved & np.isfinite(middle)])
             if truth and name in first.record.channels:
                 known = first.record[name]
-                ax.plot(first.record.time, known, color="black", linestyle="--", linewidth=0.9, label="truth")
+                ax.plot(
+                    first.record.time,
+                    known,
+                    color="black",
+                    linestyle="--",
+                    linewidth=0.9,
+                    label="truth",
+                )
                 extent.append(known)
             _limits(ax, extent)
             ax.set_ylabel(_label(name))
@@ -315,7 +362,10 @@ def trace(
 
 
 def _limits(ax: Axes, extent: Iterable[Any]) -> None:
-    """Room for nearly all of the curves: single values where a gain nearly vanishes do not decide the scale."""
+    """Limits with room for nearly all of the curves.
+
+    Single values where a gain nearly vanishes do not set the scale.
+    """
     parts = [np.asarray(part)[np.isfinite(part)] for part in extent]
     values = np.concatenate(parts) if parts else np.array([])
     if values.size:
@@ -331,16 +381,19 @@ def box_plots(
     label: str = "",
     ax: Axes | None = None,
 ) -> Axes:
-    """Box plots of samples by name: median, quartiles, whiskers to 1.5 times their distance, the rest as points.
+    """Box plots of samples by name.
+
+    They show the median, the quartiles, whiskers to 1.5 times their distance, and the rest as
+    points.
 
     Parameters
     ----------
     groups : mapping from str to array_like
-        Values that are not finite are left out; their number stands below the name.
+        Values that are not finite are left out; their number is shown below the name.
     truth : float, optional
-        Drawn as a dashed line.
+        The true value, drawn as a dashed line.
     label : str
-        Of the ordinate; a parameter's name gets its symbol and unit.
+        Label of the ordinate; a parameter's name becomes its symbol and unit.
     """
     with style():
         ax = _axes(ax)
@@ -369,14 +422,14 @@ def box_plots(
 
 
 def reference(name: str, directory: str | PathLike[str]) -> Figure:
-    """A figure of the reproduction of the reference text, drawn from its data.
+    """Draw a figure of the reproduction of the reference text from its data.
 
     Parameters
     ----------
     name : str
-        As ``"fig-11"``, ``"C.1"`` or ``"A.1"``; ``hoid reproduce --list`` shows them.
+        ``"fig-11"``, ``"C.1"``, ``"A.1"``, ...; ``hoid reproduce --list`` shows all names.
     directory : path
-        What ``hoid reproduce --out`` has written.
+        The directory that ``hoid reproduce --out`` has written.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Figures of the reproduction of the reference text, from the tables that stand beside its own figures.
+"""Figures of the reproduction of the reference text, from the tables beside its own figures.
 
-The columns of a table tell what kind of figure it is: box plots over nk and the noise level, maps over nk and m, Bode plots, estimates over
-time, or curves.
+The columns of a table tell what kind of figure it is: box plots over nk and the noise level, maps
+over nk and m, Bode plots, estimates over time, or curves.
 """
 
 from __future__ import annotations
@@ -24,8 +24,19 @@ if TYPE_CHECKING:
 
 Columns = Mapping[str, Any]
 
-#: Columns that say which curve a row belongs to.
-KEYS = ("model", "estimator", "parameter", "quantity", "name", "remnant_order", "noise_level", "nk", "nd", "m")
+#: Columns that tell which curve a row belongs to.
+KEYS = (
+    "model",
+    "estimator",
+    "parameter",
+    "quantity",
+    "name",
+    "remnant_order",
+    "noise_level",
+    "nk",
+    "nd",
+    "m",
+)
 
 
 def draw(name: str, directory: Path) -> Figure:
@@ -35,7 +46,8 @@ def draw(name: str, directory: Path) -> Figure:
     if file is None:
         known = ", ".join(sorted(files)) or "none"
         raise FileMissingError(
-            f"{directory} has no data of {name}, but of: {known}; write them by hoid reproduce --only {name} --out {directory}"
+            f"{directory} has no data for {name}, only for: {known};"
+            f" write them with hoid reproduce --only {name} --out {directory}"
         )
     columns = _columns(file)
     with plots.style():
@@ -54,7 +66,13 @@ def draw(name: str, directory: Path) -> Figure:
 
 
 def _columns(file: Path) -> dict[str, Any]:
-    rows = list(csv.reader(line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")))
+    rows = list(
+        csv.reader(
+            line
+            for line in file.read_text(encoding="utf-8").splitlines()
+            if not line.startswith("#")
+        )
+    )
     header, body = rows[0], rows[1:]
     columns: dict[str, Any] = {}
     for i, name in enumerate(header):
@@ -67,7 +85,7 @@ def _columns(file: Path) -> dict[str, Any]:
 
 
 def _each(columns: Columns, name: str) -> list[Any]:
-    """The values of a column in their order, each once, without what is not there."""
+    """The values of a column in their order, each once, without missing ones."""
     found = columns[name].tolist() if name in columns else []
     return [value for value in dict.fromkeys(found) if value == value] or [None]
 
@@ -75,7 +93,7 @@ def _each(columns: Columns, name: str) -> list[Any]:
 def _rows(columns: Columns, **wanted: Any) -> Any:
     mask = np.ones(len(next(iter(columns.values()))), dtype=bool)
     for name, value in wanted.items():
-        # A row without the key, as that of the truth, belongs to all of its values.
+        # A row without the key, such as that of the truth, belongs to all of its values.
         if value is not None:
             mask &= (columns[name] == value) | (columns[name] != columns[name])
     return mask
@@ -88,9 +106,13 @@ def _shades(hue: str, levels: int) -> list[Any]:
     return [tuple(rgb + (1 - rgb) * -0.55 * s if s < 0 else rgb * (1 - 0.6 * s)) for s in shares]
 
 
-def _grid(rows: int, columns: int, width: float, height: float, **options: Any) -> tuple[Figure, Any]:
+def _grid(
+    rows: int, columns: int, width: float, height: float, **options: Any
+) -> tuple[Figure, Any]:
     size = (width * columns + 0.7, height * rows + 0.7)
-    figure, grid = plt.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained", **options)
+    figure, grid = plt.subplots(
+        rows, columns, figsize=size, squeeze=False, layout="constrained", **options
+    )
     return figure, grid
 
 
@@ -106,7 +128,7 @@ def _order_titles(grid: Any, orders: list[Any]) -> None:
             ax.set_title(f"m0 = {order:g}")
 
 
-#: Estimators by the start of their name: hue and dashes. Batch fits have those of their method.
+#: Estimators by the start of their name: hue and dashes. Batch fits use those of their method.
 LINES: Mapping[str, tuple[str, str]] = {
     "RLS": (plots.COLOURS[0], "-"),
     "OLS": (plots.COLOURS[0], "--"),
@@ -135,15 +157,37 @@ def _traces(columns: Columns) -> Figure:
             ax, extent = grid[row][column], []
             for hue, estimator in zip(plots._cycle(), estimators):
                 if _is_truth(estimator):
-                    mask = _rows(columns, parameter=parameter, estimator=estimator, remnant_order=order)
-                    ax.plot(columns["t"][mask], columns["median"][mask], color="black", linestyle="--", linewidth=0.9, label="simulated")
+                    mask = _rows(
+                        columns, parameter=parameter, estimator=estimator, remnant_order=order
+                    )
+                    ax.plot(
+                        columns["t"][mask],
+                        columns["median"][mask],
+                        color="black",
+                        linestyle="--",
+                        linewidth=0.9,
+                        label="simulated",
+                    )
                     extent.append(columns["median"][mask])
                     continue
                 hue, dashes = _line(estimator, hue)
                 for colour, level in zip(_shades(hue, len(levels)), levels):
-                    mask = _rows(columns, parameter=parameter, estimator=estimator, remnant_order=order, noise_level=level)
+                    mask = _rows(
+                        columns,
+                        parameter=parameter,
+                        estimator=estimator,
+                        remnant_order=order,
+                        noise_level=level,
+                    )
                     label = None if dashes == "--" else f"{estimator}, {level:g}"
-                    ax.plot(columns["t"][mask], columns["median"][mask], dashes, color=colour, linewidth=0.9, label=label)
+                    ax.plot(
+                        columns["t"][mask],
+                        columns["median"][mask],
+                        dashes,
+                        color=colour,
+                        linewidth=0.9,
+                        label=label,
+                    )
                     extent.append(columns["median"][mask])
             plots._limits(ax, extent)
             ax.margins(x=0)
@@ -156,7 +200,9 @@ def _traces(columns: Columns) -> Figure:
 
 
 def _boxes(columns: Columns) -> Figure:
-    parameters, orders, delays, levels = (_each(columns, name) for name in ("parameter", "remnant_order", "nk", "noise_level"))
+    parameters, orders, delays, levels = (
+        _each(columns, name) for name in ("parameter", "remnant_order", "nk", "noise_level")
+    )
     ends = ("lower_whisker", "upper_whisker") if "lower_whisker" in columns else ("least", "most")
     figure, grid = _grid(len(parameters), len(orders), 2.5, 1.35, sharex=True)
     colours = _shades(plots.COLOURS[1 if "f1" in parameters else 0], len(levels))
@@ -165,7 +211,9 @@ def _boxes(columns: Columns) -> Figure:
         for column, order in enumerate(orders):
             ax = grid[row][column]
             for at, (colour, level) in enumerate(zip(colours, levels)):
-                mask = np.flatnonzero(_rows(columns, parameter=parameter, remnant_order=order, noise_level=level))
+                mask = np.flatnonzero(
+                    _rows(columns, parameter=parameter, remnant_order=order, noise_level=level)
+                )
                 found = [
                     {
                         "med": columns["median"][k],
@@ -176,7 +224,10 @@ def _boxes(columns: Columns) -> Figure:
                     }
                     for k in mask
                 ]
-                places = [delays.index(columns["nk"][k]) + (at - (len(levels) - 1) / 2) * width for k in mask]
+                places = [
+                    delays.index(columns["nk"][k]) + (at - (len(levels) - 1) / 2) * width
+                    for k in mask
+                ]
                 boxes = ax.bxp(
                     found,
                     positions=places,
@@ -213,8 +264,13 @@ def _maps(columns: Columns) -> Figure:
         for ax, level in zip(grid[row], levels):
             values = np.full((len(orders), len(delays)), np.nan)
             for k in np.flatnonzero(_rows(columns, quantity=quantity, noise_level=level)):
-                values[np.searchsorted(orders, columns["m"][k]), np.searchsorted(delays, columns["nk"][k])] = columns["value"][k]
-            mesh = ax.pcolormesh(delays, orders, values, cmap="cividis", vmin=low, vmax=high, shading="nearest")
+                values[
+                    np.searchsorted(orders, columns["m"][k]),
+                    np.searchsorted(delays, columns["nk"][k]),
+                ] = columns["value"][k]
+            mesh = ax.pcolormesh(
+                delays, orders, values, cmap="cividis", vmin=low, vmax=high, shading="nearest"
+            )
             ax.set_xticks(delays)
             ax.set_yticks(orders)
             ax.grid(visible=False)
@@ -241,9 +297,20 @@ def _bode(columns: Columns) -> Figure:
                 mask = _rows(columns, model=model, remnant_order=order, **{shade: level})
                 label = str(model) if level is None else f"{model}, {level:g}"
                 for ax, name in ((grid[0][column], "magnitude_db"), (grid[1][column], "phase_deg")):
-                    values = columns[name][mask] if name == "magnitude_db" else plots._unwrapped(columns[name][mask])
+                    values = (
+                        columns[name][mask]
+                        if name == "magnitude_db"
+                        else plots._unwrapped(columns[name][mask])
+                    )
                     dashes = "--" if _is_truth(model) else "-"
-                    ax.plot(columns["omega_rad_s"][mask], values, dashes, color=colour, linewidth=0.9, label=label)
+                    ax.plot(
+                        columns["omega_rad_s"][mask],
+                        values,
+                        dashes,
+                        color=colour,
+                        linewidth=0.9,
+                        label=label,
+                    )
                     ax.set_xscale("log")
                     ax.margins(x=0)
         grid[1][column].set_xlabel("ω (rad/s)")
@@ -256,15 +323,28 @@ def _bode(columns: Columns) -> Figure:
 
 def _curves(columns: Columns) -> Figure:
     numbers = [name for name, values in columns.items() if values.dtype != object]
-    abscissa = next((name for name in ("t", "omega_rad_s", "demanded") if name in numbers), numbers[0])
-    keys = [name for name in columns if name != abscissa and (columns[name].dtype == object or name in KEYS)]
-    left = [name for name in numbers if name not in (abscissa, *keys, "runs", "sd") and not name.endswith("_se")]
+    abscissa = next(
+        (name for name in ("t", "omega_rad_s", "demanded") if name in numbers), numbers[0]
+    )
+    keys = [
+        name
+        for name in columns
+        if name != abscissa and (columns[name].dtype == object or name in KEYS)
+    ]
+    left = [
+        name
+        for name in numbers
+        if name not in (abscissa, *keys, "runs", "sd") and not name.endswith("_se")
+    ]
     figure, grid = _grid(len(left), 1, 5.0, 1.8, sharex=True)
     groups = list(dict.fromkeys(zip(*(columns[key].tolist() for key in keys)))) if keys else [()]
     for ax, name in zip(grid[:, 0], left):
         for colour, group in zip(plots._cycle(), groups):
             mask = _rows(columns, **dict(zip(keys, group)))
-            label = ", ".join(v if isinstance(v, str) else f"{key} {_text.number(v, 3)}" for key, v in zip(keys, group))
+            label = ", ".join(
+                v if isinstance(v, str) else f"{key} {_text.number(v, 3)}"
+                for key, v in zip(keys, group)
+            )
             errors = columns.get(f"{name}_se")
             ax.errorbar(
                 columns[abscissa][mask],

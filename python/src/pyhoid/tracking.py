@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from . import _hoid, _options, _recursion
+from . import _options, _pyhoid, _recursion
 from ._options import Order, Progress
 from ._recursion import Memory
 from .errors import DataError, OptionError
@@ -54,61 +54,67 @@ def track(
 ) -> Trace:
     """Track a model and the operator's parameters over a record, sample by sample.
 
-    With no options this is the physical recursion, started from a Box-Jenkins fit of the first third of the record.
+    Without options this is the physical recursion, started from a Box-Jenkins fit of the first
+    third of the record.
 
     Parameters
     ----------
     record : Record
     method : {"physical", "rls", "rpem", "window", "rriv", "adaptive", "fused", "ekf", "ukf"}
-        Recursion in the operator's parameters; recursive least squares (arx, fir); recursive prediction error method (Ljung 1999, ch. 11);
-        batch fits of a sliding window; recursive refined instrumental variable (Young 2011);
-        a bank of hypotheses of when the person changed, which sets its memory itself and tells of changes (`Trace.changes`); for comparison
-        least squares with the poles of rpem (fused), and Kalman filters of state and parameters, extended (ekf) and unscented (ukf).
+        ``"physical"`` is a recursion in the operator's parameters, ``"rls"`` recursive least
+        squares (arx, fir), ``"rpem"`` the recursive prediction error method (Ljung 1999, ch. 11),
+        ``"window"`` batch fits of a sliding window, ``"rriv"`` the recursive refined instrumental
+        variable (Young 2011). ``"adaptive"`` is a bank of hypotheses about when the person changed;
+        it sets its memory itself and reports changes (`Trace.changes`). For comparison there are
+        least squares with the poles of rpem (``"fused"``) and Kalman filters of state and
+        parameters, extended (``"ekf"``) and unscented (``"ukf"``).
     structure : str, optional
-        Default ``"arx"`` for rls, else ``"bj"``.
+        Default ``"arx"`` for ``"rls"``, otherwise ``"bj"``.
     na, nb, nc, nd, nf, nk : int or (int, int) or range, optional
         Orders; pairs are searched on the start span.
     criterion : str
-        What decides between candidates.
+        The criterion that chooses between candidates.
     start : mapping of str to float, or "nothing", optional
         All coefficients; default a batch fit of the start span.
     memory : float or str, optional
-        Time in which the weight of a sample falls to 1/e: samples (``256``), seconds (``"2.56s"``) or ``"inf"``.
+        Time in which the weight of a sample falls to 1/e: samples (``256``), seconds (``"2.56s"``)
+        or ``"inf"``.
     forgetting_factor : float, optional
-        lambda = 1 - 1/memory, in its place.
+        lambda = 1 - 1/memory, instead of `memory`.
     memory_of : mapping, optional
-        Memory of single parameters, or of all of one letter, as ``{"b": 256, "K_e": "5s"}``.
+        Memory of single parameters, or of all of one letter: ``{"b": 256, "K_e": "5s"}``.
     forgetting : {"exponential", "random-walk", "window", "variable", "directional", "gradient"}
     drift : mapping of str to float, optional
-        For ``"random-walk"``: by how much a parameter drifts in one second.
+        For ``"random-walk"``: how much a parameter drifts in one second.
     rate : float, optional
         Step size for ``"gradient"``; default 0.1.
     covariance : float, optional
-        P at the start as a multiple of the unit matrix (the reference text: 0.1); default that of the start fit.
+        P at the start, as a multiple of the unit matrix (0.1 in the reference text); default that
+        of the start fit.
     pseudo_linear : bool
-        Extended least squares in place of the gradient, for rpem.
+        Extended least squares instead of the gradient, for ``"rpem"``.
     stable : {"predictor", "noise"}
-        Polynomials that are kept stable: C and F, or D too.
+        Polynomials that are kept stable: C and F, or also D.
     bound : mapping, optional
         Bounds of physical parameters.
     track_delay : (float, float), optional
-        Track tau_e within this range in s.
+        Track tau_e too, within this range in s.
     window, refit
-        Length of the window (default ``"20s"``), and samples between two fits (25), for ``"window"``.
+        For ``"window"``: its length (default ``"20s"``), and the samples between two fits (25).
     limit : float, optional
         Standard deviations beyond which an innovation moves the estimate no further.
     alarm : float, optional
-        For ``"adaptive"``: logarithm of the odds from which a change is declared; default 6.
+        For ``"adaptive"``: logarithm of the odds at which a change is declared; default 6.
     largest : float
         Magnitude of e or u beyond which a sample is a fault.
     start_span : (float, float), optional
         Span of the start fit in s; default the first third.
     update_from : float, optional
-        Time in s from which the estimate moves.
+        Time in s from which the estimate is updated.
     moving_average : float, optional
-        Mean over the last so many seconds in place of each estimate.
+        Replace each estimate by the mean over this many seconds.
     smooth : bool
-        For ``"adaptive"``: at each sample what all of the record says of it, in place of what the past alone says.
+        For ``"adaptive"``: estimate each sample from all of the record, not only from its past.
     every : int
         Keep every n-th sample.
     progress : bool or callable
@@ -122,26 +128,35 @@ def track(
     ------
     OptionError, DataError, EstimationError
     """
-    settings = {name: value for name, value in locals().items() if name not in ("record", "progress")}
+    settings = {
+        name: value for name, value in locals().items() if name not in ("record", "progress")
+    }
     if not isinstance(record, Record):
-        raise DataError(f"expected a hoid.Record, found {type(record).__name__}")
+        raise DataError(f"expected a pyhoid.Record, found {type(record).__name__}")
     options = _recursion.plain(settings) | {"smooth": bool(smooth)}
     if smooth and options["method"] != "adaptive":
         raise OptionError('smooth belongs to method="adaptive"')
     if start_span is not None and isinstance(start, Mapping):
-        raise OptionError("start_span is the span of the start fit, and start gives the start itself; drop one")
+        raise OptionError(
+            "start_span is the span of the start fit, but start gives the start itself; drop one"
+        )
     end = record.start_time + len(record) * record.sample_time
     if update_from is not None and not update_from < end:
-        raise OptionError(f"update_from is {update_from}: the record ends at {end:.4f} s; give a time before")
+        raise OptionError(
+            f"update_from is {update_from}: the record ends at {end:.4f} s; give an earlier time"
+        )
     if every < 1:
         raise OptionError(f"every is {every}, expected 1 or more")
     rows = None
     if moving_average is not None:
         if not 0 <= moving_average <= len(record) * record.sample_time:
-            raise OptionError(f"moving_average is {moving_average}, expected a length in s up to that of the record")
-        # Half away from zero, as the command line rounds.
+            raise OptionError(
+                f"moving_average is {moving_average},"
+                " expected a length in s up to that of the record"
+            )
+        # Halves are rounded away from zero, as the command line does.
         rows = max(int(np.floor(moving_average / (every * record.sample_time) + 0.5)), 1)
-    native = _hoid.track(
+    native = _pyhoid.track(
         record,
         options,
         start_span=_options.span("start_span", start_span),

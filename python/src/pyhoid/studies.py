@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _hoid, _options
-from .errors import StudyStateError
+from . import _options, _pyhoid
 from ._options import Progress
+from .errors import StudyStateError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 
 __all__ = ["Plan", "Results", "Table", "merge", "plan", "plans", "results", "study"]
 
-Plan = _hoid.Plan
+Plan = _pyhoid.Plan
 
 
 class Table(Mapping[str, Any]):
-    """A table of results: columns by name, as arrays, or lists of text.
+    """A table of results: columns by name, as arrays.
 
     Parameters
     ----------
     path : path
-        The file; it is read at the first look.
+        The file; it is read when a column is first asked for.
     """
 
     def __init__(self, path: str | PathLike[str]) -> None:
@@ -38,28 +38,28 @@ class Table(Mapping[str, Any]):
         self._columns: dict[str, Any] | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """All columns."""
+        """All columns by name."""
         if self._columns is None:
             self._columns = {
                 name: np.asarray(values, dtype=object) if isinstance(values, list) else values
-                for name, values in _hoid.read_table(self.path).items()
+                for name, values in _pyhoid.read_table(self.path).items()
             }
         return self._columns
 
     def to_pandas(self) -> pd.DataFrame:
-        """As a table of pandas."""
+        """The table as a pandas DataFrame."""
         import pandas as pd
 
         return pd.DataFrame(self.to_dict())
 
     def to_polars(self) -> pl.DataFrame:
-        """As a table of polars."""
+        """The table as a polars DataFrame."""
         import polars as pl
 
         return pl.DataFrame({name: _listed(values) for name, values in self.to_dict().items()})
 
     def to_arrow(self) -> pa.Table:
-        """As a table of Arrow."""
+        """The table as an Arrow table."""
         import pyarrow as pa
 
         return pa.table({name: _listed(values) for name, values in self.to_dict().items()})
@@ -68,7 +68,9 @@ class Table(Mapping[str, Any]):
         try:
             return self.to_dict()[name]
         except KeyError:
-            raise KeyError(f"there is no column {name}; the table has {', '.join(self.to_dict())}") from None
+            raise KeyError(
+                f"there is no column {name}; the table has {', '.join(self.to_dict())}"
+            ) from None
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.to_dict())
@@ -79,7 +81,7 @@ class Table(Mapping[str, Any]):
     def __repr__(self) -> str:
         columns = self.to_dict()
         rows = len(next(iter(columns.values()))) if columns else 0
-        return f"<hoid.Table {self.path.name}: {rows} rows, columns {', '.join(columns)}>"
+        return f"<pyhoid.Table {self.path.name}: {rows} rows, columns {', '.join(columns)}>"
 
 
 def _listed(values: Any) -> Any:
@@ -93,14 +95,16 @@ class Results(Mapping[str, Table]):
     ----------
     directory : Path
     finished : bool
-        False for a shard, which waits to be merged.
+        False for a shard that is still to be merged.
     estimates : int
-        Estimates that this run made.
+        Number of estimates that this run made.
     pages : list of Path
-        The pages beside the tables, as a group has them.
+        The pages beside the tables, for a group.
     """
 
-    def __init__(self, directory: str | PathLike[str], *, finished: bool = True, estimates: int = 0) -> None:
+    def __init__(
+        self, directory: str | PathLike[str], *, finished: bool = True, estimates: int = 0
+    ) -> None:
         self.directory = Path(directory)
         self.finished = finished
         self.estimates = estimates
@@ -112,13 +116,17 @@ class Results(Mapping[str, Table]):
         try:
             return self._tables[name]
         except KeyError:
-            raise KeyError(f"there is no table {name}; the directory has {', '.join(self._tables) or 'none'}") from None
+            raise KeyError(
+                f"there is no table {name}; the directory has {', '.join(self._tables) or 'none'}"
+            ) from None
 
     def __getattr__(self, name: str) -> Table:
         tables = self.__dict__.get("_tables", {})
         if name in tables:
             return tables[name]  # type: ignore[no-any-return]
-        raise AttributeError(f"there is no table {name}; the directory has {', '.join(tables) or 'none'}")
+        raise AttributeError(
+            f"there is no table {name}; the directory has {', '.join(tables) or 'none'}"
+        )
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._tables)
@@ -127,23 +135,23 @@ class Results(Mapping[str, Table]):
         return len(self._tables)
 
     def __repr__(self) -> str:
-        return f"<hoid.Results {self.directory}: tables {', '.join(self._tables) or 'none yet'}>"
+        return f"<pyhoid.Results {self.directory}: tables {', '.join(self._tables) or 'none yet'}>"
 
 
 def plan(source: str | PathLike[str] | Plan, *, replications: int | None = None) -> Plan:
-    """A plan of Monte Carlo runs.
+    """Load a plan of Monte Carlo runs.
 
     Parameters
     ----------
     source : path, str or Plan
         A file (TOML), the text of one, or the name of a plan that comes with hoid (see `plans`).
     replications : int, optional
-        In place of those of the plan.
+        Replaces the number in the plan.
 
     Raises
     ------
     OptionError
-        For a plan without meaning; the message names the line.
+        For a plan that is not valid; the message names the line.
     """
     if isinstance(source, Plan):
         return source if replications is None else Plan(text=source.text, replications=replications)
@@ -159,7 +167,7 @@ def plan(source: str | PathLike[str] | Plan, *, replications: int | None = None)
 
 def plans() -> dict[str, str]:
     """Names and titles of the plans that come with hoid."""
-    return dict(_hoid.plan_names())
+    return dict(_pyhoid.plan_names())
 
 
 def study(
@@ -173,9 +181,10 @@ def study(
     csv: bool = False,
     progress: Progress = False,
 ) -> Results:
-    """Run a study, or a share of it, into a directory.
+    """Run a study, or a share of it, and write its tables into a directory.
 
-    An interrupt stops it within a second; ``resume=True`` then goes on with nothing lost or repeated.
+    An interrupt stops it within a second; ``resume=True`` then goes on, with nothing lost or done
+    twice.
 
     Parameters
     ----------
@@ -185,13 +194,13 @@ def study(
     shard : str or (int, int), optional
         ``"2/7"`` or ``(2, 7)`` runs the second of seven shares; `merge` joins them.
     jobs : int, optional
-        Threads; default one a core.
+        Threads; default one for each core.
     replications : int, optional
-        In place of those of the plan.
+        Replaces the number in the plan.
     resume : bool
         Go on with a study that was stopped.
     csv : bool
-        Write tables as CSV in place of Parquet.
+        Write the tables as CSV instead of Parquet.
     progress : bool or callable
 
     Returns
@@ -201,9 +210,9 @@ def study(
     Raises
     ------
     OptionError
-        For a plan without meaning.
+        For a plan that is not valid.
     StudyStateError
-        When the directory holds a study, and `resume` is not asked for.
+        When the directory holds a study and `resume` is False.
     """
     found = plan(source, replications=replications)
     share = f"{shard[0]}/{shard[1]}" if isinstance(shard, tuple) else shard
@@ -217,24 +226,30 @@ def study(
         progress=_options.reporter(progress, "estimates"),
     )
     if not finished:
-        raise StudyStateError(f"{found.name} was stopped; what is done is in {target}, go on with resume=True")
+        raise StudyStateError(
+            f"{found.name} was stopped; what is done is in {target}; go on with resume=True"
+        )
     return Results(target, finished=bool(tables), estimates=estimates)
 
 
-def merge(shards: Sequence[str | PathLike[str]], directory: str | PathLike[str], *, csv: bool = False) -> Results:
+def merge(
+    shards: Sequence[str | PathLike[str]], directory: str | PathLike[str], *, csv: bool = False
+) -> Results:
     """Join the shards of a study.
 
     Raises
     ------
     StudyStateError
-        For shards of different plans, or when some are missing or there twice.
+        For shards of different plans, and when a shard is missing or there twice.
     """
-    finished, estimates, _ = _hoid.merge_shards([Path(shard) for shard in shards], Path(directory), csv)
+    finished, estimates, _ = _pyhoid.merge_shards(
+        [Path(shard) for shard in shards], Path(directory), csv
+    )
     return Results(directory, finished=finished, estimates=estimates)
 
 
 def results(directory: str | PathLike[str]) -> Results:
-    """The tables of a directory that a study or a group was written to.
+    """The tables in the directory of a study or a group.
 
     Raises
     ------
@@ -243,5 +258,7 @@ def results(directory: str | PathLike[str]) -> Results:
     """
     found = Results(directory)
     if not found:
-        raise StudyStateError(f"{directory} holds no tables: expected the directory of a finished study or group")
+        raise StudyStateError(
+            f"{directory} holds no tables: expected the directory of a finished study or group"
+        )
     return found

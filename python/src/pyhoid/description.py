@@ -1,4 +1,4 @@
-"""Describing functions: what a person answers at the lines of the excitation."""
+"""Describing functions: how a person responds at the lines of the excitation."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import _hoid, _options, _text
+from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
 from .estimates import Estimate, estimates
 from .record import Record
@@ -22,11 +22,12 @@ __all__ = ["DescribingFunction", "describing_function"]
 class DescribingFunction:
     """The response of a person at the lines of the excitation. `describing_function` makes it.
 
-    Columns are read by name; all have one value a line: ``omega`` (rad/s), ``harmonic``, ``response`` (complex), ``response_se``,
-    ``coherence``, ``magnitude_db``, ``phase_deg``, with ``_se`` for standard errors (NaN where one run gives none).
+    Columns are read by name, and have one value for each line: ``omega`` (rad/s), ``harmonic``,
+    ``response`` (complex), ``response_se``, ``coherence``, ``magnitude_db``, ``phase_deg``, with
+    ``_se`` for standard errors (NaN where there is only one run).
     """
 
-    def __init__(self, native: _hoid.DescribingFunction) -> None:
+    def __init__(self, native: _pyhoid.DescribingFunction) -> None:
         self._native = native
         self.columns: dict[str, npt.NDArray[Any]] = native.columns()
 
@@ -59,15 +60,21 @@ class DescribingFunction:
 
     @property
     def figures(self) -> dict[str, Any]:
-        """Runs, and estimates of off_line_share, noise_ratio, rms_e and rms_u."""
+        """The number of runs, and estimates of off_line_share, noise_ratio, rms_e and rms_u."""
         found = dict(self._native.figures)
         runs = found.pop("runs")
         return {"runs": runs, **estimates(found)}
 
     def gain_lead_delay(
-        self, *, lead: bool = True, weights: str = "coherence", delay: tuple[float, float] = (0.0, 1.0)
+        self,
+        *,
+        lead: bool = True,
+        weights: str = "coherence",
+        delay: tuple[float, float] = (0.0, 1.0),
     ) -> dict[str, Any]:
-        """Gain, lead (s) and delay (s) of ``K (1 + T_L s) exp(-tau s)`` through the lines, and the misfit.
+        """Fit ``K (1 + T_L s) exp(-tau s)`` through the lines.
+
+        Returns gain, lead (s), delay (s) and the misfit.
 
         Parameters
         ----------
@@ -75,13 +82,19 @@ class DescribingFunction:
             False holds T_L at 0.
         weights : {"coherence", "variance", "uniform"}
         delay : (float, float)
-            Shortest and longest tau in s.
+            Smallest and largest tau in s.
         """
         found = self._native.gain_lead_delay(lead=lead, weights=weights, delay=delay)
-        return {name: Estimate(*pair) if isinstance(pair, tuple) else pair for name, pair in found.items()}
+        return {
+            name: Estimate(*pair) if isinstance(pair, tuple) else pair
+            for name, pair in found.items()
+        }
 
     def margins(self, num: Sequence[float], den: Sequence[float]) -> dict[str, Estimate | None]:
-        """Crossover frequency and phase margin with a controlled element NUM/DEN by descending powers of s."""
+        """Crossover frequency and phase margin with a controlled element.
+
+        `num` and `den` are its coefficients by descending powers of s.
+        """
         return estimates(self._native.margins([float(v) for v in num], [float(v) for v in den]))
 
     def to_pandas(self) -> pd.DataFrame:
@@ -103,7 +116,9 @@ class DescribingFunction:
 
     def __repr__(self) -> str:
         header = ["omega (rad/s)", "magnitude (dB)", "phase (deg)", "coherence"]
-        return f"Describing function at {len(self)} lines\n{_text.plain_table(header, self._rows())}"
+        return (
+            f"Describing function at {len(self)} lines\n{_text.plain_table(header, self._rows())}"
+        )
 
     def _repr_html_(self) -> str:
         header = ["omega (rad/s)", "magnitude (dB)", "phase (deg)", "coherence"]
@@ -134,17 +149,18 @@ def describing_function(
     records : Record or sequence of Record
         Runs with the same excitation.
     channel : str, optional
-        Channel in whose spectrum the lines are found; not looked at when they are given.
+        Channel in whose spectrum the lines are found; not used when they are given.
     harmonics, omega : sequence, optional
         The lines, as multiples of the fundamental or in rad/s; both need `period`.
     period : float, optional
         Period of the excitation in s.
     least_amplitude : float
-        Amplitude of a line, as a share of the largest.
+        Least amplitude of a line, as a share of the largest.
     averaging : {"ratios", "reference", "same-excitation"}
-        Mean of U/E over runs; cross spectra with the channel `reference`; cross spectra of runs with the same phases.
+        Mean of U/E over runs; cross spectra with the channel `reference`; cross spectra of runs
+        with the same phases.
     reference : str, optional
-        Channel for ``"reference"``.
+        The channel for ``averaging="reference"``.
     realisation : {"record", "period"}
         What counts as one run.
     start, stop : float, optional
@@ -153,7 +169,7 @@ def describing_function(
         ``e[k]`` belongs to ``u[k + offset_samples]``.
     detrend : {"none", "mean", "linear"}
     smoothing_bins : int
-        Bins that are averaged into one value of the remnant spectrum.
+        Number of bins averaged into one value of the remnant spectrum.
 
     Returns
     -------
@@ -166,7 +182,7 @@ def describing_function(
     """
     given = harmonics is not None or omega is not None
     return DescribingFunction(
-        _hoid.describing_function(
+        _pyhoid.describing_function(
             _options.as_records(records),
             harmonics=None if harmonics is None else [int(h) for h in harmonics],
             omega=None if omega is None else [float(w) for w in omega],

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Literal, overload
 
-from . import _hoid, _options
+from . import _options, _pyhoid
 from ._options import Order, Progress
 from .errors import OptionError
 from .fit import Fit
@@ -15,7 +15,7 @@ from .time_varying import TimeVaryingFit
 __all__ = ["identify"]
 
 
-#: Keywords that have a meaning for some fits alone, and what they belong to.
+#: What keywords belong to that only some fits have.
 _STEADY_POLYNOMIAL = 'method="pem" and a polynomial structure'
 
 
@@ -23,8 +23,10 @@ def _check(structure: str, method: str, given: Mapping[str, object]) -> None:
     grey, changing = structure == "grey-box", structure == "time-varying"
     polynomial = not (grey or changing)
     searched = polynomial and method == "pem"
-    if searched and given.keys().isdisjoint(("instruments", "remnant_order", "individual", "delay")):
-        # Of the rules below none can hold; a fit of a millisecond should not wait for them.
+    if searched and given.keys().isdisjoint(
+        ("instruments", "remnant_order", "individual", "delay")
+    ):
+        # None of the rules below can apply; a fit of a millisecond should not wait for them.
         return
     rules = [
         ("initial_state", method != "pem", 'method="pem"'),
@@ -36,8 +38,14 @@ def _check(structure: str, method: str, given: Mapping[str, object]) -> None:
         ("individual", not grey, 'structure="grey-box"'),
         ("delay", polynomial, 'structure="grey-box" or "time-varying"; else give nk'),
         ("nk", not polynomial, "a polynomial structure; else give delay in s"),
-        *((name, grey, "a polynomial structure; a grey box has remnant_order") for name in ("na", "nb", "nc", "nd", "nf")),
-        *((name, not searched, _STEADY_POLYNOMIAL) for name in ("start", "prior", "robust", "stable", "focus")),
+        *(
+            (name, grey, "a polynomial structure; a grey box has remnant_order")
+            for name in ("na", "nb", "nc", "nd", "nf")
+        ),
+        *(
+            (name, not searched, _STEADY_POLYNOMIAL)
+            for name in ("start", "prior", "robust", "stable", "focus")
+        ),
     ]
     for name, wrong, belongs in rules:
         if wrong and name in given:
@@ -84,7 +92,9 @@ def identify(  # type: ignore[overload-overlap]
 ) -> TimeVaryingFit: ...
 @overload
 def identify(
-    records: Record | Sequence[Record], structure: str | None = None, **options: Unpack[IdentifyOptions]
+    records: Record | Sequence[Record],
+    structure: str | None = None,
+    **options: Unpack[IdentifyOptions],
 ) -> Fit: ...
 def identify(
     records: Record | Sequence[Record],
@@ -117,51 +127,56 @@ def identify(
 ) -> Fit | TimeVaryingFit:
     """Identify a model and the operator's parameters from one or several records.
 
-    With no options this is the operator by Box-Jenkins, its delay searched over 0.05 to 0.6 s and nd over 1 to 4.
+    Without options this fits a Box-Jenkins model of the operator, and searches the delay from 0.05
+    to 0.6 s and nd from 1 to 4.
 
     Parameters
     ----------
     records : Record or sequence of Record
-        Several share one model and have initial states of their own.
+        Several records share one model, each with its own initial states.
     structure : str, optional
-        ``"arx"``, ``"armax"``, ``"oe"``, ``"bj"``, ``"fir"``, ``"ar"``, ``"ma"``, ``"arma"``, ``"ararx"``, ``"ararmax"``, ``"general"``,
-        ``"grey-box"`` (operator and remnant in physical parameters, with a real delay) or ``"time-varying"`` (gains that change once).
+        ``"arx"``, ``"armax"``, ``"oe"``, ``"bj"``, ``"fir"``, ``"ar"``, ``"ma"``, ``"arma"``,
+        ``"ararx"``, ``"ararmax"``, ``"general"``, ``"grey-box"`` (operator and remnant in physical
+        parameters, with a real delay) or ``"time-varying"`` (gains that change once).
         Default ``"bj"``, or that of `method`.
     na, nb, nc, nd, nf, nk : int or (int, int) or range, optional
-        Orders, and the delay of b0 in samples. A pair is searched from the first to the second, both included. nb counts b0, b1, ...
+        Orders, and the delay of b0 in samples. A pair is searched from the first to the second,
+        both included. nb counts b0, b1, ...
     method : {"pem", "iv4", "sriv", "rivbj"}
-        Prediction error method (Ljung 1999), or instrumental variables: iv4 for arx, sriv for oe, rivbj for bj (Young 2011).
+        Prediction error method (Ljung 1999), or instrumental variables: iv4 for arx, sriv for oe,
+        rivbj for bj (Young 2011).
     instruments : str, optional
-        Channel of the instruments, or ``"simulated"``; default ``f_t`` where all records have it.
+        Channel for the instruments, or ``"simulated"``; default ``f_t`` if all records have it.
     remnant_order : int or (int, int), optional
         Order m of the remnant for ``"grey-box"``; default 1 to 4.
     delay : (float, float), optional
         Shortest and longest tau_e in s for ``"grey-box"`` and ``"time-varying"``.
     individual : sequence of str
-        Parameters that each record has for itself, for ``"grey-box"``.
+        Parameters with a value of their own for each record, for ``"grey-box"``.
     criterion : {"bic", "aic", "aicc", "fpe", "mdl", "yic", "loss"}
-        What decides between candidates.
+        The criterion that chooses between candidates.
     initial_state : {"auto", "zero", "estimate", "backcast"}
     start : mapping of str to float, optional
-        Start of the search: all coefficients.
+        Where the search starts: all coefficients.
     fix : mapping of str to float, optional
-        Coefficients that are held.
+        Coefficients that are held fixed.
     bound : mapping of str to (float or None, float or None), optional
-        Bounds; None leaves an end open.
+        Lower and upper bounds; None leaves an end open.
     prior : mapping of str to (float, float), optional
-        Guesses with a weight W: the loss grows by W (theta - guess)^2.
+        Guesses, each with a weight W: the loss grows by W (theta - guess)^2.
     robust : float or True, optional
-        Loss of Huber: residuals beyond so many standard deviations count linearly; True is 1.345.
+        Huber's loss: residuals beyond this many standard deviations count linearly; True is 1.345.
     focus : {"prediction", "simulation"}
-        What the model is to be good at.
+        What the model is fitted for.
     stable : bool
-        Take only models that are stable from e to u.
+        Accept only models that are stable from e to u.
     search_method : {"auto", "gn", "lm", "grad"}
     max_iterations : int
     tolerance : float
         Relative decrease of the loss below which the search has converged.
     progress : bool or callable
-        True shows how far a search is on standard error; a callable gets what is done and the whole.
+        True shows on standard error how far a search is; a callable gets the number of
+        candidates done and the number of all.
 
     Returns
     -------
@@ -170,24 +185,28 @@ def identify(
     Raises
     ------
     OptionError
-        For options out of range or without meaning beside the others (a `ValueError`).
+        For options that are out of range or do not fit each other (a `ValueError`).
     DataError
         For records that cannot give a result (a `ValueError`).
     EstimationError
-        When there is no result, as for singular regressors.
+        When there is no result, for example with singular regressors.
 
     Examples
     --------
-    >>> fit = hoid.identify(record, "bj", nb=2, nd=1, nf=2, nk=29)
+    >>> fit = pyhoid.identify(record, "bj", nb=2, nd=1, nf=2, nk=29)
     >>> fit.operator.K_e
     0.0920 ± 0.0023
     """
-    settings = {name: value for name, value in locals().items() if name not in ("records", "progress")}
+    settings = {
+        name: value for name, value in locals().items() if name not in ("records", "progress")
+    }
     methods = {"iv4": "arx", "sriv": "oe", "rivbj": "bj"}
     own = methods.get(method.lower(), "bj")
     name = (structure or own).lower().replace("_", "-")
     if structure is not None and method.lower() in methods and name != own:
-        raise OptionError(f'method="{method}" fits the structure {own}; drop structure, or take method="pem"')
+        raise OptionError(
+            f'method="{method}" fits the structure {own}; drop structure, or use method="pem"'
+        )
     orders = {
         order: _options.order(order, value)
         for order, value in (("na", na), ("nb", nb), ("nc", nc), ("nd", nd), ("nf", nf), ("nk", nk))
@@ -211,13 +230,15 @@ def identify(
     given = {key: value for key, (value, default) in usual.items() if value != default}
     _check(name, method.lower(), {**given, **orders})
     several = _options.as_records(records)
-    found = _hoid.identify(
+    found = _pyhoid.identify(
         several,
         name,
         orders=orders,
         method=method,
         instruments=instruments,
-        remnant_order=None if remnant_order is None else _options.order("remnant_order", remnant_order),
+        remnant_order=None
+        if remnant_order is None
+        else _options.order("remnant_order", remnant_order),
         delay=_options.span("delay", delay),
         individual=list(individual),
         criterion=criterion,
@@ -225,8 +246,12 @@ def identify(
         start=None if start is None else _options.numbers("start", start),
         fix=_options.numbers("fix", fix or {}),
         bound=_options.bounds(bound or {}),
-        prior={key: (float(value), float(weight)) for key, (value, weight) in (prior or {}).items()},
-        robust=1.345 if robust is True else (None if robust is None or robust is False else float(robust)),
+        prior={
+            key: (float(value), float(weight)) for key, (value, weight) in (prior or {}).items()
+        },
+        robust=1.345
+        if robust is True
+        else (None if robust is None or robust is False else float(robust)),
         focus=focus,
         stable=stable,
         search_method=search_method,
@@ -234,7 +259,6 @@ def identify(
         tolerance=float(tolerance),
         progress=_options.reporter(progress, "candidates"),
     )
-    if isinstance(found, _hoid.TimeVaryingFit):
+    if isinstance(found, _pyhoid.TimeVaryingFit):
         return TimeVaryingFit(found, several, settings)
     return Fit(found, several, settings)
-

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _hoid, _text
+from . import _pyhoid, _text
 from ._arrays import FloatArray, signal
 from .estimates import Estimate, Operator
 from .fit import Series
@@ -20,10 +20,16 @@ __all__ = ["TimeVaryingFit"]
 
 
 class TimeVaryingFit:
-    """A fitted operator whose gains change once, by a sigmoid. `identify` makes it with ``structure="time-varying"``."""
+    """A fitted operator whose gains change once, along a sigmoid.
+
+    `identify` makes it with ``structure="time-varying"``.
+    """
 
     def __init__(
-        self, native: _hoid.TimeVaryingFit, records: Sequence[Record], settings: Mapping[str, Any] | None = None
+        self,
+        native: _pyhoid.TimeVaryingFit,
+        records: Sequence[Record],
+        settings: Mapping[str, Any] | None = None,
     ) -> None:
         self._native = native
         self.records: tuple[Record, ...] = tuple(records)
@@ -48,8 +54,10 @@ class TimeVaryingFit:
 
     @property
     def remarks(self) -> dict[str, str]:
-        """What there is to say of single parameters, as that one rests at a bound."""
-        return {name: remark for name, _, _, remark in self._native.parameters if remark is not None}
+        """Remarks on single parameters, for example that one lies at a bound."""
+        return {
+            name: remark for name, _, _, remark in self._native.parameters if remark is not None
+        }
 
     @property
     def covariance(self) -> FloatArray | None:
@@ -73,7 +81,7 @@ class TimeVaryingFit:
 
     @property
     def change(self) -> dict[str, Any]:
-        """Whether a change was found, and its comparison with the operator that does not change."""
+        """Whether a change was found, and the comparison with an operator that does not change."""
         return self._native.change
 
     @property
@@ -108,7 +116,9 @@ class TimeVaryingFit:
         return pd.DataFrame(
             {
                 "value": [pair[0] for _, pair, _, _ in rows],
-                "standard_error": [np.nan if pair[1] is None else pair[1] for _, pair, _, _ in rows],
+                "standard_error": [
+                    np.nan if pair[1] is None else pair[1] for _, pair, _, _ in rows
+                ],
                 "unit": [unit for _, _, unit, _ in rows],
                 "remark": [remark or "" for _, _, _, remark in rows],
             },
@@ -118,17 +128,25 @@ class TimeVaryingFit:
     def summary(self) -> str:
         """The fit as a text table."""
         rows = [
-            [name, *_text.with_uncertainty(*pair), unit, remark or ""] for name, pair, unit, remark in self._native.parameters
+            [name, *_text.with_uncertainty(*pair), unit, remark or ""]
+            for name, pair, unit, remark in self._native.parameters
         ]
         found = "" if self.change["found"] else "\nThe records show no change."
         header = ["parameter", "value", "standard error", "unit", ""]
-        return f"Operator whose gains change once (sigmoid)\n{_text.plain_table(header, rows)}{found}"
+        return (
+            f"Operator whose gains change once (sigmoid)\n{_text.plain_table(header, rows)}{found}"
+        )
 
     def __repr__(self) -> str:
         return self.summary()
 
     def _repr_html_(self) -> str:
         rows = [
-            [name, *_text.with_uncertainty(*pair), unit, remark or ""] for name, pair, unit, remark in self._native.parameters
+            [name, *_text.with_uncertainty(*pair), unit, remark or ""]
+            for name, pair, unit, remark in self._native.parameters
         ]
-        return _text.html_table("Operator whose gains change once (sigmoid)", ["", "value", "standard error", "unit", ""], rows)
+        return _text.html_table(
+            "Operator whose gains change once (sigmoid)",
+            ["", "value", "standard error", "unit", ""],
+            rows,
+        )

@@ -1,4 +1,4 @@
-"""Files: records read and written, and what is inside of a file."""
+"""Files: reading and writing records, and what is in a file."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from . import _hoid
+from . import _pyhoid
 from .record import Record
 
 __all__ = ["info", "read", "read_stretches", "write"]
@@ -58,30 +58,32 @@ def read(
     ----------
     path : path
     input, output : str
-        Columns: a name, ``-name``, or a difference such as ``"r-y"``. ``input=None`` reads an output alone.
+        Columns: a name, ``-name``, or a difference such as ``"r-y"``. ``input=None`` reads only an
+        output.
     sampling_frequency : float, optional
         Hz; without it the column ``t`` (s) gives the sampling.
     start, stop : float, optional
-        Span to use, s; `stop` is not part of it.
+        Span to use, in s, without `stop` itself.
     resample : bool
-        Bring unevenly sampled data onto an even grid by linear interpolation.
+        Resample unevenly sampled data on an even grid by linear interpolation.
     fill : bool
         Bridge missing values by linear interpolation.
     drop_repeated : bool
-        Drop rows that are there twice, time included.
+        Drop rows that occur twice, with the same time.
     scale : mapping, optional
-        Factors by channel (``e`` and ``u`` are input and output): ``{"u": 12.5}``, into a unit ``{"u": "12.5:deg"}``, or from unit to
-        unit ``{"e": "rad:deg"}``.
+        Factors by channel (``e`` and ``u`` are input and output): ``{"u": 12.5}``, into a unit
+        ``{"u": "12.5:deg"}``, or from unit to unit ``{"e": "rad:deg"}``.
     offset : mapping, optional
-        By how much channels were recorded late: samples ``{"u": 1}`` or seconds ``{"u": "0.0167s"}``.
+        By how much channels were recorded late: in samples ``{"u": 1}`` or in seconds
+        ``{"u": "0.0167s"}``.
     decimate : int, optional
-        Take every M-th sample, behind a low-pass filter.
+        Keep every M-th sample, after a low-pass filter.
     new_sampling_frequency : float, optional
-        Another sampling frequency in Hz, behind a low-pass filter.
+        Another sampling frequency in Hz, after a low-pass filter.
     run_in : float
-        Seconds that are dropped at the beginning.
+        Seconds dropped at the beginning.
     detrend : {"none", "mean", "linear"}
-        What is taken out of input and output, last.
+        The trend removed from input and output, as the last step.
 
     Returns
     -------
@@ -92,13 +94,13 @@ def read(
     FileError
         When the file is not there (`FileNotFoundError`) or cannot be read (`OSError`).
     FormatError
-        When its content is not what was expected; the message names the row.
+        When the content is not as expected; the message names the row.
 
     Warns
     -----
     UserWarning
-        What a person should know of the reading: columns left out, trouble with the sampling. What was done to the numbers stands in
-        `Record.steps`.
+        What a person should know about the file: columns left out, trouble with the sampling.
+        `Record.steps` lists what was done to the numbers.
     """
     (record,) = _read(
         path,
@@ -123,19 +125,25 @@ def read(
 
 
 def read_stretches(
-    path: str | PathLike[str], mask: Sequence[str], *, shortest: float = 2.0, **options: Unpack[ReadOptions]
+    path: str | PathLike[str],
+    mask: Sequence[str],
+    *,
+    shortest: float = 2.0,
+    **options: Unpack[ReadOptions],
 ) -> list[Record]:
-    """Read the stretches of a file between what is wrong with its sampling, each a record: `identify` gives each its own initial states.
+    """Read the good stretches of a file, between the trouble with its sampling.
 
-    What is left out is chosen by what was recorded: without the samples at a rail the largest answers are gone, which biases what is left.
+    Each stretch is a record: `identify` gives each its own initial states. Leaving samples out can
+    bias the result: without the samples at a rail, for example, the largest responses are gone.
 
     Parameters
     ----------
     path : path
     mask : sequence of str
-        What is left out: some of ``"missing"``, ``"gap"``, ``"stalled"`` and ``"saturated"`` (`info` tells what a file has).
+        What is left out: any of ``"missing"``, ``"gap"``, ``"stalled"`` and ``"saturated"``
+        (`info` tells what a file has).
     shortest : float
-        Shortest stretch in s that is used.
+        Length in s of the shortest stretch to use.
     **options
         As in `read`.
 
@@ -146,11 +154,11 @@ def read_stretches(
     Raises
     ------
     FileError, FormatError
-        As in `read`; also where no stretch is left.
+        As in `read`; also when no stretch is left.
 
     Examples
     --------
-    >>> fit = hoid.identify(hoid.read_stretches("run1.csv", ["missing", "stalled"]))
+    >>> fit = pyhoid.identify(pyhoid.read_stretches("run1.csv", ["missing", "stalled"]))
     """
     return _read(path, [mask] if isinstance(mask, str) else mask, shortest, **options)
 
@@ -175,7 +183,7 @@ def _read(
     run_in: float = 0.0,
     detrend: str = "none",
 ) -> list[Record]:
-    found = _hoid.read(
+    found = _pyhoid.read(
         path,
         input=input,
         output=output,
@@ -209,26 +217,29 @@ def _written(value: float | str) -> str:
 
 
 def write(path: str | PathLike[str], record: Record) -> None:
-    """Write a record as CSV, Parquet, NPZ or .mat, with the digits that give the same numbers back.
+    """Write a record as CSV, Parquet, NPZ or .mat.
+
+    The numbers have enough digits to read the same ones back.
 
     Raises
     ------
     FileError, FormatError
     """
-    _hoid.write(path, record)
+    _pyhoid.write(path, record)
 
 
 def info(path: str | PathLike[str]) -> dict[str, Any]:
-    """What is inside of a file, before anything is identified, as ``hoid info --json`` has it.
+    """Describe a file, as ``hoid info --json`` does.
 
     Returns
     -------
     dict
-        ``format``; ``columns`` with unit, type, rows and the figures of their values; ``samplings`` with frequency, gaps and jitter;
-        ``trouble`` with what is wrong with the sampling, where, how much, and the remedy; ``notes``.
+        ``format``; ``columns`` with unit, type, rows and the range of their values; ``samplings``
+        with frequency, gaps and jitter; ``trouble`` with what is wrong with the sampling, where,
+        how much, and the remedy; ``notes``.
 
     Raises
     ------
     FileError, FormatError
     """
-    return _hoid.info(path)
+    return _pyhoid.info(path)

@@ -1,4 +1,4 @@
-"""Estimates with their standard errors, and what they make together: operator, remnant, margins."""
+"""Estimates with their standard errors, and the operator and remnant made of them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ UNITS: Mapping[str, str] = {
 
 
 class Estimate(NamedTuple):
-    """A value and its standard error, which is None where there is none (a delay of whole samples, an exact fit)."""
+    """A value and its standard error.
+
+    The standard error is None where there is none: for a delay of whole samples, or an exact fit.
+    """
 
     value: float
     standard_error: float | None
@@ -42,7 +45,7 @@ class Estimate(NamedTuple):
 
 
 def estimates(found: Mapping[str, Any]) -> dict[str, Estimate | None]:
-    """Pairs of the native module as estimates."""
+    """Estimates from the pairs of the native module."""
     return {name: None if pair is None else Estimate(*pair) for name, pair in found.items()}
 
 
@@ -74,7 +77,9 @@ class _Converted(Mapping[str, Estimate]):
         try:
             return self._all[name]
         except KeyError:
-            raise AttributeError(f"{type(self).__name__} has no parameter {name}; it has {', '.join(self._all)}") from None
+            raise AttributeError(
+                f"{type(self).__name__} has no parameter {name}; it has {', '.join(self._all)}"
+            ) from None
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._all)
@@ -84,26 +89,37 @@ class _Converted(Mapping[str, Estimate]):
 
     def _rows(self) -> list[list[str]]:
         return [
-            [name, *_text.with_uncertainty(estimate.value, estimate.standard_error), UNITS.get(name, "")]
+            [
+                name,
+                *_text.with_uncertainty(estimate.value, estimate.standard_error),
+                UNITS.get(name, ""),
+            ]
             for name, estimate in self._all.items()
         ]
 
     def __repr__(self) -> str:
         if not self.convertible:
             return f"{type(self).__name__}: not convertible: {self.reason}"
-        return _text.plain_table([type(self).__name__.lower(), "value", "standard error", "unit"], self._rows())
+        return _text.plain_table(
+            [type(self).__name__.lower(), "value", "standard error", "unit"], self._rows()
+        )
 
     def _repr_html_(self) -> str:
         if not self.convertible:
             return f"<p>{type(self).__name__}: not convertible: {self.reason}</p>"
-        return _text.html_table(type(self).__name__, ["", "value", "standard error", "unit"], self._rows())
+        return _text.html_table(
+            type(self).__name__, ["", "value", "standard error", "unit"], self._rows()
+        )
 
 
 class Operator(_Converted):
-    """The human operator of a model: K_e (deg/deg), T_L (s), K_e_dot (s), omega_nm (rad/s), zeta_nm, tau_e (s).
+    """The human operator of a model.
 
-    A mapping from names to `Estimate`, whose entries are attributes too (``operator.K_e.value``). Where the coefficients stand for no
-    continuous operator, `convertible` is False, `reason` says why, and a look at a parameter raises `NotConvertibleError`.
+    The parameters are K_e (deg/deg), T_L (s), K_e_dot (s), omega_nm (rad/s), zeta_nm, tau_e (s).
+
+    A mapping from names to `Estimate`; the entries are also attributes (``operator.K_e.value``).
+    Where the coefficients do not represent a continuous operator, `convertible` is False, `reason`
+    says why, and reading a parameter raises `NotConvertibleError`.
 
     Attributes
     ----------
@@ -121,7 +137,7 @@ class Operator(_Converted):
 
 
 class Remnant(_Converted):
-    """The remnant of a noise model: T_n (s) and K_n, with the order m of its filter.
+    """The remnant of a noise model: T_n (s) and K_n, and the order m of its filter.
 
     Attributes
     ----------

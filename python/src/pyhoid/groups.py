@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
-from . import _hoid, _options
+from . import _options, _pyhoid
 from ._options import Progress
 from .errors import StudyStateError
 from .studies import Results
@@ -28,17 +28,17 @@ def group(
     Parameters
     ----------
     manifest : path
-        The file ``group.toml``, or the directory with it; `group_manifest` writes one.
+        The file ``group.toml``, or its directory; `group_manifest` makes the text of one.
     directory : path
-        Where tables and pages are written.
+        Where the tables and pages are written.
     jobs, resume, csv, progress
         As in `study`.
 
     Returns
     -------
     Results
-        ``estimates``, ``averages``, ``delays``, ``trace-averages``, ...; `Results.pages` has the page of the group, ``report.html``, and one a
-        subject.
+        ``estimates``, ``averages``, ``delays``, ``trace-averages``, ...; `Results.pages` has the
+        page of the group, ``report.html``, and one for each subject.
 
     Raises
     ------
@@ -46,17 +46,29 @@ def group(
     """
     file = Path(manifest)
     file = file / "group.toml" if file.is_dir() else file
-    finished, estimates = _hoid.group(
-        file, Path(directory), jobs=jobs, resume=resume, csv=csv, progress=_options.reporter(progress, "runs")
+    finished, estimates = _pyhoid.group(
+        file,
+        Path(directory),
+        jobs=jobs,
+        resume=resume,
+        csv=csv,
+        progress=_options.reporter(progress, "runs"),
     )
     if not finished:
-        raise StudyStateError(f"the group was stopped; what is done is in {directory}, go on with resume=True")
+        raise StudyStateError(
+            f"the group was stopped; what is done is in {directory}; go on with resume=True"
+        )
     return Results(directory, finished=finished, estimates=estimates)
 
 
-def group_manifest(directory: str | PathLike[str], pattern: str = "{subject}_{condition}_{run}.csv") -> tuple[str, list[str]]:
-    """The manifest (TOML text) of the files of a directory whose names match a pattern, and the files that do not."""
-    return _hoid.group_manifest(Path(directory), pattern)
+def group_manifest(
+    directory: str | PathLike[str], pattern: str = "{subject}_{condition}_{run}.csv"
+) -> tuple[str, list[str]]:
+    """The manifest of a directory, as TOML text, and the files that are not in it.
+
+    The manifest lists the files whose names match the pattern.
+    """
+    return _pyhoid.group_manifest(Path(directory), pattern)
 
 
 def simulate_group(
@@ -72,24 +84,26 @@ def simulate_group(
     seed: int = 1,
     trouble: Sequence[str] = (),
 ) -> int:
-    """Simulate a virtual experiment: a file a run, their true parameters in ``truth.csv``, and a manifest for `group`.
+    """Simulate a virtual experiment.
+
+    Writes a file for each run, the true parameters in ``truth.csv``, and a manifest for `group`.
 
     Parameters
     ----------
     directory : path
-        It is made if it is not there.
+        Created if it does not exist.
     subjects, runs : int
-        Subjects, and runs of each subject and condition.
+        Number of subjects, and of runs for each subject and condition.
     conditions : sequence of str
     between_subjects, between_runs : float
-        Spread of the parameters between subjects and between the runs of one, 0.1 for 10 %.
+        Spread of the parameters between subjects and between the runs of one; 0.1 is 10 %.
     remnant_order : int
     noise_level : float
         P_n = var(u_n) / var(u).
     seed : int
     trouble : sequence of str
-        What is wrong with the sampling: some of ``"jitter"``, ``"missing"``, ``"repeated"``, ``"slow-clock"``, ``"saturated"``,
-        ``"quantised"`` and ``"stalled"``.
+        What is wrong with the sampling: any of ``"jitter"``, ``"missing"``, ``"repeated"``,
+        ``"slow-clock"``, ``"saturated"``, ``"quantised"`` and ``"stalled"``.
 
     Returns
     -------
@@ -99,11 +113,11 @@ def simulate_group(
     Raises
     ------
     OptionError
-        For an experiment without meaning.
+        For an experiment that is not valid.
     StudyStateError
-        When the directory holds one.
+        When the directory already holds an experiment.
     """
-    return _hoid.simulate_group(
+    return _pyhoid.simulate_group(
         Path(directory),
         subjects=int(subjects),
         conditions=list(conditions),

@@ -1,12 +1,13 @@
 """Studies spread over a Dask cluster, shard by shard.
 
-A plan is cut into shards; each runs as one task in a folder of its worker, and its files come back as soon as it is done. The shards are kept
-beside the result until they are merged, so that a lost worker costs only the shard that it was running, and a study that was
-interrupted goes on with the shards that it has. The merged tables are the same bytes as those of a run on one machine.
+A plan is cut into shards. Each shard runs as one task in a folder of its worker, and its files come
+back as soon as it is done. The shards are kept beside the result until they are merged: a lost
+worker costs only the shard that it was running, and an interrupted study goes on with the shards
+that it has. The merged tables have the same bytes as those of a run on one machine.
 
 >>> from dask.distributed import Client
->>> client = Client("tcp://scheduler:8786")            # or Client(LocalCluster()), or one of dask-jobqueue
->>> results = hoid.dask.study("plan.toml", "out", client, shards=100)
+>>> client = Client("tcp://scheduler:8786")  # or Client(LocalCluster()), or one of dask-jobqueue
+>>> results = pyhoid.dask.study("plan.toml", "out", client, shards=100)
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from . import _options, studies
-from .errors import OptionError
 from ._options import Progress
+from .errors import OptionError
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -32,17 +33,19 @@ SHARDS = "shards"
 
 
 def _run_shard(text: str, replications: int, index: int, count: int, jobs: int) -> dict[str, bytes]:
-    """A shard on a worker: its files by their path."""
+    """Run a shard on a worker; returns its files by path."""
     with tempfile.TemporaryDirectory(prefix="hoid-") as folder:
         target = Path(folder) / "shard"
         studies.study(text, target, shard=(index, count), jobs=jobs, replications=replications)
         return {
-            file.relative_to(target).as_posix(): file.read_bytes() for file in sorted(target.rglob("*")) if file.is_file()
+            file.relative_to(target).as_posix(): file.read_bytes()
+            for file in sorted(target.rglob("*"))
+            if file.is_file()
         }
 
 
 def _keep(files: dict[str, bytes], target: Path) -> None:
-    """Write a shard beside its place and rename it: it is whole or not there."""
+    """Write a shard beside its place and rename it: it is there as a whole or not at all."""
     beside = target.with_name(f".{target.name}.{os.getpid()}")
     shutil.rmtree(beside, ignore_errors=True)
     for name, content in files.items():
@@ -69,23 +72,26 @@ def study(
     Parameters
     ----------
     source : path, str or Plan
-        As in `hoid.plan`. Workers get its text, and need nothing but hoid.
+        As in `pyhoid.plan`. Workers get its text, and need nothing but pyhoid.
     directory : path
-        Where the tables are written, on the machine of the client. A study that was stopped goes on there.
+        Where the tables are written, on the machine of the client. A study that was stopped there
+        goes on.
     client : distributed.Client
-        Of any scheduler.
+        A client of any scheduler.
     shards : int, optional
-        Default four for each worker. With more there is less to repeat when a worker is lost; a shard cannot be smaller than a block of the plan.
+        Default four for each worker. With more there is less to repeat when a worker is lost; a
+        shard cannot be smaller than a block of the plan.
     jobs : int, optional
-        Threads of a shard; default those of a worker.
+        Threads for a shard; default those of a worker.
     replications : int, optional
-        In place of those of the plan.
+        Replaces the number in the plan.
     retries : int
-        How often a shard that failed is tried again.
+        How often a failed shard is tried again.
     csv : bool
-        Write tables as CSV in place of Parquet.
+        Write the tables as CSV instead of Parquet.
     progress : bool or callable
-        True shows the shards that are done on standard error; a callable gets their number and the whole.
+        True shows on standard error how many shards are done; a callable gets their number and
+        the number of all shards.
 
     Returns
     -------
@@ -94,7 +100,7 @@ def study(
     Raises
     ------
     OptionError
-        For a plan without meaning, or a cluster without workers.
+        For a plan that is not valid, or a cluster without workers.
     StudyStateError
         When the directory holds another study.
     """
@@ -103,12 +109,15 @@ def study(
     plan = studies.plan(source, replications=replications)
     workers = client.scheduler_info(n_workers=-1)["workers"]
     if not workers:
-        raise OptionError("the cluster has no workers; start some, or wait for them by client.wait_for_workers(1)")
+        raise OptionError(
+            "the cluster has no workers; start some,"
+            " or wait for them with client.wait_for_workers(1)"
+        )
     count = shards or 4 * len(workers)
     threads = jobs or max(int(worker["nthreads"]) for worker in workers.values())
     report = _options.reporter(progress, "shards")
     target = Path(directory)
-    # Another plan, or another cut, has other shards.
+    # Another plan, or another number of shards, has other shards.
     kept = target / SHARDS / f"{plan.sha256[:16]}-{plan.replications}-{count}"
     kept.mkdir(parents=True, exist_ok=True)
     folders = {index: kept / f"{index}" for index in range(1, count + 1)}
@@ -116,7 +125,16 @@ def study(
     done = count - len(lacking)
     # A shard fills its worker: the tasks of one worker run one after the other.
     futures = {
-        client.submit(_run_shard, plan.text, plan.replications, index, count, threads, pure=False, retries=retries): index
+        client.submit(
+            _run_shard,
+            plan.text,
+            plan.replications,
+            index,
+            count,
+            threads,
+            pure=False,
+            retries=retries,
+        ): index
         for index in lacking
     }
     try:

@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
 
-from . import _hoid, _options
+from . import _options, _pyhoid
 from ._options import Progress
 from .errors import StudyStateError
 from .studies import Results, Table
@@ -18,15 +18,15 @@ __all__ = ["Reproduction", "reproduce"]
 class Reproduction(NamedTuple):
     """What `reproduce` has made."""
 
-    #: The page that shows it all.
+    #: The page that shows all of it.
     page: Path
-    #: Pictures by name, as ``figures["fig-11"]``; `hoid.plots.reference` draws them anew.
+    #: Pictures by name, as in ``figures["fig-11"]``; `pyhoid.plots.reference` draws them again.
     figures: dict[str, Path]
     #: Tables, and the numbers of each figure, by name.
     tables: dict[str, Table]
     #: Results of the studies by name.
     studies: dict[str, Results]
-    #: Claims that hold, hold in part, do not hold and cannot be tested; None where they were not asked for.
+    #: How many claims hold, hold in part, do not hold and cannot be tested; None if not asked for.
     claims: dict[str, int] | None
 
 
@@ -38,9 +38,10 @@ def reproduce(
     jobs: int | None = None,
     progress: Progress = False,
 ) -> Reproduction:
-    """Make the tables, figures and claims of the reference text (Ortiz Moya 2023), as ``hoid reproduce`` does.
+    """Make the tables, figures and claims of the reference text (Ortiz Moya 2023).
 
-    Studies that are there already are not run again, so that one that was interrupted goes on.
+    This does what ``hoid reproduce`` does. Studies that are already there are not run again; one
+    that was interrupted goes on.
 
     Parameters
     ----------
@@ -50,7 +51,7 @@ def reproduce(
     replications : int
         Replications of each cell.
     jobs : int, optional
-        Threads; default one a core.
+        Threads; default one for each core.
     progress : bool or callable
 
     Returns
@@ -60,14 +61,14 @@ def reproduce(
     Raises
     ------
     OptionError
-        For a name that is neither table nor figure.
+        For an unknown name.
     StudyStateError
-        When the directory holds studies with other replications.
+        When the directory holds studies with another number of replications.
     """
     if isinstance(only, str):
         only = [only]
     target = Path(directory)
-    made = _hoid.reproduce(
+    made = _pyhoid.reproduce(
         target,
         only=list(only),
         replications=int(replications),
@@ -75,7 +76,10 @@ def reproduce(
         progress=_options.reporter(progress, "estimates"),
     )
     if made is None:
-        raise StudyStateError(f"the reproduction was stopped; what is done is in {target}, the same call goes on with it")
+        raise StudyStateError(
+            f"the reproduction was stopped; what is done is in {target};"
+            " make the same call again to go on"
+        )
     page, _, tally = made
     names = ("hold", "hold in part", "do not hold", "cannot be tested")
     data = [*(target / "tables").glob("*.csv"), *(target / "figures").glob("*.csv")]
@@ -83,6 +87,10 @@ def reproduce(
         page=Path(page),
         figures={file.stem: file for file in sorted((target / "figures").glob("*.svg"))},
         tables={file.stem: Table(file) for file in sorted(data, key=lambda file: file.stem)},
-        studies={found.name: Results(found) for found in sorted((target / "studies").iterdir()) if found.is_dir()},
+        studies={
+            found.name: Results(found)
+            for found in sorted((target / "studies").iterdir())
+            if found.is_dir()
+        },
         claims=None if tally is None else dict(zip(names, tally, strict=True)),
     )

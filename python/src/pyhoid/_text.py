@@ -1,4 +1,4 @@
-"""Tables that read well, as text and as HTML, and numbers with as many digits as their uncertainty allows."""
+"""Readable tables, as text and as HTML, and numbers with no more digits than are certain."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ DASH = "–"
 
 
 def number(value: float | None, digits: int = 5) -> str:
-    """A number for people."""
+    """A number for people to read."""
     if value is None or math.isnan(value):
         return DASH
     if value == 0 or 1e-4 <= abs(value) < 1e6:
@@ -21,7 +21,7 @@ def number(value: float | None, digits: int = 5) -> str:
 
 
 def with_uncertainty(value: float, error: float | None) -> tuple[str, str]:
-    """Value and standard error, the error with two digits and the value with the same decimals."""
+    """Value and standard error: the error has two digits, the value the same decimals."""
     if error is None or not math.isfinite(error) or error <= 0 or not math.isfinite(value):
         return number(value), DASH
     decimals = 1 - math.floor(math.log10(error))
@@ -32,12 +32,15 @@ def with_uncertainty(value: float, error: float | None) -> tuple[str, str]:
 
 
 def plain_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Columns by width; the first is set left, the others right."""
+    """A table as text: the first column is aligned left, the others right."""
     table = [list(header), *[list(row) for row in rows]]
     widths = [max(len(row[i]) for row in table) for i in range(len(header))]
 
     def line(row: Sequence[str]) -> str:
-        cells = [row[0].ljust(widths[0]), *[cell.rjust(width) for cell, width in zip(row[1:], widths[1:])]]
+        cells = [
+            row[0].ljust(widths[0]),
+            *[cell.rjust(width) for cell, width in zip(row[1:], widths[1:])],
+        ]
         return ("  ".join(cells)).rstrip()
 
     rule = "─" * (sum(widths) + 2 * (len(widths) - 1))
@@ -45,12 +48,19 @@ def plain_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def html_table(caption: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """The same for notebooks."""
+    """The same table as HTML, for notebooks."""
     head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
 
     def line(row: Sequence[str]) -> str:
         first, *rest = row
-        return f"<tr><th>{escape(first)}</th>" + "".join(f"<td>{escape(cell)}</td>" for cell in rest) + "</tr>"
+        return (
+            f"<tr><th>{escape(first)}</th>"
+            + "".join(f"<td>{escape(cell)}</td>" for cell in rest)
+            + "</tr>"
+        )
 
     body = "".join(line(row) for row in rows)
-    return f"<table><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    return (
+        f"<table><caption>{escape(caption)}</caption>"
+        f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    )

@@ -1,4 +1,7 @@
-"""The native module. Users find its parts, wrapped, in `hoid`; a test compares these stubs with it."""
+"""The native module. Users find its parts, wrapped, in `pyhoid`.
+
+A test compares these stubs with the module.
+"""
 
 from collections.abc import Callable, Sequence
 from os import PathLike
@@ -58,7 +61,9 @@ class DescribingFunction:
     def remnant_spectrum(self) -> list[_Array]: ...
     @property
     def figures(self) -> dict[str, Any]: ...
-    def gain_lead_delay(self, *, lead: bool, weights: str, delay: tuple[float, float]) -> dict[str, Any]: ...
+    def gain_lead_delay(
+        self, *, lead: bool, weights: str, delay: tuple[float, float]
+    ) -> dict[str, Any]: ...
     def margins(self, num: list[float], den: list[float]) -> dict[str, Any]: ...
 
 @final
@@ -202,15 +207,19 @@ class Trace:
     def innovation_variance(self) -> _Array: ...
     def columns(self) -> dict[str, npt.NDArray[Any]]: ...
     def operator(self, row: int) -> dict[str, Any] | None: ...
-    def report(self, record: Record, directory: _Path, *, title: str, settings: list[tuple[str, str]]) -> Any: ...
+    def report(
+        self, record: Record, directory: _Path, *, title: str, settings: list[tuple[str, str]]
+    ) -> Any: ...
     def write(self, path: _Path, comments: list[str]) -> None: ...
 
 @disjoint_base
 class Tracker:
-    # `hoid.Tracker` has the keywords that people write.
-    def __new__(cls, options: dict[str, Any], sample_time: float, warm_up: int, record: Record | None) -> Any: ...
+    # `pyhoid.Tracker` has the keywords that people write.
+    def __new__(
+        cls, options: dict[str, Any], sample_time: float, warm_up: int, record: Record | None
+    ) -> Any: ...
     def step(self, e: float, u: float, f_t: float | None = None, update: bool = True) -> float:
-        """Take one sample; returns the innovation, NaN at a fault and during the warm-up."""
+        """Take one sample. Returns the innovation: NaN at a fault and during the warm-up."""
 
     def take_all(self, e: _Array, u: _Array, f_t: _Array | None, update: bool) -> _Array: ...
     @property
@@ -219,7 +228,7 @@ class Tracker:
 
     @property
     def trouble(self) -> str | None:
-        """Why the last start fit failed, or the warm-up began anew."""
+        """Why the last start fit failed, or why the warm-up began again."""
 
     @property
     def sample_time(self) -> float: ...

@@ -11,7 +11,18 @@ from typing import Any
 from .errors import DataError, OptionError
 from .record import Record
 
-__all__ = ["Order", "Progress", "as_records", "bounds", "memory", "numbers", "order", "reporter", "settings", "span"]
+__all__ = [
+    "Order",
+    "Progress",
+    "as_records",
+    "bounds",
+    "memory",
+    "numbers",
+    "order",
+    "reporter",
+    "settings",
+    "span",
+]
 
 Order = int | tuple[int, int] | range
 Progress = bool | Callable[[int, int], object]
@@ -25,13 +36,17 @@ def order(name: str, value: Any) -> tuple[int, int]:
         return value[0], value[-1]
     ends = value if isinstance(value, (tuple, list)) else (value, value)
     if len(ends) != 2:
-        raise OptionError(f"{name} is {value!r}, expected a whole number or a pair (least, greatest)")
+        raise OptionError(
+            f"{name} is {value!r}, expected a whole number or a pair (least, greatest)"
+        )
     try:
         low, high = (operator.index(end) for end in ends)
     except TypeError:
         raise OptionError(f"{name} is {value!r}, expected whole numbers") from None
     if low < 0 or high < low:
-        raise OptionError(f"{name} is {value!r}, expected numbers of zero or more, the smaller first")
+        raise OptionError(
+            f"{name} is {value!r}, expected numbers of zero or more, the smaller first"
+        )
     return low, high
 
 
@@ -40,22 +55,29 @@ def numbers(name: str, values: Mapping[str, Any]) -> dict[str, float]:
     try:
         return {str(key): float(value) for key, value in values.items()}
     except (TypeError, ValueError, AttributeError):
-        raise OptionError(f'{name} is {values!r}, expected numbers by name, as {{"f1": -1.9}}') from None
+        raise OptionError(
+            f'{name} is {values!r}, expected numbers by name, such as {{"f1": -1.9}}'
+        ) from None
 
 
 def bounds(values: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
-    """Lower and upper ends by name; None leaves one open."""
+    """Lower and upper bounds by name; None leaves an end open."""
     try:
         return {
-            str(key): (-math.inf if low is None else float(low), math.inf if high is None else float(high))
+            str(key): (
+                -math.inf if low is None else float(low),
+                math.inf if high is None else float(high),
+            )
             for key, (low, high) in values.items()
         }
     except (TypeError, ValueError, AttributeError):
-        raise OptionError(f'bound is {values!r}, expected pairs by name, as {{"b0": (0, 0.2)}}') from None
+        raise OptionError(
+            f'bound is {values!r}, expected pairs by name, such as {{"b0": (0, 0.2)}}'
+        ) from None
 
 
 def span(name: str, value: Any) -> tuple[float, float] | None:
-    """Two finite numbers in order."""
+    """Two finite numbers, the smaller first."""
     if value is None:
         return None
     try:
@@ -74,39 +96,53 @@ def memory(value: Any) -> str:
     try:
         return "inf" if math.isinf(float(value)) else repr(float(value))
     except (TypeError, ValueError):
-        raise OptionError(f'a memory is {value!r}, expected samples (256), seconds ("2.56s") or "inf"') from None
+        raise OptionError(
+            f'a memory is {value!r}, expected samples (256), seconds ("2.56s") or "inf"'
+        ) from None
 
 
 def as_records(records: Record | Sequence[Record]) -> list[Record]:
     """One record or several, as a list."""
     several = [records] if isinstance(records, Record) else records
     if not isinstance(several, Iterable) or isinstance(several, (str, bytes)):
-        raise DataError(f"expected a hoid.Record or a sequence of them, found {type(records).__name__}; make one by hoid.Record(e=, u=, sample_time=)")
+        raise DataError(
+            f"expected a pyhoid.Record or a sequence of them, found {type(records).__name__};"
+            " make one with pyhoid.Record(e=, u=, sample_time=)"
+        )
     several = list(several)
     for one in several:
         if not isinstance(one, Record):
-            raise DataError(f"expected a hoid.Record, found {type(one).__name__}; make one by hoid.Record(e=, u=, sample_time=)")
+            raise DataError(
+                f"expected a pyhoid.Record, found {type(one).__name__};"
+                " make one with pyhoid.Record(e=, u=, sample_time=)"
+            )
     if not several:
-        raise DataError("there is no record; give one or several")
+        raise DataError("there is no record; give one or more")
     return several
 
 
 def settings(given: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Settings as a page lists them: what was given or has a default, by name."""
-    return [(name, str(value)) for name, value in given.items() if value is not None and value != {} and value != ()]
+    """Settings as a page lists them, by name: those that were given or have a default."""
+    return [
+        (name, str(value))
+        for name, value in given.items()
+        if value is not None and value != {} and value != ()
+    ]
 
 
 def reporter(progress: Any, what: str) -> Callable[[int, int], object] | None:
-    """What is called with the work that is done and the whole."""
+    """The function that is called with the work done and the whole work."""
     if progress is None or progress is False:
         return None
     if progress is not True:
         if not callable(progress):
-            raise OptionError(f"progress is {progress!r}, expected True, False or a callable (done, total)")
+            raise OptionError(
+                f"progress is {progress!r}, expected True, False or a callable (done, total)"
+            )
         return progress  # type: ignore[no-any-return]
 
     def show(done: int, total: int) -> None:
-        # One line that is written over on a terminal, the end alone elsewhere.
+        # On a terminal one line that is overwritten; elsewhere only the last one.
         end = "\n" if done >= total else "\r"
         if sys.stderr.isatty() or end == "\n":
             sys.stderr.write(f"{done} of {total} {what}{end}")

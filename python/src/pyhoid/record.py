@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _hoid, _text
+from . import _pyhoid, _text
 from ._arrays import FloatArray, signal
 from .errors import DataError, OptionError
 
@@ -25,14 +25,14 @@ def _read_only(array: FloatArray) -> FloatArray:
 
 
 class Record:
-    """The signals of one run, with one value a sample.
+    """The signals of one run, with one value for each sample.
 
-    Arrays of float64 that are contiguous are not copied: do not change them afterwards.
+    Contiguous arrays of float64 are not copied: do not change them afterwards.
 
     Parameters
     ----------
     e : array_like, shape (N,), optional
-        Input, the tracking error. Left out for structures without an input (ar, ma, arma).
+        Input, the tracking error. Leave it out for structures without an input (ar, ma, arma).
     u : array_like, shape (N,)
         Output, the control.
     sample_time : float
@@ -49,12 +49,13 @@ class Record:
     Raises
     ------
     DataError
-        For values that are not finite or masked, unequal lengths, and arrays with more than one dimension. It is a `ValueError`.
+        For values that are masked or not finite, unequal lengths, and arrays with more than one
+        dimension. It is a `ValueError`.
 
     Examples
     --------
-    >>> record = hoid.Record(e=error, u=control, sample_time=0.01)
-    >>> fit = hoid.identify(record)
+    >>> record = pyhoid.Record(e=error, u=control, sample_time=0.01)
+    >>> fit = pyhoid.identify(record)
     """
 
     def __init__(
@@ -77,7 +78,7 @@ class Record:
             units=dict(units or {}),
             channels={name: signal(values, name) for name, values in channels.items()},
         )
-        _hoid.check_record(self)
+        _pyhoid.check_record(self)
 
     def _fill(
         self,
@@ -98,10 +99,12 @@ class Record:
         self.start_time: float = start_time
         self.label: str = label
         self.units: dict[str, str] = units
-        self.channels: dict[str, FloatArray] = {name: _read_only(values) for name, values in channels.items()}
+        self.channels: dict[str, FloatArray] = {
+            name: _read_only(values) for name, values in channels.items()
+        }
         self.input_name: str = input_name
         self.output_name: str = output_name
-        #: What was done to the numbers of the file that it was read from.
+        #: What was done to the numbers when the record was read from a file.
         self.steps: list[str] = []
 
     @classmethod
@@ -111,10 +114,18 @@ class Record:
         return record
 
     @classmethod
-    def from_pandas(cls, frame: pd.DataFrame, *, input: str | None = "e", output: str = "u", sample_time: float | None = None) -> Record:
-        """A record of a table: its other columns of numbers become channels.
+    def from_pandas(
+        cls,
+        frame: pd.DataFrame,
+        *,
+        input: str | None = "e",
+        output: str = "u",
+        sample_time: float | None = None,
+    ) -> Record:
+        """Make a record from a table; other columns with numbers become channels.
 
-        The sampling is `sample_time`, or that of a column ``t`` or an index of times in s, which must be even.
+        The sample time is `sample_time`, or that of a column ``t`` or an index of times in s, which
+        must be even.
         """
         columns = {str(name): frame[name].to_numpy() for name in frame.columns}
         for name in (input, output):
@@ -133,15 +144,20 @@ class Record:
             if not np.allclose(steps, sample_time, rtol=1e-3, atol=0):
                 row = int(np.argmax(np.abs(steps - sample_time)))
                 raise DataError(
-                    f"the sampling is uneven: row {row + 1} comes {steps[row]:g} s after the one before, expected {sample_time:g} s;"
+                    f"the sampling is uneven: row {row + 1} comes {steps[row]:g} s after the one"
+                    f" before, expected {sample_time:g} s;"
                     " write the table to a file and read it with resample=True, or give sample_time"
                 )
             sample_time = float(f"{sample_time:.9g}")
         if times is not None:
             start = float(times[0])
-        named = {name: values for name, values in columns.items() if name not in (input, output) and values.dtype.kind in "fiu"}
+        named = {
+            name: values
+            for name, values in columns.items()
+            if name not in (input, output) and values.dtype.kind in "fiu"
+        }
         record = cls.__new__(cls)
-        # A column may have any name, also that of a keyword.
+        # A column may have any name, even that of a keyword.
         record._fill(
             e=None if input is None else signal(columns[input], input),
             u=signal(columns[output], output),
@@ -151,7 +167,7 @@ class Record:
             units={},
             channels={name: signal(values, name) for name, values in named.items()},
         )
-        _hoid.check_record(record)
+        _pyhoid.check_record(record)
         return record
 
     @property
@@ -170,7 +186,9 @@ class Record:
         try:
             return self.channels[name]
         except KeyError:
-            raise KeyError(f"there is no channel {name}; the record has {', '.join(self.names)}") from None
+            raise KeyError(
+                f"there is no channel {name}; the record has {', '.join(self.names)}"
+            ) from None
 
     def __contains__(self, name: object) -> bool:
         return name in self.names
@@ -187,9 +205,10 @@ class Record:
         Raises
         ------
         DataError
-            When there are none.
+            When the span has no samples.
         """
-        # A bound that falls on a sample, up to rounding, takes that sample.
+
+        # A bound that falls on a sample, apart from rounding, takes that sample.
         def index(time: float | None, usual: int) -> int:
             if time is None:
                 return usual
@@ -198,7 +217,8 @@ class Record:
         first, end = index(start, 0), min(index(stop, len(self)), len(self))
         if first >= end:
             raise DataError(
-                f"there are no samples from {start} to {stop} s; the record runs from {self.start_time:g} to {self.time[-1]:g} s"
+                f"there are no samples from {start} to {stop} s;"
+                f" the record runs from {self.start_time:g} to {self.time[-1]:g} s"
             )
         record = Record.__new__(Record)
         record._fill(
@@ -215,24 +235,44 @@ class Record:
         return record
 
     def detrended(self, how: str = "mean") -> Record:
-        """The same record with the ``"mean"`` or the ``"linear"`` trend taken out of input and output."""
-        return Record._of(_hoid.detrended(self, how))
+        """The record with the ``"mean"`` or the ``"linear"`` trend of input and output removed."""
+        return Record._of(_pyhoid.detrended(self, how))
 
     def to_pandas(self) -> pd.DataFrame:
         """All channels as a table with the time in s as index."""
         import pandas as pd
 
-        return pd.DataFrame({name: self[name] for name in self.names}, index=pd.Index(self.time, name="t"), copy=False)
+        return pd.DataFrame(
+            {name: self[name] for name in self.names},
+            index=pd.Index(self.time, name="t"),
+            copy=False,
+        )
 
     def to_xarray(self) -> xr.Dataset:
         """All channels over the coordinate ``t`` (s), with their units."""
         import xarray as xr
 
-        variables = {name: ("t", self[name], {"units": self.units.get(name, "")}) for name in self.names}
-        return xr.Dataset(variables, coords={"t": ("t", self.time, {"units": "s"})}, attrs={"sample_time": self.sample_time})
+        variables = {
+            name: ("t", self[name], {"units": self.units.get(name, "")}) for name in self.names
+        }
+        return xr.Dataset(
+            variables,
+            coords={"t": ("t", self.time, {"units": "s"})},
+            attrs={"sample_time": self.sample_time},
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        keys = ("e", "u", "sample_time", "start_time", "label", "units", "channels", "input_name", "output_name")
+        keys = (
+            "e",
+            "u",
+            "sample_time",
+            "start_time",
+            "label",
+            "units",
+            "channels",
+            "input_name",
+            "output_name",
+        )
         return (_record_of, ({key: getattr(self, key) for key in keys},))
 
     def _rows(self) -> list[list[str]]:
@@ -240,19 +280,26 @@ class Record:
         for name in self.names:
             values = self[name]
             figures = (values.min(), values.max(), values.mean(), values.std())
-            rows.append([name, *(_text.number(float(v), 4) for v in figures), self.units.get(name, "")])
+            rows.append(
+                [name, *(_text.number(float(v), 4) for v in figures), self.units.get(name, "")]
+            )
         return rows
 
     def _title(self) -> str:
         label = f" {self.label}" if self.label else ""
-        return f"Record{label}: {len(self)} samples of {self.sample_time:g} s, from {self.start_time:g} s"
+        return (
+            f"Record{label}: {len(self)} samples of {self.sample_time:g} s,"
+            f" from {self.start_time:g} s"
+        )
 
     def __repr__(self) -> str:
         header = ["channel", "least", "greatest", "mean", "sd", "unit"]
         return f"{self._title()}\n{_text.plain_table(header, self._rows())}"
 
     def _repr_html_(self) -> str:
-        return _text.html_table(self._title(), ["", "least", "greatest", "mean", "sd", "unit"], self._rows())
+        return _text.html_table(
+            self._title(), ["", "least", "greatest", "mean", "sd", "unit"], self._rows()
+        )
 
 
 def _record_of(parts: Mapping[str, Any]) -> Record:

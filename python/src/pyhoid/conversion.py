@@ -1,11 +1,11 @@
-"""Discrete coefficients to operator parameters and back, and any transfer function to discrete time."""
+"""Conversions: discrete coefficients and operator parameters, and continuous to discrete time."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from . import _hoid
+from . import _pyhoid
 from ._arrays import FloatArray
 from .errors import OptionError
 from .estimates import Operator
@@ -14,7 +14,10 @@ __all__ = ["Conversion", "DiscreteTransferFunction", "convert", "discretise"]
 
 
 class Conversion(NamedTuple):
-    """An operator in both forms: ``B q^-nk / F`` with ``B = b0 + b1 q^-1``, ``F = 1 + f1 q^-1 + f2 q^-2``."""
+    """An operator in both forms.
+
+    The discrete form is ``B q^-nk / F`` with ``B = b0 + b1 q^-1``, ``F = 1 + f1 q^-1 + f2 q^-2``.
+    """
 
     f: tuple[float, float]
     b: tuple[float, float]
@@ -34,7 +37,9 @@ class DiscreteTransferFunction(NamedTuple):
 def _two(values: Sequence[float], name: str) -> tuple[float, float]:
     numbers = [float(value) for value in values]
     if len(numbers) != 2:
-        raise OptionError(f"the operator model has two coefficients in {name}, found {len(numbers)}")
+        raise OptionError(
+            f"the operator model has two coefficients in {name}, found {len(numbers)}"
+        )
     return numbers[0], numbers[1]
 
 
@@ -46,7 +51,7 @@ def convert(
     operator: Mapping[str, Any] | None = None,
     sample_time: float = 0.01,
 ) -> Conversion:
-    """Operator parameters of discrete coefficients, or the other way round.
+    """Convert discrete coefficients to operator parameters, or the other way round.
 
     Parameters
     ----------
@@ -55,8 +60,8 @@ def convert(
     nk : int
         Delay of b0 in samples.
     operator : mapping
-        ``K_e``, ``T_L`` (or ``K_e_dot``), ``omega_nm``, ``zeta_nm`` and ``tau_e`` (0 where it is left out), as numbers or estimates; an
-        `Operator` as well.
+        ``K_e``, ``T_L`` (or ``K_e_dot``), ``omega_nm``, ``zeta_nm`` and ``tau_e`` (0 where it is
+        left out), as numbers or estimates; also an `Operator`.
     sample_time : float
         Ts in s.
 
@@ -67,17 +72,19 @@ def convert(
     Raises
     ------
     OptionError
-        When both or neither are given, or a parameter is lacking.
+        When both or neither are given, or a parameter is missing.
     """
     if operator is not None:
         if f is not None or b is not None:
             raise OptionError("give f and b, or operator, not both")
-        pairs = [(str(name), float(getattr(value, "value", value))) for name, value in operator.items()]
+        pairs = [
+            (str(name), float(getattr(value, "value", value))) for name, value in operator.items()
+        ]
         if isinstance(operator, Operator):
             pairs = [(name, value) for name, value in pairs if name != "K_e_dot"]
-        found = _hoid.convert_operator(pairs, sample_time)
+        found = _pyhoid.convert_operator(pairs, sample_time)
     elif f is not None and b is not None:
-        found = _hoid.convert_discrete(_two(f, "F"), _two(b, "B"), nk, sample_time)
+        found = _pyhoid.convert_discrete(_two(f, "F"), _two(b, "B"), nk, sample_time)
     else:
         raise OptionError("give f and b, or operator")
     discrete = found["discrete"]
@@ -98,12 +105,12 @@ def discretise(
     method: str = "zoh",
     prewarp: float | None = None,
 ) -> DiscreteTransferFunction:
-    """A continuous transfer function in discrete time.
+    """Discretise a continuous transfer function.
 
     Parameters
     ----------
     num, den : sequence of float
-        By descending powers of s.
+        Coefficients by descending powers of s.
     sample_time : float
         Ts in s.
     method : {"zoh", "foh", "tustin", "prewarped", "forward-euler", "backward-euler", "matched"}
@@ -113,9 +120,11 @@ def discretise(
     Returns
     -------
     DiscreteTransferFunction
-        Both by ascending powers of q^-1.
+        Numerator and denominator by ascending powers of q^-1.
     """
     if method == "prewarped" and prewarp is None:
         raise OptionError('method="prewarped" needs prewarp, a frequency in rad/s')
-    found = _hoid.discretise_transfer_function([float(v) for v in num], [float(v) for v in den], sample_time, method, prewarp)
+    found = _pyhoid.discretise_transfer_function(
+        [float(v) for v in num], [float(v) for v in den], sample_time, method, prewarp
+    )
     return DiscreteTransferFunction(found[0], found[1], sample_time)

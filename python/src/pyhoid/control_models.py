@@ -1,4 +1,4 @@
-"""Models of python-control as those of hoid."""
+"""Models of python-control as operators."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ __all__ = ["from_control"]
 
 
 def from_control(system: control.TransferFunction | Any) -> Conversion:
-    """The operator that a discrete transfer function of python-control stands for: ``(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)``.
+    """The operator of a discrete transfer function of python-control.
+
+    The transfer function has the form ``(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)``.
 
     Parameters
     ----------
@@ -26,13 +28,16 @@ def from_control(system: control.TransferFunction | Any) -> Conversion:
     Raises
     ------
     NotConvertibleError
-        For another form.
+        For a transfer function of another form.
     """
     if not system.isdtime(strict=True) or not isinstance(system.dt, float) or system.dt <= 0:
-        raise NotConvertibleError("the system has no sample time; discretise it first, by hoid.discretise or control.sample_system")
+        raise NotConvertibleError(
+            "the system has no sample time; discretise it first,"
+            " with pyhoid.discretise or control.sample_system"
+        )
     num = np.asarray(system.num[0][0], dtype=float)
     den = np.asarray(system.den[0][0], dtype=float)
-    # By powers of z, the highest first: z^n over the denominator's order is q^-delay.
+    # Powers of z, the highest first: those that the denominator has more are the delay.
     relative = len(den) - len(num)
     den, num = den / den[0], num / den[0]
     coefficients = np.trim_zeros(num, "b")
@@ -41,7 +46,8 @@ def from_control(system: control.TransferFunction | Any) -> Conversion:
     f = np.trim_zeros(den, "b")
     if len(f) > 3 or len(b) > 2 or relative + lead < 0:
         raise NotConvertibleError(
-            f"the system has {len(b)} coefficients in the numerator and {len(f) - 1} poles off the origin, expected up to two of each"
+            f"the system has {len(b)} coefficients in the numerator and {len(f) - 1} poles away"
+            " from the origin, expected up to two of each"
         )
     f = np.pad(f, (0, 3 - len(f)))
     b = np.pad(b, (0, 2 - len(b)))

@@ -1,11 +1,11 @@
-"""Recursive estimates, live."""
+"""Live recursive estimates."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-from . import _hoid, _recursion, _text
+from . import _pyhoid, _recursion, _text
 from ._arrays import FloatArray, signal
 from ._options import Order
 from ._recursion import Memory
@@ -16,10 +16,11 @@ from .record import Record
 __all__ = ["Tracker"]
 
 
-class Tracker(_hoid.Tracker):
-    """A recursive estimate that takes one sample at a time. It can be pickled, and goes on with the same digits.
+class Tracker(_pyhoid.Tracker):
+    """A recursive estimate that takes one sample at a time.
 
-    Without a start it collects `warm_up` seconds, fits them, and goes on from there; until then `ready` is False.
+    Without a start it collects `warm_up` seconds, fits them, and goes on from there; until then
+    `ready` is False. It can be pickled, and goes on with the same digits.
 
     Parameters
     ----------
@@ -28,13 +29,14 @@ class Tracker(_hoid.Tracker):
     sample_time : float, default 0.01
         Ts in s.
     warm_up : float, default 20
-        Seconds that are collected before the start fit.
+        Seconds collected before the start fit.
     record : Record, optional
-        A record to start from, in place of the warm-up: its fit is the start, and the filters have seen it.
+        A record to start from, instead of the warm-up: its fit is the start, and the filters have
+        run over it.
 
     Examples
     --------
-    >>> tracker = hoid.Tracker("rpem", nk=29, nd=1, sample_time=0.01)
+    >>> tracker = pyhoid.Tracker("rpem", nk=29, nd=1, sample_time=0.01)
     >>> for e, u in samples:
     ...     innovation = tracker.step(e, u)
     """
@@ -80,7 +82,9 @@ class Tracker(_hoid.Tracker):
         return cls._made(options, float(sample_time), samples, record)
 
     @classmethod
-    def _made(cls, options: dict[str, Any], sample_time: float, warm_up: int, record: Record | None) -> Tracker:
+    def _made(
+        cls, options: dict[str, Any], sample_time: float, warm_up: int, record: Record | None
+    ) -> Tracker:
         tracker: Tracker = super().__new__(cls, options, sample_time, max(warm_up, 0), record)
         tracker._options = options
         return tracker
@@ -92,14 +96,15 @@ class Tracker(_hoid.Tracker):
         ----------
         e, u : array_like, shape (N,)
         f_t : array_like, shape (N,), optional
-            Forcing function, which ``"rriv"`` makes its instruments of.
+            Forcing function, from which ``"rriv"`` makes its instruments.
         update : bool
-            False lets the filters follow, and the estimate stays.
+            False runs the filters on and keeps the estimate.
 
         Returns
         -------
         ndarray, shape (N,)
-            Innovations; NaN at faults (values that are not finite or beyond `largest`) and during the warm-up.
+            Innovations; NaN at faults (values that are not finite or beyond `largest`) and during
+            the warm-up.
         """
         reference = None if f_t is None else signal(f_t, "f_t")
         return self.take_all(signal(e, "e"), signal(u, "u"), reference, update)
@@ -111,12 +116,15 @@ class Tracker(_hoid.Tracker):
 
     @property
     def start_fit(self) -> Fit | None:
-        """The batch fit that it started from; None when it was given a start, or came out of a pickle."""
+        """The batch fit that the tracker started from.
+
+        None for a tracker that was given a start or came out of a pickle.
+        """
         native = self.start
         return None if native is None else Fit(native, [])
 
     def operator_estimate(self) -> Operator | None:
-        """The operator with standard errors; None where the structure has no meaning as one."""
+        """The operator with standard errors; None where the structure cannot represent one."""
         found = self.operator
         return None if found is None else Operator(found)
 
@@ -124,10 +132,11 @@ class Tracker(_hoid.Tracker):
         return (_restored, (type(self), self._options, self.sample_time, *self.saved()))
 
     def __repr__(self) -> str:
+        title = f"Tracker by {self.method}, {self.structure}"
         if not self.ready:
-            return f"Tracker by {self.method}, {self.structure}: warming up, {self.counts['samples']} samples so far"
+            return f"{title}: warming up, {self.counts['samples']} samples so far"
         rows = [[name, repr(estimate)] for name, estimate in self.estimates.items()]
-        title = f"Tracker by {self.method}, {self.structure}: {self.counts['samples']} samples"
+        title = f"{title}: {self.counts['samples']} samples"
         return f"{title}\n{_text.plain_table(['parameter', 'estimate'], rows)}"
 
 
