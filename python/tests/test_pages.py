@@ -125,4 +125,5 @@ def test_track_and_tracker_have_the_same_keywords() -> None:
         assert tracker[name].default == usual, name
         assert track[name].annotation == tracker[name].annotation, name
     shared = [name for name in track if name in tracker]
-    assert set(KEYWORDS) == set(shared) - {"record"}
+    assert set(KEYWORDS) == set(shared) - {"record", "settings"}
+    assert track["settings"].annotation == tracker["settings"].annotation

@@ -325,11 +325,15 @@ macro_rules! names {
 mod group;
 mod reading;
 mod recursion;
+mod settings;
 mod study;
 
 pub use group::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs};
 pub use reading::{MaskArgs, ReadArgs};
-pub use recursion::{ForgettingName, RecursionArgs, StreamArgs, TrackArgs};
+pub use recursion::{RecursionArgs, StreamArgs, TrackArgs};
+#[cfg(test)]
+pub use settings::with_settings;
+pub use settings::{flag, methods_with};
 pub use study::{ReproduceArgs, StudyCommand, StudyMergeArgs, StudyRunArgs};
 
 names!(FitMethodName for Option<IvMethod> {

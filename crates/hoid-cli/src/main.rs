@@ -10,6 +10,8 @@ mod json;
 mod orders;
 mod output;
 mod recursion;
+#[cfg(test)]
+mod reference;
 mod text;
 
 use std::process::ExitCode;

@@ -10,7 +10,6 @@ use hoid_model::{
     Detrend, Structure, discretise, remnant::RemnantDiscretisation, remnant_gain::NoiseDefinition,
     scenario::Realisation,
 };
-use hoid_track::{Method, Stable};
 
 use crate::errors::{Outcome, bad_option};
 
@@ -48,26 +47,19 @@ pub enum Kind {
     TimeVarying,
 }
 
-const STRUCTURES: [(&str, Structure); 11] = [
-    ("arx", Structure::Arx),
-    ("armax", Structure::Armax),
-    ("oe", Structure::OutputError),
-    ("bj", Structure::BoxJenkins),
-    ("fir", Structure::Fir),
-    ("ar", Structure::Ar),
-    ("ma", Structure::Ma),
-    ("arma", Structure::Arma),
-    ("ararx", Structure::Ararx),
-    ("ararmax", Structure::Ararmax),
-    ("general", Structure::General),
-];
+/// The structures by name.
+fn structures() -> impl Iterator<Item = (&'static str, Structure)> {
+    Structure::ALL
+        .into_iter()
+        .map(|structure| (structure.name(), structure))
+}
 
 pub fn structure(found: &str) -> Outcome<Structure> {
-    word("structure", found, &STRUCTURES)
+    word("structure", found, &structures().collect::<Vec<_>>())
 }
 
 pub fn kind(found: &str) -> Outcome<Kind> {
-    let mut all: Vec<(&str, Kind)> = STRUCTURES.iter().map(|(w, s)| (*w, Kind::Polynomial(*s))).collect();
+    let mut all: Vec<(&str, Kind)> = structures().map(|(w, s)| (w, Kind::Polynomial(s))).collect();
     all.extend([("grey-box", Kind::GreyBox), ("time-varying", Kind::TimeVarying)]);
     word("structure", found, &all)
 }
@@ -154,24 +146,12 @@ pub fn remnant_discretisation(found: &str) -> Outcome<RemnantDiscretisation> {
     word("discretisation", found, &words)
 }
 
-pub fn tracking_method(found: &str) -> Outcome<Method> {
-    let words = [
-        ("rls", Method::Rls),
-        ("rpem", Method::Rpem),
-        ("physical", Method::Physical),
-        ("window", Method::Window),
-        ("rriv", Method::Refined),
-        ("adaptive", Method::Adaptive),
-        ("fused", Method::Fused),
-        ("ekf", Method::Ekf),
-        ("ukf", Method::Ukf),
-    ];
-    word("method", found, &words)
-}
-
-pub fn kept_stable(found: &str) -> Outcome<Stable> {
-    let words = [("predictor", Stable::Predictor), ("noise", Stable::PredictorAndNoise)];
-    word("stable", found, &words)
+/// The keyword of an option: its name, but for a word that Python keeps for itself.
+pub fn keyword(name: &'static str) -> &'static str {
+    match name {
+        "lambda" => "forgetting_factor",
+        name => name,
+    }
 }
 
 pub fn discretisation(found: &str, prewarp_rad_s: Option<f64>) -> Outcome<discretise::Method> {

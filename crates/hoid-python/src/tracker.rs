@@ -82,6 +82,11 @@ impl PyTracker {
     ) -> Outcome<Self> {
         let sample_time = SampleTime::new(sample_time)?;
         let plan = recursion::plan(options, sample_time)?;
+        if plan.options().method.smooths() {
+            return Err(bad_option(
+                "smooth belongs to pyhoid.track: what is still to come cannot say anything of a stream",
+            ));
+        }
         if !(1..=LONGEST_WARM_UP).contains(&warm_up) {
             return Err(bad_option(
                 "warm_up: expected a time in s of one sample to 10 million samples",

@@ -28,9 +28,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let arx = batch(Structure::Arx, &record)?;
     let bj = batch(Structure::BoxJenkins, &record)?;
     let traces = [
-        tracked(Method::Rls, &record)?,
-        tracked(Method::Rpem, &record)?,
-        tracked(Method::Physical, &record)?,
+        tracked(Method::rls(), &record)?,
+        tracked(Method::rpem(), &record)?,
+        tracked(Method::physical(), &record)?,
     ];
     let section = |name: &str, trace, batch| TraceSection {
         name: name.to_owned(),

@@ -23,7 +23,7 @@ fn run() -> Record {
 
 fn options(method: Method) -> TrackOptions {
     let structure = method.usual_structure();
-    let mut options = TrackOptions::new(method, structure, structure.operator_orders(29));
+    let mut options = TrackOptions::new(method.clone(), structure, structure.operator_orders(29));
     options.start = StartAt::Span(Some(SPANS[0]));
     options
 }
@@ -101,7 +101,7 @@ fn figure<'a>(html: &'a str, id: &str) -> &'a str {
 fn three_methods_over_each_other_show_all_that_is_asked_for() {
     let record = run();
     let (arx, bj) = (fits(Structure::Arx, &record), fits(Structure::BoxJenkins, &record));
-    let traces = [Method::Rls, Method::Rpem, Method::Physical].map(|m| tracked(m, &record));
+    let traces = [Method::rls(), Method::rpem(), Method::physical()].map(|m| tracked(m, &record));
     let sections = vec![
         section("RLS", &traces[0], &arx),
         section("RPEM", &traces[1], &bj),
@@ -178,7 +178,7 @@ fn a_recording_has_no_truth() {
         Channel::new("u", "<b>", simulated.output().to_vec()),
     )
     .unwrap();
-    let trace = tracked(Method::Physical, &record);
+    let trace = tracked(Method::physical(), &record);
     let hostile = "a<script>alert(1)</script> & \"b\" $x^2$";
     let html = report(&record, vec![section(hostile, &trace, &[])]).to_html().unwrap();
     check_page(&html);
@@ -191,7 +191,7 @@ fn a_recording_has_no_truth() {
 #[test]
 fn a_start_from_nothing_and_shortened_steps_are_told() {
     let record = run();
-    let mut options = options(Method::Rpem);
+    let mut options = options(Method::rpem());
     options.start = StartAt::Nothing;
     options.covariance = StartCovariance::Multiple(1e4);
     let trace = track(&record, &options, 1).unwrap();
@@ -213,7 +213,7 @@ fn orders_that_are_no_operator_have_coefficients_alone() {
         nk: 29,
         ..Orders::default()
     };
-    let mut options = TrackOptions::new(Method::Rls, Structure::Arx, orders);
+    let mut options = TrackOptions::new(Method::rls(), Structure::Arx, orders);
     options.start = StartAt::Span(Some(SPANS[0]));
     let trace = track(&record, &options, 1).unwrap();
     let html = report(&record, vec![section("small", &trace, &[])]).to_html().unwrap();
@@ -227,7 +227,7 @@ fn orders_that_are_no_operator_have_coefficients_alone() {
 fn short_records_and_averages_have_their_page() {
     let long = run();
     let record = long.span(0.0, 8.0).unwrap();
-    let mut options = options(Method::Rls);
+    let mut options = options(Method::rls());
     options.start = StartAt::Span(None);
     let trace = track(&record, &options, 1).unwrap().moving_average(101);
     let fit = Estimator::new(Structure::Arx, Structure::Arx.operator_orders(29))
@@ -256,7 +256,7 @@ fn short_records_and_averages_have_their_page() {
 #[test]
 fn the_delay_is_shown_where_it_is_tracked() {
     let record = run();
-    let mut with_delay = options(Method::Physical);
+    let mut with_delay = options(Method::physical());
     with_delay.track_delay_s = Some((0.2, 0.4));
     let trace = track(&record, &with_delay, 8).unwrap();
     let html = report(&record, vec![section("physical", &trace, &[])])
@@ -275,8 +275,8 @@ fn a_batch_fit_beside_a_delay_that_changed_has_the_delay_of_its_span() {
         .unwrap()
         .run(Stream::default(), false)
         .unwrap();
-    let mut with_delay = options(Method::Adaptive);
-    with_delay.orders = Method::Adaptive.usual_orders(29);
+    let mut with_delay = options(Method::adaptive());
+    with_delay.orders = Method::adaptive().usual_orders(29);
     with_delay.track_delay_s = Some((0.2, 0.4));
     let trace = track(&record, &with_delay, 8).unwrap();
     let (_, fit) = batch_fit(&trace, &record, SPANS[1]).unwrap();
@@ -288,9 +288,9 @@ fn a_batch_fit_beside_a_delay_that_changed_has_the_delay_of_its_span() {
 #[test]
 fn windows_and_instruments_have_their_page() {
     let record = run();
-    let mut window = options(Method::Window);
+    let mut window = options(Method::window());
     window.every = 500;
-    let traces = [track(&record, &window, 8).unwrap(), tracked(Method::Refined, &record)];
+    let traces = [track(&record, &window, 8).unwrap(), tracked(Method::rriv(), &record)];
     let sections = vec![section("window", &traces[0], &[]), section("RRIV", &traces[1], &[])];
     let html = report(&record, sections).to_html().unwrap();
     check_page(&html);
@@ -305,7 +305,7 @@ fn reports_of_no_trace_or_of_too_many_are_errors() {
         report(&record, Vec::new()).to_html(),
         Err(ReportError::NoTraces { most: 4 })
     ));
-    let mut options = options(Method::Rls);
+    let mut options = options(Method::rls());
     options.start = StartAt::Nothing;
     let trace = track(&record, &options, 100).unwrap();
     let five = (0..5).map(|_| section("RLS", &trace, &[])).collect();

@@ -42,7 +42,7 @@ mod truth;
 pub use columns::OPERATOR;
 pub use error::StudyError;
 pub use manifest::Shard;
-pub use plan::{Plan, plan_schema};
+pub use plan::{Plan, plan_schema, plan_schema_of};
 pub use plans::{NamedPlan, PLANS};
 pub use query::Query;
 pub use results::{Bands, Results, SummaryRow, TraceSummary};

@@ -13,7 +13,7 @@ use hoid_model::{
     schedule::Schedule,
 };
 use hoid_sim::{Simulator, Stream};
-use hoid_track::{ErrorThreshold, Memory, Method, Sample, Stable, StartAt, StartCovariance, TrackOptions, Tracker};
+use hoid_track::{ErrorThreshold, Method, Sample, StartAt, TrackOptions, Tracker};
 
 const NK: usize = 29;
 const COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
@@ -53,19 +53,15 @@ fn run(simulator: &Simulator, condition: Condition, order: usize, level: usize, 
 fn options(method: Method) -> TrackOptions {
     TrackOptions {
         start: StartAt::Span(Some((0.0, START_S))),
-        ..TrackOptions::new(method, method.usual_structure(), method.usual_orders(NK))
+        ..TrackOptions::new(method.clone(), method.usual_structure(), method.usual_orders(NK))
     }
 }
 
 /// RLS or RPEM by the text's own settings.
 fn of_the_text(method: Method) -> TrackOptions {
-    TrackOptions {
-        memory: Some(Memory::Samples(256.0)),
-        covariance: StartCovariance::Multiple(0.1),
-        stable: Stable::PredictorAndNoise,
-        limit: Some(f64::INFINITY),
-        ..options(method)
-    }
+    let mut settings = vec![("memory", "256"), ("covariance", "0.1"), ("limit", "inf")];
+    settings.extend((method != Method::rls()).then_some(("stable", "noise")));
+    options(method).with(&settings).unwrap()
 }
 
 /// What one run of one method gave.
@@ -85,7 +81,7 @@ fn follow(record: &Record, options: &TrackOptions) -> Found {
     let truth = COLUMNS.map(|c| record.channel(c).unwrap());
     let span = record.span(0.0, START_S).unwrap();
     let mut tracker = Tracker::new(options, Some(&span), record.sample_time()).unwrap();
-    let from = if options.covariance == StartCovariance::OfFit {
+    let from = if options.method.covariance().is_none() {
         START_S - 0.005
     } else {
         -1.0
@@ -181,7 +177,7 @@ fn alarms(statistic: &Statistic, threshold: f64, changes: bool) -> (Option<f64>,
 fn detection(runs: usize) {
     let statistics = |record: &Record| -> [Statistic; 2] {
         let span = record.span(0.0, START_S).unwrap();
-        let options = options(Method::Adaptive);
+        let options = options(Method::adaptive());
         let mut tracker = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
         let mut baseline = ErrorThreshold::new(span.input(), record.sample_time()).unwrap();
         let mut both = [Vec::new(), Vec::new()];
@@ -261,11 +257,11 @@ fn detection(runs: usize) {
 /// Errors over the better of RLS and RPEM on the cells on which methods are set: C3 and C5, m0 = 2 and 3, seed 9000.
 fn tune(runs: usize) {
     let methods = [
-        of_the_text(Method::Rls),
-        of_the_text(Method::Rpem),
-        options(Method::Fused),
-        options(Method::Ekf),
-        options(Method::Ukf),
+        of_the_text(Method::rls()),
+        of_the_text(Method::rpem()),
+        options(Method::fused()),
+        options(Method::ekf()),
+        options(Method::ukf()),
     ];
     let mut ratios: Vec<Vec<[f64; 5]>> = vec![Vec::new(); methods.len()];
     let mut covered: Vec<Vec<[f64; 5]>> = vec![Vec::new(); methods.len()];
@@ -309,7 +305,7 @@ fn tune(runs: usize) {
 /// Cells on which `adaptive` is set: C3 and C5, C1 and C2, and changes of the neuromuscular system that are not those of the plan.
 /// Errors: geometric mean over the cells of the median run.
 fn set(runs: usize) {
-    let options = options(Method::Adaptive);
+    let options = options(Method::adaptive());
     let neuromuscular = |omega: f64, zeta: f64| {
         move |scenario: &mut Scenario| {
             scenario.last.operator.omega_nm_rad_s = omega;
@@ -443,8 +439,8 @@ fn joined(files: &[String]) {
         let span = record.span(0.0, start_s).unwrap();
         // The delay of the least innovation variance of the start fit.
         let fits = (8..=26).filter_map(|nk| {
-            let m = Method::Adaptive;
-            let options = TrackOptions::new(m, m.usual_structure(), m.usual_orders(nk));
+            let m = Method::adaptive();
+            let options = TrackOptions::new(m.clone(), m.usual_structure(), m.usual_orders(nk));
             Tracker::new(&options, Some(&span), sample_time).ok()
         });
         let Some(mut tracker) = fits.min_by(|a, b| a.innovation_variance().total_cmp(&b.innovation_variance())) else {
@@ -501,18 +497,17 @@ fn cost(runs: usize) {
     let simulator = simulator(Condition::C4, 2, 0.1);
     let record = run(&simulator, Condition::C4, 2, 1, 0);
     let span = record.span(0.0, START_S).unwrap();
-    let tracked = TrackOptions {
-        track_delay_s: Some((0.2, 0.4)),
-        ..options(Method::Adaptive)
-    };
+    let tracked = options(Method::adaptive())
+        .with(&[("track_delay", "0.2..0.4")])
+        .unwrap();
     let methods = [
-        Method::Rls,
-        Method::Rpem,
-        Method::Fused,
-        Method::Physical,
-        Method::Ekf,
-        Method::Ukf,
-        Method::Adaptive,
+        Method::rls(),
+        Method::rpem(),
+        Method::fused(),
+        Method::physical(),
+        Method::ekf(),
+        Method::ukf(),
+        Method::adaptive(),
     ];
     for options in methods.map(options).into_iter().chain([tracked]) {
         let mut least = f64::INFINITY;
@@ -524,7 +519,7 @@ fn cost(runs: usize) {
             }
             least = least.min(begin.elapsed().as_secs_f64() / record.len() as f64);
         }
-        let delays = options.track_delay_s.map_or("", |_| ", delays of .2 to .4 s");
+        let delays = options.method.track_delay_s().map_or("", |_| ", delays of .2 to .4 s");
         println!("{}{delays}: {:.0} ns", options.method.name(), 1e9 * least);
     }
 }

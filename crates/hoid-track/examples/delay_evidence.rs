@@ -46,9 +46,9 @@ fn main() {
         ]
     };
     let methods = [
-        ("adaptive, nk = 29", options(Method::Adaptive, None)),
-        ("adaptive, tracked", options(Method::Adaptive, Some(RANGE_S))),
-        ("physical, tracked", options(Method::Physical, Some(RANGE_S))),
+        ("adaptive, nk = 29", options(Method::adaptive(), None)),
+        ("adaptive, tracked", options(Method::adaptive(), Some(RANGE_S))),
+        ("physical, tracked", options(Method::physical(), Some(RANGE_S))),
     ];
     let orders: &[usize] = if tune { &[2, 3] } else { &[2] };
     println!(
@@ -116,10 +116,13 @@ fn of_all(found: &[Found], of: &dyn Fn(&Found) -> f64) -> f64 {
 }
 
 fn options(method: Method, track_delay_s: Option<(f64, f64)>) -> TrackOptions {
+    let method = match track_delay_s {
+        Some((low, high)) => method.with("track_delay", &format!("{low}..{high}")).unwrap(),
+        None => method,
+    };
     TrackOptions {
         start: StartAt::Span(Some((0.0, START_S))),
-        track_delay_s,
-        ..TrackOptions::new(method, method.usual_structure(), method.usual_orders(NK))
+        ..TrackOptions::new(method.clone(), method.usual_structure(), method.usual_orders(NK))
     }
 }
 

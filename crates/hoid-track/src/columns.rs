@@ -19,7 +19,7 @@ impl Trace {
     /// Names of the operator's columns: those of every trace, and the delay where it is tracked.
     pub fn operator_columns(&self) -> Vec<&'static str> {
         let mut names = OPERATOR_COLUMNS.to_vec();
-        if self.options().track_delay_s.is_some() {
+        if self.options().method.track_delay_s().is_some() {
             names.push("tau_e");
         }
         names

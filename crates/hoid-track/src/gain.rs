@@ -9,11 +9,9 @@ use hoid_core::{
 };
 use hoid_model::SampleTime;
 
-use crate::{
-    options::{ForgettingRule, Method, StartCovariance, TrackOptions},
-    start::StartState,
-};
 use hoid_ident::IdentError;
+
+use crate::{forgetting::ForgettingRule, setup::Setup, start::StartState};
 
 /// Where nothing excites a parameter, its variance in P may grow to this multiple of the level that it has with the excitation of
 /// the start fit: the gain after a silence is that of three times the usual standard error.
@@ -44,16 +42,22 @@ impl<const N: usize> State for Gain<N> {
 }
 
 impl<const N: usize> Gain<N> {
-    /// The adaptation with room for N parameters.
+    /// The adaptation with room for N parameters. With `growing` a start without a fit has a growing memory: gradients on the way from a
+    /// start that no data speak for must not be remembered for ever; least squares has none.
     ///
     /// # Errors
     /// [`IdentError`] for options that contradict each other, or a start covariance that is not positive.
-    pub(crate) fn new(options: &TrackOptions, from: &StartState, sample_time: SampleTime) -> Result<Self, IdentError> {
+    pub(crate) fn new(
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+        growing: bool,
+    ) -> Result<Self, IdentError> {
         let p = from.values.len();
-        let lambda = options
-            .memories()?
-            .into_iter()
-            .map(|m| m.lambda(sample_time))
+        let lambda = setup
+            .memories
+            .iter()
+            .map(|(_, memory)| memory.lambda(sample_time))
             .collect::<Result<Vec<f64>, _>>()?;
         let shortest = lambda.iter().copied().fold(1.0, f64::min);
         // Where no fit says what the innovation variance is, P and drift are in the units of the parameters.
@@ -63,12 +67,12 @@ impl<const N: usize> Gain<N> {
         let square = |values: &[f64]| -> [[f64; N]; N] {
             std::array::from_fn(|i| std::array::from_fn(|j| if i < p && j < p { values[i * p + j] } else { 0.0 }))
         };
-        let forgetting = match &options.forgetting {
+        let forgetting = match &setup.forgetting {
             ForgettingRule::Exponential => Forgetting::Exponential {
                 lambda: padded(&lambda, 1.0),
             },
             ForgettingRule::RandomWalk(drift) => {
-                let names = options.parameter_names();
+                let names = setup.names();
                 if let Some(unknown) = drift.keys().find(|k| !names.contains(k)) {
                     return Err(IdentError::UnknownParameter {
                         name: unknown.clone(),
@@ -114,18 +118,15 @@ impl<const N: usize> Gain<N> {
             });
         };
         let bound = std::array::from_fn(|i| {
-            let room = match options.covariance {
+            let room = match setup.covariance {
                 // N samples of the start leave 1/N of the information of a sample, a memory 1 - lambda of it.
-                StartCovariance::OfFit if from.from_fit && i < p => {
-                    ROOM_TO_GROW * (from.residuals * (1.0 - lambda[i])).max(1.0)
-                }
+                None if from.from_fit && i < p => ROOM_TO_GROW * (from.residuals * (1.0 - lambda[i])).max(1.0),
                 _ => ROOM_WITHOUT_FIT,
             };
             room * matrix[i][i]
         });
         let covariance = Covariance::new(factors, forgetting, bound);
-        // Gradients on the way from a start that no data speak for must not be remembered for ever; least squares has none.
-        Ok(Self::Covariance(if from.from_fit || options.method == Method::Rls {
+        Ok(Self::Covariance(if from.from_fit || !growing {
             covariance
         } else {
             covariance.with_growing_memory(EARLY_FORGETTING, EARLY_SHARE)
@@ -175,19 +176,19 @@ impl<const N: usize> Adaptation<N> for Gain<N> {
 /// The error bars at the start, with room for N parameters and the errors of K filters.
 ///
 /// # Errors
-/// As [`TrackOptions::memories`].
+/// [`IdentError::BadOption`] for a memory that is too short.
 pub(crate) fn error_bars<const N: usize, const K: usize>(
-    options: &TrackOptions,
+    setup: &Setup,
     from: &StartState,
     sample_time: SampleTime,
 ) -> Result<ErrorBars<N, K>, IdentError> {
     let mut shortest = 1.0_f64;
-    for memory in options.memories()? {
+    for (_, memory) in &setup.memories {
         shortest = shortest.min(memory.lambda(sample_time)?);
     }
     let level = Level::new(from.variance, from.residuals, 1.0 - (1.0 - shortest) / LEVEL_MEMORIES);
     let p = from.values.len();
     let start: [[f64; N]; N] =
         std::array::from_fn(|i| std::array::from_fn(|j| if i < p && j < p { from.spread[i * p + j] } else { 0.0 }));
-    Ok(ErrorBars::new(&start, level, options.limit_in_use()))
+    Ok(ErrorBars::new(&start, level, setup.limit))
 }

@@ -6,7 +6,7 @@ use hoid_core::{
     delay::DelayLine,
     error_bars::ErrorBars,
     physical::{Physical, PhysicalModel},
-    predictor::{AnyShape, FixedShape, Shape},
+    predictor::{AnyShape, FixedShape, Regressor, Shape},
     rls::Rls,
     rpem::Rpem,
     state::State,
@@ -16,69 +16,24 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate},
 };
 
-use crate::{
-    gain::{self, Gain},
-    options::{Method, TrackOptions},
-    recursion::{Recursion, Sample, StepOutcome},
-    start::{self, StartState},
-    trace::polynomial_orders,
-};
 use hoid_ident::IdentError;
 
-/// Builds the recursion of the kernel that the options ask for: the smallest room that holds its parameters, and the orders in its
-/// type where they are those of the operator.
-///
-/// # Errors
-/// [`IdentError`] for options that contradict each other or a start that the recursion cannot take.
-pub(crate) fn build(
-    options: &TrackOptions,
-    from: &StartState,
-    sample_time: SampleTime,
-) -> Result<Box<dyn Recursion>, IdentError> {
-    let o = polynomial_orders(options);
-    let p = from.values.len();
-    let any = AnyShape {
-        na: o.na,
-        nb: o.nb,
-        nc: o.nc,
-        nd: o.nd,
-        nf: o.nf,
-    };
-    let of_operator = (o.na, o.nb, o.nc, o.nd, o.nf) == (0, 2, 0, 1, 2);
-    let plan = Plan {
-        options,
-        from,
-        sample_time,
-    };
-    match options.method {
-        Method::Rls => match p {
-            4 if o.na == 2 => plan.linear::<_, 4>(FixedShape::<2, 2, 0, 0, 0>),
-            0..=8 => plan.linear::<_, 8>(any),
-            9..=16 => plan.linear::<_, 16>(any),
-            17..=64 => plan.linear::<_, 64>(any),
-            _ => Err(too_many(p)),
-        },
-        Method::Physical => match (p, plan.taps()) {
-            (5, None) if of_operator => plan.physical::<_, 5, 2, 5>(FixedShape::<0, 2, 0, 1, 2>),
-            (0..=8, None) => plan.physical::<_, 8, 8, 8>(any),
-            (0..=16, None) => plan.physical::<_, 16, 16, 16>(any),
-            (0..=8, Some(0..=128)) => plan.physical::<_, 8, 8, 128>(any),
-            (0..=16, Some(0..=1024)) => plan.physical::<_, 16, 16, 1024>(any),
-            (0..=16, Some(taps)) => Err(IdentError::BadOption {
-                option: "the range of the delay".to_owned(),
-                found: format!("{taps} samples"),
-                expected: "at most 1024 samples; narrow it, or sample more slowly".to_owned(),
-            }),
-            _ => Err(too_many(p)),
-        },
-        _ => match p {
-            5 if of_operator => plan.polynomials::<_, 5, 2>(FixedShape::<0, 2, 0, 1, 2>),
-            0..=8 => plan.polynomials::<_, 8, 8>(any),
-            9..=16 => plan.polynomials::<_, 16, 16>(any),
-            17..=64 => plan.polynomials::<_, 64, 64>(any),
-            _ => Err(too_many(p)),
-        },
-    }
+use crate::{
+    gain::{self, Gain},
+    recursion::{Recursion, Sample, StepOutcome},
+    setup::Setup,
+    start::{self, StartState},
+};
+
+/// The recursions of the kernel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kernel {
+    /// Least squares.
+    LeastSquares,
+    /// Prediction-error method.
+    PredictionError(Regressor),
+    /// Prediction-error method in the operator's parameters.
+    Physical,
 }
 
 fn too_many(parameters: usize) -> IdentError {
@@ -90,23 +45,79 @@ fn too_many(parameters: usize) -> IdentError {
 }
 
 /// What a recursion is made of.
-struct Plan<'a> {
-    options: &'a TrackOptions,
+pub(crate) struct Plan<'a> {
+    setup: &'a Setup,
     from: &'a StartState,
     sample_time: SampleTime,
 }
 
-impl Plan<'_> {
+impl<'a> Plan<'a> {
+    /// From setup and start.
+    pub fn new(setup: &'a Setup, from: &'a StartState, sample_time: SampleTime) -> Self {
+        Self {
+            setup,
+            from,
+            sample_time,
+        }
+    }
+
+    /// Builds a recursion of the kernel: the smallest room that holds its parameters, and the orders in its type where they are those of the
+    /// operator.
+    ///
+    /// # Errors
+    /// [`IdentError`] for options that contradict each other or a start that the recursion cannot take.
+    pub fn build(&self, kernel: Kernel) -> Result<Box<dyn Recursion>, IdentError> {
+        let o = self.setup.polynomial_orders();
+        let p = self.from.values.len();
+        let any = AnyShape {
+            na: o.na,
+            nb: o.nb,
+            nc: o.nc,
+            nd: o.nd,
+            nf: o.nf,
+        };
+        let of_operator = (o.na, o.nb, o.nc, o.nd, o.nf) == (0, 2, 0, 1, 2);
+        match kernel {
+            Kernel::LeastSquares => match p {
+                4 if o.na == 2 => self.linear::<_, 4>(FixedShape::<2, 2, 0, 0, 0>),
+                0..=8 => self.linear::<_, 8>(any),
+                9..=16 => self.linear::<_, 16>(any),
+                17..=64 => self.linear::<_, 64>(any),
+                _ => Err(too_many(p)),
+            },
+            Kernel::Physical => match (p, self.taps()) {
+                (5, None) if of_operator => self.physical::<_, 5, 2, 5>(FixedShape::<0, 2, 0, 1, 2>),
+                (0..=8, None) => self.physical::<_, 8, 8, 8>(any),
+                (0..=16, None) => self.physical::<_, 16, 16, 16>(any),
+                (0..=8, Some(0..=128)) => self.physical::<_, 8, 8, 128>(any),
+                (0..=16, Some(0..=1024)) => self.physical::<_, 16, 16, 1024>(any),
+                (0..=16, Some(taps)) => Err(IdentError::BadOption {
+                    option: "the range of the delay".to_owned(),
+                    found: format!("{taps} samples"),
+                    expected: "at most 1024 samples; narrow it, or sample more slowly".to_owned(),
+                }),
+                _ => Err(too_many(p)),
+            },
+            Kernel::PredictionError(regressor) => match p {
+                5 if of_operator => self.polynomials::<_, 5, 2>(FixedShape::<0, 2, 0, 1, 2>, regressor),
+                0..=8 => self.polynomials::<_, 8, 8>(any, regressor),
+                9..=16 => self.polynomials::<_, 16, 16>(any, regressor),
+                17..=64 => self.polynomials::<_, 64, 64>(any, regressor),
+                _ => Err(too_many(p)),
+            },
+        }
+    }
+
     fn values<const N: usize>(&self) -> [f64; N] {
         std::array::from_fn(|i| self.from.values.get(i).copied().unwrap_or(0.0))
     }
 
-    fn gain<const N: usize>(&self) -> Result<Gain<N>, IdentError> {
-        Gain::new(self.options, self.from, self.sample_time)
+    fn gain<const N: usize>(&self, growing: bool) -> Result<Gain<N>, IdentError> {
+        Gain::new(self.setup, self.from, self.sample_time, growing)
     }
 
     fn bars<const N: usize, const K: usize>(&self) -> Result<ErrorBars<N, K>, IdentError> {
-        gain::error_bars(self.options, self.from, self.sample_time)
+        gain::error_bars(self.setup, self.from, self.sample_time)
     }
 
     fn parameters(&self) -> usize {
@@ -117,12 +128,12 @@ impl Plan<'_> {
     fn tracked_from(&self) -> Option<usize> {
         // Up to rounding: 0.29/0.01 is 28.999999999999996.
         let whole = |low: f64| (low / self.sample_time.s() + 1e-9) as usize + 1;
-        self.options.track_delay_s.map(|(low, _)| whole(low))
+        self.setup.track_delay_s.map(|(low, _)| whole(low))
     }
 
     /// Samples of the input to be kept, where tau_e is tracked.
     fn taps(&self) -> Option<usize> {
-        let (_, longest) = self.options.track_delay_s?;
+        let (_, longest) = self.setup.track_delay_s?;
         let all = (longest / self.sample_time.s()) as usize + 5;
         Some(all.saturating_sub(self.tracked_from().unwrap_or(0)))
     }
@@ -131,16 +142,16 @@ impl Plan<'_> {
         &self,
         shape: S,
     ) -> Result<Box<dyn Recursion>, IdentError> {
-        let rls = Rls::new(shape, self.values(), self.gain::<N>()?, self.bars::<N, 0>()?).ok_or_else(|| {
+        let rls = Rls::new(shape, self.values(), self.gain::<N>(false)?, self.bars::<N, 0>()?).ok_or_else(|| {
             IdentError::BadOption {
                 option: "the orders".to_owned(),
-                found: self.options.orders.to_string(),
+                found: self.setup.orders.to_string(),
                 expected: "at least one parameter in A or B".to_owned(),
             }
         })?;
         Ok(Box::new(Linear {
             rls,
-            delay: delay(self.options.orders.nk),
+            delay: delay(self.setup.orders.nk),
             parameters: self.parameters(),
         }))
     }
@@ -148,14 +159,14 @@ impl Plan<'_> {
     fn polynomials<S: Shape + Send + Sync + 'static, const N: usize, const K: usize>(
         &self,
         shape: S,
+        regressor: Regressor,
     ) -> Result<Box<dyn Recursion>, IdentError> {
-        let TrackOptions { regressor, stable, .. } = *self.options;
         let rpem = Rpem::new(
             shape,
             regressor,
-            stable,
+            self.setup.stable,
             self.values(),
-            self.gain::<N>()?,
+            self.gain::<N>(true)?,
             self.bars::<N, K>()?,
         )
         .ok_or_else(|| IdentError::BadStart {
@@ -163,7 +174,7 @@ impl Plan<'_> {
         })?;
         Ok(Box::new(Polynomials {
             rpem,
-            delay: delay(self.options.orders.nk),
+            delay: delay(self.setup.orders.nk),
             parameters: self.parameters(),
         }))
     }
@@ -172,26 +183,27 @@ impl Plan<'_> {
         &self,
         shape: S,
     ) -> Result<Box<dyn Recursion>, IdentError> {
-        let (options, ts) = (self.options, self.sample_time.s());
+        let (setup, ts) = (self.setup, self.sample_time.s());
         let tracked_from = self.tracked_from();
         let model = PhysicalModel {
             shape,
             tracked_from,
             sample_time: ts,
-            bounds: start::physical_bounds::<N>(options, self.sample_time)?,
-            stable: options.stable,
+            bounds: start::physical_bounds::<N>(setup, self.sample_time)?,
+            stable: setup.stable,
         };
-        let recursion = Physical::<S, N, K, L, _>::new(model, self.values(), self.gain::<N>()?, self.bars::<N, K>()?)
-            .ok_or_else(|| IdentError::BadStart {
-            reason: "it lies outside the bounds of the physical parameters, or its noise model is not stable"
-                .to_owned(),
-        })?;
+        let recursion =
+            Physical::<S, N, K, L, _>::new(model, self.values(), self.gain::<N>(true)?, self.bars::<N, K>()?)
+                .ok_or_else(|| IdentError::BadStart {
+                    reason: "it lies outside the bounds of the physical parameters, or its noise model is not stable"
+                        .to_owned(),
+                })?;
         Ok(Box::new(InPhysical {
             recursion,
-            delay: delay(tracked_from.unwrap_or(options.orders.nk)),
+            delay: delay(tracked_from.unwrap_or(setup.orders.nk)),
             parameters: self.parameters(),
             tracked: tracked_from.is_some(),
-            fixed_tau_s: (options.orders.nk as f64 - 1.0) * ts,
+            fixed_tau_s: (setup.orders.nk as f64 - 1.0) * ts,
         }))
     }
 }

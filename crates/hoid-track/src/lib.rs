@@ -27,9 +27,13 @@
 
 mod change;
 mod columns;
+mod forgetting;
 mod gain;
+mod in_words;
 mod kernel;
 mod live;
+mod memory;
+mod method;
 mod methods;
 mod options;
 mod over_record;
@@ -39,6 +43,8 @@ mod predictor;
 mod recursion;
 mod reported;
 mod saved;
+mod setup;
+mod shared_options;
 mod smoother;
 mod start;
 mod trace;
@@ -46,11 +52,19 @@ mod tracker;
 
 pub use change::{Change, ErrorThreshold};
 pub use columns::{Columns, value_of};
+pub use forgetting::ForgettingRule;
 pub use live::{Choose, Live, LiveOutcome, WarmUp};
-pub use options::{ForgettingRule, Memory, Method, StartAt, StartCovariance, TrackOptions};
+pub use memory::{CommonMemory, Memory, MemoryOptions};
+pub use methods::{
+    AdaptiveOptions, EkfOptions, FusedOptions, Method, PhysicalOptions, RlsOptions, RpemOptions, RrivOptions,
+    UkfOptions, WindowOptions,
+};
+pub use options::TrackOptions;
 pub use over_record::{track, track_from};
 pub use plan::{TrackPlan, narrowed};
 pub use recursion::Sample;
+pub use setup::StartAt;
+pub use shared_options::{BoundOptions, DelayOptions, GainOptions, StabilityOptions};
 pub use trace::{OPERATOR_COLUMNS, Trace};
 pub use tracker::{Counts, Outcome, Tracker};
 

@@ -1,13 +1,13 @@
 //! A recursive estimate over a record.
 
-use hoid_ident::{Fit, IdentError, iv::FORCING_CHANNEL};
+use hoid_ident::{Fit, IdentError};
 use hoid_model::Record;
 
 use crate::{
-    options::{Method, StartCovariance, TrackOptions},
+    options::TrackOptions,
     recursion::Sample,
     smoother,
-    trace::{self, Trace, pack, packed_len, polynomial_orders},
+    trace::{self, Trace, pack, packed_len},
     tracker::{Counts, Tracker},
 };
 
@@ -44,15 +44,13 @@ pub fn track_from(
         None => (None, f64::NEG_INFINITY),
     };
     let mut options = options.clone();
-    if options.method == Method::Refined && options.instruments.is_none() && record.channel(FORCING_CHANNEL).is_some() {
-        options.instruments = Some(FORCING_CHANNEL.to_owned());
-    }
+    options.method.inner_mut().prepare(record);
     let options = &options;
-    let reference = match &options.instruments {
+    let reference = match options.method.inner().reference_channel() {
         None => None,
         Some(name) => Some(record.channel(name).ok_or_else(|| {
             IdentError::NoChannel {
-                channel: name.clone(),
+                channel: name.to_owned(),
                 label: record.label().to_owned(),
                 available: record
                     .channels()
@@ -63,12 +61,12 @@ pub fn track_from(
         })?),
     };
     let mut tracker = Tracker::from_fit(options, span.as_ref(), start, sample_time)?;
-    let known = span.is_some() && options.covariance == StartCovariance::OfFit;
+    let known = span.is_some() && options.method.covariance().is_none();
     let from_s = options
         .update_from_s
         .unwrap_or(if known { end_s } else { f64::NEG_INFINITY })
         .max(record.time_s(0));
-    let p = polynomial_orders(options).parameters();
+    let p = options.polynomial_orders().parameters();
     let rows = record.len().div_ceil(every);
     let mut trace = Trace {
         options: options.clone(),
@@ -121,7 +119,7 @@ pub fn track_from(
     }
     trace.counts = tracker.counts;
     trace.failures = tracker.failures();
-    if options.smooth {
+    if options.method.inner().smooths() {
         smoother::smooth(record, &mut trace, &tracker.start)?;
     }
     Ok(trace)

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use hoid_model::{Orders, Record, SampleTime};
 
-use crate::{ForgettingRule, Memory, StartAt, TrackOptions};
+use crate::{forgetting::ForgettingRule, methods::Method, options::TrackOptions, setup::StartAt};
 use hoid_ident::{
-    Choice, Estimator, IdentError, OrderRanges,
+    Choice, IdentError, OrderRanges,
     order_selection::{Criterion, choose_orders_with},
 };
 
@@ -76,10 +76,7 @@ impl TrackPlan {
         if self.is_settled() {
             return Ok((self.options.clone(), None));
         }
-        let template = Estimator {
-            search: self.options.search,
-            ..Estimator::new(self.options.structure, self.options.orders)
-        };
+        let template = self.options.start_estimator();
         let records = std::slice::from_ref(span);
         let choice = choose_orders_with(&template, &self.ranges, self.criterion, records, each)?;
         Ok((self.with_orders(choice.fit.orders()), Some(choice)))
@@ -92,11 +89,7 @@ impl TrackPlan {
             ..self.options.clone()
         };
         let names = options.parameter_names();
-        options.memory_of.retain(|key, _| is_known(&names, key));
-        options.bounds.retain(|key, _| is_known(&names, key));
-        if let ForgettingRule::RandomWalk(drift) = &mut options.forgetting {
-            drift.retain(|key, _| is_known(&names, key));
-        }
+        options.method.inner_mut().retain(&|key| is_known(&names, key));
         options
     }
 }
@@ -137,13 +130,16 @@ fn check(options: &TrackOptions, sample_time: SampleTime) -> Result<(), IdentErr
     for memory in options.memories()? {
         memory.lambda(sample_time)?;
     }
-    options.window.lambda(sample_time)?;
+    if let Method::Window(own) = &options.method {
+        own.window.lambda(sample_time)?;
+    }
     let names = options.parameter_names();
-    let drift = match &options.forgetting {
+    let setup = options.setup()?;
+    let drift = match &setup.forgetting {
         ForgettingRule::RandomWalk(drift) => Some(drift),
         _ => None,
     };
-    let named = drift.into_iter().flat_map(BTreeMap::keys).chain(options.bounds.keys());
+    let named = drift.into_iter().flat_map(BTreeMap::keys).chain(setup.bounds.keys());
     for name in named {
         if !names.contains(name) {
             return Err(IdentError::UnknownParameter {
@@ -151,13 +147,6 @@ fn check(options: &TrackOptions, sample_time: SampleTime) -> Result<(), IdentErr
                 available: names.join(", "),
             });
         }
-    }
-    if options.window == Memory::Infinite {
-        return Err(IdentError::BadOption {
-            option: "the window".to_owned(),
-            found: "inf".to_owned(),
-            expected: "samples or seconds".to_owned(),
-        });
     }
     Ok(())
 }
@@ -205,7 +194,7 @@ mod tests {
         let options = TrackOptions {
             start: StartAt::Theta(vec![0.0; 5]),
             ..TrackOptions::new(
-                Method::Rpem,
+                Method::rpem(),
                 Structure::BoxJenkins,
                 Structure::BoxJenkins.operator_orders(29),
             )

@@ -6,7 +6,7 @@
 use hoid_core::state::{State, visit_all};
 use hoid_model::SampleTime;
 
-use crate::{Counts, Tracker, methods, options::TrackOptions, start::StartState};
+use crate::{Counts, Tracker, options::TrackOptions, start::StartState};
 use hoid_ident::IdentError;
 
 impl State for Tracker {
@@ -77,7 +77,7 @@ impl Tracker {
         };
         start.visit(&mut restore);
         let mut tracker = Self {
-            recursion: methods::build(options, &start, sample_time)?,
+            recursion: options.method.inner().build(&options.setup()?, &start, sample_time)?,
             options: options.clone(),
             sample_time,
             last_e: 0.0,
@@ -95,8 +95,6 @@ impl Tracker {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::collections::BTreeMap;
-
     use hoid_model::{
         Record, Structure,
         scenario::{Condition, Scenario},
@@ -104,7 +102,7 @@ mod tests {
     use hoid_sim::{Simulator, Stream};
 
     use super::*;
-    use crate::{ForgettingRule, Method, Sample};
+    use crate::{Method, Sample};
 
     fn record() -> Record {
         let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
@@ -127,44 +125,33 @@ mod tests {
         let bj = Structure::BoxJenkins;
         let orders = bj.operator_orders(29);
         let of = |method| TrackOptions::new(method, bj, orders);
-        let drift: BTreeMap<String, f64> = [("b0".to_owned(), 0.01)].into();
         let mut cases = vec![
-            TrackOptions::new(Method::Rls, Structure::Arx, Structure::Arx.operator_orders(29)),
-            of(Method::Physical),
-            of(Method::Adaptive),
-            of(Method::Fused),
-            of(Method::Ekf),
-            of(Method::Ukf),
-            of(Method::Window),
-            of(Method::Refined),
-            TrackOptions {
-                track_delay_s: Some((0.2, 0.35)),
-                ..of(Method::Physical)
-            },
-            TrackOptions {
-                track_delay_s: Some((0.2, 0.35)),
-                ..of(Method::Adaptive)
-            },
+            TrackOptions::new(Method::rls(), Structure::Arx, Structure::Arx.operator_orders(29)),
+            of(Method::physical()),
+            of(Method::adaptive()),
+            of(Method::fused()),
+            of(Method::ekf()),
+            of(Method::ukf()),
+            of(Method::window()).with(&[("refit", "400")]).unwrap(),
+            of(Method::rriv()).with(&[("instruments", "f_t")]).unwrap(),
+            of(Method::physical()).with(&[("track_delay", "0.2..0.35")]).unwrap(),
+            of(Method::adaptive()).with(&[("track_delay", "0.2..0.35")]).unwrap(),
         ];
         for forgetting in [
-            ForgettingRule::Exponential,
-            ForgettingRule::RandomWalk(drift),
-            ForgettingRule::Window,
-            ForgettingRule::Variable,
-            ForgettingRule::Directional,
-            ForgettingRule::Gradient(0.1),
+            "exponential",
+            "random-walk",
+            "window",
+            "variable",
+            "directional",
+            "gradient",
         ] {
-            cases.push(TrackOptions {
-                forgetting,
-                ..of(Method::Rpem)
-            });
+            let mut rule = vec![("forgetting", forgetting)];
+            rule.extend((forgetting == "random-walk").then_some(("drift", "b0=0.01")));
+            cases.push(of(Method::rpem()).with(&rule).unwrap());
         }
-        for mut options in cases {
-            options.every = 400;
-            let reference = record.channel("f_t").filter(|_| options.method == Method::Refined);
-            if reference.is_some() {
-                options.instruments = Some("f_t".to_owned());
-            }
+        for options in cases {
+            let rriv = matches!(options.method, Method::Rriv(_));
+            let reference = record.channel("f_t").filter(|_| rriv);
             let sample = |k: usize| Sample {
                 e: record.input()[k],
                 u: record.output()[k],
@@ -176,7 +163,7 @@ mod tests {
             });
             let numbers = first.saved();
             let mut second = Tracker::restored(&options, record.sample_time(), &numbers).unwrap();
-            let name = format!("{} {:?}", options.method.name(), options.forgetting);
+            let name = format!("{:?}", options.method);
             for k in 3000..5000 {
                 assert_eq!(
                     first.take(sample(k), true),

@@ -30,9 +30,9 @@ use hoid_model::Record;
 
 use crate::{
     Trace,
-    methods::{first_hypothesis, outside, suppositions},
-    options::TrackOptions,
+    methods::{AdaptiveOptions, Method, change_prior, first_hypothesis, outside},
     reported::Reported,
+    setup::Setup,
     start::StartState,
     trace::{pack, packed_len},
 };
@@ -94,12 +94,15 @@ type Seen = Option<(f64, Signals)>;
 /// # Errors
 /// [`IdentError::BadStart`] for a start that cannot be used.
 pub(crate) fn smooth(record: &Record, trace: &mut Trace, from: &StartState) -> Result<(), IdentError> {
-    let options = trace.options.clone();
+    let (options, setup) = (trace.options.clone(), trace.options.setup()?);
+    let Method::Adaptive(own) = &options.method else {
+        return Ok(());
+    };
     let rows = kept_rows(record.len(), trace.every);
     let about = trace.operator.last().map_or([from.values[2], from.values[3]], |o| {
         [o.omega_nm_rad_s.value, o.zeta_nm.value]
     });
-    let joined = two_sided(record, &options, from, about, &rows)?;
+    let joined = two_sided(record, own, &setup, options.largest, from, about, &rows)?;
     let mut reported = Reported::new(from, options.orders.nk, record.sample_time());
     let p = reported.theta().len();
     let mut covariance = vec![0.0; p * p];
@@ -130,14 +133,16 @@ fn kept_rows(samples: usize, every: usize) -> Vec<usize> {
 /// The mixtures of pairs at the samples asked for, ascending.
 fn two_sided(
     record: &Record,
-    options: &TrackOptions,
+    options: &AdaptiveOptions,
+    setup: &Setup,
+    largest: f64,
     from: &StartState,
     about: [f64; 2],
     rows: &[usize],
 ) -> Result<Vec<Joined>, IdentError> {
     let sample_time = record.sample_time();
     let spacing = (SPACING_S / sample_time.s()).round().max(1.0);
-    let usual = suppositions(options, sample_time)?;
+    let usual = change_prior(options, setup, sample_time)?;
     let supposed = Suppositions {
         spacing: spacing as u32,
         hazard: usual.hazard.min(0.5 / spacing),
@@ -149,7 +154,7 @@ fn two_sided(
         Ok(Box::new(Bank::new(first, supposed).ok_or_else(outside)?))
     };
     let d = &from.values[OPERATOR..];
-    let seen = whitened(record, options, d, about);
+    let seen = whitened(record, setup.orders.nk, largest, d, about);
     let mut front = bank(first)?;
     let mut before: Vec<Vec<Side>> = Vec::with_capacity(rows.len());
     for (k, seen) in seen.iter().enumerate() {
@@ -175,12 +180,12 @@ fn two_sided(
 }
 
 /// Output and signals of every sample behind D, for filters about a point that began at rest.
-fn whitened(record: &Record, options: &TrackOptions, d: &[f64], about: [f64; 2]) -> Vec<Seen> {
+fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]) -> Vec<Seen> {
     let (e, u) = (record.input(), record.output());
-    let sound = |v: f64| v.abs() <= options.largest;
+    let sound = |v: f64| v.abs() <= largest;
     let mut response = Response::new(about, record.sample_time().s());
     let settled = SETTLED / (about[0] * about[1] * record.sample_time().s());
-    let begin = options.orders.nk + d.len() + settled.min(record.len() as f64 / 4.0) as usize;
+    let begin = nk + d.len() + settled.min(record.len() as f64 / 4.0) as usize;
     let mut signals: Vec<Signals> = Vec::with_capacity(e.len());
     let (mut last, mut held) = (0.0, vec![0.0; e.len()]);
     for (held, e) in held.iter_mut().zip(e) {
@@ -191,7 +196,7 @@ fn whitened(record: &Record, options: &TrackOptions, d: &[f64], about: [f64; 2])
     }
     (0..u.len())
         .map(|t| {
-            let x = t.checked_sub(options.orders.nk).map_or(0.0, |s| held[s]);
+            let x = t.checked_sub(nk).map_or(0.0, |s| held[s]);
             signals.push(response.step(x));
             let known = t >= begin && sound(e[t]) && (0..=d.len()).all(|j| sound(u[t - j]));
             if !known {

@@ -9,8 +9,9 @@ use std::collections::BTreeMap;
 use hoid_core::{recursion::Stable, stability::roots_inside};
 use hoid_model::{Record, SampleTime, operator::retrieval_jacobian};
 
-use crate::options::{PHYSICAL_NAMES, StartAt, StartCovariance, TrackOptions};
 use hoid_ident::{Constraint, Fit, GreyBox, IdentError};
+
+use crate::setup::{PHYSICAL_NAMES, Setup, StartAt};
 
 /// Variance of P for a start from nothing, in units of the innovation variance.
 const UNKNOWN: f64 = 1e6;
@@ -50,44 +51,44 @@ impl StartState {
     /// # Errors
     /// Those of the batch fit; [`IdentError::BadStart`].
     pub fn new(
-        options: &TrackOptions,
+        setup: &Setup,
         span: Option<&Record>,
         known: Option<&Fit>,
         sample_time: SampleTime,
     ) -> Result<Self, IdentError> {
-        match (&options.start, span) {
-            (StartAt::Theta(theta), _) => Self::given(options, theta, sample_time),
-            (StartAt::Span(_), Some(record)) => Self::fitted(options, record, known),
-            _ => Self::nothing(options, sample_time),
+        match (&setup.start, span) {
+            (StartAt::Theta(theta), _) => Self::given(setup, theta, sample_time),
+            (StartAt::Span(_), Some(record)) => Self::fitted(setup, record, known),
+            _ => Self::nothing(setup, sample_time),
         }
     }
 
     /// From a theta.
-    fn given(options: &TrackOptions, theta: &[f64], sample_time: SampleTime) -> Result<Self, IdentError> {
-        let names = options.orders.parameter_names();
+    fn given(setup: &Setup, theta: &[f64], sample_time: SampleTime) -> Result<Self, IdentError> {
+        let names = setup.orders.parameter_names();
         if theta.len() != names.len() || theta.iter().any(|t| !t.is_finite()) {
             return Err(IdentError::BadStart {
                 reason: format!("found {theta:?}; expected finite values of {}", names.join(", ")),
             });
         }
-        let values = if options.method.is_physical() {
-            physical_values(options, theta, sample_time)?
+        let values = if setup.is_physical {
+            physical_values(setup, theta, sample_time)?
         } else {
             theta.to_vec()
         };
-        Ok(Self::without_fit(options, values))
+        Ok(Self::without_fit(setup, values))
     }
 
-    fn nothing(options: &TrackOptions, sample_time: SampleTime) -> Result<Self, IdentError> {
-        let o = &options.orders;
-        let mut values = vec![0.0; options.parameter_names().len()];
-        if options.method.is_physical() {
-            let first = if options.delay_parameter_s().is_some() { 5 } else { 4 };
+    fn nothing(setup: &Setup, sample_time: SampleTime) -> Result<Self, IdentError> {
+        let o = &setup.orders;
+        let mut values = vec![0.0; setup.names().len()];
+        if setup.is_physical {
+            let first = if setup.delay_parameter_s.is_some() { 5 } else { 4 };
             values[..first].copy_from_slice(&TYPICAL_OPERATOR[..first]);
-            if let Some((low, high)) = options.delay_parameter_s() {
+            if let Some((low, high)) = setup.delay_parameter_s {
                 values[4] = TYPICAL_OPERATOR[4].clamp(low.min(high), high.max(low));
             }
-            let limits = bounds(options, sample_time)?;
+            let limits = bounds(setup, sample_time)?;
             for (value, [low, high]) in values.iter_mut().zip(limits) {
                 *value = value.clamp(low, high);
             }
@@ -95,14 +96,11 @@ impl StartState {
                 values[first + o.nc] = TYPICAL_NOISE_POLE;
             }
         }
-        Ok(Self::without_fit(options, values))
+        Ok(Self::without_fit(setup, values))
     }
 
-    fn without_fit(options: &TrackOptions, values: Vec<f64>) -> Self {
-        let size = match options.covariance {
-            StartCovariance::Multiple(size) => size,
-            StartCovariance::OfFit => UNKNOWN,
-        };
+    fn without_fit(setup: &Setup, values: Vec<f64>) -> Self {
+        let size = setup.covariance.unwrap_or(UNKNOWN);
         let covariance = multiple(size, values.len());
         Self {
             spread: covariance.clone(),
@@ -116,23 +114,23 @@ impl StartState {
     }
 
     /// From the batch fit of a record.
-    fn fitted(options: &TrackOptions, record: &Record, known: Option<&Fit>) -> Result<Self, IdentError> {
-        let (values, covariance, fit) = if options.method.is_physical() {
-            fit_physical(options, record, known)?
+    fn fitted(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Self, IdentError> {
+        let (values, covariance, fit) = if setup.is_physical {
+            fit_physical(setup, record, known)?
         } else {
-            let fit = polynomial_fit(options, record, known)?;
+            let fit = polynomial_fit(setup, record, known)?;
             (fit.model().theta().to_vec(), fit.covariance().map(<[f64]>::to_vec), fit)
         };
-        let values = stabilised(options, values);
+        let values = stabilised(setup, values);
         let variance = fit.innovation_variance();
         let p = values.len();
         let spread = match &covariance {
             Some(c) if variance > 0.0 => c.iter().map(|c| c / variance).collect(),
             _ => multiple(UNKNOWN, p),
         };
-        let covariance = match options.covariance {
-            StartCovariance::OfFit => spread.clone(),
-            StartCovariance::Multiple(size) => multiple(size, p),
+        let covariance = match setup.covariance {
+            None => spread.clone(),
+            Some(size) => multiple(size, p),
         };
         Ok(Self {
             values,
@@ -151,10 +149,10 @@ impl StartState {
 /// # Errors
 /// As [`bounds`].
 pub(crate) fn physical_bounds<const N: usize>(
-    options: &TrackOptions,
+    setup: &Setup,
     sample_time: SampleTime,
 ) -> Result<[[f64; 2]; N], IdentError> {
-    let limits = bounds(options, sample_time)?;
+    let limits = bounds(setup, sample_time)?;
     let free = [f64::NEG_INFINITY, f64::INFINITY];
     Ok(std::array::from_fn(|i| limits.get(i).copied().unwrap_or(free)))
 }
@@ -163,9 +161,9 @@ pub(crate) fn physical_bounds<const N: usize>(
 ///
 /// # Errors
 /// [`IdentError::UnknownParameter`], [`IdentError::BadOption`].
-pub(crate) fn bounds(options: &TrackOptions, sample_time: SampleTime) -> Result<Vec<[f64; 2]>, IdentError> {
-    let names = options.parameter_names();
-    if let Some(unknown) = options.bounds.keys().find(|k| !names.contains(k)) {
+pub(crate) fn bounds(setup: &Setup, sample_time: SampleTime) -> Result<Vec<[f64; 2]>, IdentError> {
+    let names = setup.names();
+    if let Some(unknown) = setup.bounds.keys().find(|k| !names.contains(k)) {
         return Err(IdentError::UnknownParameter {
             name: unknown.clone(),
             available: names.join(", "),
@@ -174,16 +172,14 @@ pub(crate) fn bounds(options: &TrackOptions, sample_time: SampleTime) -> Result<
     let usual = |name: &str| match name {
         "omega_nm" => [SLOWEST_OMEGA, FASTEST_SHARE * sample_time.nyquist_rad_s()],
         "zeta_nm" => DAMPING,
-        "tau_e" => options
-            .delay_parameter_s()
-            .map_or([0.0, 0.0], |(low, high)| [low, high]),
+        "tau_e" => setup.delay_parameter_s.map_or([0.0, 0.0], |(low, high)| [low, high]),
         _ => [f64::NEG_INFINITY, f64::INFINITY],
     };
     names
         .iter()
         .map(|name| {
             let [low, high] = usual(name);
-            let Some(constraint) = options.bounds.get(name) else {
+            let Some(constraint) = setup.bounds.get(name) else {
                 return Ok([low, high]);
             };
             let (a, b) = constraint.limits();
@@ -208,14 +204,14 @@ fn multiple(size: f64, p: usize) -> Vec<f64> {
 }
 
 /// Values with a noise model that is as stable as the options ask.
-fn stabilised(options: &TrackOptions, mut values: Vec<f64>) -> Vec<f64> {
-    let o = &options.orders;
-    if options.stable == Stable::Predictor || o.nd == 0 {
+fn stabilised(setup: &Setup, mut values: Vec<f64>) -> Vec<f64> {
+    let o = &setup.orders;
+    if setup.stable == Stable::Predictor || o.nd == 0 {
         return values;
     }
-    let first = match options.method {
-        m if m.is_physical() => values.len() - o.nd,
-        _ => o.na + o.nb + o.nc,
+    let first = match setup.is_physical {
+        true => values.len() - o.nd,
+        false => o.na + o.nb + o.nc,
     };
     let d = &mut values[first..first + o.nd];
     while d.iter().all(|v| v.is_finite()) && !roots_inside(d, 1.0) {
@@ -229,8 +225,8 @@ fn stabilised(options: &TrackOptions, mut values: Vec<f64>) -> Vec<f64> {
 }
 
 /// eta of a theta `[b0, b1, c.., d.., f1, f2]`.
-fn physical_values(options: &TrackOptions, theta: &[f64], sample_time: SampleTime) -> Result<Vec<f64>, IdentError> {
-    let model = hoid_model::PolynomialModel::new(options.structure, options.orders, sample_time, theta.to_vec())?;
+fn physical_values(setup: &Setup, theta: &[f64], sample_time: SampleTime) -> Result<Vec<f64>, IdentError> {
+    let model = hoid_model::PolynomialModel::new(setup.structure, setup.orders, sample_time, theta.to_vec())?;
     let operator = model
         .discrete_operator()
         .and_then(|o| o.parameters())
@@ -243,7 +239,7 @@ fn physical_values(options: &TrackOptions, theta: &[f64], sample_time: SampleTim
         operator.omega_nm_rad_s,
         operator.zeta_nm,
     ];
-    if options.delay_parameter_s().is_some() {
+    if setup.delay_parameter_s.is_some() {
         eta.push(operator.tau_e_s);
     }
     eta.extend_from_slice(model.c());
@@ -254,36 +250,32 @@ fn physical_values(options: &TrackOptions, theta: &[f64], sample_time: SampleTim
 type PhysicalStart = (Vec<f64>, Option<Vec<f64>>, Fit);
 
 /// The fit of the start span, made where it is not known.
-fn polynomial_fit(options: &TrackOptions, record: &Record, known: Option<&Fit>) -> Result<Fit, IdentError> {
+fn polynomial_fit(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Fit, IdentError> {
     match known {
         Some(fit) => Ok(fit.clone()),
-        None => options.start_estimator().fit(std::slice::from_ref(record)),
+        None => setup.start_estimator().fit(std::slice::from_ref(record)),
     }
 }
 
 /// The Box-Jenkins fit where it has physical parameters within the bounds, else the grey box, which always has.
-fn fit_physical(options: &TrackOptions, record: &Record, known: Option<&Fit>) -> Result<PhysicalStart, IdentError> {
-    if options.delay_parameter_s().is_none()
-        && let Some(start) = from_box_jenkins(options, record, known)?
+fn fit_physical(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<PhysicalStart, IdentError> {
+    if setup.delay_parameter_s.is_none()
+        && let Some(start) = from_box_jenkins(setup, record, known)?
     {
         return Ok(start);
     }
-    from_grey_box(options, record)
+    from_grey_box(setup, record)
 }
 
-fn from_box_jenkins(
-    options: &TrackOptions,
-    record: &Record,
-    known: Option<&Fit>,
-) -> Result<Option<PhysicalStart>, IdentError> {
+fn from_box_jenkins(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Option<PhysicalStart>, IdentError> {
     let sample_time = record.sample_time();
-    let Ok(fit) = polynomial_fit(options, record, known) else {
+    let Ok(fit) = polynomial_fit(setup, record, known) else {
         return Ok(None);
     };
-    let Ok(eta) = physical_values(options, fit.model().theta(), sample_time) else {
+    let Ok(eta) = physical_values(setup, fit.model().theta(), sample_time) else {
         return Ok(None);
     };
-    let limits = bounds(options, sample_time)?;
+    let limits = bounds(setup, sample_time)?;
     let inside = eta.iter().zip(&limits).all(|(e, [low, high])| low < e && e < high);
     let operator = fit.model().discrete_operator().and_then(|o| o.parameters());
     let inverse = operator.ok().and_then(|o| retrieval_jacobian(&o, sample_time));
@@ -301,7 +293,7 @@ fn from_box_jenkins(
                 vec![(2 + i - 4, 1.0)]
             }
         };
-        debug_assert_eq!(noise, options.orders.nc + options.orders.nd);
+        debug_assert_eq!(noise, setup.orders.nc + setup.orders.nd);
         congruence(&(0..p).map(row).collect::<Vec<_>>(), c, p)
     });
     Ok(Some((eta, covariance, fit)))
@@ -318,11 +310,11 @@ fn congruence(rows: &[Vec<(usize, f64)>], c: &[f64], width: usize) -> Vec<f64> {
         .collect()
 }
 
-fn from_grey_box(options: &TrackOptions, record: &Record) -> Result<PhysicalStart, IdentError> {
+fn from_grey_box(setup: &Setup, record: &Record) -> Result<PhysicalStart, IdentError> {
     let ts = record.sample_time().s();
-    let o = &options.orders;
-    let names = options.parameter_names();
-    let limits = bounds(options, record.sample_time())?;
+    let o = &setup.orders;
+    let names = setup.names();
+    let limits = bounds(setup, record.sample_time())?;
     let mut constraints: BTreeMap<String, Constraint> = BTreeMap::new();
     for (name, [low, high]) in names.iter().zip(&limits).take(4) {
         if low.is_finite() || high.is_finite() {
@@ -331,10 +323,10 @@ fn from_grey_box(options: &TrackOptions, record: &Record) -> Result<PhysicalStar
     }
     let order = usize::from(o.nd > 0);
     let mut grey = GreyBox {
-        search: options.search,
+        search: setup.search,
         ..GreyBox::new(order..=order)
     };
-    match options.delay_parameter_s() {
+    match setup.delay_parameter_s {
         Some(range) => grey.delay_range_s = range,
         None => {
             let tau = (o.nk as f64 - 1.0) * ts;
@@ -346,7 +338,7 @@ fn from_grey_box(options: &TrackOptions, record: &Record) -> Result<PhysicalStar
     let found = grey.fit(std::slice::from_ref(record))?;
     let parameters = found.parameters();
     let value = |name: &str| parameters.iter().position(|(n, _)| n == name);
-    let operator = if options.delay_parameter_s().is_some() { 5 } else { 4 };
+    let operator = if setup.delay_parameter_s.is_some() { 5 } else { 4 };
     let variance = found.innovation_variance();
     let width = parameters.len();
     let (mut eta, mut rows) = (Vec::new(), Vec::new());

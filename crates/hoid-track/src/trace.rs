@@ -71,11 +71,11 @@ impl Trace {
 
     /// Names of the coefficients. With the delay as a parameter B has three, from the smallest delay that is tracked on.
     pub fn parameter_names(&self) -> Vec<String> {
-        polynomial_orders(&self.options).parameter_names()
+        self.options.polynomial_orders().parameter_names()
     }
 
     fn width(&self) -> usize {
-        polynomial_orders(&self.options).parameters()
+        self.options.polynomial_orders().parameters()
     }
 
     /// theta of a row.
@@ -246,17 +246,6 @@ impl Trace {
             .collect();
         self.averaged = rows;
         self
-    }
-}
-
-/// Orders of the polynomials that the method reports.
-pub(crate) fn polynomial_orders(options: &TrackOptions) -> Orders {
-    match options.delay_parameter_s() {
-        Some(_) => Orders {
-            nb: 3,
-            ..options.orders
-        },
-        None => options.orders,
     }
 }
 

@@ -8,11 +8,10 @@ use hoid_model::{
 
 use crate::{
     change::Change,
-    methods,
     options::TrackOptions,
     recursion::{Recursion, Sample},
     start::StartState,
-    trace::{operator_of, polynomial_orders},
+    trace::operator_of,
 };
 
 /// Samples that were not as they should be.
@@ -75,9 +74,10 @@ impl Tracker {
         sample_time: SampleTime,
     ) -> Result<Self, IdentError> {
         options.check()?;
-        let start = StartState::new(options, span, known, sample_time)?;
+        let setup = options.setup()?;
+        let start = StartState::new(&setup, span, known, sample_time)?;
         Ok(Self {
-            recursion: methods::build(options, &start, sample_time)?,
+            recursion: options.method.inner().build(&setup, &start, sample_time)?,
             options: options.clone(),
             sample_time,
             last_e: 0.0,
@@ -133,7 +133,7 @@ impl Tracker {
 
     /// Names of the coefficients.
     pub fn parameter_names(&self) -> Vec<String> {
-        polynomial_orders(&self.options).parameter_names()
+        self.options.polynomial_orders().parameter_names()
     }
 
     /// Covariance of theta by rows; `None` while there is none.

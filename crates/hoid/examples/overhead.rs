@@ -39,10 +39,10 @@ fn main() {
     let start = Estimator::new(Structure::BoxJenkins, orders)
         .fit(std::slice::from_ref(&record))
         .unwrap();
-    for method in [Method::Rpem, Method::Physical] {
+    for method in [Method::rpem(), Method::physical()] {
         let options = TrackOptions {
             start: StartAt::Theta(start.model().theta().to_vec()),
-            ..TrackOptions::new(method, Structure::BoxJenkins, orders)
+            ..TrackOptions::new(method.clone(), Structure::BoxJenkins, orders)
         };
         let mut tracker = Tracker::new(&options, None, record.sample_time()).unwrap();
         let pass = median(20, || {

@@ -66,13 +66,9 @@ fn options(method: Method) -> TrackOptions {
 
 /// RLS or RPEM by the text's own settings.
 fn of_the_text(method: Method) -> TrackOptions {
-    TrackOptions {
-        memory: Some(Memory::Samples(256.0)),
-        covariance: StartCovariance::Multiple(0.1),
-        stable: Stable::PredictorAndNoise,
-        limit: Some(f64::INFINITY),
-        ..options(method)
-    }
+    let mut settings = vec![("memory", "256"), ("covariance", "0.1"), ("limit", "inf")];
+    settings.extend((method != Method::rls()).then_some(("stable", "noise")));
+    options(method).with(&settings).unwrap()
 }
 
 /// RMS of the relative error over t in [10, 81.92], per cent, and the share of rows that convert.
@@ -135,10 +131,10 @@ fn table(runs: usize) {
         (4, 0.2),
     ];
     let methods: [(&str, TrackOptions); 4] = [
-        ("RLS, text", of_the_text(Method::Rls)),
-        ("RPEM, text", of_the_text(Method::Rpem)),
-        ("RPEM", options(Method::Rpem)),
-        ("physical", options(Method::Physical)),
+        ("RLS, text", of_the_text(Method::rls())),
+        ("RPEM, text", of_the_text(Method::rpem())),
+        ("RPEM", options(Method::rpem())),
+        ("physical", options(Method::physical())),
     ];
     for (cell, (m, level)) in cells.into_iter().enumerate() {
         let simulator = simulator(Condition::C4, m, level);
@@ -217,7 +213,7 @@ fn alternating(k: usize, record: &Record) -> (f64, f64) {
 fn endurance(samples: usize) {
     let record = run(&simulator(Condition::C1, 1, 0.1), 0, 0);
     let span = record.span(0.0, 30.72).unwrap();
-    let methods = [Method::Rls, Method::Rpem, Method::Physical, Method::Refined];
+    let methods = [Method::rls(), Method::rpem(), Method::physical(), Method::rriv()];
     let lines = on_all_cores(methods.len(), |i| {
         let options = options(methods[i as usize]);
         let mut tracker = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();

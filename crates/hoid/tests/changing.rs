@@ -29,7 +29,7 @@ fn run(condition: Condition, remnant_order: usize, noise_level: f64, replication
 fn options(method: Method) -> TrackOptions {
     TrackOptions {
         start: StartAt::Span(Some((0.0, START_S))),
-        ..TrackOptions::new(method, method.usual_structure(), method.usual_orders(29))
+        ..TrackOptions::new(method.clone(), method.usual_structure(), method.usual_orders(29))
     }
 }
 
@@ -63,15 +63,12 @@ fn mean(all: &[[[f64; 5]; 2]], what: usize, i: usize) -> f64 {
 
 #[test]
 fn the_two_sided_estimate_is_closer_and_its_bands_hold() {
-    let two_sided = TrackOptions {
-        smooth: true,
-        ..options(Method::Adaptive)
-    };
+    let two_sided = options(Method::adaptive()).with(&[("smooth", "true")]).unwrap();
     let (mut causal, mut smooth) = (Vec::new(), Vec::new());
     for condition in [Condition::C3, Condition::C4, Condition::C5, Condition::C6] {
         for replication in 0..3 {
             let record = run(condition, 2, 0.1, replication);
-            causal.push(errors(&record, &options(Method::Adaptive)));
+            causal.push(errors(&record, &options(Method::adaptive())));
             smooth.push(errors(&record, &two_sided));
         }
     }
@@ -88,7 +85,7 @@ fn the_two_sided_estimate_is_closer_and_its_bands_hold() {
 
 #[test]
 fn the_methods_of_the_literature_follow_a_change() {
-    for method in [Method::Fused, Method::Ekf, Method::Ukf] {
+    for method in [Method::fused(), Method::ekf(), Method::ukf()] {
         let all: Vec<_> = (0..4)
             .map(|replication| errors(&run(Condition::C3, 2, 0.1, replication), &options(method)))
             .collect();
@@ -106,7 +103,7 @@ fn the_methods_of_the_literature_follow_a_change() {
 #[test]
 fn on_real_dimensions_the_points_and_the_linearisation_agree() {
     let record = run(Condition::C5, 1, 0.05, 0);
-    let [extended, unscented] = [Method::Ekf, Method::Ukf].map(|m| track(&record, &options(m), 512).unwrap());
+    let [extended, unscented] = [Method::ekf(), Method::ukf()].map(|m| track(&record, &options(m), 512).unwrap());
     for row in 0..extended.len() {
         let (a, b) = (extended.operator(row).unwrap(), unscented.operator(row).unwrap());
         for ((_, _, a), (_, _, b)) in a.rows()[..5].iter().zip(b.rows()) {
@@ -124,10 +121,9 @@ fn a_delay_that_changes_is_followed_and_named() {
     scenario.realisation = hoid::model::scenario::Realisation::Output;
     scenario.last.operator.tau_e_s = 0.34;
     let simulator = Simulator::new(&scenario).unwrap();
-    let tracked = TrackOptions {
-        track_delay_s: Some((0.2, 0.4)),
-        ..options(Method::Adaptive)
-    };
+    let tracked = options(Method::adaptive())
+        .with(&[("track_delay", "0.2..0.4")])
+        .unwrap();
     for replication in 0..2 {
         let stream = Stream {
             seed: 84,
@@ -156,9 +152,12 @@ fn a_delay_that_changes_is_followed_and_named() {
             .unwrap_err()
             .to_string()
     };
-    let with = |range| TrackOptions {
-        track_delay_s: Some(range),
-        ..options(Method::Adaptive)
+    let with = |range| {
+        let mut options = options(Method::adaptive());
+        if let Method::Adaptive(own) = &mut options.method {
+            own.delay.track_delay_s = Some(range);
+        }
+        options
     };
     let says = refused(with((0.3, 0.4)));
     assert!(says.contains("nk = 29") && says.contains("31 to 41"), "{says}");
@@ -166,33 +165,24 @@ fn a_delay_that_changes_is_followed_and_named() {
         let says = refused(with(range));
         assert!(says.contains("shorter first"), "{says}");
     }
-    let says = refused(TrackOptions {
-        smooth: true,
-        ..tracked
-    });
+    let says = refused(tracked.with(&[("smooth", "true")]).unwrap());
     assert!(says.contains("one delay"), "{says}");
 }
 
 #[test]
 fn what_has_a_model_of_the_change_takes_no_memory() {
-    use hoid::track::{Memory, StartCovariance};
-    for method in [Method::Ekf, Method::Ukf, Method::Adaptive] {
-        let with_memory = TrackOptions {
-            memory: Some(Memory::Samples(256.0)),
-            ..options(method)
-        };
-        let with_covariance = TrackOptions {
-            covariance: StartCovariance::Multiple(0.1),
-            ..options(method)
-        };
-        assert!(with_memory.check().is_err() && with_covariance.check().is_err());
+    for method in [Method::ekf(), Method::ukf(), Method::adaptive()] {
+        for (name, text) in [("memory", "256"), ("covariance", "0.1")] {
+            let refused = options(method.clone()).with(&[(name, text)]).unwrap_err().to_string();
+            assert!(refused.contains(name) && refused.contains("rpem"), "{refused}");
+        }
     }
     let other_orders = TrackOptions {
         orders: hoid::model::Orders {
             nf: 1,
-            ..Method::Fused.usual_orders(29)
+            ..Method::fused().usual_orders(29)
         },
-        ..options(Method::Fused)
+        ..options(Method::fused())
     };
     assert!(other_orders.check().is_err());
 }

@@ -75,21 +75,18 @@ fn z_scores(options: &TrackOptions, runs: u64) -> [f64; 5] {
     deviations
 }
 
-fn with_memory(method: Method, memory: Memory) -> TrackOptions {
-    TrackOptions {
-        memory: Some(memory),
-        ..options(method)
-    }
+fn with_memory(method: Method, memory: &str) -> TrackOptions {
+    options(method).with(&[("memory", memory)]).unwrap()
 }
 
 #[test]
 fn error_bars_hold_with_an_infinite_memory() {
-    for method in [Method::Rpem, Method::Physical] {
+    for method in [Method::rpem(), Method::physical()] {
         // From half of the record, whose own errors are nearly normal. The standard error of a standard deviation from 6000 runs is
         // 1/sqrt(12000) = .009.
         let half = TrackOptions {
             start: StartAt::Span(Some((0.0, 40.96))),
-            ..with_memory(method, Memory::Infinite)
+            ..with_memory(method.clone(), "inf")
         };
         for deviation in z_scores(&half, 6000) {
             assert!((0.95..=1.05).contains(&deviation), "{method:?}: {deviation}");
@@ -99,8 +96,8 @@ fn error_bars_hold_with_an_infinite_memory() {
 
 #[test]
 fn error_bars_hold_with_a_memory_of_256_samples() {
-    for method in [Method::Rpem, Method::Physical] {
-        for deviation in z_scores(&with_memory(method, Memory::Samples(256.0)), 2000) {
+    for method in [Method::rpem(), Method::physical()] {
+        for deviation in z_scores(&with_memory(method.clone(), "256"), 2000) {
             assert!((0.9..=1.1).contains(&deviation), "{method:?}: {deviation}");
         }
     }
@@ -108,7 +105,7 @@ fn error_bars_hold_with_a_memory_of_256_samples() {
 
 #[test]
 fn error_bars_hold_with_a_memory_for_each_parameter() {
-    for method in [Method::Rpem, Method::Physical] {
+    for method in [Method::rpem(), Method::physical()] {
         for deviation in z_scores(&options(method), 2000) {
             assert!((0.9..=1.1).contains(&deviation), "{method:?}: {deviation}");
         }
@@ -130,16 +127,17 @@ fn with_an_infinite_memory_it_comes_to_the_batch_fit_from_several_starts() {
     let batch = Estimator::new(structure, orders)
         .fit(std::slice::from_ref(&record))
         .unwrap();
-    let from = |start, covariance, update_from_s| TrackOptions {
+    let from = |start, update_from_s| TrackOptions {
         start,
-        covariance,
         update_from_s,
-        memory: Some(Memory::Infinite),
-        ..options(Method::Rpem)
+        ..with_memory(Method::rpem(), "inf")
     };
-    let span = |to: f64| from(StartAt::Span(Some((0.0, to))), StartCovariance::OfFit, None);
+    let span = |to: f64| from(StartAt::Span(Some((0.0, to))), None);
     // With filters that are warm. The memory grows at the start, so that the way from there is forgotten.
-    let theta = |theta: Vec<f64>| from(StartAt::Theta(theta), StartCovariance::Multiple(10.0), Some(4.0));
+    let theta = |theta: Vec<f64>| {
+        let from = from(StartAt::Theta(theta), Some(4.0));
+        from.with(&[("covariance", "10")]).unwrap()
+    };
     let starts = [
         ("batch fit of 20 s", span(20.0)),
         ("batch fit of 60 s", span(60.0)),
@@ -180,10 +178,9 @@ fn least_squares_with_an_infinite_memory_is_the_batch_fit() {
     let batch = batch.fit(std::slice::from_ref(&record)).unwrap();
     let recursive = TrackOptions {
         start: StartAt::Nothing,
-        covariance: StartCovariance::Multiple(1e12),
-        memory: Some(Memory::Infinite),
-        ..options(Method::Rls)
+        ..options(Method::rls())
     };
+    let recursive = recursive.with(&[("covariance", "1e12"), ("memory", "inf")]).unwrap();
     let trace = track(&record, &recursive, record.len()).unwrap();
     for (found, (name, expected)) in trace.parameters(trace.len() - 1).iter().zip(batch.parameters()) {
         assert!(
@@ -211,31 +208,27 @@ fn alternating(k: usize, record: &Record) -> (f64, f64) {
 fn a_million_samples_in_all_weathers_leave_numbers_and_a_bounded_covariance() {
     let record = run(&Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap(), 6);
     let span = record.span(0.0, 30.72).unwrap();
-    let rules = [
-        ForgettingRule::Exponential,
-        ForgettingRule::Directional,
-        ForgettingRule::Variable,
-        ForgettingRule::Window,
-        ForgettingRule::Gradient(0.5),
-        ForgettingRule::RandomWalk(BTreeMap::from([("d1".to_owned(), 0.01)])),
+    let rules: [&[(&str, &str)]; 6] = [
+        &[("forgetting", "exponential")],
+        &[("forgetting", "directional")],
+        &[("forgetting", "variable")],
+        &[("forgetting", "window"), ("memory", "500")],
+        &[("forgetting", "gradient"), ("rate", "0.5")],
+        &[("forgetting", "random-walk"), ("drift", "d1=0.01")],
     ];
     let mut all: Vec<TrackOptions> = rules
         .into_iter()
-        .map(|forgetting| TrackOptions {
-            memory: (forgetting == ForgettingRule::Window).then_some(Memory::Samples(500.0)),
-            forgetting,
-            ..options(Method::Rpem)
-        })
+        .map(|rule| options(Method::rpem()).with(rule).unwrap())
         .collect();
     all.extend([
-        options(Method::Rls),
-        options(Method::Physical),
-        options(Method::Refined),
+        options(Method::rls()),
+        options(Method::physical()),
+        options(Method::rriv()),
     ]);
     on_all_cores(all.len() as u64, |i| {
         let options = &all[i as usize];
         let mut tracker = Tracker::new(options, Some(&span), record.sample_time()).unwrap();
-        let name = format!("{} {:?}", options.method.name(), options.forgetting);
+        let name = format!("{:?}", options.method);
         for k in 0..1_000_000 {
             let (e, u) = alternating(k, &record);
             tracker.step(e, u);
@@ -265,7 +258,7 @@ fn after_silence_the_estimate_recovers_as_fast_as_at_the_start() {
     let simulator = Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap();
     let (first, second) = (run(&simulator, 7), run(&simulator, 8));
     let span = first.span(0.0, 30.72).unwrap();
-    for method in [Method::Rls, Method::Rpem, Method::Physical] {
+    for method in [Method::rls(), Method::rpem(), Method::physical()] {
         let mut fresh = Tracker::new(&options(method), Some(&span), first.sample_time()).unwrap();
         let mut silent = Tracker::new(&options(method), Some(&span), first.sample_time()).unwrap();
         for k in 0..first.len() {
@@ -290,7 +283,7 @@ fn after_silence_the_estimate_recovers_as_fast_as_at_the_start() {
         }
         // RMS over 8192 samples from 10 s on. A start from the batch fit has the smaller covariance: it is better by up to a half.
         println!("{method:?} fresh and after silence: {errors:?}");
-        if method != Method::Rpem {
+        if method != Method::rpem() {
             for (fresh, silent) in errors[0].iter().zip(errors[1]) {
                 let limit = (0.05_f64.powi(2) * second.len() as f64).max(1.5 * fresh);
                 assert!(silent < limit, "{method:?}: {errors:?}");
@@ -335,7 +328,7 @@ fn hostile_samples_are_skipped_counted_and_forgotten() {
 
 #[test]
 fn no_default_diverges_in_the_reference_conditions() {
-    let methods = [Method::Rls, Method::Rpem, Method::Physical, Method::Refined];
+    let methods = [Method::rls(), Method::rpem(), Method::physical(), Method::rriv()];
     for condition in Condition::ALL {
         for m in [1, 4] {
             let simulator = Simulator::new(&scenario(condition, m, 0.2)).unwrap();
@@ -356,13 +349,13 @@ fn no_default_diverges_in_the_reference_conditions() {
 #[test]
 fn the_texts_own_settings_are_there() {
     let record = run(&Simulator::new(&scenario(Condition::C4, 1, 0.1)).unwrap(), 10);
-    let text = TrackOptions {
-        memory: Some(Memory::Samples(256.0)),
-        covariance: StartCovariance::Multiple(0.1),
-        stable: Stable::PredictorAndNoise,
-        limit: Some(f64::INFINITY),
-        ..options(Method::Rpem)
-    };
+    let settings = [
+        ("memory", "256"),
+        ("covariance", "0.1"),
+        ("stable", "noise"),
+        ("limit", "inf"),
+    ];
+    let text = options(Method::rpem()).with(&settings).unwrap();
     let trace = track(&record, &text, 1).unwrap();
     assert_eq!((trace.len(), trace.updated_from_s()), (8192, 0.0));
     let (before, after) = (trace.operator(4000).unwrap(), trace.operator(8191).unwrap());
@@ -370,7 +363,7 @@ fn the_texts_own_settings_are_there() {
     assert!((before.k_e_dot.value - 0.036).abs() < 0.012, "{:?}", before.k_e_dot);
     assert!((after.k_e_dot.value - 0.084).abs() < 0.02, "{:?}", after.k_e_dot);
     // By default nothing counts twice: the estimate stays until the span of its fit is over.
-    let default = track(&record, &options(Method::Rpem), 1).unwrap();
+    let default = track(&record, &options(Method::rpem()), 1).unwrap();
     assert_eq!(default.theta(0), default.theta(3071));
     assert_ne!(default.theta(3071), default.theta(3200));
 }
@@ -381,10 +374,9 @@ fn the_delay_is_tracked_with_its_error() {
     inside.initial.operator.tau_e_s = 0.3;
     inside.last.operator.tau_e_s = 0.3;
     let record = run(&Simulator::new(&inside).unwrap(), 11);
-    let tracked = TrackOptions {
-        track_delay_s: Some((0.1, 0.5)),
-        ..options(Method::Physical)
-    };
+    let tracked = options(Method::physical())
+        .with(&[("track_delay", "0.1..0.5")])
+        .unwrap();
     let trace = track(&record, &tracked, 1).unwrap();
     let tau = trace.operator(trace.len() - 1).unwrap().tau_e_s;
     let error = tau.standard_error.unwrap();
@@ -397,24 +389,21 @@ fn contradictions_are_refused() {
     let record = run(&Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap(), 12);
     let refused = |options: TrackOptions| track(&record, &options, 1).unwrap_err().to_string();
     let bj = Structure::BoxJenkins;
-    let says = refused(TrackOptions::new(Method::Rls, bj, bj.operator_orders(NK)));
+    let says = refused(TrackOptions::new(Method::rls(), bj, bj.operator_orders(NK)));
     assert!(says.contains("arx or fir"), "{says}");
-    let says = refused(TrackOptions {
-        memory_of: BTreeMap::from([("q7".to_owned(), Memory::Infinite)]),
-        ..options(Method::Rpem)
-    });
+    let says = refused(options(Method::rpem()).with(&[("memory_of", "q7=inf")]).unwrap());
     assert!(says.contains("q7") && says.contains("f2"), "{says}");
-    let says = refused(with_memory(Method::Rpem, Memory::Samples(1.0)));
+    let says = refused(with_memory(Method::rpem(), "0.001s"));
     assert!(says.contains("more than one sample"), "{says}");
     let says = refused(TrackOptions {
         start: StartAt::Theta(vec![0.1, 0.1, -0.5, -2.5, 1.6]),
-        ..options(Method::Rpem)
+        ..options(Method::rpem())
     });
     assert!(says.contains("stable"), "{says}");
     let says = refused(TrackOptions {
         start: StartAt::Span(Some((90.0, 95.0))),
-        ..options(Method::Rpem)
+        ..options(Method::rpem())
     });
     assert!(says.contains("90"), "{says}");
-    assert!(track(&record, &options(Method::Rls), 0).is_err());
+    assert!(track(&record, &options(Method::rls()), 0).is_err());
 }

@@ -16,12 +16,12 @@ __all__ = [
     "Progress",
     "as_records",
     "bounds",
-    "memory",
     "numbers",
     "order",
     "reporter",
     "settings",
     "span",
+    "text",
 ]
 
 Order = int | tuple[int, int] | range
@@ -89,15 +89,34 @@ def span(name: str, value: Any) -> tuple[float, float] | None:
     return low, high
 
 
-def memory(value: Any) -> str:
-    """A memory as text: a number of samples, ``"2.56s"`` seconds, or inf."""
+def text(name: str, value: Any) -> str | None:
+    """A value as the command line writes it; None where it says nothing.
+
+    >>> text("memory_of", {"b": 256, "f": "inf"})
+    'b=256,f=inf'
+    >>> text("bound", {"omega_nm": (5, None)})
+    'omega_nm=5..'
+    """
+    if value is None or value is False or (isinstance(value, Mapping) and not value):
+        return None
     if isinstance(value, str):
         return value
+    if value is True:
+        return "true"
+    if isinstance(value, Mapping):
+        return ",".join(f"{key}={text(name, one)}" for key, one in value.items())
+    if isinstance(value, (tuple, list)) and len(value) == 2:
+        low, high = ("" if end is None else text(name, end) for end in value)
+        return f"{low}..{high}"
     try:
-        return "inf" if math.isinf(float(value)) else repr(float(value))
+        return str(operator.index(value))
+    except TypeError:
+        pass
+    try:
+        return repr(float(value))
     except (TypeError, ValueError):
         raise OptionError(
-            f'a memory is {value!r}, expected samples (256), seconds ("2.56s") or "inf"'
+            f"{name} is {value!r}, expected a number, a text, a pair, or values by name"
         ) from None
 
 

@@ -387,6 +387,7 @@ def simulate_group(
     seed: int,
     trouble: list[str],
 ) -> int: ...
+def recursive_methods() -> list[tuple[str, str, str, list[str]]]: ...
 def track(
     record: Record,
     options: dict[str, Any],

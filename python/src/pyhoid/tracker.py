@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import _pyhoid, _recursion, _text
 from ._arrays import FloatArray, signal
 from ._options import Order
-from ._recursion import Memory
 from .estimates import Estimate, Operator
 from .fit import Fit
 from .record import Record
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._settings import MethodSettings, RecursiveMethod, Structure
 
 __all__ = ["Tracker"]
 
@@ -45,12 +49,12 @@ class Tracker(_pyhoid.Tracker):
 
     def __new__(
         cls,
-        method: str = "physical",
+        method: RecursiveMethod = "physical",
         *,
         sample_time: float = 0.01,
         warm_up: float = 20.0,
         record: Record | None = None,
-        structure: str | None = None,
+        structure: Structure | None = None,
         na: Order | None = None,
         nb: Order | None = None,
         nc: Order | None = None,
@@ -59,25 +63,11 @@ class Tracker(_pyhoid.Tracker):
         nk: Order | None = None,
         criterion: str = "bic",
         start: Mapping[str, float] | str | None = None,
-        memory: Memory | None = None,
-        forgetting_factor: float | None = None,
-        memory_of: Mapping[str, Memory] | None = None,
-        forgetting: str = "exponential",
-        drift: Mapping[str, float] | None = None,
-        rate: float | None = None,
-        covariance: float | None = None,
-        pseudo_linear: bool = False,
-        stable: str = "predictor",
-        bound: Mapping[str, tuple[float | None, float | None]] | None = None,
-        track_delay: tuple[float, float] | None = None,
-        window: Memory | None = None,
-        refit: int | None = None,
-        limit: float | None = None,
-        alarm: float | None = None,
         largest: float = 1e6,
+        **settings: Unpack[MethodSettings],
     ) -> Tracker:
         """See the class."""
-        options = _recursion.plain(locals())
+        options = _recursion.plain(locals(), settings)
         samples = round(warm_up / sample_time) if sample_time > 0 else 0
         return cls._made(options, float(sample_time), samples, record)
 

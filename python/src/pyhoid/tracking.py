@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from . import _options, _pyhoid, _recursion
 from ._options import Order, Progress
-from ._recursion import Memory
+from ._settings import METHODS, SETTINGS
 from .errors import DataError, OptionError
 from .record import Record
 from .trace import Trace
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._settings import MethodSettings, RecursiveMethod, Structure
 
 __all__ = ["track"]
 
 
 def track(
     record: Record,
-    method: str = "physical",
+    method: RecursiveMethod = "physical",
     *,
-    structure: str | None = None,
+    structure: Structure | None = None,
     na: Order | None = None,
     nb: Order | None = None,
     nc: Order | None = None,
@@ -29,28 +35,13 @@ def track(
     nk: Order | None = None,
     criterion: str = "bic",
     start: Mapping[str, float] | str | None = None,
-    memory: Memory | None = None,
-    forgetting_factor: float | None = None,
-    memory_of: Mapping[str, Memory] | None = None,
-    forgetting: str = "exponential",
-    drift: Mapping[str, float] | None = None,
-    rate: float | None = None,
-    covariance: float | None = None,
-    pseudo_linear: bool = False,
-    stable: str = "predictor",
-    bound: Mapping[str, tuple[float | None, float | None]] | None = None,
-    track_delay: tuple[float, float] | None = None,
-    window: Memory | None = None,
-    refit: int | None = None,
-    limit: float | None = None,
-    alarm: float | None = None,
     largest: float = 1e6,
     start_span: tuple[float, float] | None = None,
     update_from: float | None = None,
     moving_average: float | None = None,
-    smooth: bool = False,
     every: int = 1,
     progress: Progress = False,
+    **settings: Unpack[MethodSettings],
 ) -> Trace:
     """Track a model and the operator's parameters over a record, sample by sample.
 
@@ -60,14 +51,8 @@ def track(
     Parameters
     ----------
     record : Record
-    method : {"physical", "rls", "rpem", "window", "rriv", "adaptive", "fused", "ekf", "ukf"}
-        ``"physical"`` is a recursion in the operator's parameters, ``"rls"`` recursive least
-        squares (arx, fir), ``"rpem"`` the recursive prediction error method (Ljung 1999, ch. 11),
-        ``"window"`` batch fits of a sliding window, ``"rriv"`` the recursive refined instrumental
-        variable (Young 2011). ``"adaptive"`` is a bank of hypotheses about when the person changed;
-        it sets its memory itself and reports changes (`Trace.changes`). For comparison there are
-        least squares with the poles of rpem (``"fused"``) and Kalman filters of state and
-        parameters, extended (``"ekf"``) and unscented (``"ukf"``).
+    method : str
+        {methods}
     structure : str, optional
         Default ``"arx"`` for ``"rls"``, otherwise ``"bj"``.
     na, nb, nc, nd, nf, nk : int or (int, int) or range, optional
@@ -76,35 +61,6 @@ def track(
         The criterion that chooses between candidates.
     start : mapping of str to float, or "nothing", optional
         All coefficients; default a batch fit of the start span.
-    memory : float or str, optional
-        Time in which the weight of a sample falls to 1/e: samples (``256``), seconds (``"2.56s"``)
-        or ``"inf"``.
-    forgetting_factor : float, optional
-        lambda = 1 - 1/memory, instead of `memory`.
-    memory_of : mapping, optional
-        Memory of single parameters, or of all of one letter: ``{"b": 256, "K_e": "5s"}``.
-    forgetting : {"exponential", "random-walk", "window", "variable", "directional", "gradient"}
-    drift : mapping of str to float, optional
-        For ``"random-walk"``: how much a parameter drifts in one second.
-    rate : float, optional
-        Step size for ``"gradient"``; default 0.1.
-    covariance : float, optional
-        P at the start, as a multiple of the unit matrix (0.1 in the reference text); default that
-        of the start fit.
-    pseudo_linear : bool
-        Extended least squares instead of the gradient, for ``"rpem"``.
-    stable : {"predictor", "noise"}
-        Polynomials that are kept stable: C and F, or also D.
-    bound : mapping, optional
-        Bounds of physical parameters.
-    track_delay : (float, float), optional
-        Track tau_e too, within this range in s.
-    window, refit
-        For ``"window"``: its length (default ``"20s"``), and the samples between two fits (25).
-    limit : float, optional
-        Standard deviations beyond which an innovation moves the estimate no further.
-    alarm : float, optional
-        For ``"adaptive"``: logarithm of the odds at which a change is declared; default 6.
     largest : float
         Magnitude of e or u beyond which a sample is a fault.
     start_span : (float, float), optional
@@ -113,12 +69,12 @@ def track(
         Time in s from which the estimate is updated.
     moving_average : float, optional
         Replace each estimate by the mean over this many seconds.
-    smooth : bool
-        For ``"adaptive"``: estimate each sample from all of the record, not only from its past.
     every : int
         Keep every n-th sample.
     progress : bool or callable
         As in `identify`.
+    **settings
+        {settings}
 
     Returns
     -------
@@ -128,14 +84,14 @@ def track(
     ------
     OptionError, DataError, EstimationError
     """
-    settings = {
-        name: value for name, value in locals().items() if name not in ("record", "progress")
+    shared = {
+        name: value
+        for name, value in locals().items()
+        if name not in ("record", "progress", "settings")
     }
     if not isinstance(record, Record):
         raise DataError(f"expected a pyhoid.Record, found {type(record).__name__}")
-    options = _recursion.plain(settings) | {"smooth": bool(smooth)}
-    if smooth and options["method"] != "adaptive":
-        raise OptionError('smooth belongs to method="adaptive"')
+    options = _recursion.plain(shared, settings)
     if start_span is not None and isinstance(start, Mapping):
         raise OptionError(
             "start_span is the span of the start fit, but start gives the start itself; drop one"
@@ -165,4 +121,7 @@ def track(
         every=int(every),
         progress=_options.reporter(progress, "candidates"),
     )
-    return Trace(native, record, settings)
+    return Trace(native, record, shared | settings)
+
+
+track.__doc__ = (track.__doc__ or "").format(methods=METHODS, settings=SETTINGS)

@@ -65,13 +65,13 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
 fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, CliError> {
     let (_, from, to) = SPANS[0];
     let nk = stages[0].choice.fit.orders().nk;
-    [Method::Rls, Method::Rpem, Method::Physical]
+    [Method::rls(), Method::rpem(), Method::physical()]
         .into_iter()
         .map(|method| {
             let structure = method.usual_structure();
             let options = TrackOptions {
                 start: StartAt::Span(Some((from, to))),
-                ..TrackOptions::new(method, structure, structure.operator_orders(nk))
+                ..TrackOptions::new(method.clone(), structure, structure.operator_orders(nk))
             };
             Ok((format!("{}, {structure}", method.name()), track(record, &options, 1)?))
         })
@@ -119,7 +119,7 @@ fn report_of_traces(
             .map(|(stage, (_, from_s, to_s))| BatchLine {
                 from_s,
                 to_s,
-                fit: if name.starts_with(Method::Rls.name()) {
+                fit: if name.starts_with(Method::rls().name()) {
                     &stage.arx
                 } else {
                     &stage.choice.fit

@@ -195,12 +195,13 @@ impl<V: Value> Value for BTreeMap<String, V> {
     }
 }
 
-/// One of a list of words.
-pub(crate) fn choice<T: Copy>(text: &str, words: &[(&str, T)]) -> Result<T, String> {
+/// One of a list of words; others are read too.
+fn choice<T: Copy>(text: &str, words: &[(&str, T)], others: &[(&str, T)]) -> Result<T, String> {
     let plain = text.to_ascii_lowercase().replace('_', "-");
     let known = || words.iter().map(|(word, _)| *word).collect::<Vec<_>>().join(", ");
     words
         .iter()
+        .chain(others)
         .find(|(word, _)| *word == plain)
         .map(|(_, value)| *value)
         .ok_or_else(|| format!("one of {}", known()))
@@ -208,12 +209,12 @@ pub(crate) fn choice<T: Copy>(text: &str, words: &[(&str, T)]) -> Result<T, Stri
 
 /// Makes an enum a choice of words.
 macro_rules! choices {
-    ($target:ty { $($word:literal = $value:path),+ $(,)? }) => {
+    ($target:ty { $($word:literal = $value:path),+ $(,)? } $(also { $($alias:literal = $other:path),+ })?) => {
         impl Value for $target {
             const KIND: Kind = Kind::Choice(&[$($word),+]);
 
             fn read(text: &str) -> Result<Self, String> {
-                choice(text, &[$(($word, $value)),+])
+                choice(text, &[$(($word, $value)),+], &[$($(($alias, $other)),+)?])
             }
 
             fn text(&self) -> Option<String> {
@@ -223,7 +224,7 @@ macro_rules! choices {
     };
 }
 
-choices!(Stable { "predictor" = Stable::Predictor, "noise" = Stable::PredictorAndNoise });
+choices!(Stable { "predictor" = Stable::Predictor, "noise" = Stable::PredictorAndNoise } also { "predictor-and-noise" = Stable::PredictorAndNoise });
 
 #[cfg(test)]
 mod tests {

@@ -172,7 +172,7 @@ pub type BatchFit = ((f64, f64), Fit);
 /// The orders of a trace; where it tracks the delay, with the median of what it says of the delay in a span, s.
 fn orders_within(trace: &Trace, (from, to): (f64, f64)) -> Orders {
     let orders = trace.options().orders;
-    if trace.options().track_delay_s.is_none() {
+    if trace.options().method.track_delay_s().is_none() {
         return orders;
     }
     let rows = trace

@@ -3,7 +3,7 @@
 use std::mem::discriminant;
 
 use hoid_model::{NotConvertible, Record, uncertainty::Estimate};
-use hoid_track::{Change, ForgettingRule, Memory, Method, StartAt, StartCovariance, TrackOptions};
+use hoid_track::Change;
 use minijinja::{Value, context};
 
 use super::{
@@ -25,7 +25,7 @@ pub fn methods(traces: &[Evaluated<'_>], record: &Record) -> Vec<Value> {
     let row = |t: &Evaluated<'_>| {
         let trace = t.section.trace;
         let options = trace.options();
-        let model = match options.track_delay_s {
+        let model = match options.method.track_delay_s() {
             Some((from, to)) => format!(
                 "{}({}), tau_e tracked in {} to {} s",
                 options.structure,
@@ -41,73 +41,12 @@ pub fn methods(traces: &[Evaluated<'_>], record: &Record) -> Vec<Value> {
         };
         context! {
             name => t.section.name.clone(), method => options.method.name(), model, average,
-            forgetting => forgetting(options),
-            start => start(options),
+            forgetting => options.memory_in_words(record.sample_time()),
+            start => options.start_in_words(),
             moves_from => format!("{} s", plain(trace.updated_from_s().max(record.time_s(0)))),
         }
     };
     traces.iter().map(row).collect()
-}
-
-fn forgetting(options: &TrackOptions) -> String {
-    match (&options.forgetting, options.method) {
-        (_, Method::Window) => format!(
-            "window of {}, a fit every {} samples",
-            length(options.window),
-            options.every
-        ),
-        (_, Method::Adaptive) => "since the last change, by hypotheses".to_owned(),
-        (_, Method::Ekf | Method::Ukf) => "by a random walk of the parameters".to_owned(),
-        (ForgettingRule::Exponential, _) => format!("exponential, memory {}", memories(options)),
-        (ForgettingRule::RandomWalk(drifts), _) => {
-            let drifts: Vec<String> = drifts.iter().map(|(name, d)| format!("{name} {}", plain(*d))).collect();
-            format!("random walk, drift in one second {}", drifts.join(", "))
-        }
-        (ForgettingRule::Window, _) => format!("rectangular window, memory {}", memories(options)),
-        (ForgettingRule::Variable, _) => format!("variable, memory {}", memories(options)),
-        (ForgettingRule::Directional, _) => format!("directional, memory {}", memories(options)),
-        (ForgettingRule::Gradient(rate), _) => format!("none: normalised gradient, rate {}", plain(*rate)),
-    }
-}
-
-fn length(memory: Memory) -> String {
-    match memory {
-        Memory::Samples(n) => format!("{} samples", plain(n)),
-        Memory::Seconds(t) => format!("{} s", plain(t)),
-        Memory::Infinite => "no end".to_owned(),
-    }
-}
-
-/// Each memory once, with the parameters that have it.
-fn memories(options: &TrackOptions) -> String {
-    let Ok(all) = options.memories() else {
-        return DASH.to_owned();
-    };
-    let mut groups: Vec<(Memory, Vec<String>)> = Vec::new();
-    for (name, memory) in options.parameter_names().into_iter().zip(all) {
-        match groups.iter_mut().find(|g| g.0 == memory) {
-            Some(group) => group.1.push(name),
-            None => groups.push((memory, vec![name])),
-        }
-    }
-    if let [(memory, _)] = groups.as_slice() {
-        return length(*memory);
-    }
-    let of = |(memory, names): &(Memory, Vec<String>)| format!("{} for {}", length(*memory), names.join(", "));
-    groups.iter().map(of).collect::<Vec<_>>().join("; ")
-}
-
-fn start(options: &TrackOptions) -> String {
-    let covariance = match options.covariance {
-        StartCovariance::OfFit => "its covariance".to_owned(),
-        StartCovariance::Multiple(p) => format!("P = {} I", plain(p)),
-    };
-    match &options.start {
-        StartAt::Span(Some((from, to))) => format!("batch fit of [{}, {}] s, {covariance}", plain(*from), plain(*to)),
-        StartAt::Span(None) => format!("batch fit of the first third, {covariance}"),
-        StartAt::Theta(_) => "from coefficients that were given".to_owned(),
-        StartAt::Nothing => "from nothing".to_owned(),
-    }
 }
 
 /// One row a method: how many samples were taken, left out, shortened, and which rows do not convert.

@@ -45,7 +45,7 @@ pub fn coefficients(record: &Record, trace: &Trace) -> Vec<(Coefficient, Vec<f64
             if now != before {
                 before = now;
                 held = match now.map(|o| o.discretise(record.sample_time())) {
-                    Some(Ok(d)) if d.nk == orders.nk && trace.options().track_delay_s.is_none() => {
+                    Some(Ok(d)) if d.nk == orders.nk && trace.options().method.track_delay_s().is_none() => {
                         [d.held.b0, d.held.b1, d.held.f1, d.held.f2]
                     }
                     Some(Ok(d)) => [f64::NAN, f64::NAN, d.held.f1, d.held.f2],

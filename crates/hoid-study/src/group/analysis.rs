@@ -205,7 +205,7 @@ impl<'a> Bench<'a> {
                 if method.usual_structure() == structure {
                     let options = TrackOptions {
                         start: StartAt::Span(Some((windows[0].from_s, windows[0].to_s))),
-                        ..TrackOptions::new(method, structure, orders)
+                        ..TrackOptions::new(method.clone(), structure, orders)
                     };
                     match track(record, &options, self.manifest.analysis.trace_every) {
                         Ok(trace) => {
@@ -216,7 +216,7 @@ impl<'a> Bench<'a> {
                                     if middle.is_finite() {
                                         self.row(
                                             Some(*window),
-                                            &traces::label_of(method),
+                                            &traces::label_of(&method),
                                             &name,
                                             Estimate::fixed(middle),
                                         );
@@ -224,7 +224,7 @@ impl<'a> Bench<'a> {
                                 }
                             }
                         }
-                        Err(error) => self.failed(None, &traces::label_of(method), &error.to_string()),
+                        Err(error) => self.failed(None, &traces::label_of(&method), &error.to_string()),
                     }
                 }
             }

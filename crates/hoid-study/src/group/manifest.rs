@@ -155,9 +155,9 @@ pub enum MethodName {
 impl From<MethodName> for Method {
     fn from(name: MethodName) -> Self {
         match name {
-            MethodName::Rls => Self::Rls,
-            MethodName::Rpem => Self::Rpem,
-            MethodName::Physical => Self::Physical,
+            MethodName::Rls => Self::rls(),
+            MethodName::Rpem => Self::rpem(),
+            MethodName::Physical => Self::physical(),
         }
     }
 }

@@ -87,7 +87,7 @@ fn pairs() -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// Label of a recursion in the tables.
-pub(super) fn label_of(method: Method) -> String {
+pub(super) fn label_of(method: &Method) -> String {
     method.name().to_uppercase()
 }
 
@@ -99,7 +99,7 @@ pub(super) fn moving(trace: &Trace) -> impl Iterator<Item = usize> + '_ {
 
 /// Writes the moving rows of a trace.
 pub(super) fn write(rows: &mut Rows, columns: &TraceColumns, entry: &RunEntry, trace: &Trace) {
-    let label = label_of(trace.options().method);
+    let label = label_of(&trace.options().method);
     let names = trace.parameter_names();
     let correlated = CORRELATED.map(|name| names.iter().position(|n| n == name));
     for k in moving(trace) {

@@ -3,7 +3,7 @@
 //! ```toml
 //! [[estimators]]
 //! name = "BJ"
-//! method = "fit"                  # or "grey-box", "rls", "rpem", "physical", "window", "rriv", "record"
+//! method = "fit"                  # or "grey-box", "record", or a recursive method
 //! structure = "bj"
 //! orders = { nd = [1, 2], nk = "true" }
 //! ```
@@ -19,7 +19,7 @@ use hoid_track::{Method, StartAt, TrackOptions};
 
 use super::{
     PlanProblem,
-    estimator_table::{EstimatorTable, OfScenario, Order, OrdersTable, StartValue, TaskKey},
+    estimator_table::{EstimatorTable, FIT, GREY_BOX, OfScenario, Order, OrdersTable, RECORD, StartValue},
     grid::{Axis, Variant},
 };
 
@@ -38,7 +38,7 @@ pub struct EstimatorCell {
     pub scenarios: Option<Vec<String>>,
     /// Span of the record that it takes, s; none for all.
     pub span_s: Option<(f64, f64)>,
-    /// It takes every so manieth sample.
+    /// Every n-th sample is taken.
     pub decimate: usize,
     /// What is taken out of e and u before.
     pub detrend: Detrend,
@@ -70,13 +70,16 @@ impl EstimatorCell {
             line: variant.line_of_key(key).or_else(|| variant.lines.first().copied()),
             reason: format!("{key} {reason}"),
         };
-        let method = table.method.recursion();
-        let structure = table.structure.map_or_else(
-            || method.map_or(Structure::BoxJenkins, Method::usual_structure),
-            Structure::from,
-        );
-        table.check_placement(method, &at)?;
-        if table.method == TaskKey::Fit && table.structure.is_none() {
+        let method = match table.method.as_str() {
+            FIT | GREY_BOX | RECORD => None,
+            name => Some(name.parse::<Method>().map_err(|_| at("method", unknown_method(name)))?),
+        };
+        let structure = match &table.structure {
+            None => method.as_ref().map_or(Structure::BoxJenkins, Method::usual_structure),
+            Some(name) => structure(name).ok_or_else(|| at("structure", unknown_structure(name)))?,
+        };
+        table.check_placement(method.as_ref(), &at)?;
+        if table.method == FIT && table.structure.is_none() {
             return Err(at(
                 "structure",
                 "is missing, expected one such as \"arx\" or \"bj\"".to_owned(),
@@ -111,9 +114,9 @@ impl EstimatorCell {
         if start.is_empty() && !start_values.is_empty() {
             "given".clone_into(&mut start);
         }
-        let task = match (table.method, method) {
-            (TaskKey::Record, _) => Task::Describe,
-            (TaskKey::GreyBox, _) => Task::GreyBox(Box::new(table.grey_box(&at)?)),
+        let task = match (table.method.as_str(), method) {
+            (RECORD, _) => Task::Describe,
+            (GREY_BOX, _) => Task::GreyBox(Box::new(table.grey_box(&at)?)),
             (_, Some(method)) => Task::Track(Box::new(table.track(method, structure, &at)?)),
             _ => Task::Fit(Box::new(table.fit(structure))),
         };
@@ -156,9 +159,9 @@ impl EstimatorCell {
     /// Method as in the plan.
     pub fn method(&self) -> &'static str {
         match &self.task {
-            Task::Describe => "record",
-            Task::Fit(_) => "fit",
-            Task::GreyBox(_) => "grey-box",
+            Task::Describe => RECORD,
+            Task::Fit(_) => FIT,
+            Task::GreyBox(_) => GREY_BOX,
             Task::Track(options) => options.method.name(),
         }
     }
@@ -281,4 +284,19 @@ impl EstimatorCell {
             _ => None,
         }
     }
+}
+
+fn structure(name: &str) -> Option<Structure> {
+    Structure::ALL.into_iter().find(|structure| structure.name() == name)
+}
+
+fn unknown_structure(name: &str) -> String {
+    let known: Vec<&str> = Structure::ALL.iter().map(|structure| structure.name()).collect();
+    format!("is {name:?}, expected one of {}", known.join(", "))
+}
+
+fn unknown_method(name: &str) -> String {
+    let methods = Method::registry().into_iter().map(|spec| spec.name);
+    let known: Vec<&str> = [FIT, GREY_BOX, RECORD].into_iter().chain(methods).collect();
+    format!("is {name:?}, expected one of {}", known.join(", "))
 }

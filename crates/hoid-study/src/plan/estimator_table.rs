@@ -2,16 +2,26 @@
 
 use std::collections::BTreeMap;
 
-use hoid_ident::{Estimator, GreyBox, IdentError, InitialState, SearchOptions};
+use hoid_ident::{
+    Estimator, GreyBox, InitialState, SearchOptions,
+    settings::{Kind, Setting},
+};
 use hoid_model::{Detrend, Orders, Structure};
-use hoid_track::{ForgettingRule, Memory, Method, Stable, StartAt, StartCovariance, TrackOptions};
+use hoid_track::{Method, StartAt, TrackOptions};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::PlanProblem;
 
 /// Keys that want a list or a table as it stands.
-pub const WHOLE: [&str; 5] = ["scenarios", "span_s", "start_span_s", "delay_range_s", "track_delay_s"];
+pub fn whole_keys() -> Vec<String> {
+    let fixed = ["scenarios", "span_s", "start_span_s", "delay_range_s"].map(str::to_owned);
+    let settings = Method::registry().into_iter().flat_map(|spec| spec.settings);
+    let spans = settings
+        .filter(|setting| setting.kind == Kind::Span)
+        .map(|setting| plan_key(&setting));
+    fixed.into_iter().chain(spans).collect()
+}
 
 /// A whole number, or `"true"` for that of the scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -50,39 +60,6 @@ pub(crate) struct OrdersTable {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum TaskKey {
-    Fit,
-    GreyBox,
-    Rls,
-    Rpem,
-    Physical,
-    Window,
-    Rriv,
-    Adaptive,
-    Fused,
-    Ekf,
-    Ukf,
-    Record,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum StructureKey {
-    Fir,
-    Ar,
-    Ma,
-    Arx,
-    Arma,
-    Armax,
-    Ararx,
-    Ararmax,
-    Oe,
-    Bj,
-    General,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum InitialKey {
     Auto,
@@ -99,57 +76,21 @@ pub(super) enum DetrendKey {
     Linear,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum ForgettingKey {
-    Exponential,
-    Window,
-    Variable,
-    Directional,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum StableKey {
-    Predictor,
-    PredictorAndNoise,
-}
-
-/// Samples as a number, or text: "256", "2.56s", "inf".
-#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
-#[serde(
-    untagged,
-    expecting = "a memory is a number of samples, or a text such as \"2.56s\" or \"inf\""
-)]
-pub(super) enum MemoryValue {
-    Samples(f64),
-    Text(String),
-}
-
-impl MemoryValue {
-    fn memory(&self) -> Result<Memory, IdentError> {
-        match self {
-            Self::Samples(n) if *n == f64::INFINITY => Ok(Memory::Infinite),
-            Self::Samples(n) => n.to_string().parse(),
-            Self::Text(text) => text.parse(),
-        }
-    }
-}
-
 /// What is estimated from each record, and how. Each value may be a list, which makes it an axis of the grid.
 #[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
 pub(crate) struct EstimatorTable {
     /// Name in the results.
     pub(super) name: String,
     /// Names of the scenarios that it takes. Default: all.
     pub(super) scenarios: Option<Vec<String>>,
     /// What is done.
-    pub(super) method: TaskKey,
+    #[schemars(extend("enum" = what_is_done()))]
+    pub(super) method: String,
     /// Name of an estimator above, from whose VAF with the same nk on the same run that of this one is counted: delta_vaf.
     pub(super) versus: Option<String>,
     /// Structure of the polynomial model. Default: arx for rls, else bj.
-    pub(super) structure: Option<StructureKey>,
+    #[schemars(extend("enum" = structure_names()))]
+    pub(super) structure: Option<String>,
     /// Orders.
     #[serde(default)]
     pub(super) orders: OrdersTable,
@@ -169,32 +110,14 @@ pub(crate) struct EstimatorTable {
     pub(super) max_iterations: Option<usize>,
     /// Range of the delay of the grey box, s. Default 0.05 to 0.6.
     pub(super) delay_range_s: Option<(f64, f64)>,
-    /// Memory of all parameters of a recursion, samples, or as "2.56s" or "inf".
-    pub(super) memory: Option<MemoryValue>,
-    /// Memory of single parameters, or of all of one letter; `name` labels it.
-    pub(super) memory_of: Option<BTreeMap<String, MemoryValue>>,
-    /// Factor of forgetting instead of a memory.
-    pub(super) lambda: Option<f64>,
-    /// How a recursion forgets. Default: exponential.
-    pub(super) forgetting: Option<ForgettingKey>,
-    /// P at the start, a multiple of the unit matrix in units of the innovation variance. Default: that of the start fit.
-    pub(super) covariance: Option<f64>,
     /// Span of the start fit of a recursion, s. Default: the first third.
     pub(super) start_span_s: Option<(f64, f64)>,
     /// Time from which a recursion moves its estimate, s.
     pub(super) update_from_s: Option<f64>,
-    /// Standard deviations beyond which an innovation moves an estimate no further; inf for none.
-    pub(super) limit: Option<f64>,
-    /// Polynomials that a recursion keeps stable. Default: predictor.
-    pub(super) stable: Option<StableKey>,
-    /// Length of the window of the window method. Default "20s".
-    pub(super) window: Option<MemoryValue>,
-    /// Samples between two fits of the window method. Default 25.
-    pub(super) refit: Option<usize>,
-    /// Two-sided estimates in place of causal ones, for adaptive. Default: no.
-    pub(super) smooth: Option<bool>,
-    /// Range of the delay that the physical recursion tracks, s.
-    pub(super) track_delay_s: Option<(f64, f64)>,
+    /// Options of the recursive method, as the registry of methods has them.
+    #[serde(flatten)]
+    #[schemars(skip)]
+    pub(super) settings: BTreeMap<String, toml::Value>,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
@@ -211,13 +134,15 @@ impl EstimatorTable {
     /// Refuses keys that the method does not look at: a setting without effect would be believed.
     pub(super) fn check_placement(
         &self,
-        method: Option<Method>,
+        method: Option<&Method>,
         at: &impl Fn(&str, String) -> PlanProblem,
     ) -> Result<(), PlanProblem> {
-        let fits = self.method == TaskKey::Fit;
+        let (fits, grey_box) = (self.method == FIT, self.method == GREY_BOX);
         let tracks = method.is_some();
-        let windowed = method == Some(Method::Window);
-        let recursive = tracks && !windowed;
+        // A window is no recursion that starts from coefficients or waits.
+        let moves = method.is_some_and(|method| !matches!(method, Method::Window(_)));
+        let both = "fit and grey-box";
+        let recursive = "the recursive methods";
         let given = [
             (
                 "structure",
@@ -225,100 +150,40 @@ impl EstimatorTable {
                 fits || tracks,
                 "fit and the recursive methods",
             ),
-            (
-                "initial_state",
-                self.initial_state.is_some(),
-                fits || self.method == TaskKey::GreyBox,
-                "fit and grey-box",
-            ),
+            ("initial_state", self.initial_state.is_some(), fits || grey_box, both),
             (
                 "start",
                 self.start.is_some(),
-                fits || recursive,
+                fits || moves,
                 "fit and the recursive methods",
             ),
-            (
-                "starts",
-                self.starts.is_some(),
-                fits || self.method == TaskKey::GreyBox,
-                "fit and grey-box",
-            ),
+            ("starts", self.starts.is_some(), fits || grey_box, both),
             (
                 "max_iterations",
                 self.max_iterations.is_some(),
-                self.method != TaskKey::Record,
+                self.method != RECORD,
                 "methods that search",
             ),
-            (
-                "versus",
-                self.versus.is_some(),
-                fits || self.method == TaskKey::GreyBox,
-                "fit and grey-box",
-            ),
-            (
-                "delay_range_s",
-                self.delay_range_s.is_some(),
-                self.method == TaskKey::GreyBox,
-                "grey-box",
-            ),
-            ("memory", self.memory.is_some(), recursive, "the recursive methods"),
-            (
-                "memory_of",
-                self.memory_of.is_some(),
-                recursive,
-                "the recursive methods",
-            ),
-            ("lambda", self.lambda.is_some(), recursive, "the recursive methods"),
-            (
-                "forgetting",
-                self.forgetting.is_some(),
-                recursive,
-                "the recursive methods",
-            ),
-            (
-                "covariance",
-                self.covariance.is_some(),
-                recursive,
-                "the recursive methods",
-            ),
-            (
-                "start_span_s",
-                self.start_span_s.is_some(),
-                tracks,
-                "the recursive methods",
-            ),
-            (
-                "update_from_s",
-                self.update_from_s.is_some(),
-                recursive,
-                "the recursive methods",
-            ),
-            ("limit", self.limit.is_some(), recursive, "the recursive methods"),
-            ("stable", self.stable.is_some(), recursive, "the recursive methods"),
-            ("window", self.window.is_some(), windowed, "window"),
-            ("refit", self.refit.is_some(), windowed, "window"),
-            (
-                "smooth",
-                self.smooth.is_some(),
-                method == Some(Method::Adaptive),
-                "adaptive",
-            ),
-            (
-                "track_delay_s",
-                self.track_delay_s.is_some(),
-                matches!(method, Some(Method::Physical | Method::Adaptive)),
-                "physical and adaptive",
-            ),
+            ("versus", self.versus.is_some(), fits || grey_box, both),
+            ("delay_range_s", self.delay_range_s.is_some(), grey_box, "grey-box"),
+            ("start_span_s", self.start_span_s.is_some(), tracks, recursive),
+            ("update_from_s", self.update_from_s.is_some(), moves, recursive),
         ];
         for (key, is_given, has_effect, of) in given {
             if is_given && !has_effect {
                 return Err(at(key, format!("has no effect here: it belongs to {of}")));
             }
         }
-        if self.memory.is_some() && self.lambda.is_some() {
+        if let (None, Some(key)) = (method, self.settings.keys().next()) {
+            let of = methods_with(key);
             return Err(at(
-                "lambda",
-                "and memory are both given: leave one of them out".to_owned(),
+                key,
+                match of.as_slice() {
+                    [] => {
+                        "is unknown; the book has the keys of an estimator on its page Monte Carlo studies".to_owned()
+                    }
+                    of => format!("has no effect here: it belongs to {}", of.join(", ")),
+                },
             ));
         }
         if self.start.is_some() && self.start_span_s.is_some() {
@@ -375,101 +240,106 @@ impl EstimatorTable {
         })
     }
 
+    /// The method with the options of the table.
     pub(super) fn track(
         &self,
-        method: Method,
+        mut method: Method,
         structure: Structure,
         at: &impl Fn(&str, String) -> PlanProblem,
     ) -> Result<TrackOptions, PlanProblem> {
-        let memory = |key: &str, value: &Option<MemoryValue>| match value {
-            None => Ok(None),
-            Some(value) => value
-                .memory()
-                .map(Some)
-                .map_err(|error| at(key, format!("is wrong: {error}"))),
-        };
-        let lambda = match self.lambda {
-            None => None,
-            Some(1.0) => Some(Memory::Infinite),
-            Some(l) if l > 0.0 && l < 1.0 => Some(Memory::Samples(1.0 / (1.0 - l))),
-            Some(l) => return Err(at("lambda", format!("is {l}, expected a number above 0 and up to 1"))),
-        };
-        let mut memory_of = BTreeMap::new();
-        for (name, value) in self.memory_of.iter().flatten() {
-            if name == "name" {
+        // In the order of the registry: what belongs to a way of forgetting comes after it.
+        let known = Method::registry().into_iter().flat_map(|spec| spec.settings);
+        let mut left: BTreeMap<&str, &toml::Value> = self.settings.iter().map(|(k, v)| (k.as_str(), v)).collect();
+        for setting in known {
+            let key = plan_key(&setting);
+            let Some(value) = left.remove(key.as_str()) else {
                 continue;
-            }
-            let value = value
-                .memory()
-                .map_err(|error| at("memory_of", format!("of {name} is wrong: {error}")))?;
-            memory_of.insert(name.clone(), value);
+            };
+            let text = text_of(value, setting.kind).map_err(|reason| at(&key, reason))?;
+            method
+                .set(setting.name, &text)
+                .map_err(|error| at(&key, format!("is wrong: {error}")))?;
         }
-        let covariance = match self.covariance {
-            None => StartCovariance::OfFit,
-            Some(p) if p > 0.0 && p.is_finite() => StartCovariance::Multiple(p),
-            Some(p) => return Err(at("covariance", format!("is {p}, expected a positive finite number"))),
-        };
-        let usual = TrackOptions::new(method, structure, Orders::default());
+        if let Some(key) = left.keys().next() {
+            return Err(at(key, unknown_key(&method)));
+        }
         Ok(TrackOptions {
-            memory: memory("memory", &self.memory)?.or(lambda),
-            memory_of,
-            forgetting: match self.forgetting {
-                None | Some(ForgettingKey::Exponential) => ForgettingRule::Exponential,
-                Some(ForgettingKey::Window) => ForgettingRule::Window,
-                Some(ForgettingKey::Variable) => ForgettingRule::Variable,
-                Some(ForgettingKey::Directional) => ForgettingRule::Directional,
-            },
             start: StartAt::Span(self.start_span_s),
-            covariance,
             update_from_s: self.update_from_s,
-            limit: self.limit,
-            stable: match self.stable {
-                None | Some(StableKey::Predictor) => Stable::Predictor,
-                Some(StableKey::PredictorAndNoise) => Stable::PredictorAndNoise,
-            },
-            track_delay_s: self.track_delay_s,
-            smooth: self.smooth.unwrap_or(false),
-            window: memory("window", &self.window)?.unwrap_or(usual.window),
-            every: self.refit.unwrap_or(usual.every),
             search: self.search(),
-            ..usual
+            ..TrackOptions::new(method, structure, Orders::default())
         })
     }
 }
 
-impl TaskKey {
-    pub(super) fn recursion(self) -> Option<Method> {
-        match self {
-            Self::Fit | Self::GreyBox | Self::Record => None,
-            Self::Rls => Some(Method::Rls),
-            Self::Rpem => Some(Method::Rpem),
-            Self::Physical => Some(Method::Physical),
-            Self::Window => Some(Method::Window),
-            Self::Rriv => Some(Method::Refined),
-            Self::Adaptive => Some(Method::Adaptive),
-            Self::Fused => Some(Method::Fused),
-            Self::Ekf => Some(Method::Ekf),
-            Self::Ukf => Some(Method::Ukf),
-        }
+/// Words for `method` beside those of the recursive methods.
+pub(super) const FIT: &str = "fit";
+pub(super) const GREY_BOX: &str = "grey-box";
+pub(super) const RECORD: &str = "record";
+
+fn what_is_done() -> Vec<&'static str> {
+    let methods = Method::registry().into_iter().map(|spec| spec.name);
+    [FIT, GREY_BOX, RECORD].into_iter().chain(methods).collect()
+}
+
+fn structure_names() -> Vec<&'static str> {
+    Structure::ALL.iter().map(|structure| structure.name()).collect()
+}
+
+/// Key of an option: its name, and its unit where the value has none of its own.
+pub(super) fn plan_key(setting: &Setting) -> String {
+    match (setting.kind, setting.unit) {
+        (Kind::Span | Kind::Number, "s") => format!("{}_s", setting.name),
+        _ => setting.name.to_owned(),
     }
 }
 
-impl From<StructureKey> for Structure {
-    fn from(key: StructureKey) -> Self {
-        match key {
-            StructureKey::Fir => Self::Fir,
-            StructureKey::Ar => Self::Ar,
-            StructureKey::Ma => Self::Ma,
-            StructureKey::Arx => Self::Arx,
-            StructureKey::Arma => Self::Arma,
-            StructureKey::Armax => Self::Armax,
-            StructureKey::Ararx => Self::Ararx,
-            StructureKey::Ararmax => Self::Ararmax,
-            StructureKey::Oe => Self::OutputError,
-            StructureKey::Bj => Self::BoxJenkins,
-            StructureKey::General => Self::General,
+/// A value of a plan in the form of the command line.
+fn text_of(value: &toml::Value, kind: Kind) -> Result<String, String> {
+    let wrong = || format!("is {value}, expected {}", in_words(kind));
+    Ok(match (value, kind) {
+        (toml::Value::String(text), _) => text.clone(),
+        (toml::Value::Integer(n), _) => n.to_string(),
+        (toml::Value::Float(x), _) => x.to_string(),
+        (toml::Value::Boolean(b), _) => b.to_string(),
+        (toml::Value::Array(ends), Kind::Span | Kind::OpenSpan) => match ends.as_slice() {
+            [low, high] => format!("{}..{}", text_of(low, Kind::Number)?, text_of(high, Kind::Number)?),
+            _ => return Err(wrong()),
+        },
+        (toml::Value::Table(values), Kind::Named(of)) => {
+            // `name` labels the table.
+            let named = values.iter().filter(|(name, _)| *name != "name");
+            let each: Vec<String> = named
+                .map(|(name, value)| Ok(format!("{name}={}", text_of(value, *of)?)))
+                .collect::<Result<_, String>>()?;
+            each.join(",")
         }
+        _ => return Err(wrong()),
+    })
+}
+
+fn in_words(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Flag => "true or false",
+        Kind::Count => "a whole number",
+        Kind::Number => "a number",
+        Kind::Memory => "a number of samples, or a text such as \"2.56s\" or \"inf\"",
+        Kind::Span | Kind::OpenSpan => "two numbers",
+        Kind::Choice(_) | Kind::Channel => "a text",
+        Kind::Named(_) => "a table of values by name",
     }
+}
+
+/// The methods that have an option of this key.
+fn methods_with(key: &str) -> Vec<&'static str> {
+    let all = Method::registry().into_iter();
+    let with = all.filter(|spec| spec.settings.iter().any(|setting| plan_key(setting) == key));
+    with.map(|spec| spec.name).collect()
+}
+
+fn unknown_key(method: &Method) -> String {
+    let keys: Vec<String> = method.settings().list().iter().map(plan_key).collect();
+    format!("is unknown; {method} has {}", keys.join(", "))
 }
 
 impl From<DetrendKey> for Detrend {

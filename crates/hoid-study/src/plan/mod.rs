@@ -48,7 +48,7 @@ pub use estimator::{EstimatorCell, Task};
 pub use grid::Axis;
 pub(crate) use grid::line_at;
 use grid::{Variant, variants};
-pub use schema::plan_schema;
+pub use schema::{plan_schema, plan_schema_of};
 
 use crate::StudyError;
 
@@ -237,9 +237,11 @@ impl Plan {
         }
         let known: BTreeSet<&str> = plan.cells.iter().map(|cell| cell.scenario.as_str()).collect();
         let mut names = BTreeSet::new();
+        let whole = estimator_table::whole_keys();
+        let whole: Vec<&str> = whole.iter().map(String::as_str).collect();
         for table in &estimators {
             let first_line = line_at(text, table.span().start);
-            for (i, variant) in variants(table, text, &estimator_table::WHOLE)?.into_iter().enumerate() {
+            for (i, variant) in variants(table, text, &whole)?.into_iter().enumerate() {
                 let estimator = EstimatorCell::of(&variant)?;
                 let problem = |key: &str, reason: String| PlanProblem {
                     line: variant.line_of_key(key).or(Some(first_line)),

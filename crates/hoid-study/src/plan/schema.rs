@@ -2,16 +2,23 @@
 //!
 //! It is made of the types that read plans and of the schema of a scenario file, in which each single value may also be a list.
 
+use hoid_ident::settings::{Kind, MethodSpec};
+use hoid_track::Method;
 use schemars::{SchemaGenerator, generate::SchemaSettings};
 use serde_json::{Map, Value, json};
 
 use super::{
     Head,
-    estimator_table::{EstimatorTable, WHOLE},
+    estimator_table::{EstimatorTable, plan_key, whole_keys},
 };
 
 /// The schema (draft 2020-12) as text.
 pub fn plan_schema() -> String {
+    plan_schema_of(&Method::registry())
+}
+
+/// The schema with the options of these methods.
+pub fn plan_schema_of(methods: &[MethodSpec]) -> String {
     let settings = || SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
     let of = |generator: SchemaGenerator, which: u8| match which {
         0 => generator.into_root_schema_for::<Head>(),
@@ -20,7 +27,10 @@ pub fn plan_schema() -> String {
     let mut plan = of(settings().into_generator(), 0).to_value();
     let mut estimator = of(settings().into_generator(), 1).to_value();
     let mut scenario: Value = serde_json::from_str(&hoid_io::scenario_schema()).unwrap_or_default();
-    for (table, whole) in [(&mut estimator, WHOLE.as_slice()), (&mut scenario, &["forcing"])] {
+    add_settings(&mut estimator, methods);
+    let whole = whole_keys();
+    let whole: Vec<&str> = whole.iter().map(String::as_str).collect();
+    for (table, whole) in [(&mut estimator, whole.as_slice()), (&mut scenario, &["forcing"])] {
         strip(table);
         with_lists(table, whole);
     }
@@ -36,6 +46,49 @@ pub fn plan_schema() -> String {
         plan.insert("title".to_owned(), "Plan of a hoid study".into());
     }
     format!("{plan:#}\n")
+}
+
+/// The options of the recursive methods, as the registry has them.
+fn add_settings(estimator: &mut Value, methods: &[MethodSpec]) {
+    let Some(table) = estimator.as_object_mut() else { return };
+    table.insert("additionalProperties".to_owned(), false.into());
+    let Some(properties) = table.get_mut("properties").and_then(Value::as_object_mut) else {
+        return;
+    };
+    for setting in methods.iter().flat_map(|spec| &spec.settings) {
+        let key = plan_key(setting);
+        if properties.contains_key(&key) {
+            continue;
+        }
+        let of: Vec<&str> = methods
+            .iter()
+            .filter(|spec| spec.settings.iter().any(|other| other.name == setting.name))
+            .map(|spec| spec.name)
+            .collect();
+        let mut schema = of_kind(setting.kind);
+        if let Some(schema) = schema.as_object_mut() {
+            let text = format!("{}. For {}.", setting.help, of.join(", "));
+            schema.insert("description".to_owned(), text.into());
+        }
+        properties.insert(key, schema);
+    }
+}
+
+/// The schema of a type of values.
+fn of_kind(kind: Kind) -> Value {
+    match kind {
+        Kind::Flag => json!({ "type": "boolean" }),
+        Kind::Count => json!({ "type": "integer", "minimum": 0 }),
+        Kind::Number => json!({ "type": "number" }),
+        Kind::Memory => json!({ "type": ["number", "string"] }),
+        Kind::Span => json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 }),
+        Kind::OpenSpan | Kind::Channel => json!({ "type": "string" }),
+        Kind::Choice(words) => json!({ "enum": words }),
+        Kind::Named(of) => {
+            // `name` labels a table among others.
+            json!({ "type": "object", "additionalProperties": of_kind(*of), "properties": { "name": { "type": "string" } } })
+        }
+    }
 }
 
 /// Parts that belong to a schema of its own.

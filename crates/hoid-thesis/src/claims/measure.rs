@@ -239,9 +239,12 @@ fn forgets(estimator: &EstimatorCell, parameter: &str) -> bool {
         Memory::Seconds(t) => *t <= LONGEST_S,
         Memory::Infinite => false,
     };
-    match options.memory_of.get("b") {
+    let Some(given) = options.method.memories() else {
+        return false;
+    };
+    match given.memory_of.get("b") {
         Some(of_b) if ["K_e", "T_L", "K_e_dot"].contains(&parameter) => is_short(of_b),
-        _ => options.memory.as_ref().is_some_and(is_short) && options.memory_of.values().all(is_short),
+        _ => given.memory.0.as_ref().is_some_and(is_short) && given.memory_of.values().all(is_short),
     }
 }
 

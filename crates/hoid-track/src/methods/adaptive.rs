@@ -5,7 +5,7 @@
 //!
 //! The numbers were set on conditions C3 and C5 with remnants of order 2 and 3; the errors change by a tenth or less when any of them is halved or doubled.
 
-use std::ops::RangeInclusive;
+use std::{collections::BTreeMap, ops::RangeInclusive};
 
 use hoid_core::{
     adaptive::{
@@ -19,23 +19,32 @@ use hoid_core::{
     state::{State, visit_all},
 };
 use hoid_model::{
-    SampleTime,
+    SampleTime, Structure,
     uncertainty::{Estimate, OperatorEstimate},
 };
 
+use hoid_ident::{
+    Constraint, IdentError, settings,
+    settings::{Bounds, Settings},
+};
+
 use crate::{
-    Change,
-    options::TrackOptions,
+    change::Change,
+    memory::Memory,
+    method::{About, RecursiveMethod, bad as bad_option, check_delay, check_operator_orders},
     recursion::{Recursion, Sample, StepOutcome},
     reported::Reported,
+    setup::{Setup, StartAt},
+    shared_options::{BoundOptions, DelayOptions},
     start::{self, StartState},
 };
-use hoid_ident::IdentError;
 
 /// Room for hypotheses where the delay is known, where it is not, and the largest order of the noise model.
 const HYPOTHESES: usize = 16;
 const WITH_DELAYS: usize = 48;
 pub(crate) const LARGEST_ND: usize = 8;
+/// Standard deviations beyond which an innovation moves the estimate no further.
+const LIMIT: f64 = 3.5;
 /// Time between two births, s.
 const SPACING_S: f64 = 0.32;
 /// Mean time between two changes, s.
@@ -73,10 +82,155 @@ const NEIGHBOUR: f64 = 0.15;
 /// What 0.01 s of delay is worth in K_e, K_e_dot, omega_nm and zeta_nm, in the units of [`Delays::worth`].
 const WORTH: [f64; OPERATOR] = [0.01, 0.03, 0.04, 0.08];
 
+/// Order of the noise model when none is named: the odds need innovations that are white.
+const USUAL_ND: usize = 6;
+
+settings! {
+    /// Options of the bank of hypotheses.
+    pub struct AdaptiveOptions {
+        /// Logarithm of the odds from which a change is declared
+        pub alarm: f64 = 6.0,
+        /// Standard deviations beyond which an innovation moves the estimate no further
+        #[setting(bounds(Bounds::Positive), default("3.5"))]
+        pub limit: Option<f64> = None,
+        /// At each sample what all of a recorded run says of it, by hypotheses run from both ends, in place of what the past alone says
+        pub smooth: bool = false,
+    }
+    groups {
+        /// Bounds.
+        pub bounds: BoundOptions,
+        /// A delay that is followed.
+        pub delay: DelayOptions,
+    }
+}
+
+impl RecursiveMethod for AdaptiveOptions {
+    fn about(&self) -> About {
+        About {
+            name: "adaptive",
+            help: "a bank of hypotheses of when the person changed, which sets its memory itself and tells of changes",
+            source: "Andersson 1985; Willsky and Jones 1976; Adams and MacKay 2007; the book, page A person who changes",
+            structures: &[Structure::BoxJenkins, Structure::OutputError],
+            defaults: &[],
+        }
+    }
+
+    fn settings(&self) -> &dyn Settings {
+        self
+    }
+
+    fn settings_mut(&mut self) -> &mut dyn Settings {
+        self
+    }
+
+    fn usual_nd(&self) -> Option<usize> {
+        Some(USUAL_ND)
+    }
+
+    /// It follows from a model of the change.
+    fn usual_memory(&self, _parameter: &str) -> Memory {
+        Memory::Infinite
+    }
+
+    fn check(&self, setup: &Setup) -> Result<(), IdentError> {
+        check_model_of_change("adaptive", setup)?;
+        if self.smooth && self.delay.track_delay_s.is_some() {
+            return Err(bad_option(
+                "the range of the delay",
+                "with the two-sided estimate".to_owned(),
+                "a delay that is given or searched on the start span: past and future are joined for one delay",
+            ));
+        }
+        Ok(())
+    }
+
+    fn build(
+        &self,
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Box<dyn Recursion>, IdentError> {
+        match setup.track_delay_s {
+            None => Ok(Box::new(AdaptiveRecursion::<HYPOTHESES>::new(
+                self,
+                setup,
+                from,
+                sample_time,
+            )?)),
+            Some(_) => Ok(Box::new(AdaptiveRecursion::<WITH_DELAYS>::new(
+                self,
+                setup,
+                from,
+                sample_time,
+            )?)),
+        }
+    }
+
+    fn is_physical(&self) -> bool {
+        true
+    }
+
+    fn is_model_of_change(&self) -> bool {
+        true
+    }
+
+    fn memory_in_words(&self) -> Option<String> {
+        Some(format!(
+            "since the last change, by a bank of hypotheses; a change is declared at log odds of {}",
+            self.alarm
+        ))
+    }
+
+    fn smooths(&self) -> bool {
+        self.smooth
+    }
+
+    fn limit(&self) -> f64 {
+        self.limit.unwrap_or(LIMIT)
+    }
+
+    fn bounds(&self) -> BTreeMap<String, Constraint> {
+        self.bounds.bound.clone()
+    }
+
+    fn track_delay_s(&self) -> Option<(f64, f64)> {
+        self.delay.track_delay_s
+    }
+
+    fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
+        self.bounds.bound.retain(|key, _| known(key));
+    }
+}
+
+/// Checks what a method needs that has a model of how the person changes.
+///
+/// # Errors
+/// [`IdentError::BadOption`].
+pub(crate) fn check_model_of_change(name: &str, setup: &Setup) -> Result<(), IdentError> {
+    check_operator_orders(name, setup)?;
+    check_delay(&setup.orders)?;
+    let o = &setup.orders;
+    if !(o.nc == 0 && o.nd <= LARGEST_ND) {
+        return Err(bad_option(
+            &format!("the noise model of {name}"),
+            format!("nc={},nd={}", o.nc, o.nd),
+            "nc = 0 and nd of at most 8",
+        ));
+    }
+    if !matches!(setup.start, StartAt::Span(_)) {
+        return Err(bad_option(
+            &format!("the start of {name}"),
+            "no batch fit".to_owned(),
+            "the batch fit of a span, whose noise model and covariance it needs",
+        ));
+    }
+    Ok(())
+}
+
 /// The delays in question, in samples of nk: nk itself, or those of the range that is tracked.
-fn delays(options: &TrackOptions, sample_time: SampleTime) -> RangeInclusive<usize> {
-    match options.track_delay_s {
-        None => options.orders.nk..=options.orders.nk,
+fn delays(setup: &Setup, sample_time: SampleTime) -> RangeInclusive<usize> {
+    match setup.track_delay_s {
+        None => setup.orders.nk..=setup.orders.nk,
         Some((low, high)) => {
             let nk = |delay_s: f64| (delay_s / sample_time.s()).round().max(0.0) as usize + 1;
             nk(low)..=nk(high)
@@ -84,16 +238,20 @@ fn delays(options: &TrackOptions, sample_time: SampleTime) -> RangeInclusive<usi
     }
 }
 
-/// The suppositions in samples.
+/// What is supposed of changes, in samples.
 ///
 /// # Errors
 /// As [`start::physical_bounds`].
-pub(crate) fn suppositions(options: &TrackOptions, sample_time: SampleTime) -> Result<Suppositions, IdentError> {
+pub(crate) fn change_prior(
+    options: &AdaptiveOptions,
+    setup: &Setup,
+    sample_time: SampleTime,
+) -> Result<Suppositions, IdentError> {
     let ts = sample_time.s();
     let spacing = (SPACING_S / ts).round().max(1.0);
     Ok(Suppositions {
         sample_time: ts,
-        bounds: start::physical_bounds::<OPERATOR>(options, sample_time)?,
+        bounds: start::physical_bounds::<OPERATOR>(setup, sample_time)?,
         spacing: spacing as u32,
         // Where samples are further apart than changes are supposed to be, half of them.
         hazard: (ts / BETWEEN_CHANGES_S).min(0.5 / spacing),
@@ -107,11 +265,11 @@ pub(crate) fn suppositions(options: &TrackOptions, sample_time: SampleTime) -> R
         crossover: CROSSOVER_RAD_S,
         doubt: (DOUBT_S / ts).max(4.0),
         protected: (PROTECTED_BIRTHS * spacing) as u64,
-        limit: options.limit_in_use(),
+        limit: setup.limit,
         settled: (SETTLED_S / ts).round() as u64,
         recent: (RECENT_S / ts).round().max(2.0 * spacing) as u64,
         threshold: options.alarm,
-        delays: match delays(options, sample_time).count() {
+        delays: match delays(setup, sample_time).count() {
             1 => Delays::KNOWN,
             count => Delays {
                 count,
@@ -157,29 +315,6 @@ pub(crate) fn outside() -> IdentError {
     bad("it lies outside the bounds of the physical parameters, or its covariance is not positive")
 }
 
-/// The recursion, from the batch fit of the start span.
-///
-/// # Errors
-/// [`IdentError::BadStart`] without a fit, or with a delay that is not in question.
-pub(crate) fn build(
-    options: &TrackOptions,
-    from: &StartState,
-    sample_time: SampleTime,
-) -> Result<Box<dyn Recursion>, IdentError> {
-    match options.track_delay_s {
-        None => Ok(Box::new(AdaptiveRecursion::<HYPOTHESES>::new(
-            options,
-            from,
-            sample_time,
-        )?)),
-        Some(_) => Ok(Box::new(AdaptiveRecursion::<WITH_DELAYS>::new(
-            options,
-            from,
-            sample_time,
-        )?)),
-    }
-}
-
 /// The bank with its filters and its delay line, which is as long as the shortest delay.
 struct AdaptiveRecursion<const M: usize> {
     model: Box<Adaptive<M, LARGEST_ND, Vec<Signals>>>,
@@ -190,8 +325,13 @@ struct AdaptiveRecursion<const M: usize> {
 }
 
 impl<const M: usize> AdaptiveRecursion<M> {
-    fn new(options: &TrackOptions, from: &StartState, sample_time: SampleTime) -> Result<Self, IdentError> {
-        let (nk, delays) = (options.orders.nk, delays(options, sample_time));
+    fn new(
+        options: &AdaptiveOptions,
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Self, IdentError> {
+        let (nk, delays) = (setup.orders.nk, delays(setup, sample_time));
         let shortest = *delays.start();
         if !delays.contains(&nk) {
             return Err(bad(&format!(
@@ -202,7 +342,8 @@ impl<const M: usize> AdaptiveRecursion<M> {
         let first = first_hypothesis(from, 1.0, sample_time)?.delayed(nk - shortest);
         let d = &from.values[OPERATOR..];
         let memory = vec![[0.0; 6]; delays.count()];
-        let model = Adaptive::with_delays(first, d, suppositions(options, sample_time)?, memory).ok_or_else(outside)?;
+        let model =
+            Adaptive::with_delays(first, d, change_prior(options, setup, sample_time)?, memory).ok_or_else(outside)?;
         Ok(Self {
             model: Box::new(model),
             delay: DelayLine::new(vec![0.0; shortest]),

@@ -10,23 +10,116 @@
 
 use hoid_core::{
     delay::DelayLine,
-    predictor::AnyShape,
+    predictor::{AnyShape, Regressor},
+    recursion::Stable,
     rls::Rls,
     state::{State, visit_all},
 };
 use hoid_model::{Orders, SampleTime, Structure};
 
+use hoid_ident::{
+    IdentError, settings,
+    settings::{Bounds, Settings},
+};
+
+use super::rpem::LIMIT;
 use crate::{
     gain::{self, Gain},
-    kernel,
-    options::{Method, TrackOptions},
+    kernel::{Kernel, Plan},
+    memory::{Memory, MemoryOptions},
+    method::{About, RecursiveMethod, check_operator_orders},
     recursion::{Recursion, Sample, StepOutcome},
+    setup::Setup,
+    shared_options::StabilityOptions,
     start::StartState,
 };
-use hoid_ident::IdentError;
 
 /// Coefficients of B.
 const B: usize = 2;
+
+settings! {
+    /// Options of least squares with the poles of the prediction-error method.
+    pub struct FusedOptions {
+        /// Covariance P at the start: X times the unit matrix, in units of the innovation variance (the reference text: 0.1)
+        #[setting(bounds(Bounds::PositiveFinite), default("that of the start fit; 1e6 where there is none"))]
+        pub covariance: Option<f64> = None,
+        /// Standard deviations beyond which an innovation moves the estimate no further
+        #[setting(bounds(Bounds::Positive), default("5"))]
+        pub limit: Option<f64> = None,
+    }
+    groups {
+        /// Memories.
+        pub memories: MemoryOptions,
+        /// Stability.
+        pub stability: StabilityOptions,
+    }
+}
+
+impl RecursiveMethod for FusedOptions {
+    fn about(&self) -> About {
+        About {
+            name: "fused",
+            help: "least squares for B with the poles of rpem, for comparison",
+            source: "the reference text, section VII",
+            structures: &[Structure::BoxJenkins, Structure::OutputError],
+            defaults: &[("memory", "2.56s for b, inf for the others")],
+        }
+    }
+
+    fn settings(&self) -> &dyn Settings {
+        self
+    }
+
+    fn settings_mut(&mut self) -> &mut dyn Settings {
+        self
+    }
+
+    fn usual_memory(&self, parameter: &str) -> Memory {
+        if parameter.starts_with('b') {
+            Memory::Seconds(2.56)
+        } else {
+            Memory::Infinite
+        }
+    }
+
+    fn check(&self, setup: &Setup) -> Result<(), IdentError> {
+        check_operator_orders("fused", setup)
+    }
+
+    fn build(
+        &self,
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Box<dyn Recursion>, IdentError> {
+        Ok(Box::new(FusedRecursion::new(
+            setup,
+            self.limit.unwrap_or(f64::INFINITY),
+            from,
+            sample_time,
+        )?))
+    }
+
+    fn memories(&self) -> Option<&MemoryOptions> {
+        Some(&self.memories)
+    }
+
+    fn covariance(&self) -> Option<f64> {
+        self.covariance
+    }
+
+    fn limit(&self) -> f64 {
+        self.limit.unwrap_or(LIMIT)
+    }
+
+    fn stable(&self) -> Stable {
+        self.stability.stable
+    }
+
+    fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
+        self.memories.memory_of.retain(|key, _| known(key));
+    }
+}
 
 /// RLS beside RPEM.
 pub(crate) struct FusedRecursion {
@@ -52,16 +145,16 @@ impl State for FusedRecursion {
 }
 
 impl FusedRecursion {
-    /// From the same start as the prediction-error method.
+    /// From the same start as the prediction-error method; least squares has no limit of its own.
     ///
     /// # Errors
     /// As that.
-    pub(crate) fn new(options: &TrackOptions, from: &StartState, sample_time: SampleTime) -> Result<Self, IdentError> {
-        let rpem = TrackOptions {
-            method: Method::Rpem,
-            memory_of: named(options)?,
-            ..options.clone()
-        };
+    pub(crate) fn new(
+        setup: &Setup,
+        limit_of_b: f64,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Self, IdentError> {
         let p = from.values.len();
         let of_b = |matrix: &[f64]| -> Vec<f64> { (0..B * B).map(|k| matrix[k / B * p + k % B]).collect() };
         let start = StartState {
@@ -71,18 +164,16 @@ impl FusedRecursion {
             fit: None,
             ..from.clone()
         };
-        let mut memory_of = rpem.memory_of.clone();
-        memory_of.retain(|name, _| name.starts_with('b'));
-        let linear = TrackOptions {
-            method: Method::Rls,
+        let linear = Setup {
             structure: Structure::Fir,
             orders: Orders {
                 nb: B,
-                nk: options.orders.nk,
+                nk: setup.orders.nk,
                 ..Orders::default()
             },
-            memory_of,
-            ..options.clone()
+            memories: setup.memories.iter().take(B).cloned().collect(),
+            limit: limit_of_b,
+            ..setup.clone()
         };
         let shape = AnyShape {
             na: 0,
@@ -91,16 +182,16 @@ impl FusedRecursion {
             nd: 0,
             nf: 0,
         };
-        let gain = Gain::new(&linear, &start, sample_time)?;
+        let gain = Gain::new(&linear, &start, sample_time, false)?;
         let bars = gain::error_bars(&linear, &start, sample_time)?;
         let values = [start.values[0], start.values[1]];
         let rls = Rls::new(shape, values, gain, bars).ok_or_else(|| IdentError::BadStart {
             reason: "it has no coefficients of B".to_owned(),
         })?;
         Ok(Self {
-            rpem: kernel::build(&rpem, from, sample_time)?,
+            rpem: Plan::new(setup, from, sample_time).build(Kernel::PredictionError(Regressor::Gradient))?,
             rls,
-            delay: DelayLine::new(vec![0.0; options.orders.nk]),
+            delay: DelayLine::new(vec![0.0; setup.orders.nk]),
             past: [0.0; 2],
             theta: from.values.clone(),
         })
@@ -118,15 +209,9 @@ impl FusedRecursion {
         self.theta[..B].copy_from_slice(&self.rls.theta()[..B]);
     }
 
-    fn take(&mut self, u: f64) {
+    fn remember(&mut self, u: f64) {
         self.past = [u, self.past[0]];
     }
-}
-
-/// The memories of all parameters by name: those of the fused method are not those of the prediction-error method.
-fn named(options: &TrackOptions) -> Result<std::collections::BTreeMap<String, crate::Memory>, IdentError> {
-    let names = options.parameter_names();
-    Ok(names.into_iter().zip(options.memories()?).collect())
 }
 
 impl Recursion for FusedRecursion {
@@ -135,7 +220,7 @@ impl Recursion for FusedRecursion {
         let of_rpem = self.rpem.step(sample);
         let y = self.filtered(sample.u);
         let of_rls: StepOutcome = self.rls.step(x, y).into();
-        self.take(sample.u);
+        self.remember(sample.u);
         self.join();
         StepOutcome {
             innovation: of_rls.innovation,
@@ -148,7 +233,7 @@ impl Recursion for FusedRecursion {
         self.rpem.follow(sample);
         let y = self.filtered(sample.u);
         let taken = self.rls.follow(x, y).into();
-        self.take(sample.u);
+        self.remember(sample.u);
         taken
     }
 
@@ -158,7 +243,7 @@ impl Recursion for FusedRecursion {
         // eps of an output of zero is the prediction with its sign changed.
         let y = self.filtered(0.0);
         let predicted = -self.rls.follow(x, y).innovation;
-        self.take(crate::past::bounded(predicted));
+        self.remember(crate::past::bounded(predicted));
     }
 
     fn theta(&self) -> &[f64] {

@@ -13,14 +13,22 @@
 use hoid_core::state::{State, visit_all};
 use std::collections::VecDeque;
 
-use hoid_model::{Channel, Record, SampleTime};
+use hoid_model::{Channel, Record, SampleTime, Structure};
 
-use hoid_ident::{Estimator, Fit, IdentError, first_residual};
+use hoid_ident::{
+    Estimator, Fit, IdentError, first_residual, settings,
+    settings::{Bounds, Settings, Value},
+};
 
+use super::rpem::gain_fast;
 use crate::{
+    memory::Memory,
+    method::{About, RecursiveMethod, bad},
     past::bounded,
     predictor::Predictor,
     recursion::{Recursion, Sample, StepOutcome},
+    setup::{Setup, StartAt},
+    start::StartState,
 };
 
 /// Fits from the last theta between two comparisons with the estimator's own starts.
@@ -31,6 +39,71 @@ const SUSPICIOUS: f64 = 0.25;
 const FIRST_SHARE: usize = 4;
 /// Residuals for each unknown that are enough for a first fit.
 const RESIDUALS_EACH: usize = 5;
+
+settings! {
+    /// Options of the sliding window.
+    pub struct WindowOptions {
+        /// Length of the window: samples or seconds
+        pub window: Memory = Memory::Seconds(20.0),
+        /// Samples between two fits
+        #[setting(unit("samples"), bounds(Bounds::AtLeast(1.0)))]
+        pub refit: usize = 25,
+    }
+}
+
+impl RecursiveMethod for WindowOptions {
+    fn about(&self) -> About {
+        About {
+            name: "window",
+            help: "a batch fit of the last seconds, again and again",
+            source: "the reference text, section VII",
+            structures: &Structure::ALL,
+            defaults: &[],
+        }
+    }
+
+    fn settings(&self) -> &dyn Settings {
+        self
+    }
+
+    fn settings_mut(&mut self) -> &mut dyn Settings {
+        self
+    }
+
+    /// Not used: the window is what it remembers.
+    fn usual_memory(&self, parameter: &str) -> Memory {
+        gain_fast(parameter)
+    }
+
+    fn memory_in_words(&self) -> Option<String> {
+        let window = self.window.text().unwrap_or_default();
+        Some(format!("window of {window}, a fit every {} samples", self.refit))
+    }
+
+    fn check(&self, _setup: &Setup) -> Result<(), IdentError> {
+        match (self.window, self.refit) {
+            (Memory::Infinite, _) => Err(bad("the window", "inf".to_owned(), "samples or seconds")),
+            (_, 0) => Err(bad("the samples between two fits", "0".to_owned(), "1 or more")),
+            _ => Ok(()),
+        }
+    }
+
+    fn build(
+        &self,
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Box<dyn Recursion>, IdentError> {
+        let covariance: Vec<f64> = from.spread.iter().map(|s| s * from.variance).collect();
+        let known = match setup.start {
+            StartAt::Nothing => None,
+            _ => Some((from.values.as_slice(), from.from_fit.then_some(covariance.as_slice()))),
+        };
+        let window = self.window.samples(sample_time)?;
+        let recursion = WindowRecursion::new(setup.start_estimator(), sample_time, window, self.refit, known)?;
+        Ok(Box::new(recursion))
+    }
+}
 
 /// The recursion.
 #[derive(Debug, Clone)]

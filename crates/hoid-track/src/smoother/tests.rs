@@ -1,5 +1,6 @@
 #![allow(clippy::unwrap_used)]
 use super::*;
+use crate::TrackOptions;
 use crate::{Method, StartAt, track};
 use hoid_model::{
     Channel, SampleTime,
@@ -64,12 +65,11 @@ fn a_past_and_a_future_that_contradict_each_other_are_not_joined() {
 
 fn options() -> TrackOptions {
     TrackOptions {
-        smooth: true,
         start: StartAt::Span(Some((0.0, 30.72))),
         ..TrackOptions::new(
-            Method::Adaptive,
-            Method::Adaptive.usual_structure(),
-            Method::Adaptive.usual_orders(29),
+            Method::adaptive().with("smooth", "true").unwrap(),
+            Method::adaptive().usual_structure(),
+            Method::adaptive().usual_orders(29),
         )
     }
 }
@@ -139,11 +139,8 @@ fn a_record_with_faults_and_one_that_is_too_short() {
 
 #[test]
 fn other_methods_have_no_two_sided_estimate() {
-    for method in Method::ALL.into_iter().filter(|m| *m != Method::Adaptive) {
-        let options = TrackOptions {
-            smooth: true,
-            ..TrackOptions::new(method, method.usual_structure(), method.usual_orders(29))
-        };
-        assert!(options.check().is_err(), "{method:?}");
+    for method in Method::all().into_iter().filter(|m| *m != Method::adaptive()) {
+        let name = method.name();
+        assert!(method.with("smooth", "true").is_err(), "{name}");
     }
 }

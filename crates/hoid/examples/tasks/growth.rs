@@ -83,11 +83,10 @@ fn work(name: &str, parameters: Option<usize>) -> Box<dyn Fn(&Record)> {
             })
         }
         "rls" | "rpem" => {
-            let mut options = traced(if method == "rls" { Method::Rls } else { Method::Rpem });
+            let mut options = traced(if method == "rls" { Method::rls() } else { Method::rpem() });
             if let Some(p) = parameters {
                 options = TrackOptions {
                     start: StartAt::Theta(vec![0.0; p]),
-                    covariance: StartCovariance::Multiple(0.1),
                     orders: half(p),
                     ..options
                 };

@@ -124,7 +124,11 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
             median(effort, || rpem(record.input(), record.output(), &mut history).to_vec())
         }
         "rls trace" | "rpem trace" => {
-            let method = if task == "rls trace" { Method::Rls } else { Method::Rpem };
+            let method = if task == "rls trace" {
+                Method::rls()
+            } else {
+                Method::rpem()
+            };
             let options = traced(method);
             median(effort, || {
                 let trace = track(&record, &options, 1).unwrap();
@@ -246,15 +250,17 @@ pub fn rpem(e: &[f64], u: &[f64], history: &mut Vec<[f64; 5]>) -> [f64; 5] {
 /// The same start and memory through `track`.
 pub fn traced(method: Method) -> TrackOptions {
     let structure = method.usual_structure();
-    TrackOptions {
-        memory: Some(Memory::Samples(MEMORY)),
-        start: StartAt::Theta(match method {
-            Method::Rls => vec![0.0; 4],
-            _ => RPEM_START.to_vec(),
-        }),
-        covariance: StartCovariance::Multiple(0.1),
+    let start = StartAt::Theta(match method {
+        Method::Rls(_) => vec![0.0; 4],
+        _ => RPEM_START.to_vec(),
+    });
+    let options = TrackOptions {
+        start,
         ..TrackOptions::new(method, structure, structure.operator_orders(NK))
-    }
+    };
+    options
+        .with(&[("memory", &MEMORY.to_string()), ("covariance", "0.1")])
+        .unwrap()
 }
 
 /// What a measurement gives: median time in s, and the last answer.

@@ -38,6 +38,11 @@ const PATIENCE: Duration = Duration::from_secs(1);
 pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     let sample_time = SampleTime::new(1.0 / args.fs)?;
     let plan = Plan::new(&args.recursion, sample_time)?;
+    if plan.options().method.smooths() {
+        return Err(CliError::Usage(
+            "--smooth belongs to hoid track: what is still to come cannot say anything of a stream".to_owned(),
+        ));
+    }
     if args.recursion.start.is_some() && !plan.is_settled() {
         return Err(CliError::Usage(
             "--start leaves no warm-up to search nk and orders on; give --nk and --orders as single numbers, as --nk 29 \
@@ -99,7 +104,7 @@ impl Session {
                 "--warm-up {length_s}: expected a time in s of one sample to 10 million"
             )));
         }
-        let with_input = recursion::structure(&args.recursion).has_input();
+        let with_input = recursion::structure(&args.recursion)?.has_input();
         let largest = plan.options().largest;
         let mut session = Self {
             live: Live::new(plan.options(), samples as usize, sample_time)?,

@@ -7,7 +7,7 @@ pub use result::relative_errors;
 
 use hoid_io::{check_table_path, write_table};
 use hoid_model::Record;
-use hoid_track::{Method, StartAt, TrackOptions, track};
+use hoid_track::{StartAt, TrackOptions, track};
 
 use crate::{args::TrackArgs, error::CliError, json, output, recursion, recursion::Plan};
 use result::Tracked;
@@ -17,7 +17,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     if !args.batch.is_empty() && args.report.is_none() {
         return Err(CliError::Usage("--batch belongs to --report".to_owned()));
     }
-    let with_input = recursion::structure(&args.recursion).has_input();
+    let with_input = recursion::structure(&args.recursion)?.has_input();
     let (record, account) = super::reading::read(&args.record, &args.read, with_input)?;
     let plan = Plan::new(&args.recursion, record.sample_time())?;
     let span_s = start_span(args, &plan, &record)?;
@@ -31,12 +31,8 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         StartAt::Span(_) => StartAt::Span(Some(span_s)),
         other => other,
     };
-    if args.smooth && options.method != Method::Adaptive {
-        return Err(CliError::Usage("--smooth belongs to --method adaptive".to_owned()));
-    }
     let options = TrackOptions {
         start,
-        smooth: args.smooth,
         update_from_s: update_from(args, &record)?,
         ..options
     };
@@ -54,7 +50,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
             StartAt::Nothing => "nothing".to_owned(),
         },
     ));
-    if args.smooth {
+    if options.method.smooths() {
         settings.push(("estimate".to_owned(), "two-sided, of the whole record".to_owned()));
     } else {
         settings.push((

@@ -4,7 +4,7 @@
 //!
 //! (A. H. Jazwinski, *Stochastic Processes and Filtering Theory*, 1970, section 8.3; the last in the form of P. D. Joseph).
 
-use super::{Belief, Matrix, Model, N};
+use super::belief::{Belief, Matrix, Model, N};
 
 /// Takes a sample; returns the innovation and its variance as expected.
 pub(crate) fn step(model: &Model, belief: &mut Belief, e: f64, u: f64) -> [f64; 2] {

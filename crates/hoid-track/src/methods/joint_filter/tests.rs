@@ -1,5 +1,10 @@
 #![allow(clippy::unwrap_used)]
-use super::*;
+use super::{
+    belief::{Belief, ETA, Model, N},
+    ekf,
+    filter::power,
+    ukf,
+};
 use hoid_core::adaptive::response::Response;
 
 const MODEL: Model = Model {

@@ -2,7 +2,7 @@
 //! (S. J. Julier and J. K. Uhlmann, *Proceedings of the IEEE* 92 (2004) 401-422, with kappa = 0). The points are drawn anew after the noise of
 //! the transition has been added. `X <- X + c/s eps`, `P <- P - c c'/s`, with c the covariance of X with the output and s the variance of the output.
 
-use super::{Belief, Matrix, Model, N};
+use super::belief::{Belief, Matrix, Model, N};
 
 /// Takes a sample; returns the innovation and its variance as expected.
 pub(crate) fn step(model: &Model, belief: &mut Belief, e: f64, u: f64) -> [f64; 2] {

@@ -1,0 +1,248 @@
+//! Pages and types that are made from the registry of methods: the book's page of options and the keywords of the Python package.
+//!
+//! `HOID_UPDATE_DOCS=1 cargo test -p hoid-cli` renews them.
+
+use hoid_ident::settings::{Kind, MethodSpec, Setting};
+use hoid_track::Method;
+
+/// The type of a value in words.
+fn kind_in_words(kind: Kind) -> String {
+    match kind {
+        Kind::Flag => "flag".to_owned(),
+        Kind::Count => "whole number".to_owned(),
+        Kind::Number => "number".to_owned(),
+        Kind::Memory => "`256` samples, `2.56s` or `inf`".to_owned(),
+        Kind::Span => "`LO..HI`".to_owned(),
+        Kind::OpenSpan => "`LO..HI`, either end may be left out".to_owned(),
+        Kind::Choice(words) => words
+            .iter()
+            .map(|word| format!("`{word}`"))
+            .collect::<Vec<_>>()
+            .join(", "),
+        Kind::Channel => "name of a channel".to_owned(),
+        Kind::Named(of) => format!("`NAME=VALUE,...`, each {}", kind_in_words(*of)),
+    }
+}
+
+/// The page of the book.
+fn options_page(methods: &[MethodSpec]) -> String {
+    let mut page = "# Options of the recursive methods\n\nEach option is a flag of `hoid track` and `hoid stream` (with hyphens), a key of an estimator in a \
+                    plan, and a keyword of `pyhoid.track` and `pyhoid.Tracker`. In a plan a range of times carries its unit (`track_delay_s`); in \
+                    Python `lambda` is called `forgetting_factor`.\n"
+        .to_owned();
+    for spec in methods {
+        let structures: Vec<&str> = spec.structures.iter().map(|structure| structure.name()).collect();
+        page.push_str(&format!(
+            "\n## {}\n\nWhat it is: {}.\nStructures: {}.\nSource: {}.\n\n",
+            spec.name,
+            spec.help,
+            structures.join(", "),
+            spec.source
+        ));
+        page.push_str("| option | type | unit | default | bounds | what it does |\n|---|---|---|---|---|---|\n");
+        for setting in &spec.settings {
+            let bounds = match setting.kind {
+                Kind::Count | Kind::Number | Kind::Span | Kind::Named(Kind::Number) => setting.bounds.to_string(),
+                _ => String::new(),
+            };
+            page.push_str(&format!(
+                "| `{}` | {} | {} | {} | {bounds} | {} |\n",
+                setting.name,
+                kind_in_words(setting.kind),
+                setting.unit,
+                setting.default,
+                setting.help
+            ));
+        }
+    }
+    page
+}
+
+/// The keyword in Python, which keeps the word lambda for itself.
+fn keyword(name: &str) -> &str {
+    match name {
+        "lambda" => "forgetting_factor",
+        name => name,
+    }
+}
+
+fn python_type(kind: Kind) -> String {
+    match kind {
+        Kind::Flag => "bool".to_owned(),
+        Kind::Count => "int".to_owned(),
+        Kind::Number => "float".to_owned(),
+        Kind::Memory => "float | str".to_owned(),
+        Kind::Span => "tuple[float, float]".to_owned(),
+        Kind::OpenSpan => "tuple[float | None, float | None]".to_owned(),
+        Kind::Choice(words) => format!("Literal[{}]", quoted(words)),
+        Kind::Channel => "str".to_owned(),
+        Kind::Named(of) => format!("Mapping[str, {}]", python_type(*of)),
+    }
+}
+
+fn quoted(words: &[&str]) -> String {
+    words
+        .iter()
+        .map(|word| format!("\"{word}\""))
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+/// Lines of at most 96 columns, each behind `indent`.
+fn wrapped(text: &str, indent: &str) -> String {
+    let mut lines = vec![indent.to_owned()];
+    for word in text.split_whitespace() {
+        let last = lines.len() - 1;
+        if lines[last].len() > indent.len() && lines[last].len() + 1 + word.len() > 96 {
+            lines.push(format!("{indent}{word}"));
+        } else {
+            let space = if lines[last].len() > indent.len() { " " } else { "" };
+            lines[last] += &format!("{space}{word}");
+        }
+    }
+    lines.join("\n")
+}
+
+/// The keywords of the Python package.
+fn python_settings(methods: &[MethodSpec]) -> String {
+    let mut settings: Vec<(&Setting, Vec<&str>)> = Vec::new();
+    for spec in methods {
+        for setting in &spec.settings {
+            match settings.iter_mut().find(|(known, _)| known.name == setting.name) {
+                Some((_, of)) => of.push(spec.name),
+                None => settings.push((setting, vec![spec.name])),
+            }
+        }
+    }
+    let names: Vec<&str> = methods.iter().map(|spec| spec.name).collect();
+    let structures = hoid_model::Structure::ALL.map(|structure| structure.name());
+    let one_a_line = |words: &[&str]| {
+        words
+            .iter()
+            .map(|word| format!("    \"{word}\",\n"))
+            .collect::<String>()
+    };
+    let about = |setting: &Setting, of: &[&str]| {
+        let of = if of.len() < methods.len() {
+            format!(" For {}.", of.join(", "))
+        } else {
+            String::new()
+        };
+        format!("{}.{of}", setting.help)
+    };
+    let mut text = format!(
+        "\"\"\"The recursive methods and their options, made from the registry of the library.\n\n\
+         `HOID_UPDATE_DOCS=1 cargo test -p hoid-cli` renews this file; it is not edited by hand.\n\"\"\"\n\n\
+         from __future__ import annotations\n\nfrom collections.abc import Mapping\n\
+         from typing import Literal, TypedDict\n\n\
+         __all__ = [\"METHODS\", \"SETTINGS\", \"MethodSettings\", \"RecursiveMethod\", \"Structure\"]\n\n\
+         #: A recursive method.\nRecursiveMethod = Literal[\n{}]\n\n\
+         #: A polynomial structure.\nStructure = Literal[\n{}]\n\n\n\
+         class MethodSettings(TypedDict, total=False):\n    \"\"\"Options of the recursive methods.\"\"\"\n",
+        one_a_line(&names),
+        one_a_line(&structures),
+    );
+    for (setting, of) in &settings {
+        let kind = python_type(setting.kind);
+        let line = format!("    {}: {kind} | None", keyword(setting.name));
+        let line = match (line.len() > 100, setting.kind) {
+            (true, Kind::Choice(words)) => format!(
+                "    {}: (\n        Literal[\n{}        ]\n        | None\n    )",
+                keyword(setting.name),
+                words
+                    .iter()
+                    .map(|word| format!("            \"{word}\",\n"))
+                    .collect::<String>()
+            ),
+            _ => line,
+        };
+        text.push_str(&format!("\n{}\n{line}\n", wrapped(&about(setting, of), "    # ")));
+    }
+    text.push_str("\n\n#: The methods, as the documentation of `track` lists them.\nMETHODS = \"\"\"");
+    let methods_text: Vec<String> = methods
+        .iter()
+        .map(|spec| wrapped(&format!("``\"{}\"``: {};", spec.name, spec.help), "        "))
+        .collect();
+    text.push_str(methods_text.join("\n").trim_start().trim_end_matches(';'));
+    text.push_str(".\"\"\"\n\n#: The options, as the documentation of `track` lists them.\nSETTINGS = \"\"\"");
+    let settings_text: Vec<String> = settings
+        .iter()
+        .map(|(setting, of)| {
+            let head = format!(
+                "        {} : {}",
+                keyword(setting.name),
+                python_type(setting.kind).replace('"', "'")
+            );
+            format!("{head}\n{}", wrapped(&about(setting, of), "            "))
+        })
+        .collect();
+    text.push_str(settings_text.join("\n").trim_start());
+    text.push_str("\"\"\"\n");
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Command;
+    use hoid_ident::settings::Bounds;
+
+    use super::*;
+    use crate::args::with_settings;
+
+    fn is_as_written(path: &str, expected: &str) {
+        let path = format!("{}/../../{path}", env!("CARGO_MANIFEST_DIR"));
+        if std::env::var_os("HOID_UPDATE_DOCS").is_some() {
+            std::fs::write(&path, expected).unwrap();
+        }
+        let found = std::fs::read_to_string(&path).unwrap_or_default();
+        assert_eq!(
+            found, expected,
+            "run HOID_UPDATE_DOCS=1 cargo test -p hoid-cli to renew {path}"
+        );
+    }
+
+    #[test]
+    fn the_book_has_the_options_of_the_registry() {
+        is_as_written("docs/src/reference/options.md", &options_page(&Method::registry()));
+    }
+
+    #[test]
+    fn python_has_the_options_of_the_registry() {
+        is_as_written("python/src/pyhoid/_settings.py", &python_settings(&Method::registry()));
+    }
+
+    /// An option that is declared once is there wherever options are.
+    #[test]
+    fn a_new_option_needs_no_other_edit() {
+        let mut methods = Method::registry();
+        let dummy = Setting::of("tremor_band", &(8.0, 12.0))
+            .unit("s")
+            .bounds(Bounds::NonNegative)
+            .help(&["Frequencies that count as tremor"]);
+        methods[5].settings.push(dummy);
+        let help = with_settings(Command::new("track"), &methods)
+            .render_long_help()
+            .to_string();
+        assert!(
+            help.contains("--tremor-band <LO..HI>") && help.contains("[default: 8..12]"),
+            "{help}"
+        );
+        let schema = hoid_study::plan_schema_of(&methods);
+        assert!(schema.contains("\"tremor_band_s\"") && schema.contains("count as tremor. For adaptive."));
+        let python = python_settings(&methods);
+        assert!(python.contains("    tremor_band: tuple[float, float] | None\n"));
+        assert!(options_page(&methods).contains("| `tremor_band` | `LO..HI` | s | 8..12 |"));
+    }
+
+    #[test]
+    fn a_new_method_needs_no_other_edit() {
+        let mut methods = Method::registry();
+        methods.push(MethodSpec {
+            name: "setpoint",
+            help: "a method that is new",
+            ..methods[0].clone()
+        });
+        assert!(python_settings(&methods).contains("    \"setpoint\",\n"));
+        assert!(options_page(&methods).contains("\n## setpoint\n\nWhat it is: a method that is new.\n"));
+    }
+}

@@ -1,0 +1,167 @@
+//! How a recursion forgets.
+
+use std::collections::BTreeMap;
+
+use hoid_ident::{
+    IdentError,
+    settings::{Bounds, Kind, Setting, Settings, Value},
+};
+
+/// Rate of the gradient when none is given.
+const USUAL_RATE: f64 = 0.1;
+
+/// The words for the rules.
+const WORDS: [&str; 6] = [
+    "exponential",
+    "random-walk",
+    "window",
+    "variable",
+    "directional",
+    "gradient",
+];
+
+/// How the recursion forgets.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum ForgettingRule {
+    /// A factor for each parameter; with equal memories the scalar factor.
+    #[default]
+    Exponential,
+    /// Random walk: the standard deviation by which each parameter drifts in one second, in its unit. Parameters that are not named do not
+    /// drift.
+    RandomWalk(BTreeMap<String, f64>),
+    /// Sliding rectangular window as long as the shortest memory.
+    Window,
+    /// Variable factor with the shortest memory while innovations are as expected.
+    Variable,
+    /// Directional forgetting with the shortest memory.
+    Directional,
+    /// Normalised gradient with this rate, between 0 and 2.
+    Gradient(f64),
+}
+
+/// The rule of a word, without what belongs to it.
+impl Value for ForgettingRule {
+    const KIND: Kind = Kind::Choice(&WORDS);
+
+    fn read(text: &str) -> Result<Self, String> {
+        match text.to_ascii_lowercase().replace('_', "-").as_str() {
+            "exponential" => Ok(Self::Exponential),
+            "random-walk" => Ok(Self::RandomWalk(BTreeMap::new())),
+            "window" => Ok(Self::Window),
+            "variable" => Ok(Self::Variable),
+            "directional" => Ok(Self::Directional),
+            "gradient" => Ok(Self::Gradient(USUAL_RATE)),
+            _ => Err(format!("one of {}", WORDS.join(", "))),
+        }
+    }
+
+    fn text(&self) -> Option<String> {
+        let word = match self {
+            Self::Exponential => 0,
+            Self::RandomWalk(_) => 1,
+            Self::Window => 2,
+            Self::Variable => 3,
+            Self::Directional => 4,
+            Self::Gradient(_) => 5,
+        };
+        Some(WORDS[word].to_owned())
+    }
+}
+
+impl ForgettingRule {
+    fn rule() -> Setting {
+        Setting::of("forgetting", &Self::Exponential)
+            .help(&["How it forgets; window, variable and directional take the shortest memory"])
+    }
+
+    fn drift() -> Setting {
+        Setting::of("drift", &BTreeMap::<String, f64>::new())
+            .bounds(Bounds::NonNegative)
+            .help(&[
+                "For forgetting by a random walk: by how much a parameter drifts in one second (standard deviation),",
+                "as K_e=.01,K_e_dot=.01",
+            ])
+    }
+
+    fn rate() -> Setting {
+        Setting::of("rate", &USUAL_RATE)
+            .bounds(Bounds::Between(0.0, 2.0))
+            .help(&["For forgetting by the gradient: step size"])
+    }
+
+    fn belongs(name: &str, rule: &str) -> IdentError {
+        IdentError::BadOption {
+            option: name.to_owned(),
+            found: "with another way of forgetting".to_owned(),
+            expected: format!("forgetting = {rule}, to which it belongs"),
+        }
+    }
+
+    /// Checks that the rule has what it needs.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`].
+    pub(crate) fn check(&self) -> Result<(), IdentError> {
+        match self {
+            Self::RandomWalk(drift) if drift.is_empty() => Err(IdentError::BadOption {
+                option: "forgetting".to_owned(),
+                found: "random-walk without drift".to_owned(),
+                expected: "the standard deviation of the drift in one second, as drift K_e=.01".to_owned(),
+            }),
+            Self::Gradient(rate) if !Self::rate().bounds.hold(*rate) => Err(IdentError::BadOption {
+                option: "the rate of the gradient".to_owned(),
+                found: rate.to_string(),
+                expected: Self::rate().bounds.to_string(),
+            }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// `forgetting` comes first: what belongs to one rule is refused by the others.
+impl Settings for ForgettingRule {
+    fn list(&self) -> Vec<Setting> {
+        vec![Self::rule(), Self::drift(), Self::rate()]
+    }
+
+    fn set(&mut self, name: &str, text: &str) -> Result<bool, IdentError> {
+        match (name, &mut *self) {
+            ("forgetting", rule) => *rule = Self::rule().read(text)?,
+            ("drift", Self::RandomWalk(drift)) => *drift = Self::drift().read(text)?,
+            ("drift", _) => return Err(Self::belongs(name, WORDS[1])),
+            ("rate", Self::Gradient(rate)) => *rate = Self::rate().read(text)?,
+            ("rate", _) => return Err(Self::belongs(name, WORDS[5])),
+            _ => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    fn get(&self, name: &str) -> Option<String> {
+        match (name, self) {
+            ("forgetting", rule) => rule.text(),
+            ("drift", Self::RandomWalk(drift)) => drift.text(),
+            ("rate", Self::Gradient(rate)) => rate.text(),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn what_belongs_to_a_rule_is_refused_by_the_others() {
+        let mut rule = ForgettingRule::default();
+        assert!(rule.set("drift", "K_e=.01").is_err() && rule.set("rate", ".2").is_err());
+        assert!(rule.set("forgetting", "random_walk").unwrap());
+        assert!(rule.check().is_err());
+        assert!(rule.set("drift", "K_e=.01").unwrap() && rule.check().is_ok());
+        assert_eq!(rule.get("drift").as_deref(), Some("K_e=0.01"));
+        assert!(rule.set("forgetting", "gradient").unwrap() && rule.set("rate", "0.5").unwrap());
+        assert_eq!(rule, ForgettingRule::Gradient(0.5));
+        assert!(rule.set("rate", "2").is_err() && rule.set("forgetting", "never").is_err());
+        assert!(ForgettingRule::Gradient(2.0).check().is_err());
+    }
+}

@@ -1,0 +1,108 @@
+//! Options in words, as results and reports print them.
+
+use hoid_model::SampleTime;
+
+use crate::{forgetting::ForgettingRule, memory::Memory, options::TrackOptions, setup::StartAt};
+
+impl TrackOptions {
+    /// What the recursion remembers, and how.
+    pub fn memory_in_words(&self, sample_time: SampleTime) -> String {
+        let method = self.method.inner();
+        if let Some(words) = method.memory_in_words() {
+            return words;
+        }
+        let memories = || self.memories_in_words(sample_time);
+        match method.forgetting() {
+            ForgettingRule::Exponential => format!("exponential forgetting, memory {}", memories()),
+            ForgettingRule::RandomWalk(drift) => {
+                let each: Vec<String> = drift.iter().map(|(name, d)| format!("{name} {d}")).collect();
+                format!("random walk, drift in one second: {}", each.join(", "))
+            }
+            ForgettingRule::Window => format!("sliding window of the shortest memory, {}", memories()),
+            ForgettingRule::Variable => format!("variable forgetting with the shortest memory, {}", memories()),
+            ForgettingRule::Directional => format!("directional forgetting with the shortest memory, {}", memories()),
+            ForgettingRule::Gradient(rate) => format!("none: normalised gradient of rate {rate}"),
+        }
+    }
+
+    /// Each memory once, with the parameters that have it.
+    fn memories_in_words(&self, sample_time: SampleTime) -> String {
+        let mut groups: Vec<(Memory, Vec<String>)> = Vec::new();
+        for (name, memory) in self
+            .parameter_names()
+            .into_iter()
+            .zip(self.memories().unwrap_or_default())
+        {
+            match groups.iter_mut().find(|(known, _)| *known == memory) {
+                Some((_, names)) => names.push(name),
+                None => groups.push((memory, vec![name])),
+            }
+        }
+        if let [(memory, _)] = groups.as_slice() {
+            return memory.in_words(sample_time);
+        }
+        let of = |(memory, names): &(Memory, Vec<String>)| {
+            format!("{} for {}", memory.in_words(sample_time), names.join(", "))
+        };
+        groups.iter().map(of).collect::<Vec<_>>().join("; ")
+    }
+
+    /// Where the recursion starts.
+    pub fn start_in_words(&self) -> String {
+        let covariance = match self.method.covariance() {
+            None => "its covariance".to_owned(),
+            Some(p) => format!("P = {p} I"),
+        };
+        match &self.start {
+            StartAt::Span(Some((from, to))) => format!("batch fit of {from:.2} to {to:.2} s, {covariance}"),
+            StartAt::Span(None) => format!("batch fit of the first third, {covariance}"),
+            StartAt::Theta(_) => "from coefficients that were given".to_owned(),
+            StartAt::Nothing => "from nothing".to_owned(),
+        }
+    }
+}
+
+impl Memory {
+    /// With its unit, in samples and seconds.
+    pub fn in_words(self, sample_time: SampleTime) -> String {
+        let ts = sample_time.s();
+        let round = |v: f64| (v * 1e6).round() / 1e6;
+        match self {
+            Self::Samples(n) => format!("{} samples ({} s)", round(n), round(n * ts)),
+            Self::Seconds(s) => format!("{s} s ({} samples)", round(s / ts)),
+            Self::Infinite => "without end".to_owned(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::Method;
+
+    #[test]
+    fn every_method_says_what_it_remembers() {
+        let ts = SampleTime::HUNDREDTH;
+        for method in Method::all() {
+            let (structure, orders) = (method.usual_structure(), method.usual_orders(29));
+            assert!(
+                !TrackOptions::new(method, structure, orders)
+                    .memory_in_words(ts)
+                    .is_empty()
+            );
+        }
+        let of = |settings: &[(&str, &str)]| {
+            let rls = Method::rls();
+            let (structure, orders) = (rls.usual_structure(), rls.usual_orders(29));
+            let options = TrackOptions::new(rls, structure, orders).with(settings).unwrap();
+            options.memory_in_words(ts)
+        };
+        assert_eq!(of(&[]), "exponential forgetting, memory 2.56 s (256 samples)");
+        assert_eq!(
+            of(&[("memory_of", "b=inf")]),
+            "exponential forgetting, memory 2.56 s (256 samples) for a1, a2; without end for b0, b1"
+        );
+        assert!(of(&[("forgetting", "gradient")]).ends_with("rate 0.1"));
+    }
+}

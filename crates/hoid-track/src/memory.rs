@@ -1,0 +1,218 @@
+//! How long an observation counts: the time in which its weight falls to 1/e.
+
+use std::{collections::BTreeMap, str::FromStr};
+
+use hoid_ident::{
+    IdentError, settings,
+    settings::{Bounds, Kind, Setting, Settings, Value},
+};
+use hoid_model::SampleTime;
+
+/// How long an observation counts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Memory {
+    /// N samples: `lambda = 1 - 1/N`.
+    Samples(f64),
+    /// T seconds: `lambda = 1 - Ts/T`. (`exp(-Ts/T)` agrees to first order.)
+    Seconds(f64),
+    /// For ever: `lambda = 1`.
+    Infinite,
+}
+
+impl Memory {
+    /// The factor lambda.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] unless the memory is longer than one sample.
+    pub fn lambda(self, sample_time: SampleTime) -> Result<f64, IdentError> {
+        match self {
+            Self::Infinite => Ok(1.0),
+            _ => Ok(1.0 - 1.0 / self.length(sample_time)?),
+        }
+    }
+
+    /// Whole samples of a window as long as the memory.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] for a memory without end, or not longer than one sample.
+    pub fn samples(self, sample_time: SampleTime) -> Result<usize, IdentError> {
+        Ok(self.length(sample_time)?.round() as usize)
+    }
+
+    fn length(self, sample_time: SampleTime) -> Result<f64, IdentError> {
+        let samples = match self {
+            Self::Samples(n) => n,
+            Self::Seconds(t) => t / sample_time.s(),
+            Self::Infinite => f64::INFINITY,
+        };
+        // A window of 1e9 samples would not fit in memory.
+        if samples > 1.0 && samples <= 1e9 {
+            Ok(samples)
+        } else {
+            Err(IdentError::BadOption {
+                option: "the memory".to_owned(),
+                found: format!("{samples} samples"),
+                expected: "more than one sample and at most 1e9, or inf where nothing is to be forgotten".to_owned(),
+            })
+        }
+    }
+}
+
+/// `256` samples, `2.56s`, or `inf`.
+impl Value for Memory {
+    const KIND: Kind = Kind::Memory;
+
+    fn read(text: &str) -> Result<Self, String> {
+        let trimmed = text.trim();
+        if ["inf", "infinite"]
+            .iter()
+            .any(|word| trimmed.eq_ignore_ascii_case(word))
+        {
+            return Ok(Self::Infinite);
+        }
+        let number = |part: &str| part.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+        let memory = match trimmed.strip_suffix('s') {
+            Some(seconds) => number(seconds).filter(|s| *s > 0.0).map(Self::Seconds),
+            None => number(trimmed).filter(|n| *n > 1.0).map(Self::Samples),
+        };
+        memory.ok_or_else(|| "more than 1 sample (256), seconds (2.56s) or inf".to_owned())
+    }
+
+    fn text(&self) -> Option<String> {
+        match self {
+            Self::Samples(n) => n.text(),
+            Self::Seconds(s) => Some(format!("{s}s")),
+            Self::Infinite => Some("inf".to_owned()),
+        }
+    }
+}
+
+impl FromStr for Memory {
+    type Err = IdentError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Setting::of("the memory", &Self::Infinite).read(text)
+    }
+}
+
+/// The memory of all parameters: as such, or by its factor of forgetting.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct CommonMemory(pub Option<Memory>);
+
+impl CommonMemory {
+    fn memory() -> Setting {
+        Setting::of("memory", &None::<Memory>).help(&[
+            "Memory of all parameters, in which the weight of a sample falls to 1/e:",
+            "samples (256), seconds (2.56s) or inf",
+        ])
+    }
+
+    fn factor() -> Setting {
+        Setting::of("lambda", &None::<f64>)
+            .bounds(Bounds::UpTo(0.0, 1.0))
+            .help(&["Factor of forgetting instead of a memory: lambda = 1 - 1/memory in samples"])
+    }
+}
+
+impl Settings for CommonMemory {
+    fn list(&self) -> Vec<Setting> {
+        vec![Self::memory(), Self::factor()]
+    }
+
+    fn set(&mut self, name: &str, text: &str) -> Result<bool, IdentError> {
+        let memory = match name {
+            "memory" => Self::memory().read(text)?,
+            "lambda" => match Self::factor().read::<f64>(text)? {
+                1.0 => Memory::Infinite,
+                lambda => Memory::Samples(1.0 / (1.0 - lambda)),
+            },
+            _ => return Ok(false),
+        };
+        if self.0.is_some() {
+            return Err(IdentError::BadOption {
+                option: name.to_owned(),
+                found: "memory and lambda".to_owned(),
+                expected: "one of them".to_owned(),
+            });
+        }
+        self.0 = Some(memory);
+        Ok(true)
+    }
+
+    fn get(&self, name: &str) -> Option<String> {
+        (name == "memory").then(|| self.0.text()).flatten()
+    }
+}
+
+settings! {
+    /// Memories of a recursion that forgets.
+    pub struct MemoryOptions {
+        /// Memory of single parameters, or of all of one letter, as b0=256,f=inf,K_e=5s
+        pub memory_of: BTreeMap<String, Memory> = BTreeMap::new(),
+    }
+    groups {
+        /// Memory of all parameters.
+        pub memory: CommonMemory,
+    }
+}
+
+impl MemoryOptions {
+    /// The same memory for all parameters.
+    pub fn of_all(memory: Memory) -> Self {
+        Self {
+            memory: CommonMemory(Some(memory)),
+            ..Self::default()
+        }
+    }
+
+    /// The memory of a parameter where one was given: of its name, of its letter, or of all.
+    pub(crate) fn given(&self, name: &str) -> Option<Memory> {
+        let by_letter = self.memory_of.iter().find(|(key, _)| is_named(name, key));
+        let by_letter = by_letter.map(|(_, memory)| *memory);
+        self.memory_of.get(name).copied().or(by_letter).or(self.memory.0)
+    }
+
+    /// The first name of a memory that is neither a parameter nor a letter of one.
+    pub(crate) fn unknown(&self, names: &[String]) -> Option<&String> {
+        let known = |key: &String| names.iter().any(|name| is_named(name, key));
+        self.memory_of.keys().find(|key| !known(key))
+    }
+}
+
+/// True when `key` is the name, or the letter of its polynomial.
+fn is_named(name: &str, key: &str) -> bool {
+    name == key || (key.len() == 1 && name.starts_with(key) && name[1..].bytes().all(|b| b.is_ascii_digit()))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_factor_is_a_memory_and_only_one_of_them_is_taken() {
+        let mut options = MemoryOptions::default();
+        assert!(options.set("lambda", "0.75").unwrap());
+        assert_eq!(options.memory.0, Some(Memory::Samples(4.0)));
+        assert!(options.set("memory", "256").is_err());
+        for bad in ["0", "1.1", "-1", "x", "NaN"] {
+            assert!(MemoryOptions::default().set("lambda", bad).is_err(), "{bad}");
+        }
+        let mut options = MemoryOptions::default();
+        assert!(options.set("memory_of", "b=256, f1=inf").unwrap());
+        assert_eq!(
+            (options.given("b1"), options.given("f1"), options.given("f2")),
+            (Some(Memory::Samples(256.0)), Some(Memory::Infinite), None)
+        );
+    }
+
+    #[test]
+    fn memories_as_written() {
+        assert_eq!("256".parse::<Memory>().unwrap(), Memory::Samples(256.0));
+        assert_eq!("2.56s".parse::<Memory>().unwrap(), Memory::Seconds(2.56));
+        assert_eq!("Inf".parse::<Memory>().unwrap(), Memory::Infinite);
+        for bad in ["", "0", "1", "-5", "nan", "0s", "s", "-infs", "2m"] {
+            assert!(bad.parse::<Memory>().is_err(), "{bad}");
+        }
+    }
+}

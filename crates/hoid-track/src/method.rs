@@ -1,0 +1,200 @@
+//! What a recursive method says of itself.
+//!
+//! A method is a file or folder in `methods`: its options (a struct made by `settings!`), this trait for them, and the recursion that it
+//! builds. One line in `methods/mod.rs` makes it a variant of [`Method`](crate::Method); the command line, plans, Python and the book follow.
+
+use std::collections::BTreeMap;
+
+use hoid_core::recursion::Stable;
+use hoid_ident::{
+    Constraint, IdentError,
+    settings::{MethodSpec, Setting, Settings},
+};
+use hoid_model::{Orders, Record, SampleTime, Structure};
+
+use crate::{
+    forgetting::ForgettingRule,
+    memory::{Memory, MemoryOptions},
+    recursion::Recursion,
+    setup::Setup,
+    start::StartState,
+};
+
+/// The words for a method.
+pub(crate) struct About {
+    /// Name as typed.
+    pub name: &'static str,
+    /// What it is, in a line without a full stop.
+    pub help: &'static str,
+    /// Where it comes from.
+    pub source: &'static str,
+    /// The structures that it serves; the first is that of the method when none is named, but for Box-Jenkins where it is among them.
+    pub structures: &'static [Structure],
+    /// Defaults, in words, of options that it shares with others.
+    pub defaults: &'static [(&'static str, &'static str)],
+}
+
+/// A recursive method with its options.
+pub(crate) trait RecursiveMethod {
+    /// The words for it.
+    fn about(&self) -> About;
+
+    /// Its options by name.
+    fn settings(&self) -> &dyn Settings;
+
+    /// Its options by name, to be set.
+    fn settings_mut(&mut self) -> &mut dyn Settings;
+
+    /// Memory of a parameter when none is given.
+    fn usual_memory(&self, parameter: &str) -> Memory;
+
+    /// Builds the recursion.
+    ///
+    /// # Errors
+    /// [`IdentError`] for options that contradict each other, or a start that it cannot take.
+    fn build(
+        &self,
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Box<dyn Recursion>, IdentError>;
+
+    /// Checks the options against structure and orders.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] with what is wrong.
+    fn check(&self, setup: &Setup) -> Result<(), IdentError>;
+
+    /// Order of the noise model when none is named; none where that of the structure is taken.
+    fn usual_nd(&self) -> Option<usize> {
+        None
+    }
+
+    /// True for a method that estimates the operator's parameters.
+    fn is_physical(&self) -> bool {
+        false
+    }
+
+    /// True for a method that has a model of how the person changes, and no memory: physical parameters behind the noise model of a batch fit,
+    /// which stays.
+    fn is_model_of_change(&self) -> bool {
+        false
+    }
+
+    /// True where the two-sided estimate of a recorded run was asked for.
+    fn smooths(&self) -> bool {
+        false
+    }
+
+    /// What it remembers, in words, where that is no memory of parameters.
+    fn memory_in_words(&self) -> Option<String> {
+        None
+    }
+
+    /// Its memories, where it has some.
+    fn memories(&self) -> Option<&MemoryOptions> {
+        None
+    }
+
+    /// How it forgets.
+    fn forgetting(&self) -> ForgettingRule {
+        ForgettingRule::Exponential
+    }
+
+    /// P at the start as a multiple of the unit matrix; none for that of the start fit.
+    fn covariance(&self) -> Option<f64> {
+        None
+    }
+
+    /// Multiple of the innovation's standard deviation beyond which an innovation moves the estimate no further.
+    fn limit(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Polynomials that are kept stable.
+    fn stable(&self) -> Stable {
+        Stable::Predictor
+    }
+
+    /// Bounds of physical parameters.
+    fn bounds(&self) -> BTreeMap<String, Constraint> {
+        BTreeMap::new()
+    }
+
+    /// Range of tau_e in s that it follows.
+    fn track_delay_s(&self) -> Option<(f64, f64)> {
+        None
+    }
+
+    /// True where tau_e, when it is followed, is one of the parameters that move.
+    fn delay_is_parameter(&self) -> bool {
+        false
+    }
+
+    /// Channel of the signal from outside the loop that it takes.
+    fn reference_channel(&self) -> Option<&str> {
+        None
+    }
+
+    /// Takes from a record what has a default there.
+    fn prepare(&mut self, _record: &Record) {}
+
+    /// Leaves out what was said of parameters that are not known.
+    fn retain(&mut self, _known: &dyn Fn(&str) -> bool) {}
+}
+
+/// What is known of a method.
+pub(crate) fn spec(method: &dyn RecursiveMethod) -> MethodSpec {
+    let about = method.about();
+    let own = |setting: Setting| match about.defaults.iter().find(|(name, _)| *name == setting.name) {
+        Some((_, words)) => setting.default(words),
+        None => setting,
+    };
+    MethodSpec {
+        name: about.name,
+        help: about.help,
+        source: about.source,
+        structures: about.structures,
+        settings: method.settings().list().into_iter().map(own).collect(),
+    }
+}
+
+/// An error about an option.
+pub(crate) fn bad(option: &str, found: String, expected: &str) -> IdentError {
+    IdentError::BadOption {
+        option: option.to_owned(),
+        found,
+        expected: expected.to_owned(),
+    }
+}
+
+/// Checks that the orders are those of the operator's Box-Jenkins model.
+///
+/// # Errors
+/// [`IdentError::BadOption`].
+pub(crate) fn check_operator_orders(name: &str, setup: &Setup) -> Result<(), IdentError> {
+    let o = &setup.orders;
+    if !(o.na == 0 && o.nb == 2 && o.nf == 2) {
+        return Err(bad(
+            &format!("the orders of {name}"),
+            format!("{} with {o}", setup.structure),
+            "bj with nb = 2 and nf = 2, the operator; nc and nd are free",
+        ));
+    }
+    Ok(())
+}
+
+/// Checks that the delay leaves room for the hold.
+///
+/// # Errors
+/// [`IdentError::BadOption`].
+pub(crate) fn check_delay(orders: &Orders) -> Result<(), IdentError> {
+    match orders.nk {
+        0 => Err(bad(
+            "the delay",
+            "nk = 0".to_owned(),
+            "nk of 1 or more: the hold alone delays by one sample",
+        )),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,91 @@
+//! Recursive least squares for structures that are linear in theta (L. Ljung, *System Identification*, 1999, section 11.2).
+
+use hoid_ident::{IdentError, settings, settings::Settings};
+use hoid_model::{SampleTime, Structure};
+
+use crate::{
+    forgetting::ForgettingRule,
+    kernel::{Kernel, Plan},
+    memory::{Memory, MemoryOptions},
+    method::{About, RecursiveMethod, bad},
+    recursion::Recursion,
+    setup::Setup,
+    shared_options::GainOptions,
+    start::StartState,
+};
+
+settings! {
+    /// Options of recursive least squares.
+    pub struct RlsOptions {}
+    groups {
+        /// The gain.
+        pub gain: GainOptions,
+    }
+}
+
+impl RecursiveMethod for RlsOptions {
+    fn about(&self) -> About {
+        About {
+            name: "rls",
+            help: "recursive least squares",
+            source: "Ljung 1999, section 11.2; the reference text, section III",
+            structures: &[Structure::Arx, Structure::Fir],
+            defaults: &[("memory", "2.56s"), ("limit", "inf")],
+        }
+    }
+
+    fn settings(&self) -> &dyn Settings {
+        self
+    }
+
+    fn settings_mut(&mut self) -> &mut dyn Settings {
+        self
+    }
+
+    /// The text's 256 samples at 100 Hz.
+    fn usual_memory(&self, _parameter: &str) -> Memory {
+        Memory::Seconds(2.56)
+    }
+
+    fn check(&self, setup: &Setup) -> Result<(), IdentError> {
+        let o = &setup.orders;
+        if setup.structure.is_linear() && o.nc == 0 && o.nd == 0 && o.nf == 0 && o.nb > 0 {
+            return Ok(());
+        }
+        Err(bad(
+            "the structure of rls",
+            format!("{} with {o}", setup.structure),
+            "arx or fir; take rpem for structures with C, D or F",
+        ))
+    }
+
+    fn build(
+        &self,
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Box<dyn Recursion>, IdentError> {
+        Plan::new(setup, from, sample_time).build(Kernel::LeastSquares)
+    }
+
+    fn memories(&self) -> Option<&MemoryOptions> {
+        Some(&self.gain.memories)
+    }
+
+    fn forgetting(&self) -> ForgettingRule {
+        self.gain.forgetting.clone()
+    }
+
+    fn covariance(&self) -> Option<f64> {
+        self.gain.covariance
+    }
+
+    /// None, as in the text.
+    fn limit(&self) -> f64 {
+        self.gain.limit_or(f64::INFINITY)
+    }
+
+    fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
+        self.gain.retain(known);
+    }
+}

@@ -1,0 +1,108 @@
+//! The recursive prediction-error method for every structure (L. Ljung, *System Identification*, 1999, section 11.5).
+
+use hoid_core::{predictor::Regressor, recursion::Stable};
+use hoid_ident::{IdentError, settings, settings::Settings};
+use hoid_model::{SampleTime, Structure};
+
+use crate::{
+    forgetting::ForgettingRule,
+    kernel::{Kernel, Plan},
+    memory::{Memory, MemoryOptions},
+    method::{About, RecursiveMethod},
+    recursion::Recursion,
+    setup::Setup,
+    shared_options::{GainOptions, StabilityOptions},
+    start::StartState,
+};
+
+settings! {
+    /// Options of the recursive prediction-error method.
+    pub struct RpemOptions {
+        /// Pseudo-linear regression (extended least squares) instead of the gradient
+        pub pseudo_linear: bool = false,
+    }
+    groups {
+        /// The gain.
+        pub gain: GainOptions,
+        /// Stability.
+        pub stability: StabilityOptions,
+    }
+}
+
+/// What an innovation may move an estimate at most, in standard deviations.
+pub(crate) const LIMIT: f64 = 5.0;
+
+impl RecursiveMethod for RpemOptions {
+    fn about(&self) -> About {
+        About {
+            name: "rpem",
+            help: "recursive prediction-error method, for every structure",
+            source: "Ljung 1999, section 11.5; the reference text, section III",
+            structures: &Structure::ALL,
+            defaults: &[("memory", "2.56s for b, 20.48s for the others"), ("limit", "5")],
+        }
+    }
+
+    fn settings(&self) -> &dyn Settings {
+        self
+    }
+
+    fn settings_mut(&mut self) -> &mut dyn Settings {
+        self
+    }
+
+    fn usual_memory(&self, parameter: &str) -> Memory {
+        gain_fast(parameter)
+    }
+
+    fn check(&self, _setup: &Setup) -> Result<(), IdentError> {
+        Ok(())
+    }
+
+    fn build(
+        &self,
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Box<dyn Recursion>, IdentError> {
+        let regressor = if self.pseudo_linear {
+            Regressor::PseudoLinear
+        } else {
+            Regressor::Gradient
+        };
+        Plan::new(setup, from, sample_time).build(Kernel::PredictionError(regressor))
+    }
+
+    fn memories(&self) -> Option<&MemoryOptions> {
+        Some(&self.gain.memories)
+    }
+
+    fn forgetting(&self) -> ForgettingRule {
+        self.gain.forgetting.clone()
+    }
+
+    fn covariance(&self) -> Option<f64> {
+        self.gain.covariance
+    }
+
+    fn limit(&self) -> f64 {
+        self.gain.limit_or(LIMIT)
+    }
+
+    fn stable(&self) -> Stable {
+        self.stability.stable
+    }
+
+    fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
+        self.gain.retain(known);
+    }
+}
+
+/// B follows the gains and is short, the others long.
+pub(crate) fn gain_fast(parameter: &str) -> Memory {
+    if parameter.starts_with('b') {
+        Memory::Seconds(2.56)
+    } else {
+        Memory::Seconds(20.48)
+    }
+}
