@@ -136,7 +136,7 @@ const FORGOTTEN: f64 = 1e-9;
 const LONGEST_PERIOD: f64 = 64.0;
 
 /// Samples between two turns of the guard, for the shortest memory and the number of parameters.
-pub(crate) fn guard_period(shortest: f64, parameters: usize) -> u32 {
+fn guard_period(shortest: f64, parameters: usize) -> u32 {
     (shortest / (TURNS_IN_A_MEMORY * parameters as f64)).clamp(1.0, LONGEST_PERIOD) as u32
 }
 

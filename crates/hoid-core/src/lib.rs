@@ -18,7 +18,6 @@
 //! | [`predictor`] | one-step predictor of the general model with its gradient |
 //! | [`rls`], [`rpem`], [`physical`] | recursive least squares, prediction-error method in polynomials and in physical parameters |
 //! | [`adaptive`] | a bank of hypotheses of when the person changed |
-//! | [`number`], [`lanes`] | one run, or several side by side: recursions in the lanes of vector registers |
 //! | [`recursion`] | outcome of a step, stability of a step |
 //! | [`mod@state`] | the numbers that change, to save a recursion and go on elsewhere |
 #![no_std]
@@ -37,8 +36,6 @@ pub mod error_bars;
 pub mod factored;
 pub mod filter;
 pub mod held_operator;
-pub mod lanes;
-pub mod number;
 pub mod physical;
 pub mod predictor;
 pub mod recursion;

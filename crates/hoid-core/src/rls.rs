@@ -98,9 +98,9 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: Bars<N, 0>> Rls<S, N, A, B> 
         if nb > 0 {
             psi[na] = x;
         }
-        let w = dot(0.0, &theta[na..na + nb], &psi[na..]);
+        let w = dot(&theta[na..na + nb], &psi[na..]);
         // As the predictor of the general model has it, which keeps u itself.
-        let from_past = dot(0.0, &theta[..na], &psi.map(|p| -p));
+        let from_past = dot(&theta[..na], &psi.map(|p| -p));
         (psi, u + from_past - w)
     }
 

@@ -39,7 +39,7 @@ use hoid::{
         rpem::Rpem,
     },
     ident::order_selection::Criterion,
-    lanes::Path as LanesPath,
+    lanes::InstructionSet,
     prelude::*,
     sim::Signals,
     thesis::reproduction::{Reproduction, reproduce},
@@ -150,7 +150,7 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
         }
         "cell" => {
             // As many runs at a time as there are lanes, in memory that was used before.
-            let beside = LanesPath::Best.lanes().unwrap();
+            let beside = InstructionSet::Best.lanes().unwrap();
             let (mut noises, mut runs) = (vec![shared.noise.clone(); beside], Vec::new());
             median(effort, || {
                 let mut records = Vec::with_capacity(CELL_RUNS as usize + beside);
@@ -160,7 +160,7 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
                     }
                     let simulator = &shared.simulator;
                     simulator
-                        .signals_of_many_into(&noises, LanesPath::Best, &mut runs)
+                        .signals_of_many_into(&noises, InstructionSet::Best, &mut runs)
                         .unwrap();
                     let count = (CELL_RUNS - begin) as usize;
                     records.extend(runs.iter().take(count).map(|run| shared.measured(run)));

@@ -1,6 +1,6 @@
 //! Filters of the signals of a span, of a record in each lane; every signal has its past in front.
 
-use hoid_core::number::Number;
+use hoid_lanes::Number;
 
 use super::pass::{Room, add_scaled};
 
