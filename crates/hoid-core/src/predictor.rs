@@ -24,115 +24,10 @@
 
 use core::hint::black_box;
 
-use crate::error_bars::{Places, Row, Sensitivities};
-
-/// Numbers of coefficients of A, B, C, D and F.
-///
-/// [`AnyShape`] holds them as numbers. [`FixedShape`] has them in its type, so that the compiler writes out every loop over
-/// coefficients: the same operations in the same order, at half the time.
-pub trait Shape: Copy {
-    /// Coefficients `a_1 ...`.
-    fn na(&self) -> usize;
-    /// Coefficients `b_0 ...`.
-    fn nb(&self) -> usize;
-    /// Coefficients `c_1 ...`.
-    fn nc(&self) -> usize;
-    /// Coefficients `d_1 ...`.
-    fn nd(&self) -> usize;
-    /// Coefficients `f_1 ...`.
-    fn nf(&self) -> usize;
-
-    /// Length of `theta = [a.. b.. c.. d.. f..]`.
-    #[inline]
-    fn parameters(&self) -> usize {
-        self.na() + self.nb() + self.nc() + self.nd() + self.nf()
-    }
-
-    /// `[a, b, c, d, f]` of theta.
-    #[inline]
-    fn split<'t, R>(&self, theta: &'t [R]) -> [&'t [R]; 5] {
-        let (a, rest) = theta.split_at(self.na());
-        let (b, rest) = rest.split_at(self.nb());
-        let (c, rest) = rest.split_at(self.nc());
-        let (d, rest) = rest.split_at(self.nd());
-        [a, b, c, d, &rest[..self.nf()]]
-    }
-}
-
-/// Orders as numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct AnyShape {
-    /// Coefficients `a_1 ...`.
-    pub na: usize,
-    /// Coefficients `b_0 ...`.
-    pub nb: usize,
-    /// Coefficients `c_1 ...`.
-    pub nc: usize,
-    /// Coefficients `d_1 ...`.
-    pub nd: usize,
-    /// Coefficients `f_1 ...`.
-    pub nf: usize,
-}
-
-impl Shape for AnyShape {
-    #[inline]
-    fn na(&self) -> usize {
-        self.na
-    }
-
-    #[inline]
-    fn nb(&self) -> usize {
-        self.nb
-    }
-
-    #[inline]
-    fn nc(&self) -> usize {
-        self.nc
-    }
-
-    #[inline]
-    fn nd(&self) -> usize {
-        self.nd
-    }
-
-    #[inline]
-    fn nf(&self) -> usize {
-        self.nf
-    }
-}
-
-/// Orders in the type.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct FixedShape<const NA: usize, const NB: usize, const NC: usize, const ND: usize, const NF: usize>;
-
-impl<const NA: usize, const NB: usize, const NC: usize, const ND: usize, const NF: usize> Shape
-    for FixedShape<NA, NB, NC, ND, NF>
-{
-    #[inline]
-    fn na(&self) -> usize {
-        NA
-    }
-
-    #[inline]
-    fn nb(&self) -> usize {
-        NB
-    }
-
-    #[inline]
-    fn nc(&self) -> usize {
-        NC
-    }
-
-    #[inline]
-    fn nd(&self) -> usize {
-        ND
-    }
-
-    #[inline]
-    fn nf(&self) -> usize {
-        NF
-    }
-}
+use crate::{
+    sensitivities::{ErrorLayout, LinearForm, Sensitivities},
+    shape::Shape,
+};
 
 /// What psi is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -219,7 +114,7 @@ fn push(history: &mut [f64], n: usize, value: f64) {
 // One move for each number: a wide copy of what was just pushed would wait as in [`dot_of_fresh`].
 #[allow(clippy::manual_memcpy)]
 #[inline(always)]
-fn regressor<S: Shape, const N: usize>(shape: &S, x: &[f64], [u, eps, v, w]: [&[f64; N]; 4]) -> [f64; N] {
+fn gather<S: Shape, const N: usize>(shape: &S, x: &[f64], [u, eps, v, w]: [&[f64; N]; 4]) -> [f64; N] {
     let mut psi = [0.0; N];
     let (psi_a, rest) = psi.split_at_mut(shape.na());
     let (psi_b, rest) = rest.split_at_mut(shape.nb());
@@ -281,7 +176,7 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
     /// Brings all filters to rest.
     #[cold]
     #[inline(never)]
-    pub fn rest(&mut self) {
+    pub fn reset(&mut self) {
         let offset = self.offset;
         if let Some(rested) = Self::new(self.shape, self.regressor) {
             *self = rested;
@@ -314,10 +209,10 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         }
         let psi = if gradient {
             let of = [&self.filtered_u, &self.filtered_eps, &self.filtered_v, &self.filtered_w];
-            regressor(&shape, &self.filtered_x[offset..], of)
+            gather(&shape, &self.filtered_x[offset..], of)
         } else {
             let of = [&self.u, &self.eps, &self.v, &self.w];
-            regressor(&shape, &self.x[offset..], of)
+            gather(&shape, &self.x[offset..], of)
         };
         (psi, self.residual(theta)[2])
     }
@@ -385,11 +280,11 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
 
     /// How dw, dv and de of the pending sample follow from the errors X of [`crate::error_bars`].
     #[inline(always)]
-    pub fn sensitivities<const K: usize>(&self, theta: &[f64; N], places: &Places) -> Sensitivities<N, K> {
+    pub fn sensitivities<const K: usize>(&self, theta: &[f64; N], layout: &ErrorLayout) -> Sensitivities<N, K> {
         let shape = self.shape;
         let (na, nb, nc, nd, nf) = (shape.na(), shape.nb(), shape.nc(), shape.nd(), shape.nf());
         let [_, _, c, d, f] = shape.split(theta);
-        let mut w = Row {
+        let mut w = LinearForm {
             theta: [0.0; N],
             filters: [0.0; K],
         };
@@ -398,21 +293,21 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         }
         for j in 0..nf {
             w.theta[na + nb + nc + nd + j] = -self.w[j];
-            w.filters[places.w.0 + j] = -f[j];
+            w.filters[layout.w.0 + j] = -f[j];
         }
         let mut v = w;
         for j in 0..na {
             v.theta[j] = -self.u[j];
         }
         let mut e = v;
-        let of_v = if na == 0 { places.w.0 } else { places.v.0 };
+        let of_v = if na == 0 { layout.w.0 } else { layout.v.0 };
         for j in 0..nd {
             e.theta[na + nb + nc + j] = -self.v[j];
             e.filters[of_v + j] += d[j];
         }
         for j in 0..nc {
             e.theta[na + nb + j] = self.eps[j];
-            e.filters[places.e.0 + j] = -c[j];
+            e.filters[layout.e.0 + j] = -c[j];
         }
         Sensitivities { w, v, e }
     }

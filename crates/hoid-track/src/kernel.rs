@@ -5,10 +5,10 @@ use hoid_core::{
     adaptation::Adaptation,
     delay::DelayLine,
     error_bars::ErrorBars,
-    physical::{Physical, PhysicalModel},
-    predictor::{AnyShape, FixedShape, Shape},
+    physical::{PhysicalModel, PhysicalRpem},
     rls::Rls,
     rpem::Rpem,
+    shape::{AnyShape, FixedShape, Shape},
     state::State,
 };
 use hoid_model::{
@@ -114,7 +114,7 @@ impl Plan<'_> {
     }
 
     /// Smallest delay in samples, where tau_e is tracked.
-    fn tracked_from(&self) -> Option<usize> {
+    fn smallest_nk(&self) -> Option<usize> {
         // Up to rounding: 0.29/0.01 is 28.999999999999996.
         let whole = |low: f64| (low / self.sample_time.s() + 1e-9) as usize + 1;
         self.options.track_delay_s.map(|(low, _)| whole(low))
@@ -124,7 +124,7 @@ impl Plan<'_> {
     fn taps(&self) -> Option<usize> {
         let (_, longest) = self.options.track_delay_s?;
         let all = (longest / self.sample_time.s()) as usize + 5;
-        Some(all.saturating_sub(self.tracked_from().unwrap_or(0)))
+        Some(all.saturating_sub(self.smallest_nk().unwrap_or(0)))
     }
 
     fn linear<S: Shape + Send + Sync + 'static, const N: usize>(
@@ -173,24 +173,25 @@ impl Plan<'_> {
         shape: S,
     ) -> Result<Box<dyn Recursion>, IdentError> {
         let (options, ts) = (self.options, self.sample_time.s());
-        let tracked_from = self.tracked_from();
+        let smallest_nk = self.smallest_nk();
         let model = PhysicalModel {
             shape,
-            tracked_from,
+            smallest_nk,
             sample_time: ts,
             bounds: start::physical_bounds::<N>(options, self.sample_time)?,
             stable: options.stable,
         };
-        let recursion = Physical::<S, N, K, L, _>::new(model, self.values(), self.gain::<N>()?, self.bars::<N, K>()?)
-            .ok_or_else(|| IdentError::BadStart {
-            reason: "it lies outside the bounds of the physical parameters, or its noise model is not stable"
-                .to_owned(),
-        })?;
+        let recursion =
+            PhysicalRpem::<S, N, K, L, _>::new(model, self.values(), self.gain::<N>()?, self.bars::<N, K>()?)
+                .ok_or_else(|| IdentError::BadStart {
+                    reason: "it lies outside the bounds of the physical parameters, or its noise model is not stable"
+                        .to_owned(),
+                })?;
         Ok(Box::new(InPhysical {
             recursion,
-            delay: delay(tracked_from.unwrap_or(options.orders.nk)),
+            delay: delay(smallest_nk.unwrap_or(options.orders.nk)),
             parameters: self.parameters(),
-            tracked: tracked_from.is_some(),
+            tracked: smallest_nk.is_some(),
             fixed_tau_s: (options.orders.nk as f64 - 1.0) * ts,
         }))
     }
@@ -227,7 +228,7 @@ impl<S: Shape + Send + Sync, const N: usize, A: Adaptation<N> + State + Send + S
 
     fn follow(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
-        self.rls.follow(x, sample.u).into()
+        self.rls.step_without_update(x, sample.u).into()
     }
 
     fn bridge(&mut self, sample: Sample) {
@@ -241,7 +242,7 @@ impl<S: Shape + Send + Sync, const N: usize, A: Adaptation<N> + State + Send + S
 
     fn covariance(&self, into: &mut [f64]) -> bool {
         scaled(
-            &self.rls.spread(),
+            &self.rls.normalised_covariance(),
             self.rls.innovation_variance(),
             self.parameters,
             into,
@@ -270,7 +271,7 @@ impl<S: Shape + Send + Sync, const N: usize, const K: usize, A: Adaptation<N> + 
 
     fn follow(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
-        self.rpem.follow(x, sample.u).into()
+        self.rpem.step_without_update(x, sample.u).into()
     }
 
     fn bridge(&mut self, sample: Sample) {
@@ -284,7 +285,7 @@ impl<S: Shape + Send + Sync, const N: usize, const K: usize, A: Adaptation<N> + 
 
     fn covariance(&self, into: &mut [f64]) -> bool {
         scaled(
-            &self.rpem.spread(),
+            &self.rpem.normalised_covariance(),
             self.rpem.innovation_variance(),
             self.parameters,
             into,
@@ -298,7 +299,7 @@ impl<S: Shape + Send + Sync, const N: usize, const K: usize, A: Adaptation<N> + 
 }
 
 struct InPhysical<S, const N: usize, const K: usize, const L: usize, A> {
-    recursion: Physical<S, N, K, L, A>,
+    recursion: PhysicalRpem<S, N, K, L, A>,
     delay: DelayLine<Vec<f64>>,
     parameters: usize,
     tracked: bool,
@@ -315,7 +316,7 @@ impl<S: Shape + Send + Sync, const N: usize, const K: usize, const L: usize, A: 
 
     fn follow(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
-        self.recursion.follow(x, sample.u).into()
+        self.recursion.step_without_update(x, sample.u).into()
     }
 
     fn bridge(&mut self, sample: Sample) {
@@ -332,7 +333,7 @@ impl<S: Shape + Send + Sync, const N: usize, const K: usize, const L: usize, A: 
         let p = self.parameters;
         let mut of_eta = vec![0.0; p * p];
         scaled(
-            &self.recursion.spread(),
+            &self.recursion.normalised_covariance(),
             self.recursion.innovation_variance(),
             p,
             &mut of_eta,
@@ -364,7 +365,7 @@ impl<S: Shape + Send + Sync, const N: usize, const K: usize, const L: usize, A: 
 
     fn operator(&self) -> Option<OperatorEstimate> {
         let eta = self.recursion.eta();
-        let spread = self.recursion.spread();
+        let spread = self.recursion.normalised_covariance();
         let variance = self.recursion.innovation_variance();
         let estimate = |i: usize| Estimate::with_variance(eta[i], variance * spread[i][i]);
         let (k_e, k_e_dot) = (eta[0], eta[1]);

@@ -31,12 +31,13 @@ use hoid::{
     core::{
         adaptation::{Covariance, Forgetting},
         delay::DelayLine,
-        error_bars::NoBars,
-        factored::Factored,
-        predictor::{FixedShape, Regressor},
+        error_bars::NoErrorBars,
+        predictor::Regressor,
         recursion::Stable,
         rls::Rls,
         rpem::Rpem,
+        shape::FixedShape,
+        ud_covariance::UdCovariance,
     },
     ident::order_selection::Criterion,
     lanes::InstructionSet,
@@ -203,7 +204,7 @@ fn whole_text(directory: &Path, replications: u64) -> (f64, Vec<f64>) {
 fn forgetting<const N: usize>() -> Covariance<N> {
     let lambda = [1.0 - 1.0 / MEMORY; N];
     Covariance::new(
-        Factored::diagonal([0.1; N]),
+        UdCovariance::diagonal([0.1; N]),
         Forgetting::Exponential { lambda },
         [f64::INFINITY; N],
     )
@@ -212,7 +213,7 @@ fn forgetting<const N: usize>() -> Covariance<N> {
 /// Recursive least squares from zero, theta after each sample.
 pub fn rls(e: &[f64], u: &[f64], history: &mut Vec<[f64; 4]>) -> [f64; 4] {
     history.clear();
-    let mut recursion = Rls::new(FixedShape::<2, 2, 0, 0, 0>, [0.0; 4], forgetting::<4>(), NoBars).unwrap();
+    let mut recursion = Rls::new(FixedShape::<2, 2, 0, 0, 0>, [0.0; 4], forgetting::<4>(), NoErrorBars).unwrap();
     let mut memory = [0.0; NK];
     let mut delay = DelayLine::new(&mut memory[..]);
     for (&e, &u) in e.iter().zip(u) {
@@ -231,7 +232,7 @@ pub fn rpem(e: &[f64], u: &[f64], history: &mut Vec<[f64; 5]>) -> [f64; 5] {
         Stable::Predictor,
         RPEM_START,
         forgetting::<5>(),
-        NoBars,
+        NoErrorBars,
     )
     .unwrap();
     let mut memory = [0.0; NK];

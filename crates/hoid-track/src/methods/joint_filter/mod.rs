@@ -20,7 +20,7 @@ mod ekf;
 mod ukf;
 
 use hoid_core::{
-    adaptive::hypothesis::OPERATOR,
+    adaptive::prior::OPERATOR,
     delay::DelayLine,
     divided_differences::DividedDifferences,
     state::{State, visit_all},

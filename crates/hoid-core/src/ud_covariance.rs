@@ -15,15 +15,15 @@
 /// `U D U'` of an N x N matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
-pub struct Factored<const N: usize> {
+pub struct UdCovariance<const N: usize> {
     /// Column j holds `U_ij`, i < j, and `d_j` in the place of the 1; the rest is not used. The d stand apart, so that no compiler makes a
     /// vector of them: the first would wait for the last.
     u: [[f64; N]; N],
 }
 
-crate::state!([const N: usize] Factored<N> { u });
+crate::state!([const N: usize] UdCovariance<N> { u });
 
-impl<const N: usize> Factored<N> {
+impl<const N: usize> UdCovariance<N> {
     /// A diagonal matrix.
     pub fn diagonal(d: [f64; N]) -> Self {
         let mut u = [[0.0; N]; N];
@@ -35,7 +35,7 @@ impl<const N: usize> Factored<N> {
 
     /// The factors of a symmetric matrix; `None` unless it is positive semidefinite up to rounding. Rows and columns of zeros
     /// are parameters that do not move.
-    pub fn of(p: &[[f64; N]; N]) -> Option<Self> {
+    pub fn from_matrix(p: &[[f64; N]; N]) -> Option<Self> {
         let mut rest = *p;
         let mut factored = Self::diagonal([0.0; N]);
         for j in (0..N).rev() {
@@ -66,13 +66,13 @@ impl<const N: usize> Factored<N> {
 
     /// The measurement of the module: the gain g; P moves on.
     #[inline]
-    pub fn measure(&mut self, psi: &[f64; N], variance: f64) -> [f64; N] {
-        self.grow_and_measure(1.0, psi, variance)
+    pub fn measurement_update(&mut self, psi: &[f64; N], variance: f64) -> [f64; N] {
+        self.inflate_and_update(1.0, psi, variance)
     }
 
     /// `P <- growth P`, then the measurement, in one pass.
     #[inline(always)]
-    pub fn grow_and_measure(&mut self, growth: f64, psi: &[f64; N], variance: f64) -> [f64; N] {
+    pub fn inflate_and_update(&mut self, growth: f64, psi: &[f64; N], variance: f64) -> [f64; N] {
         let (mut f, mut v, mut grown) = ([0.0; N], [0.0; N], [0.0; N]);
         for j in 0..N {
             let mut sum = psi[j];
@@ -83,12 +83,12 @@ impl<const N: usize> Factored<N> {
             f[j] = sum;
             v[j] = grown[j] * sum;
         }
-        self.measured(grown, f, v, variance)
+        self.update_projected_by(grown, f, v, variance)
     }
 
     /// The measurement, of the projections and of D.
     #[inline(always)]
-    fn measured(&mut self, grown: [f64; N], f: [f64; N], v: [f64; N], variance: f64) -> [f64; N] {
+    fn update_projected_by(&mut self, grown: [f64; N], f: [f64; N], v: [f64; N], variance: f64) -> [f64; N] {
         let mut gain = [0.0; N];
         let (mut before, mut inverse_before) = (variance, 1.0 / variance);
         for j in 0..N {
@@ -112,16 +112,16 @@ impl<const N: usize> Factored<N> {
 
     /// `psi' P psi`.
     #[inline]
-    pub fn along(&self, psi: &[f64; N]) -> f64 {
+    pub fn quadratic_form(&self, psi: &[f64; N]) -> f64 {
         let (f, v) = self.projections(psi);
         f.iter().zip(&v).map(|(f, v)| f * v).sum()
     }
 
-    /// [`Factored::measure`] by what [`Factored::projections`] gave for psi.
+    /// [`UdCovariance::measurement_update`] by what [`UdCovariance::projections`] gave for psi.
     #[inline(always)]
-    pub fn measure_projected(&mut self, (f, v): ([f64; N], [f64; N]), variance: f64) -> [f64; N] {
+    pub fn update_projected(&mut self, (f, v): ([f64; N], [f64; N]), variance: f64) -> [f64; N] {
         let grown = core::array::from_fn(|j| self.u[j][j]);
-        self.measured(grown, f, v, variance)
+        self.update_projected_by(grown, f, v, variance)
     }
 
     /// `f = U' psi` and `v = D f`: `psi' P psi = f' v`.
@@ -173,7 +173,7 @@ impl<const N: usize> Factored<N> {
 
     /// `P <- P + c a a'`, c not negative.
     #[inline]
-    pub fn add(&mut self, mut c: f64, mut a: [f64; N]) {
+    pub fn rank_one_update(&mut self, mut c: f64, mut a: [f64; N]) {
         for j in (0..N).rev() {
             let s = a[j];
             let d = self.u[j][j] + c * s * s;
@@ -209,7 +209,7 @@ impl<const N: usize> Factored<N> {
 
     /// True when every number is finite and no variance negative.
     #[inline(always)]
-    pub fn is_sound(&self) -> bool {
+    pub fn is_valid(&self) -> bool {
         let mut sum = 0.0;
         let mut positive = true;
         for j in 0..N {
