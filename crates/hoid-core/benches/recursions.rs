@@ -8,13 +8,15 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use hoid_core::{
     adaptation::{Covariance, Forgetting},
-    error_bars::{ErrorBars, Level, NoBars},
-    factored::Factored,
-    physical::{Physical, PhysicalModel},
-    predictor::{AnyShape, FixedShape, Regressor, Shape},
+    error_bars::{ErrorBars, NoErrorBars},
+    innovation_variance::InnovationVariance,
+    physical::{PhysicalModel, PhysicalRpem},
+    predictor::Regressor,
     recursion::Stable,
     rls::Rls,
     rpem::Rpem,
+    shape::{AnyShape, FixedShape, Shape},
+    ud_covariance::UdCovariance,
 };
 
 const SAMPLES: usize = 8192;
@@ -43,12 +45,12 @@ fn data() -> Vec<(f64, f64)> {
 }
 
 fn covariance<const N: usize>(forgetting: Forgetting<N>) -> Covariance<N> {
-    Covariance::new(Factored::diagonal([0.1; N]), forgetting, [1e3; N])
+    Covariance::new(UdCovariance::diagonal([0.1; N]), forgetting, [1e3; N])
 }
 
 fn bars<const N: usize, const K: usize>() -> ErrorBars<N, K> {
     let start: [[f64; N]; N] = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 0.1 } else { 0.0 }));
-    ErrorBars::new(&start, Level::new(1e-4, 100.0, 0.999), 5.0)
+    ErrorBars::new(&start, InnovationVariance::new(1e-4, 100.0, 0.999), 5.0)
 }
 
 fn scalar<const N: usize>() -> Forgetting<N> {
@@ -107,8 +109,8 @@ fn rpem<S: Shape, const N: usize, const K: usize>(
 /// As a user without error bars would have it, for the comparison with peers that have none: no guard, no limit on outliers.
 fn bare_rls(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
     history.clear();
-    let adaptation = Covariance::new(Factored::diagonal([0.1; 4]), scalar(), [f64::INFINITY; 4]);
-    let mut recursion = Rls::new(FixedShape::<2, 2, 0, 0, 0>, [0.0; 4], adaptation, NoBars).unwrap();
+    let adaptation = Covariance::new(UdCovariance::diagonal([0.1; 4]), scalar(), [f64::INFINITY; 4]);
+    let mut recursion = Rls::new(FixedShape::<2, 2, 0, 0, 0>, [0.0; 4], adaptation, NoErrorBars).unwrap();
     for &(x, u) in data {
         recursion.step(x, u);
         history.push(*recursion.theta());
@@ -123,8 +125,8 @@ fn bare_rpem(data: &[(f64, f64)], history: &mut Vec<[f64; 5]>) {
         Regressor::Gradient,
         Stable::Predictor,
         [0.04, -0.04, -0.8, -1.9, 0.92],
-        Covariance::new(Factored::diagonal([0.1; 5]), scalar(), [f64::INFINITY; 5]),
-        NoBars,
+        Covariance::new(UdCovariance::diagonal([0.1; 5]), scalar(), [f64::INFINITY; 5]),
+        NoErrorBars,
     )
     .unwrap();
     for &(x, u) in data {
@@ -135,7 +137,7 @@ fn bare_rpem(data: &[(f64, f64)], history: &mut Vec<[f64; 5]>) {
 
 fn physical<S: Shape, const N: usize, const K: usize, const L: usize>(
     shape: S,
-    tracked_from: Option<usize>,
+    smallest_nk: Option<usize>,
     data: &[(f64, f64)],
     history: &mut Vec<[f64; N]>,
 ) {
@@ -145,18 +147,18 @@ fn physical<S: Shape, const N: usize, const K: usize, const L: usize>(
     bounds[3] = [0.02, 5.0];
     let mut eta = [0.0; N];
     eta[..4].copy_from_slice(&[0.09, 0.036, 11.25, 0.35]);
-    if tracked_from.is_some() {
+    if smallest_nk.is_some() {
         bounds[4] = [0.0, 0.5];
         eta[4] = 0.02;
     }
     let model = PhysicalModel {
         shape,
-        tracked_from,
+        smallest_nk,
         sample_time: 0.01,
         bounds,
         stable: Stable::Predictor,
     };
-    let mut recursion = Physical::<S, N, K, L, _>::new(model, eta, covariance(matrix()), bars::<N, K>()).unwrap();
+    let mut recursion = PhysicalRpem::<S, N, K, L, _>::new(model, eta, covariance(matrix()), bars::<N, K>()).unwrap();
     for &(x, u) in data {
         recursion.step(x, u);
         history.push(*recursion.eta());

@@ -22,8 +22,8 @@
 //! What an estimate is worth that was made with such a gain: [`crate::error_bars`].
 
 use crate::{
-    error_bars::{Bars, ErrorBars},
-    factored::Factored,
+    error_bars::{ErrorBars, ErrorPropagation},
+    ud_covariance::UdCovariance,
 };
 
 /// How old information loses its weight.
@@ -60,7 +60,7 @@ pub enum Forgetting<const N: usize> {
 
 /// The step for one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Move<const N: usize> {
+pub struct ParameterStep<const N: usize> {
     /// What is to be added to theta.
     pub step: [f64; N],
     /// The gain g; `step = g eps` except in a window.
@@ -70,31 +70,31 @@ pub struct Move<const N: usize> {
 /// What turns gradients into steps; [`Covariance`] and [`crate::window::Window`].
 pub trait Adaptation<const N: usize> {
     /// The step for psi and the innovation eps of the given variance at theta; the memory moves on.
-    fn advance(&mut self, psi: &[f64; N], eps: f64, theta: &[f64; N], variance: f64) -> Move<N>;
+    fn update(&mut self, psi: &[f64; N], eps: f64, theta: &[f64; N], variance: f64) -> ParameterStep<N>;
     /// Covariance of theta over the innovation variance where it does not follow from the gains.
-    fn spread(&self) -> Option<[[f64; N]; N]> {
+    fn own_covariance(&self) -> Option<[[f64; N]; N]> {
         None
     }
     /// Adds to the error bars what parameters drift in a sample.
-    fn drift_into<const K: usize, B: Bars<N, K>>(&self, _bars: &mut B) {}
-    /// True when the variance that [`Adaptation::advance`] is given has a part in the step.
-    fn needs_variance(&self) -> bool {
+    fn add_drift_to<const K: usize, B: ErrorPropagation<N, K>>(&self, _bars: &mut B) {}
+    /// True when the variance that [`Adaptation::update`] is given has a part in the step.
+    fn needs_innovation_variance(&self) -> bool {
         false
     }
     /// The covariance of theta over the innovation variance.
-    fn spread_or<const K: usize>(&self, bars: &ErrorBars<N, K>) -> [[f64; N]; N] {
-        self.spread().unwrap_or_else(|| bars.spread())
+    fn normalised_covariance<const K: usize>(&self, bars: &ErrorBars<N, K>) -> [[f64; N]; N] {
+        self.own_covariance().unwrap_or_else(|| bars.normalised_covariance())
     }
     /// True when every number inside is finite.
-    fn is_sound(&self) -> bool;
+    fn is_valid(&self) -> bool;
 }
 
 /// A covariance in factors, with one way of forgetting.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Covariance<const N: usize> {
-    factors: Factored<N>,
+    factors: UdCovariance<N>,
     /// P at the start.
-    first: Factored<N>,
+    first: UdCovariance<N>,
     forgetting: Forgetting<N>,
     /// `lambda_i^{-1/2}` and its inverse, for unequal factors.
     scales: [[f64; N]; 2],
@@ -136,14 +136,14 @@ const FORGOTTEN: f64 = 1e-9;
 const LONGEST_PERIOD: f64 = 64.0;
 
 /// Samples between two turns of the guard, for the shortest memory and the number of parameters.
-pub(crate) fn guard_period(shortest: f64, parameters: usize) -> u32 {
+fn guard_period(shortest: f64, parameters: usize) -> u32 {
     (shortest / (TURNS_IN_A_MEMORY * parameters as f64)).clamp(1.0, LONGEST_PERIOD) as u32
 }
 
 /// The step `g eps`.
 #[inline(always)]
-fn along<const N: usize>(gain: [f64; N], eps: f64) -> Move<N> {
-    Move {
+fn along<const N: usize>(gain: [f64; N], eps: f64) -> ParameterStep<N> {
+    ParameterStep {
         step: gain.map(|g| g * eps),
         gain,
     }
@@ -151,7 +151,7 @@ fn along<const N: usize>(gain: [f64; N], eps: f64) -> Move<N> {
 
 impl<const N: usize> Covariance<N> {
     /// `factors` is P; `bound` the largest variance of each parameter, in the units of P, infinite for none.
-    pub fn new(factors: Factored<N>, forgetting: Forgetting<N>, bound: [f64; N]) -> Self {
+    pub fn new(factors: UdCovariance<N>, forgetting: Forgetting<N>, bound: [f64; N]) -> Self {
         let mut scales = [[1.0; N]; 2];
         let mut uniform = 0.0;
         let mut shortest = f64::INFINITY;
@@ -213,7 +213,7 @@ impl<const N: usize> Covariance<N> {
 
     /// The step where it is not that of a recursion in its stride with an exponential memory.
     #[inline(never)]
-    fn advance_otherwise(&mut self, psi: &[f64; N], eps: f64, variance: f64) -> Move<N> {
+    fn update_slowly(&mut self, psi: &[f64; N], eps: f64, variance: f64) -> ParameterStep<N> {
         if self.early > FORGOTTEN {
             self.factors.scale_all(1.0 / (1.0 - self.early));
             self.hold(self.early);
@@ -236,24 +236,24 @@ impl<const N: usize> Covariance<N> {
                     if *q > 0.0 {
                         let mut unit = [0.0; N];
                         unit[i] = 1.0;
-                        self.factors.add(*q, unit);
+                        self.factors.rank_one_update(*q, unit);
                     }
                 }
                 self.hold(1.0);
             }
             Forgetting::Variable { memory, smallest } => {
-                return self.advance_variable(psi, eps, *memory * variance, *smallest);
+                return self.update_variable(psi, eps, *memory * variance, *smallest);
             }
-            Forgetting::Directional { lambda } => return self.advance_directional(psi, eps, *lambda),
-            Forgetting::Gradient { rate } => return self.advance_gradient(psi, eps, *rate),
+            Forgetting::Directional { lambda } => return self.update_directional(psi, eps, *lambda),
+            Forgetting::Gradient { rate } => return self.update_gradient(psi, eps, *rate),
         }
-        along(self.factors.grow_and_measure(growth, psi, 1.0), eps)
+        along(self.factors.inflate_and_update(growth, psi, 1.0), eps)
     }
 
     /// `level` is N_0 sigma^2.
-    fn advance_variable(&mut self, psi: &[f64; N], eps: f64, level: f64, smallest: f64) -> Move<N> {
-        let denominator = 1.0 + self.factors.along(psi);
-        let gain = self.factors.measure(psi, 1.0);
+    fn update_variable(&mut self, psi: &[f64; N], eps: f64, level: f64, smallest: f64) -> ParameterStep<N> {
+        let denominator = 1.0 + self.factors.quadratic_form(psi);
+        let gain = self.factors.measurement_update(psi, 1.0);
         let expected = denominator * level;
         let lambda = if expected > 0.0 {
             (1.0 - eps * eps / expected).clamp(smallest, 1.0)
@@ -265,19 +265,19 @@ impl<const N: usize> Covariance<N> {
         along(gain, eps)
     }
 
-    fn advance_directional(&mut self, psi: &[f64; N], eps: f64, lambda: f64) -> Move<N> {
-        let power = self.factors.along(psi);
+    fn update_directional(&mut self, psi: &[f64; N], eps: f64, lambda: f64) -> ParameterStep<N> {
+        let power = self.factors.quadratic_form(psi);
         let gain = self.factors.times(psi).map(|g| g / (1.0 + power));
         let beta = lambda - (1.0 - lambda) / power;
         // Without excitation nothing is measured, and there is no direction to forget along.
         if power > NO_EXCITATION && beta != 0.0 {
-            self.factors.measure(psi, 1.0 / beta);
+            self.factors.measurement_update(psi, 1.0 / beta);
         }
         self.hold(1.0 - lambda);
         along(gain, eps)
     }
 
-    fn advance_gradient(&mut self, psi: &[f64; N], eps: f64, rate: f64) -> Move<N> {
+    fn update_gradient(&mut self, psi: &[f64; N], eps: f64, rate: f64) -> ParameterStep<N> {
         let power: f64 = psi.iter().map(|p| p * p).sum();
         self.power += (power - self.power) * POWER_SHARE;
         self.largest_power = self.largest_power.max(self.power);
@@ -300,7 +300,7 @@ impl<const N: usize> Covariance<N> {
     #[inline(never)]
     fn take_turn(&mut self) {
         self.wait = self.period;
-        if !self.factors.is_sound() {
+        if !self.factors.is_valid() {
             // Lost to an overflow: nothing better is known than what was known at the start.
             self.factors.clone_from(&self.first);
         }
@@ -311,19 +311,19 @@ impl<const N: usize> Covariance<N> {
         if information > 0.0 {
             let mut unit = [0.0; N];
             unit[turn] = 1.0;
-            self.factors.measure(&unit, 1.0 / information);
+            self.factors.measurement_update(&unit, 1.0 / information);
         }
     }
 }
 
 impl<const N: usize> Adaptation<N> for Covariance<N> {
     #[inline(always)]
-    fn advance(&mut self, psi: &[f64; N], eps: f64, _theta: &[f64; N], variance: f64) -> Move<N> {
+    fn update(&mut self, psi: &[f64; N], eps: f64, _theta: &[f64; N], variance: f64) -> ParameterStep<N> {
         let exponential = matches!(self.forgetting, Forgetting::Exponential { .. });
         if !exponential || self.early > FORGOTTEN {
             // A copy, so that psi can stay in registers where it is not called.
             let psi = *psi;
-            return self.advance_otherwise(&psi, eps, variance);
+            return self.update_slowly(&psi, eps, variance);
         }
         let mut growth = 1.0;
         // At 1 nothing is forgotten.
@@ -335,23 +335,23 @@ impl<const N: usize> Adaptation<N> for Covariance<N> {
             }
             self.hold(1.0);
         }
-        along(self.factors.grow_and_measure(growth, psi, 1.0), eps)
+        along(self.factors.inflate_and_update(growth, psi, 1.0), eps)
     }
 
     #[inline(always)]
-    fn drift_into<const K: usize, B: Bars<N, K>>(&self, bars: &mut B) {
+    fn add_drift_to<const K: usize, B: ErrorPropagation<N, K>>(&self, bars: &mut B) {
         if let Forgetting::RandomWalk { drift } = &self.forgetting {
             for (i, (variance, bound)) in drift.iter().zip(&self.bound).enumerate() {
-                bars.drift(i, *variance, *bound);
+                bars.add_drift(i, *variance, *bound);
             }
         }
     }
 
-    fn needs_variance(&self) -> bool {
+    fn needs_innovation_variance(&self) -> bool {
         matches!(self.forgetting, Forgetting::Variable { .. })
     }
 
-    fn is_sound(&self) -> bool {
-        self.factors.is_sound()
+    fn is_valid(&self) -> bool {
+        self.factors.is_valid()
     }
 }

@@ -12,8 +12,8 @@
 //!
 //! `theta~ <- theta~ - g (eps + h' X)`,  `Sigma <- (I - g h') Sigma (I - g h')' + g g'`
 //!
-//! (the Joseph form, in units of sigma^2), after which the new dw, dv and de take their places in X. With `z = Sigma h` and
-//! `k = z - (1 + h' z)/2 g` the update is `Sigma - g k' - k g'`, and for the row a of a new error, which differs from h in few places,
+//! (the Joseph form, in units of sigma^2), after which the new dw, dv and de take their layout in X. With `z = Sigma h` and
+//! `k = z - (1 + h' z)/2 g` the update is `Sigma - g k' - k g'`, and for the row a of a new error, which differs from h in few layout,
 //! `Sigma a = z - Sigma (h - a)`: two thirds of the products are shared. No assumption is made about g: the
 //! error bars hold for a scalar factor, where they tend to `P/(1 + lambda)` for ARX (L. Ljung and T. Söderström, *Theory and Practice of
 //! Recursive Identification*, 1983, eq. 4.136), for a forgetting matrix, a shortened step, or a gradient. Without forgetting `Sigma`
@@ -27,145 +27,13 @@
 //!
 //! The innovation variance sigma^2 is the mean of `eps^2/(1 + h' Sigma h)`, each term of which has the expectation sigma^2.
 
-use crate::{predictor::Shape, state::State};
+use crate::{
+    innovation_variance::InnovationVariance,
+    sensitivities::{ErrorLayout, LinearForm, Sensitivities},
+    state::State,
+};
 
-/// Mean of the squared innovations, each over what it is expected to be, with an exponential memory.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Level {
-    sum: f64,
-    weight: f64,
-    lambda: f64,
-}
-
-crate::state!([] Level { sum, weight, lambda });
-
-impl Level {
-    /// Starts from a variance that `weight` residuals gave; weight 0 starts from nothing.
-    pub fn new(variance: f64, weight: f64, lambda: f64) -> Self {
-        Self {
-            sum: variance * weight,
-            weight,
-            lambda,
-        }
-    }
-
-    /// Takes the square of an innovation over its expected size.
-    #[inline(always)]
-    pub fn take(&mut self, squared: f64) {
-        self.sum = self.lambda * self.sum + squared;
-        self.weight = self.lambda * self.weight + 1.0;
-    }
-
-    /// The variance; zero before anything is known.
-    #[inline(always)]
-    pub fn variance(&self) -> f64 {
-        if self.weight > 0.0 { self.sum / self.weight } else { 0.0 }
-    }
-
-    /// Number of residuals that the variance rests on.
-    #[inline(always)]
-    pub fn weight(&self) -> f64 {
-        self.weight
-    }
-
-    /// The same variance, from no more than `weight` residuals: what comes next counts the more.
-    pub fn doubt(&mut self, weight: f64) {
-        if self.weight > weight && weight > 0.0 {
-            self.sum *= weight / self.weight;
-            self.weight = weight;
-        }
-    }
-}
-
-/// Places in X: which parameters belong to A, which to C and D, and how many past errors of the filters are kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Places {
-    /// Number of coefficients of A, which come first.
-    pub na: usize,
-    /// First coefficient of C and D and their number.
-    pub noise: (usize, usize),
-    /// First dw and their number, among the errors of the filters.
-    pub w: (usize, usize),
-    /// First dv and their number; none without A, where dv is dw.
-    pub v: (usize, usize),
-    /// First de and their number.
-    pub e: (usize, usize),
-}
-
-impl Places {
-    /// The places for a shape, in the order of theta.
-    #[inline(always)]
-    pub fn of<S: Shape>(shape: &S) -> Self {
-        let w = if shape.na() == 0 {
-            shape.nf().max(shape.nd())
-        } else {
-            shape.nf()
-        };
-        let v = if shape.na() == 0 { 0 } else { shape.nd() };
-        Self {
-            na: shape.na(),
-            noise: (shape.na() + shape.nb(), shape.nc() + shape.nd()),
-            w: (0, w),
-            v: (w, v),
-            e: (w + v, shape.nc()),
-        }
-    }
-
-    /// No errors of filters: the usual error bars, with `h = psi`.
-    pub const NONE: Self = Self {
-        na: 0,
-        noise: (0, 0),
-        w: (0, 0),
-        v: (0, 0),
-        e: (0, 0),
-    };
-
-    /// The places where there is room for K errors of filters, none for K = 0.
-    #[inline(always)]
-    pub fn within<S: Shape, const K: usize>(shape: &S) -> Self {
-        if K == 0 { Self::NONE } else { Self::of(shape) }
-    }
-
-    /// Number of past errors of the filters.
-    #[inline(always)]
-    pub fn filters(&self) -> usize {
-        self.e.0 + self.e.1
-    }
-}
-
-/// A linear function of X: its coefficients for the parameters and for the errors of the filters.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Row<const N: usize, const K: usize> {
-    /// For theta~.
-    pub theta: [f64; N],
-    /// For the past dw, dv and de.
-    pub filters: [f64; K],
-}
-
-/// How the new dw, dv and de follow from X; the last is the sensitivity h of the innovation too.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sensitivities<const N: usize, const K: usize> {
-    /// Of dw.
-    pub w: Row<N, K>,
-    /// Of dv.
-    pub v: Row<N, K>,
-    /// Of de.
-    pub e: Row<N, K>,
-}
-
-impl<const N: usize, const K: usize> Sensitivities<N, K> {
-    /// Those of an estimate that does not move within the memory of its filters: `h = psi`, and no errors in the filters.
-    #[inline(always)]
-    pub fn of_gradient(psi: &[f64; N]) -> Self {
-        let row = Row {
-            theta: *psi,
-            filters: [0.0; K],
-        };
-        Self { w: row, v: row, e: row }
-    }
-}
-
-/// Sigma over sigma^2, and sigma^2. N is the room for parameters, K that for the errors of the filters ([`Places::filters`]).
+/// Sigma over sigma^2, and sigma^2. N is the room for parameters, K that for the errors of the filters ([`ErrorLayout::filter_errors`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorBars<const N: usize, const K: usize> {
     /// Covariance of theta.
@@ -176,56 +44,56 @@ pub struct ErrorBars<const N: usize, const K: usize> {
     filters: [[f64; K]; K],
     /// Variances of theta at the start.
     start: [f64; N],
-    level: Level,
+    innovation_variance: InnovationVariance,
     limit: f64,
     wait: u32,
 }
 
 crate::state!([const N: usize, const K: usize] ErrorBars<N, K> {
-    theta, cross, filters, start, level, limit, wait,
+    theta, cross, filters, start, innovation_variance, limit, wait,
 });
 
 /// Variances of theta beyond this multiple of those at the start say that nothing is known.
-pub const NOTHING_KNOWN: f64 = 1e6;
+pub const LARGEST_GROWTH: f64 = 1e6;
 /// Samples between two looks whether that is so.
-const LOOK: u32 = 64;
+const CHECK_PERIOD: u32 = 64;
 
-/// What follows the error of an estimate through its recursion: [`ErrorBars`], or [`NoBars`] where nobody asks.
-pub trait Bars<const N: usize, const K: usize>: State {
+/// What follows the error of an estimate through its recursion: [`ErrorBars`], or [`NoErrorBars`] where nobody asks.
+pub trait ErrorPropagation<const N: usize, const K: usize>: State {
     /// The innovation as far as it may move the estimate.
-    fn limited(&self, eps: f64) -> f64;
+    fn clip(&self, eps: f64) -> f64;
     /// Takes the innovation of a sample with the gain that was used, and the errors that the sample leaves in the filters.
-    fn take(&mut self, places: &Places, rows: &Sensitivities<N, K>, gain: &[f64; N], eps: f64);
+    fn update(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>, gain: &[f64; N], eps: f64);
     /// The errors that a sample leaves in the filters, without a step of the estimate.
-    fn follow(&mut self, places: &Places, rows: &Sensitivities<N, K>);
+    fn propagate(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>);
     /// Adds the variance by which parameter i drifts in a sample, until `bound`.
-    fn drift(&mut self, i: usize, variance: f64, bound: f64);
+    fn add_drift(&mut self, i: usize, variance: f64, bound: f64);
     /// Innovation variance sigma^2; `None` where it is not followed.
     fn variance(&self) -> Option<f64>;
 }
 
 /// No error bars, no innovation variance and no limit on outliers: a recursion that is its estimate alone, at no cost besides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct NoBars;
+pub struct NoErrorBars;
 
-impl State for NoBars {
+impl State for NoErrorBars {
     fn visit(&mut self, _each: &mut dyn FnMut(&mut f64)) {}
 }
 
-impl<const N: usize> Bars<N, 0> for NoBars {
+impl<const N: usize> ErrorPropagation<N, 0> for NoErrorBars {
     #[inline(always)]
-    fn limited(&self, eps: f64) -> f64 {
+    fn clip(&self, eps: f64) -> f64 {
         eps
     }
 
     #[inline(always)]
-    fn take(&mut self, _places: &Places, _rows: &Sensitivities<N, 0>, _gain: &[f64; N], _eps: f64) {}
+    fn update(&mut self, _layout: &ErrorLayout, _rows: &Sensitivities<N, 0>, _gain: &[f64; N], _eps: f64) {}
 
     #[inline(always)]
-    fn follow(&mut self, _places: &Places, _rows: &Sensitivities<N, 0>) {}
+    fn propagate(&mut self, _layout: &ErrorLayout, _rows: &Sensitivities<N, 0>) {}
 
     #[inline(always)]
-    fn drift(&mut self, _i: usize, _variance: f64, _bound: f64) {}
+    fn add_drift(&mut self, _i: usize, _variance: f64, _bound: f64) {}
 
     #[inline(always)]
     fn variance(&self) -> Option<f64> {
@@ -236,21 +104,21 @@ impl<const N: usize> Bars<N, 0> for NoBars {
 impl<const N: usize, const K: usize> ErrorBars<N, K> {
     /// From the covariance of theta at the start over the innovation variance, with filters whose past is right. Innovations move the
     /// estimate as if they were no larger than `limit` times sigma; infinite for no limit.
-    pub fn new(start: &[[f64; N]; N], level: Level, limit: f64) -> Self {
+    pub fn new(start: &[[f64; N]; N], innovation_variance: InnovationVariance, limit: f64) -> Self {
         Self {
             theta: *start,
             cross: [[0.0; N]; K],
             filters: [[0.0; K]; K],
             start: core::array::from_fn(|i| start[i][i]),
-            level,
+            innovation_variance,
             limit,
-            wait: LOOK,
+            wait: CHECK_PERIOD,
         }
     }
 
     /// `Sigma a`.
     #[inline(always)]
-    fn times(&self, count: usize, a: &Row<N, K>) -> ([f64; N], [f64; K]) {
+    fn times(&self, count: usize, a: &LinearForm<N, K>) -> ([f64; N], [f64; K]) {
         let (mut theta, mut filters) = ([0.0; N], [0.0; K]);
         for j in 0..N {
             for i in 0..N {
@@ -275,9 +143,9 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
 
     /// Puts the new dw, dv and de in front of those of their kind, from `Sigma h`.
     #[inline(always)]
-    fn insert(&mut self, places: &Places, rows: &Sensitivities<N, K>, z: [f64; N], z_filters: [f64; K]) {
-        let count = places.filters();
-        let kinds = [places.w, places.v, places.e];
+    fn insert(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>, z: [f64; N], z_filters: [f64; K]) {
+        let count = layout.filter_errors();
+        let kinds = [layout.w, layout.v, layout.e];
         let new = [&rows.w, &rows.v, &rows.e];
         let mut with_theta = [z; 3];
         let mut with_filters = [z_filters; 3];
@@ -286,8 +154,8 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
                 continue;
             }
             // h and the row differ in A (for dw), in C and D, and in the filters.
-            let of_a = if kind == 0 { places.na } else { 0 };
-            let (first, noise) = places.noise;
+            let of_a = if kind == 0 { layout.na } else { 0 };
+            let (first, noise) = layout.noise;
             for j in (0..of_a).chain(first..first + noise) {
                 let difference = rows.e.theta[j] - new[kind].theta[j];
                 for i in 0..N {
@@ -361,17 +229,17 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
     /// To first order a recursion with large gains can be unstable where it is not: then the variances grow to what says that nothing
     /// is known, and no further. What is not finite starts again from there.
     #[cold]
-    fn confine(&mut self) {
-        if !self.is_sound() {
+    fn bound_variances(&mut self) {
+        if !self.is_valid() {
             self.cross = [[0.0; N]; K];
             self.filters = [[0.0; K]; K];
             self.theta = [[0.0; N]; N];
             for i in 0..N {
-                self.theta[i][i] = NOTHING_KNOWN * self.start[i];
+                self.theta[i][i] = LARGEST_GROWTH * self.start[i];
             }
         }
         for i in 0..N {
-            let limit = NOTHING_KNOWN * self.start[i];
+            let limit = LARGEST_GROWTH * self.start[i];
             if self.start[i] > 0.0 && self.theta[i][i] > limit {
                 let share = libm::sqrt(limit / self.theta[i][i]);
                 for j in 0..N {
@@ -386,38 +254,37 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
     }
 
     /// Covariance of theta over sigma^2.
-    pub fn spread(&self) -> [[f64; N]; N] {
+    pub fn normalised_covariance(&self) -> [[f64; N]; N] {
         self.theta
     }
 
     /// Innovation variance sigma^2.
     #[inline(always)]
     pub fn innovation_variance(&self) -> f64 {
-        self.level.variance()
+        self.innovation_variance.variance()
     }
 
     /// True when every number inside is finite.
-    pub fn is_sound(&self) -> bool {
+    pub fn is_valid(&self) -> bool {
         let all = self.theta.iter().chain(&self.cross).flatten();
         let mut all = all.chain(self.filters.iter().flatten());
-        all.all(|s| s.is_finite()) && self.level.variance().is_finite()
+        all.all(|s| s.is_finite()) && self.innovation_variance.variance().is_finite()
     }
 }
 
-impl<const N: usize, const K: usize> Bars<N, K> for ErrorBars<N, K> {
+impl<const N: usize, const K: usize> ErrorPropagation<N, K> for ErrorBars<N, K> {
     #[inline(always)]
-    fn limited(&self, eps: f64) -> f64 {
-        // Before anything is known of sigma there is no limit. Most innovations are within it, and need no root to know it.
-        if self.level.sum > 0.0 && eps * eps * self.level.weight > self.limit * self.limit * self.level.sum {
-            libm::copysign(self.limit * libm::sqrt(self.level.variance()), eps)
+    fn clip(&self, eps: f64) -> f64 {
+        if self.innovation_variance.is_beyond(eps, self.limit) {
+            libm::copysign(self.limit * libm::sqrt(self.innovation_variance.variance()), eps)
         } else {
             eps
         }
     }
 
     #[inline(always)]
-    fn take(&mut self, places: &Places, rows: &Sensitivities<N, K>, gain: &[f64; N], eps: f64) {
-        let count = places.filters();
+    fn update(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>, gain: &[f64; N], eps: f64) {
+        let count = layout.filter_errors();
         let (mut z, z_filters) = self.times(count, &rows.e);
         let mut along = 0.0;
         for i in 0..N {
@@ -426,7 +293,7 @@ impl<const N: usize, const K: usize> Bars<N, K> for ErrorBars<N, K> {
         for i in 0..count {
             along += rows.e.filters[i] * z_filters[i];
         }
-        self.level.take(eps * eps / (1.0 + along.max(0.0)));
+        self.innovation_variance.update(eps * eps / (1.0 + along.max(0.0)));
         let half = 0.5 * (1.0 + along);
         let mut k = z;
         for i in 0..N {
@@ -457,26 +324,26 @@ impl<const N: usize, const K: usize> Bars<N, K> for ErrorBars<N, K> {
                 z[i] -= gain[i] * k_h + k[i] * g_h;
             }
             let z_filters = core::array::from_fn(|c| z_filters[c] * (1.0 - g_h));
-            self.insert(places, rows, z, z_filters);
+            self.insert(layout, rows, z, z_filters);
         }
         self.wait -= 1;
         if self.wait == 0 {
-            self.wait = LOOK;
-            self.confine();
+            self.wait = CHECK_PERIOD;
+            self.bound_variances();
         }
     }
 
     #[inline]
-    fn follow(&mut self, places: &Places, rows: &Sensitivities<N, K>) {
-        let count = places.filters();
+    fn propagate(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>) {
+        let count = layout.filter_errors();
         if count > 0 {
             let (z, z_filters) = self.times(count, &rows.e);
-            self.insert(places, rows, z, z_filters);
+            self.insert(layout, rows, z, z_filters);
         }
     }
 
     #[inline]
-    fn drift(&mut self, i: usize, variance: f64, bound: f64) {
+    fn add_drift(&mut self, i: usize, variance: f64, bound: f64) {
         // Beyond the bound nothing is known that could be forgotten.
         if self.theta[i][i] < bound {
             self.theta[i][i] += variance;
@@ -485,6 +352,6 @@ impl<const N: usize, const K: usize> Bars<N, K> for ErrorBars<N, K> {
 
     #[inline(always)]
     fn variance(&self) -> Option<f64> {
-        Some(self.level.variance())
+        Some(self.innovation_variance.variance())
     }
 }

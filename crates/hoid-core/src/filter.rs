@@ -18,11 +18,11 @@ pub fn divide(d: &[f64], x: &[f64], y: &mut [f64]) {
 
 /// All-pole filter in place: `x <- x / D(q^-1)`, that is `y(t) = x(t) - d_1 y(t-1) - ... - d_n y(t-n)`.
 pub fn divide_in_place(d: &[f64], x: &mut [f64]) {
-    divide_on(d, x, 0);
+    divide_from(d, x, 0);
 }
 
 /// As [`divide_in_place`] from index `from` on: what stands before is what has come out of the filter so far, and zeros before that.
-pub fn divide_on(d: &[f64], x: &mut [f64], from: usize) {
+pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
     let before = |lag: usize, x: &[f64]| from.checked_sub(lag).map_or(0.0, |t| x[t]);
     match *d {
         [] => {}
@@ -151,7 +151,7 @@ pub fn multiply(d: &[f64], x: &[f64], y: &mut [f64]) {
 ///
 /// # Panics
 /// If `x` and `y` differ in length.
-pub fn moving_sum(b: &[f64], nk: usize, x: &[f64], y: &mut [f64]) {
+pub fn fir(b: &[f64], nk: usize, x: &[f64], y: &mut [f64]) {
     assert_eq!(x.len(), y.len(), "input and output of a filter have the same length");
     y.fill(0.0);
     for (j, &bj) in b.iter().enumerate() {
@@ -205,7 +205,7 @@ mod tests {
             for cut in [1, 3, 64] {
                 let mut parts = wave(200);
                 divide_in_place(&d[..n], &mut parts[..cut]);
-                divide_on(&d[..n], &mut parts, cut);
+                divide_from(&d[..n], &mut parts, cut);
                 for (a, b) in whole.iter().zip(&parts) {
                     assert!((a - b).abs() < 1e-14, "order {n}: {a} and {b}");
                 }
@@ -214,12 +214,12 @@ mod tests {
     }
 
     #[test]
-    fn moving_sum_delays_and_weighs() {
+    fn fir_delays_and_weighs() {
         let mut y = [0.0; 5];
-        moving_sum(&[2.0, 3.0], 1, &[1.0, 10.0, 0.0, 0.0, 0.0], &mut y);
+        fir(&[2.0, 3.0], 1, &[1.0, 10.0, 0.0, 0.0, 0.0], &mut y);
         assert_eq!(y, [0.0, 2.0, 23.0, 30.0, 0.0]);
         // A delay longer than the record leaves nothing, and does not panic.
-        moving_sum(&[2.0], 9, &[1.0; 5], &mut y);
+        fir(&[2.0], 9, &[1.0; 5], &mut y);
         assert_eq!(y, [0.0; 5]);
     }
 

@@ -1,25 +1,73 @@
-//! Real-time kernel of hoid: what runs once per sample, beside a control loop.
+//! Recursive identification of a human operator in real time: what runs once per sample, beside a control loop.
 //!
-//! `no_std`, no allocation, no dependency but elementary functions (`libm`): every routine works in memory that the caller owns and
-//! has a bounded number of operations. The batch estimators and the simulator stand on the same routines, so that a recursion and its batch twin
-//! cannot differ in their filters.
+//! A person steers a machine by the tracking error e and gives the control output u. Their dynamics change as they learn, tire or adapt to the
+//! machine. The recursions of this crate estimate a model of them from each new sample, with the uncertainty of the estimate.
+//!
+//! **Mathematics.** For the model `A u = (B/F) q^-nk e + (C/D) eps` with the coefficients theta of its polynomials, the one-step prediction error and
+//! its negative gradient are `eps(t)` and `psi(t) = -d eps/d theta`. Each sample moves the estimate by the recursive prediction-error method
+//! (L. Ljung and T. Söderström, *Theory and Practice of Recursive Identification*, 1983):
+//!
+//! - forget: `P <- Lambda P Lambda` with a factor for each parameter, or another rule of [`adaptation`];
+//! - gain: `g = P psi/(1 + psi' P psi)`;
+//! - update: `theta <- theta + g eps`, `P <- P - g psi' P`.
+//!
+//! P is kept in factors `U D U'`, which rounding cannot make indefinite. A step that would make the predictor unstable is halved until it does not.
+//! The error bars follow the error of the estimate through the recursion, whatever the gain, in units of the innovation variance sigma^2.
+//!
+//! **Real time.** `no_std`, no allocation, no dependency but elementary functions (`libm`). Every routine works in memory that the caller owns and has
+//! a bounded number of operations. The numbers of a recursion can be saved and restored ([`mod@state`]). Batch estimators and simulator of hoid stand on
+//! the same filters, so that a recursion and its batch counterpart cannot differ in them.
+//!
+//! ```
+//! use hoid_core::{
+//!     adaptation::{Covariance, Forgetting},
+//!     error_bars::ErrorBars,
+//!     innovation_variance::InnovationVariance,
+//!     rls::Rls,
+//!     shape::AnyShape,
+//!     ud_covariance::UdCovariance,
+//! };
+//!
+//! // u(t) = -a1 u(t-1) + b0 e(t) + eps(t): an ARX model with two parameters.
+//! let shape = AnyShape { na: 1, nb: 1, ..AnyShape::default() };
+//! // Both start at 0 with variance 100 (over sigma^2); a memory of 50 samples; variances stay below 1000.
+//! let gain = Covariance::new(
+//!     UdCovariance::diagonal([100.0; 2]),
+//!     Forgetting::Exponential { lambda: [1.0 - 1.0 / 50.0; 2] },
+//!     [1000.0; 2],
+//! );
+//! // Nothing is known of sigma^2 at the start; outliers count as five sigma.
+//! let sigma2 = InnovationVariance::new(0.0, 0.0, 0.99);
+//! let bars = ErrorBars::new(&[[100.0, 0.0], [0.0, 100.0]], sigma2, 5.0);
+//! let mut recursion = Rls::new(shape, [0.0; 2], gain, bars).ok_or("orders do not fit")?;
+//!
+//! let mut u = 0.0;
+//! for t in 0..600 {
+//!     let e = f64::from(t % 40) - 19.5;
+//!     // The operator doubles their gain after 300 samples.
+//!     let b0 = if t < 300 { 0.1 } else { 0.2 };
+//!     let noise = 0.05 * f64::from(t * t % 7 - 2);
+//!     u = 0.8 * u + b0 * e + noise;
+//!     recursion.step(e, u);
+//! }
+//! let [a1, b0] = *recursion.theta();
+//! assert!((a1 + 0.8).abs() < 0.02 && (b0 - 0.2).abs() < 0.01, "{a1} {b0}");
+//! let variance = recursion.normalised_covariance()[1][1] * recursion.innovation_variance();
+//! assert!(variance > 0.0 && variance.is_finite());
+//! # Ok::<(), &str>(())
+//! ```
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`delay`] | a delay line of fixed length |
-//! | [`divided_differences`] | divided differences of the exponential: second-order holds |
-//! | [`filter`] | rational filters `C(q^-1)/D(q^-1)` over slices |
-//! | [`held_operator`] | exact zero-order hold of the operator with any delay, and its Jacobian |
-//! | [`stability`] | Schur-Cohn test: are all roots inside a circle? |
-//! | [`factored`] | covariance `U D U'` |
-//! | [`adaptation`] | gain, ways of forgetting, guard against windup |
-//! | [`error_bars`] | covariance of the estimate whatever the gain, innovation variance |
-//! | [`window`] | the adaptation of a rectangular window |
-//! | [`predictor`] | one-step predictor of the general model with its gradient |
-//! | [`rls`], [`rpem`], [`physical`] | recursive least squares, prediction-error method in polynomials and in physical parameters |
-//! | [`adaptive`] | a bank of hypotheses of when the person changed |
-//! | [`number`], [`lanes`] | one run, or several side by side: recursions in the lanes of vector registers |
-//! | [`recursion`] | outcome of a step, stability of a step |
+//! | [`rls`], [`rpem`], [`physical`] | the recursions: least squares, prediction-error method in polynomials and in physical parameters |
+//! | [`adaptive`] | a bank of hypotheses about when the operator changed |
+//! | [`predictor`], [`shape`] | one-step predictor of the general model with its gradient; orders of the model |
+//! | [`adaptation`], [`window`] | from gradient to step: gain, forgetting, guard against windup; a rectangular window |
+//! | [`ud_covariance`] | the covariance `U D U'` |
+//! | [`error_bars`], [`sensitivities`], [`innovation_variance`] | covariance of the estimate whatever the gain, errors in the filters, sigma^2 |
+//! | [`recursion`] | outcome of a step, polynomials that are kept stable |
+//! | [`held_operator`], [`divided_differences`] | exact zero-order hold of the operator with any delay, and its Jacobian; the functions that it is made of |
+//! | [`filter`], [`delay`], [`stability`] | rational filters over slices, a delay line, the Schur-Cohn test |
 //! | [`mod@state`] | the numbers that change, to save a recursion and go on elsewhere |
 #![no_std]
 
@@ -34,15 +82,16 @@ pub mod adaptive;
 pub mod delay;
 pub mod divided_differences;
 pub mod error_bars;
-pub mod factored;
 pub mod filter;
 pub mod held_operator;
-pub mod lanes;
-pub mod number;
+pub mod innovation_variance;
 pub mod physical;
 pub mod predictor;
 pub mod recursion;
 pub mod rls;
 pub mod rpem;
+pub mod sensitivities;
+pub mod shape;
 pub mod stability;
+pub mod ud_covariance;
 pub mod window;

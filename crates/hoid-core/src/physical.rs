@@ -13,10 +13,12 @@
 
 use crate::{
     adaptation::Adaptation,
-    error_bars::{Bars, ErrorBars, Places, Row, Sensitivities},
+    error_bars::{ErrorBars, ErrorPropagation},
     held_operator::{held_operator, held_operator_delayed},
-    predictor::{Predictor, Regressor, Shape},
-    recursion::{Stable, Step, allowed_share, share},
+    predictor::{Predictor, Regressor},
+    recursion::{Stable, Step, backtrack, ratio},
+    sensitivities::{ErrorLayout, LinearForm, Sensitivities},
+    shape::Shape,
 };
 
 /// Place of omega_nm in eta.
@@ -32,7 +34,7 @@ pub struct PhysicalModel<S, const N: usize> {
     /// Orders: nc and nd are free, na = 0, nf = 2 and nb = 2, or 3 when tau_e is a parameter.
     pub shape: S,
     /// Smallest delay nk in samples, of which the recursion is given the input `x(t) = e(t - nk)`, when tau_e is a parameter.
-    pub tracked_from: Option<usize>,
+    pub smallest_nk: Option<usize>,
     /// Sample time in s.
     pub sample_time: f64,
     /// Least and largest value of each parameter.
@@ -41,10 +43,10 @@ pub struct PhysicalModel<S, const N: usize> {
     pub stable: Stable,
 }
 
-/// The recursion. N is the room for parameters, K that for the errors of its filters ([`Places::filters`])
+/// The recursion. N is the room for parameters, K that for the errors of its filters ([`ErrorLayout::filter_errors`])
 /// (0 for the usual error bars), L that for the input: 2 without tau_e, 3 and the range of the delay with it; at least nc.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Physical<S, const N: usize, const K: usize, const L: usize, A> {
+pub struct PhysicalRpem<S, const N: usize, const K: usize, const L: usize, A> {
     model: PhysicalModel<S, N>,
     predictor: Predictor<S, N, L>,
     eta: [f64; N],
@@ -65,7 +67,7 @@ struct Polynomials<const N: usize> {
 }
 
 crate::state!([const N: usize] Polynomials<N> { theta, jacobian, whole_samples });
-crate::state!([S, const N: usize, const K: usize, const L: usize, A: crate::state::State] Physical<S, N, K, L, A> {
+crate::state!([S, const N: usize, const K: usize, const L: usize, A: crate::state::State] PhysicalRpem<S, N, K, L, A> {
     predictor, eta, polynomials, psi, adaptation, bars, restarts,
 });
 
@@ -81,7 +83,7 @@ impl<S: Shape, const N: usize> PhysicalModel<S, N> {
         let mut theta = [0.0; N];
         let mut jacobian = [[0.0; 5]; 5];
         let (operator, mut whole_samples) = (self.operator(), 0);
-        if self.tracked_from.is_some() {
+        if self.smallest_nk.is_some() {
             let samples = eta[TAU] / self.sample_time;
             // Up to rounding: 0.29/0.01 is 28.999999999999996.
             let whole = libm::floor(samples * (1.0 + 1e-12) + 1e-12).max(0.0);
@@ -108,27 +110,27 @@ impl<S: Shape, const N: usize> PhysicalModel<S, N> {
         }
     }
 
-    fn inside(&self, eta: &[f64; N]) -> bool {
+    fn within_bounds(&self, eta: &[f64; N]) -> bool {
         eta.iter()
             .zip(&self.bounds)
             .all(|(e, [low, high])| low <= e && e <= high)
     }
 }
 
-impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>> Physical<S, N, K, L, A> {
+impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>> PhysicalRpem<S, N, K, L, A> {
     /// Starts from eta with filters at rest. `None` when the orders are others, N or L is too small, eta lies outside the bounds, the bounds let omega_nm or
     /// zeta_nm become zero, or the noise model is not stable.
     pub fn new(model: PhysicalModel<S, N>, eta: [f64; N], adaptation: A, bars: ErrorBars<N, K>) -> Option<Self> {
         let shape = model.shape;
         let predictor = Predictor::new(shape, Regressor::Gradient)?;
-        let nb = if model.tracked_from.is_some() { 3 } else { 2 };
+        let nb = if model.smallest_nk.is_some() { 3 } else { 2 };
         let orders = (shape.na(), shape.nb(), shape.nf()) == (0, nb, 2);
         let sound = orders
             && model.sample_time > 0.0
             && model.bounds[OMEGA][0] > 0.0
             && model.bounds[ZETA][0] > 0.0
-            && model.inside(&eta);
-        if !sound || Places::within::<S, K>(&shape).filters() > K {
+            && model.within_bounds(&eta);
+        if !sound || ErrorLayout::for_capacity::<S, K>(&shape).filter_errors() > K {
             return None;
         }
         let polynomials = model.polynomials(&eta);
@@ -145,13 +147,13 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
             bars,
             restarts: 0,
         };
-        recursion.place();
+        recursion.apply_delay();
         Some(recursion)
     }
 
     /// Lets B begin where the delay says.
-    fn place(&mut self) {
-        if let Some(first) = self.model.tracked_from {
+    fn apply_delay(&mut self) {
+        if let Some(first) = self.model.smallest_nk {
             let nk = self.polynomials.whole_samples + 1;
             self.predictor.set_offset(nk.saturating_sub(first));
         }
@@ -160,13 +162,13 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
     #[inline(always)]
     fn predict(&mut self, x: f64, u: f64) -> f64 {
         let (of_theta, innovation) = self.predictor.predict(&self.polynomials.theta, x, u);
-        self.psi = self.by_eta(of_theta);
+        self.psi = self.chain_rule(of_theta);
         innovation
     }
 
     /// A row that stands for theta as one that stands for eta: `J' psi_theta`.
     #[inline(always)]
-    fn by_eta(&self, of_theta: [f64; N]) -> [f64; N] {
+    fn chain_rule(&self, of_theta: [f64; N]) -> [f64; N] {
         let shape = self.model.shape;
         let (operator, noise) = (self.model.operator(), shape.nc() + shape.nd());
         let nb = operator - 2;
@@ -190,16 +192,16 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
     #[inline]
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         let innovation = self.predict(x, u);
-        let (places, rows) = self.sensitivities();
-        let limited = self.bars.limited(innovation);
-        let used = share(limited, innovation);
+        let (layout, rows) = self.sensitivities();
+        let limited = self.bars.clip(innovation);
+        let used = ratio(limited, innovation);
         let moved = self
             .adaptation
-            .advance(&self.psi, limited, &self.eta, self.bars.innovation_variance());
+            .update(&self.psi, limited, &self.eta, self.bars.innovation_variance());
         let (operator, noise) = (self.model.operator(), self.model.shape.nc() + self.model.shape.nd());
         let (shape, stable) = (self.model.shape, self.model.stable);
         // The operator's part of theta is stable by its bounds; only the noise model has to be tested.
-        let (allowed, mut eta) = allowed_share(&self.eta, &moved.step, |eta| {
+        let (allowed, mut eta) = backtrack(&self.eta, &moved.step, |eta| {
             let mut theta = [0.0; N];
             theta[operator - 2..operator - 2 + noise].copy_from_slice(&eta[operator..operator + noise]);
             stable.holds(&shape, &theta)
@@ -221,10 +223,10 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
             gain[i] *= part * used;
         }
         self.eta = eta;
-        self.bars.take(&places, &rows, &gain, innovation);
-        self.adaptation.drift_into(&mut self.bars);
+        self.bars.update(&layout, &rows, &gain, innovation);
+        self.adaptation.add_drift_to(&mut self.bars);
         self.polynomials = self.model.polynomials(&eta);
-        self.place();
+        self.apply_delay();
         self.correct();
         Step {
             innovation,
@@ -233,10 +235,10 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
     }
 
     /// Takes a sample into the filters alone; the estimate stays.
-    pub fn follow(&mut self, x: f64, u: f64) -> Step {
+    pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let innovation = self.predict(x, u);
-        let (places, rows) = self.sensitivities();
-        self.bars.follow(&places, &rows);
+        let (layout, rows) = self.sensitivities();
+        self.bars.propagate(&layout, &rows);
         self.correct();
         Step {
             innovation,
@@ -244,43 +246,43 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         }
     }
 
-    /// As [`Physical::follow`] where the output is missing: the one-step prediction takes its place.
+    /// As [`PhysicalRpem::step_without_update`] where the output is missing: the one-step prediction takes its place.
     pub fn bridge(&mut self, x: f64) {
         self.predict(x, 0.0);
         self.predictor.bridge(&self.polynomials.theta);
-        let (places, rows) = self.sensitivities();
-        self.bars.follow(&places, &rows);
+        let (layout, rows) = self.sensitivities();
+        self.bars.propagate(&layout, &rows);
         self.correct();
     }
 
     /// Sensitivities with respect to eta, whose noise parameters stand behind the operator's.
     #[inline(always)]
-    fn sensitivities(&self) -> (Places, Sensitivities<N, K>) {
+    fn sensitivities(&self) -> (ErrorLayout, Sensitivities<N, K>) {
         if K == 0 {
-            return (Places::NONE, Sensitivities::of_gradient(&self.psi));
+            return (ErrorLayout::NONE, Sensitivities::from_gradient(&self.psi));
         }
-        let places = Places::of(&self.model.shape);
-        let rows = self.predictor.sensitivities(&self.polynomials.theta, &places);
-        let in_eta = |row: Row<N, K>| Row {
-            theta: self.by_eta(row.theta),
+        let layout = ErrorLayout::of(&self.model.shape);
+        let rows = self.predictor.sensitivities(&self.polynomials.theta, &layout);
+        let in_eta = |row: LinearForm<N, K>| LinearForm {
+            theta: self.chain_rule(row.theta),
             filters: row.filters,
         };
-        let places = Places {
-            noise: (self.model.operator(), places.noise.1),
-            ..places
+        let layout = ErrorLayout {
+            noise: (self.model.operator(), layout.noise.1),
+            ..layout
         };
         let rows = Sensitivities {
             w: in_eta(rows.w),
             v: in_eta(rows.v),
             e: in_eta(rows.e),
         };
-        (places, rows)
+        (layout, rows)
     }
 
     #[inline(always)]
     fn correct(&mut self) {
         if !self.predictor.correct(&self.polynomials.theta).is_finite() {
-            self.predictor.rest();
+            self.predictor.reset();
             self.restarts += 1;
         }
     }
@@ -311,8 +313,8 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
     }
 
     /// Covariance of eta over sigma^2.
-    pub fn spread(&self) -> [[f64; N]; N] {
-        self.adaptation.spread_or(&self.bars)
+    pub fn normalised_covariance(&self) -> [[f64; N]; N] {
+        self.adaptation.normalised_covariance(&self.bars)
     }
 
     /// Innovation variance sigma^2.

@@ -1,6 +1,6 @@
 //! What all recursions share: the outcome of a step, and the step that keeps the predictor stable.
 
-use crate::{predictor::Shape, stability::roots_inside};
+use crate::{shape::Shape, stability::roots_inside};
 
 /// What a recursion says of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +35,7 @@ impl Stable {
 
 /// `part/whole`, 1 where both are zero.
 #[inline(always)]
-pub fn share(part: f64, whole: f64) -> f64 {
+pub fn ratio(part: f64, whole: f64) -> f64 {
     if part == whole { 1.0 } else { part / whole }
 }
 
@@ -48,7 +48,7 @@ pub(crate) fn all_finite<const N: usize>(values: &[f64; N]) -> bool {
 
 /// The largest of the shares 1, 1/2, 1/4 ... of a step that is allowed; 0 when none is.
 #[inline]
-pub fn allowed_share<const N: usize>(
+pub fn backtrack<const N: usize>(
     theta: &[f64; N],
     step: &[f64; N],
     allowed: impl Fn(&[f64; N]) -> bool,
@@ -58,17 +58,13 @@ pub fn allowed_share<const N: usize>(
         return (1.0, whole);
     }
     let (theta, step) = (*theta, *step);
-    shortened(&theta, &step, allowed)
+    halved(&theta, &step, allowed)
 }
 
 /// Where the whole step is not allowed.
 #[cold]
 #[inline(never)]
-fn shortened<const N: usize>(
-    theta: &[f64; N],
-    step: &[f64; N],
-    allowed: impl Fn(&[f64; N]) -> bool,
-) -> (f64, [f64; N]) {
+fn halved<const N: usize>(theta: &[f64; N], step: &[f64; N], allowed: impl Fn(&[f64; N]) -> bool) -> (f64, [f64; N]) {
     let mut share = 0.5;
     for _ in 0..HALVINGS {
         let moved: [f64; N] = core::array::from_fn(|i| theta[i] + share * step[i]);

@@ -5,12 +5,14 @@
 
 use crate::{
     adaptation::Adaptation,
-    error_bars::{Bars, ErrorBars, Places, Sensitivities},
-    predictor::{Shape, dot},
-    recursion::{Step, all_finite, share},
+    error_bars::{ErrorBars, ErrorPropagation},
+    predictor::dot,
+    recursion::{Step, all_finite, ratio},
+    sensitivities::{ErrorLayout, Sensitivities},
+    shape::Shape,
 };
 
-/// The recursion. N is the room for parameters; B is [`NoBars`](crate::error_bars::NoBars) where no error bars are asked for.
+/// The recursion. N is the room for parameters; B is [`NoErrorBars`](crate::error_bars::NoErrorBars) where no error bars are asked for.
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
 pub struct Rls<S, const N: usize, A, B = ErrorBars<N, 0>> {
@@ -24,12 +26,12 @@ pub struct Rls<S, const N: usize, A, B = ErrorBars<N, 0>> {
 
 crate::state!([S, const N: usize, A: crate::state::State, B: crate::state::State] Rls<S, N, A, B> { theta, psi, adaptation, bars, restarts });
 
-impl<S: Shape, const N: usize, A: Adaptation<N>, B: Bars<N, 0>> Rls<S, N, A, B> {
+impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<S, N, A, B> {
     /// Starts from theta `[a.., b..]` with zeros before the first sample. `None` when there is no parameter, more than N, or one of
     /// C, D or F; or when the way of forgetting needs the innovation variance and `bars` do not follow it.
     pub fn new(shape: S, theta: [f64; N], adaptation: A, bars: B) -> Option<Self> {
         let linear = (shape.nc(), shape.nd(), shape.nf()) == (0, 0, 0);
-        let known = bars.variance().is_some() || !adaptation.needs_variance();
+        let known = bars.variance().is_some() || !adaptation.needs_innovation_variance();
         (linear && known && (1..=N).contains(&shape.parameters())).then_some(Self {
             shape,
             theta,
@@ -46,19 +48,23 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: Bars<N, 0>> Rls<S, N, A, B> 
         // State is read once, worked on in locals and written once.
         let theta = self.theta;
         let (psi, innovation) = self.innovation(&theta, x, u);
-        let limited = self.bars.limited(innovation);
+        let limited = self.bars.clip(innovation);
         let moved = self
             .adaptation
-            .advance(&psi, limited, &theta, self.bars.variance().unwrap_or(0.0));
+            .update(&psi, limited, &theta, self.bars.variance().unwrap_or(0.0));
         let theta: [f64; N] = core::array::from_fn(|i| theta[i] + moved.step[i]);
         let sound = all_finite(&theta);
         if sound {
             self.theta = theta;
-            let used = share(limited, innovation);
+            let used = ratio(limited, innovation);
             let gain = moved.gain.map(|g| used * g);
-            self.bars
-                .take(&Places::NONE, &Sensitivities::of_gradient(&psi), &gain, innovation);
-            self.adaptation.drift_into(&mut self.bars);
+            self.bars.update(
+                &ErrorLayout::NONE,
+                &Sensitivities::from_gradient(&psi),
+                &gain,
+                innovation,
+            );
+            self.adaptation.add_drift_to(&mut self.bars);
             self.shift(psi, u);
         } else {
             self.psi = [0.0; N];
@@ -71,7 +77,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: Bars<N, 0>> Rls<S, N, A, B> 
     }
 
     /// Takes a sample into the regressor alone; the estimate stays.
-    pub fn follow(&mut self, x: f64, u: f64) -> Step {
+    pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let (psi, innovation) = self.innovation(&self.theta, x, u);
         self.shift(psi, u);
         Step {
@@ -80,7 +86,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: Bars<N, 0>> Rls<S, N, A, B> 
         }
     }
 
-    /// As [`Rls::follow`] where the output is missing: the one-step prediction takes its place.
+    /// As [`Rls::step_without_update`] where the output is missing: the one-step prediction takes its place.
     pub fn bridge(&mut self, x: f64) {
         let (psi, innovation) = self.innovation(&self.theta, x, 0.0);
         self.shift(psi, -innovation);
@@ -98,9 +104,9 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: Bars<N, 0>> Rls<S, N, A, B> 
         if nb > 0 {
             psi[na] = x;
         }
-        let w = dot(0.0, &theta[na..na + nb], &psi[na..]);
+        let w = dot(&theta[na..na + nb], &psi[na..]);
         // As the predictor of the general model has it, which keeps u itself.
-        let from_past = dot(0.0, &theta[..na], &psi.map(|p| -p));
+        let from_past = dot(&theta[..na], &psi.map(|p| -p));
         (psi, u + from_past - w)
     }
 
@@ -134,8 +140,8 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: Bars<N, 0>> Rls<S, N, A, B> 
 
 impl<S: Shape, const N: usize, A: Adaptation<N>> Rls<S, N, A> {
     /// Covariance of theta over sigma^2.
-    pub fn spread(&self) -> [[f64; N]; N] {
-        self.adaptation.spread_or(&self.bars)
+    pub fn normalised_covariance(&self) -> [[f64; N]; N] {
+        self.adaptation.normalised_covariance(&self.bars)
     }
 
     /// Innovation variance sigma^2.

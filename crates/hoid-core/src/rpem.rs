@@ -6,13 +6,15 @@
 
 use crate::{
     adaptation::Adaptation,
-    error_bars::{Bars, ErrorBars, Places, Sensitivities},
-    predictor::{Predictor, Regressor, Shape},
-    recursion::{Stable, Step, allowed_share, share},
+    error_bars::{ErrorBars, ErrorPropagation},
+    predictor::{Predictor, Regressor},
+    recursion::{Stable, Step, backtrack, ratio},
+    sensitivities::{ErrorLayout, Sensitivities},
+    shape::Shape,
 };
 
-/// The recursion. N is the room for parameters, K that for the errors of its filters ([`Places::filters`]), or 0
-/// for the usual error bars and for none, B = [`NoBars`](crate::error_bars::NoBars).
+/// The recursion. N is the room for parameters, K that for the errors of its filters ([`ErrorLayout::filter_errors`]), or 0
+/// for the usual error bars and for none, B = [`NoErrorBars`](crate::error_bars::NoErrorBars).
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
 pub struct Rpem<S, const N: usize, const K: usize, A, B = ErrorBars<N, K>> {
@@ -29,7 +31,7 @@ crate::state!([S, const N: usize, const K: usize, A: crate::state::State, B: cra
     predictor, theta, psi, adaptation, bars, restarts,
 });
 
-impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: Bars<N, K>> Rpem<S, N, K, A, B> {
+impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropagation<N, K>> Rpem<S, N, K, A, B> {
     /// Starts from `theta = [a.. b.. c.. d.. f..]` with filters at rest. `None` when the shape does not fit in N and K, theta is not
     /// stable, or the way of forgetting needs the innovation variance and `bars` do not follow it.
     pub fn new(
@@ -41,8 +43,9 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: Bars<N, K>> 
         bars: B,
     ) -> Option<Self> {
         let predictor = Predictor::new(shape, regressor)?;
-        let known = bars.variance().is_some() || !adaptation.needs_variance();
-        let usable = known && stable.holds(&shape, &theta) && Places::within::<S, K>(&shape).filters() <= K;
+        let known = bars.variance().is_some() || !adaptation.needs_innovation_variance();
+        let usable =
+            known && stable.holds(&shape, &theta) && ErrorLayout::for_capacity::<S, K>(&shape).filter_errors() <= K;
         usable.then_some(Self {
             predictor,
             theta,
@@ -61,19 +64,19 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: Bars<N, K>> 
         // State is read once, worked on in locals and written once.
         let theta = self.theta;
         let (psi, innovation) = self.predictor.predict(&theta, x, u);
-        let (places, rows) = self.sensitivities(&theta, &psi);
-        let limited = self.bars.limited(innovation);
-        let used = share(limited, innovation);
+        let (layout, rows) = self.sensitivities(&theta, &psi);
+        let limited = self.bars.clip(innovation);
+        let used = ratio(limited, innovation);
         let moved = self
             .adaptation
-            .advance(&psi, limited, &theta, self.bars.variance().unwrap_or(0.0));
+            .update(&psi, limited, &theta, self.bars.variance().unwrap_or(0.0));
         let stable = self.stable;
-        let (allowed, theta) = allowed_share(&theta, &moved.step, |theta| stable.holds(&shape, theta));
+        let (allowed, theta) = backtrack(&theta, &moved.step, |theta| stable.holds(&shape, theta));
         self.correct(&theta);
         (self.theta, self.psi) = (theta, psi);
         let gain = moved.gain.map(|g| allowed * used * g);
-        self.bars.take(&places, &rows, &gain, innovation);
-        self.adaptation.drift_into(&mut self.bars);
+        self.bars.update(&layout, &rows, &gain, innovation);
+        self.adaptation.add_drift_to(&mut self.bars);
         Step {
             innovation,
             shortened: allowed < 1.0,
@@ -81,7 +84,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: Bars<N, K>> 
     }
 
     /// Takes a sample into the filters alone; the estimate stays.
-    pub fn follow(&mut self, x: f64, u: f64) -> Step {
+    pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let theta = self.theta;
         let (psi, innovation) = self.predictor.predict(&theta, x, u);
         self.psi = psi;
@@ -93,7 +96,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: Bars<N, K>> 
         }
     }
 
-    /// As [`Rpem::follow`] where the output is missing: the one-step prediction takes its place.
+    /// As [`Rpem::step_without_update`] where the output is missing: the one-step prediction takes its place.
     pub fn bridge(&mut self, x: f64) {
         let theta = self.theta;
         (self.psi, _) = self.predictor.predict(&theta, x, 0.0);
@@ -103,25 +106,25 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: Bars<N, K>> 
     }
 
     fn follow_bars(&mut self) {
-        let (places, rows) = self.sensitivities(&self.theta, &self.psi);
-        self.bars.follow(&places, &rows);
+        let (layout, rows) = self.sensitivities(&self.theta, &self.psi);
+        self.bars.propagate(&layout, &rows);
     }
 
     #[inline(always)]
-    fn sensitivities(&self, theta: &[f64; N], psi: &[f64; N]) -> (Places, Sensitivities<N, K>) {
-        let places = Places::within::<S, K>(&self.predictor.shape());
+    fn sensitivities(&self, theta: &[f64; N], psi: &[f64; N]) -> (ErrorLayout, Sensitivities<N, K>) {
+        let layout = ErrorLayout::for_capacity::<S, K>(&self.predictor.shape());
         let rows = if K == 0 {
-            Sensitivities::of_gradient(psi)
+            Sensitivities::from_gradient(psi)
         } else {
-            self.predictor.sensitivities(theta, &places)
+            self.predictor.sensitivities(theta, &layout)
         };
-        (places, rows)
+        (layout, rows)
     }
 
     #[inline(always)]
     fn correct(&mut self, theta: &[f64; N]) {
         if !self.predictor.correct(theta).is_finite() {
-            self.predictor.rest();
+            self.predictor.reset();
             self.restarts += 1;
         }
     }
@@ -149,8 +152,8 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: Bars<N, K>> 
 
 impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>> Rpem<S, N, K, A> {
     /// Covariance of theta over sigma^2.
-    pub fn spread(&self) -> [[f64; N]; N] {
-        self.adaptation.spread_or(&self.bars)
+    pub fn normalised_covariance(&self) -> [[f64; N]; N] {
+        self.adaptation.normalised_covariance(&self.bars)
     }
 
     /// Innovation variance sigma^2.

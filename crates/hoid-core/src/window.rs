@@ -5,14 +5,14 @@
 //! `theta = R^{-1} sum psi y`, `R = sum psi psi'`, which for ARX and FIR is exact and for the others the recursive prediction-error method
 //! with that memory.
 //!
-//! Sums from which the oldest term is subtracted would keep the rounding of all the past. Here the window is held as two sums: one
+//! NormalEquations from which the oldest term is subtracted would keep the rounding of all the past. Here the window is undetermined as two sums: one
 //! grows from a boundary on, the other, a sum that grew until that boundary, loses its terms; when it has lost all of them the first takes its
 //! place. No rounding lives longer than two windows.
 //!
 //! The covariance of theta over sigma^2 is `R^{-1}`. Where the window does not determine theta (fewer samples than parameters, no
 //! excitation), theta stays and there is no covariance. Memory: `W (N + 1)` numbers, which the caller owns.
 
-use crate::adaptation::{Adaptation, Move};
+use crate::adaptation::{Adaptation, ParameterStep};
 
 /// Smallest pivot of R scaled to a unit diagonal that counts as information.
 const SINGULAR: f64 = 1e-13;
@@ -20,14 +20,14 @@ const SINGULAR: f64 = 1e-13;
 /// Power of a gradient below which a window is silent, as a share of the largest so far.
 const SILENCE: f64 = 1e-20;
 
-/// Sums over samples.
+/// NormalEquations over samples.
 #[derive(Debug, Clone, PartialEq)]
-struct Sums<const N: usize> {
+struct NormalEquations<const N: usize> {
     gram: [[f64; N]; N],
     right: [f64; N],
 }
 
-crate::state!([const N: usize] Sums<N> { gram, right });
+crate::state!([const N: usize] NormalEquations<N> { gram, right });
 
 /// The adaptation of the module, with its memory.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,12 +38,12 @@ pub struct Window<const N: usize, M> {
     length: usize,
     filled: usize,
     next: usize,
-    growing: Sums<N>,
-    fading: Sums<N>,
+    growing: NormalEquations<N>,
+    fading: NormalEquations<N>,
     /// Largest power of each parameter's gradient over a window so far.
     largest: [f64; N],
     /// Samples whose window did not determine theta.
-    held: u64,
+    undetermined: u64,
 }
 
 impl<const N: usize, M: AsMut<[f64]>> crate::state::State for Window<N, M> {
@@ -55,13 +55,13 @@ impl<const N: usize, M: AsMut<[f64]>> crate::state::State for Window<N, M> {
             &mut self.growing,
             &mut self.fading,
             &mut self.largest,
-            &mut self.held,
+            &mut self.undetermined,
         ];
         crate::state::visit_all(parts, each);
     }
 }
 
-impl<const N: usize> Sums<N> {
+impl<const N: usize> NormalEquations<N> {
     const ZERO: Self = Self {
         gram: [[0.0; N]; N],
         right: [0.0; N],
@@ -81,7 +81,7 @@ impl<const N: usize> Sums<N> {
 
 impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
     /// Numbers of memory for a window of this many samples.
-    pub const fn numbers(samples: usize) -> usize {
+    pub const fn memory_length(samples: usize) -> usize {
         samples * (N + 1)
     }
 
@@ -95,20 +95,20 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
             length,
             filled: 0,
             next: 0,
-            growing: Sums::ZERO,
-            fading: Sums::ZERO,
+            growing: NormalEquations::ZERO,
+            fading: NormalEquations::ZERO,
             largest: [0.0; N],
-            held: 0,
+            undetermined: 0,
         })
     }
 
     /// Samples whose window did not determine theta, so that it stayed.
-    pub fn held(&self) -> u64 {
-        self.held
+    pub fn undetermined(&self) -> u64 {
+        self.undetermined
     }
 
     /// Cholesky factor of R scaled to a unit diagonal, and the scale; `None` when it is singular.
-    fn factor(&self) -> Option<([[f64; N]; N], [f64; N])> {
+    fn cholesky(&self) -> Option<([[f64; N]; N], [f64; N])> {
         let p = self.parameters;
         let (mut l, mut scale) = ([[0.0; N]; N], [0.0; N]);
         for i in 0..p {
@@ -156,7 +156,7 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
 }
 
 impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Adaptation<N> for Window<N, M> {
-    fn advance(&mut self, psi: &[f64; N], eps: f64, theta: &[f64; N], _variance: f64) -> Move<N> {
+    fn update(&mut self, psi: &[f64; N], eps: f64, theta: &[f64; N], _variance: f64) -> ParameterStep<N> {
         let p = self.parameters;
         let y = eps + (0..p).map(|i| psi[i] * theta[i]).sum::<f64>();
         let place = self.next * (N + 1);
@@ -172,9 +172,9 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Adaptation<N> for Window<N,
         self.next += 1;
         if self.next == self.length {
             self.next = 0;
-            self.fading = core::mem::replace(&mut self.growing, Sums::ZERO);
+            self.fading = core::mem::replace(&mut self.growing, NormalEquations::ZERO);
         }
-        let stay = Move {
+        let stay = ParameterStep {
             step: [0.0; N],
             gain: [0.0; N],
         };
@@ -182,27 +182,27 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Adaptation<N> for Window<N,
             self.largest[i] = self.largest[i].max(self.growing.gram[i][i] + self.fading.gram[i][i]);
         }
         // With as many samples as parameters the residuals are zero and say nothing.
-        let factor = if self.filled > p { self.factor() } else { None };
+        let factor = if self.filled > p { self.cholesky() } else { None };
         let Some(factor) = factor else {
-            self.held += 1;
+            self.undetermined += 1;
             return stay;
         };
         let right: [f64; N] = core::array::from_fn(|i| self.growing.right[i] + self.fading.right[i]);
         let best = self.solve(&factor, &right);
         let gain = self.solve(&factor, psi);
         if best.iter().all(|v| v.is_finite()) && gain.iter().all(|v| v.is_finite()) {
-            Move {
+            ParameterStep {
                 step: core::array::from_fn(|i| best[i] - theta[i]),
                 gain,
             }
         } else {
-            self.held += 1;
+            self.undetermined += 1;
             stay
         }
     }
 
-    fn spread(&self) -> Option<[[f64; N]; N]> {
-        let factor = self.factor()?;
+    fn own_covariance(&self) -> Option<[[f64; N]; N]> {
+        let factor = self.cholesky()?;
         let mut spread = [[0.0; N]; N];
         for j in 0..self.parameters {
             let mut unit = [0.0; N];
@@ -214,8 +214,8 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Adaptation<N> for Window<N,
         Some(spread)
     }
 
-    fn is_sound(&self) -> bool {
-        let sound = |s: &Sums<N>| s.gram.iter().flatten().chain(&s.right).all(|v| v.is_finite());
+    fn is_valid(&self) -> bool {
+        let sound = |s: &NormalEquations<N>| s.gram.iter().flatten().chain(&s.right).all(|v| v.is_finite());
         sound(&self.growing) && sound(&self.fading)
     }
 }

@@ -5,40 +5,45 @@ mod common;
 
 use common::{
     Noise,
-    person::{self, S1, TS, diagonal},
+    operator::{self, S1, TS, diagonal},
 };
 use hoid_core::{
-    adaptive::{Adaptive, Suppositions, delays::Delays, hypothesis::Hypothesis, response::Response},
-    error_bars::Level,
+    adaptive::{
+        AdaptiveFilter,
+        hypothesis::Hypothesis,
+        prior::{ChangePrior, DelayPrior},
+        response::Response,
+    },
     held_operator::held_operator,
+    innovation_variance::InnovationVariance,
 };
 
 const S2: [f64; 4] = [0.07, 0.084, 11.25, 0.35];
 
-fn suppositions() -> Suppositions {
-    person::suppositions(Delays::KNOWN)
+fn prior_of() -> ChangePrior {
+    operator::prior_of(DelayPrior::KNOWN)
 }
 
-/// As the suppositions of a person who never changes.
-fn steady() -> Suppositions {
-    Suppositions {
-        spacing: u32::MAX,
+/// A prior of an operator who never changes.
+fn steady() -> ChangePrior {
+    ChangePrior {
+        birth_interval: u32::MAX,
         hazard: 1e-12,
-        drift: 0.0,
-        limit: f64::INFINITY,
-        ..suppositions()
+        gain_drift: 0.0,
+        outlier_limit: f64::INFINITY,
+        ..prior_of()
     }
 }
 
 const WIDE: [f64; 4] = [1e-4, 1e-4, 0.5, 1e-3];
 
-fn bank(eta: [f64; 4], spread: [f64; 4], level: Level, d: &[f64], s: Suppositions) -> Adaptive<8, 4> {
+fn bank(eta: [f64; 4], spread: [f64; 4], level: InnovationVariance, d: &[f64], s: ChangePrior) -> AdaptiveFilter<8, 4> {
     let first = Hypothesis::new(eta, &diagonal(spread), level).unwrap();
-    Adaptive::new(first, d, s).unwrap()
+    AdaptiveFilter::new(first, d, s).unwrap()
 }
 
-fn level(deviation: f64) -> Level {
-    Level::new(deviation * deviation, 2000.0, 1.0 - 1.0 / 2000.0)
+fn level(deviation: f64) -> InnovationVariance {
+    InnovationVariance::new(deviation * deviation, 2000.0, 1.0 - 1.0 / 2000.0)
 }
 
 /// Delayed error and control of an operator whose gains are those of `eta` at each sample, in its output, with AR(1) noise.
@@ -122,7 +127,7 @@ fn a_point_that_moves_takes_the_past_with_it() {
             last[0] = moved.step(x);
             there.step(x);
         }
-        moved.move_to(there.about(), &mut last);
+        moved.move_to(there.point(), &mut last);
         let (a, b) = (moved.step(0.0), there.step(0.0));
         (a[0] - b[0]).abs().max((a[1] - b[1]).abs() / 10.0)
     };
@@ -137,7 +142,7 @@ fn one_hypothesis_with_a_known_neuromuscular_system_is_least_squares() {
     let prior = [1e-4, 1e-4];
     // So many residuals that sigma^2 stays what it is.
     let sigma2 = 4e-4;
-    let fixed = Level::new(sigma2, 1e30, 1.0);
+    let fixed = InnovationVariance::new(sigma2, 1e30, 1.0);
     let mut bank = bank(
         [0.05, 0.05, S1[2], S1[3]],
         [prior[0], prior[1], 0.0, 0.0],
@@ -201,11 +206,11 @@ fn the_neuromuscular_system_is_found_from_a_quarter_away() {
 fn a_change_is_declared_once_with_its_time_and_its_gains() {
     let change_at = 6000;
     let data = operator(10_000, 21, 0.02, |k| if k < change_at { S1 } else { S2 });
-    let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], suppositions());
+    let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], prior_of());
     let mut declared = Vec::new();
     for (k, &(x, u)) in data.iter().enumerate() {
         bank.step(x, u);
-        let total: f64 = bank.bank().hypotheses().map(|h| h.weight).sum();
+        let total: f64 = bank.bank().hypotheses().map(|h| h.probability).sum();
         assert!((total - 1.0).abs() < 1e-12);
         declared.extend(bank.bank().change().map(|c| (k, c)));
     }
@@ -215,7 +220,7 @@ fn a_change_is_declared_once_with_its_time_and_its_gains() {
     // The birth before or after the change.
     let since = k as f64 - change.samples_ago as f64;
     assert!((since - change_at as f64).abs() <= 64.0, "{since}");
-    assert!(change.odds > 4.0 && change.z[1] > 2.0, "{change:?}");
+    assert!(change.log_odds > 4.0 && change.z[1] > 2.0, "{change:?}");
     assert!((change.before.eta[1] - S1[1]).abs() < 0.01);
     let covariance = bank.bank().covariance();
     for i in 0..2 {
@@ -228,18 +233,18 @@ fn a_change_is_declared_once_with_its_time_and_its_gains() {
 fn a_steady_person_raises_no_alarm_and_memory_grows() {
     // Ten minutes.
     let data = operator(60_000, 33, 0.02, |_| S1);
-    let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], suppositions());
+    let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], prior_of());
     for &(x, u) in &data {
         bank.step(x, u);
         assert!(bank.bank().change().is_none());
     }
-    assert!(bank.bank().hypotheses().any(|h| h.born == 0 && h.weight > 0.5));
+    assert!(bank.bank().hypotheses().any(|h| h.born == 0 && h.probability > 0.5));
 }
 
 #[test]
 fn the_variance_of_the_remnant_alone_is_a_change_too() {
     let data = with_noise(8000, 2, |k| if k < 4000 { 0.02 } else { 0.06 }, |_| S1);
-    let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], suppositions());
+    let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], prior_of());
     let mut declared = Vec::new();
     for (k, &(x, u)) in data.iter().enumerate() {
         bank.step(x, u);
@@ -256,7 +261,7 @@ fn outliers_are_no_change() {
     for k in (500..8000).step_by(700) {
         data[k].1 += 5.0;
     }
-    let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], suppositions());
+    let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], prior_of());
     for &(x, u) in &data {
         bank.step(x, u);
         assert!(bank.bank().change().is_none());
@@ -271,13 +276,13 @@ fn outliers_are_no_change() {
 #[test]
 fn silence_constants_saturation_and_overflow_leave_everything_finite() {
     let data = operator(2000, 4, 0.02, |_| S1);
-    let mut bank = bank(S1, WIDE, level(0.02), &[-1.6, 0.7], suppositions());
-    let finite = |bank: &mut Adaptive<8, 4>, x: f64, u: f64| {
+    let mut bank = bank(S1, WIDE, level(0.02), &[-1.6, 0.7], prior_of());
+    let finite = |bank: &mut AdaptiveFilter<8, 4>, x: f64, u: f64| {
         bank.step(x, u);
         assert!(bank.bank().mixture().eta.iter().all(|e| e.is_finite()));
         assert!(bank.bank().covariance().iter().flatten().all(|c| c.is_finite()));
-        assert!(bank.bank().mixture().variance.is_finite() && bank.bank().odds().is_finite());
-        assert!(bank.bank().hypotheses().all(Hypothesis::is_sound));
+        assert!(bank.bank().mixture().variance.is_finite() && bank.bank().log_odds().is_finite());
+        assert!(bank.bank().hypotheses().all(Hypothesis::is_valid));
     };
     for round in 0..3 {
         for k in 0..8000 {
@@ -294,7 +299,7 @@ fn silence_constants_saturation_and_overflow_leave_everything_finite() {
         finite(&mut bank, if round == 2 { 1e308 } else { 0.0 }, 1e308);
         finite(&mut bank, -1e308, -1e308);
         bank.bridge(0.1);
-        bank.follow(0.1, 0.1);
+        bank.step_without_update(0.1, 0.1);
     }
     assert!(bank.restarts() > 0);
 }
@@ -302,7 +307,7 @@ fn silence_constants_saturation_and_overflow_leave_everything_finite() {
 #[test]
 fn a_gap_in_the_output_is_bridged() {
     let data = operator(9000, 14, 0.02, |_| S1);
-    let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], suppositions());
+    let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], prior_of());
     for (k, &(x, u)) in data.iter().enumerate() {
         if (3000..3050).contains(&k) || k % 97 == 0 {
             bank.bridge(x);
@@ -321,11 +326,11 @@ fn a_gap_in_the_output_is_bridged() {
 #[test]
 fn t_l_stays_finite_as_k_e_becomes_zero() {
     let data = operator(3000, 6, 0.02, |_| [0.0, 0.05, S1[2], S1[3]]);
-    let mut bank = bank([0.0, 0.05, S1[2], S1[3]], WIDE, level(0.02), &[-0.85], suppositions());
+    let mut bank = bank([0.0, 0.05, S1[2], S1[3]], WIDE, level(0.02), &[-0.85], prior_of());
     for &(x, u) in &data {
         bank.step(x, u);
         let covariance = bank.bank().covariance();
-        let [lead, variance] = bank.bank().lead(&covariance);
+        let [lead, variance] = bank.bank().lead_time(&covariance);
         // |E[xy]| <= sqrt(E[x^2] E[y^2]), so that |T| <= sqrt(E[y^2]/E[x^2]).
         let largest = ((0.06_f64.powi(2) + covariance[1][1]) / covariance[0][0]).sqrt();
         assert!(lead.abs() < largest && variance.is_finite(), "{lead} {largest}");
@@ -335,24 +340,24 @@ fn t_l_stays_finite_as_k_e_becomes_zero() {
 #[test]
 fn starts_that_cannot_be_are_refused() {
     let first = |eta| Hypothesis::new(eta, &diagonal(WIDE), level(0.02)).unwrap();
-    let new = |eta, d: &[f64], s| Adaptive::<8, 4>::new(first(eta), d, s);
-    assert!(new(S1, &[-0.85], suppositions()).is_some());
-    assert!(new(S1, &[0.0; 5], suppositions()).is_none());
-    assert!(new([0.09, 0.036, 200.0, 0.35], &[], suppositions()).is_none());
-    assert!(new([f64::NAN, 0.036, 11.0, 0.35], &[], suppositions()).is_none());
-    assert!(Adaptive::<1, 4>::new(first(S1), &[], suppositions()).is_none());
+    let new = |eta, d: &[f64], s| AdaptiveFilter::<8, 4>::new(first(eta), d, s);
+    assert!(new(S1, &[-0.85], prior_of()).is_some());
+    assert!(new(S1, &[0.0; 5], prior_of()).is_none());
+    assert!(new([0.09, 0.036, 200.0, 0.35], &[], prior_of()).is_none());
+    assert!(new([f64::NAN, 0.036, 11.0, 0.35], &[], prior_of()).is_none());
+    assert!(AdaptiveFilter::<1, 4>::new(first(S1), &[], prior_of()).is_none());
     for wrong in [
-        Suppositions {
-            spacing: 0,
-            ..suppositions()
+        ChangePrior {
+            birth_interval: 0,
+            ..prior_of()
         },
-        Suppositions {
+        ChangePrior {
             hazard: 0.1,
-            ..suppositions()
+            ..prior_of()
         },
-        Suppositions {
+        ChangePrior {
             sample_time: 0.0,
-            ..suppositions()
+            ..prior_of()
         },
     ] {
         assert!(new(S1, &[], wrong).is_none(), "{wrong:?}");
@@ -369,7 +374,7 @@ fn a_neuromuscular_system_that_changes_is_followed_and_named() {
     let (mut slow, mut fast, mut n) = (0.0, 0.0, 0.0);
     let (mut before, mut w) = (0.0, [0.0; 2]);
     let first = Hypothesis::new(S1, &diagonal(WIDE), level(0.003)).unwrap();
-    let mut bank: Adaptive<16, 4> = Adaptive::new(first, &[-0.85], suppositions()).unwrap();
+    let mut bank: AdaptiveFilter<16, 4> = AdaptiveFilter::new(first, &[-0.85], prior_of()).unwrap();
     let mut changes = Vec::new();
     for k in 0..9000 {
         let ([b0, b1, f1, f2], _) = held_operator(if k < at { S1 } else { slower }, TS);

@@ -5,48 +5,48 @@ mod common;
 
 use common::{
     Noise,
-    person::{S1, TS, diagonal, suppositions},
+    operator::{S1, TS, diagonal, prior_of},
 };
 use hoid_core::{
     adaptive::{
-        Adaptive, Suppositions,
-        delays::Delays,
+        AdaptiveFilter,
         hypothesis::Hypothesis,
+        prior::{ChangePrior, DelayPrior},
         response::{Response, Signals},
     },
-    error_bars::Level,
+    innovation_variance::InnovationVariance,
 };
 
-/// Delays in question.
+/// Number of candidate delays.
 const COUNT: usize = 16;
 const D: [f64; 1] = [-0.85];
 const DEVIATION: f64 = 0.02;
 
-type Bank = Adaptive<48, 4, Vec<Signals>>;
+type Bank = AdaptiveFilter<48, 4, Vec<Signals>>;
 
-const OPEN: Delays = Delays {
+const OPEN: DelayPrior = DelayPrior {
     count: COUNT,
-    every: 4,
-    odds: 0.5,
-    births: 8,
+    propose_every: 4,
+    change_odds: 0.5,
+    proposals: 8,
     jump: 5.0,
-    neighbour: 0.05,
-    worth: [0.01, 0.03, 0.04, 0.08],
+    neighbour_probability: 0.05,
+    error_per_sample: [0.01, 0.03, 0.04, 0.08],
 };
 
 const SPREAD: [f64; 4] = [1e-5, 1e-5, 0.05, 1e-4];
 
 fn first(spread: [f64; 4]) -> Hypothesis {
-    let level = Level::new(DEVIATION * DEVIATION, 2000.0, 1.0 - 1.0 / 2000.0);
+    let level = InnovationVariance::new(DEVIATION * DEVIATION, 2000.0, 1.0 - 1.0 / 2000.0);
     Hypothesis::new(S1, &diagonal(spread), level).unwrap()
 }
 
-fn bank(later: usize, delays: Delays) -> Bank {
-    Adaptive::with_delays(
-        first(SPREAD).delayed(later),
+fn bank(later: usize, delay: DelayPrior) -> Bank {
+    AdaptiveFilter::with_delays(
+        first(SPREAD).with_extra_delay(later),
         &D,
-        suppositions(delays),
-        vec![[0.0; 6]; delays.count],
+        prior_of(delay),
+        vec![[0.0; 6]; delay.count],
     )
     .unwrap()
 }
@@ -73,19 +73,19 @@ fn operator(samples: usize, seed: u64, delay: impl Fn(usize) -> usize) -> Vec<(f
 fn a_delay_that_is_not_questioned_is_a_delay_line() {
     // omega_nm and zeta_nm are known, so that the point of the filters stays: when it moves, signals that the delay line has not let through yet differ in
     // the second order.
-    let suppositions = |delays| Suppositions {
-        whole_every: 0,
-        ..suppositions(delays)
+    let prior_of = |delay| ChangePrior {
+        neuromuscular_every: 0,
+        ..prior_of(delay)
     };
     let first = first([1e-5, 1e-5, 0.0, 0.0]);
-    let silent = Delays {
-        every: u32::MAX,
-        neighbour: 0.0,
+    let silent = DelayPrior {
+        propose_every: u32::MAX,
+        neighbour_probability: 0.0,
         ..OPEN
     };
     let memory = vec![[0.0; 6]; COUNT];
-    let mut one: Bank = Adaptive::with_delays(first.delayed(5), &D, suppositions(silent), memory).unwrap();
-    let mut other: Adaptive<48, 4> = Adaptive::new(first, &D, suppositions(Delays::KNOWN)).unwrap();
+    let mut one: Bank = AdaptiveFilter::with_delays(first.with_extra_delay(5), &D, prior_of(silent), memory).unwrap();
+    let mut other: AdaptiveFilter<48, 4> = AdaptiveFilter::new(first, &D, prior_of(DelayPrior::KNOWN)).unwrap();
     let data = operator(4000, 3, |k| if k < 2000 { 5 } else { 6 });
     for (k, &(x, u)) in data.iter().enumerate() {
         let delayed = k.checked_sub(5).map_or(0.0, |past| data[past].0);
@@ -107,7 +107,7 @@ fn a_delay_that_changes_is_found_and_named() {
         let mut declared = Vec::new();
         for (k, &(x, u)) in data.iter().enumerate() {
             bank.step(x, u);
-            let total: f64 = bank.bank().hypotheses().map(|h| h.weight).sum();
+            let total: f64 = bank.bank().hypotheses().map(|h| h.probability).sum();
             assert!((total - 1.0).abs() < 1e-12);
             declared.extend(bank.bank().change().map(|c| (k, c)));
         }
@@ -154,7 +154,7 @@ fn a_steady_person_raises_no_alarm() {
     assert!(
         bank.bank()
             .hypotheses()
-            .any(|h| h.born == 0 && h.later == 8 && h.weight > 0.5)
+            .any(|h| h.born == 0 && h.extra_delay == 8 && h.probability > 0.5)
     );
 }
 
@@ -167,22 +167,31 @@ fn overflow_silence_and_bad_memory() {
             800 => _ = bank.step(x, -1e200),
             1000..2000 => _ = bank.step(0.0, 0.0),
             2100..2200 => bank.bridge(x),
-            2200..2300 => _ = bank.follow(x, u),
+            2200..2300 => _ = bank.step_without_update(x, u),
             _ => _ = bank.step(x, u),
         }
-        assert!(bank.bank().hypotheses().all(Hypothesis::is_sound), "{k}");
+        assert!(bank.bank().hypotheses().all(Hypothesis::is_valid), "{k}");
         assert!(bank.bank().delay().iter().all(|d| d.is_finite()));
     }
-    let with = |delays: Delays, memory: usize| {
-        Bank::with_delays(first(SPREAD), &D, suppositions(delays), vec![[0.0; 6]; memory]).is_some()
+    let with = |delay: DelayPrior, memory: usize| {
+        Bank::with_delays(first(SPREAD), &D, prior_of(delay), vec![[0.0; 6]; memory]).is_some()
     };
     assert!(with(OPEN, COUNT));
     assert!(!with(OPEN, COUNT - 1) && !with(OPEN, 0));
-    assert!(!with(Delays { count: 0, ..OPEN }, 0));
-    assert!(!with(Delays { births: 0, ..OPEN }, COUNT) && !with(Delays { every: 0, ..OPEN }, COUNT));
+    assert!(!with(DelayPrior { count: 0, ..OPEN }, 0));
+    assert!(
+        !with(DelayPrior { proposals: 0, ..OPEN }, COUNT)
+            && !with(
+                DelayPrior {
+                    propose_every: 0,
+                    ..OPEN
+                },
+                COUNT
+            )
+    );
     assert!(!with(
-        Delays {
-            neighbour: f64::NAN,
+        DelayPrior {
+            neighbour_probability: f64::NAN,
             ..OPEN
         },
         COUNT

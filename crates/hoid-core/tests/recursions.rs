@@ -7,13 +7,16 @@ mod common;
 use common::{Noise, Plain, box_jenkins, relative_difference};
 use hoid_core::{
     adaptation::{Adaptation, Covariance, Forgetting},
-    error_bars::{Bars, ErrorBars, Level, NoBars, Places, Sensitivities},
-    factored::Factored,
-    physical::{Physical, PhysicalModel},
-    predictor::{AnyShape, FixedShape, Predictor, Regressor, Shape},
+    error_bars::{ErrorBars, ErrorPropagation, NoErrorBars},
+    innovation_variance::InnovationVariance,
+    physical::{PhysicalModel, PhysicalRpem},
+    predictor::{Predictor, Regressor},
     recursion::Stable,
     rls::Rls,
     rpem::Rpem,
+    sensitivities::{ErrorLayout, Sensitivities},
+    shape::{AnyShape, FixedShape, Shape},
+    ud_covariance::UdCovariance,
     window::Window,
 };
 
@@ -24,11 +27,11 @@ fn diagonal<const N: usize>(value: f64) -> [[f64; N]; N] {
 }
 
 fn covariance<const N: usize>(p0: f64, forgetting: Forgetting<N>) -> Covariance<N> {
-    Covariance::new(Factored::diagonal([p0; N]), forgetting, [f64::INFINITY; N])
+    Covariance::new(UdCovariance::diagonal([p0; N]), forgetting, [f64::INFINITY; N])
 }
 
 fn bars<const N: usize, const K: usize>(p0: f64) -> ErrorBars<N, K> {
-    ErrorBars::new(&diagonal::<N>(p0), Level::new(0.0, 0.0, 1.0), 5.0)
+    ErrorBars::new(&diagonal::<N>(p0), InnovationVariance::new(0.0, 0.0, 1.0), 5.0)
 }
 
 fn ways<const N: usize>() -> Vec<Forgetting<N>> {
@@ -109,7 +112,7 @@ fn factors_are_the_plain_covariance_for_every_way_of_forgetting() {
             } else {
                 step.innovation
             };
-            let gain = plain.advance(&forgetting, recursion.psi(), limited, variance);
+            let gain = plain.update(&forgetting, recursion.psi(), limited, variance);
             if !step.shortened {
                 for i in 0..5 {
                     // In units of the standard error, so that a parameter of any size counts the same.
@@ -146,10 +149,10 @@ fn without_c_d_and_f_the_prediction_error_method_is_least_squares_to_the_last_bi
             assert_eq!(rls.theta(), rpem.theta());
         }
         assert_eq!(rls.adaptation(), rpem.adaptation());
-        assert_eq!(rls.spread(), rpem.spread());
+        assert_eq!(rls.normalised_covariance(), rpem.normalised_covariance());
         assert_eq!(rls.innovation_variance(), rpem.innovation_variance());
     }
-    let window = || Window::<4, Vec<f64>>::new(vec![0.0; Window::<4, Vec<f64>>::numbers(100)], 4).unwrap();
+    let window = || Window::<4, Vec<f64>>::new(vec![0.0; Window::<4, Vec<f64>>::memory_length(100)], 4).unwrap();
     let mut rls = Rls::new(shapes()[0], start(&shape), window(), bars::<4, 0>(0.1)).unwrap();
     let mut rpem = Rpem::new(
         shape,
@@ -171,28 +174,34 @@ fn without_c_d_and_f_the_prediction_error_method_is_least_squares_to_the_last_bi
 fn without_error_bars_the_estimate_is_the_same_to_the_last_bit() {
     let data = box_jenkins(3000, 21, 0.02);
     let (arx, bj) = (shapes()[0], shapes()[4]);
-    let unlimited = |p0: f64| ErrorBars::new(&diagonal::<5>(p0), Level::new(0.0, 0.0, 1.0), f64::INFINITY);
+    let unlimited = |p0: f64| {
+        ErrorBars::new(
+            &diagonal::<5>(p0),
+            InnovationVariance::new(0.0, 0.0, 1.0),
+            f64::INFINITY,
+        )
+    };
     for forgetting in ways::<5>() {
-        let needs_variance = matches!(forgetting, Forgetting::Variable { .. });
+        let needs_innovation_variance = matches!(forgetting, Forgetting::Variable { .. });
         let adaptation = || covariance::<5>(0.1, forgetting.clone());
         let rpem = |adaptation| {
             let (regressor, stable) = (Regressor::Gradient, Stable::Predictor);
-            Rpem::<_, 5, 0, _, _>::new(bj, regressor, stable, start(&bj), adaptation, NoBars)
+            Rpem::<_, 5, 0, _, _>::new(bj, regressor, stable, start(&bj), adaptation, NoErrorBars)
         };
         // What needs the innovation variance is refused, and not given another one.
-        assert_eq!(rpem(adaptation()).is_none(), needs_variance);
+        assert_eq!(rpem(adaptation()).is_none(), needs_innovation_variance);
         assert_eq!(
-            Rls::new(arx, start(&arx), adaptation(), NoBars).is_none(),
-            needs_variance
+            Rls::new(arx, start(&arx), adaptation(), NoErrorBars).is_none(),
+            needs_innovation_variance
         );
-        if needs_variance {
+        if needs_innovation_variance {
             continue;
         }
         let mut bare = rpem(adaptation()).unwrap();
         let (regressor, stable) = (Regressor::Gradient, Stable::Predictor);
         let mut full =
             Rpem::<_, 5, 0, _>::new(bj, regressor, stable, start(&bj), adaptation(), unlimited(0.1)).unwrap();
-        let mut bare_rls = Rls::new(arx, start(&arx), adaptation(), NoBars).unwrap();
+        let mut bare_rls = Rls::new(arx, start(&arx), adaptation(), NoErrorBars).unwrap();
         let mut full_rls = Rls::new(arx, start(&arx), adaptation(), unlimited(0.1)).unwrap();
         for &(x, u) in &data {
             assert_eq!(bare.step(x, u), full.step(x, u));
@@ -230,7 +239,7 @@ fn orders_in_the_type_are_the_same_recursion_to_the_last_bit() {
     for &(x, u) in &data {
         assert_eq!(any.step(x, u), typed.step(x, u));
         assert_eq!(any.theta(), typed.theta());
-        assert_eq!(any.spread(), typed.spread());
+        assert_eq!(any.normalised_covariance(), typed.normalised_covariance());
     }
 }
 
@@ -273,9 +282,13 @@ fn a_window_is_least_squares_over_its_samples() {
         *x *= 1e6;
         *u *= 1e6;
     }
-    let memory = vec![0.0; Window::<4, Vec<f64>>::numbers(W)];
+    let memory = vec![0.0; Window::<4, Vec<f64>>::memory_length(W)];
     let window = Window::<4, Vec<f64>>::new(memory, 4).unwrap();
-    let unlimited = ErrorBars::new(&diagonal::<4>(1.0), Level::new(0.0, 0.0, 1.0), f64::INFINITY);
+    let unlimited = ErrorBars::new(
+        &diagonal::<4>(1.0),
+        InnovationVariance::new(0.0, 0.0, 1.0),
+        f64::INFINITY,
+    );
     let mut rls = Rls::new(shapes()[0], [0.0; 4], window, unlimited).unwrap();
     let regressor = |t: usize| {
         let at = |lag: usize| if t >= lag { data[t - lag] } else { (0.0, 0.0) };
@@ -372,29 +385,29 @@ fn psi_is_the_negative_gradient_of_the_frozen_predictor() {
 /// A physical model of Box-Jenkins with one noise pole (and a zero), with or without the delay.
 fn physical<const N: usize, const L: usize>(
     nc: usize,
-    tracked_from: Option<usize>,
+    smallest_nk: Option<usize>,
     eta: [f64; N],
-) -> Physical<AnyShape, N, 4, L, Covariance<N>> {
+) -> PhysicalRpem<AnyShape, N, 4, L, Covariance<N>> {
     let mut bounds = [[f64::NEG_INFINITY, f64::INFINITY]; N];
     bounds[2] = [0.5, 100.0];
     bounds[3] = [0.02, 5.0];
-    if tracked_from.is_some() {
+    if smallest_nk.is_some() {
         bounds[4] = [0.01, 0.1];
     }
     let model = PhysicalModel {
         shape: AnyShape {
-            nb: if tracked_from.is_some() { 3 } else { 2 },
+            nb: if smallest_nk.is_some() { 3 } else { 2 },
             nc,
             nd: 1,
             nf: 2,
             ..AnyShape::default()
         },
-        tracked_from,
+        smallest_nk,
         sample_time: 0.01,
         bounds,
         stable: Stable::Predictor,
     };
-    Physical::new(
+    PhysicalRpem::new(
         model,
         eta,
         covariance::<N>(1.0, Forgetting::Exponential { lambda: [1.0; N] }),
@@ -410,7 +423,7 @@ fn psi_of_the_physical_recursion_is_its_negative_gradient() {
         let run = |eta: [f64; N]| {
             let mut recursion = physical::<N, L>(nc, tracked, eta);
             data.iter()
-                .map(|&(x, u)| (recursion.follow(x, u).innovation, *recursion.psi()))
+                .map(|&(x, u)| (recursion.step_without_update(x, u).innovation, *recursion.psi()))
                 .collect::<Vec<_>>()
         };
         let at = run(eta);
@@ -453,7 +466,7 @@ fn a_delay_that_moves_over_a_sample_leaves_the_response_continuous() {
     let run = |tau: f64| {
         let mut recursion = physical::<6, 16>(0, Some(2), [0.09, 0.036, 11.25, 0.35, tau, -0.8]);
         data.iter()
-            .map(|&(x, u)| recursion.follow(x, u).innovation)
+            .map(|&(x, u)| recursion.step_without_update(x, u).innovation)
             .collect::<Vec<f64>>()
     };
     let (before, after) = (run(0.05 - 1e-9), run(0.05 + 1e-9));
@@ -474,7 +487,7 @@ fn a_delay_is_found_from_four_samples_away() {
     for _ in 0..40_000 {
         slow = 0.97 * slow + 0.3 * noise.next();
         // The innovation for u = 0 is minus the response of the truth.
-        let response = -truth.follow(slow, 0.0).innovation;
+        let response = -truth.step_without_update(slow, 0.0).innovation;
         recursion.step(slow, response + 0.01 * noise.next());
     }
     let tau = recursion.eta()[4];
@@ -491,7 +504,7 @@ fn without_forgetting_the_error_bars_are_the_covariance_and_with_it_their_known_
         data.iter().for_each(|&(x, u)| {
             rls.step(x, u);
         });
-        (rls.spread(), rls.adaptation().matrix())
+        (rls.normalised_covariance(), rls.adaptation().matrix())
     };
     let (spread, p) = spread_of(1.0);
     assert!(relative_difference(&p, &spread) < 1e-9);
@@ -515,8 +528,9 @@ fn the_guard_holds_every_variance_within_its_bound() {
         } else {
             1.3
         };
-        let mut adaptation = Covariance::new(Factored::diagonal([1.0; 5]), forgetting.clone(), [BOUND; 5]);
-        let mut bars: ErrorBars<5, 0> = ErrorBars::new(&diagonal::<5>(1.0), Level::new(1.0, 100.0, 0.99), 5.0);
+        let mut adaptation = Covariance::new(UdCovariance::diagonal([1.0; 5]), forgetting.clone(), [BOUND; 5]);
+        let mut bars: ErrorBars<5, 0> =
+            ErrorBars::new(&diagonal::<5>(1.0), InnovationVariance::new(1.0, 100.0, 0.99), 5.0);
         for t in 0..200_000 {
             // One direction is excited, then none, then all.
             let psi: [f64; 5] = match t % 60_000 {
@@ -525,10 +539,15 @@ fn the_guard_holds_every_variance_within_its_bound() {
                 _ => std::array::from_fn(|_| noise.next()),
             };
             let eps = noise.next();
-            let moved = adaptation.advance(&psi, eps, &[0.0; 5], bars.innovation_variance());
-            bars.take(&Places::NONE, &Sensitivities::of_gradient(&psi), &moved.gain, eps);
-            adaptation.drift_into(&mut bars);
-            let (p, spread) = (adaptation.matrix(), bars.spread());
+            let moved = adaptation.update(&psi, eps, &[0.0; 5], bars.innovation_variance());
+            bars.update(
+                &ErrorLayout::NONE,
+                &Sensitivities::from_gradient(&psi),
+                &moved.gain,
+                eps,
+            );
+            adaptation.add_drift_to(&mut bars);
+            let (p, spread) = (adaptation.matrix(), bars.normalised_covariance());
             for i in 0..5 {
                 assert!(
                     p[i][i] <= slack * BOUND && p[i][i] >= 0.0,
@@ -541,7 +560,7 @@ fn the_guard_holds_every_variance_within_its_bound() {
                     spread[i][i]
                 );
             }
-            assert!(adaptation.is_sound() && bars.is_sound());
+            assert!(adaptation.is_valid() && bars.is_valid());
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_lanes::Path;
+use hoid_lanes::InstructionSet;
 use hoid_model::{Orders, PolynomialModel, Record, SampleTime, Structure, polynomial::reflected_inside};
 
 use crate::{
@@ -143,7 +143,7 @@ impl Estimator {
     /// # Errors
     /// Those of [`Estimator::fit`], for each record by itself.
     pub fn fit_each(&self, records: &[&Record]) -> Vec<Result<Fit, IdentError>> {
-        batched::fit_each(self, records, Path::Best).unwrap_or_else(|| {
+        batched::fit_each(self, records, InstructionSet::Best).unwrap_or_else(|| {
             let alone = |record: &&Record| self.fit(std::slice::from_ref(*record));
             records.iter().map(alone).collect()
         })

@@ -177,7 +177,7 @@ impl Fit {
         let poles = product(&monic(m.a()), &monic(m.d()));
         hoid_core::filter::divide_in_place(&poles[1..], &mut h);
         let mut errors = vec![0.0; eps.values.len()];
-        hoid_core::filter::moving_sum(&h, 0, &eps.values, &mut errors);
+        hoid_core::filter::fir(&h, 0, &eps.values, &mut errors);
         // Before that the residuals of the last k samples are not all known.
         let skipped = (k - 1).min(errors.len());
         let first = eps.first + skipped;

@@ -1,20 +1,65 @@
-//! Several runs side by side in the lanes of vector registers.
+//! Runs of a recursion in the lanes of vector registers, with the bits of each run alone.
 //!
-//! A recursion waits for its own last sample: alone, a run leaves most of a processor idle. Here each lane of a register holds a run of
-//! its own. The registers are chosen when the program runs (AVX-512, AVX2, else the scalar ones; Neon on ARM), and the operations on each lane
-//! are those of the run alone, in their order and without contraction: the bits do not depend on the registers, nor on what runs beside.
+//! A recursion `y(t) = x(t) - f y(t-1)` waits at each sample for its own last result, so that one run leaves most of a processor idle, and no
+//! vector instruction can shorten it: sample t + 1 cannot begin before sample t has ended. Several runs can go at a time, one in each
+//! lane of a register:
 //!
-//! | module | what it holds |
+//! `[y_1(t) .. y_L(t)] = [x_1(t) .. x_L(t)] - [f_1 .. f_L] [y_1(t-1) .. y_L(t-1)]`, lane by lane.
+//!
+//! The same holds for a sum over a record, `s(t) = s(t-1) + a(t) b(t)`: four partial sums, each of every fourth term, do not wait for one
+//! another.
+//!
+//! The registers are chosen when the program runs (AVX-512, AVX2, else scalar ones; Neon on ARM). The operations on each lane are those of
+//! the run alone, in their order and without contraction (no fused multiply-add). So the result depends neither on the registers nor on
+//! what runs in the other lanes, to the last bit.
+//!
+//! A task is written once, over a [`Number`], and run in the registers of an [`InstructionSet`]:
+//!
+//! ```
+//! use hoid_lanes::{InstructionSet, LaneTask, Number};
+//!
+//! /// `y(t) = x(t) - f y(t-1)` of several runs; `x` holds the sample t of all runs, then that of t + 1 ...
+//! struct FirstOrder<'a> {
+//!     f: f64,
+//!     x: &'a [f64],
+//! }
+//!
+//! impl LaneTask for FirstOrder<'_> {
+//!     type Output = Vec<f64>;
+//!
+//!     #[inline(always)]
+//!     fn run<R: Number>(self, zero: R) -> Vec<f64> {
+//!         let (f, mut y) = (zero.splat(self.f), zero);
+//!         let mut out = vec![0.0; self.x.len()];
+//!         for (x, out) in self.x.chunks_exact(zero.lanes()).zip(out.chunks_exact_mut(zero.lanes())) {
+//!             y = zero.load(x) - f * y;
+//!             y.store(out);
+//!         }
+//!         out
+//!     }
+//! }
+//!
+//! let lanes = InstructionSet::Best.lanes().ok_or("no registers")?;
+//! // An impulse in each run, larger from lane to lane.
+//! let mut x = vec![0.0; 3 * lanes];
+//! (0..lanes).for_each(|lane| x[lane] = lane as f64);
+//! let y = InstructionSet::Best.with_lanes(FirstOrder { f: -0.5, x: &x }).ok_or("no registers")?;
+//! assert_eq!(y[2 * lanes + 1], 0.25);
+//! # Ok::<(), &str>(())
+//! ```
+//!
+//! | item | what it is |
 //! |---|---|
-//! | [`Path`], [`SideBySide`] | the choice of the registers, and what runs in them |
-//! | [`Four`], [`by_fours`] | the partial sums of one record, four in one register or two |
-//! | [`track_many`] | recursive least squares and the prediction-error method over many runs |
+//! | [`Number`] | an f64, or several in lanes |
+//! | [`LaneTask`], [`InstructionSet::with_lanes`] | a computation over numbers, and its run in the lanes of the chosen registers |
+//! | [`with_one_lane`] | the same for one run |
+//! | [`FourLanes`], [`FourLaneTask`], [`with_four_lanes`] | four partial sums of one record, in one register or two |
 
-mod fours;
-mod path;
-mod track;
-mod wide;
+mod four_lanes;
+mod instruction_set;
+mod number;
+mod registers;
 
-pub use fours::{ByFours, Four, by_fours};
-pub use path::{Path, SideBySide, alone};
-pub use track::{Estimates, LanesError, Run, Task, track_many};
+pub use four_lanes::{FourLaneTask, FourLanes, with_four_lanes};
+pub use instruction_set::{InstructionSet, LaneTask, with_one_lane};
+pub use number::Number;

@@ -4,7 +4,7 @@
 //! `h = Ts/T_n` the transition matrix is lower triangular Toeplitz with `e^-h h^k/k!` on diagonal k, and the input enters
 //! section k (from 0) with `1 - e^-h sum_{j<=k} h^j/j!`, summed from its tail `e^-h sum_{j>k} h^j/j!` so that nothing cancels.
 
-use hoid_core::number::Number;
+use hoid_lanes::Number;
 
 /// Highest order of the remnant filter.
 pub(crate) const MOST: usize = hoid_model::remnant::HIGHEST_ORDER;
@@ -50,9 +50,9 @@ impl Cascade {
     pub fn step<R: Number, const M: usize>(&self, z: [R; M], eps: R) -> [R; M] {
         let mut next = z;
         for i in 0..M {
-            next[i] = eps.like(self.input[i]) * eps;
+            next[i] = eps.splat(self.input[i]) * eps;
             for j in 0..=i {
-                next[i] = next[i] + eps.like(self.transition[i - j]) * z[j];
+                next[i] = next[i] + eps.splat(self.transition[i - j]) * z[j];
             }
         }
         next

@@ -30,9 +30,9 @@ pub enum SimError {
         /// Samples needed.
         expected: usize,
     },
-    /// Registers that this processor does not have.
-    #[error("this processor has no registers for the path that was asked for; use Path::Best")]
-    NoSuchPath,
+    /// An instruction set that this processor does not have.
+    #[error("this processor does not have the instruction set that was asked for; use InstructionSet::Best")]
+    NoSuchInstructionSet,
     /// Noise that is no number.
     #[error("the noise at sample {index} is {value}, expected a finite number")]
     NoiseNotFinite {

@@ -16,8 +16,8 @@
 
 use std::ops::Range;
 
-use hoid_core::number::Number;
-use hoid_lanes::{Path, SideBySide, alone};
+use hoid_lanes::Number;
+use hoid_lanes::{InstructionSet, LaneTask, with_one_lane};
 use hoid_model::{
     Channel, Record,
     scenario::{Realisation, ResolvedScenario, Scenario, TrueParameters},
@@ -74,8 +74,8 @@ impl Rows {
     fn step<R: Number>(&self, x: [R; 2], u: R) -> [R; 2] {
         let ([a, b, g], [d, c, h]) = (self.plus, self.minus);
         [
-            u.like(a) * x[0] + u.like(b) * x[1] + u.like(g) * u,
-            u.like(d) * x[1] - u.like(c) * x[0] - u.like(h) * u,
+            u.splat(a) * x[0] + u.splat(b) * x[1] + u.splat(g) * u,
+            u.splat(d) * x[1] - u.splat(c) * x[0] - u.splat(h) * u,
         ]
     }
 }
@@ -163,7 +163,7 @@ impl Simulator {
             noise,
             into: signals,
         };
-        if alone(one) {
+        if with_one_lane(one) {
             Ok(())
         } else {
             self.why_not_finite(noise, signals)
@@ -171,13 +171,13 @@ impl Simulator {
     }
 
     /// The signals of several runs, each driven by its own white noise, side by side in the lanes of vector registers: the bits of
-    /// [`Simulator::signals`] for each alone, on every path.
+    /// [`Simulator::signals`] for each alone, with every instruction set.
     ///
     /// # Errors
-    /// As [`Simulator::signals`], for the first run that has one; [`SimError::NoSuchPath`].
-    pub fn signals_of_many(&self, noises: &[Vec<f64>], path: Path) -> Result<Vec<Signals>, SimError> {
+    /// As [`Simulator::signals`], for the first run that has one; [`SimError::NoSuchInstructionSet`].
+    pub fn signals_of_many(&self, noises: &[Vec<f64>], instructions: InstructionSet) -> Result<Vec<Signals>, SimError> {
         let mut all = Vec::new();
-        self.signals_of_many_into(noises, path, &mut all)?;
+        self.signals_of_many_into(noises, instructions, &mut all)?;
         Ok(all)
     }
 
@@ -188,7 +188,7 @@ impl Simulator {
     pub fn signals_of_many_into(
         &self,
         noises: &[Vec<f64>],
-        path: Path,
+        instructions: InstructionSet,
         into: &mut Vec<Signals>,
     ) -> Result<(), SimError> {
         for noise in noises {
@@ -203,7 +203,7 @@ impl Simulator {
             noises,
             into,
         };
-        let finite = path.do_with(many).ok_or(SimError::NoSuchPath)?;
+        let finite = instructions.with_lanes(many).ok_or(SimError::NoSuchInstructionSet)?;
         if finite {
             return Ok(());
         }
@@ -260,7 +260,7 @@ impl Simulator {
         noise: &[f64],
         [e_out, u_out, x_out, n_out]: [&mut [f64]; 4],
     ) {
-        let zero = state.operator[0].like(0.0);
+        let zero = state.operator[0].splat(0.0);
         let width = zero.lanes();
         let always = self.matrices[0];
         let (mut operator, mut element) = (state.operator, state.element);
@@ -279,16 +279,16 @@ impl Simulator {
         for (i, k) in range.enumerate() {
             let m = if CHANGES { self.matrices[k] } else { always };
             let at = i * width;
-            let x = zero.like(m.element_output) * element[0];
-            let e = zero.like(self.forcing_deg[k]) - x;
+            let x = zero.splat(m.element_output) * element[0];
+            let e = zero.splat(self.forcing_deg[k]) - x;
             let [of_output, of_rate] = m.operator_output;
             // The memory is a ring whose length is a power of two.
-            memory[k & last] = zero.like(of_output) * operator[0] + zero.like(of_rate) * operator[1];
+            memory[k & last] = zero.splat(of_output) * operator[0] + zero.splat(of_rate) * operator[1];
             let response = memory[k.wrapping_sub(m.delay) & last];
-            let n = zero.like(m.k_n) * remnant[M - 1];
+            let n = zero.splat(m.k_n) * remnant[M - 1];
             let u = response + n;
             operator = m.operator.step(operator, e);
-            element = m.element.step(element, zero.like(m.element_input) * u);
+            element = m.element.step(element, zero.splat(m.element_input) * u);
             remnant = self.cascade.step(remnant, zero.load(&noise[at..]));
             e.store(&mut e_out[at..]);
             u.store(&mut u_out[at..]);
@@ -415,7 +415,7 @@ struct One<'a> {
     into: &'a mut Signals,
 }
 
-impl SideBySide for One<'_> {
+impl LaneTask for One<'_> {
     /// True when all was finite.
     type Output = bool;
 
@@ -437,7 +437,7 @@ struct Many<'a> {
     into: &'a mut [Signals],
 }
 
-impl SideBySide for Many<'_> {
+impl LaneTask for Many<'_> {
     /// True when all was finite.
     type Output = bool;
 

@@ -39,22 +39,30 @@ const QUANTITIES: [&str; 6] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "remnant
 
 impl Change {
     pub(crate) fn new(change: &kernel_change::Change, tau_e_s: [Estimate; 2], sample_time: SampleTime) -> Self {
-        let (before, now) = (&change.before, &change.now);
+        let (before, now) = (&change.before, &change.after);
         let pair = |i: usize| {
-            let of = |b: &kernel::Before| if i < 2 { b.gains[i] } else { b.neuromuscular[i - 2] };
+            let of = |b: &kernel::Snapshot| {
+                if i < 2 {
+                    b.gain_covariance[i]
+                } else {
+                    b.neuromuscular_variance[i - 2]
+                }
+            };
             [before, now].map(|b| Estimate::with_variance(b.eta[i], of(b)))
         };
-        let lead = |b: &kernel::Before| (b.eta[0] * b.eta[1] + b.gains[2]) / (b.eta[0] * b.eta[0] + b.gains[0]);
+        let lead = |b: &kernel::Snapshot| {
+            (b.eta[0] * b.eta[1] + b.gain_covariance[2]) / (b.eta[0] * b.eta[0] + b.gain_covariance[0])
+        };
         Self {
             seconds_ago: change.samples_ago as f64 * sample_time.s(),
-            odds: change.odds,
+            odds: change.log_odds,
             k_e: pair(0),
             k_e_dot: pair(1),
             omega_nm_rad_s: pair(2),
             zeta_nm: pair(3),
             tau_e_s,
             t_l_s: [lead(before), lead(now)],
-            innovation_variance: [before.variance, now.variance],
+            innovation_variance: [before.innovation_variance, now.innovation_variance],
             z: change.z,
         }
     }

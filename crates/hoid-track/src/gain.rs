@@ -1,10 +1,11 @@
 //! The adaptation that the options ask for.
 
 use hoid_core::{
-    adaptation::{Adaptation, Covariance, Forgetting, Move},
-    error_bars::{Bars, ErrorBars, Level},
-    factored::Factored,
+    adaptation::{Adaptation, Covariance, Forgetting, ParameterStep},
+    error_bars::{ErrorBars, ErrorPropagation},
+    innovation_variance::InnovationVariance,
     state::State,
+    ud_covariance::UdCovariance,
     window::Window,
 };
 use hoid_model::SampleTime;
@@ -94,7 +95,7 @@ impl<const N: usize> Gain<N> {
                         expected: "a memory in samples or seconds".to_owned(),
                     });
                 }
-                let memory = vec![0.0; Window::<N, Vec<f64>>::numbers(samples as usize)];
+                let memory = vec![0.0; Window::<N, Vec<f64>>::memory_length(samples as usize)];
                 let Some(window) = Window::<N, Vec<f64>>::new(memory, p) else {
                     return Err(IdentError::BadOption {
                         option: "the sliding window".to_owned(),
@@ -112,7 +113,7 @@ impl<const N: usize> Gain<N> {
             ForgettingRule::Gradient(rate) => Forgetting::Gradient { rate: *rate },
         };
         let matrix = square(&from.covariance);
-        let Some(factors) = Factored::of(&matrix) else {
+        let Some(factors) = UdCovariance::from_matrix(&matrix) else {
             return Err(IdentError::BadStart {
                 reason: "its covariance is not positive; give a start covariance, such as 0.1".to_owned(),
             });
@@ -136,39 +137,39 @@ impl<const N: usize> Gain<N> {
 
 impl<const N: usize> Adaptation<N> for Gain<N> {
     #[inline]
-    fn advance(&mut self, psi: &[f64; N], eps: f64, theta: &[f64; N], variance: f64) -> Move<N> {
+    fn update(&mut self, psi: &[f64; N], eps: f64, theta: &[f64; N], variance: f64) -> ParameterStep<N> {
         match self {
-            Self::Covariance(c) => c.advance(psi, eps, theta, variance),
-            Self::Window(w) => w.advance(psi, eps, theta, variance),
+            Self::Covariance(c) => c.update(psi, eps, theta, variance),
+            Self::Window(w) => w.update(psi, eps, theta, variance),
         }
     }
 
-    fn spread(&self) -> Option<[[f64; N]; N]> {
+    fn own_covariance(&self) -> Option<[[f64; N]; N]> {
         match self {
-            Self::Covariance(c) => c.spread(),
-            Self::Window(w) => w.spread(),
+            Self::Covariance(c) => c.own_covariance(),
+            Self::Window(w) => w.own_covariance(),
         }
     }
 
     #[inline]
-    fn drift_into<const K: usize, B: Bars<N, K>>(&self, bars: &mut B) {
+    fn add_drift_to<const K: usize, B: ErrorPropagation<N, K>>(&self, bars: &mut B) {
         match self {
-            Self::Covariance(c) => c.drift_into(bars),
-            Self::Window(w) => w.drift_into(bars),
+            Self::Covariance(c) => c.add_drift_to(bars),
+            Self::Window(w) => w.add_drift_to(bars),
         }
     }
 
-    fn needs_variance(&self) -> bool {
+    fn needs_innovation_variance(&self) -> bool {
         match self {
-            Self::Covariance(c) => c.needs_variance(),
-            Self::Window(w) => w.needs_variance(),
+            Self::Covariance(c) => c.needs_innovation_variance(),
+            Self::Window(w) => w.needs_innovation_variance(),
         }
     }
 
-    fn is_sound(&self) -> bool {
+    fn is_valid(&self) -> bool {
         match self {
-            Self::Covariance(c) => c.is_sound(),
-            Self::Window(w) => w.is_sound(),
+            Self::Covariance(c) => c.is_valid(),
+            Self::Window(w) => w.is_valid(),
         }
     }
 }
@@ -186,7 +187,7 @@ pub(crate) fn error_bars<const N: usize, const K: usize>(
     for (_, memory) in &setup.memories {
         shortest = shortest.min(memory.lambda(sample_time)?);
     }
-    let level = Level::new(from.variance, from.residuals, 1.0 - (1.0 - shortest) / LEVEL_MEMORIES);
+    let level = InnovationVariance::new(from.variance, from.residuals, 1.0 - (1.0 - shortest) / LEVEL_MEMORIES);
     let p = from.values.len();
     let start: [[f64; N]; N] =
         std::array::from_fn(|i| std::array::from_fn(|j| if i < p && j < p { from.spread[i * p + j] } else { 0.0 }));

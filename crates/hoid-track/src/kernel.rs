@@ -5,10 +5,11 @@ use hoid_core::{
     adaptation::Adaptation,
     delay::DelayLine,
     error_bars::ErrorBars,
-    physical::{Physical, PhysicalModel},
-    predictor::{AnyShape, FixedShape, Regressor, Shape},
+    physical::{PhysicalModel, PhysicalRpem},
+    predictor::Regressor,
     rls::Rls,
     rpem::Rpem,
+    shape::{AnyShape, FixedShape, Shape},
     state::State,
 };
 use hoid_model::{
@@ -125,7 +126,7 @@ impl<'a> Plan<'a> {
     }
 
     /// Smallest delay in samples, where tau_e is tracked.
-    fn tracked_from(&self) -> Option<usize> {
+    fn smallest_nk(&self) -> Option<usize> {
         // Up to rounding: 0.29/0.01 is 28.999999999999996.
         let whole = |low: f64| (low / self.sample_time.s() + 1e-9) as usize + 1;
         self.setup.track_delay_s.map(|(low, _)| whole(low))
@@ -135,7 +136,7 @@ impl<'a> Plan<'a> {
     fn taps(&self) -> Option<usize> {
         let (_, longest) = self.setup.track_delay_s?;
         let all = (longest / self.sample_time.s()) as usize + 5;
-        Some(all.saturating_sub(self.tracked_from().unwrap_or(0)))
+        Some(all.saturating_sub(self.smallest_nk().unwrap_or(0)))
     }
 
     fn linear<S: Shape + Send + Sync + 'static, const N: usize>(
@@ -184,25 +185,25 @@ impl<'a> Plan<'a> {
         shape: S,
     ) -> Result<Box<dyn Recursion>, IdentError> {
         let (setup, ts) = (self.setup, self.sample_time.s());
-        let tracked_from = self.tracked_from();
+        let smallest_nk = self.smallest_nk();
         let model = PhysicalModel {
             shape,
-            tracked_from,
+            smallest_nk,
             sample_time: ts,
             bounds: start::physical_bounds::<N>(setup, self.sample_time)?,
             stable: setup.stable,
         };
         let recursion =
-            Physical::<S, N, K, L, _>::new(model, self.values(), self.gain::<N>(true)?, self.bars::<N, K>()?)
+            PhysicalRpem::<S, N, K, L, _>::new(model, self.values(), self.gain::<N>(true)?, self.bars::<N, K>()?)
                 .ok_or_else(|| IdentError::BadStart {
                     reason: "it lies outside the bounds of the physical parameters, or its noise model is not stable"
                         .to_owned(),
                 })?;
         Ok(Box::new(InPhysical {
             recursion,
-            delay: delay(tracked_from.unwrap_or(setup.orders.nk)),
+            delay: delay(smallest_nk.unwrap_or(setup.orders.nk)),
             parameters: self.parameters(),
-            tracked: tracked_from.is_some(),
+            tracked: smallest_nk.is_some(),
             fixed_tau_s: (setup.orders.nk as f64 - 1.0) * ts,
         }))
     }
@@ -239,7 +240,7 @@ impl<S: Shape + Send + Sync, const N: usize, A: Adaptation<N> + State + Send + S
 
     fn follow(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
-        self.rls.follow(x, sample.u).into()
+        self.rls.step_without_update(x, sample.u).into()
     }
 
     fn bridge(&mut self, sample: Sample) {
@@ -253,7 +254,7 @@ impl<S: Shape + Send + Sync, const N: usize, A: Adaptation<N> + State + Send + S
 
     fn covariance(&self, into: &mut [f64]) -> bool {
         scaled(
-            &self.rls.spread(),
+            &self.rls.normalised_covariance(),
             self.rls.innovation_variance(),
             self.parameters,
             into,
@@ -282,7 +283,7 @@ impl<S: Shape + Send + Sync, const N: usize, const K: usize, A: Adaptation<N> + 
 
     fn follow(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
-        self.rpem.follow(x, sample.u).into()
+        self.rpem.step_without_update(x, sample.u).into()
     }
 
     fn bridge(&mut self, sample: Sample) {
@@ -296,7 +297,7 @@ impl<S: Shape + Send + Sync, const N: usize, const K: usize, A: Adaptation<N> + 
 
     fn covariance(&self, into: &mut [f64]) -> bool {
         scaled(
-            &self.rpem.spread(),
+            &self.rpem.normalised_covariance(),
             self.rpem.innovation_variance(),
             self.parameters,
             into,
@@ -310,7 +311,7 @@ impl<S: Shape + Send + Sync, const N: usize, const K: usize, A: Adaptation<N> + 
 }
 
 struct InPhysical<S, const N: usize, const K: usize, const L: usize, A> {
-    recursion: Physical<S, N, K, L, A>,
+    recursion: PhysicalRpem<S, N, K, L, A>,
     delay: DelayLine<Vec<f64>>,
     parameters: usize,
     tracked: bool,
@@ -327,7 +328,7 @@ impl<S: Shape + Send + Sync, const N: usize, const K: usize, const L: usize, A: 
 
     fn follow(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
-        self.recursion.follow(x, sample.u).into()
+        self.recursion.step_without_update(x, sample.u).into()
     }
 
     fn bridge(&mut self, sample: Sample) {
@@ -344,7 +345,7 @@ impl<S: Shape + Send + Sync, const N: usize, const K: usize, const L: usize, A: 
         let p = self.parameters;
         let mut of_eta = vec![0.0; p * p];
         scaled(
-            &self.recursion.spread(),
+            &self.recursion.normalised_covariance(),
             self.recursion.innovation_variance(),
             p,
             &mut of_eta,
@@ -376,7 +377,7 @@ impl<S: Shape + Send + Sync, const N: usize, const K: usize, const L: usize, A: 
 
     fn operator(&self) -> Option<OperatorEstimate> {
         let eta = self.recursion.eta();
-        let spread = self.recursion.spread();
+        let spread = self.recursion.normalised_covariance();
         let variance = self.recursion.innovation_variance();
         let estimate = |i: usize| Estimate::with_variance(eta[i], variance * spread[i][i]);
         let (k_e, k_e_dot) = (eta[0], eta[1]);

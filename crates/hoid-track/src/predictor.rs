@@ -6,7 +6,8 @@
 use hoid_core::state::{State, visit_all};
 use hoid_core::{
     delay::DelayLine,
-    predictor::{AnyShape, Predictor as Kernel, Regressor},
+    predictor::{Predictor as Kernel, Regressor},
+    shape::AnyShape,
 };
 use hoid_model::Orders;
 
@@ -71,13 +72,13 @@ impl Predictor {
 
     fn correct(&mut self, theta: &[f64; ROOM]) {
         if !self.kernel.correct(theta).is_finite() {
-            self.kernel.rest();
+            self.kernel.reset();
         }
     }
 
     /// At rest again.
     pub fn reset(&mut self) {
-        self.kernel.rest();
+        self.kernel.reset();
         self.delay = DelayLine::new(vec![0.0; self.nk]);
     }
 }
@@ -91,7 +92,7 @@ fn padded(theta: &[f64]) -> [f64; ROOM] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hoid_core::filter::{divide_in_place, moving_sum, multiply};
+    use hoid_core::filter::{divide_in_place, fir, multiply};
 
     #[test]
     fn equals_the_filtered_residual_of_the_general_model() {
@@ -110,7 +111,7 @@ mod tests {
         // A u - (B/F) q^-nk e, then D/C of it.
         let (a, b, c, d, f) = (&theta[..1], &theta[1..3], &theta[3..5], &theta[5..6], &theta[6..]);
         let (mut w, mut v, mut batch) = (vec![0.0; 300], vec![0.0; 300], vec![0.0; 300]);
-        moving_sum(b, orders.nk, &e, &mut w);
+        fir(b, orders.nk, &e, &mut w);
         divide_in_place(f, &mut w);
         multiply(a, &u, &mut v);
         for (v, w) in v.iter_mut().zip(&w) {

@@ -1,7 +1,7 @@
 //! What a trace reports of a recursion in physical parameters whose noise model stays: the polynomials of the exact hold and the operator.
 
 use hoid_core::{
-    adaptive::hypothesis::OPERATOR,
+    adaptive::prior::OPERATOR,
     held_operator::held_operator,
     state::{State, visit_all},
 };

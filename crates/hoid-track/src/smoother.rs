@@ -20,10 +20,10 @@
 //! There is time for more hypotheses here: one is born every 0.08 s, and there is room for 64.
 
 use hoid_core::adaptive::{
-    Suppositions,
     bank::Bank,
-    delays::ByDelay,
-    hypothesis::{Hypothesis, OPERATOR},
+    signal_ring::DelayedSignals,
+    hypothesis::Hypothesis,
+    prior::{ChangePrior, OPERATOR},
     response::{Response, Signals},
 };
 use hoid_model::Record;
@@ -65,11 +65,11 @@ struct Side {
 impl Side {
     fn of(h: &Hypothesis) -> Self {
         let level = [
-            h.level.variance().max(f64::MIN_POSITIVE).ln(),
-            2.0 / h.level.weight().max(1.0),
+            h.innovation_variance.variance().max(f64::MIN_POSITIVE).ln(),
+            2.0 / h.innovation_variance.residuals().max(1.0),
         ];
         Self {
-            log_weight: h.weight.ln(),
+            log_weight: h.probability.ln(),
             eta: h.eta,
             covariance: h.covariance.matrix(),
             size: 0.5 * (h.covariance.determinant() * level[1]).ln(),
@@ -143,10 +143,10 @@ fn two_sided(
     let sample_time = record.sample_time();
     let spacing = (SPACING_S / sample_time.s()).round().max(1.0);
     let usual = change_prior(options, setup, sample_time)?;
-    let supposed = Suppositions {
-        spacing: spacing as u32,
+    let supposed = ChangePrior {
+        birth_interval: spacing as u32,
         hazard: usual.hazard.min(0.5 / spacing),
-        whole_every: 0,
+        neuromuscular_every: 0,
         ..usual
     };
     let first = first_hypothesis(from, KNOWN_LITTLE, sample_time)?;
@@ -158,7 +158,7 @@ fn two_sided(
     let mut front = bank(first)?;
     let mut before: Vec<Vec<Side>> = Vec::with_capacity(rows.len());
     for (k, seen) in seen.iter().enumerate() {
-        front.learn(seen.as_ref().map(|(y, r)| (*y, ByDelay::known(r))), about);
+        front.update_hypotheses(seen.as_ref().map(|(y, r)| (*y, DelayedSignals::known(r))), about);
         if rows.get(before.len()) == Some(&k) {
             before.push(sides(&front));
         }
@@ -173,7 +173,7 @@ fn two_sided(
         {
             joined.push(join(&before, &sides(&back)));
         }
-        back.learn(seen.as_ref().map(|(y, r)| (*y, ByDelay::known(r))), about);
+        back.update_hypotheses(seen.as_ref().map(|(y, r)| (*y, DelayedSignals::known(r))), about);
     }
     joined.reverse();
     Ok(joined)
@@ -217,7 +217,7 @@ fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]
 
 /// The likely hypotheses, the likeliest first: a pair of these leaves out most of the others.
 fn sides(bank: &Bank<HYPOTHESES>) -> Vec<Side> {
-    let likely = bank.hypotheses().filter(|h| h.weight >= LEAST);
+    let likely = bank.hypotheses().filter(|h| h.probability >= LEAST);
     let mut sides: Vec<Side> = likely.map(Side::of).collect();
     sides.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
     sides

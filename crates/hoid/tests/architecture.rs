@@ -10,7 +10,7 @@ const ALLOWED: [(&str, &[&str]); 14] = [
     ("hoid-core", &[]),
     ("hoid-model", &["hoid-core"]),
     ("hoid-ident", &["hoid-core", "hoid-lanes", "hoid-model"]),
-    ("hoid-lanes", &["hoid-core"]),
+    ("hoid-lanes", &[]),
     ("hoid-track", &["hoid-core", "hoid-ident", "hoid-model"]),
     ("hoid-sim", &["hoid-core", "hoid-lanes", "hoid-model"]),
     ("hoid-io", &["hoid-model"]),

@@ -86,7 +86,7 @@ fn open_loop(c: &[f64], gain: f64, n: usize, replication: u64) -> Record {
     let run_in = 200;
     let (e, eps) = (noise(0, replication, n + run_in), noise(1, replication, n + run_in));
     let mut w = vec![0.0; n + run_in];
-    hoid::core::filter::moving_sum(&B, 2, &e, &mut w);
+    hoid::core::filter::fir(&B, 2, &e, &mut w);
     hoid::core::filter::divide_in_place(&F, &mut w);
     let mut v = vec![0.0; n + run_in];
     hoid::core::filter::multiply(c, &eps, &mut v);

@@ -1,26 +1,39 @@
 //! The hypotheses with their probabilities, for output and signals behind the whitening filter.
+//!
+//! At each sample the probability of a hypothesis is multiplied by the density that it gave to the innovation, and all are normalised. At every birth
+//! the likeliest is the parent of new ones:
+//!
+//! - **a change of the gains**, and at every few births one of omega_nm and zeta_nm too, with the prior probability of such a change since the last birth;
+//! - **a neighbouring delay**, as what may have held all the time: as old as its parent, each parameter opened by the error that the difference of the
+//!   delays makes in it; the first of them when the bank begins;
+//! - **a change of the delay**: delays spread over all candidates, with gains that are opened as in any change, and probabilities in proportion to the
+//!   normal density of the step. The proposed delays move on by one each time, so that each candidate has its turn, and the number of hypotheses is
+//!   bounded however many delays there are.
+//!
+//! A newborn takes the slot of the least likely hypothesis that is old enough to be judged.
 
 use super::{
-    Suppositions,
-    change::{Change, Watch, delay_of},
-    delays::ByDelay,
-    hypothesis::{Hypothesis, OPERATOR},
+    change::{Change, ChangeDetector, delay_of},
+    hypothesis::Hypothesis,
+    prior::{ChangePrior, OPERATOR},
+    signal_ring::DelayedSignals,
 };
 
-/// The hypotheses. M is the room for them.
+/// The hypotheses, at most M.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bank<const M: usize> {
-    suppositions: Suppositions,
+    prior: ChangePrior,
     hypotheses: [Option<Hypothesis>; M],
     samples: u64,
-    wait: u32,
+    /// Samples until the next birth.
+    until_birth: u32,
     births: u32,
     /// Sample from which hypotheses of a change of omega_nm and zeta_nm are born.
-    whole_from: u64,
-    watch: Watch,
+    neuromuscular_from: u64,
+    detector: ChangeDetector,
 }
 
-crate::state!([const M: usize] Bank<M> { hypotheses, samples, wait, births, whole_from, watch });
+crate::state!([const M: usize] Bank<M> { hypotheses, samples, until_birth, births, neuromuscular_from, detector });
 
 /// Mean of the mixture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,30 +44,30 @@ pub struct Mixture {
     pub variance: f64,
 }
 
-/// Delays on either side of the likeliest that are proposed as what held all the time.
+/// Delays on either side of the likeliest that are proposed as what may have held all the time.
 const NEIGHBOURS: usize = 3;
-/// Least probability of a hypothesis.
-const LEAST: f64 = 1e-12;
+/// Least probability of a hypothesis, relative to the likeliest: none is lost for ever.
+const LEAST_PROBABILITY: f64 = 1e-12;
 
 impl<const M: usize> Bank<M> {
-    /// Starts from one hypothesis. `None` without room for two, for a start that is not within the bounds or not finite, or for bounds that let omega_nm or
-    /// zeta_nm become zero.
-    pub fn new(first: Hypothesis, suppositions: Suppositions) -> Option<Self> {
-        let s = &suppositions;
+    /// Starts from one hypothesis. `None` when M is below two, the start is not finite or not within the bounds, the bounds let omega_nm or zeta_nm
+    /// become zero, or a number of the prior is outside its range.
+    pub fn new(first: Hypothesis, prior: ChangePrior) -> Option<Self> {
+        let s = &prior;
         let eta = first.eta;
         let inside = eta.iter().zip(&s.bounds).all(|(e, [low, high])| low <= e && e <= high);
-        let sound = M >= 2
+        let valid = M >= 2
             && inside
             && s.bounds[2][0] > 0.0
             && s.bounds[3][0] > 0.0
             && s.sample_time > 0.0
-            && s.spacing > 0
-            && (0.0..1.0).contains(&(s.hazard * f64::from(s.spacing)))
-            && (s.delays.every > 0 && s.delays.births > 0 && first.later < s.delays.count)
-            && (0.0..0.5).contains(&s.delays.neighbour)
-            && s.delays.jump > 0.0
-            && first.is_sound();
-        if !sound {
+            && s.birth_interval > 0
+            && (0.0..1.0).contains(&(s.hazard * f64::from(s.birth_interval)))
+            && (s.delay.propose_every > 0 && s.delay.proposals > 0 && first.extra_delay < s.delay.count)
+            && (0.0..0.5).contains(&s.delay.neighbour_probability)
+            && s.delay.jump > 0.0
+            && first.is_valid();
+        if !valid {
             return None;
         }
         let mut hypotheses = core::array::from_fn(|_| None);
@@ -62,206 +75,222 @@ impl<const M: usize> Bank<M> {
         let mut bank = Self {
             hypotheses,
             samples: 0,
-            wait: s.spacing,
+            until_birth: s.birth_interval,
             births: 0,
-            whole_from: 0,
-            watch: Watch::default(),
-            suppositions,
+            neuromuscular_from: 0,
+            detector: ChangeDetector::default(),
+            prior,
         };
-        bank.bear_beside();
+        bank.spawn_neighbouring_delays();
         Some(bank)
     }
 
-    /// Takes output and signals of a sample behind the whitening filter, `None` where they are not known; returns the innovation.
-    pub fn take(&mut self, seen: Option<(f64, ByDelay<'_>)>, about: [f64; 2]) -> f64 {
-        let innovation = self.learn(seen, about);
-        if self.watch.look(&self.hypotheses, self.samples, &self.suppositions) {
-            self.wait_for_whole();
+    /// The update by a sample: output and signals behind the whitening filter, `None` where they are not known. Returns the innovation.
+    pub fn update(&mut self, sample: Option<(f64, DelayedSignals<'_>)>, point: [f64; 2]) -> f64 {
+        let innovation = self.update_hypotheses(sample, point);
+        if self.detector.update(&self.hypotheses, self.samples, &self.prior) {
+            self.suspend_neuromuscular();
         }
         innovation
     }
 
-    /// Gains that jump pass through the neuromuscular system, and for a while the person is neither what he was nor what he will be: nothing is learnt
-    /// of omega_nm and zeta_nm then. Hypotheses of their change begin anew when that is over.
-    fn wait_for_whole(&mut self) {
-        self.whole_from = self.samples + self.suppositions.settled;
+    /// Drops the young hypotheses of a change of omega_nm and zeta_nm, and lets new ones be born only after the settling time.
+    ///
+    /// The change of the gains itself passes through the neuromuscular system, and until it has settled the response is that of neither set of gains:
+    /// it would be taken for a change of omega_nm and zeta_nm.
+    fn suspend_neuromuscular(&mut self) {
+        self.neuromuscular_from = self.samples + self.prior.settling_time;
         let mut rest = 0.0;
         for h in self.hypotheses.iter().flatten() {
-            rest += if self.is_young_whole(h) { 0.0 } else { h.weight };
+            rest += if self.is_recent_neuromuscular(h) {
+                0.0
+            } else {
+                h.probability
+            };
         }
         if rest > 0.0 {
             for i in 0..M {
-                self.hypotheses[i] = self.hypotheses[i].filter(|h| !self.is_young_whole(h));
+                self.hypotheses[i] = self.hypotheses[i].filter(|h| !self.is_recent_neuromuscular(h));
                 if let Some(h) = &mut self.hypotheses[i] {
-                    h.weight /= rest;
+                    h.probability /= rest;
                 }
             }
         }
     }
 
-    /// A hypothesis that omega_nm and zeta_nm changed within the last seconds.
-    fn is_young_whole(&self, h: &Hypothesis) -> bool {
-        h.whole && self.samples - h.born < self.suppositions.recent
+    /// True for a hypothesis that omega_nm and zeta_nm changed within the change window.
+    fn is_recent_neuromuscular(&self, h: &Hypothesis) -> bool {
+        h.neuromuscular_changed && self.samples - h.born < self.prior.change_window
     }
 
-    /// As [`Bank::take`], and does not look for changes.
-    pub fn learn(&mut self, seen: Option<(f64, ByDelay<'_>)>, about: [f64; 2]) -> f64 {
+    /// As [`Bank::update`], without the detection of changes.
+    pub fn update_hypotheses(&mut self, sample: Option<(f64, DelayedSignals<'_>)>, point: [f64; 2]) -> f64 {
         self.samples += 1;
         let mut innovation = 0.0;
-        if let Some((y, signals)) = seen {
+        if let Some((y, signals)) = sample {
             for h in self.hypotheses.iter_mut().flatten() {
-                let (eps, density) = h.step(y, signals.at(h.later), about, &self.suppositions);
-                innovation += h.weight * eps;
-                h.weight *= density;
+                let (eps, density) = h.step(y, signals.at(h.extra_delay), point, &self.prior);
+                innovation += h.probability * eps;
+                h.probability *= density;
             }
-            self.weigh();
+            self.normalise();
         }
-        self.wait -= 1;
-        if self.wait == 0 {
-            self.wait = self.suppositions.spacing;
+        self.until_birth -= 1;
+        if self.until_birth == 0 {
+            self.until_birth = self.prior.birth_interval;
             self.drift();
-            self.births = self.births.wrapping_add(1);
-            let share = self.suppositions.hazard * f64::from(self.suppositions.spacing);
-            self.bear_changed(share, false);
-            let every = self.suppositions.whole_every;
-            if every > 0 && self.births.is_multiple_of(every) && self.samples >= self.whole_from {
-                self.bear_changed(share * f64::from(every) * self.suppositions.whole_odds, true);
-            }
-            let delays = self.suppositions.delays;
-            if delays.count > 1 && self.births.is_multiple_of(delays.every) {
-                self.bear_beside();
-                self.bear_elsewhere(share * f64::from(delays.every) * delays.odds);
-            }
+            self.give_birth();
         }
         innovation
     }
 
+    /// The hypotheses whose turn it is.
+    fn give_birth(&mut self) {
+        self.births = self.births.wrapping_add(1);
+        let probability = self.prior.hazard * f64::from(self.prior.birth_interval);
+        self.spawn_changed(probability, false);
+        let every = self.prior.neuromuscular_every;
+        if every > 0 && self.births.is_multiple_of(every) && self.samples >= self.neuromuscular_from {
+            self.spawn_changed(probability * f64::from(every) * self.prior.neuromuscular_odds, true);
+        }
+        let delay = self.prior.delay;
+        if delay.count > 1 && self.births.is_multiple_of(delay.propose_every) {
+            self.spawn_neighbouring_delays();
+            self.spawn_changed_delays(probability * f64::from(delay.propose_every) * delay.change_odds);
+        }
+    }
+
     /// Counts a sample; the estimate stays.
-    pub fn pass(&mut self) {
+    pub fn skip(&mut self) {
         self.samples += 1;
     }
 
-    /// Brings the sum of the probabilities to one. What has become impossible, or not finite, is nearly so.
-    fn weigh(&mut self) {
+    /// Brings the sum of the probabilities to one. Those that are too small, or not finite, become [`LEAST_PROBABILITY`].
+    fn normalise(&mut self) {
         let mut most = 0.0;
         for h in self.hypotheses.iter().flatten() {
-            if h.weight > most {
-                most = h.weight;
+            if h.probability > most {
+                most = h.probability;
             }
         }
         let (scale, mut sum) = (1.0 / most, 0.0);
         for h in self.hypotheses.iter_mut().flatten() {
-            let weight = h.weight * scale;
-            h.weight = if weight > LEAST { weight } else { LEAST };
-            sum += h.weight;
+            let p = h.probability * scale;
+            h.probability = if p > LEAST_PROBABILITY { p } else { LEAST_PROBABILITY };
+            sum += h.probability;
         }
         let scale = 1.0 / sum;
         for h in self.hypotheses.iter_mut().flatten() {
-            h.weight *= scale;
+            h.probability *= scale;
         }
     }
 
     fn drift(&mut self) {
         for h in self.hypotheses.iter_mut().flatten() {
-            h.drift(self.samples, &self.suppositions);
+            h.drift(self.samples, &self.prior);
         }
     }
 
-    /// The hypothesis that the gains change now, omega_nm and zeta_nm too or not, with its probability.
-    fn bear_changed(&mut self, share: f64, whole: bool) {
-        if let Some((place, parent)) = self.parent() {
-            self.bear(self.opened(&parent, whole), share, place);
+    /// The hypothesis that the gains change now, and with `neuromuscular` omega_nm and zeta_nm too.
+    fn spawn_changed(&mut self, probability: f64, neuromuscular: bool) {
+        if let Some((slot, parent)) = self.parent() {
+            self.spawn(self.with_change(&parent, neuromuscular), probability, slot);
         }
     }
 
     /// Hypotheses of the delays next to the likeliest, where there are none.
-    fn bear_beside(&mut self) {
-        let Some((place, parent)) = self.parent() else { return };
-        let delays = self.suppositions.delays;
-        let mut share = 1.0;
+    fn spawn_neighbouring_delays(&mut self) {
+        let Some((slot, parent)) = self.parent() else { return };
+        let delay = self.prior.delay;
+        let mut probability = 1.0;
         for away in 1..=NEIGHBOURS {
-            share *= delays.neighbour;
-            for later in [parent.later.checked_sub(away), Some(parent.later + away)]
+            probability *= delay.neighbour_probability;
+            for extra_delay in [parent.extra_delay.checked_sub(away), Some(parent.extra_delay + away)]
                 .into_iter()
                 .flatten()
             {
-                let is_there = |h: &Hypothesis| h.later == later && h.born == parent.born;
-                if later < delays.count && !self.hypotheses().any(is_there) {
-                    self.bear(parent.beside(later, &self.suppositions), share, place);
+                let is_there = |h: &Hypothesis| h.extra_delay == extra_delay && h.born == parent.born;
+                if extra_delay < delay.count && !self.hypotheses().any(is_there) {
+                    self.spawn(
+                        parent.with_neighbouring_delay(extra_delay, &self.prior),
+                        probability,
+                        slot,
+                    );
                 }
             }
         }
     }
 
-    /// Hypotheses that the delay changes too, with the probability of them all.
-    fn bear_elsewhere(&mut self, share: f64) {
-        let Some((place, parent)) = self.parent() else { return };
-        let delays = self.suppositions.delays;
-        let apart = delays.count.div_ceil(delays.births);
-        let first = (self.births / delays.every) as usize % apart;
-        let density = |later: usize| {
-            let step = later.abs_diff(parent.later) as f64 / delays.jump;
+    /// Hypotheses that the gains and the delay change now, with the probability of all together.
+    fn spawn_changed_delays(&mut self, probability: f64) {
+        let Some((slot, parent)) = self.parent() else { return };
+        let delay = self.prior.delay;
+        let apart = delay.count.div_ceil(delay.proposals);
+        let first = (self.births / delay.propose_every) as usize % apart;
+        let density = |extra_delay: usize| {
+            let step = extra_delay.abs_diff(parent.extra_delay) as f64 / delay.jump;
             libm::exp(-0.5 * step * step)
         };
-        let all: f64 = (first..delays.count).step_by(apart).map(density).sum();
+        let all: f64 = (first..delay.count).step_by(apart).map(density).sum();
         if all <= 0.0 {
             return;
         }
-        for later in (first..delays.count)
+        for extra_delay in (first..delay.count)
             .step_by(apart)
-            .filter(|later| *later != parent.later)
+            .filter(|extra_delay| *extra_delay != parent.extra_delay)
         {
-            self.bear(
-                self.opened(&parent, false).delayed(later),
-                share * density(later) / all,
-                place,
+            self.spawn(
+                self.with_change(&parent, false).with_extra_delay(extra_delay),
+                probability * density(extra_delay) / all,
+                slot,
             );
         }
     }
 
-    /// The likeliest hypothesis, and its place. What a jump of the gains does to omega_nm and zeta_nm in passing is not handed on.
+    /// The likeliest hypothesis, and its slot. One of a recent change of omega_nm and zeta_nm has no children: what a change of the gains seems to do
+    /// to them in passing is not handed on.
     fn parent(&self) -> Option<(usize, Hypothesis)> {
         let (mut likeliest, mut highest) = (None, 0.0);
-        for (place, h) in self.hypotheses.iter().enumerate() {
+        for (slot, h) in self.hypotheses.iter().enumerate() {
             if let Some(h) = h
-                && h.weight > highest
-                && !self.is_young_whole(h)
+                && h.probability > highest
+                && !self.is_recent_neuromuscular(h)
             {
-                (likeliest, highest) = (Some((place, *h)), h.weight);
+                (likeliest, highest) = (Some((slot, *h)), h.probability);
             }
         }
         likeliest
     }
 
-    /// A child that says that the person changes now.
-    fn opened(&self, parent: &Hypothesis, whole: bool) -> Hypothesis {
-        let mut child = parent.opened(self.samples, whole, &self.suppositions);
+    /// A child that says that the operator changes now.
+    fn with_change(&self, parent: &Hypothesis, neuromuscular: bool) -> Hypothesis {
+        let mut child = parent.with_change(self.samples, neuromuscular, &self.prior);
         child.before.delay = self.delay();
         child
     }
 
-    /// Takes a child in the place of the least likely that is old enough, its parent excepted.
-    fn bear(&mut self, mut child: Hypothesis, share: f64, parent: usize) {
-        let (mut place, mut lowest) = (None, f64::INFINITY);
+    /// Puts a child into the slot of the least likely that is old enough to be pruned; there is no child when that is its parent.
+    fn spawn(&mut self, mut child: Hypothesis, probability: f64, parent: usize) {
+        let (mut slot, mut lowest) = (None, f64::INFINITY);
         for (i, h) in self.hypotheses.iter().enumerate() {
             match h {
-                None => (place, lowest) = (Some(i), f64::NEG_INFINITY),
-                Some(h) if self.samples - h.born >= self.suppositions.protected && h.weight < lowest => {
-                    (place, lowest) = (Some(i), h.weight);
+                None => (slot, lowest) = (Some(i), f64::NEG_INFINITY),
+                Some(h) if self.samples - h.born >= self.prior.pruning_age && h.probability < lowest => {
+                    (slot, lowest) = (Some(i), h.probability);
                 }
                 Some(_) => {}
             }
         }
-        let Some(place) = place.filter(|place| *place != parent) else {
+        let Some(slot) = slot.filter(|slot| *slot != parent) else {
             return;
         };
-        self.hypotheses[place] = None;
-        let rest: f64 = self.hypotheses.iter().flatten().map(|h| h.weight).sum();
+        self.hypotheses[slot] = None;
+        let rest: f64 = self.hypotheses.iter().flatten().map(|h| h.probability).sum();
         for h in self.hypotheses.iter_mut().flatten() {
-            h.weight *= (1.0 - share) / rest;
+            h.probability *= (1.0 - probability) / rest;
         }
-        child.weight = share;
-        self.hypotheses[place] = Some(child);
+        child.probability = probability;
+        self.hypotheses[slot] = Some(child);
     }
 
     /// Mean of the mixture.
@@ -272,9 +301,9 @@ impl<const M: usize> Bank<M> {
         };
         for h in self.hypotheses.iter().flatten() {
             for i in 0..OPERATOR {
-                mixture.eta[i] += h.weight * h.eta[i];
+                mixture.eta[i] += h.probability * h.eta[i];
             }
-            mixture.variance += h.weight * h.level.variance();
+            mixture.variance += h.probability * h.innovation_variance.variance();
         }
         mixture
     }
@@ -289,26 +318,26 @@ impl<const M: usize> Bank<M> {
                 let a = h.eta[i] - mean[i];
                 for j in 0..OPERATOR {
                     let b = h.eta[j] - mean[j];
-                    covariance[i][j] += h.weight * (p[i][j] + a * b);
+                    covariance[i][j] += h.probability * (p[i][j] + a * b);
                 }
             }
         }
         covariance
     }
 
-    /// T_L in s and its variance, from `E[K_e K_e_dot]/E[K_e^2]`.
-    pub fn lead(&self, covariance: &[[f64; OPERATOR]; OPERATOR]) -> [f64; 2] {
+    /// T_L in s and its variance, `E[K_e K_e_dot]/E[K_e^2]`: the T for which `E (K_e_dot - T K_e)^2` is least.
+    pub fn lead_time(&self, covariance: &[[f64; OPERATOR]; OPERATOR]) -> [f64; 2] {
         let [k_e, k_e_dot, ..] = self.mixture().eta;
         let square = k_e * k_e + covariance[0][0];
-        let lead = (k_e * k_e_dot + covariance[0][1]) / square;
-        // d T_L = (d K_e_dot - T_L d K_e)/K_e.
-        let of_ratio = covariance[1][1] - 2.0 * lead * covariance[0][1] + lead * lead * covariance[0][0];
-        [lead, of_ratio.max(0.0) / square]
+        let lead_time = (k_e * k_e_dot + covariance[0][1]) / square;
+        // To first order dT_L = (dK_e_dot - T_L dK_e)/K_e.
+        let variance = covariance[1][1] - 2.0 * lead_time * covariance[0][1] + lead_time * lead_time * covariance[0][0];
+        [lead_time, variance.max(0.0) / square]
     }
 
-    /// Number of delays in question.
+    /// Number of candidate delays.
     pub fn delays(&self) -> usize {
-        self.suppositions.delays.count
+        self.prior.delay.count
     }
 
     /// Mean and variance of the delay, in samples beyond the shortest.
@@ -318,23 +347,23 @@ impl<const M: usize> Bank<M> {
 
     /// The delay of the likeliest hypothesis.
     pub fn likeliest_delay(&self) -> usize {
-        let likeliest = self.hypotheses().max_by(|a, b| a.weight.total_cmp(&b.weight));
-        likeliest.map_or(0, |h| h.later)
+        let likeliest = self.hypotheses().max_by(|a, b| a.probability.total_cmp(&b.probability));
+        likeliest.map_or(0, |h| h.extra_delay)
     }
 
-    /// The hypotheses that there are.
+    /// The hypotheses.
     pub fn hypotheses(&self) -> impl Iterator<Item = &Hypothesis> {
         self.hypotheses.iter().flatten()
     }
 
-    /// Logarithm of the odds that the person changed within the last `recent` samples.
-    pub fn odds(&self) -> f64 {
-        self.watch.odds()
+    /// Logarithm of the posterior odds that the operator changed within the change window.
+    pub fn log_odds(&self) -> f64 {
+        self.detector.log_odds()
     }
 
-    /// The change that was declared at the last sample, if it was then.
+    /// The change that was declared at the last sample, if one was.
     pub fn change(&self) -> Option<Change> {
-        self.watch.change()
+        self.detector.change()
     }
 
     /// Samples so far.

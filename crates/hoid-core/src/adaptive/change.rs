@@ -1,19 +1,19 @@
-//! When a person changed, and in what.
+//! When the operator changed, and in what.
 //!
 //! `Lambda = ln(sum of P(h) over those born within the last T)/(sum of P(h) over those that are older))`: the logarithm of the posterior odds of a
 //! change. It is the likelihood ratio of Willsky and Jones (A. S. Willsky and H. L. Jones, *IEEE Transactions on Automatic Control* 21 (1976) 108-112),
 //! with the size of the change and its time averaged out instead of maximised, so that its expectation does not grow with the number of
 //! times that are tried. A change is declared when Lambda is over the threshold and the likeliest of the recent hypotheses is old enough to
-//! say what changed; the next only after Lambda has been below zero, when
-//! what changed has become what holds, or when more turns out to have changed: the neuromuscular system, by the same odds of such hypotheses against all
-//! others, or the delay, by three standard errors.
+//! say what changed. The next is declared only after Lambda has been below zero, when
+//! the new values have become the established ones, or when more turns out to have changed: the neuromuscular system, by the same odds of such
+//! hypotheses against all others, or the delay, by three standard errors.
 //!
 //! The likeliest of the recent hypotheses says since when, and what held before: the change of each quantity over its standard
-//! error tells in what the person changed. For the innovation variance that is `ln(s2/s1)/sqrt(2/n)` with the n samples since.
+//! error tells in what the operator changed. For the innovation variance that is `ln(s2/s1)/sqrt(2/n)` with the n samples since.
 
 use super::{
-    Suppositions,
-    hypothesis::{Before, Hypothesis, OPERATOR},
+    hypothesis::{Hypothesis, Snapshot},
+    prior::{ChangePrior, OPERATOR},
 };
 use crate::state::{State, visit_all};
 
@@ -22,38 +22,38 @@ use crate::state::{State, visit_all};
 pub struct Change {
     /// Samples since the change, as the likeliest hypothesis has it.
     pub samples_ago: u64,
-    /// Logarithm of the odds.
-    pub odds: f64,
+    /// Lambda.
+    pub log_odds: f64,
     /// What held before.
-    pub before: Before,
+    pub before: Snapshot,
     /// What holds now.
-    pub now: Before,
+    pub after: Snapshot,
     /// Change of K_e, K_e_dot, omega_nm, zeta_nm, of the innovation variance and of the delay, each over its standard error.
     pub z: [f64; OPERATOR + 2],
 }
 
-/// Odds, and whether a change is being declared.
+/// Lambda, and what has been declared since it rose above zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Watch {
-    odds: f64,
-    raised: bool,
-    /// The same for one in which the neuromuscular system changed too, and for one in which the delay did.
-    raised_whole: bool,
-    raised_delay: bool,
+pub struct ChangeDetector {
+    log_odds: f64,
+    /// A change was declared; one of the neuromuscular system too; one of the delay too.
+    declared: bool,
+    declared_neuromuscular: bool,
+    declared_delay: bool,
     change: Option<Change>,
 }
 
-crate::state!([] Change { samples_ago, odds, before, now, z });
+crate::state!([] Change { samples_ago, log_odds, before, after, z });
 
-impl State for Watch {
+impl State for ChangeDetector {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         let mut is_there = self.change.is_some();
         visit_all(
             &mut [
-                &mut self.odds,
-                &mut self.raised,
-                &mut self.raised_whole,
-                &mut self.raised_delay,
+                &mut self.log_odds,
+                &mut self.declared,
+                &mut self.declared_neuromuscular,
+                &mut self.declared_delay,
                 &mut is_there,
             ],
             each,
@@ -65,74 +65,77 @@ impl State for Watch {
     }
 }
 
-impl Default for Watch {
+impl Default for ChangeDetector {
     fn default() -> Self {
         Self {
-            odds: f64::NEG_INFINITY,
-            raised: false,
-            raised_whole: false,
-            raised_delay: false,
+            log_odds: f64::NEG_INFINITY,
+            declared: false,
+            declared_neuromuscular: false,
+            declared_delay: false,
             change: None,
         }
     }
 }
 
-/// Change of the delay over its standard error that is declared where a change was declared without one.
-const OTHER_DELAY: f64 = 3.0;
-/// Least share of either side of the odds.
-const LEAST: f64 = 1e-12;
+/// Change of the delay over its standard error from which it is declared.
+const DELAY_THRESHOLD: f64 = 3.0;
+/// Added to both sides of the odds, so that Lambda stays finite.
+const REGULARISATION: f64 = 1e-12;
 
-impl Watch {
-    /// Looks at the hypotheses after a sample. True where Lambda rises above zero: a change begins.
-    pub fn look(&mut self, hypotheses: &[Option<Hypothesis>], now: u64, suppositions: &Suppositions) -> bool {
-        let (mut recent, mut older, mut whole) = (0.0, 0.0, 0.0);
+impl ChangeDetector {
+    /// The update by the hypotheses after a sample. True where Lambda rises above zero: a change begins.
+    pub fn update(&mut self, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) -> bool {
+        let (mut recent, mut older, mut neuromuscular) = (0.0, 0.0, 0.0);
         let mut likeliest: Option<&Hypothesis> = None;
         for h in hypotheses.iter().flatten() {
-            if !is_recent(h, now, suppositions) {
-                older += h.weight;
+            if !is_recent(h, now, prior) {
+                older += h.probability;
                 continue;
             }
-            recent += h.weight;
-            whole += if h.whole { h.weight } else { 0.0 };
-            if likeliest.is_none_or(|l| h.weight > l.weight) {
+            recent += h.probability;
+            neuromuscular += if h.neuromuscular_changed { h.probability } else { 0.0 };
+            if likeliest.is_none_or(|l| h.probability > l.probability) {
                 likeliest = Some(h);
             }
         }
-        let before = self.odds;
-        self.odds = libm::log((recent + LEAST) / (older + LEAST));
+        let before = self.log_odds;
+        self.log_odds = libm::log((recent + REGULARISATION) / (older + REGULARISATION));
         self.change = None;
-        if self.odds < 0.0 {
-            (self.raised, self.raised_whole, self.raised_delay) = (false, false, false);
-        } else if self.odds > suppositions.threshold {
-            let settled = likeliest.filter(|h| now - h.born >= suppositions.settled);
-            let others = recent + older - whole;
-            let is_whole = libm::log((whole + LEAST) / (others.max(0.0) + LEAST)) > suppositions.threshold;
-            // What is only asked for while it may be declared: this stands in every sample after a change.
-            let unsaid = |h: &&Hypothesis| {
-                !self.raised
-                    || is_whole && h.whole && !self.raised_whole
-                    || suppositions.delays.count > 1 && !self.raised_delay
+        if self.log_odds < 0.0 {
+            (self.declared, self.declared_neuromuscular, self.declared_delay) = (false, false, false);
+        } else if self.log_odds > prior.log_odds_threshold {
+            let settled = likeliest.filter(|h| now - h.born >= prior.settling_time);
+            let others = recent + older - neuromuscular;
+            let neuromuscular_changed =
+                libm::log((neuromuscular + REGULARISATION) / (others.max(0.0) + REGULARISATION))
+                    > prior.log_odds_threshold;
+            // Most samples behind a change have nothing more to declare and end here.
+            let may_be_declared = |h: &&Hypothesis| {
+                !self.declared
+                    || neuromuscular_changed && h.neuromuscular_changed && !self.declared_neuromuscular
+                    || prior.delay.count > 1 && !self.declared_delay
             };
-            if let Some(h) = settled.filter(unsaid) {
-                let of_recent = |h: &&Hypothesis| is_recent(h, now, suppositions);
+            if let Some(h) = settled.filter(may_be_declared) {
+                let of_recent = |h: &&Hypothesis| is_recent(h, now, prior);
                 let delay = delay_of(hypotheses.iter().flatten().filter(of_recent));
-                let change = of(h, delay, now, self.odds);
-                let other_delay = change.z[OPERATOR + 1].abs() > OTHER_DELAY;
-                let more = is_whole && h.whole && !self.raised_whole || other_delay && !self.raised_delay;
-                if !self.raised || more {
+                let change = change_of(h, delay, now, self.log_odds);
+                let delay_changed = change.z[OPERATOR + 1].abs() > DELAY_THRESHOLD;
+                let more = neuromuscular_changed && h.neuromuscular_changed && !self.declared_neuromuscular
+                    || delay_changed && !self.declared_delay;
+                if !self.declared || more {
                     self.change = Some(change);
-                    self.raised = true;
-                    self.raised_whole |= h.whole;
-                    self.raised_delay |= other_delay;
+                    self.declared = true;
+                    self.declared_neuromuscular |= h.neuromuscular_changed;
+                    self.declared_delay |= delay_changed;
                 }
             }
         }
-        self.odds > 0.0 && before <= 0.0
+        self.log_odds > 0.0 && before <= 0.0
     }
 
     /// Lambda.
-    pub fn odds(&self) -> f64 {
-        self.odds
+    pub fn log_odds(&self) -> f64 {
+        self.log_odds
     }
 
     /// The change that was declared at the last sample.
@@ -142,43 +145,51 @@ impl Watch {
 }
 
 /// The first hypothesis, born at sample 0, stands for no change.
-fn is_recent(h: &Hypothesis, now: u64, suppositions: &Suppositions) -> bool {
-    h.born > 0 && now - h.born < suppositions.recent
+fn is_recent(h: &Hypothesis, now: u64, prior: &ChangePrior) -> bool {
+    h.born > 0 && now - h.born < prior.change_window
 }
 
-/// Mean and variance of the delay of hypotheses, in samples beyond the shortest; that of rounding to whole samples included.
+/// Mean and variance of the delay over hypotheses, in samples beyond the shortest. The variance includes that of rounding to whole samples, 1/12.
 pub(super) fn delay_of<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> [f64; 2] {
     let (mut sum, mut first, mut second) = (0.0, 0.0, 0.0);
     for h in hypotheses {
-        let later = h.later as f64;
-        sum += h.weight;
-        first += h.weight * later;
-        second += h.weight * later * later;
+        let delay = h.extra_delay as f64;
+        sum += h.probability;
+        first += h.probability * delay;
+        second += h.probability * delay * delay;
     }
     let mean = first / sum;
     [mean, (second / sum - mean * mean).max(0.0) + 1.0 / 12.0]
 }
 
-fn of(h: &Hypothesis, delay: [f64; 2], now: u64, odds: f64) -> Change {
-    let (before, after) = (h.before, Before { delay, ..h.now() });
+/// The change that a hypothesis stands for, with the delay after it.
+fn change_of(h: &Hypothesis, delay: [f64; 2], now: u64, log_odds: f64) -> Change {
+    let (before, after) = (h.before, Snapshot { delay, ..h.snapshot() });
     let samples_ago = now - h.born;
     let mut z = [0.0; OPERATOR + 2];
     for i in 0..OPERATOR {
-        let of = |b: &Before| if i < 2 { b.gains[i] } else { b.neuromuscular[i - 2] };
-        let variance = of(&before) + of(&after);
+        let variance_of = |s: &Snapshot| {
+            if i < 2 {
+                s.gain_covariance[i]
+            } else {
+                s.neuromuscular_variance[i - 2]
+            }
+        };
+        let variance = variance_of(&before) + variance_of(&after);
         if variance > 0.0 {
             z[i] = (after.eta[i] - before.eta[i]) / libm::sqrt(variance);
         }
     }
-    if samples_ago > 0 && before.variance > 0.0 && after.variance > 0.0 {
-        z[OPERATOR] = libm::log(after.variance / before.variance) / libm::sqrt(2.0 / samples_ago as f64);
+    if samples_ago > 0 && before.innovation_variance > 0.0 && after.innovation_variance > 0.0 {
+        z[OPERATOR] =
+            libm::log(after.innovation_variance / before.innovation_variance) / libm::sqrt(2.0 / samples_ago as f64);
     }
     z[OPERATOR + 1] = (after.delay[0] - before.delay[0]) / libm::sqrt(before.delay[1] + after.delay[1]);
     Change {
         samples_ago,
-        odds,
+        log_odds,
         before,
-        now: after,
+        after,
         z,
     }
 }

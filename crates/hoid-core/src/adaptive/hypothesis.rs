@@ -1,34 +1,32 @@
-//! One hypothesis: a Kalman filter of the operator that supposes that the person last changed at its birth.
+//! One hypothesis: a Kalman filter of the operator's parameters, given that they last changed at its birth.
 //!
 //! With `y = D u` and `r` the whitened signals, the innovation and its negative gradient at eta are
 //!
 //! `eps = y - K_e psi_1 - K_e_dot psi_2`, `psi_1 = r_1 + d_omega r_3 + d_zeta r_5`, `psi_2 = r_2 + d_omega r_4 + d_zeta r_6`,
 //! `psi_3 = K_e r_3 + K_e_dot r_4`, `psi_4 = K_e r_5 + K_e_dot r_6`,
 //!
-//! with `d_omega`, `d_zeta` the distances from the point of the filters. Before it is seen, eps has a Student distribution of the variance
-//! `v = sigma^2 + psi' P psi` and of the n residuals that sigma^2 rests on, with the density
+//! with `d_omega`, `d_zeta` the distances from the linearisation point of the filters. The predictive distribution of eps is that of Student with the
+//! variance `v = sigma^2 + psi' P psi` and n degrees of freedom, the residuals that sigma^2 rests on; its density is
 //! `v^{-1/2} exp(-(n + 1)/2 ln(1 + eps^2/(n v)) - 1/(4 n))` up to a factor (the Gamma functions give `-1/(4 n) + O(n^{-3})`).
 //!
 //! An innovation beyond the limit counts as one at the limit, in the density and in sigma^2, and as a measurement of so large
-//! a variance that it lies there (P. J. Huber, *Robust Statistics*, 1981, section 7.3): an outlier tells nothing of who foretells better.
+//! a variance that it lies there (P. J. Huber, *Robust Statistics*, 1981, section 7.3): an outlier says nothing about which hypothesis predicts better.
 
-use crate::{
-    adaptive::{Suppositions, response::Signals},
-    error_bars::Level,
-    factored::Factored,
-    state::State,
+use super::{
+    elementary::{exp, log1p},
+    prior::{ChangePrior, OPERATOR},
+    response::Signals,
 };
+use crate::{innovation_variance::InnovationVariance, state::State, ud_covariance::UdCovariance};
 
-/// Number of the operator's parameters: K_e, K_e_dot, omega_nm, zeta_nm.
-pub const OPERATOR: usize = 4;
 /// Variances and signals beyond this would overflow in products.
 pub(super) const LARGEST: f64 = 1e60;
-/// Largest square of an innovation over its variance that sigma^2 takes.
-const LEVEL_LIMIT: f64 = 9.0;
-/// How far omega_nm and zeta_nm may be from the point of the filters, as a share of it: the derivatives reach no further.
-const REACH: f64 = 0.5;
-/// Least innovation variance, as a share of that at the start: what a silence leaves.
-const LEAST_SHARE: f64 = 1e-9;
+/// Largest square of an innovation over its variance that enters sigma^2.
+const LARGEST_SQUARE: f64 = 9.0;
+/// Largest relative distance of omega_nm and zeta_nm from the linearisation point: the first derivatives hold no further.
+const LARGEST_DISTANCE: f64 = 0.5;
+/// Least innovation variance relative to that at the start, for a span without any signal.
+const LEAST_VARIANCE: f64 = 1e-9;
 
 /// The filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,57 +34,57 @@ pub struct Hypothesis {
     /// `[K_e, K_e_dot, omega_nm, zeta_nm]`.
     pub eta: [f64; OPERATOR],
     /// Its covariance.
-    pub covariance: Factored<OPERATOR>,
+    pub covariance: UdCovariance<OPERATOR>,
     /// Innovation variance.
-    pub level: Level,
+    pub innovation_variance: InnovationVariance,
     /// Probability.
-    pub weight: f64,
+    pub probability: f64,
     /// Sample of its birth.
     pub born: u64,
     /// Whether the neuromuscular system changed too at its birth.
-    pub whole: bool,
+    pub neuromuscular_changed: bool,
     /// Its delay, in samples beyond the shortest.
-    pub later: usize,
-    /// What held before.
-    pub before: Before,
-    least: f64,
+    pub extra_delay: usize,
+    /// The estimate just before its birth.
+    pub before: Snapshot,
+    least_variance: f64,
 }
 
-/// What held before a change.
+/// The estimate of a hypothesis at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Before {
+pub struct Snapshot {
     /// `[K_e, K_e_dot, omega_nm, zeta_nm]`.
     pub eta: [f64; OPERATOR],
     /// Covariance of K_e and K_e_dot: variances, then the covariance.
-    pub gains: [f64; 3],
+    pub gain_covariance: [f64; 3],
     /// Variances of omega_nm and zeta_nm.
-    pub neuromuscular: [f64; 2],
+    pub neuromuscular_variance: [f64; 2],
     /// Innovation variance.
-    pub variance: f64,
+    pub innovation_variance: f64,
     /// Mean and variance of the delay, in samples beyond the shortest.
     pub delay: [f64; 2],
 }
 
-crate::state!([] Hypothesis { eta, covariance, level, weight, born, whole, later, before, least });
-crate::state!([] Before { eta, gains, neuromuscular, variance, delay });
+crate::state!([] Hypothesis { eta, covariance, innovation_variance, probability, born, neuromuscular_changed, extra_delay, before, least_variance });
+crate::state!([] Snapshot { eta, gain_covariance, neuromuscular_variance, innovation_variance, delay });
 
-/// A place of the bank: whether there is a hypothesis, and it.
+/// A slot of the bank: whether there is a hypothesis, and its numbers.
 impl State for Option<Hypothesis> {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         let mut is_there = self.is_some();
         is_there.visit(each);
-        // What is restored into a place that was empty replaces all of these numbers.
-        *self = is_there.then(|| self.take().unwrap_or_else(Hypothesis::nothing));
+        // A hypothesis that is restored into an empty slot replaces all of these numbers.
+        *self = is_there.then(|| self.take().unwrap_or_else(Hypothesis::empty));
         if let Some(hypothesis) = self {
             hypothesis.visit(each);
         }
     }
 }
 
-/// psi at eta, of the whitened signals of filters about a point.
+/// psi at eta, from the whitened signals of filters that are linearised about a point `[omega_nm, zeta_nm]`.
 #[inline(always)]
-pub fn gradient(eta: &[f64; OPERATOR], r: &Signals, about: [f64; 2]) -> [f64; OPERATOR] {
-    let (omega, zeta) = (eta[2] - about[0], eta[3] - about[1]);
+pub fn gradient(eta: &[f64; OPERATOR], r: &Signals, point: [f64; 2]) -> [f64; OPERATOR] {
+    let (omega, zeta) = (eta[2] - point[0], eta[3] - point[1]);
     [
         r[0] + omega * r[2] + zeta * r[4],
         r[1] + omega * r[3] + zeta * r[5],
@@ -95,239 +93,188 @@ pub fn gradient(eta: &[f64; OPERATOR], r: &Signals, about: [f64; 2]) -> [f64; OP
     ]
 }
 
+/// The value within `low` and `high`. Not `f64::clamp`, which panics where the bounds are not ordered numbers.
+#[inline(always)]
+fn bounded(value: f64, low: f64, high: f64) -> f64 {
+    if value < low {
+        low
+    } else if value > high {
+        high
+    } else {
+        value
+    }
+}
+
 impl Hypothesis {
-    fn nothing() -> Self {
+    fn empty() -> Self {
         Self {
             eta: [0.0; OPERATOR],
-            covariance: Factored::diagonal([0.0; OPERATOR]),
-            level: Level::new(0.0, 1.0, 1.0),
-            weight: 0.0,
+            covariance: UdCovariance::diagonal([0.0; OPERATOR]),
+            innovation_variance: InnovationVariance::new(0.0, 1.0, 1.0),
+            probability: 0.0,
             born: 0,
-            whole: false,
-            later: 0,
-            before: Before::default(),
-            least: 0.0,
+            neuromuscular_changed: false,
+            extra_delay: 0,
+            before: Snapshot::default(),
+            least_variance: 0.0,
         }
     }
 
     /// From the estimate at the start, its covariance and the innovation variance. `None` unless the covariance is positive.
-    pub fn new(eta: [f64; OPERATOR], covariance: &[[f64; OPERATOR]; OPERATOR], level: Level) -> Option<Self> {
-        let covariance = Factored::of(covariance)?;
+    pub fn new(
+        eta: [f64; OPERATOR],
+        covariance: &[[f64; OPERATOR]; OPERATOR],
+        innovation_variance: InnovationVariance,
+    ) -> Option<Self> {
+        let covariance = UdCovariance::from_matrix(covariance)?;
         let mut first = Self {
             eta,
             covariance,
-            level,
-            weight: 1.0,
+            innovation_variance,
+            probability: 1.0,
             born: 0,
-            whole: false,
-            later: 0,
-            before: Before::default(),
-            least: LEAST_SHARE * level.variance(),
+            neuromuscular_changed: false,
+            extra_delay: 0,
+            before: Snapshot::default(),
+            least_variance: LEAST_VARIANCE * innovation_variance.variance(),
         };
-        first.before = first.now();
+        first.before = first.snapshot();
         Some(first)
     }
 
-    /// Takes a sample: the innovation, and the density that it had.
+    /// The update by a sample: the innovation, and its predictive density.
     #[inline(always)]
-    pub fn step(&mut self, y: f64, r: &Signals, about: [f64; 2], suppositions: &Suppositions) -> (f64, f64) {
-        let psi = gradient(&self.eta, r, about);
+    pub fn step(&mut self, y: f64, r: &Signals, point: [f64; 2], prior: &ChangePrior) -> (f64, f64) {
+        let psi = gradient(&self.eta, r, point);
         let eps = y - self.eta[0] * psi[0] - self.eta[1] * psi[1];
-        let variance = self.level.variance().max(self.least);
+        let variance = self.innovation_variance.variance().max(self.least_variance);
         let (f, v) = self.covariance.projections(&psi);
         let total = variance + f[0] * v[0] + f[1] * v[1] + f[2] * v[2] + f[3] * v[3];
         if !(total > 0.0 && total < LARGEST) {
             return (eps, 1.0);
         }
         let deviation = libm::sqrt(total);
-        let limit = suppositions.limit * deviation;
+        let limit = prior.outlier_limit * deviation;
         let excess = eps.abs() / limit;
-        let (used, doubt) = if excess > 1.0 {
+        let (used, variance_factor) = if excess > 1.0 {
             (libm::copysign(limit, eps), excess * excess)
         } else {
             (eps, 1.0)
         };
         let square = used * used / total;
-        let n = self.level.weight();
+        let n = self.innovation_variance.residuals();
         let density = exp(-0.5 * (n + 1.0) * log1p(square / n) - 0.25 / n) / deviation;
-        let gain = self.covariance.measure_projected((f, v), variance * doubt);
+        let gain = self.covariance.update_projected((f, v), variance * variance_factor);
         for i in 0..OPERATOR {
-            let [mut low, mut high] = suppositions.bounds[i];
+            let [mut low, mut high] = prior.bounds[i];
             if i >= 2 {
-                low = low.max((1.0 - REACH) * about[i - 2]);
-                high = high.min((1.0 + REACH) * about[i - 2]);
+                low = low.max((1.0 - LARGEST_DISTANCE) * point[i - 2]);
+                high = high.min((1.0 + LARGEST_DISTANCE) * point[i - 2]);
             }
-            let moved = self.eta[i] + gain[i] * used;
-            // Bounds need not be ordered numbers here: a comparison that fails changes nothing.
-            self.eta[i] = if moved < low {
-                low
-            } else if moved > high {
-                high
-            } else {
-                moved
-            };
+            self.eta[i] = bounded(self.eta[i] + gain[i] * used, low, high);
         }
-        self.level.take(square.min(LEVEL_LIMIT) * variance);
+        self.innovation_variance.update(square.min(LARGEST_SQUARE) * variance);
         (eps, density)
     }
 
-    /// `g^2` and `g^2/omega^2` at the crossover.
-    fn scales(&self, suppositions: &Suppositions) -> [f64; 2] {
-        let square = suppositions.crossover * suppositions.crossover;
+    /// `g^2` and `g^2/omega_c^2`, the units of the variances of K_e and K_e_dot.
+    fn gain_scales(&self, prior: &ChangePrior) -> [f64; 2] {
+        let square = prior.crossover * prior.crossover;
         let g = self.eta[0] * self.eta[0] + square * self.eta[1] * self.eta[1];
         [g, g / square]
     }
 
-    /// What the gains drift between two births, until no less is known than after a change. Just after a change they go on changing.
-    pub fn drift(&mut self, now: u64, suppositions: &Suppositions) {
-        let scales = self.scales(suppositions);
-        let s = suppositions;
-        // Of the first, born at sample 0, nothing is said to have changed.
-        let unrest = match self.born {
+    /// Adds the drift of the parameters between two births, faster just after a change. It ends where they are known no better than after a change.
+    pub fn drift(&mut self, now: u64, prior: &ChangePrior) {
+        let scales = self.gain_scales(prior);
+        // The first, born at sample 0, stands for no change.
+        let transient = match self.born {
             0 => 0.0,
-            born => exp(-((now - born) as f64) / s.unrest_for),
+            born => exp(-((now - born) as f64) / prior.transient_time_constant),
         };
-        let samples = f64::from(s.spacing);
+        let samples = f64::from(prior.birth_interval);
         for i in 0..2 {
-            let jump = s.jump[i] * s.jump[i];
+            let jump = prior.gain_jump[i] * prior.gain_jump[i];
             if self.covariance.element(i, i) < jump * scales[i] {
-                let rate = s.drift * s.drift + s.unrest[i] * s.unrest[i] * unrest;
-                self.widen(i, rate * samples * scales[i]);
+                let rate = prior.gain_drift * prior.gain_drift
+                    + prior.transient_drift[i] * prior.transient_drift[i] * transient;
+                self.inflate(i, rate * samples * scales[i]);
             }
         }
-        if self.whole {
+        if self.neuromuscular_changed {
             for i in 0..2 {
-                let deviation = s.neuromuscular[i] * self.eta[2 + i];
+                let deviation = prior.neuromuscular_jump[i] * self.eta[2 + i];
                 let variance = deviation * deviation;
                 if self.covariance.element(2 + i, 2 + i) < variance {
-                    self.widen(2 + i, s.unrest[2 + i] * s.unrest[2 + i] * unrest * samples * variance);
+                    self.inflate(
+                        2 + i,
+                        prior.transient_drift[2 + i] * prior.transient_drift[2 + i] * transient * samples * variance,
+                    );
                 }
             }
         }
     }
 
-    /// The same with the delay so many samples beyond the shortest.
-    pub fn delayed(self, later: usize) -> Self {
-        Self { later, ..self }
+    /// The same with the delay `extra_delay` samples beyond the shortest.
+    pub fn with_extra_delay(self, extra_delay: usize) -> Self {
+        Self { extra_delay, ..self }
     }
 
-    /// The hypothesis that the delay is, and was, another near its own.
-    pub fn beside(&self, later: usize, suppositions: &Suppositions) -> Self {
-        let mut other = self.delayed(later);
-        let (scales, away) = (self.scales(suppositions), later.abs_diff(self.later) as f64);
+    /// The hypothesis that the delay is, and was, another one near its own.
+    pub fn with_neighbouring_delay(&self, extra_delay: usize, prior: &ChangePrior) -> Self {
+        let mut other = self.with_extra_delay(extra_delay);
+        let (scales, away) = (self.gain_scales(prior), extra_delay.abs_diff(self.extra_delay) as f64);
         for i in 0..OPERATOR {
             let scale = if i < 2 { scales[i] } else { self.eta[i] * self.eta[i] };
-            let worth = away * suppositions.delays.worth[i];
-            other.widen(i, worth * worth * scale);
+            let error = away * prior.delay.error_per_sample[i];
+            other.inflate(i, error * error * scale);
         }
         other
     }
 
-    /// The hypothesis that the person changes now, the neuromuscular system included or not.
-    pub fn opened(&self, now: u64, whole: bool, suppositions: &Suppositions) -> Self {
+    /// The hypothesis that the gains change now, and with `neuromuscular` omega_nm and zeta_nm too.
+    pub fn with_change(&self, now: u64, neuromuscular: bool, prior: &ChangePrior) -> Self {
         let mut child = *self;
-        let scales = self.scales(suppositions);
+        let scales = self.gain_scales(prior);
         for i in 0..2 {
-            child.widen(i, suppositions.jump[i] * suppositions.jump[i] * scales[i]);
+            child.inflate(i, prior.gain_jump[i] * prior.gain_jump[i] * scales[i]);
         }
-        if whole {
+        if neuromuscular {
             for i in 0..2 {
-                let deviation = suppositions.neuromuscular[i] * self.eta[2 + i];
-                child.widen(2 + i, deviation * deviation);
+                let deviation = prior.neuromuscular_jump[i] * self.eta[2 + i];
+                child.inflate(2 + i, deviation * deviation);
             }
         }
-        child.level.doubt(suppositions.doubt);
+        child.innovation_variance.limit_residuals(prior.residuals_after_change);
         child.born = now;
-        child.whole = whole;
-        child.before = self.now();
+        child.neuromuscular_changed = neuromuscular;
+        child.before = self.snapshot();
         child
     }
 
-    fn widen(&mut self, i: usize, variance: f64) {
+    /// Adds to the variance of parameter i.
+    fn inflate(&mut self, i: usize, variance: f64) {
         let mut unit = [0.0; OPERATOR];
         unit[i] = 1.0;
-        self.covariance.add(variance, unit);
+        self.covariance.rank_one_update(variance, unit);
     }
 
-    /// What holds.
-    pub fn now(&self) -> Before {
+    /// The estimate now.
+    pub fn snapshot(&self) -> Snapshot {
         let p = &self.covariance;
-        Before {
+        Snapshot {
             eta: self.eta,
-            gains: [p.element(0, 0), p.element(1, 1), p.element(0, 1)],
-            neuromuscular: [p.element(2, 2), p.element(3, 3)],
-            variance: self.level.variance(),
-            delay: [self.later as f64, 0.0],
+            gain_covariance: [p.element(0, 0), p.element(1, 1), p.element(0, 1)],
+            neuromuscular_variance: [p.element(2, 2), p.element(3, 3)],
+            innovation_variance: self.innovation_variance.variance(),
+            delay: [self.extra_delay as f64, 0.0],
         }
     }
 
     /// True when every number inside is finite.
-    pub fn is_sound(&self) -> bool {
-        self.covariance.is_sound() && self.eta.iter().all(|e| e.is_finite()) && self.level.variance().is_finite()
-    }
-}
-
-/// `ln(1 + x)` for x that is not negative, in a third of the time where x is small: with `z = x/(2 + x)`, `2 (z + z^3/3 + z^5/5 + ...)`, whose next term is
-/// below 1e-16 of the first.
-#[inline(always)]
-fn log1p(x: f64) -> f64 {
-    if x > 0.25 {
-        return libm::log1p(x);
-    }
-    let z = x / (2.0 + x);
-    let s = z * z;
-    let mut sum = 1.0 / 15.0;
-    for k in [13.0, 11.0, 9.0, 7.0, 5.0, 3.0, 1.0] {
-        sum = sum * s + 1.0 / k;
-    }
-    2.0 * z * sum
-}
-
-/// `e^x` without a call, to 4e-16 between -700 and 700 and libm's beyond: `2^k e^r` with `|r| <= ln(2)/2`, by Taylor's series.
-#[inline(always)]
-fn exp(x: f64) -> f64 {
-    if x.abs() >= 700.0 || x.is_nan() {
-        return libm::exp(x);
-    }
-    // Adding and taking away 3/2 2^52 rounds to the nearest whole number.
-    const ROUNDS: f64 = 6_755_399_441_055_744.0;
-    const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
-    let k = (x * core::f64::consts::LOG2_E + ROUNDS) - ROUNDS;
-    let r = (x - k * LN_2[0]) - k * LN_2[1];
-    let mut sum = 1.0 / 6_227_020_800.0;
-    for factorial in [
-        479_001_600.0,
-        39_916_800.0,
-        3_628_800.0,
-        362_880.0,
-        40_320.0,
-        5_040.0,
-        720.0,
-        120.0,
-        24.0,
-        6.0,
-        2.0,
-        1.0,
-        1.0,
-    ] {
-        sum = sum * r + 1.0 / factorial;
-    }
-    sum * f64::from_bits(((k as i64 + 1023) as u64) << 52)
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn the_short_functions_are_libm_s() {
-        for i in 0..4000 {
-            let x = f64::from(i) * 1e-3;
-            assert!((super::log1p(x) - libm::log1p(x)).abs() <= 4e-16 * libm::log1p(x));
-            for x in [-x, x, -180.0 * x] {
-                let e = libm::exp(x);
-                assert!((super::exp(x) - e).abs() <= 4e-16 * e, "{x}");
-            }
-        }
-        assert_eq!(super::exp(f64::NEG_INFINITY), 0.0);
-        assert!(super::exp(f64::NAN).is_nan() && super::log1p(1e300) == libm::log1p(1e300));
+    pub fn is_valid(&self) -> bool {
+        self.covariance.is_valid()
+            && self.eta.iter().all(|e| e.is_finite())
+            && self.innovation_variance.variance().is_finite()
     }
 }

@@ -5,7 +5,7 @@
 //! `x(t) = b0 e(t) + b1 e(t-1) - f1 x(t-1) - f2 x(t-2)`,
 //! `x'(t) = b0' e(t) + b1' e(t-1) - f1' x(t-1) - f2' x(t-2) - f1 x'(t-1) - f2 x'(t-2)`,
 //!
-//! where `'` is the derivative by omega_nm or zeta_nm. The filters stand at a point `[omega, zeta]`. When it moves, all that they remember moves
+//! where `'` is the derivative by omega_nm or zeta_nm. The filters are linearised about a point `[omega, zeta]`. When it moves, their states move
 //! along its derivative: a filter whose past belongs to another point would have a kink there, which the whitening filter, a difference of
 //! high order, makes larger than the noise.
 
@@ -17,7 +17,8 @@ pub type Signals = [f64; 6];
 /// The filters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Response {
-    at: [f64; 2],
+    /// `[omega_nm, zeta_nm]`.
+    point: [f64; 2],
     sample_time: f64,
     /// `b[gain][lag]` and `f[lag - 1]`, each with its derivatives.
     b: [[[f64; 3]; 2]; 2],
@@ -26,27 +27,27 @@ pub struct Response {
     past: [Signals; 2],
 }
 
-crate::state!([] Response { at, b, f, input, past });
+crate::state!([] Response { point, b, f, input, past });
 
 impl Response {
     /// At rest at the point `[omega_nm, zeta_nm]` (rad/s, 1). Ts in s.
-    pub fn new(at: [f64; 2], sample_time: f64) -> Self {
+    pub fn new(point: [f64; 2], sample_time: f64) -> Self {
         let mut response = Self {
-            at,
+            point,
             sample_time,
             b: [[[0.0; 3]; 2]; 2],
             f: [[0.0; 3]; 2],
             input: 0.0,
             past: [[0.0; 6]; 2],
         };
-        response.set(at);
+        response.set(point);
         response
     }
 
-    fn set(&mut self, at: [f64; 2]) {
-        self.at = at;
+    fn set(&mut self, point: [f64; 2]) {
+        self.point = point;
         for (gain, gains) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
-            let (value, by) = held_operator([gains[0], gains[1], at[0], at[1]], self.sample_time);
+            let (value, by) = held_operator([gains[0], gains[1], point[0], point[1]], self.sample_time);
             for lag in 0..2 {
                 self.b[gain][lag] = [value[lag], by[lag][2], by[lag][3]];
                 self.f[lag] = [value[2 + lag], by[2 + lag][2], by[2 + lag][3]];
@@ -54,7 +55,7 @@ impl Response {
         }
     }
 
-    /// Takes the delayed error of a sample.
+    /// The signals of a sample, from its delayed error.
     #[inline(always)]
     pub fn step(&mut self, e: f64) -> Signals {
         let ([f1, f2], [x1, x2]) = (&self.f, &self.past);
@@ -76,10 +77,10 @@ impl Response {
         x
     }
 
-    /// Moves the point, and what the filters remember, here and in `elsewhere`, along its derivative.
-    pub fn move_to<'a>(&mut self, at: [f64; 2], elsewhere: impl IntoIterator<Item = &'a mut Signals>) {
-        let by = [at[0] - self.at[0], at[1] - self.at[1]];
-        if by == [0.0; 2] || !at.iter().all(|a| a.is_finite()) {
+    /// Moves the point, and the past signals here and in `elsewhere` along their first derivative.
+    pub fn move_to<'a>(&mut self, point: [f64; 2], elsewhere: impl IntoIterator<Item = &'a mut Signals>) {
+        let by = [point[0] - self.point[0], point[1] - self.point[1]];
+        if by == [0.0; 2] || !point.iter().all(|a| a.is_finite()) {
             return;
         }
         let along = |x: &mut Signals| {
@@ -89,18 +90,18 @@ impl Response {
         };
         elsewhere.into_iter().for_each(along);
         self.past.iter_mut().for_each(along);
-        self.set(at);
+        self.set(point);
     }
 
     /// Brings the filters to rest.
-    pub fn rest(&mut self) {
+    pub fn reset(&mut self) {
         self.input = 0.0;
         self.past = [[0.0; 6]; 2];
     }
 
-    /// The point `[omega_nm, zeta_nm]`.
+    /// The linearisation point `[omega_nm, zeta_nm]`.
     #[inline(always)]
-    pub fn about(&self) -> [f64; 2] {
-        self.at
+    pub fn point(&self) -> [f64; 2] {
+        self.point
     }
 }

@@ -1,7 +1,7 @@
 //! Data and the plain form of the covariance that tests share.
 #![allow(dead_code)]
 
-pub mod person;
+pub mod operator;
 
 use hoid_core::adaptation::Forgetting;
 
@@ -69,7 +69,7 @@ impl<const N: usize> Plain<N> {
     }
 
     /// One sample, without the guard against windup; `variance` is the innovation variance that variable forgetting expects.
-    pub fn advance(&mut self, forgetting: &Forgetting<N>, psi: &[f64; N], eps: f64, variance: f64) -> [f64; N] {
+    pub fn update(&mut self, forgetting: &Forgetting<N>, psi: &[f64; N], eps: f64, variance: f64) -> [f64; N] {
         match forgetting {
             Forgetting::Exponential { lambda } => {
                 self.scale(&lambda.map(|l| l.powf(-0.5)));

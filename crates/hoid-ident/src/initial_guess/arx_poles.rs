@@ -1,7 +1,7 @@
 //! Poles by linear least squares: of an ARX model, of one of high order, and by the iteration of Steiglitz and McBride.
 
 use hoid_core::{
-    filter::{divide_in_place, moving_sum},
+    filter::{divide_in_place, fir},
     stability::MAX_ORDER,
 };
 use hoid_model::{Orders, polynomial::reflected_inside};
@@ -58,7 +58,7 @@ pub(crate) fn reduced_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) 
         .iter()
         .map(|d| {
             let mut w = vec![0.0; d.u.len()];
-            moving_sum(&theta[orders.na..], o.nk, d.e, &mut w);
+            fir(&theta[orders.na..], o.nk, d.e, &mut w);
             divide_in_place(&a, &mut w);
             w
         })

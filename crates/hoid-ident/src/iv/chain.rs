@@ -58,7 +58,7 @@ pub(crate) fn instrument_chain(criterion: &Criterion<'_>) -> Option<Vec<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use hoid_core::filter::{divide_in_place, moving_sum, multiply};
+    use hoid_core::filter::{divide_in_place, fir, multiply};
 
     use super::*;
     use crate::pem::criterion::Data;
@@ -91,7 +91,7 @@ mod tests {
         let (e, eps) = (white(n, 1), white(n, 2));
         let (b, f, c, d) = ([1.0, 0.5], [-1.5, 0.7], [0.5], [-0.8]);
         let mut w = vec![0.0; n];
-        moving_sum(&b, 2, &e, &mut w);
+        fir(&b, 2, &e, &mut w);
         let mut v = vec![0.0; n];
         multiply(&c, &eps, &mut v);
         let armax: Vec<f64> = {

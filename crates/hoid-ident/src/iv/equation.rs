@@ -14,7 +14,7 @@
 
 use std::{borrow::Cow, ops::Range};
 
-use hoid_core::filter::{divide_in_place, moving_sum, multiply};
+use hoid_core::filter::{divide_in_place, fir, multiply};
 use hoid_model::{
     Orders,
     polynomial::{product, reflected_inside},
@@ -165,7 +165,7 @@ impl<'a> Problem<'a> {
         let (f, b) = system.split_at(self.poles);
         let (extended, past) = with_past(x);
         let mut output = vec![0.0; extended.len()];
-        moving_sum(b, self.nk, &extended, &mut output);
+        fir(b, self.nk, &extended, &mut output);
         divide_in_place(f, &mut output);
         output.drain(..past);
         output
@@ -482,7 +482,7 @@ mod tests {
     fn record() -> (Vec<f64>, Vec<f64>) {
         let x = white(600);
         let mut u = vec![0.0; 600];
-        moving_sum(&SYSTEM[2..], 3, &x, &mut u);
+        fir(&SYSTEM[2..], 3, &x, &mut u);
         divide_in_place(&SYSTEM[..2], &mut u);
         (x[250..].to_vec(), u[250..].to_vec())
     }

@@ -195,7 +195,7 @@ mod tests {
             .map(|t| (0.05 * f64::from(t)).sin() + (0.31 * f64::from(t)).sin())
             .collect();
         let mut y = vec![0.0; x.len()];
-        hoid_core::filter::moving_sum(&[0.1], 20, &x, &mut y);
+        hoid_core::filter::fir(&[0.1], 20, &x, &mut y);
         divide_in_place(&[-1.7, 0.8], &mut y);
         let found = following(&[&x], &[&y]);
         let rest: f64 = found[0].iter().zip(&y).skip(200).map(|(a, b)| (a - b).powi(2)).sum();

@@ -4,12 +4,12 @@
 //! four products, where single products read eight; and a column that is the one before it, a sample later, needs no pass:
 //! `sum x(t-1) y(t-1)` over a span is `sum x(t) y(t)` but for the samples at both ends.
 //!
-//! Each product has partial sums of a fixed number and order, in registers that are chosen when the program runs ([`hoid_lanes::by_fours`]): the bits
+//! Each product has partial sums of a fixed number and order, in registers that are chosen when the program runs ([`hoid_lanes::with_four_lanes`]): the bits
 //! are the same whatever the registers, whatever is summed beside, and in whatever stretches the record is read.
 
 use std::ops::Range;
 
-use hoid_lanes::{ByFours, Four, by_fours};
+use hoid_lanes::{FourLaneTask, FourLanes, with_four_lanes};
 
 use crate::linalg::least_squares::add_scaled;
 
@@ -27,7 +27,7 @@ struct Tile<F> {
     sums: [F; 4],
 }
 
-impl<F: Four> Tile<F> {
+impl<F: FourLanes> Tile<F> {
     /// Tiles for the products of x with each of ys, nothing summed yet.
     fn cover(x: usize, mut ys: &[usize], zero: F, tiles: &mut Vec<Self>) {
         while !ys.is_empty() {
@@ -100,7 +100,7 @@ impl<F: Four> Tile<F> {
 
 /// The partial sums in a fixed order.
 #[inline(always)]
-fn in_order<F: Four>(sums: F) -> f64 {
+fn in_order<F: FourLanes>(sums: F) -> f64 {
     let s = sums.to_array();
     (s[0] + s[2]) + (s[1] + s[3])
 }
@@ -122,7 +122,7 @@ fn stretches(n: usize) -> impl Iterator<Item = Range<usize>> {
 
 /// Sum over all of x.
 #[inline(always)]
-fn sum<F: Four>(x: &[f64], zero: F) -> f64 {
+fn sum<F: FourLanes>(x: &[f64], zero: F) -> f64 {
     let (mut s0, mut s1) = (zero, zero);
     for [a, b] in eights(x) {
         s0 = s0 + zero.load(a);
@@ -135,9 +135,9 @@ fn sum<F: Four>(x: &[f64], zero: F) -> f64 {
 
 /// Sum of the squared distances from the mean.
 #[inline(always)]
-fn squares<F: Four>(x: &[f64], mean: f64, zero: F) -> f64 {
+fn squares<F: FourLanes>(x: &[f64], mean: f64, zero: F) -> f64 {
     let (mut s0, mut s1) = (zero, zero);
-    let means = zero.like(mean);
+    let means = zero.splat(mean);
     for [a, b] in eights(x) {
         let (a, b) = (zero.load(a) - means, zero.load(b) - means);
         s0 = s0 + a * a;
@@ -150,16 +150,16 @@ fn squares<F: Four>(x: &[f64], mean: f64, zero: F) -> f64 {
 
 /// Variance around the common mean of some spans.
 pub(crate) fn variance(spans: &[&[f64]]) -> f64 {
-    by_fours(Variance(spans))
+    with_four_lanes(Variance(spans))
 }
 
 struct Variance<'c, 'a>(&'c [&'a [f64]]);
 
-impl ByFours for Variance<'_, '_> {
+impl FourLaneTask for Variance<'_, '_> {
     type Output = f64;
 
     #[inline(always)]
-    fn run<F: Four>(self, zero: F) -> f64 {
+    fn run<F: FourLanes>(self, zero: F) -> f64 {
         let Self(spans) = self;
         let n = spans.iter().map(|x| x.len()).sum::<usize>() as f64;
         let (mut total, mut squared) = (0.0, 0.0);
@@ -186,16 +186,16 @@ pub(crate) struct Lagged<'a> {
 /// A column that follows none leads: it is multiplied with all columns at once. What is left are pairs of columns that both follow, which come
 /// from the pair before them.
 pub(crate) fn gram(columns: &[Lagged<'_>]) -> Vec<f64> {
-    by_fours(Gram(columns))
+    with_four_lanes(Gram(columns))
 }
 
 struct Gram<'c, 'a>(&'c [Lagged<'a>]);
 
-impl ByFours for Gram<'_, '_> {
+impl FourLaneTask for Gram<'_, '_> {
     type Output = Vec<f64>;
 
     #[inline(always)]
-    fn run<F: Four>(self, zero: F) -> Vec<f64> {
+    fn run<F: FourLanes>(self, zero: F) -> Vec<f64> {
         let Self(columns) = self;
         let p = columns.len();
         let (mut tiles, mut others) = (Vec::with_capacity(p), Vec::with_capacity(p));
@@ -246,7 +246,7 @@ const TWO_OF_EACH: [bool; 5] = [false, true, true, false, true];
 
 /// The tiles of such a regression in one pass, which reads five numbers for nine products; tile by tile it would read twelve.
 #[inline(always)]
-fn add_two_of_each<F: Four>(tiles: &mut [Tile<F>], columns: [&[f64]; 5]) {
+fn add_two_of_each<F: FourLanes>(tiles: &mut [Tile<F>], columns: [&[f64]; 5]) {
     // u with the first four columns, u with the last, e with the last four.
     let [by_u, by_u_alone, by_e] = tiles else { return };
     let [mut uu, mut uu1, mut uu2, mut ue] = by_u.sums;
@@ -298,7 +298,7 @@ impl OfResiduals {
 
     /// Adds those of `y - sum_k factors_k x_k`, of which a stretch at a time is in memory. The first column is y.
     pub fn add(&mut self, columns: &[Lagged<'_>], factors: &[f64]) {
-        by_fours(Residuals {
+        with_four_lanes(Residuals {
             columns,
             factors,
             of: self,
@@ -312,11 +312,11 @@ struct Residuals<'c, 'a> {
     of: &'c mut OfResiduals,
 }
 
-impl ByFours for Residuals<'_, '_> {
+impl FourLaneTask for Residuals<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<F: Four>(self, zero: F) {
+    fn run<F: FourLanes>(self, zero: F) {
         let Self { columns, factors, of } = self;
         let inputs: Vec<usize> = (1..columns.len()).collect();
         // The residual stands in the place of y.
@@ -354,10 +354,10 @@ impl ByFours for Residuals<'_, '_> {
 
 /// Power and products of the residuals of four inputs over a whole stretch, which never leave the registers.
 #[inline(always)]
-fn of_four_inputs<F: Four>(columns: [&[f64]; 5], factors: [f64; 4], zero: F) -> (f64, [f64; 4]) {
+fn of_four_inputs<F: FourLanes>(columns: [&[f64]; 5], factors: [f64; 4], zero: F) -> (f64, [f64; 4]) {
     let [y, a, b, c, d] = columns;
     let [ka, kb, kc, kd] = factors;
-    let (ka, kb, kc, kd) = (zero.like(ka), zero.like(kb), zero.like(kc), zero.like(kd));
+    let (ka, kb, kc, kd) = (zero.splat(ka), zero.splat(kb), zero.splat(kc), zero.splat(kd));
     let (mut rr, mut rr_later) = (zero, zero);
     let (mut ra, mut rb, mut rc, mut rd) = (zero, zero, zero, zero);
     let blocks = fours(y).iter().zip(fours(a)).zip(fours(b));

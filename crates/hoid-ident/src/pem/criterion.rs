@@ -40,7 +40,7 @@ use std::{
 };
 
 use hoid_core::{
-    filter::{SecondOrder, divide, divide_on},
+    filter::{SecondOrder, divide, divide_from},
     stability::roots_inside,
 };
 use hoid_model::{Orders, Record};
@@ -782,7 +782,7 @@ fn whiten_on(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
             add_lags(d, 1, x, y, from);
         }
     }
-    divide_on(c, y, from);
+    divide_from(c, y, from);
 }
 
 /// `y(t) += sum_i d_i x(t - first_lag - i)` from index `from` on.

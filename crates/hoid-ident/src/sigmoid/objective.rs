@@ -14,7 +14,7 @@
 //! `eps = (I - Q Q') eps_0`, psi with the best states, `psi' (I - Q Q') psi` (G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10
 //! (1973) 413-432; L. Kaufman, *BIT* 15 (1975) 49-57).
 
-use hoid_core::filter::{divide_in_place, moving_sum};
+use hoid_core::filter::{divide_in_place, fir};
 use hoid_model::{
     SampleTime,
     delayed_operator::{delayed_operator_and_jacobian_within, whole_samples},
@@ -107,7 +107,7 @@ impl UnitOperator {
     /// `y_i` for an input with the past in front.
     pub fn response(&self, i: usize, input: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; input.len()];
-        moving_sum(&self.b[i], 0, input, &mut y);
+        fir(&self.b[i], 0, input, &mut y);
         divide_in_place(&self.f, &mut y);
         y
     }
@@ -115,7 +115,7 @@ impl UnitOperator {
     /// Derivative of `y_i` for the p-th of omega, zeta and tau.
     fn slope(&self, i: usize, p: usize, input: &[f64], y: &[f64]) -> Vec<f64> {
         let mut x = vec![0.0; input.len()];
-        moving_sum(&self.b_slopes[i][p], 0, input, &mut x);
+        fir(&self.b_slopes[i][p], 0, input, &mut x);
         for (lag, &slope) in self.f_slopes[p].iter().enumerate().filter(|(_, s)| **s != 0.0) {
             add_scaled(&mut x[lag + 1..], -slope, &y[..y.len() - lag - 1]);
         }

@@ -9,13 +9,13 @@ use std::{collections::BTreeMap, ops::RangeInclusive};
 
 use hoid_core::{
     adaptive::{
-        Adaptive, Suppositions,
-        delays::Delays,
-        hypothesis::{Hypothesis, OPERATOR},
+        AdaptiveFilter,
+        hypothesis::Hypothesis,
+        prior::{ChangePrior, DelayPrior, OPERATOR},
         response::Signals,
     },
     delay::DelayLine,
-    error_bars::Level,
+    innovation_variance::InnovationVariance,
     state::{State, visit_all},
 };
 use hoid_model::{
@@ -49,7 +49,7 @@ const LIMIT: f64 = 3.5;
 const SPACING_S: f64 = 0.32;
 /// Mean time between two changes, s.
 const BETWEEN_CHANGES_S: f64 = 60.0;
-/// Change of K_e and of K_e_dot to be expected, in the units of [`Suppositions::jump`].
+/// Change of K_e and of K_e_dot to be expected, in the units of [`ChangePrior::jump`].
 const JUMP: [f64; 2] = [0.15, 0.5];
 /// Drift of the gains in one second, in the same units.
 const DRIFT: f64 = 0.005;
@@ -79,7 +79,7 @@ const DELAYS_PROPOSED: usize = 8;
 const DELAY_ODDS: f64 = 1.0;
 const DELAY_JUMP_S: f64 = 0.05;
 const NEIGHBOUR: f64 = 0.15;
-/// What 0.01 s of delay is worth in K_e, K_e_dot, omega_nm and zeta_nm, in the units of [`Delays::worth`].
+/// What 0.01 s of delay is worth in K_e, K_e_dot, omega_nm and zeta_nm, in the units of [`DelayPrior::error_per_sample`].
 const WORTH: [f64; OPERATOR] = [0.01, 0.03, 0.04, 0.08];
 
 /// Order of the noise model when none is named: the odds need innovations that are white.
@@ -246,39 +246,39 @@ pub(crate) fn change_prior(
     options: &AdaptiveOptions,
     setup: &Setup,
     sample_time: SampleTime,
-) -> Result<Suppositions, IdentError> {
+) -> Result<ChangePrior, IdentError> {
     let ts = sample_time.s();
     let spacing = (SPACING_S / ts).round().max(1.0);
-    Ok(Suppositions {
+    Ok(ChangePrior {
         sample_time: ts,
         bounds: start::physical_bounds::<OPERATOR>(setup, sample_time)?,
-        spacing: spacing as u32,
+        birth_interval: spacing as u32,
         // Where samples are further apart than changes are supposed to be, half of them.
         hazard: (ts / BETWEEN_CHANGES_S).min(0.5 / spacing),
-        jump: JUMP,
-        drift: DRIFT * ts.sqrt(),
-        unrest: UNREST.map(|u| u * ts.sqrt()),
-        unrest_for: UNREST_FOR_S / ts,
-        neuromuscular: NEUROMUSCULAR,
-        whole_every: WHOLE_EVERY,
-        whole_odds: WHOLE_ODDS,
+        gain_jump: JUMP,
+        gain_drift: DRIFT * ts.sqrt(),
+        transient_drift: UNREST.map(|u| u * ts.sqrt()),
+        transient_time_constant: UNREST_FOR_S / ts,
+        neuromuscular_jump: NEUROMUSCULAR,
+        neuromuscular_every: WHOLE_EVERY,
+        neuromuscular_odds: WHOLE_ODDS,
         crossover: CROSSOVER_RAD_S,
-        doubt: (DOUBT_S / ts).max(4.0),
-        protected: (PROTECTED_BIRTHS * spacing) as u64,
-        limit: setup.limit,
-        settled: (SETTLED_S / ts).round() as u64,
-        recent: (RECENT_S / ts).round().max(2.0 * spacing) as u64,
-        threshold: options.alarm,
-        delays: match delays(setup, sample_time).count() {
-            1 => Delays::KNOWN,
-            count => Delays {
+        residuals_after_change: (DOUBT_S / ts).max(4.0),
+        pruning_age: (PROTECTED_BIRTHS * spacing) as u64,
+        outlier_limit: setup.limit,
+        settling_time: (SETTLED_S / ts).round() as u64,
+        change_window: (RECENT_S / ts).round().max(2.0 * spacing) as u64,
+        log_odds_threshold: options.alarm,
+        delay: match delays(setup, sample_time).count() {
+            1 => DelayPrior::KNOWN,
+            count => DelayPrior {
                 count,
-                every: DELAYS_EVERY,
-                odds: DELAY_ODDS,
-                births: DELAYS_PROPOSED,
+                propose_every: DELAYS_EVERY,
+                change_odds: DELAY_ODDS,
+                proposals: DELAYS_PROPOSED,
                 jump: DELAY_JUMP_S / ts,
-                neighbour: NEIGHBOUR,
-                worth: WORTH.map(|w| w * ts / 0.01),
+                neighbour_probability: NEIGHBOUR,
+                error_per_sample: WORTH.map(|w| w * ts / 0.01),
             },
         },
     })
@@ -301,7 +301,7 @@ pub(crate) fn first_hypothesis(
     let p = from.values.len();
     let covariance = std::array::from_fn(|i| std::array::from_fn(|j| times * from.variance * from.spread[i * p + j]));
     let memory = (LEVEL_MEMORY_S / sample_time.s()).max(10.0);
-    let level = Level::new(from.variance, from.residuals.clamp(1.0, memory), 1.0 - 1.0 / memory);
+    let level = InnovationVariance::new(from.variance, from.residuals.clamp(1.0, memory), 1.0 - 1.0 / memory);
     Hypothesis::new(std::array::from_fn(|i| from.values[i]), &covariance, level).ok_or_else(outside)
 }
 
@@ -317,7 +317,7 @@ pub(crate) fn outside() -> IdentError {
 
 /// The bank with its filters and its delay line, which is as long as the shortest delay.
 struct AdaptiveRecursion<const M: usize> {
-    model: Box<Adaptive<M, LARGEST_ND, Vec<Signals>>>,
+    model: Box<AdaptiveFilter<M, LARGEST_ND, Vec<Signals>>>,
     delay: DelayLine<Vec<f64>>,
     shortest: usize,
     sample_time: SampleTime,
@@ -339,11 +339,11 @@ impl<const M: usize> AdaptiveRecursion<M> {
                 delays.end()
             )));
         }
-        let first = first_hypothesis(from, 1.0, sample_time)?.delayed(nk - shortest);
+        let first = first_hypothesis(from, 1.0, sample_time)?.with_extra_delay(nk - shortest);
         let d = &from.values[OPERATOR..];
         let memory = vec![[0.0; 6]; delays.count()];
         let model =
-            Adaptive::with_delays(first, d, change_prior(options, setup, sample_time)?, memory).ok_or_else(outside)?;
+            AdaptiveFilter::with_delays(first, d, change_prior(options, setup, sample_time)?, memory).ok_or_else(outside)?;
         Ok(Self {
             model: Box::new(model),
             delay: DelayLine::new(vec![0.0; shortest]),
@@ -380,7 +380,7 @@ impl<const M: usize> Recursion for AdaptiveRecursion<M> {
 
     fn follow(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
-        self.model.follow(x, sample.u).into()
+        self.model.step_without_update(x, sample.u).into()
     }
 
     fn bridge(&mut self, sample: Sample) {
@@ -406,7 +406,7 @@ impl<const M: usize> Recursion for AdaptiveRecursion<M> {
         let covariance = bank.covariance();
         let operator = self
             .reported
-            .operator(bank.mixture().eta, &covariance, bank.lead(&covariance));
+            .operator(bank.mixture().eta, &covariance, bank.lead_time(&covariance));
         Some(OperatorEstimate {
             tau_e_s: self.delay_s(bank.delay()),
             ..operator
@@ -414,12 +414,12 @@ impl<const M: usize> Recursion for AdaptiveRecursion<M> {
     }
 
     fn change_odds(&self) -> Option<f64> {
-        Some(self.model.bank().odds())
+        Some(self.model.bank().log_odds())
     }
 
     fn change(&self) -> Option<Change> {
         let change = self.model.bank().change()?;
-        let tau_e_s = [change.before, change.now].map(|b| self.delay_s(b.delay));
+        let tau_e_s = [change.before, change.after].map(|b| self.delay_s(b.delay));
         Some(Change::new(&change, tau_e_s, self.sample_time))
     }
 }

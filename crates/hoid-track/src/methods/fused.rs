@@ -10,9 +10,10 @@
 
 use hoid_core::{
     delay::DelayLine,
-    predictor::{AnyShape, Regressor},
+    predictor::Regressor,
     recursion::Stable,
     rls::Rls,
+    shape::AnyShape,
     state::{State, visit_all},
 };
 use hoid_model::{Orders, SampleTime, Structure};
@@ -232,7 +233,7 @@ impl Recursion for FusedRecursion {
         let x = self.delay.step(sample.e);
         self.rpem.follow(sample);
         let y = self.filtered(sample.u);
-        let taken = self.rls.follow(x, y).into();
+        let taken = self.rls.step_without_update(x, y).into();
         self.remember(sample.u);
         taken
     }
@@ -242,7 +243,7 @@ impl Recursion for FusedRecursion {
         self.rpem.bridge(sample);
         // eps of an output of zero is the prediction with its sign changed.
         let y = self.filtered(0.0);
-        let predicted = -self.rls.follow(x, y).innovation;
+        let predicted = -self.rls.step_without_update(x, y).innovation;
         self.remember(crate::past::bounded(predicted));
     }
 
@@ -254,7 +255,7 @@ impl Recursion for FusedRecursion {
     fn covariance(&self, into: &mut [f64]) -> bool {
         let known = self.rpem.covariance(into);
         let p = self.theta.len();
-        let (spread, variance) = (self.rls.spread(), self.rls.innovation_variance());
+        let (spread, variance) = (self.rls.normalised_covariance(), self.rls.innovation_variance());
         for i in 0..p {
             for j in 0..p {
                 if i < B && j < B {

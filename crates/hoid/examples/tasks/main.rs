@@ -31,15 +31,16 @@ use hoid::{
     core::{
         adaptation::{Covariance, Forgetting},
         delay::DelayLine,
-        error_bars::NoBars,
-        factored::Factored,
-        predictor::{FixedShape, Regressor},
+        error_bars::NoErrorBars,
+        predictor::Regressor,
         recursion::Stable,
         rls::Rls,
         rpem::Rpem,
+        shape::FixedShape,
+        ud_covariance::UdCovariance,
     },
     ident::order_selection::Criterion,
-    lanes::Path as LanesPath,
+    lanes::InstructionSet,
     prelude::*,
     sim::Signals,
     thesis::reproduction::{Reproduction, reproduce},
@@ -154,7 +155,7 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
         }
         "cell" => {
             // As many runs at a time as there are lanes, in memory that was used before.
-            let beside = LanesPath::Best.lanes().unwrap();
+            let beside = InstructionSet::Best.lanes().unwrap();
             let (mut noises, mut runs) = (vec![shared.noise.clone(); beside], Vec::new());
             median(effort, || {
                 let mut records = Vec::with_capacity(CELL_RUNS as usize + beside);
@@ -164,7 +165,7 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
                     }
                     let simulator = &shared.simulator;
                     simulator
-                        .signals_of_many_into(&noises, LanesPath::Best, &mut runs)
+                        .signals_of_many_into(&noises, InstructionSet::Best, &mut runs)
                         .unwrap();
                     let count = (CELL_RUNS - begin) as usize;
                     records.extend(runs.iter().take(count).map(|run| shared.measured(run)));
@@ -207,7 +208,7 @@ fn whole_text(directory: &Path, replications: u64) -> (f64, Vec<f64>) {
 fn forgetting<const N: usize>() -> Covariance<N> {
     let lambda = [1.0 - 1.0 / MEMORY; N];
     Covariance::new(
-        Factored::diagonal([0.1; N]),
+        UdCovariance::diagonal([0.1; N]),
         Forgetting::Exponential { lambda },
         [f64::INFINITY; N],
     )
@@ -216,7 +217,7 @@ fn forgetting<const N: usize>() -> Covariance<N> {
 /// Recursive least squares from zero, theta after each sample.
 pub fn rls(e: &[f64], u: &[f64], history: &mut Vec<[f64; 4]>) -> [f64; 4] {
     history.clear();
-    let mut recursion = Rls::new(FixedShape::<2, 2, 0, 0, 0>, [0.0; 4], forgetting::<4>(), NoBars).unwrap();
+    let mut recursion = Rls::new(FixedShape::<2, 2, 0, 0, 0>, [0.0; 4], forgetting::<4>(), NoErrorBars).unwrap();
     let mut memory = [0.0; NK];
     let mut delay = DelayLine::new(&mut memory[..]);
     for (&e, &u) in e.iter().zip(u) {
@@ -235,7 +236,7 @@ pub fn rpem(e: &[f64], u: &[f64], history: &mut Vec<[f64; 5]>) -> [f64; 5] {
         Stable::Predictor,
         RPEM_START,
         forgetting::<5>(),
-        NoBars,
+        NoErrorBars,
     )
     .unwrap();
     let mut memory = [0.0; NK];

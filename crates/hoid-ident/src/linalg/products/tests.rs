@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used)]
 
-use hoid_lanes::Path;
+use hoid_lanes::InstructionSet;
 
 use super::*;
 
@@ -44,8 +44,8 @@ fn products_of_any_number_and_length_have_the_same_bits_on_each_path() {
     for n in LENGTHS {
         for count in 1..=8 {
             let columns = waves(n, count);
-            for path in Path::available() {
-                let found = path.by_fours(Gram(&leading(&columns))).unwrap();
+            for path in InstructionSet::available() {
+                let found = path.with_four_lanes(Gram(&leading(&columns))).unwrap();
                 for i in 0..count {
                     for j in i..count {
                         let defined = in_partial_sums(&columns[i], &columns[j], partial_sums(j - i, count - i));
@@ -73,8 +73,8 @@ fn two_lags_of_each_signal_in_one_pass_have_the_bits_of_the_tiles() {
         };
         let (u, e): (&'static [f64], &'static [f64]) = (u.leak(), e.leak());
         let columns = [of(u, 0), of(u, 1), of(u, 2), of(e, 0), of(e, 1)];
-        for path in Path::available() {
-            let found = path.by_fours(Gram(&columns)).unwrap();
+        for path in InstructionSet::available() {
+            let found = path.with_four_lanes(Gram(&columns)).unwrap();
             let same = |i: usize, j: usize, count: usize| {
                 let defined = in_partial_sums(columns[i].values, columns[j].values, count);
                 assert_eq!(
@@ -115,14 +115,14 @@ fn residuals_of_any_number_of_inputs_have_the_same_bits_on_each_path() {
                     defined.products[k] += in_partial_sums(&r, of(k + 1), partial_sums(k, p));
                 }
             }
-            for path in Path::available() {
+            for path in InstructionSet::available() {
                 let mut found = OfResiduals::new(p);
                 let task = Residuals {
                     columns: &leading(&columns),
                     factors: &factors[..p],
                     of: &mut found,
                 };
-                path.by_fours(task).unwrap();
+                path.with_four_lanes(task).unwrap();
                 assert_eq!(found, defined, "{path:?}: {p} inputs, {n} samples");
             }
         }
@@ -134,9 +134,9 @@ fn variance_has_the_same_bits_on_each_path() {
     for n in LENGTHS {
         let x = wave(n + 1, 0.3);
         let spans = x.split_at(n / 3);
-        let on = |path: Path| path.by_fours(Variance(&[spans.0, spans.1])).unwrap().to_bits();
-        for path in Path::available() {
-            assert_eq!(on(path), on(Path::Scalar), "{path:?}: {n} samples");
+        let on = |path: InstructionSet| path.with_four_lanes(Variance(&[spans.0, spans.1])).unwrap().to_bits();
+        for path in InstructionSet::available() {
+            assert_eq!(on(path), on(InstructionSet::Scalar), "{path:?}: {n} samples");
         }
     }
 }

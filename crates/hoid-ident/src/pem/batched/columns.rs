@@ -3,7 +3,7 @@
 //! A column that is the one before it, a sample later, needs no pass of its own: `sum x(t-1) y(t-1)` over a span is `sum x(t) y(t)` but for the
 //! samples at both ends, as in [`crate::linalg::products`].
 
-use hoid_core::number::Number;
+use hoid_lanes::Number;
 
 use super::pass::Room;
 
@@ -93,7 +93,7 @@ impl Columns {
                     let y = zero.load(self.rows(room, j, row, row + 1, width));
                     let at = (i * p1 + j) * width;
                     let place = &mut products[at..at + width];
-                    (zero.load(place) + zero.like(sign) * (x * y)).store(place);
+                    (zero.load(place) + zero.splat(sign) * (x * y)).store(place);
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! Filters of the signals of a span, of a record in each lane; every signal has its past in front.
 
-use hoid_core::number::Number;
+use hoid_lanes::Number;
 
 use super::pass::{Room, add_scaled};
 
@@ -116,7 +116,7 @@ pub(super) fn respond<R: Number>(zero: R, [b, f]: [&[f64]; 2], [e, u]: [&[f64]; 
         return;
     }
     divide(zero, f, e, &mut room.s, at);
-    moving_sum(zero, b, &room.s, &mut room.r[at..end], at);
+    fir(zero, b, &room.s, &mut room.r[at..end], at);
     let rows = room.v[at..end]
         .chunks_exact_mut(width)
         .zip(room.r[at..end].chunks_exact(width));
@@ -220,7 +220,7 @@ fn whiten_by<R: Number, const N: usize>(zero: R, d: &[f64], x: &[f64], y: &mut [
 
 /// `y = B x`, x from place `at` on.
 #[inline(always)]
-fn moving_sum<R: Number>(zero: R, b: &[f64], x: &[f64], y: &mut [f64], at: usize) {
+fn fir<R: Number>(zero: R, b: &[f64], x: &[f64], y: &mut [f64], at: usize) {
     let width = zero.lanes();
     let end = at + y.len();
     y.fill(0.0);

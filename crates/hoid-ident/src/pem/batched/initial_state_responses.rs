@@ -6,7 +6,7 @@
 //! they are shifts of one, the first matrix takes nf products. The criterion alone has an orthonormal basis by Gram and Schmidt
 //! ([`crate::pem::initial_states`]), the same but for rounding; a lane whose columns depend on each other is left to it.
 
-use hoid_core::number::Number;
+use hoid_lanes::Number;
 
 use super::{
     columns::{Columns, four_products, two_products},
@@ -262,7 +262,7 @@ fn add_shifts<R: Number>(zero: R, x: &[R], s: &[f64], at: usize, y: &mut [f64]) 
 fn impulse_response<R: Number>(zero: R, f: &[f64], longest: usize, h: &mut [f64]) -> usize {
     let (width, nf) = (zero.lanes(), f.len() / zero.lanes());
     h[..nf * width].fill(0.0);
-    let mut impulse = zero.like(1.0);
+    let mut impulse = zero.splat(1.0);
     let mut ends = vec![usize::MAX; width];
     let mut rows = nf;
     while rows < nf + longest && ends.contains(&usize::MAX) {

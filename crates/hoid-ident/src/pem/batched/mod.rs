@@ -13,7 +13,7 @@ mod rows;
 
 use std::cell::Cell;
 
-use hoid_lanes::Path;
+use hoid_lanes::InstructionSet;
 use hoid_model::{Orders, Record, SampleTime, Structure};
 
 use self::{
@@ -34,7 +34,11 @@ use crate::{
 
 /// A fit to each record; `None` for what is not searched side by side: anything but Box-Jenkins models without C, with their initial
 /// states estimated and nothing known beforehand, records of different lengths, registers that this processor has not.
-pub(crate) fn fit_each(estimator: &Estimator, records: &[&Record], path: Path) -> Option<Vec<Result<Fit, IdentError>>> {
+pub(crate) fn fit_each(
+    estimator: &Estimator,
+    records: &[&Record],
+    path: InstructionSet,
+) -> Option<Vec<Result<Fit, IdentError>>> {
     let o = &estimator.orders;
     let plain = estimator.structure == Structure::BoxJenkins
         && (o.nb > 0 && o.nc == 0 && o.nf > 0)
@@ -74,7 +78,7 @@ pub(crate) fn fit_each(estimator: &Estimator, records: &[&Record], path: Path) -
 /// What the averages of each record propose.
 fn averages_say(
     informed: &[Result<(ConstrainedCriterion<'_, '_>, SampleTime), &IdentError>],
-    path: Path,
+    path: InstructionSet,
     workspace: &mut Workspace,
 ) -> Vec<Slow> {
     let averaged: Vec<Option<Averaged>> = (informed.iter())
@@ -93,7 +97,7 @@ fn averages_say(
 }
 
 /// Answers all that is asked for, side by side; the records are of one length and the orders the same.
-fn search(open: Vec<&mut impl LinearisationClient>, path: Path, workspace: &mut Workspace) {
+fn search(open: Vec<&mut impl LinearisationClient>, path: InstructionSet, workspace: &mut Workspace) {
     let first = open.first().map(|asks| asks.criterion());
     let lanes = first.and_then(|c| Some(Lanes::new(c.orders, c.first, c.data.first()?.u.len(), path.lanes()?)));
     if let Some(mut lanes) = lanes {
@@ -157,7 +161,7 @@ impl Lanes {
     }
 
     /// Runs all searches to their end, as many at a time as there are lanes.
-    fn search<A: LinearisationClient>(&mut self, open: Vec<&mut A>, path: Path, workspace: &mut Workspace) {
+    fn search<A: LinearisationClient>(&mut self, open: Vec<&mut A>, path: InstructionSet, workspace: &mut Workspace) {
         let mut open = open.into_iter();
         let mut searching: Vec<Option<&mut A>> = (0..self.width).map(|_| None).collect();
         loop {
@@ -192,8 +196,8 @@ impl Lanes {
     }
 
     /// The criterion of all lanes.
-    fn pass(&mut self, path: Path) {
-        path.do_with(Pass {
+    fn pass(&mut self, path: InstructionSet) {
+        path.with_lanes(Pass {
             orders: self.orders,
             first: self.first,
             n: self.n,

@@ -13,8 +13,8 @@
 //! neither on the registers nor on its neighbours. The sums run over time in another order than those of the criterion alone: they
 //! differ from it by rounding.
 
-use hoid_core::number::Number;
-use hoid_lanes::SideBySide;
+use hoid_lanes::LaneTask;
+use hoid_lanes::Number;
 use hoid_model::Orders;
 
 use super::{
@@ -68,7 +68,7 @@ pub(super) struct Pass<'a> {
     pub sums: &'a mut Sums,
 }
 
-impl SideBySide for Pass<'_> {
+impl LaneTask for Pass<'_> {
     type Output = ();
 
     #[inline(always)]

@@ -39,7 +39,7 @@ fn orders(nb: usize, nd: usize, nf: usize, nk: usize) -> Orders {
 }
 
 /// The criterion of each record in a lane, at a theta of its own.
-fn pass(o: Orders, records: &[Record], thetas: &[Vec<f64>], path: Path) -> Vec<(Linearisation, bool)> {
+fn pass(o: Orders, records: &[Record], thetas: &[Vec<f64>], path: InstructionSet) -> Vec<(Linearisation, bool)> {
     let first = first_residual(&o, InitialState::Estimate);
     let mut lanes = Lanes::new(o, first, records[0].len(), path.lanes().unwrap());
     for (lane, (record, theta)) in records.iter().zip(thetas).enumerate().take(lanes.width) {
@@ -88,7 +88,7 @@ fn a_lane_has_the_criterion_of_its_record_alone() {
         orders(3, 6, 3, 0),
     ] {
         let thetas: Vec<Vec<f64>> = (0..8).map(|lane| theta(&o, lane)).collect();
-        for (lane, (found, dependent)) in pass(o, &records, &thetas, Path::Best).into_iter().enumerate() {
+        for (lane, (found, dependent)) in pass(o, &records, &thetas, InstructionSet::Best).into_iter().enumerate() {
             assert!(!dependent);
             let criterion = Criterion {
                 orders: o,
@@ -123,8 +123,8 @@ fn a_lane_has_the_same_bits_on_every_path_and_beside_anything() {
     let (records, o) = (runs(8, 1200), orders(2, 2, 2, 29));
     let thetas: Vec<Vec<f64>> = (0..8).map(|lane| theta(&o, lane)).collect();
     let bits = |there: &Linearisation| -> Vec<u64> { all(there).into_iter().map(f64::to_bits).collect() };
-    let best = pass(o, &records, &thetas, Path::Best);
-    for path in Path::available() {
+    let best = pass(o, &records, &thetas, InstructionSet::Best);
+    for path in InstructionSet::available() {
         for lane in 0..best.len() {
             let (alone, _) = &pass(o, &records[lane..=lane], &thetas[lane..=lane], path)[0];
             assert_eq!(bits(alone), bits(&best[lane].0), "lane {lane} on {path:?}");
@@ -144,7 +144,7 @@ fn fits_side_by_side_are_those_alone() {
             start,
             ..Estimator::new(Structure::BoxJenkins, orders(2, nd, 2, 29))
         };
-        let each = fit_each(&estimator, &by_reference(&records), Path::Best).unwrap();
+        let each = fit_each(&estimator, &by_reference(&records), InstructionSet::Best).unwrap();
         for (record, found) in records.iter().zip(each) {
             let (found, alone) = (found.unwrap(), estimator.fit(std::slice::from_ref(record)).unwrap());
             assert_eq!(found.start(), alone.start());
@@ -163,13 +163,13 @@ fn fits_side_by_side_are_those_alone() {
 fn fits_from_no_start_have_the_same_bits_on_every_path_and_beside_anything() {
     let records = runs(5, 2048);
     let estimator = Estimator::new(Structure::BoxJenkins, orders(2, 1, 2, 29));
-    let bits = |records: &[Record], path: Path| -> Vec<Vec<u64>> {
+    let bits = |records: &[Record], path: InstructionSet| -> Vec<Vec<u64>> {
         let fits = fit_each(&estimator, &by_reference(records), path).unwrap();
         let theta = |fit: Result<Fit, IdentError>| fit.unwrap().model().theta().iter().map(|t| t.to_bits()).collect();
         fits.into_iter().map(theta).collect()
     };
-    let best = bits(&records, Path::Best);
-    for path in Path::available() {
+    let best = bits(&records, InstructionSet::Best);
+    for path in InstructionSet::available() {
         assert_eq!(bits(&records, path), best, "{path:?}");
         for (lane, alone) in best.iter().enumerate() {
             assert_eq!(
@@ -207,13 +207,13 @@ fn other_models_and_records_of_different_lengths_are_fitted_one_after_the_other(
     let mut records = runs(2, 1024);
     let bj = Estimator::new(Structure::BoxJenkins, orders(2, 1, 2, 29));
     let arx = Estimator::new(Structure::Arx, Structure::Arx.operator_orders(29));
-    assert!(fit_each(&arx, &by_reference(&records), Path::Best).is_none());
+    assert!(fit_each(&arx, &by_reference(&records), InstructionSet::Best).is_none());
     // The pass has no C.
     let with_c = Orders { nc: 1, ..bj.orders };
     let with_c = Estimator::new(Structure::BoxJenkins, with_c);
-    assert!(fit_each(&with_c, &by_reference(&records), Path::Best).is_none());
+    assert!(fit_each(&with_c, &by_reference(&records), InstructionSet::Best).is_none());
     assert!(arx.fit_each(&by_reference(&records)).into_iter().all(|fit| fit.is_ok()));
     records[1] = records[1].span(0.0, 9.0).unwrap();
-    assert!(fit_each(&bj, &by_reference(&records), Path::Best).is_none());
+    assert!(fit_each(&bj, &by_reference(&records), InstructionSet::Best).is_none());
     assert!(bj.fit_each(&by_reference(&records)).into_iter().all(|fit| fit.is_ok()));
 }

@@ -10,7 +10,7 @@
 
 use std::ops::Range;
 
-use hoid_core::filter::divide_on;
+use hoid_core::filter::divide_from;
 use hoid_model::{polynomial::product, polynomial_model::monic};
 
 use super::{Block, Criterion, Data, InitialState, Parts, Passed, Workspace, whiten_on};
@@ -67,7 +67,7 @@ impl Criterion<'_> {
         if o.nb > 0 {
             let s = &mut ws.s[..end];
             s[pad..].copy_from_slice(&data.e[span.start - o.nk..span.end - o.nk]);
-            divide_on(parts.f, s, pad);
+            divide_from(parts.f, s, pad);
         }
         self.response(parts, data, span.clone(), pad, ws);
         let Workspace {

@@ -1,7 +1,7 @@
 //! The filter of state and parameters over samples: start, bounds, restarts.
 
 use hoid_core::{
-    adaptive::hypothesis::OPERATOR,
+    adaptive::prior::OPERATOR,
     delay::DelayLine,
     state::{State, visit_all},
 };

@@ -6,7 +6,7 @@
 use hoid_core::state::{State, visit_all};
 use hoid_core::{
     adaptation::{Adaptation, Covariance, Forgetting as Rule},
-    factored::Factored,
+    ud_covariance::UdCovariance,
 };
 
 use crate::gain::ROOM_WITHOUT_FIT;
@@ -37,15 +37,15 @@ impl Forgetting {
             *factors.get_mut(i)? = *l;
             matrix[i][..p].copy_from_slice(&start[i * p..(i + 1) * p]);
         }
-        Some(Self::of(Factored::of(&matrix)?, factors))
+        Some(Self::of(UdCovariance::from_matrix(&matrix)?, factors))
     }
 
     /// From a multiple of the unit matrix, with one factor for all.
     pub fn diagonal(size: f64, lambda: f64) -> Self {
-        Self::of(Factored::diagonal([size; ROOM]), [lambda; ROOM])
+        Self::of(UdCovariance::diagonal([size; ROOM]), [lambda; ROOM])
     }
 
-    fn of(factors: Factored<ROOM>, lambda: [f64; ROOM]) -> Self {
+    fn of(factors: UdCovariance<ROOM>, lambda: [f64; ROOM]) -> Self {
         let matrix = factors.matrix();
         let bound = std::array::from_fn(|i| ROOM_WITHOUT_FIT * matrix[i][i]);
         let covariance = Box::new(Covariance::new(factors, Rule::Exponential { lambda }, bound));
@@ -59,9 +59,9 @@ impl Forgetting {
     pub fn gain(&mut self, z: &[f64], gain: &mut [f64]) {
         let mut padded = [0.0; ROOM];
         padded[..z.len()].copy_from_slice(z);
-        let moved = self.covariance.advance(&padded, 0.0, &[0.0; ROOM], 0.0);
+        let moved = self.covariance.update(&padded, 0.0, &[0.0; ROOM], 0.0);
         gain.copy_from_slice(&moved.gain[..z.len()]);
-        if !self.covariance.is_sound() || gain.iter().any(|g| !g.is_finite()) {
+        if !self.covariance.is_valid() || gain.iter().any(|g| !g.is_finite()) {
             self.covariance.clone_from(&self.start);
             gain.fill(0.0);
         }

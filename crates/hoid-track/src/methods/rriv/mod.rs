@@ -29,7 +29,7 @@ mod forgetting;
 mod laguerre;
 
 use hoid_core::state::{State, visit_all};
-use hoid_core::{error_bars::NOTHING_KNOWN, stability::roots_inside};
+use hoid_core::{error_bars::LARGEST_GROWTH, stability::roots_inside};
 use hoid_model::{Orders, Record, SampleTime, Structure};
 
 use hoid_ident::{IdentError, iv::FORCING_CHANNEL, linalg::dot, settings, settings::Settings};
@@ -439,7 +439,7 @@ impl RefinedRecursion {
         }
         for i in 0..p {
             // To first order the recursion can be unstable where it is not: then nothing is known, and no less than that.
-            let limit = NOTHING_KNOWN * self.first_spread[i * (p + 1)];
+            let limit = LARGEST_GROWTH * self.first_spread[i * (p + 1)];
             let found = self.spread[i * (p + 1)];
             if limit > 0.0 && found > limit {
                 let share = (limit / found).sqrt();

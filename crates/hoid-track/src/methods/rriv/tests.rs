@@ -1,6 +1,6 @@
 mod closed_loop;
 
-use hoid_core::filter::{divide_in_place, moving_sum};
+use hoid_core::filter::{divide_in_place, fir};
 use hoid_model::{Channel, Record, SampleTime};
 use hoid_sim::Stream;
 
@@ -34,7 +34,7 @@ fn open_loop(n: usize, replication: u64, d: &[f64], gain: f64) -> (Vec<f64>, Vec
     };
     let (e, mut v) = (white(0), white(1));
     let mut w = vec![0.0; n];
-    moving_sum(&B, 2, &e, &mut w);
+    fir(&B, 2, &e, &mut w);
     w[n / 2..].iter_mut().for_each(|w| *w *= gain);
     divide_in_place(&F, &mut w);
     divide_in_place(d, &mut v);

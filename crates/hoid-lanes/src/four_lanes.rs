@@ -1,35 +1,38 @@
 //! Four numbers in one register or two.
 //!
-//! A sum over a record is a recursion too: each term waits for the sum of those before. Four partial sums, each of every fourth term, do not wait
-//! for one another. They are four whatever the registers, since their number is part of the last digits of the sum: with AVX2 they fill one
-//! register, elsewhere two. Products and sums are those of each number by itself, without contraction: the same bits on every path.
+//! A sum over a record is a recursion: each term waits for the sum of those before it. Four partial sums, each of every fourth
+//! term, do not wait for one another. They are four whatever the registers, since their number decides the last digits of the
+//! sum: with AVX2 they fill one register, elsewhere two. Products and sums are those of each number by itself, without
+//! contraction: the same bits in all registers.
 
 use std::ops::{Add, Mul, Sub};
 
-use crate::Path;
+use crate::instruction_set::InstructionSet;
 
 /// Four numbers, with the operations of each by itself.
-pub trait Four: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
-    /// The same number four times, in registers of this kind.
-    fn like(self, value: f64) -> Self;
-    /// These numbers in registers of this kind.
+pub trait FourLanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+    /// The same number four times.
+    fn splat(self, value: f64) -> Self;
+    /// These numbers.
     fn load(self, values: &[f64; 4]) -> Self;
-    /// The numbers.
+    /// The four numbers as an array.
     fn to_array(self) -> [f64; 4];
 }
 
-/// What is done with four numbers at a time.
-pub trait ByFours {
+/// A computation on four numbers at a time.
+pub trait FourLaneTask {
     /// Its result.
     type Output;
-    /// Does it with numbers of the kind of `zero`. To be marked `#[inline(always)]`, as all that it calls at every sample.
-    fn run<F: Four>(self, zero: F) -> Self::Output;
+    /// The computation, with numbers of the type of `zero`.
+    ///
+    /// Mark it `#[inline(always)]`, and all that it calls at every sample.
+    fn run<F: FourLanes>(self, zero: F) -> Self::Output;
 }
 
 /// The registers that every processor has for which this was compiled.
-impl Four for wide::f64x4 {
+impl FourLanes for wide::f64x4 {
     #[inline(always)]
-    fn like(self, value: f64) -> Self {
+    fn splat(self, value: f64) -> Self {
         Self::splat(value)
     }
 
@@ -50,7 +53,7 @@ mod avx2 {
 
     use pulp::{NullaryFnOnce, Simd, bytemuck, f64x4, x86::V3};
 
-    use super::{ByFours, Four};
+    use super::{FourLaneTask, FourLanes};
 
     /// Four numbers in a register of AVX2.
     #[derive(Debug, Clone, Copy)]
@@ -74,9 +77,9 @@ mod avx2 {
     }
     operations!(Add, add, add_f64s; Sub, sub, sub_f64s; Mul, mul, mul_f64s);
 
-    impl Four for Register {
+    impl FourLanes for Register {
         #[inline(always)]
-        fn like(self, value: f64) -> Self {
+        fn splat(self, value: f64) -> Self {
             let numbers = self.simd.splat_f64s(value);
             Self { numbers, ..self }
         }
@@ -93,9 +96,10 @@ mod avx2 {
         }
     }
 
-    pub(super) struct Do<T>(pub V3, pub T);
+    /// The task in registers of AVX2.
+    pub(super) struct InAvx2<T>(pub V3, pub T);
 
-    impl<T: ByFours> NullaryFnOnce for Do<T> {
+    impl<T: FourLaneTask> NullaryFnOnce for InAvx2<T> {
         type Output = T::Output;
 
         #[inline(always)]
@@ -107,26 +111,28 @@ mod avx2 {
     }
 }
 
-/// The task done in registers of AVX2, or the task itself where this processor has none.
-fn in_avx2<T: ByFours>(task: T) -> Result<T::Output, T> {
+/// The result of a task in registers of AVX2, or the task itself where this processor has none.
+fn in_avx2<T: FourLaneTask>(task: T) -> Result<T::Output, T> {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     if let Some(simd) = pulp::x86::V3::try_new() {
-        return Ok(simd.vectorize(avx2::Do(simd, task)));
+        return Ok(simd.vectorize(avx2::InAvx2(simd, task)));
     }
     Err(task)
 }
 
-/// Four numbers at a time, in the best registers that this processor has.
-pub fn by_fours<T: ByFours>(task: T) -> T::Output {
+/// Runs a task on four numbers at a time, in the best registers that this processor has.
+pub fn with_four_lanes<T: FourLaneTask>(task: T) -> T::Output {
     in_avx2(task).unwrap_or_else(|task| task.run(wide::f64x4::ZERO))
 }
 
-impl Path {
-    /// As [`by_fours`] in these registers; `None` when this processor has none such. Four numbers fill half of a register of AVX-512, which stands
-    /// for AVX2 here; the scalar path is that of a processor without either.
-    pub fn by_fours<T: ByFours>(self, task: T) -> Option<T::Output> {
+impl InstructionSet {
+    /// As [`with_four_lanes`] in these registers; `None` when this processor does not have them.
+    ///
+    /// Four numbers fill half of a register of AVX-512, so that [`InstructionSet::Avx512`] stands for AVX2 here.
+    /// [`InstructionSet::Scalar`] gives the registers of a processor without either.
+    pub fn with_four_lanes<T: FourLaneTask>(self, task: T) -> Option<T::Output> {
         match self {
-            Self::Best => Some(by_fours(task)),
+            Self::Best => Some(with_four_lanes(task)),
             Self::Scalar => Some(task.run(wide::f64x4::ZERO)),
             Self::Avx2 | Self::Avx512 => in_avx2(task).ok(),
         }

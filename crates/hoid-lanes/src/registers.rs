@@ -1,23 +1,24 @@
 //! A number in each lane of two registers.
 //!
-//! Two, because an operation on one register takes several cycles to finish but the next can begin in each: with two the waiting time of a
-//! recursion is filled.
+//! Two, because the result of an operation takes several cycles while the next operation can begin in each: two independent
+//! registers fill the latency of a recursion.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use hoid_core::number::Number;
 use pulp::Simd;
 
-/// A number of each of [`Wide::LANES`] runs.
+use crate::number::Number;
+
+/// A number of each of [`TwoRegisters::LANES`] runs.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Wide<S: Simd> {
+pub(crate) struct TwoRegisters<S: Simd> {
     simd: S,
     registers: [S::f64s; 2],
 }
 
-impl<S: Simd> Wide<S> {
+impl<S: Simd> TwoRegisters<S> {
     /// Number of lanes.
-    pub(crate) const LANES: usize = 2 * S::F64_LANES;
+    const LANES: usize = 2 * S::F64_LANES;
 
     /// The same number in all lanes.
     #[inline(always)]
@@ -31,7 +32,7 @@ impl<S: Simd> Wide<S> {
 
 macro_rules! operations {
     ($($name:ident, $method:ident, $of_simd:ident);+) => {$(
-        impl<S: Simd> $name for Wide<S> {
+        impl<S: Simd> $name for TwoRegisters<S> {
             type Output = Self;
 
             #[inline(always)]
@@ -48,7 +49,7 @@ macro_rules! operations {
 }
 operations!(Add, add, add_f64s; Sub, sub, sub_f64s; Mul, mul, mul_f64s; Div, div, div_f64s);
 
-impl<S: Simd> Neg for Wide<S> {
+impl<S: Simd> Neg for TwoRegisters<S> {
     type Output = Self;
 
     #[inline(always)]
@@ -61,34 +62,10 @@ impl<S: Simd> Neg for Wide<S> {
     }
 }
 
-impl<S: Simd> Number for Wide<S> {
+impl<S: Simd> Number for TwoRegisters<S> {
     #[inline(always)]
-    fn like(self, value: f64) -> Self {
+    fn splat(self, value: f64) -> Self {
         Self::splat(self.simd, value)
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        let [a, b] = self.registers;
-        Self {
-            registers: [self.simd.abs_f64s(a), self.simd.abs_f64s(b)],
-            ..self
-        }
-    }
-
-    #[inline(always)]
-    fn all_below(self, other: Self) -> bool {
-        let [a, b] = self.registers;
-        let [c, d] = other.registers;
-        let both = self
-            .simd
-            .and_m64s(self.simd.less_than_f64s(a, c), self.simd.less_than_f64s(b, d));
-        self.simd.first_true_m64s(self.simd.not_m64s(both)) == S::F64_LANES
-    }
-
-    #[inline(always)]
-    fn apart(self) -> Self {
-        self
     }
 
     #[inline(always)]

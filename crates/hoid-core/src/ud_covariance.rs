@@ -12,117 +12,30 @@
 //!
 //! N is the room for parameters. Where there are fewer, their d is zero and nothing happens to them.
 
-use crate::number::Number;
-
-/// The smallest number above zero.
-const SMALLEST: f64 = 5e-324;
-
-/// `U D U'` of an N x N matrix, or of several side by side.
+/// `U D U'` of an N x N matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
-pub struct Factored<const N: usize, R = f64> {
+pub struct UdCovariance<const N: usize> {
     /// Column j holds `U_ij`, i < j, and `d_j` in the place of the 1; the rest is not used. The d stand apart, so that no compiler makes a
     /// vector of them: the first would wait for the last.
-    u: [[R; N]; N],
+    u: [[f64; N]; N],
 }
 
-crate::state!([const N: usize] Factored<N> { u });
+crate::state!([const N: usize] UdCovariance<N> { u });
 
-impl<const N: usize, R: Number> Factored<N, R> {
-    /// A diagonal matrix; N is not zero.
-    pub fn diagonal(d: [R; N]) -> Self {
-        let mut u = [d.map(|d| d.like(0.0)); N];
+impl<const N: usize> UdCovariance<N> {
+    /// A diagonal matrix.
+    pub fn diagonal(d: [f64; N]) -> Self {
+        let mut u = [[0.0; N]; N];
         for j in 0..N {
             u[j][j] = d[j];
         }
         Self { u }
     }
 
-    /// True when in every lane all numbers are finite and no variance negative.
-    #[inline(always)]
-    pub fn all_sound(&self) -> bool {
-        let (zero, one) = (self.u[0][0].like(0.0), self.u[0][0].like(1.0));
-        let mut sum = zero;
-        let mut positive = true;
-        for j in 0..N {
-            positive &= (-self.u[j][j]).all_below(zero.like(SMALLEST));
-            // Zero times what is not finite is not a number.
-            for i in 0..=j {
-                sum = sum + zero * self.u[j][i];
-            }
-        }
-        positive && sum.all_below(one)
-    }
-
-    /// The factors of one lane.
-    pub fn lane(&self, lane: usize) -> Factored<N> {
-        Factored {
-            u: self.u.map(|column| column.map(|u| u.lane(lane))),
-        }
-    }
-
-    /// Puts the factors of one run into a lane.
-    pub fn set_lane(&mut self, lane: usize, factors: &Factored<N>) {
-        for j in 0..N {
-            for i in 0..N {
-                self.u[j][i].set_lane(lane, factors.u[j][i]);
-            }
-        }
-    }
-
-    /// The measurement of the module: the gain g; P moves on.
-    #[inline]
-    pub fn measure(&mut self, psi: &[R; N], variance: R) -> [R; N] {
-        self.grow_and_measure(variance.like(1.0), psi, variance)
-    }
-
-    /// `P <- growth P`, then the measurement, in one pass.
-    #[inline(always)]
-    pub fn grow_and_measure(&mut self, growth: R, psi: &[R; N], variance: R) -> [R; N] {
-        let zero = variance.like(0.0);
-        let (mut f, mut v, mut grown) = ([zero; N], [zero; N], [zero; N]);
-        for j in 0..N {
-            let mut sum = psi[j];
-            for i in 0..j {
-                sum = sum + self.u[j][i] * psi[i];
-            }
-            grown[j] = self.u[j][j] * growth;
-            f[j] = sum;
-            v[j] = grown[j] * sum;
-        }
-        self.measured(grown, f, v, variance)
-    }
-
-    /// The measurement, of the projections and of D.
-    #[inline(always)]
-    fn measured(&mut self, grown: [R; N], f: [R; N], v: [R; N], variance: R) -> [R; N] {
-        let (zero, one) = (variance.like(0.0), variance.like(1.0));
-        let mut gain = [zero; N];
-        let (mut before, mut inverse_before) = (variance, one / variance);
-        for j in 0..N {
-            let alpha = before + f[j] * v[j];
-            let inverse = one / alpha;
-            self.u[j][j] = grown[j] * (before * inverse);
-            let along = -f[j] * inverse_before;
-            for i in 0..j {
-                let old = self.u[j][i];
-                self.u[j][i] = old + gain[i] * along;
-                gain[i] = gain[i] + old * v[j];
-            }
-            gain[j] = v[j];
-            (before, inverse_before) = (alpha, inverse);
-        }
-        for g in &mut gain {
-            *g = *g * inverse_before;
-        }
-        gain
-    }
-}
-
-impl<const N: usize> Factored<N> {
     /// The factors of a symmetric matrix; `None` unless it is positive semidefinite up to rounding. Rows and columns of zeros
     /// are parameters that do not move.
-    pub fn of(p: &[[f64; N]; N]) -> Option<Self> {
+    pub fn from_matrix(p: &[[f64; N]; N]) -> Option<Self> {
         let mut rest = *p;
         let mut factored = Self::diagonal([0.0; N]);
         for j in (0..N).rev() {
@@ -151,18 +64,64 @@ impl<const N: usize> Factored<N> {
         Some(factored)
     }
 
+    /// The measurement of the module: the gain g; P moves on.
+    #[inline]
+    pub fn measurement_update(&mut self, psi: &[f64; N], variance: f64) -> [f64; N] {
+        self.inflate_and_update(1.0, psi, variance)
+    }
+
+    /// `P <- growth P`, then the measurement, in one pass.
+    #[inline(always)]
+    pub fn inflate_and_update(&mut self, growth: f64, psi: &[f64; N], variance: f64) -> [f64; N] {
+        let (mut f, mut v, mut grown) = ([0.0; N], [0.0; N], [0.0; N]);
+        for j in 0..N {
+            let mut sum = psi[j];
+            for i in 0..j {
+                sum += self.u[j][i] * psi[i];
+            }
+            grown[j] = self.u[j][j] * growth;
+            f[j] = sum;
+            v[j] = grown[j] * sum;
+        }
+        self.update_projected_by(grown, f, v, variance)
+    }
+
+    /// The measurement, of the projections and of D.
+    #[inline(always)]
+    fn update_projected_by(&mut self, grown: [f64; N], f: [f64; N], v: [f64; N], variance: f64) -> [f64; N] {
+        let mut gain = [0.0; N];
+        let (mut before, mut inverse_before) = (variance, 1.0 / variance);
+        for j in 0..N {
+            let alpha = before + f[j] * v[j];
+            let inverse = 1.0 / alpha;
+            self.u[j][j] = grown[j] * (before * inverse);
+            let along = -f[j] * inverse_before;
+            for i in 0..j {
+                let old = self.u[j][i];
+                self.u[j][i] = old + gain[i] * along;
+                gain[i] += old * v[j];
+            }
+            gain[j] = v[j];
+            (before, inverse_before) = (alpha, inverse);
+        }
+        for g in &mut gain {
+            *g *= inverse_before;
+        }
+        gain
+    }
+
     /// `psi' P psi`.
     #[inline]
-    pub fn along(&self, psi: &[f64; N]) -> f64 {
+    pub fn quadratic_form(&self, psi: &[f64; N]) -> f64 {
         let (f, v) = self.projections(psi);
         f.iter().zip(&v).map(|(f, v)| f * v).sum()
     }
 
-    /// [`Factored::measure`] by what [`Factored::projections`] gave for psi.
+    /// [`UdCovariance::measurement_update`] by what [`UdCovariance::projections`] gave for psi.
     #[inline(always)]
-    pub fn measure_projected(&mut self, (f, v): ([f64; N], [f64; N]), variance: f64) -> [f64; N] {
+    pub fn update_projected(&mut self, (f, v): ([f64; N], [f64; N]), variance: f64) -> [f64; N] {
         let grown = core::array::from_fn(|j| self.u[j][j]);
-        self.measured(grown, f, v, variance)
+        self.update_projected_by(grown, f, v, variance)
     }
 
     /// `f = U' psi` and `v = D f`: `psi' P psi = f' v`.
@@ -214,7 +173,7 @@ impl<const N: usize> Factored<N> {
 
     /// `P <- P + c a a'`, c not negative.
     #[inline]
-    pub fn add(&mut self, mut c: f64, mut a: [f64; N]) {
+    pub fn rank_one_update(&mut self, mut c: f64, mut a: [f64; N]) {
         for j in (0..N).rev() {
             let s = a[j];
             let d = self.u[j][j] + c * s * s;
@@ -249,7 +208,17 @@ impl<const N: usize> Factored<N> {
     }
 
     /// True when every number is finite and no variance negative.
-    pub fn is_sound(&self) -> bool {
-        self.all_sound()
+    #[inline(always)]
+    pub fn is_valid(&self) -> bool {
+        let mut sum = 0.0;
+        let mut positive = true;
+        for j in 0..N {
+            positive &= self.u[j][j] >= 0.0;
+            // Zero times what is not finite is not a number.
+            for i in 0..=j {
+                sum += 0.0 * self.u[j][i];
+            }
+        }
+        positive && sum == 0.0
     }
 }

@@ -1,0 +1,112 @@
+//! Orders of the general model, as numbers or in the type.
+//!
+//! The parameters of `A u = (B/F) q^-nk e + (C/D) eps` stand in one vector, `theta = [a.. b.. c.. d.. f..]`. A [`Shape`] says how many there are of
+//! each kind, and so where each polynomial stands.
+
+/// Numbers of coefficients of A, B, C, D and F.
+///
+/// [`AnyShape`] holds them as numbers. [`FixedShape`] has them in its type, so that the compiler writes out every loop over
+/// coefficients: the same operations in the same order, at half the time.
+pub trait Shape: Copy {
+    /// Coefficients `a_1 ...`.
+    fn na(&self) -> usize;
+    /// Coefficients `b_0 ...`.
+    fn nb(&self) -> usize;
+    /// Coefficients `c_1 ...`.
+    fn nc(&self) -> usize;
+    /// Coefficients `d_1 ...`.
+    fn nd(&self) -> usize;
+    /// Coefficients `f_1 ...`.
+    fn nf(&self) -> usize;
+
+    /// Length of `theta = [a.. b.. c.. d.. f..]`.
+    #[inline]
+    fn parameters(&self) -> usize {
+        self.na() + self.nb() + self.nc() + self.nd() + self.nf()
+    }
+
+    /// `[a, b, c, d, f]` of theta.
+    #[inline]
+    fn split<'t, R>(&self, theta: &'t [R]) -> [&'t [R]; 5] {
+        let (a, rest) = theta.split_at(self.na());
+        let (b, rest) = rest.split_at(self.nb());
+        let (c, rest) = rest.split_at(self.nc());
+        let (d, rest) = rest.split_at(self.nd());
+        [a, b, c, d, &rest[..self.nf()]]
+    }
+}
+
+/// Orders as numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct AnyShape {
+    /// Coefficients `a_1 ...`.
+    pub na: usize,
+    /// Coefficients `b_0 ...`.
+    pub nb: usize,
+    /// Coefficients `c_1 ...`.
+    pub nc: usize,
+    /// Coefficients `d_1 ...`.
+    pub nd: usize,
+    /// Coefficients `f_1 ...`.
+    pub nf: usize,
+}
+
+impl Shape for AnyShape {
+    #[inline]
+    fn na(&self) -> usize {
+        self.na
+    }
+
+    #[inline]
+    fn nb(&self) -> usize {
+        self.nb
+    }
+
+    #[inline]
+    fn nc(&self) -> usize {
+        self.nc
+    }
+
+    #[inline]
+    fn nd(&self) -> usize {
+        self.nd
+    }
+
+    #[inline]
+    fn nf(&self) -> usize {
+        self.nf
+    }
+}
+
+/// Orders in the type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct FixedShape<const NA: usize, const NB: usize, const NC: usize, const ND: usize, const NF: usize>;
+
+impl<const NA: usize, const NB: usize, const NC: usize, const ND: usize, const NF: usize> Shape
+    for FixedShape<NA, NB, NC, ND, NF>
+{
+    #[inline]
+    fn na(&self) -> usize {
+        NA
+    }
+
+    #[inline]
+    fn nb(&self) -> usize {
+        NB
+    }
+
+    #[inline]
+    fn nc(&self) -> usize {
+        NC
+    }
+
+    #[inline]
+    fn nd(&self) -> usize {
+        ND
+    }
+
+    #[inline]
+    fn nf(&self) -> usize {
+        NF
+    }
+}

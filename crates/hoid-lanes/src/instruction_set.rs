@@ -1,0 +1,122 @@
+//! The choice of the vector registers, and tasks that run in them.
+
+use pulp::{NullaryFnOnce, Scalar, Simd, WithSimd};
+
+use crate::{number::Number, registers::TwoRegisters};
+
+/// The vector registers that are used. All give the same bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum InstructionSet {
+    /// The widest registers that this processor has.
+    #[default]
+    Best,
+    /// One number a register, on any processor.
+    Scalar,
+    /// Four numbers a register, on processors with AVX2.
+    Avx2,
+    /// Eight numbers a register, on processors with AVX-512.
+    Avx512,
+}
+
+/// A computation that is written once for registers of any width.
+pub trait LaneTask {
+    /// Its result.
+    type Output;
+    /// The computation, with numbers of the type of `zero`.
+    ///
+    /// Mark it `#[inline(always)]`, and all that it calls at every sample: a function of its own is compiled for the
+    /// narrowest registers.
+    fn run<R: Number>(self, zero: R) -> Self::Output;
+}
+
+/// The task for [`pulp::Arch`], which chooses the registers.
+struct Dispatched<T>(T);
+
+impl<T: LaneTask> WithSimd for Dispatched<T> {
+    type Output = T::Output;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> T::Output {
+        self.0.run(TwoRegisters::splat(simd, 0.0))
+    }
+}
+
+/// The task in the registers of `S`.
+struct InRegisters<T, S>(T, S);
+
+impl<T: LaneTask, S: Simd> NullaryFnOnce for InRegisters<T, S> {
+    type Output = T::Output;
+
+    #[inline(always)]
+    fn call(self) -> T::Output {
+        self.0.run(TwoRegisters::splat(self.1, 0.0))
+    }
+}
+
+fn in_registers<T: LaneTask, S: Simd>(simd: S, task: T) -> T::Output {
+    simd.vectorize(InRegisters(task, simd))
+}
+
+/// The task for one run.
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+struct OneLane<T>(T);
+
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+impl<T: LaneTask> NullaryFnOnce for OneLane<T> {
+    type Output = T::Output;
+
+    #[inline(always)]
+    fn call(self) -> T::Output {
+        self.0.run(0.0)
+    }
+}
+
+/// Runs a task for one run, with numbers that are f64.
+///
+/// It is compiled with the instructions of AVX2 where this processor has them. They name three registers, so that an operand need
+/// not be copied before it is overwritten. Products and sums are not contracted: the same bits.
+pub fn with_one_lane<T: LaneTask>(task: T) -> T::Output {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    if let Some(simd) = pulp::x86::V3::try_new() {
+        return simd.vectorize(OneLane(task));
+    }
+    task.run(0.0)
+}
+
+impl InstructionSet {
+    /// All that this processor has, [`InstructionSet::Best`] among them.
+    pub fn available() -> Vec<Self> {
+        let all = [Self::Best, Self::Scalar, Self::Avx2, Self::Avx512];
+        all.into_iter().filter(|set| set.lanes().is_some()).collect()
+    }
+
+    /// Number of runs at a time; `None` when this processor has no such registers.
+    pub fn lanes(self) -> Option<usize> {
+        self.with_lanes(CountLanes)
+    }
+
+    /// Runs a task with a run in each lane; `None` when this processor has no such registers.
+    pub fn with_lanes<T: LaneTask>(self, task: T) -> Option<T::Output> {
+        match self {
+            Self::Best => Some(pulp::Arch::new().dispatch(Dispatched(task))),
+            Self::Scalar => Some(in_registers(Scalar, task)),
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            Self::Avx2 => Some(in_registers(pulp::x86::V3::try_new()?, task)),
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            Self::Avx512 => Some(in_registers(pulp::x86::V4::try_new()?, task)),
+            #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+            Self::Avx2 | Self::Avx512 => None,
+        }
+    }
+}
+
+struct CountLanes;
+
+impl LaneTask for CountLanes {
+    type Output = usize;
+
+    #[inline(always)]
+    fn run<R: Number>(self, zero: R) -> usize {
+        zero.lanes()
+    }
+}
