@@ -9,7 +9,7 @@ use hoid_model::{
     scenario::RemnantStrength,
     uncertainty::{Estimate, OperatorEstimate},
 };
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 use hoid_track::{Trace, track_from};
 
 use crate::{
@@ -99,12 +99,12 @@ pub(crate) fn run_block(
     let all: Vec<u64> = (block.first..block.first + block.count).collect();
     for replications in all.chunks(AT_A_TIME) {
         let run = |&replication: &u64| {
-            let stream = Stream {
+            let run_seed = RunSeed {
                 seed: plan.seed,
                 cell: cell.index,
                 replication,
             };
-            let record = simulator.run(stream, false).map_err(|error| error.to_string());
+            let record = simulator.run(run_seed, false).map_err(|error| error.to_string());
             (replication, record)
         };
         let runs: Vec<Run> = replications.iter().map(run).collect();

@@ -101,7 +101,7 @@ mod tests {
         Record, Structure,
         scenario::{Condition, Scenario},
     };
-    use hoid_sim::{Simulator, Stream};
+    use hoid_sim::{RunSeed, Simulator};
 
     use super::*;
     use crate::{ForgettingRule, Method, Sample};
@@ -110,9 +110,9 @@ mod tests {
         let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
         simulator
             .run(
-                Stream {
+                RunSeed {
                     seed: 4,
-                    ..Stream::default()
+                    ..RunSeed::default()
                 },
                 false,
             )

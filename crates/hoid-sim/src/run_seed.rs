@@ -18,7 +18,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 /// Name of the random stream of one run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct Stream {
+pub struct RunSeed {
     /// Seed of the study.
     pub seed: u64,
     /// Cell of the study (a scenario of its grid).
@@ -30,7 +30,7 @@ pub struct Stream {
 /// Last eight bytes of each key: other uses of (seed, cell, replication) get another tag and so another stream.
 const REMNANT: u64 = u64::from_le_bytes(*b"remnant\0");
 
-impl Stream {
+impl RunSeed {
     /// White Gaussian noise of unit variance.
     pub fn white_noise(&self, n: usize) -> Vec<f64> {
         let mut noise = vec![0.0; n];
@@ -38,7 +38,7 @@ impl Stream {
         noise
     }
 
-    /// The first samples of [`Stream::white_noise`], into memory that was used before.
+    /// The first samples of [`RunSeed::white_noise`], into memory that was used before.
     pub fn white_noise_into(&self, noise: &mut [f64]) {
         let mut key = [0; 32];
         for (bytes, number) in key
@@ -198,8 +198,8 @@ impl TryRng for Buffered {
 mod tests {
     use super::*;
 
-    fn stream(seed: u64, cell: u64, replication: u64) -> Vec<f64> {
-        Stream {
+    fn run_seed(seed: u64, cell: u64, replication: u64) -> Vec<f64> {
+        RunSeed {
             seed,
             cell,
             replication,
@@ -239,13 +239,13 @@ mod tests {
 
     #[test]
     fn a_stream_is_repeatable_and_its_own() {
-        assert_eq!(stream(1, 2, 3), stream(1, 2, 3));
+        assert_eq!(run_seed(1, 2, 3), run_seed(1, 2, 3));
         let all = [
-            stream(1, 2, 3),
-            stream(2, 2, 3),
-            stream(1, 3, 3),
-            stream(1, 2, 4),
-            stream(3, 2, 1),
+            run_seed(1, 2, 3),
+            run_seed(2, 2, 3),
+            run_seed(1, 3, 3),
+            run_seed(1, 2, 4),
+            run_seed(3, 2, 1),
         ];
         for (i, a) in all.iter().enumerate() {
             for b in &all[..i] {
@@ -259,7 +259,7 @@ mod tests {
 
     #[test]
     fn noise_is_standard_normal() {
-        let x = stream(7, 0, 0);
+        let x = run_seed(7, 0, 0);
         let n = x.len() as f64;
         let moment = |k: i32| x.iter().map(|v| v.powi(k)).sum::<f64>() / n;
         // Standard errors of the moments: 1, sqrt 2, sqrt 15, sqrt 96 over sqrt n; four of each.
@@ -272,7 +272,7 @@ mod tests {
     #[test]
     fn the_stream_of_this_version_is_pinned() {
         // A change of generator or transform would change every published figure: it must be noticed.
-        let first: Vec<String> = Stream::default()
+        let first: Vec<String> = RunSeed::default()
             .white_noise(3)
             .iter()
             .map(|v| format!("{v:.12}"))
