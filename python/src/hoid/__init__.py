@@ -31,7 +31,7 @@ from .fit import Fit, FrequencyResponse, Series, Validation
 from .groups import group, group_manifest, simulate_group
 from .identification import identify
 from .record import Record
-from .reading import info, read, read_stretches, write
+from .reading import info, read, read_segments, write
 from .reproduction import Reproduction, reproduce
 from .simulation import margins, simulate
 from .studies import Plan, Results, Table, merge, plan, plans, results, study
@@ -83,7 +83,7 @@ __all__ = [
     "plan",
     "plans",
     "read",
-    "read_stretches",
+    "read_segments",
     "reproduce",
     "results",
     "simulate",

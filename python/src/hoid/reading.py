@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from . import _hoid
 from .record import Record
 
-__all__ = ["info", "read", "read_stretches", "write"]
+__all__ = ["info", "read", "read_segments", "write"]
 
 if TYPE_CHECKING:
     from typing_extensions import TypedDict, Unpack
@@ -122,10 +122,10 @@ def read(
     return record
 
 
-def read_stretches(
+def read_segments(
     path: str | PathLike[str], mask: Sequence[str], *, shortest: float = 2.0, **options: Unpack[ReadOptions]
 ) -> list[Record]:
-    """Read the stretches of a file between what is wrong with its sampling, each a record: `identify` gives each its own initial states.
+    """Read the segments of a file between what is wrong with its sampling, each a record: `identify` gives each its own initial states.
 
     What is left out is chosen by what was recorded: without the samples at a rail the largest answers are gone, which biases what is left.
 
@@ -135,7 +135,7 @@ def read_stretches(
     mask : sequence of str
         What is left out: some of ``"missing"``, ``"gap"``, ``"stalled"`` and ``"saturated"`` (`info` tells what a file has).
     shortest : float
-        Shortest stretch in s that is used.
+        Shortest segment in s that is used.
     **options
         As in `read`.
 
@@ -146,11 +146,11 @@ def read_stretches(
     Raises
     ------
     FileError, FormatError
-        As in `read`; also where no stretch is left.
+        As in `read`; also where no segment is left.
 
     Examples
     --------
-    >>> fit = hoid.identify(hoid.read_stretches("run1.csv", ["missing", "stalled"]))
+    >>> fit = hoid.identify(hoid.read_segments("run1.csv", ["missing", "stalled"]))
     """
     return _read(path, [mask] if isinstance(mask, str) else mask, shortest, **options)
 

@@ -1,7 +1,7 @@
 //! The options by which `hoid identify` and `hoid track` read records and prepare them.
 
 use clap::{Args, ValueEnum};
-use hoid_io::{Offset, Scaling, TroubleKind};
+use hoid_io::{Offset, QualityIssueKind, Scaling};
 
 use super::DetrendName;
 
@@ -61,21 +61,21 @@ pub struct PrepareArgs {
     pub run_in: Option<f64>,
 }
 
-names!(MaskName for TroubleKind {
-    Missing = TroubleKind::Missing,
-    Gap = TroubleKind::Gap,
-    Stalled = TroubleKind::Stalled,
-    Saturated = TroubleKind::Saturated,
+names!(MaskName for QualityIssueKind {
+    Missing = QualityIssueKind::Missing,
+    Gap = QualityIssueKind::Gap,
+    Stalled = QualityIssueKind::Stalled,
+    Saturated = QualityIssueKind::Saturated,
 });
 
 /// What is left out of a record.
 #[derive(Debug, Args)]
 pub struct MaskArgs {
-    /// Leave out what is wrong with the sampling (see `hoid info`): the record is cut there, and each stretch has initial states of its
+    /// Leave out what is wrong with the sampling (see `hoid info`): the record is cut there, and each segment has initial states of its
     /// own
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     pub mask: Vec<MaskName>,
-    /// Shortest stretch between masked samples that is used, s
+    /// Shortest segment between masked samples that is used, s
     #[arg(long, value_name = "S", default_value_t = 2.0)]
     pub shortest: f64,
 }

@@ -6,7 +6,8 @@ use std::{
 };
 
 use hoid_io::{
-    NewRate, Preparation, ReadOptions, ReadRecord, Repair, Step, Trouble, TroubleKind, read_prepared, read_stretches,
+    NewRate, Preparation, QualityIssue, QualityIssueKind, ReadOptions, ReadRecord, Repair, Step, read_prepared,
+    read_segments,
 };
 use hoid_model::{Detrend, Record};
 
@@ -20,7 +21,7 @@ use crate::{
 #[derive(Debug, Clone, Default)]
 pub struct Account {
     pub steps: Vec<Step>,
-    pub trouble: Vec<Trouble>,
+    pub quality_issues: Vec<QualityIssue>,
 }
 
 /// Records with the files that they come from; a file that is cut gives several.
@@ -40,18 +41,18 @@ pub fn read(path: &Path, args: &ReadArgs, with_input: bool) -> Result<(Record, A
     Ok(told(path, read))
 }
 
-/// As [`read`], for the stretches between what is masked.
+/// As [`read`], for the segments between what is masked.
 ///
 /// # Errors
 /// As [`read`].
 pub fn read_all(paths: &[PathBuf], args: &ReadArgs, mask: &MaskArgs, with_input: bool) -> Result<ReadAll, CliError> {
-    let kinds: Vec<TroubleKind> = mask.mask.iter().map(|name| TroubleKind::from(*name)).collect();
+    let kinds: Vec<QualityIssueKind> = mask.mask.iter().map(|name| QualityIssueKind::from(*name)).collect();
     let (options, preparation) = (options(args, with_input)?, preparation(args)?);
     let mut all = ReadAll::default();
     for path in paths {
-        for read in read_stretches(path, &options, &preparation, &kinds, mask.shortest)? {
+        for read in read_segments(path, &options, &preparation, &kinds, mask.shortest)? {
             let (record, account) = told(path, read);
-            // The label of a stretch ends in its span.
+            // The label of a segment ends in its span.
             let span = record.label().rfind(" (").filter(|_| !kinds.is_empty());
             let span = span.map_or("", |at| &record.label()[at..]);
             all.files.push(format!("{}{span}", path.display()));
@@ -66,12 +67,12 @@ fn told(path: &Path, read: ReadRecord) -> (Record, Account) {
     for note in &read.notes {
         output::complain(&format!("{}: {note}", path.display()));
     }
-    for trouble in &read.trouble {
-        output::complain(&format!("warning: {}: {trouble}", path.display()));
+    for issue in &read.quality_issues {
+        output::complain(&format!("warning: {}: {issue}", path.display()));
     }
     let account = Account {
         steps: read.steps,
-        trouble: read.trouble,
+        quality_issues: read.quality_issues,
     };
     (read.record, account)
 }
@@ -158,8 +159,8 @@ pub fn accounts(files: &[String], accounts: &[Account]) -> Vec<(String, String)>
     let mut rows = Vec::new();
     for (file, account) in files.iter().zip(accounts) {
         let steps: Vec<String> = account.steps.iter().map(Step::to_string).collect();
-        let trouble: Vec<String> = account.trouble.iter().map(Trouble::to_string).collect();
-        for (what, parts) in [("preparation", steps), ("sampling trouble", trouble)] {
+        let issues: Vec<String> = account.quality_issues.iter().map(QualityIssue::to_string).collect();
+        for (what, parts) in [("preparation", steps), ("sampling trouble", issues)] {
             if !parts.is_empty() {
                 rows.push((name(what, file), parts.join("; ")));
             }

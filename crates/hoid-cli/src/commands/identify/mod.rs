@@ -142,7 +142,7 @@ fn common_settings(args: &IdentifyArgs, with_input: bool) -> Vec<(String, String
             .collect();
         list.push((
             "masked".to_owned(),
-            format!("{}, stretches of {} s or more", kinds.join(", "), args.mask.shortest),
+            format!("{}, segments of {} s or more", kinds.join(", "), args.mask.shortest),
         ));
     }
     list.extend([
