@@ -84,7 +84,7 @@ fn remnant(found: &Result<RemnantEstimate, NotConvertible>) -> Value {
         Ok(r) => json!({
             "convertible": true,
             "order": r.order,
-            "discretisation": crate::text::remnant_discretisation(r.discretisation),
+            "discretisation": r.discretisation.name(),
             "T_n": estimate(&r.t_n_s),
             "K_n": estimate(&r.k_n),
         }),

@@ -16,14 +16,6 @@ use crate::record_file::read_prepared;
 use crate::record_from_table::ReadRecord;
 use crate::wording::decimal;
 
-/// What can be cut out.
-const CUTTABLE: [QualityIssueKind; 4] = [
-    QualityIssueKind::Missing,
-    QualityIssueKind::Gap,
-    QualityIssueKind::Stalled,
-    QualityIssueKind::Saturated,
-];
-
 /// Reads the segments of a file between faults of these kinds that last `shortest_s` or more, in their order; the whole record where no
 /// kind is named. The first carries what is wrong with the file as a whole.
 ///
@@ -47,11 +39,9 @@ pub fn read_segments(
         found,
         expected: expected.to_owned(),
     };
-    if let Some(kind) = mask.iter().find(|kind| !CUTTABLE.contains(kind)) {
-        return Err(refuse(
-            kind.name().to_owned(),
-            "some of missing, gap, stalled, saturated",
-        ));
+    if let Some(kind) = mask.iter().find(|kind| !QualityIssueKind::MASKABLE.contains(kind)) {
+        let names = QualityIssueKind::MASKABLE.map(QualityIssueKind::name).join(", ");
+        return Err(refuse(kind.name().to_owned(), &format!("some of {names}")));
     }
     if preparation.run_in_s != 0.0 {
         return Err(refuse("a run-in".to_owned(), "a span that begins behind it (--from)"));

@@ -5,7 +5,6 @@ use hoid_io::OutputTable;
 use hoid_model::{
     Record,
     remnant::RemnantDiscretisation,
-    remnant_gain::NoiseDefinition,
     scenario::RemnantStrength,
     uncertainty::{Estimate, OperatorEstimate},
 };
@@ -202,13 +201,7 @@ impl<'a> Bench<'a> {
         rows.whole("remnant_order", scenario.remnant.order as u64);
         if let RemnantStrength::Level { level, definition } = scenario.remnant.strength {
             rows.real("noise_level", level);
-            rows.text(
-                "noise_definition",
-                match definition {
-                    NoiseDefinition::Response => "response",
-                    NoiseDefinition::Remnant => "remnant",
-                },
-            );
+            rows.text("noise_definition", definition.name());
         }
         rows.real("T_n_true", scenario.remnant.time_constant_s);
         rows.real("sample_time_s", scenario.sample_time.s());

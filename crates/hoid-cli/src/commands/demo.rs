@@ -73,7 +73,10 @@ fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, Cl
                 start: StartAt::Span(Some((from, to))),
                 ..TrackOptions::new(method, structure, structure.operator_orders(nk))
             };
-            Ok((format!("{}, {structure}", method.name()), track(record, &options, 1)?))
+            Ok((
+                format!("{}, {}", method.name(), structure.label()),
+                track(record, &options, 1)?,
+            ))
         })
         .collect()
 }

@@ -6,10 +6,9 @@ use std::{
 };
 
 use hoid_io::{
-    NewRate, Preparation, QualityIssue, QualityIssueKind, ReadOptions, ReadRecord, Repair, Step, read_prepared,
-    read_segments,
+    NewRate, Preparation, QualityIssue, ReadOptions, ReadRecord, Repair, Step, read_prepared, read_segments,
 };
-use hoid_model::{Detrend, Record};
+use hoid_model::Record;
 
 use crate::{
     args::{MaskArgs, ReadArgs},
@@ -46,14 +45,13 @@ pub fn read(path: &Path, args: &ReadArgs, with_input: bool) -> Result<(Record, A
 /// # Errors
 /// As [`read`].
 pub fn read_all(paths: &[PathBuf], args: &ReadArgs, mask: &MaskArgs, with_input: bool) -> Result<ReadAll, CliError> {
-    let kinds: Vec<QualityIssueKind> = mask.mask.iter().map(|name| QualityIssueKind::from(*name)).collect();
     let (options, preparation) = (options(args, with_input)?, preparation(args)?);
     let mut all = ReadAll::default();
     for path in paths {
-        for read in read_segments(path, &options, &preparation, &kinds, mask.shortest)? {
+        for read in read_segments(path, &options, &preparation, &mask.mask, mask.shortest)? {
             let (record, account) = told(path, read);
             // The label of a segment ends in its span.
-            let span = record.label().rfind(" (").filter(|_| !kinds.is_empty());
+            let span = record.label().rfind(" (").filter(|_| !mask.mask.is_empty());
             let span = span.map_or("", |at| &record.label()[at..]);
             all.files.push(format!("{}{span}", path.display()));
             all.records.push(record);
@@ -102,7 +100,7 @@ fn preparation(args: &ReadArgs) -> Result<Preparation, CliError> {
             (None, None) => NewRate::Kept,
         },
         run_in_s: prepare.run_in.unwrap_or(0.0),
-        detrend: Detrend::from(args.detrend),
+        detrend: args.detrend,
         drop_repeated: prepare.drop_repeated,
     })
 }
@@ -133,7 +131,7 @@ pub fn settings(read: &ReadArgs, with_input: bool) -> Vec<(String, String)> {
             "span in s".to_owned(),
             format!("{} to {}", or_all(read.from, "start"), or_all(read.to, "end")),
         ),
-        ("detrend".to_owned(), format!("{:?}", read.detrend).to_lowercase()),
+        ("detrend".to_owned(), read.detrend.to_string()),
     ];
     if with_input {
         list.insert(0, ("input".to_owned(), read.input.clone()));

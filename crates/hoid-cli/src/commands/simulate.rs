@@ -65,9 +65,9 @@ fn with_changes(mut scenario: Scenario, args: &SimulateArgs) -> Result<Scenario,
         scenario.sample_time = SampleTime::new(ts)?;
     }
     if let Some(realisation) = args.realisation {
-        scenario.realisation = realisation.into();
+        scenario.realisation = realisation;
     }
-    let definition = args.noise_definition.map(Into::into);
+    let definition = args.noise_definition;
     let Some(strength) = scenario.remnant.strength.changed(args.noise_level, definition) else {
         return Err(CliError::Usage(
             "--noise-definition needs --noise-level: the scenario gives the gain K_n itself".to_owned(),

@@ -39,22 +39,8 @@ pub enum QualityIssueKind {
 }
 
 impl QualityIssueKind {
-    /// Its name, as in JSON and tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Missing => "missing",
-            Self::Unordered => "unordered",
-            Self::Repeated => "repeated",
-            Self::Gap => "gap",
-            Self::Jitter => "jitter",
-            Self::Clock => "clock",
-            Self::Drift => "drift",
-            Self::Stalled => "stalled",
-            Self::Saturated => "saturated",
-            Self::Quantised => "quantised",
-            Self::Constant => "constant",
-        }
-    }
+    /// Kinds that are places in a record and can be left out of it; a clock or a constant is none.
+    pub const MASKABLE: [Self; 4] = [Self::Missing, Self::Gap, Self::Stalled, Self::Saturated];
 
     /// What can be done about it.
     pub fn remedy(self) -> &'static str {
@@ -73,6 +59,20 @@ impl QualityIssueKind {
         }
     }
 }
+
+hoid_model::named_choice!(QualityIssueKind, "kind of fault", 11, {
+    Missing => "missing",
+    Unordered => "unordered",
+    Repeated => "repeated",
+    Gap => "gap",
+    Jitter => "jitter",
+    Clock => "clock",
+    Drift => "drift",
+    Stalled => "stalled",
+    Saturated => "saturated",
+    Quantised => "quantised",
+    Constant => "constant",
+});
 
 /// Rows that follow each other.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

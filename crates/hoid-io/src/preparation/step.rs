@@ -112,8 +112,7 @@ impl Step {
     pub(super) fn of_detrend(how: Detrend) -> Option<Self> {
         match how {
             Detrend::None => None,
-            Detrend::Mean => Some(Self::Detrend { how: "mean" }),
-            Detrend::Linear => Some(Self::Detrend { how: "linear" }),
+            Detrend::Mean | Detrend::Linear => Some(Self::Detrend { how: how.name() }),
         }
     }
 
