@@ -105,16 +105,16 @@ def test_what_is_inside_of_a_file(stalled: Path, cli: Any) -> None:
     assert found["trouble"][0]["places"][0][0] == expected["trouble"][0]["places"][0]["row"]
 
 
-def test_stretches_between_trouble(stalled: Path, cli: Any) -> None:
+def test_segments_between_faults(stalled: Path, cli: Any) -> None:
     with pytest.warns(UserWarning, match="hold their values|stand still|stalled"):
-        stretches = pyhoid.read_stretches(stalled, ["stalled"])
-    assert len(stretches) == 2 and sum(map(len, stretches)) < 8192
-    fit = pyhoid.identify(stretches, "bj", nk=29, nd=1)
+        segments = pyhoid.read_segments(stalled, ["stalled"])
+    assert len(segments) == 2 and sum(map(len, segments)) < 8192
+    fit = pyhoid.identify(segments, "bj", nk=29, nd=1)
     options = "--structure bj --nk 29 --orders nd=1 --mask stalled".split()
     found = cli.json("identify", stalled, *options)
     assert fit.parameters == {p["name"]: p["value"] for p in found["parameters"]}
     with pytest.raises(pyhoid.OptionError, match="clock"):
-        pyhoid.read_stretches(stalled, ["clock"])
+        pyhoid.read_segments(stalled, ["clock"])
 
 
 def test_track_and_tracker_have_the_same_keywords() -> None:

@@ -2,10 +2,13 @@
 
 use std::{ops::RangeInclusive, path::PathBuf};
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{
+    Args, Parser, Subcommand, ValueEnum,
+    builder::{PossibleValuesParser, TypedValueParser},
+};
 use hoid_ident::{Focus, InitialState, IvMethod, SearchMethod, order_selection::Criterion};
 use hoid_model::{
-    ContinuousTransferFunction, Detrend, Structure, discretise,
+    ContinuousTransferFunction, NamedChoice, Structure, discretise,
     remnant::RemnantDiscretisation,
     remnant_gain::NoiseDefinition,
     scenario::{Condition, Realisation},
@@ -87,8 +90,8 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "P_N")]
     pub noise_level: Option<f64>,
     /// What the noise level is a share of: var(u_n)/var(u) or var(n)/var(u) [default: response, or the scenario's]
-    #[arg(long, value_name = "WHICH")]
-    pub noise_definition: Option<NoiseDefinitionName>,
+    #[arg(long, value_name = "WHICH", value_parser = choice_of(&NoiseDefinition::ALL))]
+    pub noise_definition: Option<NoiseDefinition>,
     /// Remnant time constant T_n in s [default: 0.06, or the scenario's]
     #[arg(long, value_name = "S")]
     pub remnant_time_constant: Option<f64>,
@@ -97,8 +100,8 @@ pub struct SimulateArgs {
     pub sample_time: Option<f64>,
     /// Where K_c stands when it changes: in the input matrix (x stays continuous) or in the output matrix (as in the reference
     /// text) [default: input, or the scenario's]
-    #[arg(long, value_name = "WHERE")]
-    pub realisation: Option<RealisationName>,
+    #[arg(long, value_name = "WHERE", value_parser = choice_of(&Realisation::ALL))]
+    pub realisation: Option<Realisation>,
     /// Seed of the random streams
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
@@ -127,8 +130,8 @@ pub struct IdentifyArgs {
     pub mask: MaskArgs,
     /// What is fitted: a polynomial structure, grey-box (operator and remnant in physical parameters, with a real delay), or
     /// time-varying (the operator's gains change once, by a sigmoid) [default: bj, or that of --method]
-    #[arg(long, value_name = "NAME")]
-    pub structure: Option<StructureName>,
+    #[arg(long, value_name = "NAME", value_parser = by_name(Kind::named()))]
+    pub structure: Option<Kind>,
     /// How: pem the prediction error method; iv4 (for arx), sriv (for oe), rivbj (for bj) instrumental variables
     #[arg(long, value_name = "NAME", default_value = "pem")]
     pub method: FitMethodName,
@@ -192,8 +195,8 @@ pub struct IdentifyArgs {
     #[arg(long, value_name = "X", default_value = "1e-12")]
     pub tolerance: f64,
     /// Discretisation that is inverted to get T_n and K_n from the noise model
-    #[arg(long, value_name = "NAME", default_value = "zoh")]
-    pub remnant_discretisation: RemnantDiscretisationName,
+    #[arg(long, value_name = "NAME", default_value = "zoh", value_parser = choice_of(&RemnantDiscretisation::ALL))]
+    pub remnant_discretisation: RemnantDiscretisation,
     /// Controlled element NUM/DEN by descending powers of s, as 90/1,6,0: adds crossover frequency and margins
     #[arg(long, value_name = "NUM/DEN", value_parser = parse_transfer_function, allow_hyphen_values = true)]
     pub controlled_element: Option<ContinuousTransferFunction>,
@@ -279,8 +282,8 @@ pub struct MarginsArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [0.01, 0.1, 0.2, 0.3])]
     pub noise_levels: Vec<f64>,
     /// What the noise level is a share of: var(u_n)/var(u) or var(n)/var(u)
-    #[arg(long, value_name = "WHICH", default_value = "response")]
-    pub noise_definition: NoiseDefinitionName,
+    #[arg(long, value_name = "WHICH", default_value = "response", value_parser = choice_of(&NoiseDefinition::ALL))]
+    pub noise_definition: NoiseDefinition,
     /// Print one JSON object instead of tables
     #[arg(long)]
     pub json: bool,
@@ -295,6 +298,34 @@ pub enum Kind {
     GreyBox,
     /// The operator with gains that change once.
     TimeVarying,
+}
+
+impl Kind {
+    /// The names that are typed, in the order of the help page.
+    fn named() -> impl Iterator<Item = (&'static str, Self)> {
+        let structures = Structure::ALL.map(|structure| (structure.name(), Self::Polynomial(structure)));
+        let others = [("grey-box", Self::GreyBox), ("time-varying", Self::TimeVarying)];
+        structures.into_iter().chain(others)
+    }
+}
+
+/// One of some choices of the library, by its name.
+fn choice_of<T: NamedChoice + Send + Sync>(choices: &'static [T]) -> impl TypedValueParser<Value = T> {
+    by_name(choices.iter().map(|choice| (choice.choice_name(), *choice)))
+}
+
+/// One of some values by its name.
+fn by_name<T: Clone + Send + Sync + 'static>(
+    values: impl IntoIterator<Item = (&'static str, T)>,
+) -> impl TypedValueParser<Value = T> {
+    let values: Vec<(&str, T)> = values.into_iter().collect();
+    let names: Vec<&'static str> = values.iter().map(|(name, _)| *name).collect();
+    PossibleValuesParser::new(names).try_map(move |typed| {
+        let found = values.iter().find(|(name, _)| *name == typed);
+        found
+            .map(|(_, value)| value.clone())
+            .ok_or("not among the possible values")
+    })
 }
 
 /// `LO..HI`, finite and in order.
@@ -342,21 +373,6 @@ names!(FitMethodName for Option<IvMethod> {
     Sriv = Some(IvMethod::Sriv),
     Rivbj = Some(IvMethod::RivBj),
 });
-names!(StructureName for Kind {
-    Arx = Kind::Polynomial(Structure::Arx),
-    Armax = Kind::Polynomial(Structure::Armax),
-    Oe = Kind::Polynomial(Structure::OutputError),
-    Bj = Kind::Polynomial(Structure::BoxJenkins),
-    Fir = Kind::Polynomial(Structure::Fir),
-    Ar = Kind::Polynomial(Structure::Ar),
-    Ma = Kind::Polynomial(Structure::Ma),
-    Arma = Kind::Polynomial(Structure::Arma),
-    Ararx = Kind::Polynomial(Structure::Ararx),
-    Ararmax = Kind::Polynomial(Structure::Ararmax),
-    General = Kind::Polynomial(Structure::General),
-    GreyBox = Kind::GreyBox,
-    TimeVarying = Kind::TimeVarying,
-});
 names!(FocusName for Focus { Prediction = Focus::Prediction, Simulation = Focus::Simulation });
 names!(SearchMethodName for SearchMethod {
     Auto = SearchMethod::Automatic,
@@ -379,17 +395,6 @@ names!(InitialStateName for Option<InitialState> {
     Estimate = Some(InitialState::Estimate),
     Backcast = Some(InitialState::Backcast),
 });
-names!(DetrendName for Detrend { None = Detrend::None, Mean = Detrend::Mean, Linear = Detrend::Linear });
-names!(NoiseDefinitionName for NoiseDefinition {
-    Response = NoiseDefinition::Response,
-    Remnant = NoiseDefinition::Remnant,
-});
-names!(RealisationName for Realisation { Input = Realisation::Input, Output = Realisation::Output });
-names!(RemnantDiscretisationName for RemnantDiscretisation {
-    Zoh = RemnantDiscretisation::ZeroOrderHold,
-    BackwardEuler = RemnantDiscretisation::BackwardEuler,
-});
-
 /// A discretisation; prewarping needs its frequency besides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MethodName {

@@ -84,7 +84,7 @@ fn remnant(found: &Result<RemnantEstimate, NotConvertible>) -> Value {
         Ok(r) => json!({
             "convertible": true,
             "order": r.order,
-            "discretisation": crate::text::remnant_discretisation(r.discretisation),
+            "discretisation": r.discretisation.name(),
             "T_n": estimate(&r.t_n_s),
             "K_n": estimate(&r.k_n),
         }),
@@ -280,7 +280,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> Va
             "samples": r.len(),
             "sample_time": number(r.sample_time().s()),
             "preparation": list(&account.steps),
-            "trouble": list(&account.trouble),
+            "trouble": list(&account.quality_issues),
         })
     };
     files.iter().zip(records).zip(accounts).map(record).collect()
@@ -289,8 +289,13 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> Va
 /// What is wrong with the sampling, in words.
 pub fn warnings(files: &[String], accounts: &[Account]) -> Value {
     let all = files.iter().zip(accounts);
-    all.flat_map(|(file, account)| account.trouble.iter().map(move |one| json!(format!("{file}: {one}"))))
-        .collect()
+    all.flat_map(|(file, account)| {
+        account
+            .quality_issues
+            .iter()
+            .map(move |one| json!(format!("{file}: {one}")))
+    })
+    .collect()
 }
 
 /// What the library writes about itself, one object each.

@@ -8,7 +8,6 @@ use hoid_ident::{
 };
 use hoid_model::{
     NotConvertible, Record,
-    remnant::RemnantDiscretisation,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
 use hoid_report::numbers;
@@ -41,14 +40,6 @@ pub fn table(header: &[&str]) -> Table {
 /// Value and standard error as two texts with the digits that the error allows.
 pub fn with_uncertainty(e: &Estimate) -> (String, String) {
     numbers::with_uncertainty(e.value, e.standard_error)
-}
-
-/// Name of a discretisation as on the command line.
-pub fn remnant_discretisation(how: RemnantDiscretisation) -> &'static str {
-    match how {
-        RemnantDiscretisation::ZeroOrderHold => "zoh",
-        RemnantDiscretisation::BackwardEuler => "backward-euler",
-    }
 }
 
 /// The records in use, and what was done to them.
@@ -195,8 +186,7 @@ pub fn remnant(found: &Result<RemnantEstimate, NotConvertible>) -> String {
             let ((t_n, t_n_error), (k_n, k_n_error)) = (with_uncertainty(&r.t_n_s), with_uncertainty(&r.k_n));
             format!(
                 "Remnant of order {} ({}): T_n = {t_n} s (standard error {t_n_error}), K_n = {k_n} ({k_n_error}).\n",
-                r.order,
-                remnant_discretisation(r.discretisation)
+                r.order, r.discretisation
             )
         }
         Err(reason) => format!("Remnant filter: {}.\n", not_convertible(reason)),

@@ -80,7 +80,7 @@ pub(crate) fn record(structure: Structure, orders: &Orders, record: &Record, fir
     let label = || record.label().to_owned();
     if structure.has_input() && record.input_channel().is_none() {
         return Err(IdentError::NoInput {
-            structure: structure.to_string(),
+            structure: structure.label(),
             label: label(),
         });
     }

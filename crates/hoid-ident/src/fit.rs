@@ -238,7 +238,7 @@ impl Fit {
     pub fn title(&self) -> String {
         match &self.physical {
             Some(_) => format!("Grey box with a remnant of order m = {}", self.orders().nd),
-            None => format!("{}({})", self.model.structure(), self.orders()),
+            None => format!("{}({})", self.model.structure().label(), self.orders()),
         }
     }
 

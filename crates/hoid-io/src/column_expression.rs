@@ -8,6 +8,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use crate::IoError;
+use crate::wording::list;
 
 /// A column, its negative, or the difference of two columns. It is text until the columns of a file are known.
 ///
@@ -135,19 +136,6 @@ impl fmt::Display for ColumnExpression {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.text)
     }
-}
-
-/// Names for a message: all of them, unless there are very many.
-pub(crate) fn list(names: &[&str]) -> String {
-    const SHOWN: usize = 40;
-    let named: Vec<&str> = names.iter().copied().filter(|name| !name.is_empty()).collect();
-    let mut text = named[..named.len().min(SHOWN)].join(", ");
-    match named.len() {
-        0 => text.push_str("no named columns"),
-        n if n > SHOWN => text.push_str(&format!(" and {} more", n - SHOWN)),
-        _ => {}
-    }
-    text
 }
 
 #[cfg(test)]

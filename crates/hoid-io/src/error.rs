@@ -38,7 +38,7 @@ pub enum IoError {
         /// The extension, or that there is none.
         found: String,
         /// The extensions that are known.
-        expected: &'static str,
+        expected: String,
     },
     /// Bytes that are no text.
     #[error("{file}, {place}: {found}, expected text in UTF-8; save the table as CSV in UTF-8")]

@@ -1,99 +1,99 @@
-//! The formats of files, by extension, here and nowhere else.
+//! What the rest of the crate knows of a file format: its name, its endings, how it is read and how it is written.
+//!
+//! A format says all of this in one [`Format`], in its own module of `formats`; reading, writing, the survey of a file and all
+//! messages go through it.
 
-use std::fs;
-use std::path::Path;
+use std::io::{self, Write};
+
+use hoid_model::Record;
 
 use crate::IoError;
+use crate::arrays::{Contents, output_table_of, table_of};
+use crate::output_table::{OutputTable, TableSchema, Values};
+use crate::read_options::ReadOptions;
+use crate::table::Table;
 
-/// A format of columns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Format {
-    /// The separator is the one to write; any is read.
-    Csv {
-        separator: u8,
+/// A file format.
+pub(crate) struct Format {
+    /// Its name for a person.
+    pub(crate) name: &'static str,
+    /// The extensions in lower case that stand for it, the usual one first.
+    pub(crate) endings: &'static [&'static str],
+    /// How its bytes are read.
+    pub(crate) reading: Reading,
+    /// How a table of results is written.
+    pub(crate) writing: Writing,
+    /// How a record is written, where that is not as a table of its channels.
+    pub(crate) record: Option<RecordWriter>,
+}
+
+/// The columns that a record is made of; the reader may take the bytes or borrow from them.
+type TableReader = for<'a> fn(&'a mut Vec<u8>, &'a str) -> Result<Table<'a>, IoError>;
+/// The columns of a table of results with their kinds.
+type ResultsReader = fn(Vec<u8>, &str) -> Result<OutputTable, IoError>;
+/// All arrays with their paths.
+type ArraysReader = fn(Vec<u8>, &str) -> Result<Contents, IoError>;
+/// Begins a file of rows.
+type RowsStart = fn(&mut dyn Write, &TableSchema) -> io::Result<Box<dyn RowWriter>>;
+/// Writes columns of one length.
+pub(crate) type ColumnsWriter = fn(&mut dyn Write, &TableSchema, &[Values<'_>]) -> io::Result<()>;
+type RecordWriter = fn(&mut dyn Write, &Record) -> io::Result<()>;
+
+/// What a file of the format is.
+pub(crate) enum Reading {
+    /// One flat table.
+    Table {
+        /// As columns of numbers, for a record.
+        record: TableReader,
+        /// As it was written, for results.
+        results: ResultsReader,
     },
-    Parquet,
-    Npz,
-    Mat,
-    /// One array, which is read only.
-    Npy,
-    /// Streams, which are read only.
-    Xdf,
+    /// Named arrays, among which the columns are chosen.
+    Arrays(ArraysReader),
+}
+
+/// How the format takes columns.
+pub(crate) enum Writing {
+    /// Row by row, in bounded memory.
+    Rows(RowsStart),
+    /// Each column as one array, which says its length first: all rows have to be there.
+    Columns(ColumnsWriter),
+    /// Not at all; what the extension stands for, as in "the format of a recorder".
+    ReadOnly(&'static str),
+}
+
+/// A file between its groups of rows. The file is lent for one call at a time.
+pub(crate) trait RowWriter {
+    /// Writes columns of one length.
+    fn rows(&mut self, file: &mut dyn Write, columns: &[Values<'_>]) -> io::Result<()>;
+    /// Ends the file.
+    fn finish(self: Box<Self>, file: &mut dyn Write) -> io::Result<()>;
 }
 
 impl Format {
-    const EXPECTED: &'static str = ".csv (also as .tsv or .txt), .parquet (also as .pq), .npz, .npy, .mat or .xdf";
+    /// Whether tables and records can be written.
+    pub(crate) fn is_written(&self) -> bool {
+        !matches!(self.writing, Writing::ReadOnly(_))
+    }
 
-    /// Its name for a person.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Csv { .. } => "CSV",
-            Self::Parquet => "Parquet",
-            Self::Npz => "NPZ",
-            Self::Npy => "NPY",
-            Self::Mat => "MATLAB",
-            Self::Xdf => "XDF",
+    /// The columns that a record is made of.
+    pub(crate) fn table<'a>(
+        &self,
+        bytes: &'a mut Vec<u8>,
+        file: &'a str,
+        options: &ReadOptions,
+    ) -> Result<Table<'a>, IoError> {
+        match self.reading {
+            Reading::Table { record, .. } => record(bytes, file),
+            Reading::Arrays(read) => table_of(read(std::mem::take(bytes), file)?, options, file),
         }
     }
 
-    /// Whether each column is one array, which says its length first.
-    pub(crate) fn is_whole(self) -> bool {
-        matches!(self, Self::Npz | Self::Mat)
-    }
-
-    /// What can be written.
-    const WRITTEN: &'static str = ".csv (also as .tsv or .txt), .parquet (also as .pq), .npz or .mat";
-
-    pub(crate) fn of(path: &Path) -> Result<Self, IoError> {
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        match extension.as_deref() {
-            Some("csv" | "txt") => Ok(Self::Csv { separator: b',' }),
-            Some("tsv") => Ok(Self::Csv { separator: b'\t' }),
-            Some("parquet" | "pq") => Ok(Self::Parquet),
-            Some("npz") => Ok(Self::Npz),
-            Some("mat") => Ok(Self::Mat),
-            Some("xdf") => Ok(Self::Xdf),
-            Some("npy") => Ok(Self::Npy),
-            other => Err(IoError::UnknownFormat {
-                file: path.display().to_string(),
-                found: other.map_or(String::from("there is no extension"), |e| {
-                    format!("the extension is .{e}")
-                }),
-                expected: Self::EXPECTED,
-            }),
+    /// A table of results.
+    pub(crate) fn results(&self, bytes: Vec<u8>, file: &str) -> Result<OutputTable, IoError> {
+        match self.reading {
+            Reading::Table { results, .. } => results(bytes, file),
+            Reading::Arrays(read) => output_table_of(read(bytes, file)?, file),
         }
     }
-}
-
-/// The format of a file to write, which is no directory. A pipe or a device takes CSV under any other name.
-pub(crate) fn format_to_write(path: &Path) -> Result<Format, IoError> {
-    let known = fs::metadata(path).ok();
-    let format = match known {
-        Some(known) if known.is_dir() => Err(IoError::Directory {
-            file: path.display().to_string(),
-        }),
-        Some(known) if !known.is_file() => Ok(Format::of(path).unwrap_or(Format::Csv { separator: b',' })),
-        _ => Format::of(path),
-    }?;
-    let why = match format {
-        Format::Npy => "the extension is .npy, a single array without names",
-        Format::Xdf => "the extension is .xdf, the format of a recorder",
-        format => return Ok(format),
-    };
-    Err(IoError::UnknownFormat {
-        file: path.display().to_string(),
-        found: why.to_owned(),
-        expected: Format::WRITTEN,
-    })
-}
-
-/// The format of a file, and what is in it.
-pub(crate) fn bytes_of(path: &Path) -> Result<(Format, Vec<u8>), IoError> {
-    let file = || path.display().to_string();
-    if path.is_dir() {
-        return Err(IoError::Directory { file: file() });
-    }
-    let format = Format::of(path)?;
-    let bytes = fs::read(path).map_err(|source| IoError::Unreadable { file: file(), source })?;
-    Ok((format, bytes))
 }

@@ -10,6 +10,7 @@ use std::sync::Once;
 use std::thread;
 
 use crate::IoError;
+use crate::wording::told;
 
 thread_local! {
     static READING: Cell<bool> = const { Cell::new(false) };
@@ -49,12 +50,6 @@ fn without_panic<T>(read: impl FnOnce() -> T) -> Result<T, String> {
         Ok(text) => *text,
         Err(panic) => panic.downcast_ref::<&str>().copied().unwrap_or_default().to_owned(),
     })
-}
-
-/// What a crate says, short, and without anything that a terminal obeys.
-pub(crate) fn told(what: &str) -> String {
-    let line = what.lines().next().unwrap_or_default();
-    line.chars().take(200).collect::<String>().escape_debug().to_string()
 }
 
 #[cfg(test)]

@@ -2,66 +2,62 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | `record_file` | [`read_record`], [`read_prepared`], [`write_record`]: the format by extension, what to read and how |
-//! | `column_expression` | [`ColumnExpression`]: which columns are input and output |
-//! | `output_table` | [`OutputTable`], [`write_table`], [`read_table`]: columns of results |
-//! | `table_writer` | [`TableWriter`]: the same in bounded memory |
-//! | `format` | the formats and their extensions |
-//! | `csv_table`, `csv_record`, `csv_columns` | CSV: in, out, and for columns of results |
-//! | `parquet`, `parquet_record` | Parquet, and records in it |
+//! | `record_file` | [`read_record`], [`read_prepared`], [`write_record`] |
+//! | `table_file` | [`write_table`], [`read_table`]: tables of results; [`TableWriter`]: the same in bounded memory |
+//! | `survey` | [`survey()`]: what is inside of a file |
+//! | `segments` | [`read_segments`]: the records between faults of the recording |
+//! | `scenario_file` | [`read_scenario`]: scenarios in TOML |
+//! | `formats`, `format` | the formats, and what each says of itself |
 //! | `arrays` | files of named arrays: paths, and the columns among them |
-//! | `mat` | variables of MATLAB |
-//! | `npz` | NPZ and NPY of numpy |
-//! | `column_record` | a record into any format of columns but CSV |
-//! | `xdf` | streams of the Lab Streaming Layer |
-//! | `table`, `assemble` | the columns of any format, and the record made of them |
+//! | `table`, `table_reader`, `time_grid`, `record_from_table` | the columns of any format, and the record made of them |
+//! | `column_expression`, `read_options` | [`ColumnExpression`], [`ReadOptions`]: what is read and how |
 //! | `preparation` | [`Preparation`]: scale, offset, rate, run-in and trend of channels, and the account of it |
 //! | `sampling`, `repair` | whether t is even; `--resample` and `--fill` |
-//! | `trouble` | [`Trouble`]: what is wrong with the sampling, where and how much |
-//! | `stretches` | [`read_stretches`]: the records between troubles |
-//! | `survey` | [`survey()`]: what is inside of a file |
-//! | `scenario_file` | [`read_scenario`]: scenarios in TOML |
+//! | `data_quality` | [`QualityIssue`]: what is wrong with the sampling and the values, where and how much |
+//! | `output_table` | [`OutputTable`]: columns of results |
+//! | `wording` | numbers and names in messages |
 //! | `guarded` | panics of foreign readers as errors |
 //! | `atomic` | [`write_atomically`]: files that are whole or not there |
 //! | `error` | [`IoError`] |
 
 mod arrays;
-mod assemble;
 mod atomic;
 mod column_expression;
-mod column_record;
-mod csv_columns;
-mod csv_record;
-mod csv_table;
+mod data_quality;
 mod error;
 mod format;
+mod formats;
 mod guarded;
-mod mat;
-mod npz;
 mod output_table;
-mod parquet;
-mod parquet_record;
 mod preparation;
+mod read_options;
+mod record_columns;
 mod record_file;
+mod record_from_table;
 mod repair;
 mod sampling;
 mod scenario_file;
-mod stretches;
+mod segments;
 mod survey;
 mod table;
+mod table_file;
+mod table_reader;
 mod table_writer;
-mod trouble;
-mod xdf;
+mod time_grid;
+mod wording;
 
 pub use atomic::{file_names, make_directory, read_bytes, read_text, write_atomically};
 pub use column_expression::ColumnExpression;
+pub use data_quality::{Place, QualityIssue, QualityIssueKind};
 pub use error::IoError;
+pub use formats::{readable_endings, writable_endings};
 pub use output_table::{ColumnKind, ColumnSchema, ColumnValues, OutputColumn, OutputTable, TableSchema};
-pub use output_table::{check_table_path, read_table, write_table};
 pub use preparation::{NewRate, Offset, Preparation, Scaling, Step};
-pub use record_file::{ReadOptions, ReadRecord, Repair, read_prepared, read_record, write_record, write_record_csv};
+pub use read_options::{ReadOptions, Repair};
+pub use record_file::{read_prepared, read_record, write_record, write_record_csv};
+pub use record_from_table::ReadRecord;
 pub use scenario_file::{ScenarioFileError, parse_scenario, read_scenario, scenario_schema};
-pub use stretches::read_stretches;
+pub use segments::read_segments;
 pub use survey::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey, survey};
+pub use table_file::{check_table_path, read_table, write_table};
 pub use table_writer::TableWriter;
-pub use trouble::{Place, Trouble, TroubleKind};

@@ -1,4 +1,4 @@
-//! Columns of results, into files and out of them.
+//! Columns of results, as they go into files and come out of them.
 //!
 //! | | CSV | Parquet |
 //! |---|---|---|
@@ -12,13 +12,8 @@
 //! of no rows.
 
 use std::ops::Range;
-use std::path::Path;
 
-use crate::arrays::output_table_of;
-use crate::format::{Format, bytes_of, format_to_write};
-use crate::table::shown;
-use crate::table_writer::write_values;
-use crate::{IoError, csv_columns, mat, npz, parquet, xdf};
+use crate::IoError;
 
 /// Columns to be written.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -212,93 +207,4 @@ impl Values<'_> {
             Self::Text(values) => Self::Text(&values[rows]),
         }
     }
-}
-
-/// Whether a table can be written to a place of this name; to be asked before long work.
-///
-/// # Errors
-/// [`IoError::UnknownFormat`] for an extension that stands for no format, [`IoError::Directory`].
-pub fn check_table_path(path: &Path) -> Result<(), IoError> {
-    format_to_write(path).map(drop)
-}
-
-/// Writes a table, whole or not at all: as CSV (`.csv`, `.txt`, with tabs `.tsv`), Parquet (`.parquet`, `.pq`),
-/// NPZ (`.npz`) or for MATLAB (`.mat`). The same
-/// table gives the same bytes.
-///
-/// # Errors
-/// Those of [`check_table_path`]; [`IoError::ColumnLength`], [`IoError::NoColumns`], [`IoError::DuplicateColumn`] or
-/// [`IoError::ChannelName`] for what cannot be written; those of [`write_atomically`](crate::write_atomically).
-///
-/// ```
-/// use hoid_io::{ColumnValues, OutputColumn, OutputTable, read_table, write_table};
-/// let column = |name: &str, values| OutputColumn { name: name.into(), values };
-/// let table = OutputTable {
-///     comments: vec!["method: rpem".into()],
-///     columns: vec![
-///         column("t", ColumnValues::Real(vec![0.0, 0.01])),
-///         column("convertible", ColumnValues::Whole(vec![0, 1])),
-///     ],
-/// };
-/// let path = std::env::temp_dir().join("hoid-example.parquet");
-/// write_table(&path, &table)?;
-/// assert_eq!(read_table(&path)?, table);
-/// # std::fs::remove_file(&path).unwrap();
-/// # Ok::<(), hoid_io::IoError>(())
-/// ```
-pub fn write_table(path: &Path, table: &OutputTable) -> Result<(), IoError> {
-    table.rows(&path.display().to_string())?;
-    write_values(path, table.schema(), &table.values())
-}
-
-/// Reads a table back, with the kinds that it was written with; see the table of this module for those of CSV. A column of
-/// integers in a Parquet file of other origin is whole where no value is missing or negative, else real.
-///
-/// # Errors
-/// [`IoError`], naming the place in the file.
-pub fn read_table(path: &Path) -> Result<OutputTable, IoError> {
-    let file = path.display().to_string();
-    let (format, bytes) = bytes_of(path)?;
-    match format {
-        Format::Csv { .. } => csv_columns::read(&bytes, &file),
-        Format::Parquet => from_parquet(bytes, &file),
-        Format::Npz => output_table_of(npz::read(&bytes, &file)?, &file),
-        Format::Mat => output_table_of(mat::read(bytes, &file)?, &file),
-        Format::Xdf => output_table_of(xdf::read(&bytes, &file)?, &file),
-        Format::Npy => output_table_of(npz::read_single(bytes, &file)?, &file),
-    }
-}
-
-fn from_parquet(bytes: Vec<u8>, file: &str) -> Result<OutputTable, IoError> {
-    let read = parquet::read(bytes, file)?;
-    let mut columns = Vec::with_capacity(read.columns.len());
-    for parquet::ReadColumn { name, data, nulls, .. } in read.columns {
-        let real = |mut values: Vec<f64>| {
-            nulls.iter().for_each(|row| values[*row] = f64::NAN);
-            ColumnValues::Real(values)
-        };
-        let values = match data {
-            parquet::Data::Real(values) => real(values),
-            parquet::Data::Signed(values) if nulls.is_empty() && values.iter().all(|value| *value >= 0) => {
-                ColumnValues::Whole(values.into_iter().map(|value| value as u64).collect())
-            }
-            parquet::Data::Signed(values) => real(values.into_iter().map(|value| value as f64).collect()),
-            parquet::Data::Unsigned(values) if nulls.is_empty() => ColumnValues::Whole(values),
-            parquet::Data::Unsigned(values) => real(values.into_iter().map(|value| value as f64).collect()),
-            // A missing text was read as an empty one.
-            parquet::Data::Text(values) => ColumnValues::Text(values),
-            parquet::Data::Unread(what) => {
-                return Err(IoError::Unsupported {
-                    file: file.to_owned(),
-                    found: format!("column {} holds {what}", shown(&name)),
-                    remedy: "write the table without it",
-                });
-            }
-        };
-        columns.push(OutputColumn { name, values });
-    }
-    Ok(OutputTable {
-        comments: read.comments,
-        columns,
-    })
 }

@@ -1,15 +1,18 @@
 //! What is inside of a file, before anything is chosen: columns, their sampling and ranges, and what is suspicious in them.
 //!
-//! Nothing is judged finally here: a channel may rightly be constant. What is suspicious is found by `trouble`, in columns that
+//! Nothing is judged finally here: a channel may rightly be constant. What is suspicious is found by `data_quality`, in columns that
 //! belong to one time together; a column that is constant is only marked, because many files carry such.
 
 use std::path::Path;
 
-use crate::arrays::{Contents, Holds, TIMES};
-use crate::format::{Format, bytes_of};
-use crate::table::{Precision, Table};
-use crate::trouble::{self, Grid, Levels, Signal, Signals};
-use crate::{IoError, Trouble, TroubleKind, csv_table, mat, npz, parquet_record, xdf};
+use crate::IoError;
+use crate::arrays::{ColumnPath, Contents, Holds, TIMES};
+use crate::data_quality::{
+    Grid, Levels, QualityIssue, QualityIssueKind, Signal, Signals, issues_of, names_a_clock, rails,
+};
+use crate::format::Reading;
+use crate::formats::bytes_of;
+use crate::table::{Column, Precision, Table};
 
 /// Characters of a sketch.
 const SKETCH: usize = 32;
@@ -25,7 +28,7 @@ pub struct FileSurvey {
     /// The sampling of each structure with a time, one for a flat table.
     pub samplings: Vec<SamplingSurvey>,
     /// What is wrong with the sampling, structure by structure.
-    pub trouble: Vec<Trouble>,
+    pub quality_issues: Vec<QualityIssue>,
     /// What to know about how it was read.
     pub notes: Vec<String>,
 }
@@ -113,14 +116,10 @@ struct Read {
 /// Those of reading: [`IoError`], naming the place in the file.
 pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
     let file = path.display().to_string();
-    let (format, bytes) = bytes_of(path)?;
-    let (columns, notes) = match format {
-        Format::Csv { .. } => of_table(csv_table::parse(&bytes, &file)?),
-        Format::Parquet => of_table(parquet_record::parse(bytes, &file)?),
-        Format::Npz => of_arrays(&npz::read(&bytes, &file)?),
-        Format::Npy => of_arrays(&npz::read_single(bytes, &file)?),
-        Format::Mat => of_arrays(&mat::read(bytes, &file)?),
-        Format::Xdf => of_arrays(&xdf::read(&bytes, &file)?),
+    let (format, mut bytes) = bytes_of(path)?;
+    let (columns, notes) = match format.reading {
+        Reading::Table { record, .. } => of_table(record(&mut bytes, &file)?),
+        Reading::Arrays(read) => of_arrays(&read(bytes, &file)?),
     };
     let is_time = |column: &&Read| TIMES.contains(&column.name.as_str()) && column.rows > 1;
     let samplings = columns
@@ -128,7 +127,7 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
         .filter(is_time)
         .filter_map(|time| sampling(time, &columns))
         .collect();
-    let trouble = troubles(&columns);
+    let quality_issues = quality_issues(&columns);
     let survey = |column: Read| ColumnSurvey {
         values: column.values.as_deref().and_then(values),
         path: column.path,
@@ -137,9 +136,9 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
         rows: column.rows,
     };
     Ok(FileSurvey {
-        format: format.name(),
+        format: format.name,
         samplings,
-        trouble,
+        quality_issues,
         columns: columns.into_iter().map(survey).collect(),
         notes,
     })
@@ -147,7 +146,7 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
 
 fn of_table(table: Table<'_>) -> (Vec<Read>, Vec<String>) {
     let rows = table.rows;
-    let read = |column: crate::table::Column| {
+    let read = |column: Column| {
         let text = column.texts.len() == rows;
         Read {
             path: column.name.clone(),
@@ -164,21 +163,21 @@ fn of_table(table: Table<'_>) -> (Vec<Read>, Vec<String>) {
 }
 
 fn of_arrays(contents: &Contents) -> (Vec<Read>, Vec<String>) {
-    let leaves = contents.leaves();
-    let read = |leaf: crate::arrays::Leaf| Read {
-        parent: leaf.parent.clone(),
-        name: leaf.name().to_owned(),
-        unit: leaf.unit.clone(),
-        kind: leaf.what(),
-        rows: leaf.len(),
-        values: match &leaf.holds {
+    let column_paths = contents.column_paths();
+    let read = |column_path: ColumnPath| Read {
+        parent: column_path.parent.clone(),
+        name: column_path.name().to_owned(),
+        unit: column_path.unit.clone(),
+        kind: column_path.what(),
+        rows: column_path.len(),
+        values: match &column_path.holds {
             Holds::Numbers(numbers) => Some(numbers.values()),
             Holds::Texts(_) | Holds::Unread(_) => None,
         },
-        path: leaf.path,
+        path: column_path.path,
         precision: Precision::default(),
     };
-    (leaves.into_iter().map(read).collect(), contents.notes.clone())
+    (column_paths.into_iter().map(read).collect(), contents.notes.clone())
 }
 
 fn signal(column: &Read) -> Signal<'_> {
@@ -189,7 +188,7 @@ fn signal(column: &Read) -> Signal<'_> {
 }
 
 /// What is wrong with the columns that stand beside each other, by structure and length.
-fn troubles(columns: &[Read]) -> Vec<Trouble> {
+fn quality_issues(columns: &[Read]) -> Vec<QualityIssue> {
     let mut seen: Vec<(&str, usize)> = Vec::new();
     let mut found = Vec::new();
     for column in columns.iter().filter(|column| column.rows > 1) {
@@ -204,8 +203,8 @@ fn troubles(columns: &[Read]) -> Vec<Trouble> {
             .find_map(|name| beside().find(|c| c.name == *name && c.values.is_some()));
         let is_time = |c: &Read| time.is_some_and(|time| time.path == c.path);
         let numbers = || beside().filter(|c| c.values.is_some() && !is_time(c));
-        let is_clock = |c: &&Read| trouble::names_a_clock(&c.name) || TIMES.contains(&c.name.as_str());
-        found.extend(trouble::find(&Signals {
+        let is_clock = |c: &&Read| names_a_clock(&c.name) || TIMES.contains(&c.name.as_str());
+        found.extend(issues_of(&Signals {
             columns: numbers().filter(|c| !is_clock(c)).map(signal).collect(),
             time: time.map(signal),
             precision: time.map(|c| c.precision).unwrap_or_default(),
@@ -213,7 +212,7 @@ fn troubles(columns: &[Read]) -> Vec<Trouble> {
             ..Signals::default()
         }));
     }
-    found.retain(|one| one.kind != TroubleKind::Constant);
+    found.retain(|one| one.kind != QualityIssueKind::Constant);
     found
 }
 
@@ -236,9 +235,9 @@ fn values(all: &[f64]) -> Option<ValueSurvey> {
     let deviation = (finite.iter().map(|v| (v - mean).powi(2) / n).sum::<f64>()).sqrt();
     let constant = min == max;
     let levels = Levels::of(all);
-    let rails = trouble::rails(all, &levels);
+    let found = rails(all, &levels);
     let at_rail = |upper: bool| {
-        let rail = rails.iter().find(|rail| rail.is_upper == upper);
+        let rail = found.iter().find(|rail| rail.is_upper == upper);
         rail.map_or(0, |rail| rail.rows())
     };
     let (low, high) = (at_rail(false), at_rail(true));

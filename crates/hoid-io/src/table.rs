@@ -4,13 +4,10 @@
 //! value that is missing or no number is NaN here; the file is asked again what stood there only when an error has to say
 //! so, which keeps a million rows cheap.
 
-use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::IoError;
-
-/// A cell in a message is cut to this many characters.
-const SHOWN: usize = 40;
+use crate::wording::shown;
 
 /// What stands in a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -219,16 +216,6 @@ pub(crate) fn asides<'a>(comments: impl Iterator<Item = &'a str>, columns: &mut 
         }
     }
     sample_time_s
-}
-
-/// A cell or a name for a message: short, and without anything that a terminal obeys.
-pub(crate) fn shown(text: &str) -> String {
-    let text = text.trim();
-    let cut = match text.char_indices().nth(SHOWN) {
-        Some((at, _)) => Cow::Owned(format!("{}...", &text[..at])),
-        None => Cow::Borrowed(text),
-    };
-    cut.escape_debug().to_string()
 }
 
 #[cfg(test)]

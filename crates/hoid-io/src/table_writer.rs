@@ -4,48 +4,46 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use crate::atomic::WholeFile;
-use crate::csv_columns::CsvColumns;
-use crate::format::{Format, format_to_write};
+use crate::IoError;
+use crate::atomic::{WholeFile, write_atomically};
+use crate::format::{ColumnsWriter, Format, RowWriter, Writing};
+use crate::formats::format_to_write;
 use crate::output_table::{ColumnKind, ColumnSchema, ColumnValues, OutputTable, TableSchema, Values};
-use crate::{IoError, mat, npz, parquet, write_atomically};
 
 /// Rows that are written together. The file depends on the rows, not on how they came.
 const GROUP: usize = 1 << 16;
 
 /// A file between its groups of rows.
 enum Sink {
-    Csv(CsvColumns),
-    Parquet(Box<parquet::Writer>),
-    Whole(WholeArrays),
+    Rows(Box<dyn RowWriter>),
+    Columns(WaitingColumns),
 }
 
 /// Columns that wait for their end, since an array says its length first.
-struct WholeArrays {
-    format: Format,
+struct WaitingColumns {
+    write: ColumnsWriter,
     schema: TableSchema,
     columns: Vec<ColumnValues>,
 }
 
 impl Sink {
-    fn start(format: Format, file: &mut dyn Write, schema: TableSchema) -> io::Result<Self> {
-        match format {
-            Format::Csv { separator } => CsvColumns::start(file, &schema, separator).map(Self::Csv),
-            Format::Parquet => parquet::Writer::start(file, schema).map(|writer| Self::Parquet(Box::new(writer))),
-            format => Ok(Self::Whole(WholeArrays {
-                format,
+    fn start(format: &Format, file: &mut dyn Write, schema: TableSchema) -> io::Result<Self> {
+        match format.writing {
+            Writing::Rows(start) => start(file, &schema).map(Self::Rows),
+            Writing::Columns(write) => Ok(Self::Columns(WaitingColumns {
+                write,
                 columns: schema.columns.iter().map(|column| none(column.kind)).collect(),
                 schema,
             })),
+            Writing::ReadOnly(what) => Err(io::Error::other(what)),
         }
     }
 
     fn group(&mut self, file: &mut dyn Write, values: &[Values<'_>]) -> io::Result<()> {
         match self {
-            Self::Csv(csv) => csv.rows(file, values),
-            Self::Parquet(parquet) => parquet.group(file, values),
-            Self::Whole(whole) => {
-                for (column, values) in whole.columns.iter_mut().zip(values) {
+            Self::Rows(rows) => rows.rows(file, values),
+            Self::Columns(waiting) => {
+                for (column, values) in waiting.columns.iter_mut().zip(values) {
                     extend(column, *values);
                 }
                 Ok(())
@@ -55,27 +53,11 @@ impl Sink {
 
     fn finish(self, file: &mut dyn Write) -> io::Result<()> {
         match self {
-            Self::Csv(_) => Ok(()),
-            Self::Parquet(parquet) => parquet.finish(file),
-            Self::Whole(WholeArrays {
-                format,
-                schema,
-                columns,
-            }) => {
+            Self::Rows(rows) => rows.finish(file),
+            Self::Columns(WaitingColumns { write, schema, columns }) => {
                 let values: Vec<Values<'_>> = columns.iter().map(ColumnValues::all).collect();
-                write_whole(format, file, &schema, &values)
+                write(file, &schema, &values)
             }
-        }
-    }
-}
-
-/// Writes all columns at once in a format that keeps each as one array.
-fn write_whole(format: Format, file: &mut dyn Write, schema: &TableSchema, values: &[Values<'_>]) -> io::Result<()> {
-    match format {
-        Format::Npz => npz::write(file, schema, values),
-        Format::Mat => mat::write(file, schema, values),
-        Format::Csv { .. } | Format::Parquet | Format::Npy | Format::Xdf => {
-            Err(io::Error::other("no format of whole arrays"))
         }
     }
 }
@@ -85,8 +67,8 @@ pub(crate) fn write_values(path: &Path, schema: TableSchema, values: &[Values<'_
     let format = format_to_write(path)?;
     let schema = schema.checked(&path.display().to_string())?;
     let rows = values.first().map_or(0, Values::len);
-    if format.is_whole() {
-        return write_atomically(path, |file| write_whole(format, file, &schema, values));
+    if let Writing::Columns(write) = format.writing {
+        return write_atomically(path, |file| write(file, &schema, values));
     }
     write_atomically(path, |file| {
         let mut sink = Sink::start(format, file, schema)?;
@@ -99,7 +81,7 @@ pub(crate) fn write_values(path: &Path, schema: TableSchema, values: &[Values<'_
     })
 }
 
-/// A table that grows by and by, for studies that are larger than memory; NPZ and .mat keep their rows in
+/// A table that is written as it grows, for studies that are larger than memory; NPZ and .mat keep their rows in
 /// memory until the end. The file is in its place once
 /// [`finish`](Self::finish) is done; a writer that is dropped before leaves everything as it was. The bytes are those that
 /// [`write_table`](crate::write_table) gives for all rows at once.

@@ -554,7 +554,7 @@ fn recordings_of_people_are_read() {
 }
 
 #[test]
-fn a_constant_term_of_a_difference_is_no_trouble() {
+fn a_constant_term_of_a_difference_is_no_fault() {
     let desk = Desk::new();
     let rows: String = (0..50)
         .map(|k| format!("{:.2},0,{},7\n", 0.01 * f64::from(k), f64::from(k * k % 17).sqrt()))
@@ -562,7 +562,7 @@ fn a_constant_term_of_a_difference_is_no_trouble() {
     let text = format!("t,r,y,u\n{rows}");
     let found = |input: &str, output: &str| -> Vec<String> {
         let read = desk.read(&text, &options(input, output)).unwrap();
-        read.trouble
+        read.quality_issues
             .iter()
             .map(|one| format!("{}: {one}", one.kind.name()))
             .collect()

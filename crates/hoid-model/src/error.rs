@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::UnknownName;
+
 /// Why a model, a record or a conversion could not be made. Each message names the quantity, what was found, what was
 /// expected, and where it helps, the remedy.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -18,15 +20,8 @@ pub enum ModelError {
         expected: &'static str,
     },
     /// A name that stands for nothing.
-    #[error("there is no {quantity} {found}; expected {expected}")]
-    UnknownName {
-        /// What was asked for.
-        quantity: &'static str,
-        /// The name given.
-        found: String,
-        /// The names that exist.
-        expected: &'static str,
-    },
+    #[error(transparent)]
+    UnknownName(#[from] UnknownName),
     /// A sample that is NaN or infinite.
     #[error(
         "channel {channel}: the value at sample {index} is {value}, expected a finite number; remove or repair the sample before identification"

@@ -22,6 +22,7 @@
 //! | [`remnant_gain`] | the gain K_n that gives a demanded noise level |
 
 mod error;
+mod named_choice;
 
 pub mod controlled_element;
 pub mod delayed_operator;
@@ -45,6 +46,7 @@ pub mod uncertainty;
 
 pub use delayed_operator::{DelayedOperator, delayed_operator, delayed_operator_jacobian};
 pub use error::{ModelError, NotConvertible};
+pub use named_choice::{NamedChoice, UnknownName};
 pub use num_complex::Complex64;
 pub use operator::{DiscreteOperator, OperatorParameters};
 pub use polynomial_model::PolynomialModel;

@@ -40,6 +40,8 @@ pub enum Detrend {
     Linear,
 }
 
+crate::named_choice!(Detrend, "detrending", 3, { None => "none", Mean => "mean", Linear => "linear" });
+
 /// Evenly sampled input e, output u and further channels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {

@@ -50,6 +50,11 @@ pub enum RemnantDiscretisation {
     BackwardEuler,
 }
 
+crate::named_choice!(RemnantDiscretisation, "discretisation of the remnant", 2, {
+    ZeroOrderHold => "zoh",
+    BackwardEuler => "backward-euler",
+});
+
 /// `C(q^-1)/D(q^-1) eps'`, both monic with all roots inside the unit circle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseModel {

@@ -32,6 +32,8 @@ pub enum NoiseDefinition {
     Remnant,
 }
 
+crate::named_choice!(NoiseDefinition, "noise definition", 2, { Response => "response", Remnant => "remnant" });
+
 /// One sine of the forcing function.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {

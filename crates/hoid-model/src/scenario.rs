@@ -13,8 +13,6 @@
 //! (eq. 5); the remnant time constant is constant. The delay is that of the text's conditions throughout; where it changes it goes along the same
 //! sigmoid, in steps of a sample. The remnant gain of each state gives the demanded noise level in that state (eq. 43 or A.17).
 
-use std::{fmt, str::FromStr};
-
 use crate::{
     ModelError, OperatorParameters, SampleTime,
     controlled_element::ControlledElement,
@@ -83,31 +81,14 @@ pub enum Condition {
     C6,
 }
 
-impl Condition {
-    /// All of them.
-    pub const ALL: [Self; 6] = [Self::C1, Self::C2, Self::C3, Self::C4, Self::C5, Self::C6];
-}
-
-impl fmt::Display for Condition {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{self:?}")
-    }
-}
-
-impl FromStr for Condition {
-    type Err = ModelError;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Self::ALL
-            .into_iter()
-            .find(|c| c.to_string().eq_ignore_ascii_case(text))
-            .ok_or_else(|| ModelError::UnknownName {
-                quantity: "condition",
-                found: text.to_owned(),
-                expected: "C1, C2, C3, C4, C5 or C6",
-            })
-    }
-}
+crate::named_choice!(Condition, "condition", 6, {
+    C1 => "C1",
+    C2 => "C2",
+    C3 => "C3",
+    C4 => "C4",
+    C5 => "C5",
+    C6 => "C6",
+});
 
 /// How strong the remnant is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -180,6 +161,8 @@ pub enum Realisation {
     /// In the output matrix, as the controllable canonical form of the reference text has it: x jumps when K_c jumps.
     Output,
 }
+
+crate::named_choice!(Realisation, "realisation", 2, { Input => "input", Output => "output" });
 
 /// One task: operator, controlled element, remnant, forcing function and change over time.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,6 +3,18 @@
 //! The general family is `A(q^-1) u(t) = B(q^-1)/F(q^-1) e(t-nk) + C(q^-1)/D(q^-1) eps(t)` (eq. 5.1 times A). A structure says
 //! which polynomials are there. Orders follow the field's software: nb counts the coefficients `b0 ... b_{nb-1}` of B, the
 //! others count the coefficients behind the leading one, nk is the delay of b0 in samples.
+//!
+//! This is the one list of structures: the command line, plans and Python take their names from it.
+//!
+//! ```
+//! use hoid_model::Structure;
+//!
+//! let structure: Structure = "bj".parse()?;
+//! assert_eq!(structure, Structure::BoxJenkins);
+//! assert_eq!(structure.operator_orders(29).to_string(), "nb=2, nd=1, nf=2, nk=29");
+//! assert_eq!((structure.to_string(), structure.label()), ("bj".to_owned(), "BJ".to_owned()));
+//! # Ok::<(), hoid_model::UnknownName>(())
+//! ```
 
 use std::fmt;
 
@@ -39,21 +51,6 @@ pub enum Structure {
 }
 
 impl Structure {
-    /// All structures, in the order of Table 5.1 and the general form behind them.
-    pub const ALL: [Self; 11] = [
-        Self::Fir,
-        Self::Ar,
-        Self::Ma,
-        Self::Arx,
-        Self::Arma,
-        Self::Armax,
-        Self::Ararx,
-        Self::Ararmax,
-        Self::OutputError,
-        Self::BoxJenkins,
-        Self::General,
-    ];
-
     /// The polynomials of the structure, in the order of theta.
     pub fn polynomials(self) -> &'static str {
         match self {
@@ -120,32 +117,29 @@ impl Structure {
         }
     }
 
-    /// Short name as on the command line.
-    pub fn name(self) -> &'static str {
+    /// The name as it stands in tables and figures: `ARX`, `BJ`.
+    pub fn label(self) -> String {
         match self {
-            Self::Fir => "fir",
-            Self::Ar => "ar",
-            Self::Ma => "ma",
-            Self::Arx => "arx",
-            Self::Arma => "arma",
-            Self::Armax => "armax",
-            Self::Ararx => "ararx",
-            Self::Ararmax => "ararmax",
-            Self::OutputError => "oe",
-            Self::BoxJenkins => "bj",
-            Self::General => "general",
+            Self::General => self.name().to_owned(),
+            named => named.name().to_uppercase(),
         }
     }
 }
 
-impl fmt::Display for Structure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::General => f.write_str("general"),
-            other => f.write_str(&other.name().to_uppercase()),
-        }
-    }
-}
+// In the order of Table 5.1, and the general form behind them.
+crate::named_choice!(Structure, "structure", 11, {
+    Fir => "fir",
+    Ar => "ar",
+    Ma => "ma",
+    Arx => "arx",
+    Arma => "arma",
+    Armax => "armax",
+    Ararx => "ararx",
+    Ararmax => "ararmax",
+    OutputError => "oe",
+    BoxJenkins => "bj",
+    General => "general",
+});
 
 /// Numbers of coefficients and the delay.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

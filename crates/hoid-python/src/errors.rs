@@ -4,7 +4,7 @@
 
 use hoid_ident::IdentError;
 use hoid_io::{IoError, ScenarioFileError};
-use hoid_model::{ModelError, NotConvertible};
+use hoid_model::{ModelError, NotConvertible, UnknownName};
 use hoid_report::ReportError;
 use hoid_sim::SimError;
 use hoid_study::StudyError;
@@ -65,6 +65,12 @@ fn in_python(message: &str) -> String {
     }
     text.push_str(rest);
     text
+}
+
+impl From<UnknownName> for Failure {
+    fn from(error: UnknownName) -> Self {
+        ModelError::from(error).into()
+    }
 }
 
 impl From<ModelError> for Failure {

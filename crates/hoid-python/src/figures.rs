@@ -7,7 +7,6 @@ use hoid_ident::{
 use hoid_model::{
     NotConvertible, Orders,
     margins::Margins,
-    remnant::RemnantDiscretisation,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
 use pyo3::{prelude::*, types::PyDict};
@@ -68,11 +67,7 @@ pub fn remnant<'py>(py: Python<'py>, found: &Result<RemnantEstimate, NotConverti
         Ok(r) => {
             all.set_item("convertible", true)?;
             all.set_item("order", r.order)?;
-            let name = match r.discretisation {
-                RemnantDiscretisation::ZeroOrderHold => "zoh",
-                RemnantDiscretisation::BackwardEuler => "backward-euler",
-            };
-            all.set_item("discretisation", name)?;
+            all.set_item("discretisation", r.discretisation.name())?;
             all.set_item("T_n", pair(r.t_n_s))?;
             all.set_item("K_n", pair(r.k_n))?;
         }

@@ -1,8 +1,8 @@
-//! `pyhoid.read`, `pyhoid.read_stretches`, `pyhoid.write` and tables of results.
+//! `pyhoid.read`, `pyhoid.read_segments`, `pyhoid.write` and tables of results.
 
 use std::{collections::BTreeMap, path::PathBuf, str::FromStr};
 
-use hoid_io::{ColumnValues, IoError, NewRate, Preparation, ReadOptions, Repair, read_stretches, write_record};
+use hoid_io::{ColumnValues, IoError, NewRate, Preparation, ReadOptions, Repair, read_segments, write_record};
 use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyDict};
 
@@ -65,15 +65,15 @@ pub fn read<'py>(
     };
     let mask = mask
         .iter()
-        .map(|name| names::trouble_kind(name))
+        .map(|name| names::quality_issue_kind(name))
         .collect::<Outcome<Vec<_>>>()?;
-    let found = py.detach(|| read_stretches(&path, &options, &preparation, &mask, shortest))?;
+    let found = py.detach(|| read_segments(&path, &options, &preparation, &mask, shortest))?;
     found
         .into_iter()
         .map(|read| {
             let steps = read.steps.iter().map(ToString::to_string).collect();
-            let trouble = read.trouble.iter().map(ToString::to_string);
-            let notes = read.notes.iter().cloned().chain(trouble).collect();
+            let issues = read.quality_issues.iter().map(ToString::to_string);
+            let notes = read.notes.iter().cloned().chain(issues).collect();
             Ok((parts(py, read.record)?, steps, notes))
         })
         .collect()

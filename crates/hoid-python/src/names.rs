@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, ops::RangeInclusive};
 use hoid_ident::{
     Constraint, Focus, InitialState, IvMethod, OrderRanges, Prior, SearchMethod, order_selection::Criterion,
 };
-use hoid_io::TroubleKind;
+use hoid_io::QualityIssueKind;
 use hoid_model::{
     Detrend, Structure, discretise, remnant::RemnantDiscretisation, remnant_gain::NoiseDefinition,
     scenario::Realisation,
@@ -29,12 +29,12 @@ pub fn word<T: Clone>(option: &str, found: &str, words: &[(&str, T)]) -> Outcome
 }
 
 /// What can be left out of a record.
-pub fn trouble_kind(found: &str) -> Outcome<TroubleKind> {
+pub fn quality_issue_kind(found: &str) -> Outcome<QualityIssueKind> {
     let kinds = [
-        TroubleKind::Missing,
-        TroubleKind::Gap,
-        TroubleKind::Stalled,
-        TroubleKind::Saturated,
+        QualityIssueKind::Missing,
+        QualityIssueKind::Gap,
+        QualityIssueKind::Stalled,
+        QualityIssueKind::Saturated,
     ];
     word("mask", found, &kinds.map(|kind| (kind.name(), kind)))
 }

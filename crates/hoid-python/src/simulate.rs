@@ -12,7 +12,7 @@ use hoid_model::{
     second_order::HeldSecondOrder,
     uncertainty::OperatorEstimate,
 };
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 use numpy::PyArray1;
 use pyo3::{
     prelude::*,
@@ -75,12 +75,12 @@ pub fn simulate<'py>(
         .strength
         .changed(noise_level, definition)
         .ok_or_else(|| bad_option("noise_definition needs noise_level: the scenario gives K_n itself"))?;
-    let stream = Stream {
+    let run_seed = RunSeed {
         seed,
         cell,
         replication,
     };
-    let record = py.detach(|| Simulator::new(&scenario)?.run(stream, keep_run_in))?;
+    let record = py.detach(|| Simulator::new(&scenario)?.run(run_seed, keep_run_in))?;
     Ok(parts(py, record)?)
 }
 

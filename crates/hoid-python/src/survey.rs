@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use hoid_io::{ColumnSurvey, FileSurvey, SamplingSurvey, Trouble, ValueSurvey, survey};
+use hoid_io::{ColumnSurvey, FileSurvey, QualityIssue, SamplingSurvey, ValueSurvey, survey};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::errors::Outcome;
@@ -15,7 +15,10 @@ pub fn info<'py>(py: Python<'py>, path: PathBuf) -> Outcome<Bound<'py, PyDict>> 
     all.set_item("format", found.format)?;
     all.set_item("samplings", each(&found.samplings, |s| sampling(py, s))?)?;
     all.set_item("columns", each(&found.columns, |c| column(py, c))?)?;
-    all.set_item("trouble", each(&found.trouble, |t| trouble(py, t))?)?;
+    all.set_item(
+        "trouble",
+        each(&found.quality_issues, |issue| quality_issue(py, issue))?,
+    )?;
     all.set_item("notes", found.notes)?;
     Ok(all)
 }
@@ -65,7 +68,7 @@ fn values<'py>(py: Python<'py>, v: &ValueSurvey) -> PyResult<Bound<'py, PyDict>>
     Ok(all)
 }
 
-fn trouble<'py>(py: Python<'py>, t: &Trouble) -> PyResult<Bound<'py, PyDict>> {
+fn quality_issue<'py>(py: Python<'py>, t: &QualityIssue) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     all.set_item("kind", t.kind.name())?;
     all.set_item("channel", &t.channel)?;

@@ -202,7 +202,7 @@ impl PyTrace {
                 settings,
                 record: &record,
                 traces: vec![TraceSection {
-                    name: format!("{}, {}", options.method.name(), options.structure),
+                    name: format!("{}, {}", options.method.name(), options.structure.label()),
                     trace,
                     batch: fits.iter().map(|(span, fit)| line((*span, fit))).collect(),
                 }],

@@ -10,7 +10,7 @@ use hoid_model::{
     scenario::{Condition, Scenario},
 };
 use hoid_report::{ModelSection, Report};
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args()
@@ -20,12 +20,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let simulator = Simulator::new(&scenario)?;
     let mut records = Vec::new();
     for replication in 0..2 {
-        let stream = Stream {
+        let run_seed = RunSeed {
             seed: 1,
             replication,
-            ..Stream::default()
+            ..RunSeed::default()
         };
-        let record = simulator.run(stream, false)?;
+        let record = simulator.run(run_seed, false)?;
         records.push(record.labelled(format!("C1, run {}", replication + 1)));
     }
 

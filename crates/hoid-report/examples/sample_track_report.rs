@@ -9,7 +9,7 @@ use hoid_model::{
     scenario::{Condition, Scenario},
 };
 use hoid_report::{BatchLine, TraceSection, TrackReport};
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 use hoid_track::{Method, StartAt, Trace, TrackOptions, track};
 
 /// Spans of the batch fits, s: before and after the change at 40.96 s.
@@ -20,11 +20,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         .nth(1)
         .ok_or("give the file to write, such as report.html")?;
     let simulator = Simulator::new(&Scenario::condition(Condition::C4))?;
-    let stream = Stream {
+    let run_seed = RunSeed {
         seed: 1,
-        ..Stream::default()
+        ..RunSeed::default()
     };
-    let record = simulator.run(stream, false)?;
+    let record = simulator.run(run_seed, false)?;
     let arx = batch(Structure::Arx, &record)?;
     let bj = batch(Structure::BoxJenkins, &record)?;
     let traces = [

@@ -248,7 +248,10 @@ pub fn course(fit: &Fit, records: &[Record]) -> Vec<Value> {
         n => format!("{n} steps"),
     };
     let rows = [
-        ("model", format!("{}({})", fit.model().structure(), fit.orders())),
+        (
+            "model",
+            format!("{}({})", fit.model().structure().label(), fit.orders()),
+        ),
         ("end of the search", format!("{}; {steps}", end.reason)),
         ("start that won", fit.start().to_owned()),
         ("initial states", initial),

@@ -14,18 +14,18 @@ use hoid_model::{
     uncertainty::Estimate,
 };
 use hoid_report::{ModelSection, Report, ReportError, figures};
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 
 fn runs(n: u64) -> Vec<Record> {
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
     let run = |replication| {
-        let stream = Stream {
+        let run_seed = RunSeed {
             seed: 5,
             replication,
-            ..Stream::default()
+            ..RunSeed::default()
         };
         simulator
-            .run(stream, false)
+            .run(run_seed, false)
             .unwrap()
             .labelled(format!("run {replication}"))
     };

@@ -7,18 +7,18 @@ use hoid_model::{
     scenario::{Condition, Scenario},
 };
 use hoid_report::{BatchLine, ReportError, TraceSection, TrackReport, batch_fit};
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 use hoid_track::{Method, StartAt, StartCovariance, Trace, TrackOptions, track};
 
 const SPANS: [(f64, f64); 2] = [(0.0, 30.72), (51.20, 81.92)];
 
 fn run() -> Record {
     let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
-    let stream = Stream {
+    let run_seed = RunSeed {
         seed: 5,
-        ..Stream::default()
+        ..RunSeed::default()
     };
-    simulator.run(stream, false).unwrap()
+    simulator.run(run_seed, false).unwrap()
 }
 
 fn options(method: Method) -> TrackOptions {
@@ -273,7 +273,7 @@ fn a_batch_fit_beside_a_delay_that_changed_has_the_delay_of_its_span() {
     scenario.last.operator.tau_e_s = 0.34;
     let record = Simulator::new(&scenario)
         .unwrap()
-        .run(Stream::default(), false)
+        .run(RunSeed::default(), false)
         .unwrap();
     let mut with_delay = options(Method::adaptive());
     with_delay.orders = Method::adaptive().usual_orders(29);

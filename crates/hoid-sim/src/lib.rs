@@ -3,14 +3,14 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`Simulator`] | a scenario made ready, and its runs |
-//! | [`Stream`] | the random stream of one run |
+//! | [`RunSeed`] | what names the random numbers of one run |
 //! | `cascade` | exact zero-order hold of the remnant filter |
 
 mod cascade;
 mod error;
+mod run_seed;
 mod simulator;
-mod stream;
 
 pub use error::SimError;
+pub use run_seed::RunSeed;
 pub use simulator::{Signals, Simulator};
-pub use stream::Stream;

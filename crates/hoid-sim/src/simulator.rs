@@ -26,7 +26,7 @@ use hoid_model::{
 };
 
 use crate::{
-    SimError, Stream,
+    RunSeed, SimError,
     cascade::{Cascade, MOST},
 };
 
@@ -136,8 +136,8 @@ impl Simulator {
     ///
     /// # Errors
     /// [`SimError::Diverged`].
-    pub fn run(&self, stream: Stream, keep_run_in: bool) -> Result<Record, SimError> {
-        let signals = self.signals(&stream.white_noise(self.samples()))?;
+    pub fn run(&self, run_seed: RunSeed, keep_run_in: bool) -> Result<Record, SimError> {
+        let signals = self.signals(&run_seed.white_noise(self.samples()))?;
         self.record(signals, keep_run_in)
     }
 

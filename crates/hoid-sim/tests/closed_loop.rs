@@ -9,7 +9,7 @@ use hoid_model::{
     remnant_gain::NoiseDefinition,
     scenario::{Condition, Realisation, RemnantStrength, Scenario},
 };
-use hoid_sim::{Signals, SimError, Simulator, Stream};
+use hoid_sim::{RunSeed, Signals, SimError, Simulator};
 
 fn with_level(condition: Condition, level: f64) -> Scenario {
     let mut scenario = Scenario::condition(condition);
@@ -29,11 +29,11 @@ fn silent_run(scenario: &Scenario) -> (Simulator, Signals) {
 /// White noise for the first runs of a simulator.
 fn noises(simulator: &Simulator, runs: u64) -> Vec<Vec<f64>> {
     let of = |replication| {
-        let stream = Stream {
+        let run_seed = RunSeed {
             replication,
-            ..Stream::default()
+            ..RunSeed::default()
         };
-        stream.white_noise(simulator.samples())
+        run_seed.white_noise(simulator.samples())
     };
     (0..runs).map(of).collect()
 }
@@ -243,7 +243,7 @@ fn the_obtained_noise_level_is_the_demanded_one() {
                 let runs = 200;
                 let levels: Vec<f64> = (0..runs)
                     .map(|replication| {
-                        let noise = Stream {
+                        let noise = RunSeed {
                             seed: 11,
                             cell: order as u64,
                             replication,
@@ -280,22 +280,22 @@ fn the_obtained_noise_level_is_the_demanded_one() {
 #[test]
 fn a_run_is_the_measurement_with_its_truth_and_is_repeatable() {
     let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
-    let stream = Stream {
+    let run_seed = RunSeed {
         seed: 3,
         cell: 1,
         replication: 5,
     };
-    let record = simulator.run(stream, false).unwrap();
+    let record = simulator.run(run_seed, false).unwrap();
     assert_eq!(record.len(), 8192);
     assert_eq!(record.time_s(0), 0.0);
-    assert_eq!(record, simulator.run(stream, false).unwrap());
+    assert_eq!(record, simulator.run(run_seed, false).unwrap());
     assert_ne!(
         record.output(),
         simulator
             .run(
-                Stream {
+                RunSeed {
                     replication: 6,
-                    ..stream
+                    ..run_seed
                 },
                 false
             )
@@ -313,7 +313,7 @@ fn a_run_is_the_measurement_with_its_truth_and_is_repeatable() {
     for (k, f) in record.channel("f_t").unwrap().iter().enumerate() {
         assert!((f - record.input()[k] - record.channel("x").unwrap()[k]).abs() < 1e-12);
     }
-    let whole = simulator.run(stream, true).unwrap();
+    let whole = simulator.run(run_seed, true).unwrap();
     assert_eq!(whole.len(), 9192);
     assert_eq!(whole.time_s(0), -10.0);
     assert_eq!(&whole.input()[1000..], record.input());
@@ -348,7 +348,7 @@ fn the_remnant_has_its_theoretical_variance() {
         let theory: f64 = response.iter().map(|y| y * y).sum();
         let variances: Vec<f64> = (0..100)
             .map(|replication| {
-                let noise = Stream {
+                let noise = RunSeed {
                     seed: 5,
                     cell: order as u64,
                     replication,
@@ -378,7 +378,7 @@ fn a_diverging_loop_is_an_error_and_not_a_row_of_nan() {
     };
     let simulator = Simulator::new(&scenario).unwrap();
     assert!(matches!(
-        simulator.run(Stream::default(), false),
+        simulator.run(RunSeed::default(), false),
         Err(SimError::Diverged { .. })
     ));
     // A noise level has no meaning there, and is refused before anything runs.

@@ -5,11 +5,10 @@ use hoid_io::OutputTable;
 use hoid_model::{
     Record,
     remnant::RemnantDiscretisation,
-    remnant_gain::NoiseDefinition,
     scenario::RemnantStrength,
     uncertainty::{Estimate, OperatorEstimate},
 };
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 use hoid_track::{Trace, track_from};
 
 use crate::{
@@ -99,12 +98,12 @@ pub(crate) fn run_block(
     let all: Vec<u64> = (block.first..block.first + block.count).collect();
     for replications in all.chunks(AT_A_TIME) {
         let run = |&replication: &u64| {
-            let stream = Stream {
+            let run_seed = RunSeed {
                 seed: plan.seed,
                 cell: cell.index,
                 replication,
             };
-            let record = simulator.run(stream, false).map_err(|error| error.to_string());
+            let record = simulator.run(run_seed, false).map_err(|error| error.to_string());
             (replication, record)
         };
         let runs: Vec<Run> = replications.iter().map(run).collect();
@@ -202,13 +201,7 @@ impl<'a> Bench<'a> {
         rows.whole("remnant_order", scenario.remnant.order as u64);
         if let RemnantStrength::Level { level, definition } = scenario.remnant.strength {
             rows.real("noise_level", level);
-            rows.text(
-                "noise_definition",
-                match definition {
-                    NoiseDefinition::Response => "response",
-                    NoiseDefinition::Remnant => "remnant",
-                },
-            );
+            rows.text("noise_definition", definition.name());
         }
         rows.real("T_n_true", scenario.remnant.time_constant_s);
         rows.real("sample_time_s", scenario.sample_time.s());

@@ -10,7 +10,7 @@ use std::{
 
 use hoid_io::{ColumnValues, OutputTable, read_table, write_record};
 use hoid_model::scenario::{Condition, Scenario};
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 use hoid_study::{
     RunOptions, StudyError,
     group::{Manifest, Pattern, Trouble, VirtualExperiment, run_group, simulate_group},
@@ -27,12 +27,12 @@ fn recorded() -> tempfile::TempDir {
             }
             let simulator = Simulator::new(&scenario).unwrap();
             for run in 1..=2 {
-                let stream = Stream {
+                let run_seed = RunSeed {
                     seed: if subject == "A" { 1 } else { 2 },
                     cell: cell as u64,
                     replication: run,
                 };
-                let record = simulator.run(stream, false).unwrap();
+                let record = simulator.run(run_seed, false).unwrap();
                 let name = format!("{subject}_{condition}_{run}.csv");
                 write_record(&directory.path().join(name), &record).unwrap();
             }

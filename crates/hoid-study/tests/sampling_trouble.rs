@@ -4,7 +4,8 @@
 use std::path::Path;
 
 use hoid_io::{
-    Preparation, ReadOptions, Repair, Step, Trouble as Found, TroubleKind, read_prepared, read_record, read_stretches,
+    Preparation, QualityIssue as Found, QualityIssueKind, ReadOptions, Repair, Step, read_prepared, read_record,
+    read_segments,
 };
 use hoid_model::{Record, scenario::Condition};
 use hoid_study::group::{Trouble, VirtualExperiment, simulate_group};
@@ -32,13 +33,13 @@ fn found(trouble: &[Trouble], options: &ReadOptions) -> Vec<(Vec<Found>, Record)
         .map(|name| {
             let read = |directory: &Path, options: &ReadOptions| read_record(&directory.join(name), options).unwrap();
             let whole = read(clean.path(), &ReadOptions::default());
-            assert_eq!(whole.trouble, []);
+            assert_eq!(whole.quality_issues, []);
             let preparation = Preparation {
                 drop_repeated: true,
                 ..Preparation::default()
             };
             let read = read_prepared(&troubled.path().join(name), options, &preparation).unwrap();
-            (read.trouble, whole.record)
+            (read.quality_issues, whole.record)
         })
         .into()
 }
@@ -53,19 +54,19 @@ fn resampled() -> ReadOptions {
     }
 }
 
-fn only(found: &[Found], kinds: &[TroubleKind]) {
+fn only(found: &[Found], kinds: &[QualityIssueKind]) {
     assert_eq!(found.iter().map(|one| one.kind).collect::<Vec<_>>(), kinds, "{found:?}");
 }
 
 #[test]
 fn jitter_and_clocks_have_the_size_that_was_planted() {
     for (found, _) in found(&[Trouble::Jitter], &resampled()) {
-        only(&found, &[TroubleKind::Jitter]);
+        only(&found, &[QualityIssueKind::Jitter]);
         // 0.2 of a sample, clamped at 2.25 standard deviations, which leaves 0.194.
         assert!((found[0].size / 0.01 - 0.194).abs() < 0.006, "{}", found[0]);
     }
     for (found, _) in found(&[Trouble::SlowClock], &ReadOptions::default()) {
-        only(&found, &[TroubleKind::Clock]);
+        only(&found, &[QualityIssueKind::Clock]);
         assert!((found[0].size - (1.0 / 0.998 - 1.0)).abs() < 1e-6, "{}", found[0]);
     }
 }
@@ -74,7 +75,7 @@ fn jitter_and_clocks_have_the_size_that_was_planted() {
 fn missing_and_repeated_rows_are_counted_one_by_one() {
     for trouble in [vec![Trouble::Missing], vec![Trouble::Missing, Trouble::Jitter]] {
         for (found, record) in found(&trouble, &resampled()) {
-            let gap = found.iter().find(|one| one.kind == TroubleKind::Gap).unwrap();
+            let gap = found.iter().find(|one| one.kind == QualityIssueKind::Gap).unwrap();
             // One in two hundred of 8192 rows: 41 with a standard deviation of 6.4.
             assert!((15..70).contains(&gap.rows) && gap.places.len() <= gap.rows, "{gap}");
             let (first, last) = (record.time_s(0), record.time_s(record.len() - 1));
@@ -88,7 +89,7 @@ fn missing_and_repeated_rows_are_counted_one_by_one() {
         }
     }
     for (found, _) in found(&[Trouble::Repeated], &ReadOptions::default()) {
-        only(&found, &[TroubleKind::Repeated]);
+        only(&found, &[QualityIssueKind::Repeated]);
         assert!((15..70).contains(&found[0].rows), "{}", found[0]);
     }
 }
@@ -96,19 +97,19 @@ fn missing_and_repeated_rows_are_counted_one_by_one() {
 #[test]
 fn rails_steps_and_stalls_are_found_where_they_are() {
     for (found, record) in found(&[Trouble::Saturated], &ReadOptions::default()) {
-        only(&found, &[TroubleKind::Saturated, TroubleKind::Saturated]);
+        only(&found, &[QualityIssueKind::Saturated, QualityIssueKind::Saturated]);
         let u = record.output();
         let sd = (u.iter().map(|u| u * u).sum::<f64>() / u.len() as f64).sqrt();
         let beyond = u.iter().filter(|u| u.abs() > 1.5 * sd).count();
         assert_eq!(found.iter().map(|one| one.rows).sum::<usize>(), beyond);
     }
     for (found, record) in found(&[Trouble::Quantised], &ReadOptions::default()) {
-        only(&found, &[TroubleKind::Quantised]);
+        only(&found, &[QualityIssueKind::Quantised]);
         let sd = (record.output().iter().map(|u| u * u).sum::<f64>() / record.len() as f64).sqrt();
         assert!((found[0].size / (8.0 * sd / 256.0) - 1.0).abs() < 1e-9, "{}", found[0]);
     }
     for (found, record) in found(&[Trouble::Stalled], &ReadOptions::default()) {
-        only(&found, &[TroubleKind::Stalled]);
+        only(&found, &[QualityIssueKind::Stalled]);
         let place = found[0].places[0];
         // Rows are counted from 1; the first row of a stall still has a value of its own.
         assert_eq!((place.row, place.rows), (record.len() / 3 + 2, 49));
@@ -121,7 +122,7 @@ fn rails_steps_and_stalls_are_found_where_they_are() {
         Trouble::Missing,
     ];
     for (found, _) in found(&all, &resampled()) {
-        use TroubleKind::{Gap, Quantised, Repeated, Saturated};
+        use QualityIssueKind::{Gap, Quantised, Repeated, Saturated};
         only(&found, &[Repeated, Gap, Saturated, Saturated, Quantised]);
     }
 }
@@ -136,8 +137,8 @@ fn a_record_is_cut_where_it_is_masked() {
     )
     .unwrap();
     let path = directory.path().join("S1_C1_1.csv");
-    let cut = |mask: &[TroubleKind], shortest_s| {
-        read_stretches(
+    let cut = |mask: &[QualityIssueKind], shortest_s| {
+        read_segments(
             &path,
             &ReadOptions::default(),
             &Preparation::default(),
@@ -147,21 +148,21 @@ fn a_record_is_cut_where_it_is_masked() {
     };
     // Without a mask the gaps are an error as ever.
     assert!(cut(&[], 2.0).unwrap_err().to_string().contains("samples missing"));
-    let stretches = cut(&[TroubleKind::Gap, TroubleKind::Stalled], 1.0).unwrap();
-    assert!(stretches.len() > 10);
+    let segments = cut(&[QualityIssueKind::Gap, QualityIssueKind::Stalled], 1.0).unwrap();
+    assert!(segments.len() > 10);
     let mut end = f64::NEG_INFINITY;
-    for stretch in &stretches {
-        let record = &stretch.record;
+    for segment in &segments {
+        let record = &segment.record;
         assert!(record.time_s(0) > end && record.sample_time().s() == 0.01 && record.len() > 100);
         end = record.time_s(record.len() - 1);
-        assert!(matches!(stretch.steps[0], Step::Mask { .. }));
+        assert!(matches!(segment.steps[0], Step::Mask { .. }));
         assert!(record.output().windows(2).all(|pair| pair[0] != pair[1]));
     }
-    assert_eq!(stretches[0].trouble.len(), 2);
+    assert_eq!(segments[0].quality_issues.len(), 2);
     for (mask, shortest, words) in [
-        (&[TroubleKind::Clock][..], 1.0, "some of missing, gap"),
-        (&[TroubleKind::Gap], f64::NAN, "NaN"),
-        (&[TroubleKind::Gap], 1e6, "no stretch of 1000000 s"),
+        (&[QualityIssueKind::Clock][..], 1.0, "some of missing, gap"),
+        (&[QualityIssueKind::Gap], f64::NAN, "NaN"),
+        (&[QualityIssueKind::Gap], 1e6, "no segment of 1000000 s"),
     ] {
         assert!(cut(mask, shortest).unwrap_err().to_string().contains(words), "{words}");
     }
@@ -182,7 +183,7 @@ fn two_hundred_clean_runs_raise_no_alarm() {
         let directory = tempfile::tempdir().unwrap();
         for run in simulate_group(&clean, directory.path(), &|| ()).unwrap().runs {
             let read = read_record(&directory.path().join(&run.file), &ReadOptions::default()).unwrap();
-            assert_eq!(read.trouble, [], "{}", run.file.display());
+            assert_eq!(read.quality_issues, [], "{}", run.file.display());
             runs += 1;
         }
     }

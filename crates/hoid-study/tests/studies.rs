@@ -11,7 +11,7 @@ use std::{
 
 use hoid_io::{ColumnValues, OutputTable, read_table};
 use hoid_model::{Record, scenario::Condition};
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 use hoid_study::{Plan, RunOptions, Shard, StudyError, merge, run};
 
 const PLAN: &str = r#"
@@ -268,12 +268,12 @@ fn a_row_is_the_run_by_itself() {
         level: 0.1,
         definition: hoid_model::remnant_gain::NoiseDefinition::Response,
     };
-    let stream = Stream {
+    let run_seed = RunSeed {
         seed: 7,
         cell: 1,
         replication: 4,
     };
-    let record: Record = Simulator::new(&scenario).unwrap().run(stream, false).unwrap();
+    let record: Record = Simulator::new(&scenario).unwrap().run(run_seed, false).unwrap();
     let structure = hoid_model::Structure::Arx;
     let fit = hoid_ident::Estimator::new(structure, structure.operator_orders(29))
         .fit(&[record.span(0.0, 30.72).unwrap()])

@@ -12,7 +12,7 @@ use hoid_model::{
     scenario::{Condition, Scenario},
     schedule::Schedule,
 };
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 use hoid_track::{ErrorThreshold, Method, Sample, StartAt, TrackOptions, Tracker};
 
 const NK: usize = 29;
@@ -42,12 +42,12 @@ fn simulator(condition: Condition, remnant_order: usize, level: f64) -> Simulato
 
 /// Seed 7000; the method was set on seed 9000, and looked at on seed 5000.
 fn run(simulator: &Simulator, condition: Condition, order: usize, level: usize, replication: u64) -> Record {
-    let stream = Stream {
+    let run_seed = RunSeed {
         seed: 7000,
         cell: condition as u64 * 16 + order as u64 * 4 + level as u64,
         replication,
     };
-    simulator.run(stream, false).unwrap()
+    simulator.run(run_seed, false).unwrap()
 }
 
 fn options(method: Method) -> TrackOptions {
@@ -270,12 +270,12 @@ fn tune(runs: usize) {
             for level in LEVELS {
                 let simulator = simulator(condition, order, level);
                 let found = on_all_cores(runs, |r| {
-                    let stream = Stream {
+                    let run_seed = RunSeed {
                         seed: 9000,
                         cell: condition as u64 * 16 + order as u64 * 4,
                         replication: r,
                     };
-                    let record = simulator.run(stream, false).unwrap();
+                    let record = simulator.run(run_seed, false).unwrap();
                     methods.each_ref().map(|options| follow(&record, options))
                 });
                 let errors = [0, 1, 2, 3, 4]
@@ -366,12 +366,12 @@ fn set(runs: usize) {
                 change(&mut scenario);
                 let simulator = Simulator::new(&scenario).unwrap();
                 found.push(on_all_cores(runs, |replication| {
-                    let stream = Stream {
+                    let run_seed = RunSeed {
                         seed: 9000,
                         cell: *condition as u64 * 16 + order as u64 * 4,
                         replication,
                     };
-                    follow(&simulator.run(stream, false).unwrap(), &options)
+                    follow(&simulator.run(run_seed, false).unwrap(), &options)
                 }));
             }
         }

@@ -11,7 +11,7 @@ use hoid_model::{
     scenario::{Condition, Scenario},
     schedule::Schedule,
 };
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 use hoid_track::{Method, StartAt, TrackOptions, track};
 
 const COLUMNS: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
@@ -67,12 +67,12 @@ fn main() {
                     let simulator = Simulator::new(&with_delay(condition, order, level, delays)).unwrap();
                     let changes = simulator.scenario().scenario().schedule != Schedule::Constant;
                     let each = on_all_cores(runs, |replication| {
-                        let stream = Stream {
+                        let run_seed = RunSeed {
                             seed: if tune { 9000 } else { 7000 },
                             cell: condition as u64 * 16 + order as u64 * 4 + l as u64,
                             replication,
                         };
-                        let record = simulator.run(stream, false).unwrap();
+                        let record = simulator.run(run_seed, false).unwrap();
                         methods.each_ref().map(|(_, options)| follow(&record, options, changes))
                     });
                     for of_methods in each {

@@ -35,7 +35,7 @@ pub fn track_from(
     let sample_time = record.sample_time();
     if options.structure.has_input() && record.input_channel().is_none() {
         return Err(IdentError::NoInput {
-            structure: options.structure.to_string(),
+            structure: options.structure.label(),
             label: record.label().to_owned(),
         });
     }

@@ -99,7 +99,7 @@ mod tests {
         Record, Structure,
         scenario::{Condition, Scenario},
     };
-    use hoid_sim::{Simulator, Stream};
+    use hoid_sim::{RunSeed, Simulator};
 
     use super::*;
     use crate::{Method, Sample};
@@ -108,9 +108,9 @@ mod tests {
         let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
         simulator
             .run(
-                Stream {
+                RunSeed {
                     seed: 4,
-                    ..Stream::default()
+                    ..RunSeed::default()
                 },
                 false,
             )

@@ -9,13 +9,15 @@ use hoid::prelude::*;
 fn batch(c: &mut Criterion) {
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
     let changing = Simulator::new(&Scenario::condition(Condition::C3)).unwrap();
-    let stream = Stream::default();
-    let noise = stream.white_noise(simulator.samples());
-    let record = [simulator.run(stream, false).unwrap()];
+    let run_seed = RunSeed::default();
+    let noise = run_seed.white_noise(simulator.samples());
+    let record = [simulator.run(run_seed, false).unwrap()];
     let estimator = |structure: Structure| Estimator::new(structure, structure.operator_orders(29));
     let (arx, bj) = (estimator(Structure::Arx), estimator(Structure::BoxJenkins));
 
-    c.bench_function("noise of a run", |b| b.iter(|| stream.white_noise(simulator.samples())));
+    c.bench_function("noise of a run", |b| {
+        b.iter(|| run_seed.white_noise(simulator.samples()))
+    });
     c.bench_function("loop, C1, noise given", |b| {
         b.iter(|| simulator.signals(&noise).unwrap())
     });
@@ -23,7 +25,7 @@ fn batch(c: &mut Criterion) {
         b.iter(|| changing.signals(&noise).unwrap())
     });
     c.bench_function("run with all channels, C1", |b| {
-        b.iter(|| simulator.run(stream, false).unwrap())
+        b.iter(|| simulator.run(run_seed, false).unwrap())
     });
     c.bench_function("ARX fit", |b| b.iter(|| arx.fit(&record).unwrap()));
     c.bench_function("BJ fit, own start, initial states, covariance", |b| {

@@ -49,12 +49,12 @@ fn simulator(condition: Condition, remnant_order: usize, noise_level: f64) -> Si
 }
 
 fn run(simulator: &Simulator, cell: u64, replication: u64) -> Record {
-    let stream = Stream {
+    let run_seed = RunSeed {
         seed: 2000,
         cell,
         replication,
     };
-    simulator.run(stream, false).unwrap()
+    simulator.run(run_seed, false).unwrap()
 }
 
 /// Estimates of one quantity over the runs.

@@ -17,9 +17,9 @@ fn main() {
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
     let record = simulator
         .run(
-            Stream {
+            RunSeed {
                 seed: 1,
-                ..Stream::default()
+                ..RunSeed::default()
             },
             false,
         )

@@ -43,12 +43,12 @@ fn simulator(condition: Condition, remnant_order: usize, noise_level: f64) -> Si
 }
 
 fn run(simulator: &Simulator, cell: u64, replication: u64) -> Record {
-    let stream = Stream {
+    let run_seed = RunSeed {
         seed: 3000,
         cell,
         replication,
     };
-    simulator.run(stream, false).unwrap()
+    simulator.run(run_seed, false).unwrap()
 }
 
 /// Results of the runs in their order, on all cores.

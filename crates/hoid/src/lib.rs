@@ -8,7 +8,7 @@
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let simulator = Simulator::new(&Scenario::condition(Condition::C1))?;
-//! let record = simulator.run(Stream { seed: 1, ..Stream::default() }, false)?;
+//! let record = simulator.run(RunSeed { seed: 1, ..RunSeed::default() }, false)?;
 //!
 //! let orders = Structure::BoxJenkins.operator_orders(29);
 //! let fit = Estimator::new(Structure::BoxJenkins, orders).fit(&[record])?;
@@ -38,5 +38,5 @@ pub mod prelude {
         scenario::{Condition, Scenario},
         uncertainty::Estimate,
     };
-    pub use hoid_sim::{Simulator, Stream};
+    pub use hoid_sim::{RunSeed, Simulator};
 }

@@ -24,7 +24,7 @@ fn records(condition: Condition, m0: usize, level: f64) -> Vec<Record> {
             let cell = (m0 as u64) << 8 | (level * 100.0).round() as u64;
             simulator
                 .run(
-                    Stream {
+                    RunSeed {
                         seed: 2024,
                         cell,
                         replication,
@@ -233,7 +233,7 @@ fn a_start_from_rest_biases_the_gains_and_estimated_states_do_not() {
 fn noise_free_ols_returns_the_parameters() {
     for condition in [Condition::C1, Condition::C2] {
         let simulator = Simulator::new(&scenario(condition, 1, 0.0)).unwrap();
-        let record = simulator.run(Stream::default(), false).unwrap();
+        let record = simulator.run(RunSeed::default(), false).unwrap();
         let fit = Estimator::new(Structure::Arx, Structure::Arx.operator_orders(NK))
             .fit(&[record])
             .unwrap();
@@ -247,7 +247,7 @@ fn noise_free_ols_returns_the_parameters() {
 #[test]
 fn noise_free_box_jenkins_is_exact_and_says_so() {
     let simulator = Simulator::new(&scenario(Condition::C1, 1, 0.0)).unwrap();
-    let record = simulator.run(Stream::default(), false).unwrap();
+    let record = simulator.run(RunSeed::default(), false).unwrap();
     let fit = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(NK))
         .fit(&[record])
         .unwrap();

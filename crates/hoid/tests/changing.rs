@@ -18,12 +18,12 @@ fn run(condition: Condition, remnant_order: usize, noise_level: f64, replication
         level: noise_level,
         definition: NoiseDefinition::Response,
     };
-    let stream = Stream {
+    let run_seed = RunSeed {
         seed: 83,
         cell: condition as u64,
         replication,
     };
-    Simulator::new(&scenario).unwrap().run(stream, false).unwrap()
+    Simulator::new(&scenario).unwrap().run(run_seed, false).unwrap()
 }
 
 fn options(method: Method) -> TrackOptions {
@@ -125,12 +125,12 @@ fn a_delay_that_changes_is_followed_and_named() {
         .with(&[("track_delay", "0.2..0.4")])
         .unwrap();
     for replication in 0..2 {
-        let stream = Stream {
+        let run_seed = RunSeed {
             seed: 84,
             cell: 0,
             replication,
         };
-        let record = simulator.run(stream, false).unwrap();
+        let record = simulator.run(run_seed, false).unwrap();
         let delay = record.channel("tau_e").unwrap();
         assert_eq!((delay[0], delay[8191]), (0.28, 0.34));
         let trace = track(&record, &tracked, 8).unwrap();

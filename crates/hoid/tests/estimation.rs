@@ -15,7 +15,7 @@ fn runs(condition: Condition, n: u64) -> Vec<Record> {
         .map(|replication| {
             simulator
                 .run(
-                    Stream {
+                    RunSeed {
                         seed: 77,
                         cell: 0,
                         replication,
@@ -104,7 +104,7 @@ fn records_of_other_lengths_and_spans_fit_together() {
 /// `u = (B/F) q^-2 e + (C/D) eps` in open loop, any orders.
 fn open_loop(b: &[f64], c: &[f64], d: &[f64], f: &[f64], n: usize) -> Record {
     let noise = |cell| {
-        Stream {
+        RunSeed {
             seed: 9,
             cell,
             replication: 0,

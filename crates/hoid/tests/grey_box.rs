@@ -23,12 +23,12 @@ fn runs(condition: Condition, m0: usize, n: u64) -> Vec<Record> {
     let simulator = Simulator::new(&scenario).unwrap();
     (0..n)
         .map(|replication| {
-            let stream = Stream {
+            let run_seed = RunSeed {
                 seed: 2025,
                 cell: (condition as u64) << 8 | m0 as u64,
                 replication,
             };
-            simulator.run(stream, false).unwrap()
+            simulator.run(run_seed, false).unwrap()
         })
         .collect()
 }
@@ -166,7 +166,7 @@ fn respond([k_e, k_e_dot, omega, zeta, tau]: [f64; 5], n: usize, noise: f64, rep
                 .sum()
         })
         .collect();
-    let deviates = Stream {
+    let deviates = RunSeed {
         seed: 3,
         cell: 1,
         replication,
@@ -223,7 +223,7 @@ fn without_noise_every_delay_comes_back() {
 
 #[test]
 fn every_person_is_found_from_the_own_starts() {
-    let draws = Stream {
+    let draws = RunSeed {
         seed: 5,
         cell: 2,
         replication: 0,

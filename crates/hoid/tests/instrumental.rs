@@ -73,7 +73,7 @@ const F: [f64; 2] = [-1.5, 0.7];
 const D: [f64; 1] = [-0.8];
 
 fn noise(cell: u32, replication: u64, n: usize) -> Vec<f64> {
-    Stream {
+    RunSeed {
         seed: 31,
         cell: u64::from(cell),
         replication,
@@ -204,12 +204,12 @@ fn runs(delay_s: f64, time_constant_s: f64, m0: usize, level: f64, n: u64) -> Ve
     (0..n)
         .map(|replication| {
             let cell = (m0 as u64) << 8 | (level * 100.0).round() as u64;
-            let stream = Stream {
+            let run_seed = RunSeed {
                 seed: 40,
                 cell,
                 replication,
             };
-            simulator.run(stream, false).unwrap()
+            simulator.run(run_seed, false).unwrap()
         })
         .collect()
 }

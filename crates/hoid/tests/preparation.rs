@@ -9,12 +9,12 @@ use hoid::{
 
 fn run(replication: u64) -> Record {
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
-    let stream = Stream {
+    let run_seed = RunSeed {
         seed: 21,
         cell: 0,
         replication,
     };
-    simulator.run(stream, false).unwrap()
+    simulator.run(run_seed, false).unwrap()
 }
 
 /// A record of e and u alone, the output `late` samples behind.

@@ -24,12 +24,12 @@ fn scenario(condition: Condition, remnant_order: usize, noise_level: f64) -> Sce
 }
 
 fn run(simulator: &Simulator, replication: u64) -> Record {
-    let stream = Stream {
+    let run_seed = RunSeed {
         seed: 71,
         cell: 1,
         replication,
     };
-    simulator.run(stream, false).unwrap()
+    simulator.run(run_seed, false).unwrap()
 }
 
 fn options(method: Method) -> TrackOptions {

@@ -14,12 +14,12 @@ const SPAN_S: f64 = 81.92;
 
 fn runs(condition: Condition, n: u64) -> Vec<Record> {
     let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
-    let stream = |replication| Stream {
+    let run_seed = |replication| RunSeed {
         seed: 78,
         cell: 0,
         replication,
     };
-    (0..n).map(|r| simulator.run(stream(r), false).unwrap()).collect()
+    (0..n).map(|r| simulator.run(run_seed(r), false).unwrap()).collect()
 }
 
 fn without_noise(condition: Condition) -> Record {
@@ -30,7 +30,7 @@ fn without_noise(condition: Condition) -> Record {
     };
     Simulator::new(&scenario)
         .unwrap()
-        .run(Stream::default(), false)
+        .run(RunSeed::default(), false)
         .unwrap()
 }
 

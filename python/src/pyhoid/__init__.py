@@ -36,7 +36,7 @@ from .estimates import Estimate, Operator, Remnant
 from .fit import Fit, FrequencyResponse, Series, Validation
 from .groups import group, group_manifest, simulate_group
 from .identification import identify
-from .reading import info, read, read_stretches, write
+from .reading import info, read, read_segments, write
 from .record import Record
 from .reproduction import Reproduction, reproduce
 from .simulation import margins, simulate
@@ -93,7 +93,7 @@ __all__ = [
     "plan",
     "plans",
     "read",
-    "read_stretches",
+    "read_segments",
     "reproduce",
     "results",
     "simulate",

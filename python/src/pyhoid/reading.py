@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from . import _pyhoid
 from .record import Record
 
-__all__ = ["info", "read", "read_stretches", "write"]
+__all__ = ["info", "read", "read_segments", "write"]
 
 if TYPE_CHECKING:
     from typing_extensions import TypedDict, Unpack
@@ -124,16 +124,16 @@ def read(
     return record
 
 
-def read_stretches(
+def read_segments(
     path: str | PathLike[str],
     mask: Sequence[str],
     *,
     shortest: float = 2.0,
     **options: Unpack[ReadOptions],
 ) -> list[Record]:
-    """Read the good stretches of a file, between the trouble with its sampling.
+    """Read the good segments of a file, between what is wrong with its sampling.
 
-    Each stretch is a record: `identify` gives each its own initial states. Leaving samples out can
+    Each segment is a record: `identify` gives each its own initial states. Leaving samples out can
     bias the result: without the samples at a rail, for example, the largest responses are gone.
 
     Parameters
@@ -143,7 +143,7 @@ def read_stretches(
         What is left out: any of ``"missing"``, ``"gap"``, ``"stalled"`` and ``"saturated"``
         (`info` tells what a file has).
     shortest : float
-        Length in s of the shortest stretch to use.
+        Length in s of the shortest segment to use.
     **options
         As in `read`.
 
@@ -154,11 +154,11 @@ def read_stretches(
     Raises
     ------
     FileError, FormatError
-        As in `read`; also when no stretch is left.
+        As in `read`; also when no segment is left.
 
     Examples
     --------
-    >>> fit = pyhoid.identify(pyhoid.read_stretches("run1.csv", ["missing", "stalled"]))
+    >>> fit = pyhoid.identify(pyhoid.read_segments("run1.csv", ["missing", "stalled"]))
     """
     return _read(path, [mask] if isinstance(mask, str) else mask, shortest, **options)
 

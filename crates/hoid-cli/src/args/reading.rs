@@ -1,9 +1,10 @@
 //! The options by which `hoid identify` and `hoid track` read records and prepare them.
 
-use clap::{Args, ValueEnum};
-use hoid_io::{Offset, Scaling, TroubleKind};
+use clap::Args;
+use hoid_io::{Offset, QualityIssueKind, Scaling};
+use hoid_model::Detrend;
 
-use super::DetrendName;
+use super::choice_of;
 
 /// How record files are read.
 #[derive(Debug, Args)]
@@ -32,8 +33,8 @@ pub struct ReadArgs {
     #[command(flatten)]
     pub prepare: PrepareArgs,
     /// Take out the mean or the straight line of input and output, last
-    #[arg(long, value_name = "HOW", default_value = "none")]
-    pub detrend: DetrendName,
+    #[arg(long, value_name = "HOW", default_value = "none", value_parser = choice_of(&Detrend::ALL))]
+    pub detrend: Detrend,
 }
 
 /// What is done to a record before it is used, in this order.
@@ -61,21 +62,14 @@ pub struct PrepareArgs {
     pub run_in: Option<f64>,
 }
 
-names!(MaskName for TroubleKind {
-    Missing = TroubleKind::Missing,
-    Gap = TroubleKind::Gap,
-    Stalled = TroubleKind::Stalled,
-    Saturated = TroubleKind::Saturated,
-});
-
 /// What is left out of a record.
 #[derive(Debug, Args)]
 pub struct MaskArgs {
-    /// Leave out what is wrong with the sampling (see `hoid info`): the record is cut there, and each stretch has initial states of its
+    /// Leave out what is wrong with the sampling (see `hoid info`): the record is cut there, and each segment has initial states of its
     /// own
-    #[arg(long, value_name = "KINDS", value_delimiter = ',')]
-    pub mask: Vec<MaskName>,
-    /// Shortest stretch between masked samples that is used, s
+    #[arg(long, value_name = "KINDS", value_delimiter = ',', value_parser = choice_of(&QualityIssueKind::MASKABLE))]
+    pub mask: Vec<QualityIssueKind>,
+    /// Shortest segment between masked samples that is used, s
     #[arg(long, value_name = "S", default_value_t = 2.0)]
     pub shortest: f64,
 }

@@ -11,7 +11,7 @@ use hoid_model::{
     uncertainty::OperatorEstimate,
 };
 use hoid_report::{BatchLine, ModelSection, Report, TraceSection, TrackReport, known_operator, numbers, write_report};
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 use hoid_track::{Method, OPERATOR_COLUMNS, StartAt, Trace, TrackOptions, track};
 
 use crate::{args::DemoArgs, commands::track::relative_errors, error::CliError, output, text};
@@ -28,11 +28,11 @@ struct Stage {
 
 pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     let scenario = Scenario::condition(Condition::C4);
-    let stream = Stream {
+    let run_seed = RunSeed {
         seed: args.seed,
-        ..Stream::default()
+        ..RunSeed::default()
     };
-    let record = Simulator::new(&scenario)?.run(stream, false)?;
+    let record = Simulator::new(&scenario)?.run(run_seed, false)?;
     make_directory(&args.out)?;
     let path = args.out.join("c4.csv");
     write_record(&path, &record)?;
@@ -73,7 +73,10 @@ fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, Cl
                 start: StartAt::Span(Some((from, to))),
                 ..TrackOptions::new(method.clone(), structure, structure.operator_orders(nk))
             };
-            Ok((format!("{}, {structure}", method.name()), track(record, &options, 1)?))
+            Ok((
+                format!("{}, {}", method.name(), structure.label()),
+                track(record, &options, 1)?,
+            ))
         })
         .collect()
 }

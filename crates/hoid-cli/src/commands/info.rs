@@ -47,11 +47,11 @@ fn words(file: &str, found: &FileSurvey) -> String {
         let line = format!("{:width$}  {}  {remarks}", column.path, values.sketch);
         text.push_str(&format!("{}\n", line.trim_end()));
     }
-    if !found.trouble.is_empty() {
+    if !found.quality_issues.is_empty() {
         text.push_str("\nTrouble:\n");
     }
-    for trouble in &found.trouble {
-        text.push_str(&format!("  {trouble}\n    remedy: {}\n", trouble.kind.remedy()));
+    for issue in &found.quality_issues {
+        text.push_str(&format!("  {issue}\n    remedy: {}\n", issue.kind.remedy()));
     }
     for note in &found.notes {
         text.push_str(&format!("Note: {note}.\n"));
@@ -145,7 +145,7 @@ fn object(found: &FileSurvey) -> Value {
         "format": found.format,
         "samplings": found.samplings.iter().map(sampling).collect::<Vec<_>>(),
         "columns": found.columns.iter().map(column).collect::<Vec<_>>(),
-        "trouble": json::list(&found.trouble),
+        "trouble": json::list(&found.quality_issues),
         "notes": found.notes,
     })
 }

@@ -9,7 +9,7 @@ use hoid_model::{
 use serde_json::{Value, json};
 
 use crate::{
-    args::{MarginsArgs, NoiseDefinitionName, StateName},
+    args::{MarginsArgs, StateName},
     error::CliError,
     json, output, text,
 };
@@ -32,7 +32,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
         .transfer_function()?
         .series(&state.controlled_element.transfer_function()?);
     let found = margins(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S);
-    let definition = NoiseDefinition::from(args.noise_definition);
+    let definition = args.noise_definition;
     let gains: Vec<Gain> = (1..=HIGHEST_ORDER)
         .flat_map(|order| args.noise_levels.iter().map(move |&level| (order, level)))
         .map(|(order, level)| Gain {
@@ -49,10 +49,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
             return Err(error.clone().into());
         }
     }
-    let name = match args.noise_definition {
-        NoiseDefinitionName::Response => "response",
-        NoiseDefinitionName::Remnant => "remnant",
-    };
+    let name = args.noise_definition.name();
     if args.json {
         let mut object = json::margins(&found);
         let rows = gains

@@ -6,9 +6,9 @@ use std::{
 };
 
 use hoid_io::{
-    NewRate, Preparation, ReadOptions, ReadRecord, Repair, Step, Trouble, TroubleKind, read_prepared, read_stretches,
+    NewRate, Preparation, QualityIssue, ReadOptions, ReadRecord, Repair, Step, read_prepared, read_segments,
 };
-use hoid_model::{Detrend, Record};
+use hoid_model::Record;
 
 use crate::{
     args::{MaskArgs, ReadArgs},
@@ -20,7 +20,7 @@ use crate::{
 #[derive(Debug, Clone, Default)]
 pub struct Account {
     pub steps: Vec<Step>,
-    pub trouble: Vec<Trouble>,
+    pub quality_issues: Vec<QualityIssue>,
 }
 
 /// Records with the files that they come from; a file that is cut gives several.
@@ -40,19 +40,18 @@ pub fn read(path: &Path, args: &ReadArgs, with_input: bool) -> Result<(Record, A
     Ok(told(path, read))
 }
 
-/// As [`read`], for the stretches between what is masked.
+/// As [`read`], for the segments between what is masked.
 ///
 /// # Errors
 /// As [`read`].
 pub fn read_all(paths: &[PathBuf], args: &ReadArgs, mask: &MaskArgs, with_input: bool) -> Result<ReadAll, CliError> {
-    let kinds: Vec<TroubleKind> = mask.mask.iter().map(|name| TroubleKind::from(*name)).collect();
     let (options, preparation) = (options(args, with_input)?, preparation(args)?);
     let mut all = ReadAll::default();
     for path in paths {
-        for read in read_stretches(path, &options, &preparation, &kinds, mask.shortest)? {
+        for read in read_segments(path, &options, &preparation, &mask.mask, mask.shortest)? {
             let (record, account) = told(path, read);
-            // The label of a stretch ends in its span.
-            let span = record.label().rfind(" (").filter(|_| !kinds.is_empty());
+            // The label of a segment ends in its span.
+            let span = record.label().rfind(" (").filter(|_| !mask.mask.is_empty());
             let span = span.map_or("", |at| &record.label()[at..]);
             all.files.push(format!("{}{span}", path.display()));
             all.records.push(record);
@@ -66,12 +65,12 @@ fn told(path: &Path, read: ReadRecord) -> (Record, Account) {
     for note in &read.notes {
         output::complain(&format!("{}: {note}", path.display()));
     }
-    for trouble in &read.trouble {
-        output::complain(&format!("warning: {}: {trouble}", path.display()));
+    for issue in &read.quality_issues {
+        output::complain(&format!("warning: {}: {issue}", path.display()));
     }
     let account = Account {
         steps: read.steps,
-        trouble: read.trouble,
+        quality_issues: read.quality_issues,
     };
     (read.record, account)
 }
@@ -101,7 +100,7 @@ fn preparation(args: &ReadArgs) -> Result<Preparation, CliError> {
             (None, None) => NewRate::Kept,
         },
         run_in_s: prepare.run_in.unwrap_or(0.0),
-        detrend: Detrend::from(args.detrend),
+        detrend: args.detrend,
         drop_repeated: prepare.drop_repeated,
     })
 }
@@ -132,7 +131,7 @@ pub fn settings(read: &ReadArgs, with_input: bool) -> Vec<(String, String)> {
             "span in s".to_owned(),
             format!("{} to {}", or_all(read.from, "start"), or_all(read.to, "end")),
         ),
-        ("detrend".to_owned(), format!("{:?}", read.detrend).to_lowercase()),
+        ("detrend".to_owned(), read.detrend.to_string()),
     ];
     if with_input {
         list.insert(0, ("input".to_owned(), read.input.clone()));
@@ -158,8 +157,8 @@ pub fn accounts(files: &[String], accounts: &[Account]) -> Vec<(String, String)>
     let mut rows = Vec::new();
     for (file, account) in files.iter().zip(accounts) {
         let steps: Vec<String> = account.steps.iter().map(Step::to_string).collect();
-        let trouble: Vec<String> = account.trouble.iter().map(Trouble::to_string).collect();
-        for (what, parts) in [("preparation", steps), ("sampling trouble", trouble)] {
+        let issues: Vec<String> = account.quality_issues.iter().map(QualityIssue::to_string).collect();
+        for (what, parts) in [("preparation", steps), ("sampling trouble", issues)] {
             if !parts.is_empty() {
                 rows.push((name(what, file), parts.join("; ")));
             }

@@ -3,19 +3,19 @@
 use hoid_io::{write_record, write_record_csv};
 use hoid_model::{Record, SampleTime, scenario::Scenario};
 use hoid_report::numbers;
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 
 use crate::{args::SimulateArgs, error::CliError, output};
 
 pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
     let scenario = with_changes(super::scenario(&args.base)?, args)?;
     let simulator = Simulator::new(&scenario)?;
-    let stream = Stream {
+    let run_seed = RunSeed {
         seed: args.seed,
         cell: args.cell,
         replication: args.replication,
     };
-    let record = simulator.run(stream, args.keep_run_in)?;
+    let record = simulator.run(run_seed, args.keep_run_in)?;
     let piped = args.out.as_os_str() == "-";
     if piped {
         write_out(&record)?;
@@ -65,9 +65,9 @@ fn with_changes(mut scenario: Scenario, args: &SimulateArgs) -> Result<Scenario,
         scenario.sample_time = SampleTime::new(ts)?;
     }
     if let Some(realisation) = args.realisation {
-        scenario.realisation = realisation.into();
+        scenario.realisation = realisation;
     }
-    let definition = args.noise_definition.map(Into::into);
+    let definition = args.noise_definition;
     let Some(strength) = scenario.remnant.strength.changed(args.noise_level, definition) else {
         return Err(CliError::Usage(
             "--noise-definition needs --noise-level: the scenario gives the gain K_n itself".to_owned(),

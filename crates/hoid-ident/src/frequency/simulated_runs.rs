@@ -6,7 +6,7 @@ use hoid_model::{
     scenario::{Condition, RemnantStrength, Scenario},
     uncertainty::Estimate,
 };
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 
 use super::*;
 
@@ -27,12 +27,12 @@ fn scenario(condition: Condition, remnant: bool) -> Scenario {
 
 fn runs(scenario: &Scenario, cell: u64, n: u64) -> Vec<Record> {
     let simulator = Simulator::new(scenario).unwrap();
-    let stream = |replication| Stream {
+    let run_seed = |replication| RunSeed {
         seed: 20,
         cell,
         replication,
     };
-    (0..n).map(|i| simulator.run(stream(i), false).unwrap()).collect()
+    (0..n).map(|i| simulator.run(run_seed(i), false).unwrap()).collect()
 }
 
 fn lines() -> Excitation {

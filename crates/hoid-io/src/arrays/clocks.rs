@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use super::{Leaf, Numbers};
+use super::column_path::ColumnPath;
+use super::numbers::Numbers;
 use crate::IoError;
-use crate::table::shown;
+use crate::wording::shown;
 
 /// A column at the times of another stream.
 pub(super) struct Aligned {
@@ -14,10 +15,18 @@ pub(super) struct Aligned {
     pub(super) note: String,
 }
 
-/// The column `leaf` at the times of the structure `beside`.
-pub(super) fn aligned(leaves: &[Leaf], leaf: &Leaf, beside: &str, file: &str) -> Result<Aligned, IoError> {
-    let (from, to) = (times(leaves, &leaf.parent, file)?, times(leaves, beside, file)?);
-    let values = leaf.numbers().map(Numbers::values).unwrap_or_default();
+/// The column `column_path` at the times of the structure `beside`.
+pub(super) fn aligned(
+    column_paths: &[ColumnPath],
+    column_path: &ColumnPath,
+    beside: &str,
+    file: &str,
+) -> Result<Aligned, IoError> {
+    let (from, to) = (
+        times(column_paths, &column_path.parent, file)?,
+        times(column_paths, beside, file)?,
+    );
+    let values = column_path.numbers().map(Numbers::values).unwrap_or_default();
     let (Some(first), Some(last)) = (from.first(), from.last()) else {
         return Err(IoError::NoRows { file: file.to_owned() });
     };
@@ -35,7 +44,7 @@ pub(super) fn aligned(leaves: &[Leaf], leaf: &Leaf, beside: &str, file: &str) ->
     let (from_hz, to_hz) = (hz(&from), hz(&to));
     let mut note = format!(
         "{} is interpolated linearly from {from_hz:.3} Hz to the {to_hz:.3} Hz of {}, where both have samples",
-        shown(&leaf.path),
+        shown(&column_path.path),
         shown(beside)
     );
     if from_hz > 1.5 * to_hz {
@@ -62,9 +71,14 @@ fn between(t: &[f64], values: &[f64], at: f64) -> f64 {
 }
 
 /// The times of a structure, which have to increase.
-fn times(leaves: &[Leaf], place: &str, file: &str) -> Result<Vec<f64>, IoError> {
-    let time = leaves.iter().find(|leaf| leaf.parent == place && leaf.name() == "t");
-    let times = time.and_then(Leaf::numbers).map(Numbers::values).unwrap_or_default();
+fn times(column_paths: &[ColumnPath], place: &str, file: &str) -> Result<Vec<f64>, IoError> {
+    let time = column_paths
+        .iter()
+        .find(|column_path| column_path.parent == place && column_path.name() == "t");
+    let times = time
+        .and_then(ColumnPath::numbers)
+        .map(Numbers::values)
+        .unwrap_or_default();
     let standing = |pair: &[f64]| pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Greater);
     match times.windows(2).position(standing) {
         None if times.is_empty() => Err(IoError::NoRows { file: file.to_owned() }),
@@ -81,7 +95,7 @@ fn times(leaves: &[Leaf], place: &str, file: &str) -> Result<Vec<f64>, IoError> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arrays::{Array, Entry, Lines, Value};
+    use crate::arrays::{Array, Entry, Indexing, Value};
 
     #[test]
     fn other_times() {
@@ -95,17 +109,25 @@ mod tests {
             entry("c", "t", &[0.0, 1.0, 1.0]),
             entry("d", "t", &[7.0]),
         ];
-        let leaves: Vec<Leaf> = entries.iter().flat_map(|entry| entry.leaves(Lines::Python)).collect();
-        let found = aligned(&leaves, &leaves[1], "b", "f").unwrap();
+        let column_paths: Vec<ColumnPath> = entries
+            .iter()
+            .flat_map(|entry| entry.column_paths(Indexing::Python))
+            .collect();
+        let found = aligned(&column_paths, &column_paths[1], "b", "f").unwrap();
         assert_eq!(found.rows, 1..6);
         assert_eq!(found.numbers.values()[1..6], [0.0, 5.0, 10.0, 0.0, -10.0]);
         assert!(matches!(
-            aligned(&leaves, &leaves[1], "c", "f"),
+            aligned(&column_paths, &column_paths[1], "c", "f"),
             Err(IoError::NotIncreasing { .. })
         ));
-        assert!(aligned(&leaves, &leaves[1], "d", "f").unwrap().rows.is_empty());
+        assert!(
+            aligned(&column_paths, &column_paths[1], "d", "f")
+                .unwrap()
+                .rows
+                .is_empty()
+        );
         assert!(matches!(
-            aligned(&leaves, &leaves[1], "e", "f"),
+            aligned(&column_paths, &column_paths[1], "e", "f"),
             Err(IoError::NoRows { .. })
         ));
     }

@@ -4,121 +4,27 @@
 //! | module | what it holds |
 //! |---|---|
 //! | `numbers` | [`Numbers`]: bytes with a type |
-//! | `leaves` | [`Leaf`]: arrays as columns, matrices line by line |
-//! | `choose` | [`table_of`]: the columns that are asked for, and those beside them |
+//! | `array` | [`Array`]: numbers with dimensions |
+//! | `contents` | [`Contents`]: what stands in a file |
+//! | `column_path` | [`ColumnPath`]: arrays as columns, matrices line by line |
+//! | `selection` | [`table_of`]: the columns of a record, and those beside them |
 //! | `clocks` | columns at the times of another |
-//! | `limits` | [`Budget`]: how much a file may unpack to |
+//! | `results` | [`output_table_of`]: all columns, as a table of results |
+//! | `budget` | [`Budget`]: how much a file may unpack to |
 
-mod choose;
+mod array;
+mod budget;
 mod clocks;
-mod leaves;
-mod limits;
+mod column_path;
+mod contents;
 mod numbers;
+mod results;
+mod selection;
 
-pub(crate) use choose::{TIMES, output_table_of, table_of};
-pub(crate) use leaves::{Holds, Leaf, Lines};
-pub(crate) use limits::{Budget, MOST_NESTED};
+pub(crate) use array::Array;
+pub(crate) use budget::{Budget, MOST_NESTED};
+pub(crate) use column_path::{ColumnPath, Holds};
+pub(crate) use contents::{COMMENTS, Contents, Entry, Indexing, Value};
 pub(crate) use numbers::{Kind, Numbers};
-
-/// The name under which comments are kept as text.
-pub(crate) const COMMENTS: &str = "hoid_comments";
-
-/// An array of numbers.
-#[derive(Debug, Clone)]
-pub(crate) struct Array {
-    pub(crate) numbers: Numbers,
-    /// Its lengths, as many as there are dimensions. Their product is the count of the numbers.
-    pub(crate) dims: Vec<usize>,
-    /// The last index runs fastest, as in C; otherwise the first, as in Fortran and MATLAB.
-    pub(crate) last_fastest: bool,
-}
-
-/// What stands under a path.
-#[derive(Debug, Clone)]
-pub(crate) enum Value {
-    Array(Array),
-    Texts(Vec<String>),
-    /// What is not read, in words.
-    Unread(String),
-}
-
-/// One thing in a file.
-#[derive(Debug, Clone)]
-pub(crate) struct Entry {
-    /// Such as `e`, `data.run(3).e` or `c{2}`.
-    pub(crate) path: String,
-    /// The structure that it stands in, such as `data.run(3)`; empty at top level.
-    pub(crate) parent: String,
-    pub(crate) value: Value,
-    /// Unit; empty when unknown.
-    pub(crate) unit: String,
-}
-
-impl Entry {
-    /// At top level.
-    pub(crate) fn new(path: impl Into<String>, value: Value) -> Self {
-        Self {
-            path: path.into(),
-            parent: String::new(),
-            value,
-            unit: String::new(),
-        }
-    }
-
-    /// In a structure, or at top level where that has no name.
-    pub(crate) fn field(parent: &str, name: &str, value: Value) -> Self {
-        let path = if parent.is_empty() {
-            name.to_owned()
-        } else {
-            format!("{parent}.{name}")
-        };
-        Self {
-            parent: parent.to_owned(),
-            ..Self::new(path, value)
-        }
-    }
-}
-
-/// What stands in a file.
-#[derive(Debug)]
-pub(crate) struct Contents {
-    pub(crate) entries: Vec<Entry>,
-    /// The lines that hoid wrote beside the columns.
-    pub(crate) comments: Vec<String>,
-    /// What to know about how it was read.
-    pub(crate) notes: Vec<String>,
-    /// How the lines of a matrix are named.
-    pub(crate) lines: Lines,
-    /// Whether each structure holds times of its own on one common clock, so that its columns can be put beside those of
-    /// another.
-    pub(crate) own_clocks: bool,
-}
-
-impl Contents {
-    pub(crate) fn new(mut entries: Vec<Entry>, lines: Lines) -> Self {
-        // A name is printed: nothing in it that a terminal obeys.
-        for text in entries
-            .iter_mut()
-            .flat_map(|entry| [&mut entry.path, &mut entry.parent])
-        {
-            text.retain(|c| !c.is_control());
-        }
-        let at = entries.iter().position(|entry| entry.path == COMMENTS);
-        let comments = match at.map(|at| entries.remove(at).value) {
-            Some(Value::Texts(texts)) => texts,
-            _ => Vec::new(),
-        };
-        Self {
-            entries,
-            comments,
-            notes: Vec::new(),
-            lines,
-            own_clocks: false,
-        }
-    }
-
-    /// All columns.
-    pub(crate) fn leaves(&self) -> Vec<Leaf> {
-        self.entries.iter().flat_map(|entry| entry.leaves(self.lines)).collect()
-    }
-}
+pub(crate) use results::output_table_of;
+pub(crate) use selection::{TIMES, table_of};

@@ -36,6 +36,11 @@ impl Kind {
         !matches!(self, Self::F16 | Self::F32 | Self::F64)
     }
 
+    /// Whether the numbers are of single precision or less.
+    pub(crate) fn is_single(self) -> bool {
+        matches!(self, Self::F16 | Self::F32)
+    }
+
     /// As numpy and MATLAB call it.
     pub(crate) fn name(self) -> &'static str {
         match self {

@@ -8,11 +8,11 @@
 
 use std::str::FromStr;
 
-use super::{
-    Bench, Step, decimal,
-    kernel::{Kernel, PASS},
-};
+use super::kernel::{Kernel, PASS};
+use super::record_parts::RecordParts;
+use super::step::Step;
 use crate::IoError;
+use crate::wording::decimal;
 
 /// Distance from a whole number of samples that is none.
 const WHOLE: f64 = 1e-6;
@@ -50,7 +50,7 @@ struct Shift {
     interpolated: bool,
 }
 
-impl Bench {
+impl RecordParts {
     pub(super) fn offset(&mut self, offset: &std::collections::BTreeMap<String, Offset>) -> Result<(), IoError> {
         const STEP: &str = "offset";
         let ts = self.sample_time.s();

@@ -10,12 +10,13 @@
 //! was held over the old Ts, if any. A hold of T delays by T/2: to agree with the data, the delay of the model is shorter by
 //! `(T - Ts) / 2` than the one that is found at the old rate.
 
-use super::{
-    Bench, Step, decimal,
-    kernel::{Kernel, PASS, STOP_DB},
-};
-use crate::IoError;
 use hoid_model::SampleTime;
+
+use super::kernel::{Kernel, PASS, STOP_DB};
+use super::record_parts::RecordParts;
+use super::step::Step;
+use crate::IoError;
+use crate::wording::decimal;
 
 /// A new rate makes at most so many samples out of one.
 const LARGEST_FACTOR: f64 = 100.0;
@@ -32,7 +33,7 @@ pub enum NewRate {
     Hz(f64),
 }
 
-impl Bench {
+impl RecordParts {
     pub(super) fn rate(&mut self, rate: NewRate) -> Result<(), IoError> {
         let old = self.sample_time;
         let (step, factor, new) = match rate {
@@ -61,8 +62,8 @@ impl Bench {
                 format!("at most {LARGEST_FACTOR}"),
             ));
         }
-        let too_long = |bench: &Self| {
-            bench.error(
+        let too_long = |parts: &Self| {
+            parts.error(
                 step,
                 format!(
                     "{length} samples for a filter that reaches {} to each side",

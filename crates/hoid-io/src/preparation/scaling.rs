@@ -7,8 +7,10 @@
 use std::f64::consts::PI;
 use std::str::FromStr;
 
-use super::{Bench, Step, decimal};
+use super::record_parts::RecordParts;
+use super::step::Step;
 use crate::IoError;
+use crate::wording::decimal;
 
 /// Known units: name, kind, and size in the first unit of its kind.
 const UNITS: [(&str, &str, f64); 18] = [
@@ -131,7 +133,7 @@ fn refused(found: &str, expected: &str) -> IoError {
     }
 }
 
-impl Bench {
+impl RecordParts {
     pub(super) fn scale(&mut self, scale: &std::collections::BTreeMap<String, Scaling>) -> Result<(), IoError> {
         const STEP: &str = "scale";
         let named = scale.iter().map(|(name, scaling)| (name.clone(), scaling));

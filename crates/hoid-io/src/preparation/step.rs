@@ -5,7 +5,7 @@ use std::fmt;
 use hoid_model::Detrend;
 use serde::Serialize;
 
-use super::decimal;
+use crate::wording::decimal;
 
 /// One step, in the order in which it was taken.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -19,9 +19,9 @@ pub enum Step {
         /// The first of them, from 1.
         first_row: usize,
     },
-    /// Only a part between troubles was taken.
+    /// Only a segment between faults was taken.
     Mask {
-        /// Kinds of trouble that are cut out.
+        /// Kinds of faults that are cut out.
         what: Vec<&'static str>,
         /// Time of the first sample of the part, s.
         from_s: f64,
@@ -112,8 +112,7 @@ impl Step {
     pub(super) fn of_detrend(how: Detrend) -> Option<Self> {
         match how {
             Detrend::None => None,
-            Detrend::Mean => Some(Self::Detrend { how: "mean" }),
-            Detrend::Linear => Some(Self::Detrend { how: "linear" }),
+            Detrend::Mean | Detrend::Linear => Some(Self::Detrend { how: how.name() }),
         }
     }
 

@@ -1,4 +1,7 @@
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
+
+use hoid_model::{Channel, Detrend, Record, SampleTime};
 
 use super::*;
 

@@ -28,12 +28,12 @@ pub fn methods(traces: &[Evaluated<'_>], record: &Record) -> Vec<Value> {
         let model = match options.method.track_delay_s() {
             Some((from, to)) => format!(
                 "{}({}), tau_e tracked in {} to {} s",
-                options.structure,
+                options.structure.label(),
                 options.orders,
                 plain(from),
                 plain(to)
             ),
-            None => format!("{}({})", options.structure, options.orders),
+            None => format!("{}({})", options.structure.label(), options.orders),
         };
         let average = match trace.averaged() {
             1 => DASH.to_owned(),

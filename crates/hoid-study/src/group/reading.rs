@@ -96,7 +96,7 @@ pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static st
             steps.text("step", step.name());
             steps.text("what", &step.to_string());
         }
-        for one in &read.trouble {
+        for one in &read.quality_issues {
             begin(&mut trouble, entry, file);
             trouble.text("kind", one.kind.name());
             trouble.text("channel", &one.channel);

@@ -14,7 +14,7 @@ use hoid_model::{
     scenario::{Condition, RemnantStrength, Scenario},
     uncertainty::OperatorEstimate,
 };
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 
 use super::{
     MANIFEST,
@@ -201,12 +201,12 @@ impl VirtualExperiment {
     /// The person of a run, and the run.
     fn run(&self, subject: u64, cell: u64, condition: Condition, run: u64) -> Result<(Scenario, Record), StudyError> {
         let deviates = |replication: u64| {
-            let stream = Stream {
+            let run_seed = RunSeed {
                 seed: self.seed,
                 cell: PEOPLE - subject,
                 replication,
             };
-            stream.white_noise(6 * MOST_DRAWS)
+            run_seed.white_noise(6 * MOST_DRAWS)
         };
         let of_subject = deviates(0);
         let of_run = deviates(1 + cell * 1_000_000 + run);
@@ -231,12 +231,12 @@ impl VirtualExperiment {
                 definition: NoiseDefinition::Response,
             };
             scenario.name = format!("S{subject} {condition} {run}");
-            let stream = Stream {
+            let run_seed = RunSeed {
                 seed: self.seed,
                 cell: subject * 1000 + cell,
                 replication: run,
             };
-            match Simulator::new(&scenario).and_then(|simulator| simulator.run(stream, false)) {
+            match Simulator::new(&scenario).and_then(|simulator| simulator.run(run_seed, false)) {
                 Ok(record) => return Ok((scenario, record)),
                 Err(error) => reason = error.to_string(),
             }
@@ -252,7 +252,7 @@ impl VirtualExperiment {
     fn troubled(&self, record: &Record, subject: u64, cell: u64, run: u64) -> OutputTable {
         let has = |trouble: Trouble| self.trouble.contains(&trouble);
         let n = record.len();
-        let noise = Stream {
+        let noise = RunSeed {
             seed: self.seed,
             cell: PEOPLE / 2 - subject * 1000 - cell,
             replication: run,

@@ -49,7 +49,7 @@ const LIMIT: f64 = 3.5;
 const SPACING_S: f64 = 0.32;
 /// Mean time between two changes, s.
 const BETWEEN_CHANGES_S: f64 = 60.0;
-/// Change of K_e and of K_e_dot to be expected, in the units of [`ChangePrior::jump`].
+/// Change of K_e and of K_e_dot to be expected, in the units of [`ChangePrior::gain_jump`].
 const JUMP: [f64; 2] = [0.15, 0.5];
 /// Drift of the gains in one second, in the same units.
 const DRIFT: f64 = 0.005;

@@ -6,7 +6,7 @@ use hoid_model::{
     Channel, SampleTime,
     scenario::{Condition, Scenario},
 };
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 
 fn side(eta: [f64; OPERATOR], scale: f64, weight: f64) -> Side {
     // Positive: a unit matrix and a rank-one matrix.
@@ -75,14 +75,14 @@ fn options() -> TrackOptions {
 }
 
 fn run(condition: Condition) -> Record {
-    let stream = Stream {
+    let run_seed = RunSeed {
         seed: 77,
         cell: 0,
         replication: 0,
     };
     Simulator::new(&Scenario::condition(condition))
         .unwrap()
-        .run(stream, false)
+        .run(run_seed, false)
         .unwrap()
 }
 

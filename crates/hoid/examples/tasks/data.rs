@@ -22,9 +22,9 @@ pub struct Shared {
     pub record: Record,
 }
 
-/// The stream of a replication.
-pub fn stream(replication: u64) -> Stream {
-    Stream {
+/// The seed of a replication.
+pub fn run_seed(replication: u64) -> RunSeed {
+    RunSeed {
         seed: 1,
         cell: 0,
         replication,
@@ -34,8 +34,8 @@ pub fn stream(replication: u64) -> Stream {
 impl Shared {
     pub fn new() -> Self {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
-        let noise = stream(0).white_noise(simulator.samples());
-        let record = simulator.run(stream(0), false).unwrap();
+        let noise = run_seed(0).white_noise(simulator.samples());
+        let record = simulator.run(run_seed(0), false).unwrap();
         Self {
             simulator,
             noise,
@@ -49,7 +49,7 @@ impl Shared {
             &directory.join("record.csv"),
             [self.record.input(), self.record.output()],
         );
-        let whole = self.simulator.run(stream(0), true).unwrap();
+        let whole = self.simulator.run(run_seed(0), true).unwrap();
         columns(
             &directory.join("loop.csv"),
             [whole.channel("f_t").unwrap(), &self.noise],

@@ -148,7 +148,7 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
             let mut replication = 0;
             median(effort, || {
                 replication += 1;
-                data::stream(replication).white_noise_into(&mut noise);
+                data::run_seed(replication).white_noise_into(&mut noise);
                 shared.simulator.signals_into(&noise, &mut signals).unwrap();
             })
             .map_answer(|()| Vec::new())
@@ -161,7 +161,7 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
                 let mut records = Vec::with_capacity(CELL_RUNS as usize + beside);
                 for begin in (0..CELL_RUNS).step_by(beside) {
                     for (noise, replication) in noises.iter_mut().zip(begin..CELL_RUNS) {
-                        data::stream(replication).white_noise_into(noise);
+                        data::run_seed(replication).white_noise_into(noise);
                     }
                     let simulator = &shared.simulator;
                     simulator

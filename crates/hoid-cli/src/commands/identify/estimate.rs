@@ -24,7 +24,7 @@ pub struct Estimated {
 /// What is to be fitted, the options checked against each other.
 pub fn kind(args: &IdentifyArgs) -> Result<Kind, CliError> {
     let method: Option<IvMethod> = args.method.into();
-    let typed = args.structure.map(Kind::from);
+    let typed = args.structure;
     let kind = match (typed, method) {
         (Some(kind), None) => kind,
         (None, None) => Kind::Polynomial(Structure::BoxJenkins),

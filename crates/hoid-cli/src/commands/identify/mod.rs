@@ -50,7 +50,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let mut settings = chosen;
     settings.extend(common_settings(args, with_input));
     let operator = fit.operator();
-    let remnant = (fit.orders().nd > 0).then(|| fit.remnant(args.remnant_discretisation.into()));
+    let remnant = (fit.orders().nd > 0).then(|| fit.remnant(args.remnant_discretisation));
     let margins = args
         .controlled_element
         .as_ref()
@@ -134,15 +134,10 @@ fn common_settings(args: &IdentifyArgs, with_input: bool) -> Vec<(String, String
     )];
     list.extend(reading::settings(&args.read, with_input));
     if !args.mask.mask.is_empty() {
-        let kinds: Vec<String> = args
-            .mask
-            .mask
-            .iter()
-            .map(|kind| format!("{kind:?}").to_lowercase())
-            .collect();
+        let kinds: Vec<&str> = args.mask.mask.iter().map(|kind| kind.name()).collect();
         list.push((
             "masked".to_owned(),
-            format!("{}, stretches of {} s or more", kinds.join(", "), args.mask.shortest),
+            format!("{}, segments of {} s or more", kinds.join(", "), args.mask.shortest),
         ));
     }
     list.extend([

@@ -29,7 +29,7 @@ pub fn write(args: &TrackArgs, tracked: &Tracked<'_>, batch: &[BatchFit]) -> Res
         settings,
         record: tracked.record,
         traces: vec![TraceSection {
-            name: format!("{}, {}", options.method.name(), options.structure),
+            name: format!("{}, {}", options.method.name(), options.structure.label()),
             trace: tracked.trace,
             batch,
         }],

@@ -76,7 +76,7 @@ impl Tracked<'_> {
         comments.extend(self.settings.iter().map(|(k, v)| format!("{k}: {v}")));
         comments.extend(
             self.account
-                .trouble
+                .quality_issues
                 .iter()
                 .map(|one| format!("sampling trouble: {one}")),
         );

@@ -4,7 +4,7 @@ use hoid_model::{
     Orders,
     scenario::{Condition, Scenario},
 };
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 
 use super::{by_normal_equations, regress};
 use crate::pem::criterion::Data;
@@ -49,11 +49,11 @@ fn normal_equations_give_what_qr_gives() {
     for (condition, orders, by_products) in cases {
         let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
         let records = [0, 1].map(|replication| {
-            let stream = Stream {
+            let run_seed = RunSeed {
                 replication,
-                ..Stream::default()
+                ..RunSeed::default()
             };
-            simulator.run(stream, false).unwrap()
+            simulator.run(run_seed, false).unwrap()
         });
         let data = Data::of(&records);
         assert_eq!(

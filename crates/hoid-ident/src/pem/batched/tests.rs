@@ -1,5 +1,5 @@
 use hoid_model::scenario::{Condition, RemnantStrength, Scenario};
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 
 use super::*;
 use crate::pem::criterion::{Criterion, Data, first_residual};
@@ -13,12 +13,12 @@ fn runs(count: u64, samples: usize) -> Vec<Record> {
             level: 0.05 * (1 + replication % 5) as f64,
             definition: Default::default(),
         };
-        let stream = Stream {
+        let run_seed = RunSeed {
             seed: 17,
             replication,
-            ..Stream::default()
+            ..RunSeed::default()
         };
-        let run = Simulator::new(&scenario).unwrap().run(stream, false).unwrap();
+        let run = Simulator::new(&scenario).unwrap().run(run_seed, false).unwrap();
         run.span(0.0, samples as f64 * 0.01).unwrap()
     };
     (0..count).map(run).collect()

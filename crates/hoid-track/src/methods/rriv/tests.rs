@@ -2,7 +2,7 @@ mod closed_loop;
 
 use hoid_core::filter::{divide_in_place, fir};
 use hoid_model::{Channel, Record, SampleTime};
-use hoid_sim::Stream;
+use hoid_sim::RunSeed;
 
 use super::*;
 use hoid_ident::{Fit, InstrumentalVariable, IvMethod};
@@ -25,7 +25,7 @@ fn textbook() -> Orders {
 /// `u = (B/F) q^-2 e + (1/D) eps` with white e and eps of unit variance; B is `gain` times the usual one from the middle on.
 fn open_loop(n: usize, replication: u64, d: &[f64], gain: f64) -> (Vec<f64>, Vec<f64>) {
     let white = |cell| {
-        Stream {
+        RunSeed {
             seed: 9,
             cell,
             replication,
@@ -177,7 +177,7 @@ type Shape = fn(usize, f64) -> (f64, f64);
 
 #[test]
 fn any_data_leave_numbers() {
-    let noise = Stream::default().white_noise(100_000);
+    let noise = RunSeed::default().white_noise(100_000);
     let (e, u) = open_loop(1000, 3, &D, 1.0);
     let warm = record(&e, &u);
     let fit = riv(&warm, textbook());
@@ -270,7 +270,7 @@ fn a_pole_at_the_border_shortens_the_step() {
     let mut recursion = RefinedRecursion::new(orders, start, &[1.0; 2], false).unwrap();
     // An unstable system: `u(t) = 1.01 u(t-1) + e(t-1)`.
     let (mut u, mut shortened) = (0.0, 0);
-    for e in Stream::default().white_noise(500) {
+    for e in RunSeed::default().white_noise(500) {
         shortened += usize::from(recursion.step(Sample { e, u, reference: None }).shortened);
         u = 1.01 * u + e;
         assert!(recursion.theta()[1].abs() < RADIUS);

@@ -4,19 +4,19 @@ use hoid_model::{
     Orders, Structure,
     scenario::{Condition, Scenario},
 };
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 
 use super::*;
 
 fn run(condition: Condition, replication: u64) -> Record {
-    let stream = Stream {
+    let run_seed = RunSeed {
         seed: 4,
         cell: 1,
         replication,
     };
     Simulator::new(&Scenario::condition(condition))
         .unwrap()
-        .run(stream, false)
+        .run(run_seed, false)
         .unwrap()
 }
 
@@ -202,7 +202,7 @@ type Shape = fn(usize, f64) -> (f64, f64);
 
 #[test]
 fn any_data_leave_numbers() {
-    let noise = Stream::default().white_noise(4000);
+    let noise = RunSeed::default().white_noise(4000);
     let shapes: [(&str, Shape); 7] = [
         ("silence", |_, _| (0.0, 0.0)),
         ("constant", |_, _| (1.0, -3.0)),

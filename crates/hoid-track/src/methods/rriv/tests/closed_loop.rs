@@ -20,12 +20,12 @@ fn closed(condition: Condition, m0: usize, level: f64, replication: u64) -> Reco
         definition: NoiseDefinition::Response,
     };
     let cell = (m0 as u64) << 8 | (level * 100.0).round() as u64;
-    let stream = Stream {
+    let run_seed = RunSeed {
         seed: 12,
         cell,
         replication,
     };
-    Simulator::new(&scenario).unwrap().run(stream, false).unwrap()
+    Simulator::new(&scenario).unwrap().run(run_seed, false).unwrap()
 }
 
 /// From the prediction error fit of the first 30.72 s, and on from there or from 10 s.

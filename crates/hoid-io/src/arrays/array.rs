@@ -1,0 +1,38 @@
+//! An array of numbers, and the lines of a matrix.
+
+use super::numbers::Numbers;
+
+/// An array of numbers.
+#[derive(Debug, Clone)]
+pub(crate) struct Array {
+    pub(crate) numbers: Numbers,
+    /// Its lengths, as many as there are dimensions. Their product is the count of the numbers.
+    pub(crate) dims: Vec<usize>,
+    /// The last index runs fastest, as in C; otherwise the first, as in Fortran and MATLAB.
+    pub(crate) last_fastest: bool,
+}
+
+impl Array {
+    /// The numbers from the first to the last, in the order in which they stand.
+    pub(crate) fn vector(numbers: Numbers) -> Self {
+        Self {
+            dims: vec![numbers.len()],
+            numbers,
+            last_fastest: true,
+        }
+    }
+
+    /// Line `k` of a matrix.
+    pub(super) fn line(&self, k: usize, along_first: bool) -> Numbers {
+        let (rows, columns) = (self.dims[0], self.dims[1]);
+        let len = if along_first { rows } else { columns };
+        // Where an index runs fastest, its neighbours are neighbours in the file.
+        let (first, stride) = match (along_first, self.last_fastest) {
+            (true, true) => (k, columns),
+            (true, false) => (k * rows, 1),
+            (false, true) => (k * columns, 1),
+            (false, false) => (k, rows),
+        };
+        self.numbers.line(first, stride, len)
+    }
+}

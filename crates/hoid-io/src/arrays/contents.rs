@@ -1,0 +1,98 @@
+//! What stands in a file of named arrays: paths, each with a value.
+
+use super::array::Array;
+
+/// How the lines of a matrix are named.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Indexing {
+    Matlab,
+    Python,
+}
+
+/// The name under which comments are kept as text.
+pub(crate) const COMMENTS: &str = "hoid_comments";
+
+/// What stands under a path.
+#[derive(Debug, Clone)]
+pub(crate) enum Value {
+    Array(Array),
+    Texts(Vec<String>),
+    /// What is not read, in words.
+    Unread(String),
+}
+
+/// One thing in a file.
+#[derive(Debug, Clone)]
+pub(crate) struct Entry {
+    /// Such as `e`, `data.run(3).e` or `c{2}`.
+    pub(crate) path: String,
+    /// The structure that it stands in, such as `data.run(3)`; empty at top level.
+    pub(crate) parent: String,
+    pub(crate) value: Value,
+    /// Unit; empty when unknown.
+    pub(crate) unit: String,
+}
+
+impl Entry {
+    /// At top level.
+    pub(crate) fn new(path: impl Into<String>, value: Value) -> Self {
+        Self {
+            path: path.into(),
+            parent: String::new(),
+            value,
+            unit: String::new(),
+        }
+    }
+
+    /// In a structure, or at top level where that has no name.
+    pub(crate) fn field(parent: &str, name: &str, value: Value) -> Self {
+        let path = if parent.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{parent}.{name}")
+        };
+        Self {
+            parent: parent.to_owned(),
+            ..Self::new(path, value)
+        }
+    }
+}
+
+/// What stands in a file.
+#[derive(Debug)]
+pub(crate) struct Contents {
+    pub(crate) entries: Vec<Entry>,
+    /// The lines that hoid wrote beside the columns.
+    pub(crate) comments: Vec<String>,
+    /// What to know about how it was read.
+    pub(crate) notes: Vec<String>,
+    /// How the lines of a matrix are named.
+    pub(crate) indexing: Indexing,
+    /// Whether each structure holds times of its own on one common clock, so that its columns can be put beside those of
+    /// another.
+    pub(crate) own_clocks: bool,
+}
+
+impl Contents {
+    pub(crate) fn new(mut entries: Vec<Entry>, indexing: Indexing) -> Self {
+        // A name is printed: nothing in it that a terminal obeys.
+        for text in entries
+            .iter_mut()
+            .flat_map(|entry| [&mut entry.path, &mut entry.parent])
+        {
+            text.retain(|c| !c.is_control());
+        }
+        let at = entries.iter().position(|entry| entry.path == COMMENTS);
+        let comments = match at.map(|at| entries.remove(at).value) {
+            Some(Value::Texts(texts)) => texts,
+            _ => Vec::new(),
+        };
+        Self {
+            entries,
+            comments,
+            notes: Vec::new(),
+            indexing,
+            own_clocks: false,
+        }
+    }
+}

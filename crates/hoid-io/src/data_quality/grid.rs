@@ -1,0 +1,180 @@
+//! The even grid behind a recorded time, and how the time differs from it.
+//!
+//! Row i stands at `t_i = t_0 + k_i Ts + jitter`, with whole k that grow by one from row to row, and by more where rows are missing. The
+//! k are found by a phase that follows the times, `k_i - k_{i-1} = round((t_i - g) / Ts)` with `g` pulled a small share of the way to each
+//! time: jitter of nearly half a sample is then no gap. A row taken too far is given back when the next seems to stand. Ts is the
+//! slope of least squares, found twice.
+//!
+//! The jitter is the deviation from straight lines over parts of 256 rows without a gap, so that a slow drift is none.
+
+/// Rows of a part, and the fewest that make one.
+const PART: usize = 256;
+const LEAST_PART: usize = 5;
+/// A gap of so many rows is a pause, behind which the grid begins anew.
+const PAUSE: f64 = 10.0;
+/// Rows within which a step that was taken too far is set right.
+const NEAR: usize = 4;
+/// Times that say where a grid begins.
+const BEGIN: usize = 8;
+
+/// Where the rows stand on an even grid.
+pub(crate) struct Grid {
+    /// Rows whose time is later than that of all before.
+    pub(crate) rows: Vec<usize>,
+    /// Steps of the grid from each of them to the one before; 1 where no row is missing.
+    pub(crate) steps: Vec<f64>,
+    /// Sample time, s; NaN where fewer than two rows advance.
+    pub(crate) sample_time_s: f64,
+    /// Rows whose time stands still.
+    pub(super) standing: Vec<usize>,
+    /// Rows whose time lies before that of an earlier row.
+    pub(super) back: Vec<usize>,
+}
+
+impl Grid {
+    pub(crate) fn of(t: &[f64]) -> Self {
+        let (mut rows, mut standing, mut back) = (Vec::new(), Vec::new(), Vec::new());
+        let mut last = f64::NEG_INFINITY;
+        for (row, t) in t.iter().enumerate().filter(|(_, t)| t.is_finite()) {
+            if *t > last {
+                rows.push(row);
+                last = *t;
+            } else if *t == last {
+                standing.push(row);
+            } else {
+                back.push(row);
+            }
+        }
+        let times: Vec<f64> = rows.iter().map(|row| t[*row]).collect();
+        // The median of single steps is exact without jitter; that of sixteen at once sees through it, where few rows are missing.
+        let median = |length: usize| {
+            let mut spans: Vec<f64> = times
+                .windows(length + 1)
+                .map(|w| (w[length] - w[0]) / length as f64)
+                .collect();
+            let middle = spans.len() / 2;
+            (!spans.is_empty()).then(|| *spans.select_nth_unstable_by(middle, f64::total_cmp).1)
+        };
+        let mut sample_time_s = f64::NAN;
+        if let Some(single) = median(1) {
+            sample_time_s = median(16)
+                .filter(|many| (many / single - 1.0).abs() < 0.03)
+                .unwrap_or(single);
+        }
+        let mut steps = vec![1.0; rows.len()];
+        if sample_time_s.is_finite() {
+            for pull in [0.1, 0.02] {
+                follow(&times, sample_time_s, pull, &mut steps);
+                let slope = slope(&times, &steps);
+                if slope.is_finite() && slope > 0.0 {
+                    sample_time_s = slope;
+                }
+            }
+        }
+        Self {
+            rows,
+            steps,
+            sample_time_s,
+            standing,
+            back,
+        }
+    }
+
+    /// Gaps: position of the row before among the rows that advance, and rows missing.
+    pub(crate) fn gaps(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        (1..self.steps.len())
+            .filter(|i| self.steps[*i] > 1.5)
+            .map(|i| (i - 1, self.steps[i] - 1.0))
+    }
+
+    /// Deviation from lines over parts without a gap: RMS, and the largest with its row; none where no part is long enough.
+    pub(crate) fn jitter(&self, t: &[f64]) -> Option<(f64, f64, usize)> {
+        let (mut squares, mut freedom) = (0.0, 0);
+        let mut worst = (0.0, 0);
+        let mut start = 0;
+        while start < self.rows.len() {
+            let mut end = start + 1;
+            while end < self.rows.len() && end - start < PART && self.steps[end] < 1.5 {
+                end += 1;
+            }
+            if end - start >= LEAST_PART {
+                let times: Vec<f64> = self.rows[start..end]
+                    .iter()
+                    .map(|row| t[*row] - t[self.rows[start]])
+                    .collect();
+                let n = times.len() as f64;
+                let slope = slope(&times, &vec![1.0; times.len()]);
+                let mean = times.iter().sum::<f64>() / n;
+                for (i, time) in times.iter().enumerate() {
+                    let off = (time - mean - slope * (i as f64 - 0.5 * (n - 1.0))).abs();
+                    squares += off * off;
+                    if off > worst.0 {
+                        worst = (off, self.rows[start + i]);
+                    }
+                }
+                freedom += times.len() - 2;
+            }
+            start = end;
+        }
+        (freedom > 0).then(|| ((squares / freedom as f64).sqrt(), worst.0, worst.1))
+    }
+}
+
+/// Steps of the grid from row to row, one of each time.
+fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
+    steps.fill(1.0);
+    let mut owed: Option<usize> = None;
+    // Where a grid begins, the first times together say where it lies: one alone is off by its jitter.
+    let begin = |i: usize| {
+        let ahead = times[i..]
+            .iter()
+            .take(BEGIN)
+            .enumerate()
+            .map(|(j, t)| t - j as f64 * ts);
+        let near: Vec<f64> = ahead.filter(|t| (t - times[i]).abs() < 1.5 * ts).collect();
+        near.iter().sum::<f64>() / near.len() as f64
+    };
+    let (mut phase, mut known) = (begin(0), BEGIN as f64);
+    for i in 1..times.len() {
+        let mut step = ((times[i] - phase) / ts).round();
+        if step >= PAUSE {
+            let anew = begin(i);
+            step = ((anew - phase) / ts).round();
+            (phase, known) = (anew, BEGIN as f64);
+        } else {
+            phase += step * ts;
+            phase += f64::max(pull, 1.0 / (known + 1.0)) * (times[i] - phase);
+        }
+        known += 1.0;
+        steps[i] = step.max(1.0);
+        // What seems to stand gives back what an early time took, or is owed what the next one takes.
+        if step < 1.0 {
+            match (i.saturating_sub(NEAR)..i).rev().find(|j| steps[*j] > 1.5) {
+                Some(taken) => steps[taken] -= 1.0,
+                None => owed = Some(i),
+            }
+        } else if step > 1.5 && owed.take_if(|at| i - *at <= NEAR).is_some() {
+            steps[i] -= 1.0;
+        }
+    }
+}
+
+/// Slope of least squares of the times over the grid.
+pub(super) fn slope(times: &[f64], steps: &[f64]) -> f64 {
+    // Counted anew for each sum: a record of hours has no room for its indices.
+    let indexed = || {
+        let mut index = 0.0;
+        times.iter().zip(steps).enumerate().map(move |(i, (time, step))| {
+            if i > 0 {
+                index += step;
+            }
+            (index, *time)
+        })
+    };
+    let n = times.len() as f64;
+    // Scaled by n before they are summed, so that nothing overflows that has a meaning.
+    let x = indexed().map(|(index, _)| index / n).sum::<f64>();
+    let y = times.iter().map(|t| t / n).sum::<f64>();
+    let covariance: f64 = indexed().map(|(index, time)| (index - x) * (time - y)).sum();
+    covariance / indexed().map(|(index, _)| (index - x) * (index - x)).sum::<f64>()
+}

@@ -1,0 +1,106 @@
+//! What is wrong with the columns of a table that a record is made of.
+
+use std::ops::Range;
+
+use super::issue::{QualityIssue, QualityIssueKind};
+use super::search::{issues_of, names_a_clock};
+use super::signals::{Signal, Signals};
+use crate::IoError;
+use crate::column_expression;
+use crate::read_options::ReadOptions;
+use crate::table::Table;
+
+/// What is wrong with the columns that are asked for, within the span.
+///
+/// # Errors
+/// [`IoError::NoSuchColumn`] and [`IoError::Expression`].
+pub(crate) fn issues_of_record(
+    table: &Table<'_>,
+    options: &ReadOptions,
+) -> Result<(Vec<QualityIssue>, Range<usize>), IoError> {
+    let file = table.source.file();
+    let names = table.names();
+    let signals = options.input.iter().chain([&options.output]);
+    let signals: Vec<column_expression::Signal> =
+        signals.map(|one| one.resolve(&names, file)).collect::<Result<_, _>>()?;
+    let time = names.iter().position(|name| *name == "t");
+    let rows = span_rows(table, time, options);
+    Ok((issues_of_signals(table, time, signals.into_iter(), options), rows))
+}
+
+pub(crate) fn issues_of_signals(
+    table: &Table<'_>,
+    time: Option<usize>,
+    signals: impl Iterator<Item = column_expression::Signal>,
+    options: &ReadOptions,
+) -> Vec<QualityIssue> {
+    let signals: Vec<column_expression::Signal> = signals.collect();
+    let mut used: Vec<usize> = signals
+        .iter()
+        .copied()
+        .flat_map(column_expression::Signal::columns)
+        .collect();
+    used.sort_unstable();
+    used.dedup();
+    // A frequency to resample to says nothing of the clock of the file.
+    let nominal_hz = options.sampling_hz.filter(|_| !options.repair.resample);
+    let mut found = of_columns(table, &used, time, nominal_hz, span_rows(table, time, options));
+    // A difference may rightly have one constant term, such as a reference of zero.
+    let names = |one: &QualityIssue, column: usize| table.columns[column].name == one.channel;
+    let constant: Vec<QualityIssue> = found
+        .iter()
+        .filter(|one| one.kind == QualityIssueKind::Constant)
+        .cloned()
+        .collect();
+    found.retain(|one| {
+        let is_fair = |signal: &column_expression::Signal| match signal {
+            column_expression::Signal::Difference(a, b) if names(one, *a) => {
+                constant.iter().all(|other| !names(other, *b))
+            }
+            column_expression::Signal::Difference(a, b) if names(one, *b) => {
+                constant.iter().all(|other| !names(other, *a))
+            }
+            _ => false,
+        };
+        one.kind != QualityIssueKind::Constant || !signals.iter().any(is_fair)
+    });
+    found
+}
+
+/// The rows of the span, as far as the time of the file tells.
+fn span_rows(table: &Table<'_>, time: Option<usize>, options: &ReadOptions) -> Range<usize> {
+    let at = |row: usize| match (time, options.sampling_hz) {
+        (Some(time), _) => table.columns[time].values[row],
+        (None, Some(hz)) => row as f64 / hz,
+        (None, None) => f64::NAN,
+    };
+    let (from, to) = options.span_s;
+    let start = from.map_or(0, |from| {
+        (0..table.rows).find(|row| at(*row) >= from).unwrap_or(table.rows)
+    });
+    let end = to.and_then(|to| (start..table.rows).find(|row| at(*row) >= to));
+    start..end.unwrap_or(table.rows)
+}
+
+/// What is wrong with some columns of a table.
+fn of_columns(
+    table: &Table<'_>,
+    used: &[usize],
+    time: Option<usize>,
+    nominal_hz: Option<f64>,
+    rows: Range<usize>,
+) -> Vec<QualityIssue> {
+    let signal = |column: usize| Signal {
+        name: &table.columns[column].name,
+        values: &table.columns[column].values[rows.clone()],
+    };
+    let is_clock = |column: &usize| Some(*column) != time && names_a_clock(&table.columns[*column].name);
+    issues_of(&Signals {
+        columns: used.iter().copied().map(signal).collect(),
+        time: time.map(signal),
+        precision: time.map(|time| table.columns[time].precision).unwrap_or_default(),
+        nominal_hz: nominal_hz.or(table.sample_time_s.map(|ts| 1.0 / ts)),
+        clocks: (0..table.columns.len()).filter(is_clock).map(signal).collect(),
+        before: rows.start,
+    })
+}

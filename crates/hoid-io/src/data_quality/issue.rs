@@ -1,0 +1,155 @@
+//! A finding: what it is, where, how much, and what can be done about it.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::wording::decimal;
+
+/// Places of a finding that are written as JSON; all of them are counted.
+const PLACES_WRITTEN: usize = 100;
+
+/// What is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum QualityIssueKind {
+    /// Values that are missing or not finite.
+    Missing,
+    /// Time that stands still or runs back.
+    Unordered,
+    /// Rows that are there twice, time included.
+    Repeated,
+    /// Rows that are not there.
+    Gap,
+    /// Times off an even grid.
+    Jitter,
+    /// A clock that is off another, or off a usual rate.
+    Clock,
+    /// A clock whose rate changes.
+    Drift,
+    /// All channels hold their values while the time goes on.
+    Stalled,
+    /// A channel that stays at its end.
+    Saturated,
+    /// A channel in coarse steps.
+    Quantised,
+    /// A channel with one value.
+    Constant,
+}
+
+impl QualityIssueKind {
+    /// Kinds that are places in a record and can be left out of it; a clock or a constant is none.
+    pub const MASKABLE: [Self; 4] = [Self::Missing, Self::Gap, Self::Stalled, Self::Saturated];
+
+    /// What can be done about it.
+    pub fn remedy(self) -> &'static str {
+        match self {
+            Self::Missing => "bridge with --fill, or leave out with --from and --to or --mask missing",
+            Self::Unordered => "look at how the file was joined, or count the samples with --fs",
+            Self::Repeated => "drop them with --drop-repeated",
+            Self::Gap => "interpolate with --resample, or leave out with --mask gap",
+            Self::Jitter => "interpolate with --resample, or count the samples with --fs if only t is wrong",
+            Self::Clock => "give the true sampling frequency with --fs if t is wrong",
+            Self::Drift => "interpolate with --resample if t is right, or count the samples with --fs",
+            Self::Stalled => "leave out with --mask stalled or --from and --to",
+            Self::Saturated => "leave out with --mask saturated; a bias stays, see the page on record files",
+            Self::Quantised => "nothing; it adds noise of variance step^2 / 12",
+            Self::Constant => "choose another column",
+        }
+    }
+}
+
+hoid_model::named_choice!(QualityIssueKind, "kind of fault", 11, {
+    Missing => "missing",
+    Unordered => "unordered",
+    Repeated => "repeated",
+    Gap => "gap",
+    Jitter => "jitter",
+    Clock => "clock",
+    Drift => "drift",
+    Stalled => "stalled",
+    Saturated => "saturated",
+    Quantised => "quantised",
+    Constant => "constant",
+});
+
+/// Rows that follow each other.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Place {
+    /// The first row, counted from 1 without header and comments; of a gap the row before it.
+    pub row: usize,
+    /// How many rows; of a gap those that are missing.
+    pub rows: usize,
+    /// Time of the first row, s; none without a time.
+    pub from_s: Option<f64>,
+    /// Time of the row behind the last, s.
+    pub to_s: Option<f64>,
+}
+
+/// One finding.
+#[derive(Debug, Clone, PartialEq)]
+pub struct QualityIssue {
+    /// What it is.
+    pub kind: QualityIssueKind,
+    /// The channel; empty for the time and for all channels.
+    pub channel: String,
+    /// Rows concerned.
+    pub rows: usize,
+    /// Their share of the rows looked at.
+    pub share: f64,
+    /// How much, in `unit`: jitter RMS in s; a gap, a stall or a saturation its longest time in s; a clock and a drift the relative
+    /// deviation; the step of what is quantised; else the number of rows.
+    pub size: f64,
+    /// Unit of the size.
+    pub unit: String,
+    /// Where.
+    pub places: Vec<Place>,
+    /// A sentence without a full stop.
+    pub text: String,
+}
+
+impl fmt::Display for QualityIssue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+impl Serialize for QualityIssue {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Written<'a> {
+            kind: QualityIssueKind,
+            channel: &'a str,
+            rows: usize,
+            share: f64,
+            size: f64,
+            unit: &'a str,
+            text: &'a str,
+            remedy: &'static str,
+            place_count: usize,
+            places: &'a [Place],
+        }
+        Written {
+            kind: self.kind,
+            channel: &self.channel,
+            rows: self.rows,
+            share: self.share,
+            size: self.size,
+            unit: &self.unit,
+            text: &self.text,
+            remedy: self.kind.remedy(),
+            place_count: self.places.len(),
+            places: &self.places[..self.places.len().min(PLACES_WRITTEN)],
+        }
+        .serialize(serializer)
+    }
+}
+
+/// "row 12 (0.11 s)".
+pub(super) fn at(place: &Place) -> String {
+    match place.from_s {
+        Some(s) => format!("row {} ({} s)", place.row, decimal(s)),
+        None => format!("row {}", place.row),
+    }
+}

@@ -1,0 +1,33 @@
+//! Everything that is wrong with columns that belong together.
+
+use super::grid::Grid;
+use super::issue::QualityIssue;
+use super::signals::Signals;
+use super::values::Levels;
+use super::{holds, timing, values};
+
+/// Everything that is wrong with columns that belong together.
+pub(crate) fn issues_of(signals: &Signals<'_>) -> Vec<QualityIssue> {
+    let mut found = Vec::new();
+    if signals.rows() == 0 {
+        return found;
+    }
+    let grid = signals.time.map(|time| Grid::of(time.values));
+    if let Some(grid) = &grid {
+        holds::standing(signals, grid, &mut found);
+        timing::find(signals, grid, &mut found);
+    }
+    let levels: Vec<Levels> = signals.columns.iter().map(|signal| Levels::of(signal.values)).collect();
+    holds::stalls(signals, &levels, grid.as_ref(), &mut found);
+    for (signal, levels) in signals.columns.iter().zip(&levels) {
+        values::find(signals, *signal, levels, &mut found);
+    }
+    found.sort_by(|a, b| (a.kind, &a.channel).cmp(&(b.kind, &b.channel)));
+    found
+}
+
+/// Whether a name says that a column counts time.
+pub(crate) fn names_a_clock(name: &str) -> bool {
+    let name = name.to_ascii_lowercase();
+    ["time", "clock", "stamp"].iter().any(|word| name.contains(word))
+}

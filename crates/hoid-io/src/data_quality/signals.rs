@@ -1,0 +1,54 @@
+//! Columns as they are looked at, and what is known of their time.
+
+use std::ops::Range;
+
+use super::issue::Place;
+use crate::table::Precision;
+
+/// A column as it is looked at.
+#[derive(Clone, Copy)]
+pub(crate) struct Signal<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) values: &'a [f64],
+}
+
+/// Columns of one length, and what is known of their time.
+#[derive(Default)]
+pub(crate) struct Signals<'a> {
+    pub(crate) columns: Vec<Signal<'a>>,
+    pub(crate) time: Option<Signal<'a>>,
+    /// How exactly the time is printed.
+    pub(crate) precision: Precision,
+    /// Sampling frequency that was given or stated, Hz.
+    pub(crate) nominal_hz: Option<f64>,
+    /// Other columns that count time.
+    pub(crate) clocks: Vec<Signal<'a>>,
+    /// Rows before the first one looked at.
+    pub(crate) before: usize,
+}
+
+impl Signals<'_> {
+    /// Number of rows.
+    pub(super) fn rows(&self) -> usize {
+        let lengths = self.columns.iter().chain(&self.time).map(|signal| signal.values.len());
+        lengths.min().unwrap_or(0)
+    }
+
+    /// Time of a row, s.
+    pub(super) fn at_s(&self, row: usize) -> Option<f64> {
+        match (&self.time, self.nominal_hz) {
+            (Some(time), _) => time.values.get(row).copied().filter(|t| t.is_finite()),
+            (None, Some(hz)) => Some(row as f64 / hz).filter(|t| t.is_finite()),
+            (None, None) => None,
+        }
+    }
+
+    pub(super) fn place(&self, rows: &Range<usize>) -> Place {
+        Place {
+            row: self.before + rows.start + 1,
+            rows: rows.len(),
+            from_s: self.at_s(rows.start),
+            to_s: self.at_s(rows.end).or_else(|| self.at_s(rows.end.saturating_sub(1))),
+        }
+    }
+}

@@ -1,0 +1,262 @@
+use super::*;
+use crate::table::Precision;
+
+/// Numbers between -1 and 1 that look arbitrary, the same in every run.
+struct Arbitrary(u64);
+
+impl Arbitrary {
+    fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as f64 / 2.0_f64.powi(30) - 1.0
+    }
+}
+
+const TS: f64 = 0.01;
+const N: usize = 4000;
+
+fn even() -> Vec<f64> {
+    (0..N).map(|k| k as f64 * TS).collect()
+}
+
+/// Two smooth channels of different frequencies.
+fn smooth() -> [Vec<f64>; 2] {
+    let wave = |omega: f64| {
+        even()
+            .iter()
+            .map(|t| (omega * t).sin() + 0.3 * (2.7 * omega * t + 1.0).cos())
+            .collect()
+    };
+    [wave(0.6), wave(1.9)]
+}
+
+fn look(t: &[f64], e: &[f64], u: &[f64]) -> Vec<QualityIssue> {
+    issues_of(&Signals {
+        columns: vec![Signal { name: "e", values: e }, Signal { name: "u", values: u }],
+        time: Some(Signal { name: "t", values: t }),
+        ..Signals::default()
+    })
+}
+
+fn kinds(found: &[QualityIssue]) -> Vec<QualityIssueKind> {
+    found.iter().map(|one| one.kind).collect()
+}
+
+#[test]
+fn smooth_and_quiet_channels_have_no_faults() {
+    let [e, u] = smooth();
+    assert_eq!(look(&even(), &e, &u), []);
+    // Printed with few decimals, slow as they are, and far from zero.
+    let printed = |values: &[f64]| {
+        values
+            .iter()
+            .map(|v| (v * 1e4).round() / 1e4 + 50.0)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(look(&even(), &printed(&e), &printed(&u)), []);
+    // A hand that rests for a third of the time.
+    let mut resting = u.clone();
+    let at = resting[1000];
+    resting[1000..2300].fill(at);
+    assert_eq!(look(&even(), &e, &resting), []);
+    // Times that are printed rounded, or in single precision.
+    let rounded: Vec<f64> = (0..N).map(|k| (k as f64 / 60.0 * 1e4).round() / 1e4).collect();
+    let mut precision = Precision::default();
+    precision.add("0.0167");
+    let signals = Signals {
+        time: Some(Signal {
+            name: "t",
+            values: &rounded,
+        }),
+        precision,
+        ..Signals::default()
+    };
+    assert_eq!(issues_of(&signals), []);
+    let single: Vec<f64> = (0..N).map(|k| f64::from((k as f64 * TS) as f32)).collect();
+    assert_eq!(look(&single, &e, &u), []);
+}
+
+#[test]
+fn gaps_are_found_under_jitter_of_nearly_half_a_sample() {
+    let mut any = Arbitrary(3);
+    let mut t: Vec<f64> = even().iter().map(|t| t + 0.45 * TS * any.next()).collect();
+    let [mut e, mut u] = smooth();
+    // In the order of rows that are still there.
+    for (row, missing) in [(3000, 1), (2000, 7), (1000, 1), (500, 150)] {
+        for column in [&mut t, &mut e, &mut u] {
+            column.drain(row..row + missing);
+        }
+    }
+    let found = look(&t, &e, &u);
+    assert_eq!(kinds(&found), [QualityIssueKind::Gap, QualityIssueKind::Jitter]);
+    let places: Vec<(usize, usize)> = found[0].places.iter().map(|place| (place.row, place.rows)).collect();
+    assert_eq!(places, [(500, 150), (850, 1), (1849, 7), (2842, 1)]);
+    assert_eq!(found[0].rows, 159);
+    // Uniform within 0.45 of a sample: 0.45 / sqrt 3 of one RMS.
+    assert!(
+        (found[1].size / (0.45 * TS / 3_f64.sqrt()) - 1.0).abs() < 0.05,
+        "{}",
+        found[1]
+    );
+}
+
+#[test]
+fn stalls_and_rows_there_twice() {
+    let [mut e, mut u] = smooth();
+    let (held_e, held_u) = (e[700], u[700]);
+    e[700..792].fill(held_e);
+    u[700..792].fill(held_u);
+    let found = look(&even(), &e, &u);
+    assert_eq!(kinds(&found), [QualityIssueKind::Stalled]);
+    let place = found[0].places[0];
+    assert_eq!((found[0].places.len(), place.row, place.rows), (1, 702, 91));
+    assert!((found[0].size - 0.91).abs() < 1e-9);
+    // In steps the channels hold too, and a stall is what is longer.
+    let steps = |values: &[f64]| values.iter().map(|v| (v * 20.0).round() / 20.0).collect::<Vec<_>>();
+    let coarse = look(&even(), &steps(&e), &steps(&u));
+    let stalls: Vec<&QualityIssue> = coarse
+        .iter()
+        .filter(|one| one.kind == QualityIssueKind::Stalled)
+        .collect();
+    assert!(
+        stalls
+            .iter()
+            .all(|one| one.places.iter().all(|place| (700..=792).contains(&place.row))),
+        "{stalls:?}"
+    );
+    let [mut e, mut u] = smooth();
+    let mut t = even();
+    for column in [&mut t, &mut e, &mut u] {
+        for row in [2000, 10] {
+            column.insert(row, column[row - 1]);
+        }
+    }
+    let found = look(&t, &e, &u);
+    assert_eq!(kinds(&found), [QualityIssueKind::Repeated]);
+    assert_eq!(
+        found[0].places.iter().map(|place| place.row).collect::<Vec<_>>(),
+        [11, 2002]
+    );
+    t[100] = t[20];
+    assert!(kinds(&look(&t, &e, &u)).contains(&QualityIssueKind::Unordered));
+}
+
+#[test]
+fn rails_and_steps() {
+    let [e, u] = smooth();
+    let clipped: Vec<f64> = u.iter().map(|v| v.clamp(-0.9, 1.0)).collect();
+    let found = look(&even(), &e, &clipped);
+    assert_eq!(
+        kinds(&found),
+        [QualityIssueKind::Saturated, QualityIssueKind::Saturated]
+    );
+    for (one, value) in found.iter().zip([-0.9, 1.0]) {
+        assert_eq!(one.rows, clipped.iter().filter(|v| **v == value).count());
+    }
+    // Steps alone are no rail, at any coarseness and with any phase of the steps.
+    for levels in [8.0, 16.0, 31.0, 64.0, 256.0] {
+        for phase in [0.0, 0.2, 0.5, 0.77] {
+            let steps: Vec<f64> = u
+                .iter()
+                .map(|v| ((v * levels / 2.6 + phase).round() - phase) * 2.6 / levels)
+                .collect();
+            let found = look(&even(), &e, &steps);
+            assert!(
+                kinds(&found).iter().all(|kind| *kind == QualityIssueKind::Quantised),
+                "{levels} {phase}: {found:?}"
+            );
+        }
+    }
+    let both: Vec<f64> = clipped.iter().map(|v| (v * 40.0).round() / 40.0).collect();
+    let found = look(&even(), &e, &both);
+    assert_eq!(
+        kinds(&found),
+        [
+            QualityIssueKind::Saturated,
+            QualityIssueKind::Saturated,
+            QualityIssueKind::Quantised
+        ]
+    );
+    assert!((found[2].size - 0.025).abs() < 1e-12);
+}
+
+#[test]
+fn clocks() {
+    let [e, u] = smooth();
+    let slow: Vec<f64> = even().iter().map(|t| 0.998 * t).collect();
+    let found = look(&slow, &e, &u);
+    assert_eq!(kinds(&found), [QualityIssueKind::Clock]);
+    assert!(
+        (found[0].size - 0.002).abs() < 1e-4 && found[0].text.contains("slow by 0.2"),
+        "{}",
+        found[0]
+    );
+    let drifting: Vec<f64> = even().iter().map(|t| t + 5e-5 * t * t).collect();
+    let found = look(&drifting, &e, &u);
+    // From 1e-4 * 2 / 3 of the time to the same share of its last third: 40 s * 2 / 3 * 1e-4.
+    let drift = found.iter().find(|one| one.kind == QualityIssueKind::Drift).unwrap();
+    assert!((drift.size - 40.0 * 2.0 / 3.0 * 1e-4).abs() < 2e-4, "{}", drift.size);
+    let t = even();
+    let other: Vec<f64> = t.iter().map(|t| 7e5 + 1.001e3 * t).collect();
+    let with = |nominal_hz| {
+        issues_of(&Signals {
+            columns: vec![Signal { name: "e", values: &e }, Signal { name: "u", values: &u }],
+            time: Some(Signal { name: "t", values: &t }),
+            clocks: vec![Signal {
+                name: "time_ms",
+                values: &other,
+            }],
+            nominal_hz,
+            ..Signals::default()
+        })
+    };
+    let found = with(None);
+    assert_eq!(
+        (kinds(&found), found[0].channel.as_str()),
+        (vec![QualityIssueKind::Clock], "time_ms")
+    );
+    assert!((found[0].size - 1e-3).abs() < 1e-9);
+    assert_eq!(with(Some(99.9)).len(), 2);
+}
+
+#[test]
+fn nothing_panics() {
+    let mut any = Arbitrary(11);
+    let odd = [
+        f64::NAN,
+        f64::INFINITY,
+        -f64::INFINITY,
+        f64::MAX,
+        f64::MIN,
+        5e-324,
+        0.0,
+        -0.0,
+        1.0,
+        1e300,
+    ];
+    for round in 0..3000 {
+        let n = round % 41;
+        let mut column = || -> Vec<f64> {
+            let kind = (any.next() * 3.0) as i32;
+            (0..n)
+                .map(|k| match kind {
+                    0 => k as f64 * TS + 0.3 * TS * any.next(),
+                    1 => odd[(any.next().abs() * 10.0) as usize % 10],
+                    _ if any.next() > 0.5 => odd[(any.next().abs() * 10.0) as usize % 10],
+                    _ => (any.next() * 3.0).round(),
+                })
+                .collect()
+        };
+        let (t, e, u) = (column(), column(), column());
+        for one in look(&t, &e, &u) {
+            assert!(!one.text.is_empty() && one.kind.remedy().len() > 5);
+        }
+    }
+    let gone = vec![f64::NAN; 5];
+    let found = look(&gone, &gone, &gone);
+    assert_eq!(kinds(&found), [QualityIssueKind::Missing, QualityIssueKind::Missing]);
+    assert_eq!(look(&[], &[], &[]), []);
+    assert_eq!(look(&[0.0], &[1.0], &[1.0]), []);
+}

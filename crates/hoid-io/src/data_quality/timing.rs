@@ -1,0 +1,234 @@
+//! The time against the even grid behind it: jitter, missing rows, a clock that is off or drifts.
+
+use super::grid::{Grid, slope};
+use super::issue::{Place, QualityIssue, QualityIssueKind, at};
+use super::signals::Signals;
+use crate::table::Precision;
+use crate::wording::{counted, decimal, short};
+
+/// Deviation from the grid that is no jitter, sample times; that of `sampling`.
+const JITTER: f64 = 1e-3;
+/// Relative deviation of a clock from a given rate that is told; crystals are within 1e-4.
+const OFF: f64 = 2e-4;
+/// The same from a usual rate that nobody gave, and the farthest that still looks like it.
+const OFF_USUAL: (f64, f64) = (5e-4, 1e-2);
+/// Usual rates of recorders, Hz.
+const USUAL_HZ: [f64; 42] = [
+    1.0, 2.0, 4.0, 5.0, 8.0, 10.0, 12.5, 15.0, 16.0, 20.0, 24.0, 25.0, 29.97, 30.0, 32.0, 40.0, 50.0, 59.94, 60.0,
+    64.0, 75.0, 80.0, 90.0, 100.0, 119.88, 120.0, 125.0, 128.0, 144.0, 150.0, 200.0, 240.0, 250.0, 256.0, 300.0, 400.0,
+    500.0, 512.0, 600.0, 1000.0, 1024.0, 2000.0,
+];
+
+/// How far rounding may move a time: one unit of the last printed digit, or of single precision.
+fn rounding(t: &[f64], precision: Precision) -> f64 {
+    let largest = t
+        .iter()
+        .copied()
+        .filter(|t| t.is_finite())
+        .fold(0.0, |m: f64, t| m.max(t.abs()));
+    let single = t.iter().all(|t| !t.is_finite() || f64::from(*t as f32) == *t);
+    let ulp = if single { largest * f64::from(f32::EPSILON) } else { 0.0 };
+    precision.unit(largest).max(ulp)
+}
+
+pub(super) fn find(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
+    let Some(time) = signals.time else { return };
+    let (t, ts) = (time.values, grid.sample_time_s);
+    if !(ts > 0.0 && ts.is_finite()) {
+        return;
+    }
+    let rows = signals.rows();
+    gaps(signals, grid, found);
+    let unit = rounding(t, signals.precision).min(ts);
+    let jitter = grid.jitter(t);
+    if let Some((rms, worst, row)) = jitter.filter(|(_, worst, _)| *worst > (JITTER * ts).max(unit * (1.0 + 1e-6))) {
+        let place = signals.place(&(row..row + 1));
+        found.push(QualityIssue {
+            kind: QualityIssueKind::Jitter,
+            channel: String::new(),
+            rows,
+            share: 1.0,
+            size: rms,
+            unit: "s".to_owned(),
+            text: format!(
+                "the times jitter by {} s RMS around an even grid of {} s ({} % of a sample), at most by {} s at {}",
+                short(rms),
+                short(ts),
+                short(100.0 * rms / ts),
+                short(worst),
+                at(&place)
+            ),
+            places: vec![place],
+        });
+    }
+    let rms = jitter.map_or(0.0, |(rms, ..)| rms).max(unit / 12_f64.sqrt());
+    rate(signals, grid, rms, unit, found);
+    drift(signals, grid, rms, unit, found);
+    second_clocks(signals, grid, found);
+}
+
+fn gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
+    let places: Vec<Place> = grid
+        .gaps()
+        .map(|(i, missing)| Place {
+            row: signals.before + grid.rows[i] + 1,
+            rows: missing as usize,
+            from_s: signals.at_s(grid.rows[i]),
+            to_s: signals.at_s(grid.rows[i + 1]),
+        })
+        .collect();
+    let Some(first) = places.first() else { return };
+    let missing = places.iter().fold(0_usize, |sum, place| sum.saturating_add(place.rows));
+    let longest = places
+        .iter()
+        .filter_map(|place| Some(place.to_s? - place.from_s?))
+        .fold(0.0, f64::max);
+    found.push(QualityIssue {
+        kind: QualityIssueKind::Gap,
+        channel: String::new(),
+        rows: missing,
+        share: missing as f64 / (missing as f64 + signals.rows() as f64),
+        size: longest,
+        unit: "s".to_owned(),
+        text: format!(
+            "{} missing in {}, the first behind {}; the longest step is {} s",
+            counted(missing, "row"),
+            counted(places.len(), "place"),
+            at(first),
+            short(longest)
+        ),
+        places,
+    });
+}
+
+/// The rate against the one that was given, or the usual one that it nearly is.
+fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec<QualityIssue>) {
+    let (ts, n) = (grid.sample_time_s, grid.rows.len() as f64);
+    // Standard error of a slope, and what rounding of the ends can do.
+    let uncertain = 5.0 * (rms * 12_f64.sqrt() / n.powf(1.5)).max(unit / n / 5.0) / ts;
+    let hz = 1.0 / ts;
+    let usual = || {
+        USUAL_HZ
+            .into_iter()
+            .min_by(|a, b| (a / hz).ln().abs().total_cmp(&(b / hz).ln().abs()))
+            .filter(|usual| {
+                let off = (hz / usual - 1.0).abs();
+                off > OFF_USUAL.0 && off < OFF_USUAL.1
+            })
+    };
+    let (expected, given) = match signals.nominal_hz {
+        Some(given) => (given, true),
+        None => match usual() {
+            Some(usual) => (usual, false),
+            None => return,
+        },
+    };
+    let off = hz / expected - 1.0;
+    if !(off.abs() > OFF.max(uncertain) && off.is_finite()) {
+        return;
+    }
+    let way = if off > 0.0 { "slow" } else { "fast" };
+    let what = if given { "where" } else { "which would be" };
+    found.push(QualityIssue {
+        kind: QualityIssueKind::Clock,
+        channel: String::new(),
+        rows: signals.rows(),
+        share: 1.0,
+        size: off,
+        unit: "1".to_owned(),
+        text: format!(
+            "t gives {hz:.4} Hz {what} {} Hz {}: the clock of t runs {way} by {} %{}",
+            short(expected),
+            if given { "were expected" } else { "is usual" },
+            short(100.0 * off.abs()),
+            if given {
+                ""
+            } else {
+                ", if that is not the rate of the recorder"
+            }
+        ),
+        places: Vec::new(),
+    });
+}
+
+/// The rate of the first third against that of the last.
+fn drift(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec<QualityIssue>) {
+    let Some(time) = signals.time else { return };
+    let third = grid.rows.len() / 3;
+    if third < 100 {
+        return;
+    }
+    let of = |from: usize| {
+        let times: Vec<f64> = grid.rows[from..from + third]
+            .iter()
+            .map(|row| time.values[*row])
+            .collect();
+        slope(&times, &grid.steps[from..from + third])
+    };
+    let (first, last) = (of(0), of(grid.rows.len() - third));
+    let change = last / first - 1.0;
+    let n = third as f64;
+    let uncertain = 8.0 * (rms * 12_f64.sqrt() / n.powf(1.5)).max(unit / n / 4.0) / grid.sample_time_s;
+    if change.is_nan() || change.abs() <= OFF.max(uncertain) {
+        return;
+    }
+    found.push(QualityIssue {
+        kind: QualityIssueKind::Drift,
+        channel: String::new(),
+        rows: signals.rows(),
+        share: 1.0,
+        size: change,
+        unit: "1".to_owned(),
+        text: format!(
+            "the sample time changes along the record: {} s in its first third, {} s in its last ({} %)",
+            decimal(first),
+            decimal(last),
+            short(100.0 * change)
+        ),
+        places: Vec::new(),
+    });
+}
+
+/// Other columns that count time, in s, ms, us or ns.
+fn second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
+    let Some(time) = signals.time else { return };
+    for clock in &signals.clocks {
+        let pairs: Vec<(f64, f64)> = grid
+            .rows
+            .iter()
+            .filter_map(|row| Some((time.values[*row], *clock.values.get(*row)?)))
+            .filter(|(_, c)| c.is_finite())
+            .collect();
+        let (&[first, .., last], true) = (pairs.as_slice(), pairs.windows(2).all(|p| p[1].1 >= p[0].1)) else {
+            continue;
+        };
+        let ratio = (last.1 - first.1) / (last.0 - first.0);
+        let Some(off) = [1.0, 1e3, 1e6, 1e9]
+            .into_iter()
+            .map(|unit| ratio / unit - 1.0)
+            .find(|off| off.abs() < 0.1)
+        else {
+            continue;
+        };
+        // The ends stand for the rate as far as a row of jitter allows.
+        let uncertain = 2.0 / pairs.len() as f64;
+        if off.abs() <= OFF.max(uncertain) {
+            continue;
+        }
+        found.push(QualityIssue {
+            kind: QualityIssueKind::Clock,
+            channel: clock.name.to_owned(),
+            rows: signals.rows(),
+            share: 1.0,
+            size: off,
+            unit: "1".to_owned(),
+            text: format!(
+                "{} goes {} % {} than t: one of the two clocks is wrong",
+                clock.name,
+                short(100.0 * off.abs()),
+                if off > 0.0 { "faster" } else { "slower" }
+            ),
+            places: Vec::new(),
+        });
+    }
+}

@@ -1,0 +1,240 @@
+//! Saturation, quantisation, constants and missing values of one channel.
+//!
+//! A channel is quantised where its values, fewer than half as many as its rows, lie on a grid within `1e-3 q`, q being the smallest
+//! step between two of them; the smallest and the largest may lie off it, as the rails of a stick do.
+//!
+//! It is saturated at an end where it stays there as no peak does. In full precision no two values in a row are equal by chance: three rows
+//! at the extreme value are a rail. In steps a peak stays longest at its top: of a parabola with its top at the far edge of the last step,
+//! 3 times as long there as on average at the next three steps. A rail is told where the rows at the extreme are at least 6 times as many as that
+//! average, with a stay of 5 rows at least, and where the channel came there and stayed more than once.
+
+use std::ops::Range;
+
+use super::issue::{Place, QualityIssue, QualityIssueKind, at};
+use super::signals::{Signal, Signals};
+use crate::wording::{counted, short};
+
+/// A quantised channel is told from this step on, as a share of its deviation: its noise has 1e-5 of its power there.
+const COARSE: f64 = 1e-2;
+/// Rows in a row at the extreme that are a rail, for values in full precision and in steps.
+const STAY: (usize, usize) = (3, 5);
+/// Rows at a rail against the average of the next steps.
+const PEAK: usize = 6;
+
+/// What a rail of a channel is.
+pub(crate) struct Rail {
+    /// The value at which it stays.
+    pub(crate) value: f64,
+    pub(crate) is_upper: bool,
+    /// Stays, as rows.
+    pub(crate) stays: Vec<Range<usize>>,
+}
+
+impl Rail {
+    /// Rows at the rail.
+    pub(crate) fn rows(&self) -> usize {
+        self.stays.iter().map(Range::len).sum()
+    }
+}
+
+/// Distinct finite values of a channel; those within rounding of the range are one.
+pub(crate) struct Levels {
+    count: usize,
+    /// Rows of the channel, and those with a finite value.
+    rows: usize,
+    finite: usize,
+    /// In increasing order: all of a coarse channel, else those at both ends.
+    kept: Vec<f64>,
+}
+
+impl Levels {
+    /// Levels at each end that a channel in full precision keeps.
+    const END: usize = 4;
+
+    pub(crate) fn of(values: &[f64]) -> Self {
+        let mut levels: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+        let finite = levels.len();
+        levels.sort_unstable_by(f64::total_cmp);
+        levels.dedup();
+        if let [first, .., last] = levels.as_slice() {
+            let range = last - first;
+            let mut kept: Option<f64> = None;
+            levels.retain(|level| {
+                let keep = kept.is_none_or(|kept| level - kept > 1e-12 * range);
+                if keep {
+                    kept = Some(*level);
+                }
+                keep
+            });
+        }
+        let (count, rows) = (levels.len(), values.len());
+        if 2 * count > rows && count > 2 * Self::END {
+            levels.drain(Self::END..count - Self::END);
+            levels.shrink_to_fit();
+        }
+        Self {
+            count,
+            rows,
+            finite,
+            kept: levels,
+        }
+    }
+
+    /// Whether they are fewer than half as many as the rows.
+    pub(super) fn is_coarse(&self) -> bool {
+        2 * self.count <= self.rows
+    }
+
+    /// The step of a grid on which all values lie, and the number of levels.
+    pub(crate) fn quantum(&self) -> Option<(f64, usize)> {
+        if self.count < 2 || 2 * self.count > self.finite {
+            return None;
+        }
+        let inner = if self.count > 4 {
+            &self.kept[1..self.count - 1]
+        } else {
+            &self.kept[..]
+        };
+        let step = inner
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .fold(f64::INFINITY, f64::min);
+        let off = |level: &f64| {
+            let steps = (level - inner[0]) / step;
+            (steps - steps.round()).abs()
+        };
+        (step > 0.0 && step.is_finite() && inner.iter().all(|level| off(level) < 1e-3)).then_some((step, self.count))
+    }
+}
+
+/// The rails of a channel, lower and upper.
+pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<Rail> {
+    if levels.count < 4 {
+        // A switch or a constant stays at its ends by its nature.
+        return Vec::new();
+    }
+    let (coarse, levels) = (levels.is_coarse(), &levels.kept);
+    let count = |level: f64| values.iter().filter(|v| **v == level).count();
+    let rail = |is_upper: bool| {
+        let (extreme, next) = if is_upper {
+            (levels[levels.len() - 1], &levels[levels.len() - 4..levels.len() - 1])
+        } else {
+            (levels[0], &levels[1..4])
+        };
+        let mut stays: Vec<Range<usize>> = Vec::new();
+        for (row, _) in values.iter().enumerate().filter(|(_, v)| **v == extreme) {
+            match stays.last_mut() {
+                Some(stay) if stay.end == row => stay.end = row + 1,
+                _ => stays.push(row..row + 1),
+            }
+        }
+        let rows: usize = stays.iter().map(Range::len).sum();
+        let beside: usize = next.iter().map(|level| count(*level)).sum();
+        // What begins or ends the record may be a value that settles.
+        let inner = || {
+            stays
+                .iter()
+                .filter(|stay| stay.start > 0 && stay.end < values.len())
+                .map(Range::len)
+        };
+        let longest = inner().max().unwrap_or(0);
+        let stayed = inner().filter(|length| *length >= STAY.0).count();
+        let is_rail = if coarse {
+            longest >= STAY.1 && 3 * rows >= PEAK * beside && stayed > 1
+        } else {
+            longest >= STAY.0
+        };
+        is_rail.then_some(Rail {
+            value: extreme,
+            is_upper,
+            stays,
+        })
+    };
+    [rail(false), rail(true)].into_iter().flatten().collect()
+}
+
+pub(super) fn find(signals: &Signals<'_>, signal: Signal<'_>, levels: &Levels, found: &mut Vec<QualityIssue>) {
+    let values = signal.values;
+    let n = values.len();
+    let name = signal.name;
+    let mut tell = |kind, rows: usize, size: f64, unit: &str, places, text| {
+        found.push(QualityIssue {
+            kind,
+            channel: name.to_owned(),
+            rows,
+            share: rows as f64 / n as f64,
+            size,
+            unit: unit.to_owned(),
+            places,
+            text,
+        });
+    };
+    missing(signals, signal, &mut tell);
+    let finite = || values.iter().filter(|v| v.is_finite());
+    let Some(first) = finite().next() else { return };
+    if finite().all(|v| v == first) {
+        if n > 1 {
+            let text = format!("{name} is constant: {}", short(*first));
+            tell(
+                QualityIssueKind::Constant,
+                n,
+                0.0,
+                "",
+                vec![signals.place(&(0..n))],
+                text,
+            );
+        }
+        return;
+    }
+    for rail in rails(values, levels) {
+        let places: Vec<Place> = rail.stays.iter().map(|stay| signals.place(stay)).collect();
+        let seconds = |place: &Place| place.to_s.zip(place.from_s).map_or(0.0, |(to, from)| to - from);
+        let longest = places.iter().map(seconds).fold(0.0, f64::max);
+        let text = format!(
+            "{name} stays at its {} value, {}, in {} ({} %), in {}; the first is {}",
+            if rail.is_upper { "largest" } else { "smallest" },
+            short(rail.value),
+            counted(rail.rows(), "row"),
+            short(100.0 * rail.rows() as f64 / n as f64),
+            counted(places.len(), "place"),
+            places.first().map(at).unwrap_or_default()
+        );
+        tell(QualityIssueKind::Saturated, rail.rows(), longest, "s", places, text);
+    }
+    let count = levels.finite as f64;
+    let mean = finite().map(|v| v / count).sum::<f64>();
+    let deviation = finite().map(|v| (v - mean).powi(2) / count).sum::<f64>().sqrt();
+    if let Some((step, count)) = levels.quantum().filter(|(step, _)| *step >= COARSE * deviation) {
+        let text = format!(
+            "{name} is quantised: {count} levels in steps of {} ({} % of its deviation)",
+            short(step),
+            short(100.0 * step / deviation)
+        );
+        tell(QualityIssueKind::Quantised, n, step, "", Vec::new(), text);
+    }
+}
+
+fn missing(
+    signals: &Signals<'_>,
+    signal: Signal<'_>,
+    tell: &mut impl FnMut(QualityIssueKind, usize, f64, &str, Vec<Place>, String),
+) {
+    let mut gone: Vec<Range<usize>> = Vec::new();
+    for (row, _) in signal.values.iter().enumerate().filter(|(_, v)| !v.is_finite()) {
+        match gone.last_mut() {
+            Some(run) if run.end == row => run.end = row + 1,
+            _ => gone.push(row..row + 1),
+        }
+    }
+    let places: Vec<Place> = gone.iter().map(|run| signals.place(run)).collect();
+    let Some(first) = places.first() else { return };
+    let rows: usize = gone.iter().map(Range::len).sum();
+    let text = format!(
+        "{} has no finite value in {} ({} %), the first {}",
+        signal.name,
+        counted(rows, "row"),
+        short(100.0 * rows as f64 / signal.values.len() as f64),
+        at(first)
+    );
+    tell(QualityIssueKind::Missing, rows, rows as f64, "rows", places, text);
+}

@@ -1,0 +1,214 @@
+//! Columns of results in CSV, out and in.
+
+use std::fmt::Write as _;
+use std::io::{self, Write};
+
+use super::text::{comments, is_aside, place, reader, row_start, separator, text};
+use crate::IoError;
+use crate::format::RowWriter;
+use crate::output_table::{ColumnKind, ColumnValues, OutputColumn, OutputTable, TableSchema, Values};
+use crate::table::{Cell, check_names};
+use crate::wording::shown;
+
+/// A file between its rows.
+struct CsvColumns {
+    separator: u8,
+}
+
+/// Writes comments and header, divided by commas.
+pub(super) fn start_with_commas(file: &mut dyn Write, schema: &TableSchema) -> io::Result<Box<dyn RowWriter>> {
+    Ok(Box::new(CsvColumns::start(file, schema, b',')?))
+}
+
+/// Writes comments and header, divided by tabs.
+pub(super) fn start_with_tabs(file: &mut dyn Write, schema: &TableSchema) -> io::Result<Box<dyn RowWriter>> {
+    Ok(Box::new(CsvColumns::start(file, schema, b'\t')?))
+}
+
+impl RowWriter for CsvColumns {
+    fn rows(&mut self, file: &mut dyn Write, columns: &[Values<'_>]) -> io::Result<()> {
+        let mut csv = self.writer(file);
+        let mut cell = String::new();
+        for row in 0..columns.first().map_or(0, Values::len) {
+            for column in columns {
+                cell.clear();
+                let written = match column {
+                    Values::Real(values) if values[row].is_nan() => Ok(()),
+                    // The fewest digits, with a point or an exponent, which tells them from whole numbers.
+                    Values::Real(values) => write!(cell, "{:?}", values[row]),
+                    Values::Whole(values) => write!(cell, "{}", values[row]),
+                    Values::Text(values) => {
+                        csv.write_field(&values[row])?;
+                        continue;
+                    }
+                };
+                // Writing into a String does not fail.
+                debug_assert!(written.is_ok());
+                csv.write_field(&cell)?;
+            }
+            csv.write_record(None::<&[u8]>)?;
+        }
+        csv.flush()
+    }
+
+    fn finish(self: Box<Self>, _: &mut dyn Write) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl CsvColumns {
+    fn start(file: &mut dyn Write, schema: &TableSchema, separator: u8) -> io::Result<Self> {
+        for comment in &schema.comments {
+            writeln!(file, "# {comment}")?;
+        }
+        let this = Self { separator };
+        let mut csv = this.writer(file);
+        csv.write_record(schema.columns.iter().map(|column| &column.name))?;
+        csv.flush()?;
+        drop(csv);
+        Ok(this)
+    }
+
+    fn writer<'a>(&self, file: &'a mut dyn Write) -> csv::Writer<&'a mut dyn Write> {
+        csv::WriterBuilder::new()
+            .delimiter(self.separator)
+            // What starts with # is quoted.
+            .comment(Some(b'#'))
+            .from_writer(file)
+    }
+}
+
+/// The columns in the bytes of a CSV file.
+pub(super) fn read(bytes: &[u8], file: &str) -> Result<OutputTable, IoError> {
+    let text = text(bytes, file)?;
+    let Some(header_line) = text.lines().find(|line| !is_aside(line)) else {
+        return Err(IoError::Empty { file: file.to_owned() });
+    };
+    let separator = separator(header_line);
+    let (names, kinds, rows) = survey(text, file, separator)?;
+    let mut values: Vec<ColumnValues> = kinds
+        .iter()
+        .map(|kind| match kind {
+            ColumnKind::Real => ColumnValues::Real(Vec::with_capacity(rows)),
+            ColumnKind::Whole => ColumnValues::Whole(Vec::with_capacity(rows)),
+            ColumnKind::Text => ColumnValues::Text(Vec::with_capacity(rows)),
+        })
+        .collect();
+    let mut reader = reader(text.as_bytes(), separator);
+    let mut record = csv::ByteRecord::new();
+    let mut header = true;
+    while matches!(reader.read_byte_record(&mut record), Ok(true)) {
+        if std::mem::replace(&mut header, false) {
+            continue;
+        }
+        for (column, cell) in values.iter_mut().zip(&record) {
+            let cell = utf8(cell);
+            match column {
+                ColumnValues::Real(values) => values.push(match Cell::parse(cell) {
+                    Cell::Number(value) => value,
+                    Cell::Missing | Cell::Text => f64::NAN,
+                }),
+                ColumnValues::Whole(values) => values.push(whole(cell).unwrap_or_default()),
+                ColumnValues::Text(values) => values.push(cell.to_owned()),
+            }
+        }
+    }
+    let columns = names.into_iter().zip(values);
+    Ok(OutputTable {
+        comments: comments(text)
+            .map(|line| line.strip_prefix(' ').unwrap_or(line).to_owned())
+            .collect(),
+        columns: columns.map(|(name, values)| OutputColumn { name, values }).collect(),
+    })
+}
+
+/// Names and kinds of the columns, and the number of rows.
+fn survey(text: &str, file: &str, separator: u8) -> Result<(Vec<String>, Vec<ColumnKind>, usize), IoError> {
+    let mut reader = reader(text.as_bytes(), separator);
+    let mut record = csv::ByteRecord::new();
+    let mut names: Vec<String> = Vec::new();
+    let mut kinds = Vec::new();
+    let mut rows = 0;
+    // The reader fails on nothing but input and output, of which there is none here.
+    while matches!(reader.read_byte_record(&mut record), Ok(true)) {
+        let line = || {
+            let at = record.position().map_or(0, |p| p.byte() as usize);
+            place(text.as_bytes(), row_start(text.as_bytes(), at))
+        };
+        if names.is_empty() {
+            names = record.iter().map(|name| utf8(name).trim().to_owned()).collect();
+            if names.iter().all(|name| !matches!(Cell::parse(name), Cell::Text)) {
+                return Err(IoError::NoHeader {
+                    file: file.to_owned(),
+                    place: line(),
+                    found: shown(&names.join(", ")),
+                });
+            }
+            check_names(&names, file, &mut Vec::new())?;
+            kinds = vec![ColumnKind::Whole; names.len()];
+            continue;
+        }
+        if record.len() != names.len() {
+            return Err(IoError::RowLength {
+                file: file.to_owned(),
+                place: line(),
+                found: record.len(),
+                expected: names.len(),
+            });
+        }
+        rows += 1;
+        for (kind, cell) in kinds.iter_mut().zip(&record) {
+            let cell = utf8(cell);
+            *kind = match *kind {
+                ColumnKind::Whole if whole(cell).is_some() => ColumnKind::Whole,
+                ColumnKind::Whole | ColumnKind::Real if Cell::parse(cell) != Cell::Text => ColumnKind::Real,
+                _ => ColumnKind::Text,
+            };
+        }
+    }
+    if rows == 0 {
+        kinds.fill(ColumnKind::Real);
+    }
+    Ok((names, kinds, rows))
+}
+
+/// A whole number as it is written: digits without zeros in front.
+fn whole(cell: &str) -> Option<u64> {
+    let digits = cell.bytes().all(|b| b.is_ascii_digit()) && (cell == "0" || !cell.starts_with('0'));
+    digits.then(|| cell.parse().ok()).flatten()
+}
+
+/// The text is UTF-8 as a whole and the separators are ASCII, so that each cell is as well.
+fn utf8(cell: &[u8]) -> &str {
+    std::str::from_utf8(cell).unwrap_or("\u{fffd}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kinds(text: &str) -> Vec<ColumnKind> {
+        let table = read(text.as_bytes(), "run.csv").unwrap();
+        table.columns.iter().map(|column| column.values.kind()).collect()
+    }
+
+    #[test]
+    fn kinds_of_columns() {
+        use ColumnKind::{Real, Text, Whole};
+        let text = "a,b,c,d,e,f\n1,1,1,,01,x\n18446744073709551615,1.0,,,2,1\n";
+        assert_eq!(kinds(text), [Whole, Real, Real, Real, Real, Text]);
+        assert_eq!(kinds("a,b\n"), [Real, Real]);
+        assert_eq!(kinds("a\n18446744073709551616\n"), [Real]);
+        assert_eq!(kinds("a\n-1\n"), [Real]);
+    }
+
+    #[test]
+    fn what_is_no_table_says_so() {
+        let message = |text: &str| read(text.as_bytes(), "run.csv").unwrap_err().to_string();
+        assert!(message("# only\n").contains("is empty"));
+        assert!(message("1,2\n3,4\n").contains("line 1: the first line holds numbers"));
+        assert!(message("a,a\n1,2\n").contains("both named \"a\""));
+        assert!(message("a,b\n1,2\n\n1\n").contains("line 4: 1 values, expected 2"));
+        assert!(message("a,b\n1,\u{0}\n").contains("a zero byte"));
+    }
+}

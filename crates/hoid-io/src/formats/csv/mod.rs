@@ -1,0 +1,40 @@
+//! CSV: text with a header and one line a row, divided by commas, semicolons or tabs.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | `text` | encoding, comments, separator, lines |
+//! | `table` | the columns of a record |
+//! | `record` | a record into CSV |
+//! | `columns` | tables of results, out and in |
+
+mod columns;
+mod record;
+mod table;
+mod text;
+
+pub(crate) use record::write_with_commas as write_record;
+
+use crate::format::{Format, Reading, Writing};
+
+/// Divided by commas where it is written; read with any separator.
+pub(super) const CSV: Format = Format {
+    name: "CSV",
+    endings: &["csv", "txt"],
+    reading: READING,
+    writing: Writing::Rows(columns::start_with_commas),
+    record: Some(record::write_with_commas),
+};
+
+/// Divided by tabs where it is written.
+pub(super) const TSV: Format = Format {
+    name: "CSV",
+    endings: &["tsv"],
+    reading: READING,
+    writing: Writing::Rows(columns::start_with_tabs),
+    record: Some(record::write_with_tabs),
+};
+
+const READING: Reading = Reading::Table {
+    record: |bytes, file| table::parse(bytes, file),
+    results: |bytes, file| columns::read(&bytes, file),
+};

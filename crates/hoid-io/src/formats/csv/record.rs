@@ -1,0 +1,82 @@
+//! A record into CSV.
+
+use std::fmt::Write as _;
+use std::io::{self, Write};
+
+use hoid_model::Record;
+
+use crate::record_columns::{channels, comments};
+
+/// Writes the record, divided by commas.
+pub(crate) fn write_with_commas(file: &mut dyn Write, record: &Record) -> io::Result<()> {
+    write(file, record, b',')
+}
+
+/// Writes the record, divided by tabs.
+pub(super) fn write_with_tabs(file: &mut dyn Write, record: &Record) -> io::Result<()> {
+    write(file, record, b'\t')
+}
+
+/// Writes the record with the digits that give the same numbers back.
+fn write(file: &mut dyn Write, record: &Record, separator: u8) -> io::Result<()> {
+    let channels = channels(record);
+    for comment in comments(record, &channels) {
+        writeln!(file, "# {comment}")?;
+    }
+    let mut csv = csv::WriterBuilder::new().delimiter(separator).from_writer(file);
+    csv.write_field("t")?;
+    for channel in &channels {
+        csv.write_field(&channel.name)?;
+    }
+    csv.write_record(None::<&[u8]>)?;
+    let mut text = String::new();
+    for k in 0..record.len() {
+        let row = channels.iter().map(|c| c.values[k]);
+        for value in std::iter::once(record.time_s(k)).chain(row) {
+            text.clear();
+            shortest(&mut text, value);
+            csv.write_field(&text)?;
+        }
+        csv.write_record(None::<&[u8]>)?;
+    }
+    csv.flush()
+}
+
+/// The fewest digits that give the same number back, with an exponent where that is shorter to read.
+fn shortest(text: &mut String, value: f64) {
+    let size = value.abs();
+    let written = if size == 0.0 || (1e-5..1e16).contains(&size) {
+        write!(text, "{value}")
+    } else {
+        write!(text, "{value:e}")
+    };
+    // Writing into a String does not fail.
+    debug_assert!(written.is_ok());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_come_back_bit_for_bit() {
+        for value in [
+            0.0,
+            -0.0,
+            0.1,
+            -1.0 / 3.0,
+            1e-5,
+            9.9e-6,
+            1e16,
+            5e-324,
+            f64::MAX,
+            f64::MIN_POSITIVE,
+            1e15 + 0.5,
+        ] {
+            let mut text = String::new();
+            shortest(&mut text, value);
+            assert_eq!(text.parse::<f64>().unwrap().to_bits(), value.to_bits(), "{text}");
+            assert!(text.len() < 25, "{text}");
+        }
+    }
+}

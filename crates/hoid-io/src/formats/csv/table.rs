@@ -1,0 +1,228 @@
+//! CSV into a table.
+//!
+//! ```text
+//! # units: t s, e deg, u deg          comment lines start with #; these two are understood
+//! # sample_time: 0.01 s
+//! t,e,u                               names, divided by comma, semicolon or tab
+//! 0,0.125,-0.5                        one line a sample, decimal points
+//! ```
+//!
+//! Blank lines are skipped; a byte order mark and CRLF are tolerated. The stated sample time says without rounding what t
+//! can only say up to its last digit; it counts where t agrees with it.
+
+use super::text::{comments, is_aside, place, reader, row_start, separator, text};
+use crate::IoError;
+use crate::table::{Cell, Column, Source, Table, asides, check_names};
+use crate::wording::shown;
+
+/// The text of the file, asked again when an error needs a line or a cell.
+struct CsvSource<'a> {
+    file: &'a str,
+    text: &'a str,
+    separator: u8,
+    /// Byte at which each row starts.
+    starts: Vec<usize>,
+}
+
+impl Source for CsvSource<'_> {
+    fn file(&self) -> &str {
+        self.file
+    }
+
+    fn place(&self, row: usize) -> String {
+        place(
+            self.text.as_bytes(),
+            self.starts.get(row).copied().unwrap_or(self.text.len()),
+        )
+    }
+
+    fn cell(&self, row: usize, column: usize) -> String {
+        let start = self.starts.get(row).copied().unwrap_or(self.text.len());
+        let mut record = csv::ByteRecord::new();
+        let read = reader(&self.text.as_bytes()[start..], self.separator).read_byte_record(&mut record);
+        match (read, record.get(column)) {
+            (Ok(true), Some(cell)) => shown(&String::from_utf8_lossy(cell)),
+            _ => String::new(),
+        }
+    }
+}
+
+/// The table in the bytes of a CSV file.
+pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoError> {
+    let text = text(bytes, file)?;
+    let Some(header_line) = text.lines().find(|line| !is_aside(line)) else {
+        return Err(IoError::Empty { file: file.to_owned() });
+    };
+    let separator = separator(header_line);
+    let mut reader = reader(text.as_bytes(), separator);
+    let mut record = csv::ByteRecord::new();
+    let mut columns: Vec<Column> = Vec::new();
+    let mut starts = Vec::new();
+    let mut notes = Vec::new();
+    let mut empty_at_end = 0;
+    // The reader fails on nothing but input and output, of which there is none here.
+    while matches!(reader.read_byte_record(&mut record), Ok(true)) {
+        let blank = record.iter().all(|cell| cell.trim_ascii().is_empty());
+        if blank && record.len() == 1 {
+            continue;
+        }
+        let start = row_start(text.as_bytes(), record.position().map_or(0, |p| p.byte() as usize));
+        let mut line = || place(text.as_bytes(), start);
+        if columns.is_empty() {
+            columns = header(&record, file, &mut line, &mut notes)?;
+            continue;
+        }
+        if record.len() != columns.len() {
+            return Err(IoError::RowLength {
+                file: file.to_owned(),
+                place: line(),
+                found: record.len(),
+                expected: columns.len(),
+            });
+        }
+        empty_at_end = if blank { empty_at_end + 1 } else { 0 };
+        let row = starts.len();
+        starts.push(start);
+        for (column, cell) in columns.iter_mut().zip(&record) {
+            // The text is UTF-8 as a whole and the separators are ASCII, so that each cell is as well.
+            let cell = std::str::from_utf8(cell).unwrap_or("\u{fffd}");
+            column.values.push(match Cell::parse(cell) {
+                Cell::Number(value) => {
+                    if column.name == "t" {
+                        column.precision.add(cell);
+                    }
+                    value
+                }
+                Cell::Missing => f64::NAN,
+                Cell::Text => {
+                    column.texts.push(row);
+                    f64::NAN
+                }
+            });
+        }
+    }
+    // Spreadsheets leave rows of bare separators behind the table.
+    starts.truncate(starts.len() - empty_at_end);
+    for column in &mut columns {
+        column.values.truncate(starts.len());
+    }
+    if columns.is_empty() {
+        return Err(IoError::Empty { file: file.to_owned() });
+    }
+    if starts.is_empty() {
+        return Err(IoError::NoRows { file: file.to_owned() });
+    }
+    let sample_time_s = asides(comments(text), &mut columns);
+    Ok(Table {
+        columns,
+        rows: starts.len(),
+        sample_time_s,
+        source: Box::new(CsvSource {
+            file,
+            text,
+            separator,
+            starts,
+        }),
+        notes,
+    })
+}
+
+fn header(
+    record: &csv::ByteRecord,
+    file: &str,
+    place: &mut dyn FnMut() -> String,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Column>, IoError> {
+    let names: Vec<String> = record
+        .iter()
+        .map(|name| String::from_utf8_lossy(name).trim().to_owned())
+        .collect();
+    if names.iter().all(|name| !matches!(Cell::parse(name), Cell::Text)) {
+        return Err(IoError::NoHeader {
+            file: file.to_owned(),
+            place: place(),
+            found: shown(&names.join(", ")),
+        });
+    }
+    check_names(&names, file, notes)?;
+    let column = |name| Column {
+        name,
+        ..Column::default()
+    };
+    Ok(names.into_iter().map(column).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names_and_rows(text: &str) -> (Vec<String>, usize) {
+        let table = parse(text.as_bytes(), "run.csv").unwrap();
+        (table.names().into_iter().map(str::to_owned).collect(), table.rows)
+    }
+
+    fn message(bytes: &[u8]) -> String {
+        match parse(bytes, "run.csv") {
+            Ok(_) => panic!("was read"),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    #[test]
+    fn separators_comments_blank_lines_mark_and_line_ends() {
+        for text in [
+            "t,e,u\n0,1,2\n1,3,4\n",
+            "t;e;u\n0;1;2\n1;3;4",
+            "t\te\tu\r\n0\t1\t2\r\n1\t3\t4\r\n",
+            "\u{feff}t,e,u\r\n\r\n0,1,2\r\n  \r\n1,3,4\r\n",
+            "# made by hand\n\n#; ; ;\n \"t\" , e ,u\n# here, too\n0, 1 ,2\n1,3,4\n\n",
+            "t,e,u\r0,1,2\r1,3,4\r",
+            "t,e,u\n0,1,2\n1,3,4\n,,\n,,\n",
+        ] {
+            let table = parse(text.as_bytes(), "run.csv").unwrap();
+            assert_eq!(table.rows, 2, "{text:?}");
+            assert_eq!(table.columns[0].values, [0.0, 1.0], "{text:?}");
+            assert_eq!(table.columns[2].values, [2.0, 4.0], "{text:?}");
+        }
+        assert_eq!(names_and_rows("\"a,b\";c\n1;2\n").0, ["a,b", "c"]);
+        assert_eq!(names_and_rows(",t,e,u,\n0,0,1,2,\n").0, ["", "t", "e", "u", ""]);
+    }
+
+    #[test]
+    fn lines_are_counted_as_an_editor_counts_them() {
+        let text = "# one\r\n\r\nt,e,u\r\n0,1,2\r\n# five\r\n\r\n1,x,4\r\n";
+        let table = parse(text.as_bytes(), "run.csv").unwrap();
+        assert_eq!(table.source.place(0), "line 4");
+        assert_eq!(table.source.place(1), "line 7");
+        assert_eq!(table.source.cell(1, 1), "x");
+        assert_eq!(table.columns[1].texts, [1]);
+        assert!(message(b"# one\n\nt,e,u\n0,1,2\n#\n1,2\n").contains("run.csv, line 6: 2 values, expected 3"));
+        assert!(message(b"t,e,u\n0,1,2,3\n").contains("line 2: 4 values, expected 3"));
+    }
+
+    #[test]
+    fn units_and_sample_time() {
+        let text = "# units: t s, e deg, K_e deg/deg, stick x mV per deg, q -\n# sample_time: 0.0125 s\nt,e,K_e,stick,stick x\n0,1,2,3,4\n";
+        let table = parse(text.as_bytes(), "run.csv").unwrap();
+        let units: Vec<&str> = table.columns.iter().map(|c| c.unit.as_str()).collect();
+        assert_eq!(units, ["s", "deg", "deg/deg", "", "mV per deg"]);
+        assert_eq!(table.sample_time_s, Some(0.0125));
+        let none = parse(b"# sample_time: -1 s\nt,e\n0,1\n# units: t h\n", "run.csv").unwrap();
+        assert_eq!(none.sample_time_s, None);
+        assert_eq!(none.columns[0].unit, "");
+    }
+
+    #[test]
+    fn what_is_no_table_says_so() {
+        assert!(message(b"").contains("run.csv is empty"));
+        assert!(message(b"\n# only\n  \n").contains("is empty"));
+        assert!(message(b"t,e,u\n").contains("no samples"));
+        assert!(message(b"t,e,u\n,,\n").contains("no samples"));
+        assert!(message(b"# t,e,u\n0,1,2\n").contains("line 2: the first line holds numbers (0, 1, 2)"));
+        assert!(message(b"t,e,u,e\n0,1,2,3\n").contains("columns 2 and 4 are both named \"e\""));
+        assert!(message(b"t,e\n0,1\xff\n").contains("line 2: the byte 0xFF"));
+        assert!(message(b"PK\x03\x04\x00").contains("line 1: a zero byte"));
+        let long = format!("t,e\n0,1\n{},2,3\n", "x".repeat(1000));
+        assert!(message(long.as_bytes()).contains("line 3: 3 values"));
+    }
+}

@@ -1,0 +1,78 @@
+//! The text of a CSV file: its encoding, comments, separator, lines and cells.
+
+use crate::IoError;
+
+pub(crate) fn text<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, IoError> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let not_text = |at: usize, found: String| IoError::NotText {
+        file: file.to_owned(),
+        place: place(bytes, at),
+        found,
+    };
+    if let Some(at) = bytes.iter().position(|b| *b == 0) {
+        return Err(not_text(at, String::from("a zero byte")));
+    }
+    std::str::from_utf8(bytes).map_err(|error| {
+        let at = error.valid_up_to();
+        not_text(at, format!("the byte 0x{:02X}", bytes.get(at).copied().unwrap_or(0)))
+    })
+}
+
+pub(crate) fn reader(bytes: &[u8], separator: u8) -> csv::Reader<&[u8]> {
+    csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .comment(Some(b'#'))
+        .delimiter(separator)
+        .from_reader(bytes)
+}
+
+pub(crate) fn is_aside(line: &str) -> bool {
+    line.trim().is_empty() || line.starts_with('#')
+}
+
+/// The separator that the header holds most of; the comma when it holds none.
+pub(crate) fn separator(header: &str) -> u8 {
+    let mut quoted = false;
+    let mut counts = [(b',', 0), (b';', 0), (b'\t', 0)];
+    for byte in header.bytes() {
+        quoted ^= byte == b'"';
+        for (separator, count) in &mut counts {
+            *count += usize::from(byte == *separator && !quoted);
+        }
+    }
+    counts
+        .into_iter()
+        .reduce(|best, next| if next.1 > best.1 { next } else { best })
+        .map_or(b',', |best| best.0)
+}
+
+/// The comment lines above the header, without their marks.
+pub(crate) fn comments(text: &str) -> impl Iterator<Item = &str> {
+    let lines = text.lines().take_while(|line| is_aside(line));
+    lines.filter_map(|line| line.strip_prefix('#'))
+}
+
+/// The start of a row, behind the comments and blank lines that the reader skips with it.
+pub(crate) fn row_start(bytes: &[u8], mut at: usize) -> usize {
+    while let Some(byte) = bytes.get(at) {
+        match byte {
+            b'\n' | b'\r' => at += 1,
+            b'#' => at += bytes[at..].iter().position(|b| *b == b'\n').unwrap_or(bytes.len() - at),
+            _ => break,
+        }
+    }
+    at
+}
+
+pub(crate) fn place(bytes: &[u8], at: usize) -> String {
+    let before = &bytes[..at.min(bytes.len())];
+    let count = |end| before.iter().filter(|b| **b == end).count();
+    // A file with bare carriage returns has lines as well.
+    let lines = if bytes.contains(&b'\n') {
+        count(b'\n')
+    } else {
+        count(b'\r')
+    };
+    format!("line {}", lines + 1)
+}

@@ -1,0 +1,118 @@
+//! Names of columns and names of variables.
+//!
+//! A name that MATLAB does not take, such as `K e` or `f-y`, is written as the nearest that it does, and kept beside.
+
+use crate::arrays::{COMMENTS, Entry, Value};
+
+/// The variable that keeps the names that are no names of variables, each line a variable and the name it stands for.
+pub(super) const NAMES: &str = "hoid_names";
+/// MATLAB cuts what is longer.
+const LONGEST_NAME: usize = 63;
+const KEYWORDS: [&str; 20] = [
+    "break",
+    "case",
+    "catch",
+    "classdef",
+    "continue",
+    "else",
+    "elseif",
+    "end",
+    "for",
+    "function",
+    "global",
+    "if",
+    "otherwise",
+    "parfor",
+    "persistent",
+    "return",
+    "spmd",
+    "switch",
+    "try",
+    "while",
+];
+
+/// A name of a variable for each column, all different.
+pub(super) fn variables(names: &[&str]) -> Vec<String> {
+    let mut variables: Vec<String> = Vec::with_capacity(names.len());
+    for name in names {
+        let plain: String = name
+            .chars()
+            .map(|c| if c.is_ascii_alphanumeric() { c } else { '_' })
+            .take(LONGEST_NAME)
+            .collect();
+        let plain = match plain.chars().next() {
+            Some(first) if first.is_ascii_alphabetic() && !KEYWORDS.contains(&plain.as_str()) => plain,
+            _ => format!("x{plain}"),
+        };
+        let mut variable: String = plain.chars().take(LONGEST_NAME).collect();
+        // A column that has the name already keeps it.
+        let taken = |variable: &str| {
+            variables.iter().any(|v| v == variable)
+                || [COMMENTS, NAMES].contains(&variable)
+                || names.iter().any(|other| other != name && *other == variable)
+        };
+        let mut number = 2;
+        while taken(&variable) {
+            let end = format!("_{number}");
+            variable = plain.chars().take(LONGEST_NAME - end.len()).collect::<String>() + &end;
+            number += 1;
+        }
+        variables.push(variable);
+    }
+    variables
+}
+
+/// The variables under the names that they were written for.
+pub(super) fn named(mut entries: Vec<Entry>) -> Vec<Entry> {
+    let at = entries.iter().position(|entry| entry.path == NAMES);
+    if let Some(Value::Texts(lines)) = at.map(|at| entries.remove(at).value) {
+        for line in &lines {
+            let Some((variable, name)) = line.split_once(' ') else {
+                continue;
+            };
+            if let Some(entry) = entries.iter_mut().find(|entry| entry.path == variable) {
+                name.clone_into(&mut entry.path);
+            }
+        }
+    }
+    entries
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_variables() {
+        let found = variables(&[
+            "e",
+            "K e",
+            "K_e",
+            "f-y",
+            "1st",
+            "",
+            "end",
+            "_x",
+            "K/e",
+            "run(3).e",
+            "hoid_names",
+        ]);
+        let expected = [
+            "e",
+            "K_e_2",
+            "K_e",
+            "f_y",
+            "x1st",
+            "x",
+            "xend",
+            "x_x",
+            "K_e_3",
+            "run_3__e",
+            "hoid_names_2",
+        ];
+        assert_eq!(found, expected);
+        let long = "a".repeat(70);
+        let found = variables(&[&long, &format!("{long}b")]);
+        assert!(found.iter().all(|name| name.len() == 63) && found[0] != found[1]);
+    }
+}

@@ -1,0 +1,38 @@
+//! The variables of a file of any version, told by its first bytes.
+
+use super::elements::HEADER;
+use super::names::named;
+use super::{version4, version5, version73};
+use crate::IoError;
+use crate::arrays::{Budget, Contents, Indexing};
+
+/// The first bytes of HDF5.
+const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
+/// The variables in the bytes of a file.
+pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Contents, IoError> {
+    let wrong = |found: String| IoError::WrongFormat {
+        file: file.to_owned(),
+        format: "MATLAB",
+        found,
+        expected: "variables as MATLAB, Octave or scipy save them",
+    };
+    if bytes.is_empty() {
+        return Err(wrong(String::from("it is empty")));
+    }
+    if bytes.starts_with(HDF5) || bytes.get(512..).is_some_and(|rest| rest.starts_with(HDF5)) {
+        return version73::read(bytes, file).map(|entries| Contents::new(entries, Indexing::Matlab));
+    }
+    let bytes = bytes.as_slice();
+    let mut budget = Budget::of(bytes.len());
+    let entries = match bytes.get(HEADER - 4..HEADER) {
+        Some([.., b'I', b'M']) => version5::read(bytes, false, &mut budget, file)?,
+        Some([.., b'M', b'I']) => version5::read(bytes, true, &mut budget, file)?,
+        // Version 4 begins with a number below 5000, the later ones with text.
+        _ if bytes[..bytes.len().min(4)].contains(&0) => version4::read(bytes, &mut budget, file)?,
+        _ => {
+            let start = String::from_utf8_lossy(&bytes[..bytes.len().min(12)]).into_owned();
+            return Err(wrong(format!("it starts with \"{}\"", start.escape_debug())));
+        }
+    };
+    Ok(Contents::new(named(entries), Indexing::Matlab))
+}

@@ -1,0 +1,362 @@
+//! Versions 5 to 7 (MathWorks, "MAT-File Format", 2019, chapter 1): since 7 each variable may be deflated.
+
+use std::io::Read;
+
+use flate2::read::ZlibDecoder;
+
+use super::elements::{Elements, HEADER, data};
+use crate::IoError;
+use crate::arrays::{Array, Budget, Entry, Kind, MOST_NESTED, Numbers, Value};
+use crate::wording::{shown, told};
+
+const CELL: u32 = 1;
+const STRUCT: u32 = 2;
+const OBJECT: u32 = 3;
+const CHAR: u32 = 4;
+const SPARSE: u32 = 5;
+const DOUBLE: u32 = 6;
+const SINGLE: u32 = 7;
+const UINT64: u32 = 15;
+const FUNCTION: u32 = 16;
+const OPAQUE: u32 = 17;
+/// The bit of complex numbers in the flags.
+const COMPLEX: u32 = 0x800;
+/// MATLAB takes 63 characters.
+const LONGEST_NAME: usize = 256;
+/// What an entry takes beside its path and its values, about.
+const ENTRY_BYTES: u64 = 256;
+
+/// Why a variable is not read: the format is contradicted, or something else is wrong.
+enum Stop {
+    Damaged(String),
+    Other(IoError),
+}
+
+impl From<String> for Stop {
+    fn from(found: String) -> Self {
+        Self::Damaged(found)
+    }
+}
+
+impl From<IoError> for Stop {
+    fn from(error: IoError) -> Self {
+        Self::Other(error)
+    }
+}
+
+/// The variables of a file.
+pub(super) fn read(bytes: &[u8], big_endian: bool, budget: &mut Budget, file: &str) -> Result<Vec<Entry>, IoError> {
+    let mut elements = Elements::new(bytes.get(HEADER..).unwrap_or_default(), big_endian);
+    let mut reader = Reader {
+        entries: Vec::new(),
+        budget,
+        file,
+    };
+    let mut variable = 0;
+    while !elements.is_empty() {
+        variable += 1;
+        reader.variable(&mut elements).map_err(|stop| match stop {
+            Stop::Other(error) => error,
+            Stop::Damaged(found) => IoError::Damaged {
+                file: file.to_owned(),
+                found: format!("variable {variable}: {found}"),
+            },
+        })?;
+    }
+    Ok(reader.entries)
+}
+
+struct Reader<'a> {
+    entries: Vec<Entry>,
+    budget: &'a mut Budget,
+    file: &'a str,
+}
+
+/// Where something stands.
+#[derive(Clone, Copy)]
+struct Place<'a> {
+    /// The structure around it; empty at top level.
+    parent: &'a str,
+    /// Its path; at top level the name that the variable has itself.
+    path: &'a str,
+    depth: usize,
+}
+
+impl Reader<'_> {
+    fn variable(&mut self, elements: &mut Elements<'_>) -> Result<(), Stop> {
+        let element = elements.next()?;
+        let top = Place {
+            parent: "",
+            path: "",
+            depth: 0,
+        };
+        match element.kind {
+            data::MATRIX => self.matrix(element.bytes, elements.big_endian, top),
+            data::COMPRESSED => {
+                let bytes = self.inflated(element.bytes, elements.big_endian)?;
+                self.matrix(&bytes, elements.big_endian, top)
+            }
+            // What programs put between the variables.
+            _ => Ok(()),
+        }
+    }
+
+    /// The data of the matrix in deflated bytes. Its tag says how long it is at most: Octave counts the data that stand in a tag
+    /// twice.
+    fn inflated(&mut self, bytes: &[u8], big_endian: bool) -> Result<Vec<u8>, Stop> {
+        let failed = |error: std::io::Error| Stop::Damaged(told(&error.to_string()));
+        let mut decoder = ZlibDecoder::new(bytes);
+        let mut tag = [0; 8];
+        decoder.read_exact(&mut tag).map_err(failed)?;
+        let [k0, k1, k2, k3, l0, l1, l2, l3] = tag;
+        let number = |bytes| {
+            if big_endian {
+                u32::from_be_bytes(bytes)
+            } else {
+                u32::from_le_bytes(bytes)
+            }
+        };
+        let (kind, length) = (number([k0, k1, k2, k3]), u64::from(number([l0, l1, l2, l3])));
+        if kind != data::MATRIX {
+            return Err(format!("a compressed element of type {kind}, expected {}", data::MATRIX).into());
+        }
+        self.budget.take(length, self.file)?;
+        let mut inflated = Vec::new();
+        decoder.take(length).read_to_end(&mut inflated).map_err(failed)?;
+        Ok(inflated)
+    }
+
+    /// An array of any class, its parts behind one another.
+    fn matrix(&mut self, bytes: &[u8], big_endian: bool, place: Place<'_>) -> Result<(), Stop> {
+        // A field that was never set.
+        if bytes.is_empty() {
+            return self.push(place, place.path, Value::Array(Array::vector(Numbers::from_f64(&[]))));
+        }
+        let mut parts = Elements::new(bytes, big_endian);
+        let flags = parts.of(data::UINT32, "the flags of an array")?;
+        let flags = parts
+            .u32s(flags)
+            .first()
+            .copied()
+            .ok_or_else(|| String::from("an array without flags"))?;
+        let class = flags & 0xff;
+        if class == OPAQUE {
+            let name = String::from_utf8_lossy(parts.next()?.bytes).into_owned();
+            let system = parts.next()?;
+            let of = parts.next().unwrap_or(system).bytes;
+            let what = format!("an object of the class {}", shown(&String::from_utf8_lossy(of)));
+            let path = if place.depth == 0 {
+                shown(&name)
+            } else {
+                place.path.to_owned()
+            };
+            return self.push(place, &path, Value::Unread(what));
+        }
+        let dims = parts.of(data::INT32, "the size of an array")?;
+        let dims: Vec<usize> = parts.u32s(dims).iter().map(|side| *side as usize).collect();
+        let count = dims.iter().try_fold(1_usize, |count, side| count.checked_mul(*side));
+        let count = count.ok_or_else(|| format!("an array of {}", shown(&format!("{dims:?}"))))?;
+        if dims.len() > MOST_NESTED {
+            return Err(format!("an array of {} dimensions", dims.len()).into());
+        }
+        let name = name(parts.next()?.bytes)?;
+        // What has no name is no variable: MATLAB keeps the parts of objects there.
+        if place.depth == 0 && name.is_empty() {
+            return Ok(());
+        }
+        let place = Place {
+            path: if place.depth == 0 { &name } else { place.path },
+            ..place
+        };
+        match class {
+            CELL => self.cell(parts, count, place),
+            STRUCT => self.structure(parts, count, place),
+            OBJECT => {
+                parts.next()?;
+                self.structure(parts, count, place)
+            }
+            CHAR => {
+                let texts = texts(&mut parts, &dims, count)?;
+                self.budget
+                    .take(texts.iter().map(|text| text.len() as u64).sum(), self.file)?;
+                self.push(place, place.path, Value::Texts(texts))
+            }
+            SPARSE => self.unread(place, "a sparse matrix"),
+            FUNCTION => self.unread(place, "a function"),
+            DOUBLE..=UINT64 if flags & COMPLEX != 0 => self.unread(place, "complex numbers"),
+            DOUBLE..=UINT64 => {
+                let numbers = self.numbers(&mut parts, class, count)?;
+                let array = Array {
+                    numbers,
+                    dims,
+                    last_fastest: false,
+                };
+                self.push(place, place.path, Value::Array(array))
+            }
+            _ => Err(format!("an array of class {class}").into()),
+        }
+    }
+
+    /// Numbers, which may be stored in a shorter type than that of their class.
+    fn numbers(&mut self, parts: &mut Elements<'_>, class: u32, count: usize) -> Result<Numbers, Stop> {
+        let element = parts.next()?;
+        let kind = match element.kind {
+            data::INT8 => Kind::I8,
+            data::UINT8 => Kind::U8,
+            data::INT16 => Kind::I16,
+            data::UINT16 => Kind::U16,
+            data::INT32 => Kind::I32,
+            data::UINT32 => Kind::U32,
+            data::SINGLE => Kind::F32,
+            data::DOUBLE => Kind::F64,
+            data::INT64 => Kind::I64,
+            data::UINT64 => Kind::U64,
+            other => return Err(format!("numbers of type {other}").into()),
+        };
+        if count.checked_mul(kind.size()) != Some(element.bytes.len()) {
+            let found = element.bytes.len();
+            return Err(format!("{found} bytes for {count} numbers of {} bytes", kind.size()).into());
+        }
+        self.budget.take(element.bytes.len() as u64, self.file)?;
+        let numbers = Numbers::new(element.bytes.to_vec(), kind, parts.big_endian);
+        if kind.is_whole() && (DOUBLE..=SINGLE).contains(&class) {
+            self.budget.take(8 * count as u64, self.file)?;
+            return Ok(Numbers::from_f64(&numbers.values()));
+        }
+        Ok(numbers)
+    }
+
+    /// One or more structures of the same fields.
+    fn structure(&mut self, mut parts: Elements<'_>, count: usize, place: Place<'_>) -> Result<(), Stop> {
+        let depth = deeper(place)?;
+        let length = parts.of(data::INT32, "the length of the names of fields")?;
+        let length = parts.u32s(length).first().map_or(0, |length| *length as usize);
+        let names = parts.next()?.bytes;
+        if names.is_empty() || count == 0 {
+            return Ok(());
+        }
+        if length == 0 || !names.len().is_multiple_of(length) {
+            return Err(format!("names of fields of {length} bytes in {} bytes", names.len()).into());
+        }
+        let names: Vec<String> = names.chunks(length).map(name).collect::<Result<_, _>>()?;
+        for at in 0..count {
+            let parent = match count {
+                1 => place.path.to_owned(),
+                _ => format!("{}({})", place.path, at + 1),
+            };
+            for name in &names {
+                let matrix = parts.of(data::MATRIX, "a field")?;
+                let path = format!("{parent}.{name}");
+                let place = Place {
+                    parent: &parent,
+                    path: &path,
+                    depth,
+                };
+                self.matrix(matrix, parts.big_endian, place)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The cells, each under a path of its own; texts alone are one column.
+    fn cell(&mut self, mut parts: Elements<'_>, count: usize, place: Place<'_>) -> Result<(), Stop> {
+        let depth = deeper(place)?;
+        let before = self.entries.len();
+        for at in 0..count {
+            let matrix = parts.of(data::MATRIX, "a cell")?;
+            let path = format!("{}{{{}}}", place.path, at + 1);
+            self.matrix(
+                matrix,
+                parts.big_endian,
+                Place {
+                    path: &path,
+                    depth,
+                    ..place
+                },
+            )?;
+        }
+        let text = |entry: &Entry| matches!(&entry.value, Value::Texts(texts) if texts.len() == 1);
+        if self.entries.len() - before == count && self.entries[before..].iter().all(text) {
+            let texts = self.entries.drain(before..).filter_map(|entry| match entry.value {
+                Value::Texts(texts) => texts.into_iter().next(),
+                _ => None,
+            });
+            let texts = texts.collect();
+            return self.push(place, place.path, Value::Texts(texts));
+        }
+        Ok(())
+    }
+
+    fn unread(&mut self, place: Place<'_>, what: &str) -> Result<(), Stop> {
+        self.push(place, place.path, Value::Unread(what.to_owned()))
+    }
+
+    fn push(&mut self, place: Place<'_>, path: &str, value: Value) -> Result<(), Stop> {
+        let bytes = (path.len() + place.parent.len()) as u64 + ENTRY_BYTES;
+        self.budget.take(bytes, self.file)?;
+        let mut entry = Entry::new(path, value);
+        place.parent.clone_into(&mut entry.parent);
+        self.entries.push(entry);
+        Ok(())
+    }
+}
+
+fn deeper(place: Place<'_>) -> Result<usize, Stop> {
+    if place.depth == MOST_NESTED {
+        return Err(format!("structures more than {MOST_NESTED} deep").into());
+    }
+    Ok(place.depth + 1)
+}
+
+/// A name, which may be filled up with zeros.
+fn name(bytes: &[u8]) -> Result<String, String> {
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+    if end > LONGEST_NAME {
+        return Err(format!("a name of {end} bytes"));
+    }
+    Ok(String::from_utf8_lossy(&bytes[..end]).into_owned())
+}
+
+/// The rows of an array of characters.
+fn texts(parts: &mut Elements<'_>, dims: &[usize], count: usize) -> Result<Vec<String>, String> {
+    // Octave writes no characters for an empty text.
+    if parts.is_empty() || count == 0 {
+        return Ok(vec![String::new()]);
+    }
+    let element = parts.next()?;
+    let bytes = element.bytes;
+    let order = |pair: &[u8]| {
+        let pair = [pair[0], pair[1]];
+        if parts.big_endian {
+            u16::from_be_bytes(pair)
+        } else {
+            u16::from_le_bytes(pair)
+        }
+    };
+    let of = |code: u32| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER);
+    let characters: Vec<char> = match element.kind {
+        data::INT8 | data::UINT8 => bytes.iter().map(|byte| char::from(*byte)).collect(),
+        data::UTF8 => String::from_utf8_lossy(bytes).chars().collect(),
+        data::INT16 | data::UINT16 | data::UTF16 => {
+            let units: Vec<u16> = bytes.chunks_exact(2).map(order).collect();
+            String::from_utf16_lossy(&units).chars().collect()
+        }
+        data::INT32 | data::UINT32 | data::UTF32 => parts.u32s(bytes).into_iter().map(of).collect(),
+        other => return Err(format!("characters of type {other}")),
+    };
+    match dims {
+        [1, ..] | [] => Ok(vec![characters.into_iter().collect()]),
+        [rows, ..] if *rows <= characters.len() => {
+            let row = |at: usize| {
+                characters[at..]
+                    .iter()
+                    .step_by(*rows)
+                    .collect::<String>()
+                    .trim_end()
+                    .to_owned()
+            };
+            Ok((0..*rows).map(row).collect())
+        }
+        [rows, ..] => Err(format!("{} characters in {rows} rows", characters.len())),
+    }
+}

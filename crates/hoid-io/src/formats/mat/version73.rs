@@ -1,0 +1,260 @@
+//! Version 7.3: HDF5 in MATLAB's manner. Structures are groups, arrays of structures and cells are references to what stands
+//! under `/#refs#`, sizes stand in the order of C and so read backwards, and `MATLAB_class` says what a dataset is. Datasets
+//! without it, as other programs write them, are numbers.
+
+use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group, H5Element, Object};
+
+use crate::IoError;
+use crate::arrays::{Array, Budget, Entry, Kind, MOST_NESTED, Numbers, Value};
+use crate::guarded::guarded;
+use crate::wording::told;
+
+/// What the visit of a group or a dataset counts for, bytes: links may lead in circles.
+const VISIT: u64 = 1 << 13;
+/// Arrays of structures and cells of more elements are not columns.
+const MOST_REFERENCES: u64 = 1 << 16;
+
+/// The variables of a file.
+pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Vec<Entry>, IoError> {
+    guarded(file, || {
+        let mut reader = Reader {
+            entries: Vec::new(),
+            budget: Budget::of(bytes.len()),
+            file,
+        };
+        let opened = File::from_bytes(bytes).map_err(|error| reader.damaged("its head", &error))?;
+        reader.group(&opened.root(), "", 0)?;
+        Ok(reader.entries)
+    })
+}
+
+struct Reader<'a> {
+    entries: Vec<Entry>,
+    budget: Budget,
+    file: &'a str,
+}
+
+impl Reader<'_> {
+    /// What the crate says: damage, or what it does not know.
+    fn damaged(&self, place: &str, error: &Error) -> IoError {
+        let what = error.to_string();
+        let (file, found) = (self.file.to_owned(), format!("{}: {}", told(place), told(&what)));
+        match ["version", "filter", "unsupported"]
+            .iter()
+            .any(|word| what.to_lowercase().contains(word))
+        {
+            true => IoError::Unsupported {
+                file,
+                found,
+                remedy: "save it with -v7, or by h5py with libver=\"v114\" and gzip",
+            },
+            false => IoError::Damaged { file, found },
+        }
+    }
+
+    /// What stands in a group, which is a structure or the whole file.
+    fn group(&mut self, group: &Group, path: &str, depth: usize) -> Result<(), IoError> {
+        self.budget.take(VISIT, self.file)?;
+        if depth > MOST_NESTED {
+            return Err(IoError::Damaged {
+                file: self.file.to_owned(),
+                found: format!("structures more than {MOST_NESTED} deep"),
+            });
+        }
+        let inside = |name: &str| {
+            if path.is_empty() {
+                name.to_owned()
+            } else {
+                format!("{path}.{name}")
+            }
+        };
+        let datasets = group.iter_datasets().map_err(|error| self.damaged(path, &error))?;
+        for (name, dataset) in datasets {
+            self.dataset(&dataset, path, &inside(&name), depth)?;
+        }
+        let groups = group.iter_groups().map_err(|error| self.damaged(path, &error))?;
+        for (name, group) in groups {
+            // What MATLAB keeps for itself.
+            if !(depth == 0 && name.starts_with('#')) {
+                self.group(&group, &inside(&name), depth + 1)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A dataset. The parent of one in an array of structures is the element, and its path begins with it.
+    fn dataset(&mut self, dataset: &Dataset, parent: &str, path: &str, depth: usize) -> Result<(), IoError> {
+        self.budget.take(VISIT, self.file)?;
+        let error = |reader: &Self, error: Error| reader.damaged(path, &error);
+        let attributes = dataset.attrs().map_err(|e| error(self, e))?;
+        let class = match attributes.get("MATLAB_class") {
+            Some(AttrValue::String(class) | AttrValue::AsciiString(class)) => class.as_str(),
+            _ => "",
+        };
+        let class = class.trim_end_matches('\0');
+        if attributes.contains_key("MATLAB_empty") {
+            return match class {
+                "char" => self.push(parent, path, Value::Texts(vec![String::new()])),
+                "struct" | "cell" => Ok(()),
+                _ => self.push(parent, path, Value::Array(Array::vector(Numbers::from_f64(&[])))),
+            };
+        }
+        let kind = dataset.dtype().map_err(|e| error(self, e))?;
+        let mut dims: Vec<usize> = Vec::new();
+        let mut count = Some(1_u64);
+        for side in dataset.shape().map_err(|e| error(self, e))? {
+            count = count.and_then(|count| count.checked_mul(side));
+            dims.push(usize::try_from(side).unwrap_or(usize::MAX));
+        }
+        dims.reverse();
+        let size = dataset.element_size().map_err(|e| error(self, e))?;
+        let Some((count, bytes)) = count.and_then(|count| Some((count, count.checked_mul(size.max(8))?))) else {
+            return self.push(parent, path, Value::Unread(String::from("an array of any size")));
+        };
+        if matches!(kind, DType::ObjectReference) {
+            if count > MOST_REFERENCES {
+                return self.push(parent, path, Value::Unread(format!("{count} references")));
+            }
+            return self.references(dataset, class == "cell", (parent, path), depth);
+        }
+        self.budget.take(bytes, self.file)?;
+        let value = match kind {
+            DType::U16 if class == "char" => Value::Texts(texts(&self.all::<u16>(dataset, path)?, &dims)),
+            DType::F64 => self.array::<f64>(dataset, path, Kind::F64, dims)?,
+            DType::F32 => self.array::<f32>(dataset, path, Kind::F32, dims)?,
+            DType::I8 | DType::Enum(_) if size == 1 => self.array::<i8>(dataset, path, Kind::I8, dims)?,
+            DType::I16 => self.array::<i16>(dataset, path, Kind::I16, dims)?,
+            DType::I32 => self.array::<i32>(dataset, path, Kind::I32, dims)?,
+            DType::I64 => self.array::<i64>(dataset, path, Kind::I64, dims)?,
+            DType::U8 => self.array::<u8>(dataset, path, Kind::U8, dims)?,
+            DType::U16 => self.array::<u16>(dataset, path, Kind::U16, dims)?,
+            DType::U32 => self.array::<u32>(dataset, path, Kind::U32, dims)?,
+            DType::U64 => self.array::<u64>(dataset, path, Kind::U64, dims)?,
+            DType::String => Value::Texts(dataset.read_string().map_err(|e| error(self, e))?),
+            DType::VariableLengthString => Value::Unread(String::from("texts of any length")),
+            DType::Compound(fields) if fields.len() == 2 && fields[0].0 == "real" => {
+                Value::Unread(String::from("complex numbers"))
+            }
+            _ => Value::Unread(String::from("something else than numbers")),
+        };
+        self.push(parent, path, value)
+    }
+
+    /// Cells, each `path{k}`, or one field of an array of structures, each `parent(k).field`.
+    fn references(
+        &mut self,
+        dataset: &Dataset,
+        cells: bool,
+        (parent, path): (&str, &str),
+        depth: usize,
+    ) -> Result<(), IoError> {
+        if depth == MOST_NESTED {
+            return Err(IoError::Damaged {
+                file: self.file.to_owned(),
+                found: format!("structures more than {MOST_NESTED} deep"),
+            });
+        }
+        let objects = match dataset.dereference() {
+            Ok(objects) => objects,
+            // A reference to nothing is no damage.
+            Err(error) => {
+                let what = format!("references that lead nowhere ({})", told(&error.to_string()));
+                return self.push(parent, path, Value::Unread(what));
+            }
+        };
+        let before = self.entries.len();
+        let several = objects.len() > 1;
+        let count = objects.len();
+        for (at, object) in objects.into_iter().enumerate() {
+            let (parent, path) = match path.strip_prefix(parent).and_then(|name| name.strip_prefix('.')) {
+                Some(field) if !cells && several && !parent.is_empty() => {
+                    let element = format!("{parent}({})", at + 1);
+                    let path = format!("{element}.{field}");
+                    (element, path)
+                }
+                _ => (parent.to_owned(), format!("{path}{{{}}}", at + 1)),
+            };
+            match object {
+                Object::Dataset(dataset) => self.dataset(&dataset, &parent, &path, depth + 1)?,
+                Object::Group(group) => self.group(&group, &path, depth + 1)?,
+                _ => {}
+            }
+        }
+        // Cells of texts alone are one column.
+        let text = |entry: &Entry| matches!(&entry.value, Value::Texts(texts) if texts.len() == 1);
+        if cells && self.entries.len() - before == count && self.entries[before..].iter().all(text) {
+            let texts = self.entries.drain(before..).filter_map(|entry| match entry.value {
+                Value::Texts(texts) => texts.into_iter().next(),
+                _ => None,
+            });
+            let texts = texts.collect();
+            return self.push(parent, path, Value::Texts(texts));
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, parent: &str, path: &str, value: Value) -> Result<(), IoError> {
+        self.budget.take((path.len() + parent.len()) as u64, self.file)?;
+        let mut entry = Entry::new(path, value);
+        parent.clone_into(&mut entry.parent);
+        self.entries.push(entry);
+        Ok(())
+    }
+
+    fn all<T: H5Element>(&self, dataset: &Dataset, path: &str) -> Result<Vec<T>, IoError> {
+        dataset.read::<T>().map_err(|error| self.damaged(path, &error))
+    }
+
+    fn array<T: H5Element + Bytes>(
+        &self,
+        dataset: &Dataset,
+        path: &str,
+        kind: Kind,
+        dims: Vec<usize>,
+    ) -> Result<Value, IoError> {
+        let values = self.all::<T>(dataset, path)?;
+        let mut bytes = Vec::with_capacity(values.len() * kind.size());
+        values.iter().for_each(|value| value.append(&mut bytes));
+        let numbers = Numbers::new(bytes, kind, false);
+        let expected = dims.iter().try_fold(1_usize, |count, side| count.checked_mul(*side));
+        if expected != Some(numbers.len()) {
+            return Err(IoError::Damaged {
+                file: self.file.to_owned(),
+                found: format!("{}: {} numbers in an array of {dims:?}", told(path), numbers.len()),
+            });
+        }
+        Ok(Value::Array(Array {
+            numbers,
+            dims,
+            last_fastest: false,
+        }))
+    }
+}
+
+/// The rows of an array of characters.
+fn texts(units: &[u16], dims: &[usize]) -> Vec<String> {
+    let rows = dims.first().copied().unwrap_or(1).clamp(1, units.len().max(1));
+    let row = |at: usize| units.iter().skip(at).step_by(rows).copied().collect::<Vec<u16>>();
+    let text = |at: usize| String::from_utf16_lossy(&row(at));
+    match rows {
+        1 => vec![text(0)],
+        rows => (0..rows).map(|at| text(at).trim_end().to_owned()).collect(),
+    }
+}
+
+/// A number as bytes, the little end first.
+trait Bytes {
+    fn append(&self, bytes: &mut Vec<u8>);
+}
+
+macro_rules! bytes {
+    ($($number:ty),*) => {$(
+        impl Bytes for $number {
+            fn append(&self, bytes: &mut Vec<u8>) {
+                bytes.extend_from_slice(&self.to_le_bytes());
+            }
+        }
+    )*};
+}
+
+bytes!(f32, f64, i8, i16, i32, i64, u8, u16, u32, u64);

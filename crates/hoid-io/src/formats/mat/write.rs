@@ -1,0 +1,117 @@
+//! Version 7, each variable deflated: a column of numbers is a variable of one column, of texts a cell of them.
+
+use std::io::{self, Write};
+
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+
+use super::elements::{HEADER, data};
+use super::names::{NAMES, variables};
+use crate::arrays::COMMENTS;
+use crate::output_table::{TableSchema, Values};
+
+const CELL: u32 = 1;
+const CHAR: u32 = 4;
+const DOUBLE: u32 = 6;
+const UINT64: u32 = 15;
+
+/// Writes columns, and the comments as a cell of texts.
+pub(super) fn write(file: &mut dyn Write, schema: &TableSchema, columns: &[Values<'_>]) -> io::Result<()> {
+    // Nothing of time or place: the same columns give the same bytes.
+    let mut header = format!("MATLAB 5.0 MAT-file, written by hoid {}", env!("CARGO_PKG_VERSION")).into_bytes();
+    header.resize(HEADER - 12, b' ');
+    header.extend([0; 8]);
+    header.extend([0x00, 0x01, b'I', b'M']);
+    file.write_all(&header)?;
+    let names: Vec<&str> = schema.columns.iter().map(|column| column.name.as_str()).collect();
+    let variables = variables(&names);
+    for (variable, values) in variables.iter().zip(columns) {
+        compressed(file, &column(variable, *values)?)?;
+    }
+    if !schema.comments.is_empty() {
+        compressed(file, &column(COMMENTS, Values::Text(&schema.comments))?)?;
+    }
+    let renamed = names
+        .iter()
+        .zip(&variables)
+        .filter(|(name, variable)| *name != variable);
+    let lines: Vec<String> = renamed.map(|(name, variable)| format!("{variable} {name}")).collect();
+    if !lines.is_empty() {
+        compressed(file, &column(NAMES, Values::Text(&lines))?)?;
+    }
+    Ok(())
+}
+
+fn column(name: &str, values: Values<'_>) -> io::Result<Vec<u8>> {
+    let mut matrix = Matrix::default();
+    match values {
+        Values::Real(values) => {
+            matrix.head(DOUBLE, values.len(), 1, name)?;
+            matrix.element(
+                data::DOUBLE,
+                &values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>(),
+            )?;
+        }
+        Values::Whole(values) => {
+            matrix.head(UINT64, values.len(), 1, name)?;
+            matrix.element(
+                data::UINT64,
+                &values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>(),
+            )?;
+        }
+        Values::Text(texts) => {
+            matrix.head(CELL, texts.len(), 1, name)?;
+            for text in texts {
+                let mut cell = Matrix::default();
+                let rows = usize::from(!text.is_empty());
+                cell.head(CHAR, rows, text.chars().count(), "")?;
+                cell.element(data::UTF8, text.as_bytes())?;
+                matrix.element(data::MATRIX, &cell.bytes)?;
+            }
+        }
+    }
+    let mut element = Matrix::default();
+    element.element(data::MATRIX, &matrix.bytes)?;
+    Ok(element.bytes)
+}
+
+/// The parts of an array, one behind the other.
+#[derive(Default)]
+struct Matrix {
+    bytes: Vec<u8>,
+}
+
+impl Matrix {
+    fn head(&mut self, class: u32, rows: usize, columns: usize, name: &str) -> io::Result<()> {
+        let side = |side: usize| i32::try_from(side).map_err(|_| too_long());
+        self.element(data::UINT32, &[class.to_le_bytes(), [0; 4]].concat())?;
+        self.element(
+            data::INT32,
+            &[side(rows)?.to_le_bytes(), side(columns)?.to_le_bytes()].concat(),
+        )?;
+        self.element(data::INT8, name.as_bytes())
+    }
+
+    fn element(&mut self, kind: u32, bytes: &[u8]) -> io::Result<()> {
+        let length = u32::try_from(bytes.len()).map_err(|_| too_long())?;
+        self.bytes.extend(kind.to_le_bytes());
+        self.bytes.extend(length.to_le_bytes());
+        self.bytes.extend_from_slice(bytes);
+        self.bytes.resize(self.bytes.len().next_multiple_of(8), 0);
+        Ok(())
+    }
+}
+
+fn compressed(file: &mut dyn Write, element: &[u8]) -> io::Result<()> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
+    encoder.write_all(element)?;
+    let bytes = encoder.finish()?;
+    let length = u32::try_from(bytes.len()).map_err(|_| too_long())?;
+    file.write_all(&data::COMPRESSED.to_le_bytes())?;
+    file.write_all(&length.to_le_bytes())?;
+    file.write_all(&bytes)
+}
+
+fn too_long() -> io::Error {
+    io::Error::other("a variable of more than 4 GB, which .mat does not take; write Parquet")
+}

@@ -1,0 +1,110 @@
+//! The zip around the arrays: each member `name.npy` is the array `name`.
+//!
+//! Reading takes stored and deflated members. Writing stores them, as `numpy.savez` does, without times, so that the same
+//! columns give the same bytes; texts keep no zeros at their end, which numpy's type of text cannot hold.
+
+use std::io::{self, Cursor, Read, Write};
+
+use zip::result::ZipError;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
+
+use super::npy::{self, NpyError};
+use crate::IoError;
+use crate::arrays::{Budget, COMMENTS, Contents, Entry, Indexing};
+use crate::guarded::guarded;
+use crate::output_table::{TableSchema, Values};
+use crate::wording::{shown, told};
+
+/// The arrays in the bytes of a file.
+pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
+    if !bytes.starts_with(b"PK") {
+        let start = String::from_utf8_lossy(&bytes[..bytes.len().min(12)]).into_owned();
+        return Err(IoError::WrongFormat {
+            file: file.to_owned(),
+            format: "NPZ",
+            found: format!("it starts with \"{}\"", start.escape_debug()),
+            expected: "a zip archive, which starts with PK",
+        });
+    }
+    guarded(file, || members(bytes, file))
+}
+
+fn members(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
+    let mut budget = Budget::of(bytes.len());
+    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| refused(&error, "the archive", file))?;
+    let mut entries: Vec<Entry> = Vec::new();
+    let mut others = Vec::new();
+    for index in 0..archive.len() {
+        let mut member = archive
+            .by_index(index)
+            .map_err(|error| refused(&error, &format!("member {}", index + 1), file))?;
+        let path = match member.name() {
+            Ok(name) => name.into_owned(),
+            Err(error) => return Err(refused(&error, &format!("the name of member {}", index + 1), file)),
+        };
+        let Some(name) = path.strip_suffix(".npy") else {
+            others.push(shown(&path));
+            continue;
+        };
+        let damaged = |what: &str| IoError::Damaged {
+            file: file.to_owned(),
+            found: format!("array {}: {what}", shown(name)),
+        };
+        let size = member.size();
+        budget.take(size, file)?;
+        // What is promised is not reserved: memory grows with what is there.
+        let mut data = Vec::new();
+        let read = (&mut member).take(size.saturating_add(1)).read_to_end(&mut data);
+        read.map_err(|error| damaged(&told(&error.to_string())))?;
+        if data.len() as u64 != size {
+            return Err(damaged(&format!("{} bytes or more, expected {size}", data.len())));
+        }
+        let found = npy::entries(data, name, false).map_err(|error| match error {
+            NpyError::NoMagic(what) | NpyError::Damaged(what) => damaged(&what),
+        })?;
+        entries.extend(found);
+    }
+    let mut contents = Contents::new(entries, Indexing::Python);
+    if !others.is_empty() {
+        contents.notes.push(format!(
+            "members that are no arrays are left out: {}",
+            others.join(", ")
+        ));
+    }
+    Ok(contents)
+}
+
+fn refused(error: &ZipError, place: &str, file: &str) -> IoError {
+    let found = format!("{place}: {}", told(&error.to_string()));
+    let file = file.to_owned();
+    match error {
+        ZipError::UnsupportedArchive(_) | ZipError::CompressionMethodNotSupported(_) => IoError::Unsupported {
+            file,
+            found,
+            remedy: "write it with numpy.savez or numpy.savez_compressed, without a password",
+        },
+        _ => IoError::Damaged { file, found },
+    }
+}
+
+/// Writes columns, and the comments as an array of texts.
+pub(super) fn write(file: &mut dyn Write, schema: &TableSchema, columns: &[Values<'_>]) -> io::Result<()> {
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Stored)
+        .last_modified_time(DateTime::default());
+    let mut member = |name: &str, values: Values<'_>| -> io::Result<()> {
+        let bytes = npy::written(values);
+        let large = bytes.len() as u64 >= u64::from(u32::MAX);
+        archive.start_file(format!("{name}.npy"), options.large_file(large))?;
+        archive.write_all(&bytes)
+    };
+    for (column, values) in schema.columns.iter().zip(columns) {
+        member(&column.name, *values)?;
+    }
+    if !schema.comments.is_empty() {
+        member(COMMENTS, Values::Text(&schema.comments))?;
+    }
+    file.write_all(archive.finish()?.get_ref())
+}

@@ -1,0 +1,31 @@
+//! NPZ, the archive of arrays of numpy, and NPY, one array of it.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | `header` | what numpy writes in front of the numbers, a Python literal |
+//! | `npy` | one array, in and out |
+//! | `archive` | NPZ: the zip around them |
+//! | `single` | NPY: one array in a file of its own |
+
+mod archive;
+mod header;
+mod npy;
+mod single;
+
+use crate::format::{Format, Reading, Writing};
+
+pub(super) const NPZ: Format = Format {
+    name: "NPZ",
+    endings: &["npz"],
+    reading: Reading::Arrays(|bytes, file| archive::read(&bytes, file)),
+    writing: Writing::Columns(archive::write),
+    record: None,
+};
+
+pub(super) const NPY: Format = Format {
+    name: "NPY",
+    endings: &["npy"],
+    reading: Reading::Arrays(single::read),
+    writing: Writing::ReadOnly("a single array without names"),
+    record: None,
+};

@@ -1,0 +1,284 @@
+//! One array of numpy.
+
+use std::rc::Rc;
+
+use super::header::{self, Descr, Header};
+use crate::arrays::{Array, Entry, Kind, Numbers, Value};
+use crate::output_table::Values;
+use crate::wording::shown;
+
+const MAGIC: &[u8] = b"\x93NUMPY";
+/// A header of more bytes is damage.
+const LONGEST_HEADER: usize = 1 << 20;
+/// The numbers begin at a multiple of it.
+const ALIGNMENT: usize = 64;
+
+/// What is wrong with an array.
+#[derive(Debug)]
+pub(super) enum NpyError {
+    NoMagic(String),
+    Damaged(String),
+}
+
+/// The type of an item: `<f8` and so on.
+enum Item {
+    Numbers {
+        kind: Kind,
+        big_endian: bool,
+    },
+    /// Characters of four bytes.
+    Unicode {
+        length: usize,
+        big_endian: bool,
+    },
+    /// Characters of one byte.
+    Bytes {
+        length: usize,
+    },
+    Unread {
+        what: &'static str,
+        size: Option<usize>,
+    },
+}
+
+impl Item {
+    fn of(descr: &str) -> Self {
+        let big_endian = descr.starts_with('>');
+        let plain = descr.trim_start_matches(['<', '>', '|', '=']);
+        let unread = |what, size| Self::Unread { what, size };
+        let Some(letter) = plain.chars().next() else {
+            return unread("an unknown type", None);
+        };
+        let size = plain[letter.len_utf8()..].parse::<usize>().ok();
+        let kind = match (letter, size) {
+            ('f', Some(2)) => Kind::F16,
+            ('f', Some(4)) => Kind::F32,
+            ('f', Some(8)) => Kind::F64,
+            ('i', Some(1)) => Kind::I8,
+            ('i', Some(2)) => Kind::I16,
+            ('i', Some(4)) => Kind::I32,
+            ('i', Some(8)) => Kind::I64,
+            ('b' | 'u', Some(1)) => Kind::U8,
+            ('u', Some(2)) => Kind::U16,
+            ('u', Some(4)) => Kind::U32,
+            ('u', Some(8)) => Kind::U64,
+            ('U', Some(length)) => return Self::Unicode { length, big_endian },
+            ('S' | 'a', Some(length)) => return Self::Bytes { length },
+            ('f', size) => return unread("numbers of extended precision", size),
+            ('c', size) => return unread("complex numbers", size),
+            ('M' | 'm', _) => return unread("dates or times", Some(8)),
+            ('O', _) => return unread("Python objects", None),
+            (_, size) => return unread("an unknown type", size),
+        };
+        Self::Numbers { kind, big_endian }
+    }
+
+    fn size(&self) -> Option<usize> {
+        match self {
+            Self::Numbers { kind, .. } => Some(kind.size()),
+            Self::Unicode { length, .. } => length.checked_mul(4),
+            Self::Bytes { length } => Some(*length),
+            Self::Unread { size, .. } => *size,
+        }
+    }
+}
+
+/// What stands in an array: one entry, or one for each field, at the top level where there is no other array.
+pub(super) fn entries(bytes: Vec<u8>, name: &str, alone: bool) -> Result<Vec<Entry>, NpyError> {
+    let (header, at) = header_of(&bytes)?;
+    let data = || bytes[at..].to_vec();
+    let entries = match &header.descr {
+        Descr::Plain(descr) => vec![Entry::new(name, plain(&Item::of(descr), &header, data())?)],
+        Descr::Fields(fields) => structured(fields, &header, data())?
+            .into_iter()
+            .map(|(field, value)| Entry::field(if alone { "" } else { name }, &field, value))
+            .collect(),
+    };
+    Ok(entries)
+}
+
+fn header_of(bytes: &[u8]) -> Result<(Header, usize), NpyError> {
+    let damaged = |what: &str| NpyError::Damaged(what.to_owned());
+    if !bytes.starts_with(MAGIC) {
+        let start = String::from_utf8_lossy(&bytes[..bytes.len().min(12)]).into_owned();
+        return Err(NpyError::NoMagic(format!(
+            "it starts with \"{}\"",
+            start.escape_debug()
+        )));
+    }
+    let rest = &bytes[MAGIC.len()..];
+    let (length, before) = match rest {
+        [1, _, a, b, ..] => (usize::from(u16::from_le_bytes([*a, *b])), MAGIC.len() + 4),
+        [2 | 3, _, a, b, c, d, ..] => (u32::from_le_bytes([*a, *b, *c, *d]) as usize, MAGIC.len() + 6),
+        [version, ..] if !(1..=3).contains(version) => {
+            return Err(NpyError::Damaged(format!("the array is of version {version}")));
+        }
+        _ => return Err(damaged("the array ends in its header")),
+    };
+    if length > LONGEST_HEADER {
+        return Err(NpyError::Damaged(format!(
+            "the header of an array is {length} bytes long"
+        )));
+    }
+    let text = bytes
+        .get(before..before + length)
+        .ok_or_else(|| damaged("the array ends in its header"))?;
+    // Latin 1 before version 3; what hoid needs is ASCII in both, but for names.
+    let text = String::from_utf8_lossy(text);
+    let header = header::parse(&text)
+        .ok_or_else(|| NpyError::Damaged(format!("the header of an array reads {}", shown(&text))))?;
+    Ok((header, before + length))
+}
+
+/// The count of items, where they fill the bytes.
+fn count(header: &Header, size: usize, bytes: usize) -> Result<usize, NpyError> {
+    let count = header
+        .shape
+        .iter()
+        .try_fold(1_usize, |count, side| count.checked_mul(*side));
+    let expected = count.and_then(|count| count.checked_mul(size));
+    match (count, expected) {
+        (Some(count), Some(expected)) if expected == bytes => Ok(count),
+        _ => Err(NpyError::Damaged(format!(
+            "an array of {} items of {size} bytes holds {bytes} bytes",
+            shown(&format!("{:?}", header.shape))
+        ))),
+    }
+}
+
+fn plain(item: &Item, header: &Header, data: Vec<u8>) -> Result<Value, NpyError> {
+    let Some(size) = item.size() else {
+        return Ok(unread(item));
+    };
+    let count = count(header, size, data.len())?;
+    Ok(match item {
+        Item::Numbers { kind, big_endian } => Value::Array(Array {
+            numbers: Numbers::new(data, *kind, *big_endian),
+            dims: header.shape.clone(),
+            last_fastest: !header.fortran_order,
+        }),
+        // Texts of no length, of which there may be any number.
+        Item::Unicode { length: 0, .. } | Item::Bytes { length: 0 } if count > LONGEST_HEADER => {
+            return Err(NpyError::Damaged(format!("{count} texts without a character")));
+        }
+        Item::Unicode { length: 0, .. } | Item::Bytes { length: 0 } => Value::Texts(vec![String::new(); count]),
+        Item::Unicode { big_endian, .. } => {
+            Value::Texts(data.chunks_exact(size).map(|text| unicode(text, *big_endian)).collect())
+        }
+        Item::Bytes { .. } => Value::Texts(data.chunks_exact(size).map(latin).collect()),
+        Item::Unread { .. } => unread(item),
+    })
+}
+
+fn unread(item: &Item) -> Value {
+    match item {
+        Item::Unread { what, .. } => Value::Unread((*what).to_owned()),
+        _ => Value::Unread(String::from("an unknown type")),
+    }
+}
+
+fn structured(
+    fields: &[(String, Option<String>)],
+    header: &Header,
+    data: Vec<u8>,
+) -> Result<Vec<(String, Value)>, NpyError> {
+    let items: Option<Vec<(&String, Item, usize)>> = fields
+        .iter()
+        .map(|(name, descr)| {
+            let item = Item::of(descr.as_deref()?);
+            let size = item.size()?;
+            Some((name, item, size))
+        })
+        .collect();
+    let Some(items) = items else {
+        return Ok(vec![(
+            String::from("arr"),
+            Value::Unread(String::from("a structured array with arrays in it")),
+        )]);
+    };
+    let item = items
+        .iter()
+        .try_fold(0_usize, |sum, (.., size)| sum.checked_add(*size))
+        .unwrap_or(usize::MAX);
+    count(header, item, data.len())?;
+    let data = Rc::new(data);
+    let mut offset = 0;
+    let mut values = Vec::with_capacity(items.len());
+    for (name, kind, size) in items {
+        let texts = |of: &dyn Fn(&[u8]) -> String| {
+            let text = |row: &[u8]| of(&row[offset..offset + size]);
+            Value::Texts(data.chunks_exact(item).map(text).collect())
+        };
+        let value = match kind {
+            Item::Numbers { kind, big_endian } => {
+                let numbers = Numbers::field(&data, kind, big_endian, offset, item);
+                Value::Array(Array::vector(numbers))
+            }
+            Item::Unicode { big_endian, .. } if size > 0 => texts(&|text| unicode(text, big_endian)),
+            Item::Bytes { .. } if size > 0 => texts(&latin),
+            other => unread(&other),
+        };
+        // Fields without a name fill a gap.
+        if !name.is_empty() {
+            values.push((name.clone(), value));
+        }
+        offset += size;
+    }
+    Ok(values)
+}
+
+fn unicode(bytes: &[u8], big_endian: bool) -> String {
+    let character = |c: &[u8]| {
+        let mut c = <[u8; 4]>::try_from(c).unwrap_or_default();
+        if big_endian {
+            c.reverse();
+        }
+        char::from_u32(u32::from_le_bytes(c)).unwrap_or(char::REPLACEMENT_CHARACTER)
+    };
+    let text: String = bytes.chunks_exact(4).map(character).collect();
+    text.trim_end_matches('\0').to_owned()
+}
+
+fn latin(bytes: &[u8]) -> String {
+    let end = bytes.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+    String::from_utf8_lossy(&bytes[..end]).into_owned()
+}
+
+/// An array of one dimension, as numpy writes it.
+pub(super) fn written(values: Values<'_>) -> Vec<u8> {
+    let (descr, data): (String, Vec<u8>) = match values {
+        Values::Real(values) => (
+            String::from("<f8"),
+            values.iter().flat_map(|v| v.to_le_bytes()).collect(),
+        ),
+        Values::Whole(values) => (
+            String::from("<u8"),
+            values.iter().flat_map(|v| v.to_le_bytes()).collect(),
+        ),
+        Values::Text(texts) => {
+            let longest = texts.iter().map(|text| text.chars().count()).max().unwrap_or(0).max(1);
+            let padded = |text: &String| {
+                let characters: Vec<char> = text.chars().collect();
+                (0..longest).flat_map(move |k| characters.get(k).map_or(0, |c| u32::from(*c)).to_le_bytes())
+            };
+            (format!("<U{longest}"), texts.iter().flat_map(padded).collect())
+        }
+    };
+    let mut header = format!(
+        "{{'descr': {}, 'fortran_order': False, 'shape': ({},), }}",
+        header::quoted(&descr),
+        values.len()
+    );
+    let before = MAGIC.len() + 4;
+    let padding = (ALIGNMENT - (before + header.len() + 1) % ALIGNMENT) % ALIGNMENT;
+    header.extend(std::iter::repeat_n(' ', padding));
+    header.push('\n');
+    let mut bytes = Vec::with_capacity(before + header.len() + data.len());
+    bytes.extend_from_slice(MAGIC);
+    bytes.extend_from_slice(&[1, 0]);
+    // A plain header is far shorter than 2^16.
+    bytes.extend_from_slice(&(header.len() as u16).to_le_bytes());
+    bytes.extend_from_slice(header.as_bytes());
+    bytes.extend_from_slice(&data);
+    bytes
+}

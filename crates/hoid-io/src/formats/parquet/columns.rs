@@ -1,0 +1,37 @@
+//! Columns as they were read, whatever they are to become.
+
+/// The key of the comments, one a line.
+pub(super) const COMMENTS: &str = "hoid.comments";
+
+/// The values of a column.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Data {
+    Real(Vec<f64>),
+    Signed(Vec<i64>),
+    Unsigned(Vec<u64>),
+    Text(Vec<String>),
+    /// What is not read, in words.
+    Unread(&'static str),
+}
+
+/// A column as it was read.
+#[derive(Debug)]
+pub(super) struct ReadColumn {
+    /// Its name; the parts of a path are joined by points.
+    pub(super) name: String,
+    /// Values of single precision.
+    pub(super) single: bool,
+    /// One value a row, of no meaning where there is none.
+    pub(super) data: Data,
+    /// Rows without a value, in increasing order.
+    pub(super) nulls: Vec<usize>,
+}
+
+/// A file as it was read.
+#[derive(Debug)]
+pub(super) struct ReadFile {
+    pub(super) columns: Vec<ReadColumn>,
+    pub(super) rows: usize,
+    /// The lines under the key `hoid.comments`.
+    pub(super) comments: Vec<String>,
+}

@@ -1,0 +1,265 @@
+//! Tables of any program.
+//!
+//! A file is not trusted: values are fetched in parts, so that memory grows with what was decoded and not with what the file
+//! promises, and a panic of the crate becomes an error.
+
+use bytes::Bytes;
+use half::f16;
+use parquet::basic::{Compression, ConvertedType, LogicalType, Type};
+use parquet::column::reader::get_typed_column_reader;
+use parquet::data_type::{
+    BoolType, ByteArrayType, DataType, DoubleType, FixedLenByteArrayType, FloatType, Int32Type, Int64Type,
+};
+use parquet::errors::ParquetError;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::schema::types::{ColumnDescPtr, ColumnDescriptor};
+
+use super::columns::{COMMENTS, Data, ReadColumn, ReadFile};
+use crate::IoError;
+use crate::guarded::guarded;
+use crate::wording::{shown, told};
+
+/// The magic bytes at both ends.
+const MAGIC: &[u8; 4] = b"PAR1";
+/// A month at 100 samples/s; more rows are taken for damage before they take all memory.
+const MOST_ROWS: usize = 1 << 28;
+const TIME: &str = "a date or time";
+/// Values that are fetched together.
+const PART: usize = 1 << 16;
+
+/// The columns in the bytes of a file.
+pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<ReadFile, IoError> {
+    check_ends(&bytes, file)?;
+    guarded(file, || columns(bytes.into(), file))
+}
+
+/// Whether this is Parquet at all, in words that say what it is instead.
+fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
+    let file = || file.to_owned();
+    let found = if bytes.is_empty() {
+        String::from("it is empty")
+    } else if bytes.starts_with(b"PARE") {
+        return Err(IoError::Unsupported {
+            file: file(),
+            found: String::from("is encrypted"),
+            remedy: "write it without encryption",
+        });
+    } else if !bytes.starts_with(MAGIC) {
+        let start = String::from_utf8_lossy(&bytes[..bytes.len().min(12)]).into_owned();
+        format!("it starts with \"{}\"", start.escape_debug())
+    } else if bytes.len() < 12 {
+        String::from("it ends behind its first bytes")
+    } else if !bytes.ends_with(MAGIC) {
+        String::from("its end is missing")
+    } else {
+        return Ok(());
+    };
+    Err(IoError::NotParquet { file: file(), found })
+}
+
+fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
+    let damaged = |found: String| IoError::Damaged {
+        file: file.to_owned(),
+        found,
+    };
+    let reader = SerializedFileReader::new(bytes).map_err(|error| damaged(told(&error.to_string())))?;
+    let footer = reader.metadata().file_metadata();
+    let count = |rows: i64| usize::try_from(rows).map_err(|_| damaged(format!("{rows} rows")));
+    let rows = count(footer.num_rows())?;
+    if rows > MOST_ROWS {
+        return Err(IoError::Unsupported {
+            file: file.to_owned(),
+            found: format!("holds {rows} rows, where {MOST_ROWS} are the most"),
+            remedy: "write it in parts",
+        });
+    }
+    let mut grouped = 0_usize;
+    for group in reader.metadata().row_groups() {
+        grouped = grouped.saturating_add(count(group.num_rows())?);
+    }
+    if grouped != rows {
+        return Err(damaged(format!("{rows} rows in all, {grouped} in the row groups")));
+    }
+    let column = |(index, descriptor): (usize, &ColumnDescPtr)| {
+        let parts: Vec<&str> = descriptor.path().parts().iter().map(|part| part.trim()).collect();
+        let mut leaf = ColumnPath {
+            reader: &reader,
+            file,
+            index,
+            name: parts.join("."),
+            nulls: Vec::new(),
+        };
+        Ok(ReadColumn {
+            data: leaf.data(descriptor)?,
+            name: leaf.name,
+            single: descriptor.physical_type() == Type::FLOAT
+                || descriptor.logical_type_ref() == Some(&LogicalType::Float16),
+            nulls: leaf.nulls,
+        })
+    };
+    let leaves = footer.schema_descr().columns().iter().enumerate();
+    let pairs = footer.key_value_metadata().into_iter().flatten();
+    let comments = pairs
+        .filter(|pair| pair.key == COMMENTS)
+        .find_map(|pair| pair.value.as_ref());
+    Ok(ReadFile {
+        columns: leaves.map(column).collect::<Result<_, IoError>>()?,
+        rows,
+        comments: comments.map_or_else(Vec::new, |text| text.split('\n').map(str::to_owned).collect()),
+    })
+}
+
+/// A column over all row groups.
+struct ColumnPath<'a> {
+    reader: &'a SerializedFileReader<Bytes>,
+    file: &'a str,
+    index: usize,
+    name: String,
+    nulls: Vec<usize>,
+}
+
+impl ColumnPath<'_> {
+    /// The values by their logical type or, in older files, the converted one, which the crate fills in where there is such.
+    fn data(&mut self, column: &ColumnDescriptor) -> Result<Data, IoError> {
+        use ConvertedType as C;
+        let unit = 10_f64.powi(column.type_scale());
+        let logical = column.logical_type_ref();
+        let time = matches!(logical, Some(LogicalType::Time(_) | LogicalType::Timestamp(_)));
+        if column.max_rep_level() > 0 {
+            return Ok(Data::Unread("a list"));
+        }
+        Ok(match (column.physical_type(), column.converted_type()) {
+            (Type::BOOLEAN, _) => Data::Signed(self.values::<BoolType, _>(|value| i64::from(*value))?),
+            (Type::FLOAT, _) => Data::Real(self.values::<FloatType, _>(|value| f64::from(*value))?),
+            (Type::DOUBLE, _) => Data::Real(self.values::<DoubleType, _>(|value| *value)?),
+            (Type::INT96, _) | (_, C::DATE | C::TIME_MILLIS | C::TIME_MICROS) => Data::Unread(TIME),
+            (_, C::TIMESTAMP_MILLIS | C::TIMESTAMP_MICROS) => Data::Unread(TIME),
+            // Nanoseconds have no converted type.
+            _ if time => Data::Unread(TIME),
+            (Type::INT32, C::DECIMAL) => Data::Real(self.values::<Int32Type, _>(|value| f64::from(*value) / unit)?),
+            (Type::INT64, C::DECIMAL) => Data::Real(self.values::<Int64Type, _>(|value| *value as f64 / unit)?),
+            (Type::INT32, C::UINT_8 | C::UINT_16 | C::UINT_32) => {
+                Data::Unsigned(self.values::<Int32Type, _>(|value| u64::from(value.cast_unsigned()))?)
+            }
+            (Type::INT64, C::UINT_64) => Data::Unsigned(self.values::<Int64Type, _>(|value| value.cast_unsigned())?),
+            (Type::INT32, _) => Data::Signed(self.values::<Int32Type, _>(|value| i64::from(*value))?),
+            (Type::INT64, _) => Data::Signed(self.values::<Int64Type, _>(|value| *value)?),
+            (Type::FIXED_LEN_BYTE_ARRAY, C::DECIMAL) if column.type_length() <= 16 => {
+                Data::Real(self.values::<FixedLenByteArrayType, _>(|value| signed(value.data()) as f64 / unit)?)
+            }
+            (_, C::DECIMAL) => Data::Unread("decimal numbers of any length"),
+            (Type::FIXED_LEN_BYTE_ARRAY, _) if logical == Some(&LogicalType::Float16) => {
+                Data::Real(self.values::<FixedLenByteArrayType, _>(|value| half(value.data()))?)
+            }
+            (Type::BYTE_ARRAY, C::UTF8 | C::ENUM | C::JSON) => {
+                Data::Text(self.values::<ByteArrayType, _>(|value| String::from_utf8_lossy(value.data()).into_owned())?)
+            }
+            _ => Data::Unread("binary data"),
+        })
+    }
+
+    /// One value a row; the rows without are noted.
+    fn values<T: DataType, V: Default>(&mut self, of: impl Fn(&T::T) -> V) -> Result<Vec<V>, IoError> {
+        let mut values = Vec::new();
+        for group in 0..self.reader.num_row_groups() {
+            self.group::<T, V>(group, &of, &mut values)
+                .map_err(|error| self.error(group, error))?;
+        }
+        Ok(values)
+    }
+
+    fn group<T: DataType, V: Default>(
+        &mut self,
+        group: usize,
+        of: &impl Fn(&T::T) -> V,
+        values: &mut Vec<V>,
+    ) -> Result<(), ParquetError> {
+        let metadata = self.reader.metadata().row_group(group);
+        let chunk = metadata.column(self.index);
+        match chunk.compression() {
+            Compression::ZSTD(_) => return Err(refused("is compressed by Zstandard")),
+            Compression::BROTLI(_) => return Err(refused("is compressed by Brotli")),
+            Compression::LZO => return Err(refused("is compressed by LZO")),
+            _ if chunk.file_path().is_some() => return Err(refused("keeps its values in another file")),
+            _ => {}
+        }
+        if chunk.num_values() != metadata.num_rows() {
+            let (found, rows) = (chunk.num_values(), metadata.num_rows());
+            return Err(ParquetError::General(format!("{found} values in {rows} rows")));
+        }
+        let defined = chunk.column_descr().max_def_level();
+        let end = values.len() + metadata.num_rows() as usize;
+        let group = self.reader.get_row_group(group)?;
+        let mut reader = get_typed_column_reader::<T>(group.get_column_reader(self.index)?);
+        let (mut levels, mut stored) = (Vec::new(), Vec::new());
+        while values.len() < end {
+            levels.clear();
+            stored.clear();
+            let wanted = PART.min(end - values.len());
+            let (rows, ..) = reader.read_records(wanted, Some(&mut levels), None, &mut stored)?;
+            if rows != wanted {
+                let missing = end - values.len() - rows;
+                return Err(ParquetError::EOF(format!("{missing} values are missing")));
+            }
+            if defined == 0 {
+                values.extend(stored.iter().map(of));
+                continue;
+            }
+            let mut stored = stored.iter();
+            for level in &levels {
+                let value = if *level == defined { stored.next() } else { None };
+                if value.is_none() {
+                    self.nulls.push(values.len());
+                }
+                values.push(value.map_or_else(V::default, of));
+            }
+        }
+        Ok(())
+    }
+
+    /// What the crate says, with the place.
+    fn error(&self, group: usize, error: ParquetError) -> IoError {
+        let file = self.file.to_owned();
+        let place = format!("column {}, row group {}", shown(&self.name), group + 1);
+        match error {
+            ParquetError::NYI(what) => IoError::Unsupported {
+                file,
+                found: format!("{place} {what}"),
+                remedy: "write it again as one file with Snappy compression, as pandas and DuckDB do by default",
+            },
+            error => IoError::Damaged {
+                file,
+                found: format!("{place}: {}", told(&error.to_string())),
+            },
+        }
+    }
+}
+
+/// What is correct and not read here.
+fn refused(what: &str) -> ParquetError {
+    ParquetError::NYI(what.to_owned())
+}
+
+/// IEEE 754 binary16, the little end first.
+fn half(bytes: &[u8]) -> f64 {
+    <[u8; 2]>::try_from(bytes).map_or(f64::NAN, |bytes| f16::from_le_bytes(bytes).to_f64())
+}
+
+/// An integer of up to 16 bytes, the big end first.
+fn signed(bytes: &[u8]) -> i128 {
+    let sign = -i128::from(bytes.first().is_some_and(|first| *first >= 0x80));
+    bytes.iter().fold(sign, |value, byte| value << 8 | i128::from(*byte))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn integers_in_bytes() {
+        assert_eq!(signed(&[]), 0);
+        assert_eq!(signed(&[0xff, 0xfe]), -2);
+        assert_eq!(signed(&[0x01, 0x00]), 256);
+        assert_eq!(signed(&i128::MIN.to_be_bytes()), i128::MIN);
+    }
+}

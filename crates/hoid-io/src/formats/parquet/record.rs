@@ -1,0 +1,118 @@
+//! Records in Parquet.
+//!
+//! Numeric columns of any type are numbers here, a null is a missing value, and text counts as in CSV. Units and sample time
+//! stand in the comments, in the words of CSV.
+
+use super::columns::{Data, ReadColumn};
+use super::read::read;
+use crate::IoError;
+use crate::table::{Cell, Column, Precision, Source, Table, asides, check_names};
+use crate::wording::shown;
+
+/// What stood in the cells that are no finite numbers.
+struct ParquetSource<'a> {
+    file: &'a str,
+    columns: Vec<Cells>,
+}
+
+/// The cells of a column, as far as its values do not say it.
+enum Cells {
+    Numbers {
+        nulls: Vec<usize>,
+        infinite: Vec<(usize, f64)>,
+    },
+    Texts {
+        texts: Vec<String>,
+        nulls: Vec<usize>,
+    },
+    Unread(&'static str),
+}
+
+impl Source for ParquetSource<'_> {
+    fn file(&self) -> &str {
+        self.file
+    }
+
+    fn place(&self, row: usize) -> String {
+        format!("row {}", row + 1)
+    }
+
+    fn cell(&self, row: usize, column: usize) -> String {
+        match self.columns.get(column) {
+            Some(Cells::Numbers { nulls, .. } | Cells::Texts { nulls, .. }) if nulls.binary_search(&row).is_ok() => {
+                String::from("null")
+            }
+            Some(Cells::Numbers { infinite, .. }) => match infinite.binary_search_by_key(&row, |cell| cell.0) {
+                Ok(k) => infinite[k].1.to_string(),
+                Err(_) => String::from("NaN"),
+            },
+            Some(Cells::Texts { texts, .. }) => texts.get(row).map_or_else(String::new, |text| shown(text)),
+            Some(Cells::Unread(what)) => String::from(*what),
+            None => String::new(),
+        }
+    }
+}
+
+/// The table in the bytes of a Parquet file.
+pub(super) fn parse<'a>(bytes: Vec<u8>, file: &'a str) -> Result<Table<'a>, IoError> {
+    let read = read(bytes, file)?;
+    let rows = read.rows;
+    if rows == 0 || read.columns.is_empty() {
+        return Err(IoError::NoRows { file: file.to_owned() });
+    }
+    let mut notes = Vec::new();
+    let names: Vec<String> = read.columns.iter().map(|column| column.name.clone()).collect();
+    check_names(&names, file, &mut notes)?;
+    let (mut columns, cells): (Vec<Column>, Vec<Cells>) =
+        read.columns.into_iter().map(|column| column_of(column, rows)).unzip();
+    let sample_time_s = asides(read.comments.iter().map(String::as_str), &mut columns);
+    Ok(Table {
+        columns,
+        rows,
+        sample_time_s,
+        source: Box::new(ParquetSource { file, columns: cells }),
+        notes,
+    })
+}
+
+fn column_of(read: ReadColumn, rows: usize) -> (Column, Cells) {
+    let mut column = Column {
+        name: read.name,
+        ..Column::default()
+    };
+    if read.single {
+        column.precision = Precision::single();
+    }
+    let nulls = read.nulls;
+    column.values = match read.data {
+        Data::Real(values) => values,
+        Data::Signed(values) => values.into_iter().map(|value| value as f64).collect(),
+        Data::Unsigned(values) => values.into_iter().map(|value| value as f64).collect(),
+        Data::Text(texts) => {
+            for (row, text) in texts.iter().enumerate() {
+                let cell = Cell::parse(text);
+                if cell == Cell::Text {
+                    column.texts.push(row);
+                }
+                column.values.push(match cell {
+                    Cell::Number(value) => value,
+                    Cell::Missing | Cell::Text => f64::NAN,
+                });
+            }
+            return (column, Cells::Texts { texts, nulls });
+        }
+        Data::Unread(what) => {
+            column.values = vec![f64::NAN; rows];
+            column.texts = (0..rows).collect();
+            return (column, Cells::Unread(what));
+        }
+    };
+    nulls.iter().for_each(|row| column.values[*row] = f64::NAN);
+    let infinite = column
+        .values
+        .iter()
+        .enumerate()
+        .filter(|(_, value)| value.is_infinite());
+    let infinite = infinite.map(|(row, value)| (row, *value)).collect();
+    (column, Cells::Numbers { nulls, infinite })
+}

@@ -1,0 +1,42 @@
+//! Tables of results in Parquet.
+
+use super::columns::{Data, ReadColumn};
+use super::read::read as read_columns;
+use crate::IoError;
+use crate::output_table::{ColumnValues, OutputColumn, OutputTable};
+use crate::wording::shown;
+
+/// The columns of a file, with the kinds that they were written with.
+pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<OutputTable, IoError> {
+    let read = read_columns(bytes, file)?;
+    let mut columns = Vec::with_capacity(read.columns.len());
+    for ReadColumn { name, data, nulls, .. } in read.columns {
+        let real = |mut values: Vec<f64>| {
+            nulls.iter().for_each(|row| values[*row] = f64::NAN);
+            ColumnValues::Real(values)
+        };
+        let values = match data {
+            Data::Real(values) => real(values),
+            Data::Signed(values) if nulls.is_empty() && values.iter().all(|value| *value >= 0) => {
+                ColumnValues::Whole(values.into_iter().map(|value| value as u64).collect())
+            }
+            Data::Signed(values) => real(values.into_iter().map(|value| value as f64).collect()),
+            Data::Unsigned(values) if nulls.is_empty() => ColumnValues::Whole(values),
+            Data::Unsigned(values) => real(values.into_iter().map(|value| value as f64).collect()),
+            // A missing text was read as an empty one.
+            Data::Text(values) => ColumnValues::Text(values),
+            Data::Unread(what) => {
+                return Err(IoError::Unsupported {
+                    file: file.to_owned(),
+                    found: format!("column {} holds {what}", shown(&name)),
+                    remedy: "write the table without it",
+                });
+            }
+        };
+        columns.push(OutputColumn { name, values });
+    }
+    Ok(OutputTable {
+        comments: read.comments,
+        columns,
+    })
+}

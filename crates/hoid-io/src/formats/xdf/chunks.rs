@@ -1,0 +1,167 @@
+//! The chunks of XDF (github.com/sccn/xdf/wiki/Specifications, version 1.0): a length, a tag, the content.
+//!
+//! Each sample may have a time stamp; one without follows the sample before by the nominal sample time.
+
+use std::collections::HashMap;
+
+use super::header::{self, Header};
+use crate::arrays::Kind;
+use crate::wording::shown;
+
+const STREAM_HEADER: u16 = 2;
+const SAMPLES: u16 = 3;
+const CLOCK_OFFSET: u16 = 4;
+
+/// One stream as it stands in the file.
+#[derive(Debug)]
+pub(super) struct Stream {
+    pub(super) id: u32,
+    pub(super) header: Header,
+    /// Time stamps on the clock of the stream, s.
+    pub(super) stamps: Vec<f64>,
+    pub(super) samples: Samples,
+    /// When the offset to the clock of the recorder was measured, and the offset, s.
+    pub(super) offsets: Vec<(f64, f64)>,
+}
+
+/// The values of all channels, sample by sample.
+#[derive(Debug)]
+pub(super) enum Samples {
+    Numbers { kind: Kind, bytes: Vec<u8> },
+    Texts(Vec<String>),
+}
+
+/// Bytes that are taken from the front.
+struct Bytes<'a> {
+    rest: &'a [u8],
+}
+
+impl<'a> Bytes<'a> {
+    fn take(&mut self, length: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.rest.split_at_checked(length)?;
+        self.rest = rest;
+        Some(taken)
+    }
+
+    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        self.take(N)?.try_into().ok()
+    }
+
+    /// A length of 1, 4 or 8 bytes behind their number.
+    fn length(&mut self) -> Option<usize> {
+        match self.array::<1>()? {
+            [1] => self.array().map(|[n]| usize::from(n)),
+            [4] => usize::try_from(u32::from_le_bytes(self.array()?)).ok(),
+            [8] => usize::try_from(u64::from_le_bytes(self.array()?)).ok(),
+            _ => None,
+        }
+    }
+
+    fn f64(&mut self) -> Option<f64> {
+        self.array().map(f64::from_le_bytes)
+    }
+}
+
+/// The streams of a file that begins with its magic bytes, in the order of their headers.
+pub(super) fn streams(bytes: &[u8]) -> Result<Vec<Stream>, String> {
+    let mut rest = Bytes {
+        rest: bytes.get(4..).unwrap_or_default(),
+    };
+    let mut streams: Vec<Stream> = Vec::new();
+    let mut known: HashMap<u32, usize> = HashMap::new();
+    while !rest.rest.is_empty() {
+        let at = bytes.len() - rest.rest.len();
+        let ends = || format!("the chunk at byte {at} is cut, or its length is wrong");
+        let length = rest.length().ok_or_else(ends)?;
+        let mut content = Bytes {
+            rest: rest.take(length).ok_or_else(ends)?,
+        };
+        let tag = content.array().map(u16::from_le_bytes).ok_or_else(ends)?;
+        if !matches!(tag, STREAM_HEADER | SAMPLES | CLOCK_OFFSET) {
+            continue;
+        }
+        let id = content.array().map(u32::from_le_bytes).ok_or_else(ends)?;
+        let damaged = |what: String| format!("stream {id}, the chunk at byte {at}: {what}");
+        if tag == STREAM_HEADER {
+            let header = header::parse(content.rest).map_err(damaged)?;
+            let samples =
+                empty(&header.format).ok_or_else(|| damaged(format!("its format is \"{}\"", shown(&header.format))))?;
+            if known.insert(id, streams.len()).is_some() {
+                return Err(damaged(String::from("its header stands there a second time")));
+            }
+            streams.push(Stream {
+                id,
+                header,
+                stamps: Vec::new(),
+                samples,
+                offsets: Vec::new(),
+            });
+            continue;
+        }
+        let stream = known.get(&id).and_then(|at| streams.get_mut(*at));
+        let stream = stream.ok_or_else(|| damaged(String::from("its header is missing")))?;
+        let read = if tag == SAMPLES {
+            stream.samples(&mut content)
+        } else {
+            stream.offset(&mut content)
+        };
+        read.ok_or_else(|| damaged(String::from("it ends in the middle of a sample")))?;
+    }
+    Ok(streams)
+}
+
+fn empty(format: &str) -> Option<Samples> {
+    let kind = match format {
+        "string" => return Some(Samples::Texts(Vec::new())),
+        "double64" => Kind::F64,
+        "float32" => Kind::F32,
+        "int8" => Kind::I8,
+        "int16" => Kind::I16,
+        "int32" => Kind::I32,
+        "int64" => Kind::I64,
+        _ => return None,
+    };
+    Some(Samples::Numbers {
+        kind,
+        bytes: Vec::new(),
+    })
+}
+
+impl Stream {
+    fn samples(&mut self, content: &mut Bytes<'_>) -> Option<()> {
+        // Nothing is reserved for the promised count; each sample takes one byte at least.
+        for _ in 0..content.length()? {
+            let stamp = match content.array::<1>()? {
+                [0] => self.stamps.last().copied().unwrap_or(0.0) + self.nominal_step_s(),
+                _ => content.f64()?,
+            };
+            match &mut self.samples {
+                Samples::Numbers { kind, bytes } => {
+                    bytes.extend_from_slice(content.take(self.header.channels * kind.size())?);
+                }
+                Samples::Texts(texts) => {
+                    for _ in 0..self.header.channels {
+                        let length = content.length()?;
+                        texts.push(String::from_utf8_lossy(content.take(length)?).into_owned());
+                    }
+                }
+            }
+            self.stamps.push(stamp);
+        }
+        Some(())
+    }
+
+    fn offset(&mut self, content: &mut Bytes<'_>) -> Option<()> {
+        self.offsets.push((content.f64()?, content.f64()?));
+        Some(())
+    }
+
+    /// The nominal sample time; 0 where there is none.
+    pub(super) fn nominal_step_s(&self) -> f64 {
+        if self.header.nominal_hz > 0.0 {
+            1.0 / self.header.nominal_hz
+        } else {
+            0.0
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! Time stamps of a stream on the clock of the recorder, without jitter, as pyxdf computes them (Kothe et al., "The Lab
+//! Streaming Layer for synchronized multimodal recording", 2024; pyxdf 1.17).
+//!
+//! The offset `o_k` of the recorder's clock was measured at the times `c_k`. A line `o = b_0 + b_1 c` is fitted under Huber's
+//! loss by the alternating direction method of multipliers (Boyd et al., 2011, section 6.1.1), in units of 1e-4 s, so that
+//! a measurement over a busy network counts little. Then `t <- t + b_0 + b_1 t`. Where the clock was set anew, each part has a
+//! line of its own. At last, of a stream with a nominal rate, the time stamps between two breaks are replaced by their
+//! least-squares line over the number of the sample.
+
+use super::chunks::Stream;
+use crate::wording::shown;
+
+/// The unit of the fit, s: deviations beyond it count linearly.
+const UNIT_S: f64 = 1e-4;
+const ITERATIONS: usize = 1000;
+/// A reset: time between offsets off its median by more than so many deviations and s, and the offsets likewise.
+const RESET_TIME: (f64, f64) = (5.0, 5.0);
+const RESET_VALUE: (f64, f64) = (10.0, 1.0);
+/// A break: the longer of so many s and so many samples.
+const BREAK_S: f64 = 1.0;
+const BREAK_SAMPLES: f64 = 500.0;
+
+/// The times of the samples, s.
+pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
+    let mut times = stream.stamps.clone();
+    if times.is_empty() {
+        return times;
+    }
+    let parts = synchronise(&mut times, &stream.offsets);
+    let name = shown(&stream.header.name);
+    let resets = match parts {
+        0 => String::from("no clock offsets were recorded: its time stamps are taken for those of the recorder"),
+        1 => format!("clock aligned by a line through {} offsets", stream.offsets.len()),
+        parts => format!(
+            "clock aligned by {parts} lines through {} offsets, for it was set anew",
+            stream.offsets.len()
+        ),
+    };
+    let nominal_hz = stream.header.nominal_hz;
+    if nominal_hz <= 0.0 || stream.header.can_drop {
+        notes.push(format!(
+            "stream {name}: {resets}; its time stamps are kept, for they are not even"
+        ));
+        return times;
+    }
+    let longest = BREAK_S.max(BREAK_SAMPLES * stream.nominal_step_s());
+    let (parts, effective_hz) = straighten(&mut times, longest);
+    let found = effective_hz.map_or_else(String::new, |hz| format!(", {hz:.4} Hz found"));
+    let breaks = if parts > 1 {
+        format!(" in {parts} parts")
+    } else {
+        String::new()
+    };
+    notes.push(format!(
+        "stream {name}: {resets}; {nominal_hz} Hz stated{found}; jitter removed by a line{breaks}"
+    ));
+    times
+}
+
+/// Puts time stamps onto the clock of the recorder; the number of lines that it took.
+fn synchronise(times: &mut [f64], offsets: &[(f64, f64)]) -> usize {
+    let parts = resets(offsets);
+    let mut from = 0;
+    for &(first, last) in &parts {
+        let (b0, b1) = line(&offsets[first..=last]);
+        // Up to the first time stamp that is closer to the next part.
+        let to = match offsets.get(last + 1) {
+            Some((next, _)) => {
+                let end = offsets[last].0;
+                let later = times[from..].iter().position(|t| (t - end).abs() >= (t - next).abs());
+                later.map_or(times.len(), |later| from + later)
+            }
+            None => times.len(),
+        };
+        times[from..to].iter_mut().for_each(|t| *t += b0 + b1 * *t);
+        from = to;
+    }
+    parts.len()
+}
+
+/// First and last offset of each part between two resets of the clock.
+fn resets(offsets: &[(f64, f64)]) -> Vec<(usize, usize)> {
+    if offsets.is_empty() {
+        return Vec::new();
+    }
+    let step = |of: fn(&(f64, f64)) -> f64| -> Vec<f64> {
+        offsets.windows(2).map(|pair| of(&pair[1]) - of(&pair[0])).collect()
+    };
+    let (times, values) = (step(|o| o.0), step(|o| o.1));
+    let (time, value) = (glitches(&times, RESET_TIME), glitches(&values, RESET_VALUE));
+    let breaks = (0..times.len()).filter(|k| times[*k] < 0.0 || time[*k] && value[*k]);
+    parts(breaks, offsets.len())
+}
+
+/// Where a step differs from the median by more than so many median absolute deviations, and by more than so much.
+fn glitches(steps: &[f64], (deviations, least): (f64, f64)) -> Vec<bool> {
+    let middle = median(steps);
+    let off: Vec<f64> = steps.iter().map(|step| (step - middle).abs()).collect();
+    let typical = median(&off) + f64::EPSILON;
+    off.iter()
+        .map(|off| off / typical > deviations && *off > least)
+        .collect()
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    match (sorted.len() / 2, sorted.len() % 2) {
+        (0, 0) => f64::NAN,
+        (half, 0) => f64::midpoint(sorted[half - 1], sorted[half]),
+        (half, _) => sorted[half],
+    }
+}
+
+/// First and last of `count` where there are breaks behind some.
+fn parts(breaks: impl Iterator<Item = usize>, count: usize) -> Vec<(usize, usize)> {
+    let mut parts = Vec::new();
+    let mut first = 0;
+    for at in breaks {
+        parts.push((first, at));
+        first = at + 1;
+    }
+    parts.push((first, count.saturating_sub(1)));
+    parts
+}
+
+/// The line `b_0 + b_1 c` through offsets under Huber's loss; none where they say nothing.
+fn line(offsets: &[(f64, f64)]) -> (f64, f64) {
+    if let [(_, offset)] = offsets {
+        return (*offset, 0.0);
+    }
+    let start = offsets.iter().map(|o| o.0).fold(f64::INFINITY, f64::min) / UNIT_S;
+    let c: Vec<f64> = offsets.iter().map(|o| o.0 / UNIT_S - start).collect();
+    let y: Vec<f64> = offsets.iter().map(|o| o.1 / UNIT_S).collect();
+    let n = c.len() as f64;
+    let (sum, squares) = (c.iter().sum::<f64>(), c.iter().map(|c| c * c).sum::<f64>());
+    let determinant = n * squares - sum * sum;
+    if !(determinant > 0.0 && determinant.is_finite()) {
+        return (0.0, 0.0);
+    }
+    let (mut z, mut w) = (vec![0.0; c.len()], vec![0.0; c.len()]);
+    let mut x = (0.0, 0.0);
+    for _ in 0..ITERATIONS {
+        let (mut right, mut right_c) = (0.0, 0.0);
+        for k in 0..c.len() {
+            let target = y[k] + z[k] - w[k];
+            right += target;
+            right_c += c[k] * target;
+        }
+        x = (
+            (squares * right - sum * right_c) / determinant,
+            (n * right_c - sum * right) / determinant,
+        );
+        for k in 0..c.len() {
+            let d = x.0 + x.1 * c[k] - y[k] + w[k];
+            let shrunk = if d == 0.0 { 1.0 } else { (1.0 - 2.0 / d.abs()).max(0.0) };
+            z[k] = 0.5 * d + 0.5 * shrunk * d;
+            w[k] = d - z[k];
+        }
+    }
+    (UNIT_S * (x.0 - x.1 * start), x.1)
+}
+
+/// Replaces the time stamps between two breaks by their line; the number of parts, and the mean rate in Hz.
+fn straighten(times: &mut [f64], longest_s: f64) -> (usize, Option<f64>) {
+    let breaks: Vec<usize> = (1..times.len())
+        .filter(|k| (times[*k] - times[k - 1]).abs() > longest_s)
+        .map(|k| k - 1)
+        .collect();
+    let parts = parts(breaks.into_iter(), times.len());
+    let (mut steps, mut duration_s) = (0_usize, 0.0);
+    for &(first, last) in &parts {
+        let part = &mut times[first..=last];
+        // About the middle, where the numbers are small and the sums uncorrelated.
+        let middle = (part.len() - 1) as f64 / 2.0;
+        let mean = part.iter().sum::<f64>() / part.len() as f64;
+        let (mut products, mut squares) = (0.0, 0.0);
+        for (k, t) in part.iter().enumerate() {
+            let k = k as f64 - middle;
+            products += k * (t - mean);
+            squares += k * k;
+        }
+        let slope = if squares > 0.0 { products / squares } else { 0.0 };
+        for (k, t) in part.iter_mut().enumerate() {
+            *t = mean + slope * (k as f64 - middle);
+        }
+        steps += last - first;
+        duration_s += times[last] - times[first];
+    }
+    (parts.len(), (duration_s > 0.0).then(|| steps as f64 / duration_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_through_offsets_with_one_that_is_off() {
+        let mut offsets: Vec<(f64, f64)> = (0..40)
+            .map(|k| (1e5 + 5.0 * f64::from(k), 3.0 - 1e-4 * 5.0 * f64::from(k)))
+            .collect();
+        let (b0, b1) = line(&offsets);
+        // The offsets near 1e5 s carry rounding of 1e-11 s.
+        assert!(
+            (b0 + b1 * 1e5 - 3.0).abs() < 1e-9 && (b1 + 1e-4).abs() < 1e-11,
+            "{b0} {b1}"
+        );
+        // Off by 0.5 s: the line moves by a ten-thousandth of it.
+        offsets[7].1 += 0.5;
+        let (b0, b1) = line(&offsets);
+        assert!(
+            (b0 + b1 * 1e5 - 3.0).abs() < 5e-5 && (b1 + 1e-4).abs() < 1e-6,
+            "{b0} {b1}"
+        );
+        assert_eq!(line(&[(1.0, 2.0)]), (2.0, 0.0));
+        assert_eq!(line(&[(1.0, 2.0), (1.0, 3.0)]), (0.0, 0.0));
+        assert_eq!(line(&[(f64::NAN, 2.0), (1.0, f64::INFINITY)]), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_clock_that_is_set_anew() {
+        let mut offsets: Vec<(f64, f64)> = (0..10).map(|k| (5.0 * f64::from(k), 1.0)).collect();
+        offsets.extend((0..10).map(|k| (5.0 * f64::from(k), 100.0)));
+        assert_eq!(resets(&offsets), [(0, 9), (10, 19)]);
+        let mut times: Vec<f64> = (0..50).map(f64::from).chain((0..50).map(f64::from)).collect();
+        assert_eq!(synchronise(&mut times, &offsets[..10]), 1);
+        assert_eq!((times[0], times[49]), (1.0, 50.0));
+        assert_eq!(synchronise(&mut times, &[]), 0);
+    }
+
+    #[test]
+    fn jitter_and_breaks() {
+        let mut times: Vec<f64> = (0..100)
+            .map(|k| 0.01 * f64::from(k) + if k >= 60 { 3.0 } else { 0.0 } + 1e-4 * f64::from(k % 2))
+            .collect();
+        let (parts, hz) = straighten(&mut times, 1.0);
+        assert_eq!(parts, 2);
+        assert!((hz.unwrap() - 100.0).abs() < 0.1);
+        // Alternating jitter of 1e-4 s tilts a line over 40 samples by less than 1e-6 s a sample.
+        assert!(
+            times
+                .windows(2)
+                .enumerate()
+                .all(|(k, pair)| k == 59 || (pair[1] - pair[0] - 0.01).abs() < 1e-6)
+        );
+        assert_eq!(straighten(&mut [5.0], 1.0), (1, None));
+    }
+}

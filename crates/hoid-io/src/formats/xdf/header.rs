@@ -1,0 +1,110 @@
+//! The header of a stream, in XML: `info` with `name`, `channel_count`, `nominal_srate`, `channel_format`, and in `desc` the
+//! labels and units of the channels.
+
+use roxmltree::{Document, Node};
+
+use crate::wording::told;
+
+/// A stream of more channels is damage.
+const MOST_CHANNELS: usize = 1 << 12;
+
+/// What is known of a stream before its samples.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Header {
+    pub(super) name: String,
+    pub(super) channels: usize,
+    /// Hz; 0 for samples that come when they come.
+    pub(super) nominal_hz: f64,
+    /// Such as `float32`.
+    pub(super) format: String,
+    /// Label and unit of the channels, as far as they have any.
+    pub(super) labels: Vec<(String, String)>,
+    /// The stream leaves samples out rather than being late, so that its time stamps are kept.
+    pub(super) can_drop: bool,
+}
+
+/// The header in the bytes of a chunk.
+pub(super) fn parse(bytes: &[u8]) -> Result<Header, String> {
+    let text = String::from_utf8_lossy(bytes);
+    let document = Document::parse(text.trim_start_matches('\u{feff}'))
+        .map_err(|error| format!("its header: {}", told(&error.to_string())))?;
+    let info = document.root_element();
+    let text = |name: &str| {
+        child(info, name)
+            .and_then(|node| node.text())
+            .map(|text| text.trim().to_owned())
+    };
+    let needed = |name: &str| text(name).ok_or_else(|| format!("its header holds no {name}"));
+    let number = |name: &str, text: String| {
+        text.parse::<f64>()
+            .map_err(|_| format!("its {name} is \"{}\"", told(&text)))
+    };
+    let count = number("channel_count", needed("channel_count")?)?;
+    if !(0.0..=MOST_CHANNELS as f64).contains(&count) {
+        return Err(format!("it has {count} channels, where {MOST_CHANNELS} are the most"));
+    }
+    let nominal_hz = number("nominal_srate", needed("nominal_srate")?)?;
+    if !(nominal_hz >= 0.0 && nominal_hz.is_finite()) {
+        return Err(format!("its nominal_srate is {nominal_hz} Hz"));
+    }
+    let desc = child(info, "desc");
+    let channels = desc.and_then(|desc| child(desc, "channels"));
+    let labels = channels
+        .into_iter()
+        .flat_map(|channels| channels.children())
+        .filter(|node| node.has_tag_name("channel"));
+    let inner = |node: Node<'_, '_>, name: &str| {
+        let text = child(node, name).and_then(|node| node.text());
+        text.unwrap_or_default().to_owned()
+    };
+    let drop = desc.and_then(|desc| child(desc, "synchronization"));
+    Ok(Header {
+        name: text("name").unwrap_or_default(),
+        channels: count as usize,
+        nominal_hz,
+        format: needed("channel_format")?,
+        labels: labels
+            .take(MOST_CHANNELS)
+            .map(|node| (inner(node, "label"), inner(node, "unit")))
+            .collect(),
+        can_drop: drop.is_some_and(|node| inner(node, "can_drop_samples").trim().eq_ignore_ascii_case("true")),
+    })
+}
+
+fn child<'a, 'input>(node: Node<'a, 'input>, name: &str) -> Option<Node<'a, 'input>> {
+    node.children().find(|child| child.has_tag_name(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headers() {
+        let text = "<?xml version='1.0'?><info><name>A &lt; B</name><channel_count>2</channel_count><nominal_srate>100.5</nominal_srate>\
+            <channel_format>float32</channel_format><desc><channels><channel><label>x</label><unit>N</unit></channel><channel/></channels></desc></info>";
+        let header = parse(text.as_bytes()).unwrap();
+        assert_eq!(
+            (header.name.as_str(), header.channels, header.nominal_hz),
+            ("A < B", 2, 100.5)
+        );
+        assert_eq!(
+            header.labels,
+            [("x".into(), "N".into()), (String::new(), String::new())]
+        );
+        for (from, to) in [
+            ("<channel_count>2", "<channel_count>-1"),
+            (">2<", ">two<"),
+            ("100.5", "inf"),
+            ("</desc>", ""),
+            ("float32", ""),
+        ] {
+            let damaged = text.replace(from, to);
+            assert!(parse(damaged.as_bytes()).is_err() || to.is_empty(), "{damaged}");
+        }
+        // Neither depth nor entities cost anything.
+        assert!(parse("<a>".repeat(1_000_000).as_bytes()).is_err());
+        let bomb = "<!DOCTYPE a [<!ENTITY b \"bbbb\"><!ENTITY c \"&b;&b;&b;\">]><info>&c;</info>";
+        assert!(parse(bomb.as_bytes()).is_err());
+    }
+}

@@ -1,0 +1,26 @@
+//! XDF, the recordings of the Lab Streaming Layer: streams with clocks of their own.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | `chunks` | the samples and clock offsets of each stream |
+//! | `header` | name, channels and rate of a stream, from its XML |
+//! | `clock` | the time stamps on one clock, without jitter, as pyxdf does it |
+//! | `streams` | paths and arrays |
+//!
+//! A channel has the path `stream.label`, and the time stamps of its stream are `stream.t`, in seconds from the first sample of
+//! the file.
+
+mod chunks;
+mod clock;
+mod header;
+mod streams;
+
+use crate::format::{Format, Reading, Writing};
+
+pub(super) const XDF: Format = Format {
+    name: "XDF",
+    endings: &["xdf"],
+    reading: Reading::Arrays(|bytes, file| streams::read(&bytes, file)),
+    writing: Writing::ReadOnly("the format of a recorder"),
+    record: None,
+};

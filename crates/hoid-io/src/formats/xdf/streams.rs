@@ -1,0 +1,154 @@
+//! The streams of a file as arrays: a path for each channel and for the times of each stream.
+
+use std::collections::HashSet;
+use std::rc::Rc;
+
+use super::chunks::{self, Samples, Stream};
+use super::clock;
+use crate::IoError;
+use crate::arrays::{Array, Budget, Contents, Entry, Indexing, Numbers, Value};
+
+/// What an entry takes, bytes, about.
+const ENTRY: u64 = 512;
+
+/// The streams in the bytes of a file.
+pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
+    if !bytes.starts_with(b"XDF:") {
+        let start = String::from_utf8_lossy(&bytes[..bytes.len().min(12)]).into_owned();
+        return Err(IoError::WrongFormat {
+            file: file.to_owned(),
+            format: "XDF",
+            found: format!("it starts with \"{}\"", start.escape_debug()),
+            expected: "XDF: at its beginning",
+        });
+    }
+    let mut budget = Budget::of(bytes.len());
+    let streams = chunks::streams(bytes).map_err(|found| IoError::Damaged {
+        file: file.to_owned(),
+        found,
+    })?;
+    let mut notes = Vec::new();
+    let times: Vec<Vec<f64>> = streams.iter().map(|stream| clock::times(stream, &mut notes)).collect();
+    let first = times
+        .iter()
+        .filter_map(|times| times.first())
+        .copied()
+        .filter(|t| t.is_finite());
+    let start = first.min_by(f64::total_cmp).unwrap_or(0.0);
+    if start != 0.0 {
+        notes.push(format!(
+            "t counts from the first sample, which stands at {start:.6} s on the clock of the recorder"
+        ));
+    }
+    let mut names = Names::default();
+    let mut entries = Vec::new();
+    for (stream, times) in streams.into_iter().zip(times) {
+        let name = match stream.header.name.trim() {
+            "" => format!("stream {}", stream.id),
+            name => name.to_owned(),
+        };
+        let parent = names.unique(&name);
+        budget.take(ENTRY * (1 + stream.header.channels as u64), file)?;
+        entries.extend(entries_of(
+            stream,
+            &parent,
+            times.iter().map(|t| t - start).collect::<Vec<f64>>().as_slice(),
+        ));
+    }
+    let mut contents = Contents::new(entries, Indexing::Python);
+    contents.notes = notes;
+    contents.own_clocks = true;
+    Ok(contents)
+}
+
+/// The time stamps and the channels of a stream.
+fn entries_of(stream: Stream, parent: &str, times: &[f64]) -> Vec<Entry> {
+    let mut names = Names::default();
+    let mut entries = vec![Entry::field(
+        parent,
+        &names.unique("t"),
+        Value::Array(Array::vector(Numbers::from_f64(times))),
+    )];
+    entries[0].unit = String::from("s");
+    let channels = stream.header.channels;
+    let mut values: Vec<Value> = match stream.samples {
+        Samples::Texts(texts) => (0..channels)
+            .map(|channel| Value::Texts(texts.iter().skip(channel).step_by(channels.max(1)).cloned().collect()))
+            .collect(),
+        Samples::Numbers { kind, bytes } => {
+            let bytes = Rc::new(bytes);
+            let item = channels * kind.size();
+            (0..channels)
+                .map(|channel| {
+                    Value::Array(Array::vector(Numbers::field(
+                        &bytes,
+                        kind,
+                        false,
+                        channel * kind.size(),
+                        item,
+                    )))
+                })
+                .collect()
+        }
+    };
+    for (channel, value) in values.drain(..).enumerate() {
+        let known = stream.header.labels.get(channel);
+        let label = known.map(|(label, _)| label.trim()).filter(|label| !label.is_empty());
+        let label = names.unique(&label.map_or_else(|| format!("ch{}", channel + 1), str::to_owned));
+        let mut entry = Entry::field(parent, &label, value);
+        known.map_or("", |(_, unit)| unit.trim()).clone_into(&mut entry.unit);
+        entries.push(entry);
+    }
+    entries
+}
+
+/// Names, the second of one kind with a number.
+#[derive(Default)]
+struct Names {
+    known: HashSet<String>,
+}
+
+impl Names {
+    fn unique(&mut self, name: &str) -> String {
+        let mut unique = name.to_owned();
+        let mut number = 2;
+        while !self.known.insert(unique.clone()) {
+            unique = format!("{name}({number})");
+            number += 1;
+        }
+        unique
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_times_of_pyxdf() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/xdf");
+        let streams = chunks::streams(&std::fs::read(folder.join("tracking.xdf")).unwrap()).unwrap();
+        let expected = std::fs::read_to_string(folder.join("expected.csv")).unwrap();
+        let mut compared = 0;
+        for stream in streams {
+            let times = clock::times(&stream, &mut Vec::new());
+            let start = format!("{},", stream.header.name);
+            for line in expected.lines().filter_map(|line| line.strip_prefix(start.as_str())) {
+                let (row, t) = line.split_once(',').unwrap();
+                let (found, t) = (times[row.parse::<usize>().unwrap()], t.parse::<f64>().unwrap());
+                // Sums in another order; an offset of 3000 s in units of 1e-4 s leaves 1e-9 s of rounding.
+                assert!((found - t).abs() < 2e-9, "{} {row}: {found} {t}", stream.header.name);
+                compared += 1;
+            }
+        }
+        assert!(compared > 50, "{compared}");
+    }
+
+    #[test]
+    fn what_is_cut_is_damaged() {
+        let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/xdf/tracking.xdf");
+        let bytes = std::fs::read(file).unwrap();
+        let message = read(&bytes[..bytes.len() - 3], "a.xdf").unwrap_err().to_string();
+        assert!(message.contains("a.xdf is damaged: the chunk at byte"), "{message}");
+    }
+}

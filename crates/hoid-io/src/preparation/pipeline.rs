@@ -1,0 +1,49 @@
+//! The steps in their order.
+
+use std::collections::BTreeMap;
+
+use hoid_model::{Detrend, Record};
+
+use super::offset::Offset;
+use super::rate::NewRate;
+use super::record_parts::RecordParts;
+use super::scaling::Scaling;
+use super::step::Step;
+use crate::IoError;
+
+/// What is to be done to a record. By default nothing is.
+///
+/// A channel is meant by its name; `e` and `u` are the input and the output, whatever their columns are called.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Preparation {
+    /// Factors and units by channel.
+    pub scale: BTreeMap<String, Scaling>,
+    /// By how much channels were recorded later than they happened.
+    pub offset: BTreeMap<String, Offset>,
+    /// Another sampling rate.
+    pub rate: NewRate,
+    /// Time from the first sample that is dropped, s. What the filters cut lies within it.
+    pub run_in_s: f64,
+    /// What is taken out of input and output, last.
+    pub detrend: Detrend,
+    /// Whether rows that are there twice, time included, are dropped before anything is read.
+    pub drop_repeated: bool,
+}
+
+impl Preparation {
+    /// The record as it goes to the estimator, and what was done. [`Preparation::drop_repeated`] belongs to reading and is not
+    /// looked at.
+    ///
+    /// # Errors
+    /// [`IoError::Preparation`] naming the step, what was found, and what was expected; [`IoError::Model`] where the numbers
+    /// leave the range of floating point.
+    pub fn apply(&self, record: Record) -> Result<(Record, Vec<Step>), IoError> {
+        let begin_s = record.time_s(0);
+        let mut parts = RecordParts::new(record);
+        parts.scale(&self.scale)?;
+        parts.offset(&self.offset)?;
+        parts.rate(self.rate)?;
+        parts.run_in(begin_s, self.run_in_s)?;
+        parts.detrended(self.detrend)
+    }
+}

@@ -1,0 +1,39 @@
+//! The first seconds are dropped.
+
+use super::record_parts::RecordParts;
+use super::step::Step;
+use crate::IoError;
+use crate::wording::decimal;
+
+impl RecordParts {
+    /// Drops what lies before the end of the run-in.
+    pub(super) fn run_in(&mut self, begin_s: f64, run_in_s: f64) -> Result<(), IoError> {
+        const STEP: &str = "run-in";
+        if run_in_s == 0.0 {
+            return Ok(());
+        }
+        if !(run_in_s > 0.0 && run_in_s.is_finite()) {
+            return Err(self.error(STEP, format!("{run_in_s} s"), "a positive time in s"));
+        }
+        let ts = self.sample_time.s();
+        // A bound that falls on a sample, up to rounding, takes that sample.
+        let first = ((begin_s + run_in_s - self.start_s) / ts - 1e-6).ceil().max(0.0);
+        if first >= self.len() as f64 {
+            return Err(self.error(
+                STEP,
+                format!(
+                    "{run_in_s} s leave nothing of {} s",
+                    decimal(self.start_s + self.len() as f64 * ts - begin_s)
+                ),
+                "a run-in shorter than the record",
+            ));
+        }
+        let first = first as usize;
+        self.steps.push(Step::RunIn {
+            seconds: run_in_s,
+            samples: first,
+        });
+        self.keep(first..self.len());
+        Ok(())
+    }
+}

@@ -1,0 +1,60 @@
+//! Numbers, names and cells in the words of a message.
+
+use std::borrow::Cow;
+
+/// A cell in a message is cut to this many characters.
+const SHOWN: usize = 40;
+
+/// A cell or a name for a message: short, and without anything that a terminal obeys.
+pub(crate) fn shown(text: &str) -> String {
+    let text = text.trim();
+    let cut = match text.char_indices().nth(SHOWN) {
+        Some((at, _)) => Cow::Owned(format!("{}...", &text[..at])),
+        None => Cow::Borrowed(text),
+    };
+    cut.escape_debug().to_string()
+}
+
+/// What a crate says, short, and without anything that a terminal obeys.
+pub(crate) fn told(what: &str) -> String {
+    let line = what.lines().next().unwrap_or_default();
+    line.chars().take(200).collect::<String>().escape_debug().to_string()
+}
+
+/// Names for a message: all of them, unless there are very many.
+pub(crate) fn list(names: &[&str]) -> String {
+    const SHOWN: usize = 40;
+    let named: Vec<&str> = names.iter().copied().filter(|name| !name.is_empty()).collect();
+    let mut text = named[..named.len().min(SHOWN)].join(", ");
+    match named.len() {
+        0 => text.push_str("no named columns"),
+        n if n > SHOWN => text.push_str(&format!(" and {} more", n - SHOWN)),
+        _ => {}
+    }
+    text
+}
+
+/// A number for a message: up to nine significant digits, without zeros at the end.
+pub(crate) fn decimal(value: f64) -> String {
+    let rounded = format!("{value:.8e}").parse::<f64>().unwrap_or(value);
+    format!("{rounded}")
+}
+
+/// A number with four significant digits.
+pub(crate) fn short(value: f64) -> String {
+    let rounded = format!("{value:.3e}").parse::<f64>().unwrap_or(value);
+    if rounded != 0.0 && !(1e-3..1e7).contains(&rounded.abs()) {
+        format!("{rounded:e}")
+    } else {
+        format!("{rounded}")
+    }
+}
+
+/// "1 row", "7 rows".
+pub(crate) fn counted(n: usize, what: &str) -> String {
+    if n == 1 {
+        format!("1 {what}")
+    } else {
+        format!("{n} {what}s")
+    }
+}

@@ -1,0 +1,123 @@
+//! Choices that users type by a name: on the command line, in files and in Python.
+
+use thiserror::Error;
+
+/// A choice with a name that users type. [`named_choice!`](crate::named_choice) implements it.
+pub trait NamedChoice: Copy + PartialEq + Sized + 'static {
+    /// What is chosen, for messages: "structure".
+    const WHAT: &'static str;
+    /// All choices, in the order in which they are listed.
+    const CHOICES: &'static [Self];
+
+    /// The name that users type.
+    fn choice_name(self) -> &'static str;
+
+    /// The choice of a name, whatever its case.
+    ///
+    /// # Errors
+    /// [`UnknownName`], which lists the names that exist.
+    fn of_name(name: &str) -> Result<Self, UnknownName> {
+        let name = name.trim();
+        let known = |choice: &&Self| choice.choice_name().eq_ignore_ascii_case(name);
+        Self::CHOICES.iter().find(known).copied().ok_or_else(|| {
+            let names: Vec<&str> = Self::CHOICES.iter().map(|choice| choice.choice_name()).collect();
+            let expected = match names.as_slice() {
+                [others @ .., last] if !others.is_empty() => format!("{} or {last}", others.join(", ")),
+                names => names.concat(),
+            };
+            UnknownName {
+                what: Self::WHAT,
+                found: name.to_owned(),
+                expected,
+            }
+        })
+    }
+}
+
+/// A name that stands for nothing.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("there is no {what} {found}; expected {expected}")]
+pub struct UnknownName {
+    /// What was to be chosen.
+    pub what: &'static str,
+    /// The name given.
+    pub found: String,
+    /// The names that exist.
+    pub expected: String,
+}
+
+/// Gives an enum without fields the names that users type: `ALL`, `name`, [`Display`](std::fmt::Display),
+/// [`FromStr`](std::str::FromStr) and [`NamedChoice`].
+///
+/// ```
+/// #[derive(Debug, Clone, Copy, PartialEq)]
+/// enum Window {
+///     Hann,
+///     Rectangular,
+/// }
+/// hoid_model::named_choice!(Window, "window", 2, { Hann => "hann", Rectangular => "none" });
+///
+/// assert_eq!("hann".parse(), Ok(Window::Hann));
+/// assert_eq!(Window::Rectangular.to_string(), "none");
+/// let error = "hamming".parse::<Window>().unwrap_err();
+/// assert_eq!(error.to_string(), "there is no window hamming; expected hann or none");
+/// ```
+#[macro_export]
+macro_rules! named_choice {
+    ($type:ty, $what:literal, $count:literal, { $($variant:ident => $name:literal),+ $(,)? }) => {
+        impl $type {
+            /// All choices, in the order in which they are listed.
+            pub const ALL: [Self; $count] = [$(Self::$variant),+];
+
+            /// The name that users type.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name),+
+                }
+            }
+        }
+
+        impl $crate::NamedChoice for $type {
+            const WHAT: &'static str = $what;
+            const CHOICES: &'static [Self] = &Self::ALL;
+
+            fn choice_name(self) -> &'static str {
+                self.name()
+            }
+        }
+
+        /// The name that users type.
+        impl ::std::fmt::Display for $type {
+            fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
+                f.pad(self.name())
+            }
+        }
+
+        /// The names that users type, in any case.
+        impl ::std::str::FromStr for $type {
+            type Err = $crate::UnknownName;
+
+            fn from_str(text: &str) -> Result<Self, $crate::UnknownName> {
+                <Self as $crate::NamedChoice>::of_name(text)
+            }
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::Structure;
+
+    #[test]
+    fn names_are_read_in_any_case_and_unknown_ones_list_the_others() {
+        for structure in Structure::ALL {
+            assert_eq!(structure.to_string().parse(), Ok(structure));
+            assert_eq!(structure.label().parse(), Ok(structure));
+        }
+        let error = "arxx".parse::<Structure>().unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "there is no structure arxx; expected fir, ar, ma, arx, arma, armax, ararx, ararmax, oe, bj or general"
+        );
+    }
+}
