@@ -9,9 +9,11 @@
 //! | [`figures`] | the figures of these pages, each as an SVG text of its own |
 //! | [`numbers`] | numbers with as many digits as their standard error allows |
 
+mod cells;
 mod error;
 pub mod figures;
 mod group;
+mod model_section;
 pub mod numbers;
 mod page;
 mod report;
@@ -20,6 +22,7 @@ mod track;
 
 pub use error::ReportError;
 pub use group::{FrequencyTables, GroupReport, GroupTables, write_group_pages};
+pub use model_section::{ModelSection, known_operator};
 pub use page::{render_with, write_page, write_report};
-pub use report::{ModelSection, Report, known_operator};
+pub use report::Report;
 pub use track::{BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, usual_batch_fits};

@@ -8,9 +8,10 @@ use kuva::{
 
 use super::{
     BoxStatistics,
-    axes::{marked, panel_label, with_ordinate},
+    axes::with_ordinate,
     draw::{self, INK},
     frame::{self, Area, Frame, Ordinates},
+    labels::{marked, panel_label},
     legend::{Entry, Sample, add_legend_by},
     palette::{Shade, is_dark},
     style::{self, BLACK, TEXT},

@@ -11,8 +11,8 @@ use kuva::{
 };
 
 use super::{
-    axes::marked,
     draw,
+    labels::marked,
     style::{self, LEFT, RIGHT, WIDTH},
 };
 

@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 use hoid_io::{OutputTable, read_table};
 use hoid_study::group::Manifest;
 
-use super::{FrequencyTables, GroupReport, GroupTables, texts};
+use super::{
+    report::GroupReport,
+    tables::{FrequencyTables, GroupTables, texts},
+};
 use crate::{ReportError, page};
 
 /// Runs whose preparation and trouble the pages list.

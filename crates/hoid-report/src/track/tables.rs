@@ -7,14 +7,14 @@ use hoid_track::{Change, ForgettingRule, Memory, Method, StartAt, StartCovarianc
 use minijinja::{Value, context};
 
 use super::{
-    BatchLine,
     coefficients::{Coefficient, of_fit, of_trace},
-    panels::{Evaluated, of_name, operator_names},
+    evaluated::{Evaluated, of_name, operator_names},
+    section::BatchLine,
     truth,
 };
 use crate::{
+    cells::{cell, html, symbol},
     numbers::{DASH, fixed, plain},
-    tables::{cell, html, symbol},
 };
 
 /// Time from which errors count, s: the start of a recursion from nothing is left out.
