@@ -15,4 +15,4 @@ pub mod plans;
 pub mod reproduction;
 
 pub use error::ThesisError;
-pub use reproduction::{CLAIMS, Reproduced, Reproduction, Told, reproduce};
+pub use reproduction::{CLAIMS, Reproduction, ReproductionEvent, ReproductionSummary, reproduce};
