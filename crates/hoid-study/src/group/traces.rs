@@ -9,7 +9,8 @@ use hoid_model::PolynomialModel;
 use hoid_track::{Method, Trace};
 
 use super::{
-    manifest::{Analysis, RunEntry},
+    analysis_settings::AnalysisSettings,
+    manifest::RunEntry,
     tables::{real, schema, text},
 };
 use crate::columns::{OPERATOR, Rows};
@@ -36,7 +37,7 @@ pub(super) fn response_names(omega_rad_s: f64) -> [String; 2] {
 }
 
 impl TraceColumns {
-    pub fn of(analysis: &Analysis) -> Self {
+    pub fn of(analysis: &AnalysisSettings) -> Self {
         let fixed = ["a1", "a2", "b0", "b1", "f1", "f2"].map(str::to_owned);
         let d = (1..=analysis.nd.1.min(MOST_ND)).map(|i| format!("d{i}"));
         let correlations = pairs().map(|(i, j)| format!("correlation_{}_{}", CORRELATED[i], CORRELATED[j]));
