@@ -159,7 +159,7 @@ fn residual_tests(index: usize, name: &str, record: &Record, validation: &Valida
     }
 }
 
-/// Number of values outside the bounds among the lags asked for.
+/// Number of values outside the bounds among the chosen lags.
 fn outside(correlation: &Correlation, of: impl Fn(i64) -> bool) -> usize {
     let pairs = correlation.lags.iter().zip(&correlation.values);
     pairs.filter(|(k, v)| of(**k) && v.abs() > correlation.bound_99).count()

@@ -156,7 +156,7 @@ struct Reason {
     text: String,
 }
 
-/// The reasons, the most frequent first. Those that differ in their numbers alone are one, told as it came first.
+/// The reasons, the most frequent first. Those that differ in their numbers alone are one, in the words of the first.
 fn reasons(trace: &Evaluated<'_>) -> Vec<Reason> {
     let mut found: Vec<(&NotConvertible, Reason)> = Vec::new();
     let rows = trace.section.trace.times_s().iter().zip(&trace.operators);

@@ -40,7 +40,7 @@ struct RunOfCell {
     change_s: Option<f64>,
 }
 
-/// Makes the tables from the parts: Parquet, and CSV beside it when it is asked for.
+/// Makes the tables from the parts: Parquet, and CSV beside it where `csv` is set.
 pub(super) fn join(
     manifest: &Manifest,
     base: &Path,

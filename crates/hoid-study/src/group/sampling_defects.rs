@@ -82,7 +82,7 @@ pub(super) fn recorded(record: &Record, defects: &[SamplingDefect], noise: &[f64
         }
     };
     let mut rows: Vec<usize> = (0..n).collect();
-    // One in two hundred by a deviate that is anyhow drawn.
+    // One in two hundred by a deviate that is drawn in any case.
     let rare = |k: usize| (noise[k] * 1e6).abs() as u64 % 200;
     if has(SamplingDefect::Missing) {
         rows.retain(|k| *k == 0 || rare(*k) != 0);
