@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 use hoid_io::{Offset, Scaling, TroubleKind};
 
-use super::DetrendName;
+use super::names::DetrendName;
 
 /// How record files are read.
 #[derive(Debug, Args)]
