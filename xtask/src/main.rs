@@ -12,13 +12,17 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod bench;
+mod counts;
+mod process;
 mod python;
 
 use std::{
     env,
-    io::{BufRead, BufReader},
-    process::{Command, ExitCode, ExitStatus, Stdio},
+    process::{Command, ExitCode},
 };
+
+use counts::Counts;
+use process::{cargo, cargo_command, each_line, run};
 
 const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | book | bench [OPTION...]";
 
@@ -62,62 +66,6 @@ fn test(arguments: &[String]) -> Result<(), String> {
     total.verdict()
 }
 
-/// Runs a command, and prints and shows each line of its output.
-fn each_line(command: &mut Command, mut show: impl FnMut(&str)) -> Result<ExitStatus, String> {
-    let shown = format!("{command:?}");
-    let cannot_run = |error: std::io::Error| format!("cannot run {shown}: {error}");
-    let mut child = command.stdout(Stdio::piped()).spawn().map_err(cannot_run)?;
-    if let Some(output) = child.stdout.take() {
-        for line in BufReader::new(output).lines() {
-            let line = line.map_err(cannot_run)?;
-            println!("{line}");
-            show(&line);
-        }
-    }
-    child.wait().map_err(cannot_run)
-}
-
-#[derive(Debug, Default, PartialEq)]
-struct Counts {
-    passed: usize,
-    failed: usize,
-    ignored: usize,
-}
-
-impl Counts {
-    fn join(&mut self, other: &Self) {
-        self.passed += other.passed;
-        self.failed += other.failed;
-        self.ignored += other.ignored;
-    }
-
-    fn verdict(&self) -> Result<(), String> {
-        match self.failed {
-            0 => Ok(()),
-            failed => Err(format!("{failed} tests failed")),
-        }
-    }
-
-    /// Adds a line such as `test result: ok. 7 passed; 0 failed; 0 ignored; ...`; other lines count nothing.
-    fn add(&mut self, line: &str) {
-        let Some(numbers) = line.strip_prefix("test result: ") else {
-            return;
-        };
-        for part in numbers.split([';', '.']) {
-            let mut words = part.split_whitespace();
-            let (Some(Ok(n)), Some(what)) = (words.next().map(str::parse::<usize>), words.next()) else {
-                continue;
-            };
-            match what {
-                "passed" => self.passed += n,
-                "failed" => self.failed += n,
-                "ignored" => self.ignored += n,
-                _ => {}
-            }
-        }
-    }
-}
-
 fn check() -> Result<(), String> {
     cargo(&["fmt", "--all", "--check"], &[])?;
     cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"], &[])?;
@@ -128,46 +76,4 @@ fn check() -> Result<(), String> {
 fn book() -> Result<(), String> {
     run(Command::new("mdbook").args(["build", "docs"]))
         .map_err(|e| format!("{e}\nmdbook builds the book; install it with: cargo install mdbook --locked"))
-}
-
-fn cargo(arguments: &[&str], environment: &[(&str, &str)]) -> Result<(), String> {
-    run(cargo_command().args(arguments).envs(environment.iter().copied()))
-}
-
-fn cargo_command() -> Command {
-    Command::new(env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned()))
-}
-
-fn run(command: &mut Command) -> Result<(), String> {
-    let shown = format!("{command:?}");
-    match command.status() {
-        Ok(status) if status.success() => Ok(()),
-        Ok(status) => Err(format!("failed ({status}): {shown}")),
-        Err(error) => Err(format!("cannot run {shown}: {error}")),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn counts_add_up_over_crates() {
-        let mut counts = Counts::default();
-        for line in [
-            "running 3 tests",
-            "test result: ok. 7 passed; 0 failed; 1 ignored; 0 measured; 2 filtered out; finished in 0.00s",
-            "test result: FAILED. 5 passed; 2 failed; 0 ignored; 0 measured; 0 filtered out; finished in 1.00s",
-        ] {
-            counts.add(line);
-        }
-        assert_eq!(
-            counts,
-            Counts {
-                passed: 12,
-                failed: 2,
-                ignored: 1
-            }
-        );
-    }
 }

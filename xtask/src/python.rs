@@ -9,7 +9,10 @@ use std::{
     process::Command,
 };
 
-use crate::{Counts, cargo, each_line, run};
+use crate::{
+    counts::Counts,
+    process::{cargo, each_line, run},
+};
 
 /// Oldest Python that the package supports.
 const OLDEST: (u32, u32) = (3, 10);
@@ -130,46 +133,4 @@ fn pip(python: &Path, packages: &[&str]) -> Result<(), String> {
     run(Command::new(python)
         .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"])
         .args(packages))
-}
-
-impl Counts {
-    /// Adds the last line of pytest, as `=== 2 failed, 85 passed, 1 skipped in 61.20s (0:01:01) ===`.
-    pub fn add_pytest(&mut self, line: &str) {
-        let Some((numbers, time)) = line.trim_matches(['=', ' ']).rsplit_once(" in ") else {
-            return;
-        };
-        if !time.starts_with(|c: char| c.is_ascii_digit()) {
-            return;
-        }
-        for part in numbers.split(", ") {
-            let mut words = part.split_whitespace();
-            let (Some(Ok(n)), Some(what)) = (words.next().map(str::parse::<usize>), words.next()) else {
-                return;
-            };
-            match what {
-                "passed" => self.passed += n,
-                "failed" | "error" | "errors" => self.failed += n,
-                "skipped" | "deselected" | "xfailed" => self.ignored += n,
-                _ => {}
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_last_line_of_pytest_counts() {
-        let mut counts = Counts::default();
-        for line in [
-            "tests/test_core.py .......",
-            "3.19s call     tests/test_command_line.py::test_identify in 5 steps",
-            "============ 2 failed, 85 passed, 1 skipped, 1 error in 61.20s (0:01:01) ============",
-        ] {
-            counts.add_pytest(line);
-        }
-        assert_eq!((counts.passed, counts.failed, counts.ignored), (85, 3, 1));
-    }
 }

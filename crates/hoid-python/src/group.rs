@@ -7,7 +7,7 @@ use hoid_model::scenario::Condition;
 use hoid_report::{ReportError, write_group_pages};
 use hoid_study::{
     RunOptions,
-    group::{Manifest, Pattern, Trouble, VirtualExperiment, run_group, simulate_group as simulate_into},
+    group::{Manifest, Pattern, SamplingDefect, VirtualExperiment, run_group, simulate_group as simulate_into},
 };
 use pyo3::prelude::*;
 
@@ -90,9 +90,9 @@ pub fn simulate_group(
         remnant_order,
         noise_level,
         seed,
-        trouble: trouble
+        defects: trouble
             .iter()
-            .map(|name| names::word("trouble", name, &Trouble::ALL.map(|t| (t.name(), t))))
+            .map(|name| names::word("trouble", name, &SamplingDefect::ALL.map(|t| (t.name(), t))))
             .collect::<Outcome<_>>()?,
     };
     let manifest = py.detach(|| simulate_into(&experiment, &directory, &|| ()))?;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use hoid_study::{NamedPlan, Outcome as StudyOutcome, Plan, RunOptions, StudyError, merge, run};
 use hoid_thesis::plans::{find as find_plan, named_plans};
-use hoid_thesis::reproduction::{Reproduction, Told, reproduce as reproduce_into};
+use hoid_thesis::reproduction::{Reproduction, ReproductionEvent, reproduce as reproduce_into};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
@@ -191,8 +191,8 @@ pub fn reproduce(
         jobs,
     };
     let found = interrupt::run(py, 0, progress.as_ref(), true, move |standing| {
-        let tell = |told: Told<'_>| {
-            if let Told::Progress(p) = told {
+        let tell = |event: ReproductionEvent<'_>| {
+            if let ReproductionEvent::Progress(p) = event {
                 standing.set(p.done, p.total);
             }
         };

@@ -1,17 +1,52 @@
-//! Figures and the report of an identification. Data in, text out, but for [`write_group_pages`], which works in a directory. Nothing
-//! here prints.
+//! Figures and HTML pages about identified models.
+//!
+//! A fit is a list of numbers; whether to believe it shows in pictures: the frequency response with its bands, the residual tests, the
+//! simulated output over the measured one. A [`Report`] puts them on one page, with styles and figures inside the file:
+//!
+//! ```
+//! use hoid_ident::Estimator;
+//! use hoid_model::{Structure, scenario::{Condition, Scenario}};
+//! use hoid_report::{ModelSection, Report, known_operator};
+//! use hoid_sim::{Simulator, Stream};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let records = [Simulator::new(&Scenario::condition(Condition::C1))?.run(Stream::default(), false)?];
+//! let fit = Estimator::new(Structure::Arx, Structure::Arx.operator_orders(29)).fit(&records)?;
+//! let report = Report {
+//!     title: "A simulated run of condition C1".to_owned(),
+//!     settings: vec![("seed".to_owned(), "0".to_owned())],
+//!     models: vec![ModelSection {
+//!         name: fit.title(),
+//!         fit: &fit,
+//!         records: &records,
+//!         candidates: None,
+//!         truth: known_operator(&records),
+//!         margins: None,
+//!     }],
+//!     notes: Vec::new(),
+//! };
+//! let page = report.to_html()?;
+//! assert!(page.contains("<svg"));
+//! # Ok(())
+//! # }
+//! ```
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | [`Report`], [`ModelSection`] | one self-contained HTML page about one or several fitted models |
 //! | [`TrackReport`], [`TraceSection`], [`BatchLine`], [`batch_fit`], [`usual_batch_fits`] | one such page about recursive estimates over a record |
-//! | [`GroupReport`], [`GroupTables`] | one such page about a group of recorded runs |
+//! | [`GroupReport`], [`GroupTables`], [`write_group_pages`] | one such page about a group of recorded runs |
 //! | [`figures`] | the figures of these pages, each as an SVG text of its own |
 //! | [`numbers`] | numbers with as many digits as their standard error allows |
+//! | [`render_with`], [`write_page`], [`write_report`] | templates of one's own in the same style, and pages into files |
+//!
+//! Nothing here prints, and the same data give the same bytes.
 
+mod cells;
 mod error;
 pub mod figures;
 mod group;
+mod model_section;
 pub mod numbers;
 mod page;
 mod report;
@@ -20,6 +55,7 @@ mod track;
 
 pub use error::ReportError;
 pub use group::{FrequencyTables, GroupReport, GroupTables, write_group_pages};
+pub use model_section::{ModelSection, known_operator};
 pub use page::{render_with, write_page, write_report};
-pub use report::{ModelSection, Report, known_operator};
+pub use report::Report;
 pub use track::{BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, usual_batch_fits};

@@ -6,6 +6,9 @@
 /// Stands where there is no number.
 pub const DASH: &str = "\u{2013}";
 
+/// Two-sided 95 % point of the normal distribution.
+pub(crate) const Z_95: f64 = 1.959_963_984_540_054;
+
 const DIGITS_OF_ERROR: i32 = 2;
 const DIGITS_ALONE: i32 = 5;
 

@@ -1,15 +1,13 @@
 //! One self-contained HTML page about the models fitted to a record or to several.
 
-use hoid_ident::{
-    Choice, Fit, MarginEstimates,
-    validation::{Correlation, Quality, Validation},
-};
-use hoid_model::{OperatorParameters, Record};
+use hoid_ident::validation::{Correlation, Quality, Validation};
+use hoid_model::Record;
 use minijinja::{Value, context};
 
 use crate::{
-    ReportError,
+    ReportError, cells,
     figures::{self, BodeModel, TrueResponse},
+    model_section::ModelSection,
     page, tables,
 };
 
@@ -29,23 +27,6 @@ pub struct Report<'a> {
     pub notes: Vec<String>,
 }
 
-/// One model of the page.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ModelSection<'a> {
-    /// Heading and legend text, such as `BJ(nb=2, nd=1, nf=2, nk=29)`.
-    pub name: String,
-    /// The model.
-    pub fit: &'a Fit,
-    /// The records that it was fitted on.
-    pub records: &'a [Record],
-    /// The search that chose its orders, if there was one.
-    pub candidates: Option<&'a Choice>,
-    /// The operator behind the records, where it is known (simulation).
-    pub truth: Option<OperatorParameters>,
-    /// Margins of the loop of this model and the controlled element, where that is known.
-    pub margins: Option<MarginEstimates>,
-}
-
 impl Report<'_> {
     /// The page as HTML text, with all styles and figures inside it. The same data give the same bytes.
     ///
@@ -55,12 +36,13 @@ impl Report<'_> {
         if self.models.is_empty() {
             return Err(ReportError::NoModels);
         }
-        let validations: Vec<Vec<Result<Validation, String>>> = self.models.iter().map(validate).collect();
+        let validations: Vec<Vec<Result<Validation, String>>> =
+            self.models.iter().map(ModelSection::validate).collect();
         let qualities: Vec<Result<Quality, String>> = self
             .models
             .iter()
             .zip(&validations)
-            .map(|(model, validations)| quality_of(model, validations))
+            .map(|(model, validations)| model.quality(validations))
             .collect();
         let sections: Vec<Value> = self
             .models
@@ -106,41 +88,6 @@ impl Report<'_> {
     }
 }
 
-/// The operator of records that carry the truth, when it is the same throughout (a simulated run without a change).
-pub fn known_operator(records: &[Record]) -> Option<OperatorParameters> {
-    let constant = |name: &str| {
-        let first = *records.first()?.channel(name)?.first()?;
-        // A sigmoid far from its middle still moves in the last digits.
-        let same = |v: &f64| (v - first).abs() <= 1e-6 * first.abs();
-        records
-            .iter()
-            .all(|r| r.channel(name).is_some_and(|c| c.iter().all(same)))
-            .then_some(first)
-    };
-    Some(OperatorParameters {
-        k_e: constant("K_e")?,
-        t_l_s: constant("T_L")?,
-        omega_nm_rad_s: constant("omega_nm")?,
-        zeta_nm: constant("zeta_nm")?,
-        tau_e_s: constant("tau_e")?,
-    })
-}
-
-fn validate(model: &ModelSection<'_>) -> Vec<Result<Validation, String>> {
-    let validation = |record| model.fit.validate(record).map_err(|e| e.to_string());
-    model.records.iter().map(validation).collect()
-}
-
-/// VAF and NRMSE over all records together, or the reason why there are none.
-fn quality_of(model: &ModelSection<'_>, validations: &[Result<Validation, String>]) -> Result<Quality, String> {
-    if model.records.is_empty() {
-        return Err("no record was given".to_owned());
-    }
-    let validations = validations.iter().map(|v| v.as_ref().map_err(Clone::clone));
-    let validations: Vec<&Validation> = validations.collect::<Result<_, _>>()?;
-    Ok(Quality::together(model.records.iter().zip(validations)))
-}
-
 fn section(index: usize, model: &ModelSection<'_>, validations: &[Result<Validation, String>]) -> Value {
     let fit = model.fit;
     let drawn: Vec<Value> = model
@@ -152,7 +99,7 @@ fn section(index: usize, model: &ModelSection<'_>, validations: &[Result<Validat
         .take(MOST_TIME_RESPONSES)
         .map(|(k, record, validation)| {
             let svg = figures::time_response(&format!("m{index}-time{k}"), record, validation);
-            context! { svg => Value::from_safe_string(svg), record => tables::record_name(record, k), close_up => figures::has_close_up(record) }
+            context! { svg => Value::from_safe_string(svg), record => cells::record_name(record, k), close_up => figures::has_close_up(record) }
         })
         .collect();
     let tested = model
@@ -162,9 +109,9 @@ fn section(index: usize, model: &ModelSection<'_>, validations: &[Result<Validat
         .enumerate()
         .find_map(|(k, (r, v))| v.as_ref().ok().map(|v| (k, r, v)));
     let tests = match tested {
-        Some((k, record, validation)) => residual_tests(index, &tables::record_name(record, k), record, validation),
+        Some((k, record, validation)) => residual_tests(index, &cells::record_name(record, k), record, validation),
         None => {
-            let reason = quality_of(model, validations).err().unwrap_or_default();
+            let reason = model.quality(validations).err().unwrap_or_default();
             context! { reason }
         }
     };
@@ -212,7 +159,7 @@ fn residual_tests(index: usize, name: &str, record: &Record, validation: &Valida
     }
 }
 
-/// Number of values outside the bounds among the lags asked for.
+/// Number of values outside the bounds among the chosen lags.
 fn outside(correlation: &Correlation, of: impl Fn(i64) -> bool) -> usize {
     let pairs = correlation.lags.iter().zip(&correlation.values);
     pairs.filter(|(k, v)| of(**k) && v.abs() > correlation.bound_99).count()

@@ -5,37 +5,17 @@ use hoid_ident::{
     order_selection::Criterion,
     validation::{Quality, Validation},
 };
-use hoid_model::{OperatorParameters, Record, remnant::RemnantDiscretisation, uncertainty::Estimate};
+use hoid_model::{OperatorParameters, Record, remnant::RemnantDiscretisation};
 use minijinja::{Value, context};
 
 use crate::{
-    ModelSection,
-    numbers::{DASH, fixed, interval, plain, with_uncertainty},
+    cells::{cell, html, record_name, symbol},
+    model_section::ModelSection,
+    numbers::{DASH, Z_95, fixed, interval, plain, with_uncertainty},
 };
-
-/// Two-sided 95 % point of the normal distribution.
-const Z_95: f64 = 1.959_963_984_540_054;
 
 /// Longest table of candidates.
 const MOST_CANDIDATES: usize = 30;
-
-pub fn html(text: impl Into<String>) -> Value {
-    Value::from_safe_string(text.into())
-}
-
-/// Name and unit of an operator parameter for the page.
-pub fn symbol(name: &str) -> (Value, &'static str) {
-    let (symbol, unit) = match name {
-        "K_e" => ("<i>K</i><sub>e</sub>", "deg/deg"),
-        "T_L" => ("<i>T</i><sub>L</sub>", "s"),
-        "K_e_dot" => ("<i>K</i><sub>\u{117}</sub>", "s"),
-        "omega_nm" => ("<i>\u{3c9}</i><sub>nm</sub>", "rad/s"),
-        "zeta_nm" => ("<i>\u{3b6}</i><sub>nm</sub>", "-"),
-        "tau_e" => ("<i>\u{3c4}</i><sub>e</sub>", "s"),
-        other => return (Value::from(other), ""),
-    };
-    (html(symbol), unit)
-}
 
 fn true_value(name: &str, truth: &OperatorParameters) -> Option<f64> {
     Some(match name {
@@ -50,15 +30,6 @@ fn true_value(name: &str, truth: &OperatorParameters) -> Option<f64> {
 }
 
 const OPERATOR_NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
-
-pub fn cell(estimate: Estimate) -> Value {
-    let (value, error) = with_uncertainty(estimate.value, estimate.standard_error);
-    Value::from(if error == DASH {
-        value
-    } else {
-        format!("{value} \u{b1} {error}")
-    })
-}
 
 /// One column a model, one row a quantity.
 pub fn comparison(models: &[ModelSection<'_>], qualities: &[Result<Quality, String>]) -> Value {
@@ -296,14 +267,6 @@ pub fn qualities(records: &[Record], validations: &[Result<Validation, String>])
             }
         });
     rows.collect()
-}
-
-/// Label of a record, or its number.
-pub fn record_name(record: &Record, index: usize) -> String {
-    match record.label() {
-        "" => format!("record {}", index + 1),
-        label => label.to_owned(),
-    }
 }
 
 /// Margins of the loop with the controlled element.

@@ -1,7 +1,7 @@
-//! The batch fits that the estimators of a cell ask for, each made once for all runs of a block.
+//! The batch fits that the estimators of a cell need, each made once for all runs of a block.
 //!
 //! A recursion that starts from a fit of a span and an estimator that makes the same fit share it, and the fits of the runs are searched
-//! side by side ([`Estimator::fit_each`]). What comes out does not depend on who shares it.
+//! in one batch ([`Estimator::fit_each`]). The results do not depend on who shares a fit.
 
 use std::borrow::Cow;
 
@@ -13,53 +13,53 @@ use crate::{
     prepared::Preparation,
 };
 
-/// A fit that is asked for: the estimator, and what it is fitted to.
-type Question = (Estimator, Preparation);
+/// A fit that is needed: the estimator, and what it is fitted to.
+type FitRequest = (Estimator, Preparation);
 
 /// The fits of some runs.
 pub(crate) struct BatchFits {
-    /// For each estimator, the number of its question.
-    asked: Vec<Option<usize>>,
-    /// For each question, the fit of each run.
+    /// For each estimator, the number of its request.
+    requested: Vec<Option<usize>>,
+    /// For each request, the fit of each run.
     fits: Vec<Vec<Result<Fit, String>>>,
 }
 
 impl BatchFits {
-    /// All fits that these estimators ask for of these runs. Nothing when `go_on` says no: it is asked before each.
+    /// All fits that these estimators need of these runs. None when `go_on` says no before one of them.
     pub fn of(
         estimators: &[(&EstimatorCell, Task)],
         runs: &[&Record],
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Option<Self> {
-        let mut questions: Vec<Question> = Vec::new();
-        let (mut asked, mut fits) = (Vec::with_capacity(estimators.len()), Vec::new());
+        let mut requests: Vec<FitRequest> = Vec::new();
+        let (mut requested, mut fits) = (Vec::with_capacity(estimators.len()), Vec::new());
         for (estimator, task) in estimators {
-            let Some(question) = runs.first().and_then(|run| question(estimator, task, run)) else {
-                asked.push(None);
+            let Some(request) = runs.first().and_then(|run| request(estimator, task, run)) else {
+                requested.push(None);
                 continue;
             };
-            let known = questions.iter().position(|known| *known == question);
-            asked.push(Some(known.unwrap_or(questions.len())));
+            let known = requests.iter().position(|known| *known == request);
+            requested.push(Some(known.unwrap_or(requests.len())));
             if known.is_some() {
                 continue;
             }
             if !go_on() {
                 return None;
             }
-            fits.push(answers(&question, runs));
-            questions.push(question);
+            fits.push(fit_all(&request, runs));
+            requests.push(request);
         }
-        Some(Self { asked, fits })
+        Some(Self { requested, fits })
     }
 
-    /// The fit of a run that an estimator (by its place) asks for; none where it asks for none.
+    /// The fit of a run that an estimator (by its place) needs; none where it needs none.
     pub fn of_run(&self, estimator: usize, run: usize) -> Option<&Result<Fit, String>> {
-        let question = (*self.asked.get(estimator)?)?;
-        self.fits.get(question)?.get(run)
+        let request = (*self.requested.get(estimator)?)?;
+        self.fits.get(request)?.get(run)
     }
 }
 
-fn question(estimator: &EstimatorCell, task: &Task, record: &Record) -> Option<Question> {
+fn request(estimator: &EstimatorCell, task: &Task, record: &Record) -> Option<FitRequest> {
     let preparation = Preparation::of(estimator);
     match task {
         Task::Fit(options) => Some(((**options).clone(), preparation)),
@@ -72,7 +72,7 @@ fn question(estimator: &EstimatorCell, task: &Task, record: &Record) -> Option<Q
     }
 }
 
-fn answers((estimator, preparation): &Question, runs: &[&Record]) -> Vec<Result<Fit, String>> {
+fn fit_all((estimator, preparation): &FitRequest, runs: &[&Record]) -> Vec<Result<Fit, String>> {
     let prepared: Vec<Result<Cow<'_, Record>, String>> = runs.iter().map(|run| preparation.of_record(run)).collect();
     let records: Vec<&Record> = prepared.iter().flatten().map(Cow::as_ref).collect();
     let mut fits = estimator.fit_each(&records).into_iter();

@@ -2,7 +2,7 @@
 //!
 //! | table | a row is | columns |
 //! |---|---|---|
-//! | fits | one estimator on one replication | what was simulated and estimated; how it ended; theta, operator, remnant with standard errors; figures of merit |
+//! | fits | one estimator on one replication | what was simulated and estimated; how it ended; theta, operator, remnant with standard errors; error measures |
 //! | traces | one kept point of a recursion | cell, replication, estimator, t; theta and operator |
 //! | cells | one scenario of the grid | its settings and its true parameters |
 //!

@@ -20,7 +20,7 @@ pub enum StudyError {
     /// A file that cannot be read or written.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// A share that is none.
+    /// A shard that is none.
     #[error("shard {found:?}: expected I/N with 1 <= I <= N, such as 2/7")]
     BadShard {
         /// What was given.

@@ -1,33 +1,69 @@
-//! Monte Carlo studies: plan, shards, run, resume, merge, summaries.
+//! Monte Carlo studies of estimators, and groups of recorded runs.
+//!
+//! How large are bias and spread of an estimate, and do its standard errors say so? One record cannot tell. A study simulates many: a
+//! [`Plan`] names scenarios (operator, task, remnant) and estimators, each list in it is an axis of a grid, and [`run`] estimates every cell
+//! of the grid in many replications, each with its own random stream. [`Results`] reads the tables back, and a [`Query`] picks rows:
+//!
+//! ```
+//! use hoid_study::{Plan, Query, Results, RunOptions, run};
+//!
+//! let plan = Plan::parse(
+//!     r#"
+//! name = "lead"
+//! seed = 1
+//! replications = 8
+//!
+//! [[scenarios]]
+//! condition = "C1"
+//! measurement_s = 20.48
+//! remnant = { order = 1, noise_level = [0.0, 0.1] }
+//!
+//! [[estimators]]
+//! name = "ARX"
+//! method = "fit"
+//! structure = "arx"
+//! orders.nk = 29
+//! "#,
+//!     "lead.toml",
+//! )?;
+//! let directory = tempfile::tempdir().expect("a temporary directory");
+//! let outcome = run(&plan, directory.path(), &RunOptions::default(), &|_| (), &|| true)?;
+//! assert!(outcome.finished);
+//!
+//! let results = Results::read(directory.path())?;
+//! let bias = |level| {
+//!     let query = Query::of("bias_b0").name("ARX").noise_level(level);
+//!     results.one(&query).map_or(f64::NAN, |row| row.statistics.median.abs())
+//! };
+//! // Without remnant ARX is exact; with a remnant that is not white its estimates are biased.
+//! assert!(bias(0.0) < 1e-3 && bias(0.1) > 1.0, "{} {}", bias(0.0), bias(0.1));
+//! # Ok::<(), hoid_study::StudyError>(())
+//! ```
+//!
+//! Replications are run and stored in blocks. A study that was stopped goes on where it was (`resume`), shards of a study can run on several
+//! machines and are joined by [`merge`], and the bytes of the tables depend on neither.
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | [`plan`] | [`Plan`]: scenarios and estimators as grids, read from TOML and checked |
-//! | `block`, `prepared`, `merit` | what is done with the replications of one cell, and the figures of merit of a row |
-//! | `columns`, `truth` | the tables of a study: fits, traces, cells |
 //! | [`plans`] | plans that come with the program |
 //! | `run` | [`run`], [`merge`]: blocks over threads, parts on disk |
-//! | `summary`, [`statistics`] | what the replications of a cell say together |
+//! | `manifest` | `study.json` beside the results, [`Shard`] |
+//! | `block`, `batch_fits`, `prepared` | the estimators of one cell on its replications |
+//! | `estimate_rows`, `error_measures` | the rows of an estimate, and its errors against the truth |
+//! | `columns`, `truth`, `true_value` | the tables of a study: fits, traces, cells; what the truth of each column is |
+//! | `summary`, [`statistics`] | statistics over the replications of a cell, with Monte Carlo errors |
 //! | `results`, `query`, `tables` | [`Results`]: a finished study read back, [`Query`]: which rows of it |
 //! | [`group`] | recorded runs by subject and condition |
-//! | `manifest` | what stands beside the results, [`Shard`] |
-//!
-//! ```no_run
-//! use hoid_study::{Plan, RunOptions, run};
-//!
-//! let plan = Plan::read("plan.toml".as_ref())?;
-//! let outcome = run(&plan, "out".as_ref(), &RunOptions::default(), &|_| (), &|| true)?;
-//! assert!(outcome.finished);
-//! # Ok::<(), hoid_study::StudyError>(())
-//! ```
 
 mod batch_fits;
 mod block;
 mod columns;
 mod error;
+mod error_measures;
+mod estimate_rows;
 pub mod group;
 mod manifest;
-mod merit;
 pub mod plan;
 pub mod plans;
 mod prepared;
@@ -37,6 +73,7 @@ mod run;
 pub mod statistics;
 mod summary;
 mod tables;
+mod true_value;
 mod truth;
 
 pub use columns::OPERATOR;
@@ -48,5 +85,5 @@ pub use query::Query;
 pub use results::{Bands, Results, SummaryRow, TraceSummary};
 pub use run::{Outcome, Progress, RunOptions, merge, run};
 pub use statistics::Statistics;
-pub use summary::true_value;
+pub use true_value::true_value;
 pub use truth::TrueState;

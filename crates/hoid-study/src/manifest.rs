@@ -1,6 +1,6 @@
 //! What stands beside the results: `study.json`.
 //!
-//! It says which plan and which program made the parts of a directory, and which share of the study they are. Two directories belong
+//! It says which plan and which program made the parts of a directory, and which shard of the study they are. Two directories belong
 //! together when plan, replications, seed and version are the same.
 
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Plan, StudyError};
 
-/// A share of a study: part `index` of `of`, from 1.
+/// A shard of a study: part `index` of `of`, from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
     /// Which.

@@ -11,7 +11,7 @@ pub struct NamedPlan {
     pub text: &'static str,
 }
 
-/// Named plans of what goes beyond the reference text.
+/// The named plans of this crate.
 pub const PLANS: &[NamedPlan] = &[NamedPlan {
     name: "adaptation",
     text: include_str!("../plans/adaptation.toml"),

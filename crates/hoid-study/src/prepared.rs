@@ -1,4 +1,4 @@
-//! The record as an estimator takes it: a span, every so manieth sample, without mean or line.
+//! The record as an estimator takes it: a span, every n-th sample, without mean or line.
 
 use std::borrow::Cow;
 
@@ -11,14 +11,14 @@ use crate::plan::EstimatorCell;
 pub(crate) struct Preparation {
     /// The span that is taken, s; none for all.
     pub span_s: Option<(f64, f64)>,
-    /// Every so manieth sample.
+    /// Every `decimate`-th sample.
     pub decimate: usize,
     /// What is subtracted.
     pub detrend: Detrend,
 }
 
 impl Preparation {
-    /// What an estimator asks for.
+    /// The preparation of an estimator.
     pub fn of(estimator: &EstimatorCell) -> Self {
         Self {
             span_s: estimator.span_s,

@@ -1,4 +1,4 @@
-//! What rows of a study somebody looks for.
+//! Queries: which rows of a study.
 
 use std::collections::BTreeMap;
 
@@ -53,7 +53,7 @@ impl std::fmt::Display for Query {
 
 /// What describes a cell and an estimator.
 #[derive(Debug, Clone)]
-pub(crate) struct Subject {
+pub(crate) struct RowKey {
     pub cell: u64,
     pub scenario: String,
     pub condition: String,
@@ -179,14 +179,14 @@ impl Query {
         self
     }
 
-    /// Of estimators that took every so manieth sample.
+    /// Of estimators that took every n-th sample.
     #[must_use]
     pub fn decimate(mut self, decimate: usize) -> Self {
         self.decimate = Some(decimate);
         self
     }
 
-    pub(crate) fn takes(&self, s: &Subject) -> bool {
+    pub(crate) fn takes(&self, s: &RowKey) -> bool {
         fn is<T: PartialEq>(asked: Option<&T>, found: &T) -> bool {
             asked.is_none_or(|asked| asked == found)
         }

@@ -26,7 +26,7 @@ use crate::{
 /// How a study is run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RunOptions {
-    /// A share of the study; none for all.
+    /// A shard of the study; none for all.
     pub shard: Option<Shard>,
     /// Threads; none for one a core.
     pub jobs: Option<usize>,
@@ -62,7 +62,7 @@ pub struct Outcome {
 /// estimate, and what it stops can be resumed.
 ///
 /// # Errors
-/// [`StudyError::Occupied`] when the directory holds a study and `resume` is not asked for, [`StudyError::OtherStudy`] when it is
+/// [`StudyError::Occupied`] when the directory holds a study without `resume`, [`StudyError::OtherStudy`] when it is
 /// another one, [`StudyError::Io`] when a file cannot be written.
 pub fn run(
     plan: &Plan,

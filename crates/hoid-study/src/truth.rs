@@ -17,7 +17,7 @@ use crate::{
 pub struct TrueState {
     /// K_e, T_L, K_e_dot, omega_nm, zeta_nm.
     pub operator: [f64; 5],
-    /// f1, f2 (a1, a2 of the text), b0, b1 at the sample time of the simulation.
+    /// f1, f2 (a1, a2 of an ARX model), b0, b1 at the sample time of the simulation.
     pub discrete: [f64; 4],
     /// K_n, deg.
     pub k_n: f64,

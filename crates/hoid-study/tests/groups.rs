@@ -13,7 +13,7 @@ use hoid_model::scenario::{Condition, Scenario};
 use hoid_sim::{RunSeed, Simulator};
 use hoid_study::{
     RunOptions, StudyError,
-    group::{Manifest, Pattern, Trouble, VirtualExperiment, run_group, simulate_group},
+    group::{Manifest, Pattern, SamplingDefect, VirtualExperiment, run_group, simulate_group},
 };
 
 /// Two subjects with different gains, two conditions, two runs each.
@@ -213,7 +213,7 @@ fn a_virtual_experiment_has_its_truth_beside_it() {
         remnant_order: 1,
         noise_level: 0.05,
         seed: 4,
-        trouble: Vec::new(),
+        defects: Vec::new(),
     };
     let directory = tempfile::tempdir().unwrap();
     let (plain, again) = (directory.path().join("plain"), directory.path().join("again"));
@@ -256,7 +256,7 @@ fn a_virtual_experiment_has_its_truth_beside_it() {
     let troubled = VirtualExperiment {
         subjects: 1,
         runs: 1,
-        trouble: Trouble::ALL.to_vec(),
+        defects: SamplingDefect::ALL.to_vec(),
         ..experiment.clone()
     };
     let with = directory.path().join("with");
@@ -401,7 +401,7 @@ fn grey_box_error_bars_hold_in_a_virtual_experiment() {
         remnant_order: 1,
         noise_level: 0.1,
         seed: 12,
-        trouble: Vec::new(),
+        defects: Vec::new(),
     };
     let directory = tempfile::tempdir().unwrap();
     let (people, out) = (directory.path().join("people"), directory.path().join("out"));

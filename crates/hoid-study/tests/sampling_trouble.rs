@@ -8,9 +8,9 @@ use hoid_io::{
     read_segments,
 };
 use hoid_model::{Record, scenario::Condition};
-use hoid_study::group::{Trouble, VirtualExperiment, simulate_group};
+use hoid_study::group::{SamplingDefect, VirtualExperiment, simulate_group};
 
-fn experiment(trouble: &[Trouble]) -> VirtualExperiment {
+fn experiment(trouble: &[SamplingDefect]) -> VirtualExperiment {
     VirtualExperiment {
         subjects: 1,
         conditions: vec![Condition::C1, Condition::C4],
@@ -20,12 +20,12 @@ fn experiment(trouble: &[Trouble]) -> VirtualExperiment {
         remnant_order: 1,
         noise_level: 0.1,
         seed: 5,
-        trouble: trouble.to_vec(),
+        defects: trouble.to_vec(),
     }
 }
 
 /// The troubles of each run, and the run itself without any.
-fn found(trouble: &[Trouble], options: &ReadOptions) -> Vec<(Vec<Found>, Record)> {
+fn found(trouble: &[SamplingDefect], options: &ReadOptions) -> Vec<(Vec<Found>, Record)> {
     let (clean, troubled) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     simulate_group(&experiment(&[]), clean.path(), &|| ()).unwrap();
     simulate_group(&experiment(trouble), troubled.path(), &|| ()).unwrap();
@@ -60,20 +60,23 @@ fn only(found: &[Found], kinds: &[QualityIssueKind]) {
 
 #[test]
 fn jitter_and_clocks_have_the_size_that_was_planted() {
-    for (found, _) in found(&[Trouble::Jitter], &resampled()) {
-        only(&found, &[QualityIssueKind::Jitter]);
+    for (found, _) in found(&[SamplingDefect::Jitter], &resampled()) {
+        only(&found, &[TroubleKind::Jitter]);
         // 0.2 of a sample, clamped at 2.25 standard deviations, which leaves 0.194.
         assert!((found[0].size / 0.01 - 0.194).abs() < 0.006, "{}", found[0]);
     }
-    for (found, _) in found(&[Trouble::SlowClock], &ReadOptions::default()) {
-        only(&found, &[QualityIssueKind::Clock]);
+    for (found, _) in found(&[SamplingDefect::SlowClock], &ReadOptions::default()) {
+        only(&found, &[TroubleKind::Clock]);
         assert!((found[0].size - (1.0 / 0.998 - 1.0)).abs() < 1e-6, "{}", found[0]);
     }
 }
 
 #[test]
 fn missing_and_repeated_rows_are_counted_one_by_one() {
-    for trouble in [vec![Trouble::Missing], vec![Trouble::Missing, Trouble::Jitter]] {
+    for trouble in [
+        vec![SamplingDefect::Missing],
+        vec![SamplingDefect::Missing, SamplingDefect::Jitter],
+    ] {
         for (found, record) in found(&trouble, &resampled()) {
             let gap = found.iter().find(|one| one.kind == QualityIssueKind::Gap).unwrap();
             // One in two hundred of 8192 rows: 41 with a standard deviation of 6.4.
@@ -88,38 +91,38 @@ fn missing_and_repeated_rows_are_counted_one_by_one() {
             assert_eq!(found.len(), trouble.len(), "{found:?}");
         }
     }
-    for (found, _) in found(&[Trouble::Repeated], &ReadOptions::default()) {
-        only(&found, &[QualityIssueKind::Repeated]);
+    for (found, _) in found(&[SamplingDefect::Repeated], &ReadOptions::default()) {
+        only(&found, &[TroubleKind::Repeated]);
         assert!((15..70).contains(&found[0].rows), "{}", found[0]);
     }
 }
 
 #[test]
 fn rails_steps_and_stalls_are_found_where_they_are() {
-    for (found, record) in found(&[Trouble::Saturated], &ReadOptions::default()) {
-        only(&found, &[QualityIssueKind::Saturated, QualityIssueKind::Saturated]);
+    for (found, record) in found(&[SamplingDefect::Saturated], &ReadOptions::default()) {
+        only(&found, &[TroubleKind::Saturated, TroubleKind::Saturated]);
         let u = record.output();
         let sd = (u.iter().map(|u| u * u).sum::<f64>() / u.len() as f64).sqrt();
         let beyond = u.iter().filter(|u| u.abs() > 1.5 * sd).count();
         assert_eq!(found.iter().map(|one| one.rows).sum::<usize>(), beyond);
     }
-    for (found, record) in found(&[Trouble::Quantised], &ReadOptions::default()) {
-        only(&found, &[QualityIssueKind::Quantised]);
+    for (found, record) in found(&[SamplingDefect::Quantised], &ReadOptions::default()) {
+        only(&found, &[TroubleKind::Quantised]);
         let sd = (record.output().iter().map(|u| u * u).sum::<f64>() / record.len() as f64).sqrt();
         assert!((found[0].size / (8.0 * sd / 256.0) - 1.0).abs() < 1e-9, "{}", found[0]);
     }
-    for (found, record) in found(&[Trouble::Stalled], &ReadOptions::default()) {
-        only(&found, &[QualityIssueKind::Stalled]);
+    for (found, record) in found(&[SamplingDefect::Stalled], &ReadOptions::default()) {
+        only(&found, &[TroubleKind::Stalled]);
         let place = found[0].places[0];
         // Rows are counted from 1; the first row of a stall still has a value of its own.
         assert_eq!((place.row, place.rows), (record.len() / 3 + 2, 49));
     }
     // Several at once.
     let all = [
-        Trouble::Saturated,
-        Trouble::Quantised,
-        Trouble::Repeated,
-        Trouble::Missing,
+        SamplingDefect::Saturated,
+        SamplingDefect::Quantised,
+        SamplingDefect::Repeated,
+        SamplingDefect::Missing,
     ];
     for (found, _) in found(&all, &resampled()) {
         use QualityIssueKind::{Gap, Quantised, Repeated, Saturated};
@@ -131,7 +134,7 @@ fn rails_steps_and_stalls_are_found_where_they_are() {
 fn a_record_is_cut_where_it_is_masked() {
     let directory = tempfile::tempdir().unwrap();
     simulate_group(
-        &experiment(&[Trouble::Stalled, Trouble::Missing]),
+        &experiment(&[SamplingDefect::Stalled, SamplingDefect::Missing]),
         directory.path(),
         &|| (),
     )

@@ -1,6 +1,28 @@
 //! The reference text, reproduced: its studies, tables, figures and claims (A. Ortiz Moya, *Time-Varying Human-Operator Identification
 //! with Box-Jenkins Models*, MSc thesis, Delft University of Technology, 2023).
 //!
+//! The text compares ARX and Box-Jenkins models of the human operator, in batches and recursively, by simulation. [`reproduce`] runs its
+//! studies, draws its tables and figures, tests what it claims, and writes a page that shows all of it:
+//!
+//! ```no_run
+//! use hoid_thesis::{Reproduction, ReproductionEvent, reproduce};
+//!
+//! let quick = Reproduction {
+//!     only: vec!["fig-5".to_owned(), "claims".to_owned()],
+//!     replications: 10,
+//!     ..Reproduction::default()
+//! };
+//! let notify = |event: ReproductionEvent<'_>| {
+//!     if let ReproductionEvent::Study(study) = event {
+//!         println!("{}: {} estimates", study.name, study.estimates);
+//!     }
+//! };
+//! if let Some(summary) = reproduce(&quick, "reproduction".as_ref(), &notify, &|| true)? {
+//!     println!("{}", summary.index.display());
+//! }
+//! # Ok::<(), hoid_thesis::ThesisError>(())
+//! ```
+//!
 //! | module | what it holds |
 //! |---|---|
 //! | [`plans`] | the studies of the text as named plans |
@@ -15,4 +37,4 @@ pub mod plans;
 pub mod reproduction;
 
 pub use error::ThesisError;
-pub use reproduction::{CLAIMS, Reproduced, Reproduction, Told, reproduce};
+pub use reproduction::{CLAIMS, Reproduction, ReproductionEvent, ReproductionSummary, reproduce};

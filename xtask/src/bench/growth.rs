@@ -15,10 +15,8 @@ use std::{
 
 use serde_json::Value;
 
-use super::{
-    output,
-    table::{plain, time},
-};
+use super::table::{plain, time};
+use crate::process::output;
 
 /// One measured point.
 #[derive(Debug, Clone, Copy, PartialEq)]

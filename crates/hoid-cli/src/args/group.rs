@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use hoid_model::scenario::Condition;
-use hoid_study::group::Trouble;
+use hoid_study::group::SamplingDefect;
 
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
@@ -92,12 +92,12 @@ pub struct SimulateGroupArgs {
     pub seed: u64,
     /// What is wrong with the sampling: jitter, missing, repeated, slow-clock, saturated, quantised, stalled
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_trouble)]
-    pub trouble: Vec<Trouble>,
+    pub trouble: Vec<SamplingDefect>,
 }
 
-fn parse_trouble(text: &str) -> Result<Trouble, String> {
-    let names = || Trouble::ALL.map(Trouble::name).join(", ");
-    Trouble::ALL
+fn parse_trouble(text: &str) -> Result<SamplingDefect, String> {
+    let names = || SamplingDefect::ALL.map(SamplingDefect::name).join(", ");
+    SamplingDefect::ALL
         .into_iter()
         .find(|trouble| trouble.name() == text.trim())
         .ok_or_else(|| format!("{text:?} is no trouble, expected some of {}", names()))

@@ -7,9 +7,9 @@ use hoid_study::Shard;
 
 #[derive(Debug, Subcommand)]
 pub enum StudyCommand {
-    /// Run a plan, or a share of it, and summarise the results
+    /// Run a plan, or a shard of it, and summarise the results
     Run(StudyRunArgs),
-    /// Join the shares of a study that were run apart
+    /// Join the shards of a study that were run apart
     Merge(StudyMergeArgs),
     /// Check a plan and say what it would do, without running anything
     Check(StudyCheckArgs),
@@ -30,7 +30,7 @@ pub struct StudyRunArgs {
     /// Replications of each cell instead of those of the plan
     #[arg(long, value_name = "M")]
     pub replications: Option<u64>,
-    /// Run one share of the study, to be joined by `hoid study merge`
+    /// Run one shard of the study, to be joined by `hoid study merge`
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
     /// Threads. Default: one a core

@@ -39,7 +39,7 @@ pub fn simulate(args: &SimulateGroupArgs) -> Result<(), CliError> {
         remnant_order: args.remnant_order,
         noise_level: args.noise_level,
         seed: args.seed,
-        trouble: args.trouble.clone(),
+        defects: args.trouble.clone(),
     };
     let total = args
         .subjects

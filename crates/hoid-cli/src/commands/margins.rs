@@ -8,6 +8,7 @@ use hoid_model::{
 };
 use serde_json::{Value, json};
 
+use super::scenario::chosen_scenario;
 use crate::{
     args::{MarginsArgs, StateName},
     error::CliError,
@@ -22,7 +23,7 @@ struct Gain {
 }
 
 pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
-    let scenario = super::scenario(&args.base)?;
+    let scenario = chosen_scenario(&args.base)?;
     let state = match args.state {
         StateName::Initial => scenario.initial,
         StateName::Last => scenario.last,

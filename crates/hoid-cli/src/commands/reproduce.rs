@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use hoid_thesis::{
     ThesisError,
-    reproduction::{CLAIMS, Reproduction, Told, items, reproduce},
+    reproduction::{CLAIMS, Reproduction, ReproductionEvent, items, reproduce},
 };
 
 use super::study::stop_at_interrupt;
@@ -30,12 +30,12 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
     };
     let stopped = stop_at_interrupt();
     let bar = output::progress(0, "estimates");
-    let tell = |told: Told<'_>| match told {
-        Told::Progress(progress) => {
+    let tell = |event: ReproductionEvent<'_>| match event {
+        ReproductionEvent::Progress(progress) => {
             bar.set_length(progress.total);
             bar.set_position(progress.done);
         }
-        Told::Study(study) => {
+        ReproductionEvent::Study(study) => {
             let took = study.seconds.map_or("was there".to_owned(), |s| format!("{s:.1} s"));
             bar.suspend(|| output::complain(&format!("{:22} {} estimates, {took}", study.name, study.estimates)));
             bar.reset();

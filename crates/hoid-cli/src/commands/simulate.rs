@@ -5,10 +5,11 @@ use hoid_model::{Record, SampleTime, scenario::Scenario};
 use hoid_report::numbers;
 use hoid_sim::{RunSeed, Simulator};
 
+use super::scenario::chosen_scenario;
 use crate::{args::SimulateArgs, error::CliError, output};
 
 pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
-    let scenario = with_changes(super::scenario(&args.base)?, args)?;
+    let scenario = with_changes(chosen_scenario(&args.base)?, args)?;
     let simulator = Simulator::new(&scenario)?;
     let run_seed = RunSeed {
         seed: args.seed,

@@ -1,4 +1,4 @@
-//! `hoid study`: plans, runs, shares.
+//! `hoid study`: plans, runs, shards.
 
 use std::{
     path::Path,

@@ -4,19 +4,21 @@
 //! same hold, so that both curves lie on each other when the parameters agree. The phase is unwrapped with the delay
 //! `nk Ts omega` taken out, which turns fastest, and put back.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use hoid_ident::{Fit, ResponsePoint};
 use hoid_model::{Complex64, OperatorParameters, PolynomialModel, Record, SampleTime, Structure};
 use kuva::prelude::{BandPlot, Plot};
 
 use super::{
-    bode_points::{BodePoints, Z_95},
+    bode_points::BodePoints,
     frame::Area,
     legend::{Entry, Sample, add_legend},
+    phase::unwrap,
     scale::Scale,
     style::{self, BLACK, MODEL_COLOURS},
 };
+use crate::numbers::Z_95;
 
 const UPPER: f64 = 175.0;
 const LOWER: f64 = 205.0;
@@ -246,27 +248,6 @@ impl Curve {
     }
 }
 
-/// Phase without jumps, in deg. The first value is the principal one with the delay taken out.
-pub fn unwrap(phases: &[(f64, f64)], delay_s: f64) -> Vec<f64> {
-    let mut before: Option<f64> = None;
-    phases
-        .iter()
-        .map(|&(omega, phase)| {
-            let by_delay = omega * delay_s * 180.0 / PI;
-            let rest = phase + by_delay;
-            let turns = match before {
-                None => (rest / 360.0).round(),
-                Some(last) => ((rest - last) / 360.0).round(),
-            };
-            let rest = rest - 360.0 * turns;
-            if rest.is_finite() {
-                before = Some(rest);
-            }
-            rest - by_delay
-        })
-        .collect()
-}
-
 /// The first step that gives eight ticks or fewer, or a multiple of the last one.
 fn tick_step(span: f64, steps: &[f64]) -> f64 {
     let largest = steps.last().copied().unwrap_or(1.0);
@@ -306,20 +287,6 @@ mod tests {
     use hoid_model::scenario::OperatingState;
 
     use super::*;
-
-    #[test]
-    fn unwrapped_phase_of_a_delay_is_a_line() {
-        // 0.9 s of delay and 1 rad/s steps: 52 deg a step, far beyond one round.
-        let phases: Vec<(f64, f64)> = (1..200)
-            .map(|k| {
-                let omega = f64::from(k);
-                (omega, Complex64::from_polar(1.0, -0.9 * omega).arg().to_degrees())
-            })
-            .collect();
-        for (phase, (omega, _)) in unwrap(&phases, 0.9).iter().zip(&phases) {
-            assert!((phase + (0.9 * omega).to_degrees()).abs() < 1e-9);
-        }
-    }
 
     #[test]
     fn the_truth_behind_its_hold_is_the_continuous_operator_at_low_frequency() {

@@ -5,11 +5,12 @@
 use hoid_model::{Complex64, uncertainty::Estimate};
 
 use super::{
-    bode::unwrap,
-    bode_points::{BodePoints, Z_95},
+    bode_points::BodePoints,
     curves::{Curve, CurveGrid, CurvePanel, LineKind, curves},
     palette::Shade,
+    phase::unwrap,
 };
+use crate::numbers::Z_95;
 
 /// One frequency response.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,13 +7,12 @@ use hoid_ident::frequency::DescribingFunction;
 use hoid_model::uncertainty::Estimate;
 use kuva::render::render::Scene;
 
-use super::{bode::unwrap, draw, scale::Scale};
+use super::{draw, phase::unwrap, scale::Scale};
+use crate::numbers::Z_95;
 
 const RADIUS: f64 = 2.4;
 /// Half of the end of an error bar.
 const CAP: f64 = 2.5;
-/// Two-sided 95 % point of the normal distribution.
-pub(super) const Z_95: f64 = 1.959_963_984_540_054;
 
 /// Points of a frequency response.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -1,5 +1,5 @@
 //! Box plots of the results of many runs: groups on the abscissa, in each group one box for each series.
-//! What a box shows is told by [`BoxStatistics`].
+//! [`BoxStatistics`] says what a box shows.
 
 use kuva::{
     prelude::Plot,
@@ -8,9 +8,10 @@ use kuva::{
 
 use super::{
     BoxStatistics,
-    axes::{marked, panel_label, with_ordinate},
+    axes::with_ordinate,
     draw::{self, INK},
     frame::{self, Area, Frame, Ordinates},
+    labels::{marked, panel_label},
     legend::{Entry, Sample, add_legend_by},
     palette::{Shade, is_dark},
     style::{self, BLACK, TEXT},
@@ -220,18 +221,18 @@ impl BoxGrid {
                 below += under;
             }
         }
-        let told = [(above, "above"), (below, "below")];
-        let told: Vec<String> = told
+        let marks = [(above, "above"), (below, "below")];
+        let marks: Vec<String> = marks
             .iter()
             .filter(|t| t.0 > 0)
             .map(|(count, side)| format!("{count} {side}"))
             .collect();
-        if !told.is_empty() {
+        if !marks.is_empty() {
             let y = area.top - 3.0;
             scene.add(draw::text(
                 area.right(),
                 y,
-                told.join(", "),
+                marks.join(", "),
                 draw::SMALL,
                 TextAnchor::End,
                 None,

@@ -9,8 +9,9 @@ use kuva::{
 };
 
 use super::{
-    axes::{marked, tick, tick_step},
+    axes::{tick, tick_step},
     draw,
+    labels::marked,
     style::{BLACK, TEXT},
 };
 

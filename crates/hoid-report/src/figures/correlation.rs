@@ -4,7 +4,10 @@ use hoid_ident::validation::Correlation;
 use hoid_model::SampleTime;
 use kuva::prelude::{LollipopPlot, ReferenceLine, ShadedRegion};
 
-use super::style::{self, BLUE, GREY, VERMILLION};
+use super::{
+    labels,
+    style::{self, BLUE, GREY, VERMILLION},
+};
 
 const HEIGHT: f64 = 220.0;
 
@@ -58,7 +61,7 @@ fn stems(id: &str, title: &str, ordinate: &str, correlation: &Correlation, sampl
             .with_dasharray("4 3")
     };
     let layout = style::layout((first - room, last + room), range, HEIGHT)
-        .with_x_label(style::axis_label(
+        .with_x_label(labels::axis_label(
             "lag",
             &format!("samples of {} s", crate::numbers::plain(sample_time.s())),
         ))

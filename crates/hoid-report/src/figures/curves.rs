@@ -6,9 +6,10 @@ use kuva::{
 };
 
 use super::{
-    axes::{log_range, panel_label, with_abscissa, with_ordinate},
+    axes::{log_range, with_abscissa, with_ordinate},
     draw::{self, BAND_OPACITY},
     frame::{self, Frame, Ordinates},
+    labels::panel_label,
     legend::{Entry, Sample, add_legend},
     palette::Shade,
     scale::Scale,

@@ -6,7 +6,7 @@ use kuva::render::{
 };
 
 use super::{
-    axes::printed,
+    labels::printed,
     style::{GREY, TEXT},
 };
 

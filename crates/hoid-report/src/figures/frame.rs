@@ -11,8 +11,8 @@ use kuva::{
 };
 
 use super::{
-    axes::marked,
     draw,
+    labels::marked,
     style::{self, LEFT, RIGHT, WIDTH},
 };
 
@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn the_lowest_of_a_short_last_row_are_told() {
+    fn the_lowest_of_a_short_last_row_are_known() {
         let frame = Frame::new(5, 2, 80.0, Ordinates::Shared, false);
         let lowest: Vec<bool> = (0..5).map(|i| frame.is_lowest(i)).collect();
         assert_eq!(lowest, [false, false, false, true, true]);

@@ -3,8 +3,8 @@
 use kuva::render::render::{Scene, TextAnchor};
 
 use super::{
-    axes::marked,
     draw,
+    labels::marked,
     style::{LEFT, TEXT},
 };
 

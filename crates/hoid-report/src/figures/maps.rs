@@ -7,10 +7,10 @@ use kuva::{
 
 use super::{
     MapColours,
-    axes::marked,
     colour_bar::{BESIDE, ColourScale},
     draw,
     frame::{self, Area, Frame, Ordinates},
+    labels::marked,
     legend::{Entry, Sample, add_legend},
     palette::is_dark,
     style::{self, BLACK, TEXT},

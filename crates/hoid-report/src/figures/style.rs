@@ -7,7 +7,7 @@ use kuva::{
     render::render::Scene,
 };
 
-use super::axes::{plain, tagged};
+use super::labels::{plain, tagged};
 
 /// Width of every figure in units of the SVG.
 pub const WIDTH: f64 = 420.0;
@@ -70,17 +70,6 @@ pub fn line(points: impl IntoIterator<Item = (f64, f64)>, colour: &str, width: f
         .with_data(points.into_iter().filter(finite))
         .with_color(colour)
         .with_stroke_width(width)
-}
-
-/// Text of the user: a dollar sign would open a formula.
-pub fn label(text: &str) -> String {
-    text.replace('$', "\\$")
-}
-
-/// Name and unit of an axis.
-pub fn axis_label(name: &str, unit: &str) -> String {
-    let unit = if unit.is_empty() { "-" } else { unit };
-    label(&plain(&format!("{name} ({unit})")))
 }
 
 /// True for what has a place on an axis: beyond this size the differences of numbers overflow.
@@ -215,7 +204,8 @@ mod tests {
     #[test]
     fn text_of_the_user_stays_text() {
         let plots = vec![line([(0.0, 0.0), (1.0, 1.0)], BLUE, 1.0).into()];
-        let layout = layout((0.0, 1.0), (0.0, 1.0), 200.0).with_x_label(axis_label("a<b> & $x^2$", "\"s\""));
+        let layout = layout((0.0, 1.0), (0.0, 1.0), 200.0)
+            .with_x_label(super::super::labels::axis_label("a<b> & $x^2$", "\"s\""));
         let svg = finish("f<1", "t & t", &stacked(vec![(plots, layout, 200.0)]));
         assert!(svg.contains("a&lt;b&gt; &amp; $x^2$"), "{svg}");
         assert!(svg.contains("f&lt;1-title") && svg.contains("t &amp; t"));

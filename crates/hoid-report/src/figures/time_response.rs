@@ -5,6 +5,7 @@ use hoid_model::Record;
 use kuva::prelude::Plot;
 
 use super::{
+    labels,
     legend::{Entry, Sample, add_legend},
     series::thinned,
     style::{self, BLUE, GREY, VERMILLION},
@@ -51,7 +52,7 @@ pub fn time_response(id: &str, record: &Record, validation: &Validation) -> Stri
         (plots, (record.time_s(from), record.time_s((to - 1).max(from + 1))))
     };
     let channel = record.output_channel();
-    let ordinate = style::axis_label(&channel.name, &channel.unit);
+    let ordinate = labels::axis_label(&channel.name, &channel.unit);
     let layout = |span, height| style::layout(span, range, height).with_y_label(ordinate.clone());
 
     let n = record.len();

@@ -8,9 +8,10 @@ use kuva::{
 };
 
 use super::{
-    axes::{panel_label, with_abscissa, with_ordinate},
+    axes::{with_abscissa, with_ordinate},
     draw::BAND_OPACITY,
     frame::{self, Frame, Ordinates},
+    labels::panel_label,
     legend::{Entry, Sample, add_legend_by},
     palette::shade,
     panel::{CurveKind, Ordinate, TraceCurve, TracePanel},

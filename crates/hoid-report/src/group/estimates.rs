@@ -2,7 +2,10 @@
 
 use minijinja::{Value, context};
 
-use super::{GroupReport, reals, texts};
+use super::{
+    report::GroupReport,
+    tables::{reals, texts},
+};
 use crate::numbers;
 
 /// Columns of the table of averages: parameter and heading.

@@ -2,7 +2,10 @@
 
 use minijinja::{Value, context};
 
-use super::{GroupReport, id_of, reals, texts};
+use super::{
+    report::{GroupReport, id_of},
+    tables::{reals, rows_of, texts},
+};
 use crate::{
     figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels},
     numbers,
@@ -250,7 +253,7 @@ impl GroupReport<'_> {
     ) -> Option<TraceCurve> {
         let table = self.tables.traces;
         let estimators = texts(table, "estimator");
-        let at: Vec<usize> = Self::rows_of(table, subject, condition)
+        let at: Vec<usize> = rows_of(table, subject, condition)
             .into_iter()
             .filter(|i| estimators[*i] == method)
             .collect();

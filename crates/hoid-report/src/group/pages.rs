@@ -5,11 +5,14 @@ use std::path::{Path, PathBuf};
 use hoid_io::{OutputTable, read_table};
 use hoid_study::group::Manifest;
 
-use super::{FrequencyTables, GroupReport, GroupTables, texts};
+use super::{
+    report::GroupReport,
+    tables::{FrequencyTables, GroupTables, texts},
+};
 use crate::{ReportError, page};
 
 /// Runs whose preparation and trouble the pages list.
-const MOST_TOLD: usize = 24;
+const MOST_LISTED: usize = 24;
 
 /// Writes the page of the group and one for each subject into the directory of its tables; `path` is where the manifest was read.
 ///
@@ -96,8 +99,8 @@ fn account(preparation: &OutputTable, trouble: &OutputTable) -> Vec<(String, Str
         }
     }
     // Long lists are in the tables.
-    let more = rows.len().saturating_sub(MOST_TOLD);
-    rows.truncate(MOST_TOLD);
+    let more = rows.len().saturating_sub(MOST_LISTED);
+    rows.truncate(MOST_LISTED);
     if more > 0 {
         rows.push((
             "more runs".to_owned(),

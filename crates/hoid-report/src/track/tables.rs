@@ -7,14 +7,14 @@ use hoid_track::Change;
 use minijinja::{Value, context};
 
 use super::{
-    BatchLine,
     coefficients::{Coefficient, of_fit, of_trace},
-    panels::{Evaluated, of_name, operator_names},
+    evaluated::{Evaluated, of_name, operator_names},
+    section::BatchLine,
     truth,
 };
 use crate::{
+    cells::{cell, html, symbol},
     numbers::{DASH, fixed, plain},
-    tables::{cell, html, symbol},
 };
 
 /// Time from which errors count, s: the start of a recursion from nothing is left out.
@@ -95,7 +95,7 @@ struct Reason {
     text: String,
 }
 
-/// The reasons, the most frequent first. Those that differ in their numbers alone are one, told as it came first.
+/// The reasons, the most frequent first. Those that differ in their numbers alone are one, in the words of the first.
 fn reasons(trace: &Evaluated<'_>) -> Vec<Reason> {
     let mut found: Vec<(&NotConvertible, Reason)> = Vec::new();
     let rows = trace.section.trace.times_s().iter().zip(&trace.operators);

@@ -117,7 +117,7 @@ impl Delays {
     }
 }
 
-/// What is told of a parameter over the runs at one time.
+/// Statistics of a parameter over the runs at one time.
 const FIGURES: [&str; 6] = ["runs", "mean", "sd", "lower_quartile", "median", "upper_quartile"];
 
 /// Traces of all runs at equal times.

@@ -18,11 +18,13 @@ use hoid_ident::frequency::{
     Averaging, DescribingFunction, DescribingOptions, Excitation, GainLeadDelayOptions, Line, LineSearch, describe,
 };
 use hoid_io::OutputTable;
-use hoid_model::{ContinuousTransferFunction, Record, uncertainty::Estimate};
+use hoid_model::{Record, uncertainty::Estimate};
 
 use super::{
-    analysis,
-    manifest::{ConditionFacts, Manifest},
+    condition_settings::ConditionSettings,
+    controlled_element::transfer_function,
+    manifest::Manifest,
+    reading::read_run,
     responses::{MedianResponse, ResponseAverages},
     tables::{real, schema, text},
 };
@@ -115,7 +117,7 @@ pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAvera
             .iter()
             .filter(|r| r.counts && (r.subject.as_str(), r.condition.as_str()) == key);
         let records: Vec<Record> = of_cell
-            .filter_map(|r| analysis::read(manifest, base, r).ok())
+            .filter_map(|r| read_run(manifest, base, r).ok())
             .map(|run| run.record)
             .collect();
         let margins = &mut tables.margins;
@@ -140,7 +142,7 @@ pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAvera
 
 fn of_records(
     records: &[Record],
-    facts: &ConditionFacts,
+    facts: &ConditionSettings,
     (subject, condition): (&str, &str),
     fits: &ResponseAverages,
     tables: &mut Tables,
@@ -266,22 +268,4 @@ fn distance(found: &DescribingFunction, response: &MedianResponse) -> (f64, f64)
             (between / count).sqrt()
         },
     )
-}
-
-/// `numerator/denominator`, coefficients by falling powers of s, separated by commas.
-pub(super) fn transfer_function(text: &str) -> Result<ContinuousTransferFunction, String> {
-    let usage = "expected NUM/DEN by falling powers of s, such as 1/1,1,0";
-    let (numerator, denominator) = text
-        .split_once('/')
-        .ok_or_else(|| format!("{text:?} has no slash; {usage}"))?;
-    let coefficients = |part: &str| -> Result<Vec<f64>, String> {
-        let number = |c: &str| {
-            c.trim()
-                .parse::<f64>()
-                .map_err(|_| format!("{c:?} is no number; {usage}"))
-        };
-        part.split(',').map(number).collect()
-    };
-    ContinuousTransferFunction::new(&coefficients(numerator)?, &coefficients(denominator)?)
-        .map_err(|error| error.to_string())
 }

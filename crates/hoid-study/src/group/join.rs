@@ -7,12 +7,13 @@ use std::{collections::BTreeMap, path::Path};
 use hoid_io::{OutputTable, TableSchema, TableWriter};
 
 use super::{
-    Block, analysis,
     averages::{Averages, Delays, TraceAverages},
+    block::Block,
     frequency,
     manifest::Manifest,
     reading,
     responses::{self, ResponseAverages},
+    run_rows::estimates_schema,
     settling::Settling,
     tables::{numbers, texts},
     traces::TraceColumns,
@@ -39,7 +40,7 @@ struct RunOfCell {
     change_s: Option<f64>,
 }
 
-/// Makes the tables from the parts: Parquet, and CSV beside it when it is asked for.
+/// Makes the tables from the parts: Parquet, and CSV beside it where `csv` is set.
 pub(super) fn join(
     manifest: &Manifest,
     base: &Path,
@@ -56,7 +57,7 @@ pub(super) fn join(
 
     let (mut averages, mut delays) = (Averages::default(), Delays::default());
     let mut of_responses = ResponseAverages::default();
-    let mut estimates = writers("estimates", &analysis::estimates_schema())?;
+    let mut estimates = writers("estimates", &estimates_schema())?;
     let mut responses = writers("responses", &responses::responses_schema())?;
     // Runs of a person in a condition.
     let mut cells: BTreeMap<(&str, &str), Vec<RunOfCell>> = BTreeMap::new();

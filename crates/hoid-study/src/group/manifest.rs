@@ -9,7 +9,7 @@
 //! from_s = 5.0
 //! to_s = 45.0
 //!
-//! [prepare]                               # as in hoid identify; see `preparing`
+//! [prepare]                               # as in hoid identify; see [`PreparationSettings`]
 //! offset = { u = 1 }
 //!
 //! [analysis]
@@ -35,13 +35,18 @@ use std::{
 };
 
 use hoid_io::Preparation;
-use hoid_track::Method;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::StudyError;
 
-use super::{frequency::transfer_function, pattern::Pattern, preparing::Preparing};
+use super::{
+    analysis_settings::AnalysisSettings, condition_settings::ConditionSettings, controlled_element::transfer_function,
+    pattern::Pattern, preparation_settings::PreparationSettings, read_settings::ReadSettings,
+};
+
+/// Name of the copy of the manifest beside the results.
+pub const MANIFEST: &str = "group.toml";
 
 /// A group of recorded runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -51,168 +56,18 @@ pub struct Manifest {
     pub name: String,
     /// How the files are read.
     #[serde(default)]
-    pub read: Reading,
+    pub read: ReadSettings,
     /// What is done to the runs before they are analysed.
-    #[serde(default, skip_serializing_if = "Preparing::is_empty")]
-    pub prepare: Preparing,
+    #[serde(default, skip_serializing_if = "PreparationSettings::is_empty")]
+    pub prepare: PreparationSettings,
     /// What is done with each run.
     #[serde(default)]
-    pub analysis: Analysis,
+    pub analysis: AnalysisSettings,
     /// What is known of the conditions, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub conditions: BTreeMap<String, ConditionFacts>,
+    pub conditions: BTreeMap<String, ConditionSettings>,
     /// The runs.
     pub runs: Vec<RunEntry>,
-}
-
-/// How files are read, as in `hoid identify`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Reading {
-    /// Column of the input, or a difference such as `r-y`.
-    pub input: String,
-    /// Column of the output.
-    pub output: String,
-    /// Sampling frequency, Hz; that of the column t where it is left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sampling_hz: Option<f64>,
-    /// Begin of the span that counts, s.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub from_s: Option<f64>,
-    /// End of the span that counts, s.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub to_s: Option<f64>,
-    /// Interpolate an uneven t.
-    pub resample: bool,
-    /// Bridge missing values.
-    pub fill: bool,
-    /// What is taken out of e and u: none, mean or linear.
-    pub detrend: Detrending,
-}
-
-/// What is taken out of e and u.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Detrending {
-    /// Nothing.
-    #[default]
-    None,
-    /// The mean.
-    Mean,
-    /// A straight line.
-    Linear,
-}
-
-impl Default for Reading {
-    fn default() -> Self {
-        Self {
-            input: "e".to_owned(),
-            output: "u".to_owned(),
-            sampling_hz: None,
-            from_s: None,
-            to_s: None,
-            resample: false,
-            fill: false,
-            detrend: Detrending::None,
-        }
-    }
-}
-
-/// What is done with each run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Analysis {
-    /// The two sub-batches, s; the first and the last three eighths of each record where they are left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub windows_s: Option<[(f64, f64); 2]>,
-    /// Least and greatest order of the noise model; BIC chooses on each sub-batch, the greater one is taken.
-    pub nd: (usize, usize),
-    /// Range of the delay, s.
-    pub delay_s: (f64, f64),
-    /// Recursions: rls, rpem, physical.
-    pub methods: Vec<MethodName>,
-    /// Samples from one kept point of a trace to the next.
-    pub trace_every: usize,
-    /// Whether the grey box is fitted too.
-    pub grey_box: bool,
-    /// Frequencies at which the response of the recursions is kept, rad/s.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub response_at_rad_s: Vec<f64>,
-}
-
-/// A recursion by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum MethodName {
-    /// Recursive least squares.
-    Rls,
-    /// Recursive prediction-error method.
-    Rpem,
-    /// The same in physical parameters.
-    Physical,
-}
-
-impl From<MethodName> for Method {
-    fn from(name: MethodName) -> Self {
-        match name {
-            MethodName::Rls => Self::rls(),
-            MethodName::Rpem => Self::rpem(),
-            MethodName::Physical => Self::physical(),
-        }
-    }
-}
-
-impl Default for Analysis {
-    fn default() -> Self {
-        Self {
-            windows_s: None,
-            nd: (1, 1),
-            delay_s: (0.05, 0.6),
-            methods: vec![MethodName::Rls, MethodName::Rpem, MethodName::Physical],
-            trace_every: 16,
-            grey_box: false,
-            response_at_rad_s: Vec::new(),
-        }
-    }
-}
-
-/// What is known of a condition.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct ConditionFacts {
-    /// Controlled element as `numerator/denominator`, by falling powers of s.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub controlled_element: Option<String>,
-    /// Channel whose lines excite the loop: f_t or a disturbance.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub excitation: Option<String>,
-    /// Period of the excitation, s; the longest that all its lines are harmonics of where it is left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub period_s: Option<f64>,
-    /// Samples by which u is recorded later than the e that it answers: `e[k]` belongs to `u[k + offset]`.
-    pub offset_samples: f64,
-    /// Whether the describing function is fitted with a lead.
-    pub lead: bool,
-    /// Time at which the task changes, s.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub change_s: Option<f64>,
-    /// What is done to its runs before they are analysed; what it names wins over that of the group.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub prepare: Option<Preparing>,
-}
-
-impl Default for ConditionFacts {
-    fn default() -> Self {
-        Self {
-            controlled_element: None,
-            excitation: None,
-            period_s: None,
-            offset_samples: 0.0,
-            lead: true,
-            change_s: None,
-            prepare: None,
-        }
-    }
 }
 
 /// One run.
@@ -319,39 +174,7 @@ impl Manifest {
             self.preparation(name)
                 .map_err(|reason| format!("[conditions.{name}.prepare]: {reason}"))?;
         }
-        let a = &self.analysis;
-        if a.nd.0 == 0 || a.nd.0 > a.nd.1 || a.nd.1 > 20 {
-            return Err(format!(
-                "analysis.nd is {:?}, expected two orders from 1 to 20, the smaller first",
-                a.nd
-            ));
-        }
-        if !(a.delay_s.0 >= 0.0 && a.delay_s.0 < a.delay_s.1 && a.delay_s.1.is_finite()) {
-            return Err(format!(
-                "analysis.delay_s is {:?}, expected two times, the smaller first",
-                a.delay_s
-            ));
-        }
-        if let Some(omega) = a
-            .response_at_rad_s
-            .iter()
-            .find(|omega| !(**omega > 0.0 && omega.is_finite()))
-        {
-            return Err(format!(
-                "analysis.response_at_rad_s has {omega}, expected positive frequencies in rad/s"
-            ));
-        }
-        if a.trace_every == 0 {
-            return Err("analysis.trace_every is 0, expected 1 or more".to_owned());
-        }
-        for (from, to) in a.windows_s.iter().flatten() {
-            if !(from < to && from.is_finite() && to.is_finite()) {
-                return Err(format!(
-                    "analysis.windows_s has [{from}, {to}], expected a beginning before its end"
-                ));
-            }
-        }
-        Ok(())
+        self.analysis.check()
     }
 
     /// A manifest of the files in a directory that match a pattern, in the order of their names; and the names of those that do not.
@@ -391,9 +214,9 @@ impl Manifest {
             .unwrap_or_else(|| "group".to_owned());
         let manifest = Self {
             name,
-            read: Reading::default(),
-            prepare: Preparing::default(),
-            analysis: Analysis::default(),
+            read: ReadSettings::default(),
+            prepare: PreparationSettings::default(),
+            analysis: AnalysisSettings::default(),
             conditions: BTreeMap::new(),
             runs,
         };

@@ -5,9 +5,12 @@ use std::path::Path;
 use hoid_io::{
     ColumnKind, ColumnSchema, OutputTable, Preparation, ReadOptions, ReadRecord, Repair, TableSchema, read_prepared,
 };
-use hoid_model::Detrend;
+use hoid_model::{Detrend, Record};
 
-use super::manifest::{Detrending, Manifest, RunEntry};
+use super::{
+    manifest::{Manifest, RunEntry},
+    read_settings::Detrending,
+};
 use crate::columns::Rows;
 
 /// The record in a file, and what was done to it; the condition may have a preparation of its own.
@@ -83,6 +86,34 @@ pub(super) fn read_files<'a>(manifest: &Manifest, base: &Path, entry: &'a RunEnt
     files
         .map(|file| (file.as_path(), read_file(manifest, &entry.condition, &base.join(file))))
         .collect()
+}
+
+/// A run as the manifest wants it.
+pub(super) struct Run {
+    pub record: Record,
+    /// Where the second file begins, s, for a run that is joined of two.
+    pub seam_s: Option<f64>,
+}
+
+/// Reads a run.
+pub(super) fn read_run(manifest: &Manifest, base: &Path, entry: &RunEntry) -> Result<Run, String> {
+    run_of(read_files(manifest, base, entry))
+}
+
+/// The run in one file, or joined of two.
+pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
+    let mut run: Option<Run> = None;
+    for (_, read) in files {
+        let record = read?.record;
+        run = Some(match run {
+            None => Run { record, seam_s: None },
+            Some(first) => Run {
+                seam_s: Some(first.record.time_s(first.record.len())),
+                record: first.record.joined(&record).map_err(|error| error.to_string())?,
+            },
+        });
+    }
+    run.ok_or_else(|| "no file is named".to_owned())
 }
 
 /// What was done to the files of a run and what is wrong with them; nothing for one that cannot be read, which its estimates say.

@@ -1,7 +1,7 @@
 //! Recursive estimates of one run as rows: coefficients and operator with their standard errors, correlations of the coefficients, and the frequency
-//! response where the manifest asks for it.
+//! response at the frequencies of the manifest.
 //!
-//! The covariance of the errors of two coefficients is their correlation times both standard errors; the figures of appendix I of the reference text show it
+//! The covariance of the errors of two coefficients is their correlation times both standard errors; pages show it
 //! for RPEM. The response at a frequency between the lines of the excitation is determined where single parameters are not.
 
 use hoid_io::TableSchema;
@@ -9,7 +9,8 @@ use hoid_model::PolynomialModel;
 use hoid_track::{Method, Trace};
 
 use super::{
-    manifest::{Analysis, RunEntry},
+    analysis_settings::AnalysisSettings,
+    manifest::RunEntry,
     tables::{real, schema, text},
 };
 use crate::columns::{OPERATOR, Rows};
@@ -25,7 +26,7 @@ const CORRELATED: [&str; 4] = ["f1", "f2", "b0", "b1"];
 pub(super) struct TraceColumns {
     /// Those with a standard error: coefficients of RLS and of Box-Jenkins models, and the operator.
     pub parameters: Vec<String>,
-    /// Correlations, and the response where it is asked for.
+    /// Correlations, and the response at the frequencies of the manifest.
     pub others: Vec<String>,
     response_at_rad_s: Vec<f64>,
 }
@@ -36,7 +37,7 @@ pub(super) fn response_names(omega_rad_s: f64) -> [String; 2] {
 }
 
 impl TraceColumns {
-    pub fn of(analysis: &Analysis) -> Self {
+    pub fn of(analysis: &AnalysisSettings) -> Self {
         let fixed = ["a1", "a2", "b0", "b1", "f1", "f2"].map(str::to_owned);
         let d = (1..=analysis.nd.1.min(MOST_ND)).map(|i| format!("d{i}"));
         let correlations = pairs().map(|(i, j)| format!("correlation_{}_{}", CORRELATED[i], CORRELATED[j]));
@@ -59,7 +60,7 @@ impl TraceColumns {
             .collect()
     }
 
-    /// Those of which it is told how they settle.
+    /// Those whose settling times are computed.
     pub fn of_settling(&self) -> Vec<String> {
         let responses = self.others.iter().filter(|name| !name.starts_with("correlation"));
         self.parameters.iter().chain(responses).cloned().collect()

@@ -2,7 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::{Bands, Results, TraceSummary};
+use super::{
+    rows::{Bands, TraceSummary},
+    study_results::Results,
+};
 use crate::{
     Plan, TrueState,
     plan::{Cell, EstimatorCell, Task},

@@ -1,9 +1,12 @@
 //! Claims on batch fits of ARX(2, 2) models: bias by remnant order, delay and noise level.
 
 use super::{
-    At, Claim, DELAYS, DISCRETE, Evidence, HIGHER, LEVELS, NMS, ORDERS, Part, Source, TRUE_DELAY, Theme, bias_of, each,
-    measure::{Study, bias, linearity, med},
-    rules::{ACCEPTABLE, CLOSE, LARGE, LINEAR, MATTERS},
+    claim::{Claim, Source, Theme},
+    evidence::{Evidence, Study},
+    rules::{ACCEPTABLE, CLOSE, LARGE, LINEAR, MATTERS, Part},
+    settings::{DELAYS, DISCRETE, HIGHER, LEVELS, NMS, ORDERS, Setting, TRUE_DELAY, bias_of, settings},
+    statistics::{linearity, med, median_bias, share_of},
+    value::Value,
 };
 
 const PLANS: &[&str] = &["bias"];
@@ -84,7 +87,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "arx-only-gain-ideal",
         theme: Theme::BatchArx,
-        statement: "At the true delay \"only the HO gain K_e results achieve the ideal performance\" (ARX).",
+        statement: "Setting the true delay \"only the HO gain K_e results achieve the ideal performance\" (ARX).",
         place: "6.1.1, Fig. C.2",
         measure: "Magnitude of the median bias of K_e, and of T_L, omega_nm and zeta_nm, m0 = 2 to 4, C1, n_k* = 29.",
         plans: PLANS,
@@ -131,7 +134,7 @@ pub(super) const CLAIMS: &[Claim] = &[
 /// Magnitude of the median bias of some parameters, each with a test.
 fn biases(
     study: Study<'_>,
-    cells: &[At],
+    cells: &[Setting],
     names: &[&str],
     part: &mut Part,
     limit: f64,
@@ -152,9 +155,16 @@ fn biases(
 fn large_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("|median bias| beyond 25 %");
-    biases(study, &each(&["C1"], &[1], &LEVELS), &DISCRETE, &mut part, LARGE, true)?;
+    biases(
+        study,
+        &settings(&["C1"], &[1], &LEVELS),
+        &DISCRETE,
+        &mut part,
+        LARGE,
+        true,
+    )?;
     for name in DISCRETE {
-        let at = At {
+        let at = Setting {
             condition: "C1",
             m0: 1,
             level: 0.1,
@@ -170,7 +180,7 @@ fn large_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn b_around_fifty(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("|median bias| from 25 to 75 %");
-    for at in each(&["C1"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1"], &HIGHER, &LEVELS) {
         for name in ["b0", "b1"] {
             let found = study.median(&at.arx(&bias_of(name), TRUE_DELAY))?;
             part.around(at.label(name), found.abs(), 50.0);
@@ -186,7 +196,7 @@ fn a_acceptable(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut part = Part::new("|median bias| within 10 %");
     biases(
         evidence.study("bias")?,
-        &each(&["C1"], &HIGHER, &LEVELS),
+        &settings(&["C1"], &HIGHER, &LEVELS),
         &["a1", "a2"],
         &mut part,
         ACCEPTABLE,
@@ -200,7 +210,7 @@ fn linear_in_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for (orders, label) in [(&ORDERS[..1], "m0 = 1"), (&ORDERS[1..], "m0 >= 2")] {
         let mut part = Part::new(&format!("R^2 over n_k* at least 0.9, {label}"));
-        for at in each(&["C1"], orders, &LEVELS) {
+        for at in settings(&["C1"], orders, &LEVELS) {
             for name in DISCRETE {
                 let queries = DELAYS.map(|nk| at.arx(&bias_of(name), nk));
                 let found = study.of(&queries, &|s| linearity(&s.iter().map(|v| med(v)).collect::<Vec<_>>()))?;
@@ -215,16 +225,16 @@ fn linear_in_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn no_optimum(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("|median bias| at 29 less the smallest at another delay above 0");
-    for at in each(&["C1"], &ORDERS, &LEVELS) {
+    for at in settings(&["C1"], &ORDERS, &LEVELS) {
         for name in DISCRETE {
             let queries = DELAYS.map(|nk| at.arx(&bias_of(name), nk));
             let found = study.of(&queries, &|s| {
                 let others = s.iter().enumerate().filter(|(i, _)| DELAYS[*i] != TRUE_DELAY);
-                let best = others.map(|(_, v)| bias(v)).fold(f64::INFINITY, f64::min);
+                let best = others.map(|(_, v)| median_bias(v)).fold(f64::INFINITY, f64::min);
                 DELAYS
                     .iter()
                     .position(|nk| *nk == TRUE_DELAY)
-                    .map_or(f64::NAN, |i| bias(&s[i]))
+                    .map_or(f64::NAN, |i| median_bias(&s[i]))
                     - best
             })?;
             part.above(at.label(name), found, 0.0);
@@ -237,7 +247,7 @@ fn lead_and_lag(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut lower = Part::new("omega_nm at smaller n_k* lower than at 29");
     let mut higher = Part::new("omega_nm at n_k* = 30 higher than at 29");
-    for at in each(&["C1"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1"], &HIGHER, &LEVELS) {
         let omega = |nk| at.arx("bias_omega_nm", nk);
         for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
             let change = study.difference(&omega(nk), &omega(TRUE_DELAY))?;
@@ -254,8 +264,8 @@ fn lead_and_lag(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn more_noise(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("growth of |median bias| above 0");
-    for at in each(&["C1"], &ORDERS, &LEVELS[..2]) {
-        let more = At {
+    for at in settings(&["C1"], &ORDERS, &LEVELS[..2]) {
+        let more = Setting {
             level: if at.level < 0.15 { 0.2 } else { 0.3 },
             ..at
         };
@@ -271,7 +281,7 @@ fn null_without_remnant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut part = Part::new("|bias| within 0.001 %");
     biases(
         evidence.study("bias")?,
-        &each(&["C1", "C2"], &[1], &[0.0]),
+        &settings(&["C1", "C2"], &[1], &[0.0]),
         &DISCRETE,
         &mut part,
         1e-3,
@@ -282,7 +292,7 @@ fn null_without_remnant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn only_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let cells = each(&["C1"], &HIGHER, &LEVELS);
+    let cells = settings(&["C1"], &HIGHER, &LEVELS);
     let mut gain = Part::new("|median bias| of K_e within 5 %");
     biases(study, &cells, &["K_e"], &mut gain, CLOSE, false)?;
     let mut others = Part::new("|median bias| of T_L, omega_nm, zeta_nm beyond 5 %");
@@ -292,14 +302,14 @@ fn only_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 /// A size of the bias in C2 less that in C1, for the zero and for the neuromuscular parameters.
 pub(super) fn conditions(
-    size: &dyn Fn(At, &str) -> Result<super::Value, String>,
+    size: &dyn Fn(Setting, &str) -> Result<Value, String>,
     orders: &[usize],
 ) -> Result<Vec<Part>, String> {
     let mut worse = Part::new("K_e and T_L: bias in C2 less that in C1 above 0");
     let mut better = Part::new("omega_nm and zeta_nm: bias in C2 less that in C1 below 0");
-    for at in each(&["C1"], orders, &LEVELS) {
+    for at in settings(&["C1"], orders, &LEVELS) {
         let change = |name: &str| {
-            let [first, second] = ["C1", "C2"].map(|condition| size(At { condition, ..at }, &bias_of(name)));
+            let [first, second] = ["C1", "C2"].map(|condition| size(Setting { condition, ..at }, &bias_of(name)));
             Ok::<_, String>(second?.minus(first?))
         };
         for name in ["K_e", "T_L"] {
@@ -323,12 +333,12 @@ fn second_condition(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn poles_by_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("change of the median bias of omega_nm with m0 below 0");
-    for at in each(&["C1", "C2"], &HIGHER[1..], &LEVELS) {
+    for at in settings(&["C1", "C2"], &HIGHER[1..], &LEVELS) {
         let [lower, higher] =
-            [at.m0 - 1, at.m0].map(|m0| study.median(&At { m0, ..at }.arx("bias_omega_nm", TRUE_DELAY)));
+            [at.m0 - 1, at.m0].map(|m0| study.median(&Setting { m0, ..at }.arx("bias_omega_nm", TRUE_DELAY)));
         part.below(at.label(""), higher?.minus(lower?), 0.0);
     }
-    for at in each(&["C1"], &HIGHER, &[0.1]) {
+    for at in settings(&["C1"], &HIGHER, &[0.1]) {
         part.show(
             format!("median bias of omega_nm at m0 = {}, P_n = 0.1, C1, %", at.m0),
             study.median(&at.arx("bias_omega_nm", TRUE_DELAY))?,
@@ -340,8 +350,8 @@ fn poles_by_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn zero_by_noise(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("growth of the median T_L with the noise level above 0.1 %");
-    for at in each(&["C1"], &HIGHER, &LEVELS[..2]) {
-        let more = At {
+    for at in settings(&["C1"], &HIGHER, &LEVELS[..2]) {
+        let more = Setting {
             level: if at.level < 0.15 { 0.2 } else { 0.3 },
             ..at
         };
@@ -354,13 +364,13 @@ fn zero_by_noise(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn poles_missed(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("share of fits without the poles above 0.9");
-    for at in each(&["C1", "C2"], &[1], &LEVELS) {
+    for at in settings(&["C1", "C2"], &[1], &LEVELS) {
         let omega = study.sample(&at.arx("bias_omega_nm", TRUE_DELAY))?;
         let missed: Vec<f64> = omega
             .iter()
             .map(|bias| f64::from(u8::from(bias.is_nan() || bias.abs() > LARGE)))
             .collect();
-        part.above(at.label(""), super::measure::share_of(&missed), 0.9);
+        part.above(at.label(""), share_of(&missed), 0.9);
     }
     Ok(vec![part])
 }

@@ -1,11 +1,13 @@
 //! Claims on batch fits of Box-Jenkins models with m* = m0: bias by remnant order, delay and noise level.
 
 use super::{
-    At, Claim, DELAYS, DISCRETE, Evidence, HIGHER, LEVELS, ORDERS, Part, Source, TRUE_DELAY, Theme,
     batch_arx::conditions,
-    bias_of, each,
-    measure::{linearity, med},
-    rules::{ACCEPTABLE, CLOSE, LARGE, LINEAR},
+    claim::{Claim, Source, Theme},
+    evidence::Evidence,
+    rules::{ACCEPTABLE, CLOSE, LARGE, LINEAR, Part},
+    settings::{DELAYS, DISCRETE, HIGHER, LEVELS, ORDERS, Setting, TRUE_DELAY, WITHOUT_REMNANT, bias_of, settings},
+    statistics::{linearity, med},
+    value::Value,
 };
 
 const PLANS: &[&str] = &["bias"];
@@ -106,9 +108,9 @@ pub(super) const CLAIMS: &[Claim] = &[
 fn all_orders(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("|difference of the median bias to that at m0 = 1| within 5 points");
-    for at in each(&["C1", "C2"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1", "C2"], &HIGHER, &LEVELS) {
         for name in DISCRETE {
-            let first = study.median(&At { m0: 1, ..at }.bj(&bias_of(name), 1, TRUE_DELAY))?;
+            let first = study.median(&Setting { m0: 1, ..at }.bj(&bias_of(name), 1, TRUE_DELAY))?;
             let found = study.median(&at.bj(&bias_of(name), at.m0, TRUE_DELAY))?;
             part.below(at.label(name), found.minus(first).abs(), CLOSE);
         }
@@ -119,7 +121,7 @@ fn all_orders(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn close_to_zero(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("|median bias| within 5 %");
-    for at in each(&["C1"], &ORDERS, &LEVELS) {
+    for at in settings(&["C1"], &ORDERS, &LEVELS) {
         for name in DISCRETE {
             part.below(
                 at.label(name),
@@ -136,11 +138,11 @@ fn around_noise_free(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for (is_true, label) in [(true, "n_k* = 29"), (false, "other n_k*")] {
         let mut part = Part::new(&format!("|median bias less that at P_n = 0| within 5 points, {label}"));
-        for at in each(&["C1"], &ORDERS, &LEVELS) {
+        for at in settings(&["C1"], &ORDERS, &LEVELS) {
             for nk in DELAYS.into_iter().filter(|nk| (*nk == TRUE_DELAY) == is_true) {
                 for name in DISCRETE {
-                    let fit = |at: At| study.median(&at.bj(&bias_of(name), at.m0, nk));
-                    let change = fit(at)?.minus(fit(At { level: 0.0, ..at })?);
+                    let fit = |at: Setting| study.median(&at.bj(&bias_of(name), at.m0, nk));
+                    let change = fit(at)?.minus(fit(Setting { level: 0.0, ..at })?);
                     part.below(at.label(&format!("n_k* = {nk}, {name}")), change.abs(), CLOSE);
                 }
             }
@@ -153,7 +155,7 @@ fn around_noise_free(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn linear_in_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("R^2 over n_k* at least 0.9");
-    for at in each(&["C1"], &ORDERS, &LEVELS) {
+    for at in settings(&["C1"], &ORDERS, &LEVELS) {
         for name in DISCRETE {
             let queries = DELAYS.map(|nk| at.bj(&bias_of(name), at.m0, nk));
             let found = study.of(&queries, &|s| linearity(&s.iter().map(|v| med(v)).collect::<Vec<_>>()))?;
@@ -167,7 +169,7 @@ fn lead_and_lag(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut lower = Part::new("omega_nm at smaller n_k* lower than at 29");
     let mut higher = Part::new("omega_nm at n_k* = 30 higher than at 29");
-    for at in each(&["C1"], &ORDERS, &LEVELS) {
+    for at in settings(&["C1"], &ORDERS, &LEVELS) {
         let omega = |nk| at.bj("bias_omega_nm", at.m0, nk);
         for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
             let change = study.difference(&omega(nk), &omega(TRUE_DELAY))?;
@@ -184,7 +186,7 @@ fn lead_and_lag(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn almost_exact(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("median response_error within 10 %");
-    for at in each(&["C1"], &ORDERS, &LEVELS) {
+    for at in settings(&["C1"], &ORDERS, &LEVELS) {
         part.below(
             at.label(""),
             study.median(&at.bj("response_error", 1, TRUE_DELAY))?,
@@ -194,27 +196,20 @@ fn almost_exact(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![part])
 }
 
-/// Without remnant there is one record, whatever m0.
-pub(super) const SILENT: At = At {
-    condition: "C1",
-    m0: 1,
-    level: 0.0,
-};
-
 fn second_order_worst(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("response_error of m* = 2 less the largest of the others above 0");
     for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
-        let queries = ORDERS.map(|m| SILENT.bj("response_error", m, nk));
+        let queries = ORDERS.map(|m| WITHOUT_REMNANT.bj("response_error", m, nk));
         let found = study.of(&queries, &|s| {
             med(&s[1]) - [0, 2, 3].map(|i| med(&s[i])).into_iter().fold(f64::MIN, f64::max)
         })?;
-        part.above(SILENT.label(&format!("n_k* = {nk}")), found, 0.0);
+        part.above(WITHOUT_REMNANT.label(&format!("n_k* = {nk}")), found, 0.0);
     }
     for m in ORDERS {
         part.show(
             format!("response_error of m* = {m} at n_k* = 25, %"),
-            study.median(&SILENT.bj("response_error", m, 25))?,
+            study.median(&WITHOUT_REMNANT.bj("response_error", m, 25))?,
         );
     }
     Ok(vec![part])
@@ -225,10 +220,10 @@ fn remnant(
     evidence: &Evidence<'_>,
     name: &str,
     mut part: Part,
-    test: &dyn Fn(&mut Part, String, super::Value),
+    test: &dyn Fn(&mut Part, String, Value),
 ) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    for at in each(&["C1"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1"], &HIGHER, &LEVELS) {
         let found = study.median(&at.bj(&format!("bias_{name}_backward_euler"), at.m0, TRUE_DELAY))?;
         test(&mut part, at.label(""), found.abs());
         if at.level == 0.1 {

@@ -1,11 +1,11 @@
 //! Claims on batch fits of Box-Jenkins models with m* = m0 against those of ARX models.
 
 use super::{
-    At, Claim, DELAYS, DISCRETE, Evidence, HIGHER, LEVELS, ORDERS, Part, Source, TRUE_DELAY, Theme,
-    batch_bj::SILENT,
-    bias_of, each,
-    measure::{med, size},
-    rules::QUARTER,
+    claim::{Claim, Source, Theme},
+    evidence::Evidence,
+    rules::{Part, QUARTER},
+    settings::{DELAYS, DISCRETE, HIGHER, LEVELS, ORDERS, Setting, TRUE_DELAY, WITHOUT_REMNANT, bias_of, settings},
+    statistics::{med, median_magnitude},
 };
 
 const PLANS: &[&str] = &["bias"];
@@ -70,12 +70,12 @@ pub(super) const CLAIMS: &[Claim] = &[
 fn reduced_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("median |bias| of BJ over that of ARX below 0.25");
-    for at in each(&["C1"], &[1], &LEVELS) {
+    for at in settings(&["C1"], &[1], &LEVELS) {
         for name in DISCRETE {
             let queries = [at.bj(&bias_of(name), 1, TRUE_DELAY), at.arx(&bias_of(name), TRUE_DELAY)];
             part.below(
                 at.label(name),
-                study.of(&queries, &|s| size(&s[0]) / size(&s[1]))?,
+                study.of(&queries, &|s| median_magnitude(&s[0]) / median_magnitude(&s[1]))?,
                 QUARTER,
             );
         }
@@ -86,12 +86,12 @@ fn reduced_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> 
 fn fifty_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("median |bias| of ARX over that of BJ from 25 to 75");
-    for at in each(&["C1"], &[1], &LEVELS) {
+    for at in settings(&["C1"], &[1], &LEVELS) {
         for name in DISCRETE {
             let queries = [at.bj(&bias_of(name), 1, TRUE_DELAY), at.arx(&bias_of(name), TRUE_DELAY)];
             part.around(
                 at.label(name),
-                study.of(&queries, &|s| size(&s[1]) / size(&s[0]))?,
+                study.of(&queries, &|s| median_magnitude(&s[1]) / median_magnitude(&s[0]))?,
                 50.0,
             );
         }
@@ -102,8 +102,8 @@ fn fifty_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn more_robust(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("|change| of BJ less that of ARX below 0");
-    for at in each(&["C1"], &ORDERS, &[0.1]) {
-        let noisy = At { level: 0.3, ..at };
+    for at in settings(&["C1"], &ORDERS, &[0.1]) {
+        let noisy = Setting { level: 0.3, ..at };
         for name in DISCRETE {
             let name_of_bias = bias_of(name);
             let queries = [
@@ -124,13 +124,15 @@ fn more_robust(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn half_the_error(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("reduction of the median |bias| from 25 to 75 %");
-    for at in each(&["C1"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1"], &HIGHER, &LEVELS) {
         for name in DISCRETE {
             let queries = [
                 at.bj(&bias_of(name), at.m0, TRUE_DELAY),
                 at.arx(&bias_of(name), TRUE_DELAY),
             ];
-            let found = study.of(&queries, &|s| 100.0 * (1.0 - size(&s[0]) / size(&s[1])))?;
+            let found = study.of(&queries, &|s| {
+                100.0 * (1.0 - median_magnitude(&s[0]) / median_magnitude(&s[1]))
+            })?;
             part.around(at.label(name), found, 50.0);
         }
     }
@@ -140,7 +142,7 @@ fn half_the_error(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn outperforms(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("response_error of BJ less that of ARX below 0");
-    for at in each(&["C1", "C2"], &ORDERS, &LEVELS) {
+    for at in settings(&["C1", "C2"], &ORDERS, &LEVELS) {
         let pair = [
             at.bj("response_error", at.m0, TRUE_DELAY),
             at.arx("response_error", TRUE_DELAY),
@@ -154,10 +156,14 @@ fn worse_without_remnant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("response_error of BJ less that of ARX above 0");
     for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
-        let arx = study.median(&SILENT.arx("response_error", nk))?;
+        let arx = study.median(&WITHOUT_REMNANT.arx("response_error", nk))?;
         for m in ORDERS {
-            let bj = study.median(&SILENT.bj("response_error", m, nk))?;
-            part.above(SILENT.label(&format!("m* = {m}, n_k* = {nk}")), bj.minus(arx), 0.0);
+            let bj = study.median(&WITHOUT_REMNANT.bj("response_error", m, nk))?;
+            part.above(
+                WITHOUT_REMNANT.label(&format!("m* = {m}, n_k* = {nk}")),
+                bj.minus(arx),
+                0.0,
+            );
         }
     }
     Ok(vec![part])

@@ -1,6 +1,6 @@
 //! Claims for which there are no data here.
 
-use super::{Claim, Source, Theme};
+use super::claim::{Claim, Source, Theme};
 
 const NO_SUBJECTS: &str = "it is about recordings of three subjects in a simulator, which are not public";
 
@@ -12,7 +12,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "VI; VII",
         measure: "Not measured.",
         plans: &[],
-        source: Source::Nowhere(NO_SUBJECTS),
+        source: Source::Untested(NO_SUBJECTS),
     },
     Claim {
         id: "experiment-less-clear",
@@ -21,7 +21,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "VI; VIII",
         measure: "Not measured.",
         plans: &[],
-        source: Source::Nowhere(NO_SUBJECTS),
+        source: Source::Untested(NO_SUBJECTS),
     },
     Claim {
         id: "experiment-fluctuations",
@@ -30,6 +30,6 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "VI; VIII",
         measure: "Not measured.",
         plans: &[],
-        source: Source::Nowhere(NO_SUBJECTS),
+        source: Source::Untested(NO_SUBJECTS),
     },
 ];

@@ -1,11 +1,12 @@
 //! Claims on the start of Box-Jenkins searches (Table 6.1), m* = m0, condition C1.
 
 use super::{
-    At, Claim, DISCRETE, Evidence, LEVELS, ORDERS, Part, Source, Theme, Value, bias_of, each,
-    measure::{Study, jackknife, median_of, share_of},
-    recursive_arx::RECURSIVE_LEVELS,
-    rules::{CLOSE, LARGE, MATTERS},
-    with_f,
+    claim::{Claim, Source, Theme},
+    evidence::{Evidence, Study},
+    rules::{CLOSE, LARGE, MATTERS, Part},
+    settings::{DISCRETE, LEVELS, ORDERS, RECURSIVE_LEVELS, Setting, bias_of, settings, with_f},
+    statistics::{jackknife, median_of, share_of},
+    value::Value,
 };
 use hoid_study::Query;
 
@@ -71,12 +72,12 @@ pub(super) const CLAIMS: &[Claim] = &[
 const STARTS: [&str; 8] = ["IC1", "IC2", "IC3", "IC4", "IC5", "IC6", "IC7", "IC8"];
 const IC_DELAYS: [usize; 5] = [26, 27, 28, 29, 30];
 
-fn fit(at: At, quantity: &str, nk: usize, start: &str) -> Query {
+fn fit(at: Setting, quantity: &str, nk: usize, start: &str) -> Query {
     at.query(&with_f(quantity)).name("BJ").nk(nk).start(start)
 }
 
 /// Differences of the bias to that of the base start, points of %.
-fn differences(study: Study<'_>, at: At, name: &str, nk: usize, start: &str) -> Result<Vec<f64>, String> {
+fn differences(study: Study<'_>, at: Setting, name: &str, nk: usize, start: &str) -> Result<Vec<f64>, String> {
     let of = |start: &str| study.sample(&fit(at, &bias_of(name), nk, start));
     Ok(of(start)?.iter().zip(&of("base")?).map(|(a, b)| a - b).collect())
 }
@@ -84,7 +85,7 @@ fn differences(study: Study<'_>, at: At, name: &str, nk: usize, start: &str) -> 
 fn medians(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("initial-conditions")?;
     let mut part = Part::new("|median difference| within 5 points");
-    for at in each(&["C1"], &ORDERS, &LEVELS) {
+    for at in settings(&["C1"], &ORDERS, &LEVELS) {
         for start in STARTS {
             for nk in IC_DELAYS {
                 for name in DISCRETE {
@@ -102,7 +103,7 @@ fn single_runs(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut part = Part::new("share of differences beyond 25 points above 0.001");
     for start in STARTS {
         let mut beyond = Vec::new();
-        for at in each(&["C1"], &ORDERS, &LEVELS) {
+        for at in settings(&["C1"], &ORDERS, &LEVELS) {
             for nk in IC_DELAYS {
                 let found = differences(study, at, "b0", nk, start)?;
                 beyond.extend(found.iter().map(|d| f64::from(u8::from(d.abs() > LARGE))));
@@ -121,7 +122,7 @@ fn mean_size(values: &[f64]) -> f64 {
 fn poles_matter(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("initial-conditions")?;
     let mut part = Part::new("mean |difference| from starts with other a less that with other b above 0.1 points");
-    for at in each(&["C1"], &ORDERS, &LEVELS) {
+    for at in settings(&["C1"], &ORDERS, &LEVELS) {
         for nk in IC_DELAYS {
             for name in ["b0", "b1"] {
                 let of = |start| differences(study, at, name, nk, start);
@@ -140,7 +141,7 @@ fn poles_matter(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn third_improves(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("initial-conditions")?;
     let mut part = Part::new("mean difference of |bias|, IC3 less base, below -0.1 points");
-    for at in each(&["C1"], &ORDERS, &LEVELS) {
+    for at in settings(&["C1"], &ORDERS, &LEVELS) {
         for name in DISCRETE {
             let of = |start| fit(at, &bias_of(name), 29, start);
             let found = study.of(&[of("IC3"), of("base")], &|s| mean_size(&s[0]) - mean_size(&s[1]))?;
@@ -155,7 +156,7 @@ fn convergence(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut part = Part::new("share of searches that do not converge above 0.01");
     for start in STARTS {
         let mut open = Vec::new();
-        for at in each(&["C1"], &ORDERS, &LEVELS) {
+        for at in settings(&["C1"], &ORDERS, &LEVELS) {
             for nk in IC_DELAYS {
                 open.extend(
                     study
@@ -176,7 +177,7 @@ fn from_ols(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut part = Part::new("share of fits from OLS that go wrong above 0.01");
     for name in ["PEM first", "PEM last"] {
         let mut wrong = Vec::new();
-        for at in each(&["C1", "C2", "C3", "C4", "C5", "C6"], &[1], &RECURSIVE_LEVELS) {
+        for at in settings(&["C1", "C2", "C3", "C4", "C5", "C6"], &[1], &RECURSIVE_LEVELS) {
             let converged = study.sample(&at.query("converged").name(name))?;
             let f1 = study.sample(&at.query("f1").name(name))?;
             // No condition changes the poles.

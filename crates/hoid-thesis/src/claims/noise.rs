@@ -1,6 +1,11 @@
 //! Claims on the noise level, the remnant time constant and the sample time.
 
-use super::{Claim, DISCRETE, Evidence, HIGHER, ORDERS, Part, Source, Theme, bias_of, each, rules::CLOSE, with_f};
+use super::{
+    claim::{Claim, Source, Theme},
+    evidence::Evidence,
+    rules::{CLOSE, Part},
+    settings::{DISCRETE, HIGHER, ORDERS, bias_of, settings, with_f},
+};
 use hoid_study::Query;
 
 pub(super) const CLAIMS: &[Claim] = &[
@@ -45,7 +50,7 @@ pub(super) const CLAIMS: &[Claim] = &[
 fn mean_level(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("noise-level")?;
     let mut part = Part::new("|mean obtained less demanded level| within 0.02");
-    for at in each(&["C1"], &ORDERS, &demanded()) {
+    for at in settings(&["C1"], &ORDERS, &demanded()) {
         let mut found = study.mean(&at.query("noise_level_obtained"))?;
         found.value -= at.level;
         part.below(at.label(""), found.abs(), 0.02);
@@ -56,7 +61,7 @@ fn mean_level(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn scatter_of_level(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("noise-level")?;
     let mut part = Part::new("standard deviation of the obtained level within 0.05");
-    for at in each(&["C1"], &ORDERS, &demanded()) {
+    for at in settings(&["C1"], &ORDERS, &demanded()) {
         let found = study.of(&[at.query("noise_level_obtained")], &|s| {
             hoid_study::Statistics::of(&s[0]).sd
         })?;
@@ -75,7 +80,7 @@ fn time_constant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for (name, orders) in [("BJ", &ORDERS[..]), ("ARX", &HIGHER[..])] {
         let mut part = Part::new(&format!("{name}: |change of the median bias| within 5 points"));
-        for at in each(&["C1", "C2"], orders, &[0.1, 0.3]) {
+        for at in settings(&["C1", "C2"], orders, &[0.1, 0.3]) {
             for coefficient in DISCRETE {
                 let quantity = bias_of(&if name == "BJ" {
                     with_f(coefficient)

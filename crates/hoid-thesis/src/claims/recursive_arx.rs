@@ -1,13 +1,12 @@
 //! Claims on recursive least squares of ARX models, with a factor (V.B) and with a matrix (6.2.1) of forgetting.
 
 use super::{
-    At, Claim, DISCRETE, Evidence, HIGHER, LEVELS, NMS, Part, Source, Theme, bias_of, each,
-    measure::med,
-    rules::{ACCEPTABLE, CLOSE, LARGE, QUARTER},
+    claim::{Claim, Source, Theme},
+    evidence::Evidence,
+    rules::{ACCEPTABLE, CLOSE, LARGE, Part, QUARTER},
+    settings::{DISCRETE, HIGHER, LEVELS, NMS, RECURSIVE_LEVELS, Setting, bias_of, settings, with_f},
+    statistics::med,
 };
-
-/// Noise levels of the plan of V.B.
-pub(super) const RECURSIVE_LEVELS: [f64; 3] = [0.01, 0.1, 0.2];
 
 pub(super) const CLAIMS: &[Claim] = &[
     Claim {
@@ -88,12 +87,12 @@ fn large_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut arx = Part::new("RLS: |bias of the median trace| beyond 25 %");
     let mut bj = Part::new("RPEM: |bias of the median trace| within 5 %");
-    for at in each(&["C4"], &[1], &RECURSIVE_LEVELS) {
+    for at in settings(&["C4"], &[1], &RECURSIVE_LEVELS) {
         for name in DISCRETE {
             arx.above(at.label(name), study.trace_bias(&at.rls(""), name)?.abs(), LARGE);
             bj.below(
                 at.label(name),
-                study.trace_bias(&at.rpem(""), &super::with_f(name))?.abs(),
+                study.trace_bias(&at.rpem(""), &with_f(name))?.abs(),
                 CLOSE,
             );
         }
@@ -105,8 +104,8 @@ fn ten_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut discrete = Part::new("coefficients: bias at m0 = 1 over that at higher m0 from 5 to 15");
     let mut nms = Part::new("omega_nm and zeta_nm: RMS error at m0 = 1 over that at higher m0 from 5 to 15");
-    for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
-        let first = At { m0: 1, ..at };
+    for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+        let first = Setting { m0: 1, ..at };
         for name in DISCRETE {
             let [reference, found] = [first, at].map(|at| study.trace_bias(&at.rls(""), name));
             discrete.around(at.label(name), reference?.abs().over(found?.abs()), 10.0);
@@ -122,7 +121,7 @@ fn ten_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn persistent(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut part = Part::new("|bias of the median trace| beyond 5 %");
-    for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+    for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
         for name in NMS {
             part.above(at.label(name), study.trace_bias(&at.rls(""), name)?.abs(), CLOSE);
         }
@@ -134,11 +133,11 @@ fn like_batch(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut arx = Part::new("|RLS less OLS| within 5 points");
     let mut bj = Part::new("|RPEM less PEM| within 5 points");
-    for at in each(&["C4"], &[1, 2, 3, 4], &RECURSIVE_LEVELS) {
+    for at in settings(&["C4"], &[1, 2, 3, 4], &RECURSIVE_LEVELS) {
         for name in DISCRETE {
-            let with_f = super::with_f(name);
+            let with_f_name = with_f(name);
             let ols = study.median(&at.query(&bias_of(name)).name("OLS last"))?;
-            let pem = study.median(&at.query(&bias_of(&with_f)).name("PEM last"))?;
+            let pem = study.median(&at.query(&bias_of(&with_f_name)).name("PEM last"))?;
             arx.below(
                 at.label(name),
                 study.trace_bias(&at.rls(""), name)?.minus(ols).abs(),
@@ -146,7 +145,7 @@ fn like_batch(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
             );
             bj.below(
                 at.label(name),
-                study.trace_bias(&at.rpem(""), &with_f)?.minus(pem).abs(),
+                study.trace_bias(&at.rpem(""), &with_f_name)?.minus(pem).abs(),
                 CLOSE,
             );
         }
@@ -158,7 +157,7 @@ fn violates(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive-arx")?;
     let mut first = Part::new("m0 = 1: share that does not convert above 0.25");
     let mut others = Part::new("m0 >= 2: share that does not convert below 0.01");
-    for at in each(&["C3"], &[1, 2, 3, 4], &LEVELS) {
+    for at in settings(&["C3"], &[1, 2, 3, 4], &LEVELS) {
         let found = study.median(&at.rls("share_not_convertible"))?;
         match at.m0 {
             1 => first.above(at.label(""), found, 0.25),
@@ -172,7 +171,7 @@ fn gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive-arx")?;
     let mut first = Part::new("m0 = 1: |median bias of (b0 + b1) / (1 + a1 + a2) at the end| within 10 %");
     let mut others = Part::new("m0 >= 2: |bias of the median trace of K_e| within 10 %");
-    for at in each(&["C3"], &[1], &LEVELS) {
+    for at in settings(&["C3"], &[1], &LEVELS) {
         let queries = DISCRETE.map(|name| at.rls(name));
         let k_e = study.truth(&queries[0])?.operator[0];
         let found = study.of(&queries, &|s| {
@@ -183,7 +182,7 @@ fn gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         })?;
         first.below(at.label(""), found.abs(), ACCEPTABLE);
     }
-    for at in each(&["C3"], &HIGHER, &LEVELS) {
+    for at in settings(&["C3"], &HIGHER, &LEVELS) {
         others.below(at.label(""), study.trace_bias(&at.rls(""), "K_e")?.abs(), ACCEPTABLE);
     }
     Ok(vec![first, others])
@@ -192,9 +191,9 @@ fn gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn heavily_reduced(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive-arx")?;
     let mut part = Part::new("|bias| at higher m0 over that at m0 = 1 below 0.25");
-    for at in each(&["C3"], &HIGHER, &LEVELS) {
+    for at in settings(&["C3"], &HIGHER, &LEVELS) {
         for name in DISCRETE {
-            let [reference, found] = [At { m0: 1, ..at }, at].map(|at| study.trace_bias(&at.rls(""), name));
+            let [reference, found] = [Setting { m0: 1, ..at }, at].map(|at| study.trace_bias(&at.rls(""), name));
             part.below(at.label(name), found?.abs().over(reference?.abs()), QUARTER);
         }
     }
@@ -204,8 +203,8 @@ fn heavily_reduced(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn more_noise(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive-arx")?;
     let mut part = Part::new("growth of |bias| with the noise level above 0");
-    for at in each(&["C3"], &HIGHER, &LEVELS[..2]) {
-        let more = At {
+    for at in settings(&["C3"], &HIGHER, &LEVELS[..2]) {
+        let more = Setting {
             level: if at.level < 0.15 { 0.2 } else { 0.3 },
             ..at
         };

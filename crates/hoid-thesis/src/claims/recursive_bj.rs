@@ -1,8 +1,12 @@
 //! Claims on the recursive prediction-error method of BJ(m* = 1), and against recursive least squares.
 
 use super::{
-    At, Claim, DISCRETE, Evidence, HIGHER, NMS, ORDERS, Part, Source, Theme, each, measure::share_of,
-    recursive_arx::RECURSIVE_LEVELS, rules::ACCEPTABLE, with_f,
+    claim::{Claim, Source, Theme},
+    evidence::{Evidence, Study},
+    rules::{ACCEPTABLE, Part},
+    settings::{DISCRETE, HIGHER, NMS, ORDERS, RECURSIVE_LEVELS, Setting, settings, with_f},
+    statistics::{med, share_of},
+    value::Value,
 };
 use hoid_study::Query;
 
@@ -132,7 +136,7 @@ pub(super) const CLAIMS: &[Claim] = &[
 fn less_bias(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut part = Part::new("|bias| of RLS less that of RPEM above 0");
-    for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+    for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
         for name in DISCRETE {
             let rls = study.trace_bias(&at.rls(""), name)?.abs();
             let rpem = study.trace_bias(&at.rpem(""), &with_f(name))?.abs();
@@ -147,7 +151,7 @@ fn five_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for name in GAINS {
         let mut part = Part::new(&format!("settling time of {name}, RPEM over RLS, from 2.5 to 7.5"));
-        for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+        for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.settling(&query, name));
             let (rls, rpem) = (rls?, rpem?);
             part.around(at.label(""), rpem.over(rls), 5.0);
@@ -166,7 +170,7 @@ fn slower(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for name in GAINS {
         let mut part = Part::new(&format!("settling time of {name}, RPEM less RLS, above 0 s"));
-        for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+        for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.settling(&query, name));
             part.above(at.label(""), rpem?.minus(rls?), 0.0);
         }
@@ -185,7 +189,7 @@ fn diverges(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     );
     let mut oscillates = Part::new("share of runs with an RMS error of T_L beyond 100 % above 0.001");
     let mut beyond = Vec::new();
-    for at in each(&["C1", "C2", "C3", "C4", "C5", "C6"], &ORDERS, &RECURSIVE_LEVELS) {
+    for at in settings(&["C1", "C2", "C3", "C4", "C5", "C6"], &ORDERS, &RECURSIVE_LEVELS) {
         let errors = study.sample(&at.rpem("rms_T_L"))?;
         beyond.extend(
             errors
@@ -198,7 +202,7 @@ fn diverges(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 }
 
 /// RMS error of a trace by RPEM less that by RLS, of the same runs.
-fn rms(study: super::measure::Study<'_>, at: At, name: &str) -> Result<super::Value, String> {
+fn rms(study: Study<'_>, at: Setting, name: &str) -> Result<Value, String> {
     let quantity = format!("rms_{name}");
     study.difference(&at.rpem(&quantity), &at.rls(&quantity))
 }
@@ -207,7 +211,7 @@ fn better_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut gains = Part::new("K_e, T_L, K_e_dot: RMS error of RPEM less that of RLS above 0");
     let mut nms = Part::new("omega_nm, zeta_nm: RMS error of RPEM less that of RLS below 0");
-    for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+    for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
         for name in GAINS {
             gains.above(at.label(name), rms(study, at, name)?, 0.0);
         }
@@ -222,7 +226,7 @@ fn zero_to_five(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut bias = Part::new("|bias| of RPEM less that of RLS from 0 to 5 points");
     let mut error = Part::new("RMS error of RPEM less that of RLS from 0 to 5 points");
-    for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+    for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
         for name in ["K_e", "T_L"] {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.trace_bias(&query, name));
             bias.between(at.label(name), rpem?.abs().minus(rls?.abs()), 0.0, 5.0);
@@ -236,7 +240,7 @@ fn nms_error(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut bias = Part::new("|bias| of RPEM less that of RLS from -37.5 to -12.5 points");
     let mut error = Part::new("RMS error of RPEM less that of RLS from -37.5 to -12.5 points");
-    for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+    for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
         for name in NMS {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.trace_bias(&query, name));
             bias.between(at.label(name), rpem?.abs().minus(rls?.abs()), -37.5, -12.5);
@@ -251,7 +255,7 @@ fn first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for (names, label) in [(&GAINS[..], "K_e, T_L, K_e_dot"), (&NMS[..], "omega_nm, zeta_nm")] {
         let mut part = Part::new(&format!("{label}: RMS error of RPEM less that of RLS below 0"));
-        for at in each(&["C1", "C2", "C3", "C4", "C5", "C6"], &[1], &RECURSIVE_LEVELS) {
+        for at in settings(&["C1", "C2", "C3", "C4", "C5", "C6"], &[1], &RECURSIVE_LEVELS) {
             for name in names {
                 part.below(at.label(name), rms(study, at, name)?, 0.0);
             }
@@ -264,9 +268,8 @@ fn first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn oscillates(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut part = Part::new("RMS error of T_L less the larger of K_e and K_e_dot above 0");
-    for at in each(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+    for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
         let queries = ["rms_T_L", "rms_K_e", "rms_K_e_dot"].map(|quantity| at.rpem(quantity));
-        let med = super::measure::med;
         part.above(
             at.label(""),
             study.of(&queries, &|s| med(&s[0]) - med(&s[1]).max(med(&s[2])))?,
@@ -279,10 +282,9 @@ fn oscillates(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn coupling(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut part = Part::new("RMS error at m0 = 2 less the larger of m0 = 3 and 4 above 0");
-    for at in each(&["C4"], &[2], &RECURSIVE_LEVELS) {
+    for at in settings(&["C4"], &[2], &RECURSIVE_LEVELS) {
         for name in GAINS.into_iter().chain(NMS) {
-            let queries = HIGHER.map(|m0| At { m0, ..at }.rpem(&format!("rms_{name}")));
-            let med = super::measure::med;
+            let queries = HIGHER.map(|m0| Setting { m0, ..at }.rpem(&format!("rms_{name}")));
             part.above(
                 at.label(name),
                 study.of(&queries, &|s| med(&s[0]) - med(&s[1]).max(med(&s[2])))?,
@@ -298,7 +300,7 @@ fn tracks(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for name in GAINS {
         let mut part = Part::new(&format!("{name}: |bias of the median trace| within 10 %"));
-        for at in each(&["C3", "C4", "C5", "C6"], &[1, 2, 3, 4], &RECURSIVE_LEVELS) {
+        for at in settings(&["C3", "C4", "C5", "C6"], &[1, 2, 3, 4], &RECURSIVE_LEVELS) {
             part.below(at.label(""), study.trace_bias(&at.rpem(""), name)?.abs(), ACCEPTABLE);
         }
         parts.push(part);
@@ -309,10 +311,11 @@ fn tracks(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn second_state(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut part = Part::new("RMS error in C2 less that in C1 above 0");
-    for at in each(&["C1"], &[1, 2, 3, 4], &RECURSIVE_LEVELS) {
+    for at in settings(&["C1"], &[1, 2, 3, 4], &RECURSIVE_LEVELS) {
         for name in ["K_e", "T_L"] {
             let quantity = format!("rms_{name}");
-            let [first, second] = ["C1", "C2"].map(|condition| study.median(&At { condition, ..at }.rpem(&quantity)));
+            let [first, second] =
+                ["C1", "C2"].map(|condition| study.median(&Setting { condition, ..at }.rpem(&quantity)));
             part.above(at.label(name), second?.minus(first?), 0.0);
         }
     }
@@ -322,7 +325,7 @@ fn second_state(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn matrix(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("forgetting")?;
     let mut part = Part::new("RMS error with matrix less that with factor below 0");
-    for at in each(&["C3", "C4", "C5", "C6"], &[1, 2, 3, 4], &[0.1]) {
+    for at in settings(&["C3", "C4", "C5", "C6"], &[1, 2, 3, 4], &[0.1]) {
         for name in NMS {
             let quantity = format!("rms_{name}");
             let [matrix, factor] = ["RPEM, matrix", "RPEM, factor"].map(|of| at.query(&quantity).name(of));

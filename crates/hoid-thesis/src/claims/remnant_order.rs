@@ -1,10 +1,12 @@
 //! Claims on the order m* of the noise model of Box-Jenkins models.
 
 use super::{
-    At, Claim, DELAYS, DISCRETE, Evidence, HIGHER, LEVELS, NMS, ORDERS, Part, Source, TRUE_DELAY, Theme, Value,
-    bias_of, each,
-    measure::{bias, med, range, size, spread},
-    rules::{CLOSE, LARGE, MATTERS},
+    claim::{Claim, Source, Theme},
+    evidence::Evidence,
+    rules::{CLOSE, LARGE, MATTERS, Part},
+    settings::{DELAYS, DISCRETE, HIGHER, LEVELS, NMS, ORDERS, Setting, TRUE_DELAY, bias_of, settings},
+    statistics::{interquartile_range, mean_of, med, median_bias, median_magnitude, spread},
+    value::Value,
 };
 
 const PLANS: &[&str] = &["bias"];
@@ -22,7 +24,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "vaf-lower-with-m4-at-m1",
         theme: Theme::RemnantOrder,
-        statement: "At m0 = 1 \"a model remnant order equal to 4 provides lower VAF results\".",
+        statement: "Setting m0 = 1 \"a model remnant order equal to 4 provides lower VAF results\".",
         place: "V.A.2; 6.1.3, Figs. E.1, E.9",
         measure: "Mean of the paired difference of VAF, m* = 4 less m* = 1, m0 = 1, C1 and C2, by n_k* and noise level: lower by more than 0.1 points.",
         plans: PLANS,
@@ -137,7 +139,7 @@ fn vaf_same(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
             "spread of the mean VAF over m* within 1 point, n_k* = {} to {}",
             delays[0], delays[2]
         ));
-        for at in each(&["C1"], &[3], &LEVELS) {
+        for at in settings(&["C1"], &[3], &LEVELS) {
             for nk in delays {
                 let queries = ORDERS.map(|m| at.bj("vaf", m, *nk));
                 part.below(
@@ -155,7 +157,7 @@ fn vaf_same(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn vaf_and_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("share of records with the largest VAF at n_k* = 29 below 0.9");
-    for at in each(&["C1", "C2"], &ORDERS, &LEVELS) {
+    for at in settings(&["C1", "C2"], &ORDERS, &LEVELS) {
         let queries = DELAYS.map(|nk| at.bj("vaf", 1, nk));
         let found = study.of(&queries, &|s| {
             let best = |i: usize| {
@@ -174,13 +176,13 @@ fn vaf_and_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 }
 
 fn mean(values: &[f64]) -> f64 {
-    super::measure::mean_of(values).value
+    mean_of(values).value
 }
 
 fn vaf_lower(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("VAF of m* = 4 less that of m* = 1 below -0.1 points");
-    for at in each(&["C1", "C2"], &[1], &LEVELS) {
+    for at in settings(&["C1", "C2"], &[1], &LEVELS) {
         for nk in DELAYS {
             let queries = [at.bj("vaf", 4, nk), at.bj("vaf", 1, nk)];
             let found = study.of(&queries, &|s| mean(&s[0]) - mean(&s[1]))?;
@@ -193,7 +195,7 @@ fn vaf_lower(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn vaf_of_arx(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("|VAF of BJ less that of ARX| within 1 point");
-    for at in each(&["C1"], &[3], &LEVELS) {
+    for at in settings(&["C1"], &[3], &LEVELS) {
         for nk in 28..=30 {
             for m in ORDERS {
                 let queries = [at.bj("vaf", m, nk), at.arx("vaf", nk)];
@@ -208,7 +210,7 @@ fn vaf_of_arx(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn same_bias(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("|paired difference of the bias, m* = 1 less m* = m0| within 5 points");
-    for at in each(&["C1", "C2"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1", "C2"], &HIGHER, &LEVELS) {
         for name in DISCRETE {
             let fit = |m| at.bj(&bias_of(name), m, TRUE_DELAY);
             part.below(at.label(name), study.difference(&fit(1), &fit(at.m0))?.abs(), CLOSE);
@@ -220,12 +222,12 @@ fn same_bias(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn better_at_fourth(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("|median bias| with m* = 1 less that with m* = 4 below -0.1 points");
-    for at in each(&["C1"], &[4], &LEVELS) {
+    for at in settings(&["C1"], &[4], &LEVELS) {
         for name in ["b0", "b1"] {
             let queries = [1, 4].map(|m| at.bj(&bias_of(name), m, TRUE_DELAY));
             part.below(
                 at.label(name),
-                study.of(&queries, &|s| bias(&s[0]) - bias(&s[1]))?,
+                study.of(&queries, &|s| median_bias(&s[0]) - median_bias(&s[1]))?,
                 -MATTERS,
             );
         }
@@ -236,10 +238,10 @@ fn better_at_fourth(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn loss_at_high_orders(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("response_error with m* = 1 less that with m* = m0, mean over P_n, above 0.1 points");
-    for at in each(&["C1", "C2"], &[3, 4], &[0.1]) {
+    for at in settings(&["C1", "C2"], &[3, 4], &[0.1]) {
         let mut levels = Vec::new();
         for level in LEVELS {
-            let fit = |m| At { level, ..at }.bj("response_error", m, TRUE_DELAY);
+            let fit = |m| Setting { level, ..at }.bj("response_error", m, TRUE_DELAY);
             levels.push(study.difference(&fit(1), &fit(at.m0))?);
         }
         part.above(
@@ -254,11 +256,15 @@ fn loss_at_high_orders(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn wider_boxes(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("interquartile range with m* = 1 over that with m* = m0, mean over P_n, from 1 to 1.5");
-    for at in each(&["C1", "C2"], &HIGHER, &[0.1]) {
+    for at in settings(&["C1", "C2"], &HIGHER, &[0.1]) {
         for name in DISCRETE {
-            let fits = LEVELS.map(|level| [1, at.m0].map(|m| At { level, ..at }.bj(&bias_of(name), m, TRUE_DELAY)));
+            let fits =
+                LEVELS.map(|level| [1, at.m0].map(|m| Setting { level, ..at }.bj(&bias_of(name), m, TRUE_DELAY)));
             let found = study.of(&fits.concat(), &|s| {
-                s.chunks(2).map(|pair| range(&pair[0]) / range(&pair[1])).sum::<f64>() / LEVELS.len() as f64
+                s.chunks(2)
+                    .map(|pair| interquartile_range(&pair[0]) / interquartile_range(&pair[1]))
+                    .sum::<f64>()
+                    / LEVELS.len() as f64
             })?;
             part.between(format!("{}, m0 = {}, {name}", at.condition, at.m0), found, 1.0, 1.5);
         }
@@ -270,11 +276,11 @@ fn by_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut higher = Part::new("K_e and T_L: growth of the median |bias| with m* = 1 above 0");
     let mut same = Part::new("omega_nm and zeta_nm: |change of the median |bias| with m* = 1| within 5 points");
-    for at in each(&["C1"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1"], &HIGHER, &LEVELS) {
         for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
             let change = |name: &str| {
                 let queries = [1, at.m0].map(|m| at.bj(&bias_of(name), m, nk));
-                study.of(&queries, &|s| size(&s[0]) - size(&s[1]))
+                study.of(&queries, &|s| median_magnitude(&s[0]) - median_magnitude(&s[1]))
             };
             for name in ["K_e", "T_L"] {
                 higher.above(at.label(&format!("n_k* = {nk}, {name}")), change(name)?, 0.0);
@@ -292,7 +298,7 @@ fn remnant_wrong(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for name in ["T_n", "K_n"] {
         let mut part = Part::new(&format!("|median bias| of {name} beyond 25 %"));
-        for at in each(&["C1"], &HIGHER, &LEVELS) {
+        for at in settings(&["C1"], &HIGHER, &LEVELS) {
             let found = study.median(&at.bj(&format!("bias_{name}_backward_euler"), 1, TRUE_DELAY))?;
             part.above(at.label(""), found.abs(), LARGE);
         }
@@ -302,7 +308,7 @@ fn remnant_wrong(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 }
 
 /// Queries of a quantity over all delays with m* = m0, then over all orders at the true delay.
-fn over_both(at: At, quantity: &str) -> Vec<hoid_study::Query> {
+fn over_both(at: Setting, quantity: &str) -> Vec<hoid_study::Query> {
     let delays = DELAYS.map(|nk| at.bj(quantity, at.m0, nk));
     delays
         .into_iter()
@@ -313,11 +319,11 @@ fn over_both(at: At, quantity: &str) -> Vec<hoid_study::Query> {
 fn delay_over_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("spread over n_k* less that over m* above 0");
-    for at in each(&["C1"], &ORDERS, &LEVELS) {
+    for at in settings(&["C1"], &ORDERS, &LEVELS) {
         for name in DISCRETE {
             let found = study.of(&over_both(at, &bias_of(name)), &|s| {
                 let (delays, orders) = s.split_at(DELAYS.len());
-                spread(delays.iter().map(|v| size(v))) - spread(orders.iter().map(|v| size(v)))
+                spread(delays.iter().map(|v| median_magnitude(v))) - spread(orders.iter().map(|v| median_magnitude(v)))
             })?;
             part.above(at.label(name), found, 0.0);
         }
@@ -329,7 +335,7 @@ fn match_matters(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut first = Part::new("m0 = 1: median |bias| with m* = 1 over that of the others below 1/2");
     let mut others = Part::new("m0 >= 2: median |bias| with m* = m0 over that of the others above 1/2");
-    for at in each(&["C1"], &ORDERS, &LEVELS) {
+    for at in settings(&["C1"], &ORDERS, &LEVELS) {
         for name in DISCRETE {
             let queries = ORDERS.map(|m| at.bj(&bias_of(name), m, TRUE_DELAY));
             let found = study.of(&queries, &|s| {
@@ -337,8 +343,8 @@ fn match_matters(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
                     .iter()
                     .enumerate()
                     .filter(|(i, _)| i + 1 != at.m0)
-                    .map(|(_, v)| size(v));
-                3.0 * size(&s[at.m0 - 1]) / rest.sum::<f64>()
+                    .map(|(_, v)| median_magnitude(v));
+                3.0 * median_magnitude(&s[at.m0 - 1]) / rest.sum::<f64>()
             })?;
             match at.m0 {
                 1 => first.below(at.label(name), found, 0.5),
@@ -354,7 +360,7 @@ fn order_over_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for name in ["innovation_variance", "d1"] {
         let mut part = Part::new(&format!("{name}: spread over m* over that over n_k* above 1"));
-        for at in each(&["C1"], &ORDERS, &LEVELS) {
+        for at in settings(&["C1"], &ORDERS, &LEVELS) {
             let found = study.of(&over_both(at, name), &|s| {
                 let (delays, orders) = s.split_at(DELAYS.len());
                 spread(orders.iter().map(|v| med(v))) / spread(delays.iter().map(|v| med(v)))

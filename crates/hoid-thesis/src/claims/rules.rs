@@ -26,6 +26,8 @@
 //! | slight, small, matters more | at least 0.1 points of % of the true value |
 //! | a linear trend | R^2 of the straight line at least 0.9 |
 
+use super::value::Value;
+
 /// A large bias, % of the true value.
 pub(super) const LARGE: f64 = 25.0;
 /// An acceptable bias, % of the true value.
@@ -73,55 +75,6 @@ impl std::fmt::Display for Verdict {
         match self {
             Self::CannotBeTested(reason) => write!(f, "cannot be tested: {reason}"),
             other => f.write_str(other.words()),
-        }
-    }
-}
-
-/// A number and its Monte Carlo error, 0 for one that does not depend on chance.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Value {
-    /// The number; not a number where too few replications give one.
-    pub value: f64,
-    /// Its Monte Carlo error.
-    pub error: f64,
-}
-
-impl Value {
-    /// The magnitude, with the same error.
-    #[must_use]
-    pub fn abs(self) -> Self {
-        Self {
-            value: self.value.abs(),
-            ..self
-        }
-    }
-
-    /// The difference to a number from other replications.
-    #[must_use]
-    pub fn minus(self, other: Self) -> Self {
-        Self {
-            value: self.value - other.value,
-            error: self.error.hypot(other.error),
-        }
-    }
-
-    /// The mean of numbers from different replications.
-    #[must_use]
-    pub fn mean(values: &[Self]) -> Self {
-        let n = values.len() as f64;
-        Self {
-            value: values.iter().map(|v| v.value).sum::<f64>() / n,
-            error: values.iter().map(|v| v.error * v.error).sum::<f64>().sqrt() / n,
-        }
-    }
-
-    /// The ratio to a number from other replications; errors to first order.
-    #[must_use]
-    pub fn over(self, other: Self) -> Self {
-        let value = self.value / other.value;
-        Self {
-            value,
-            error: value.abs() * (self.error / self.value).hypot(other.error / other.value),
         }
     }
 }
@@ -366,21 +319,5 @@ mod tests {
         assert_eq!(of(&[&no, &open]), Verdict::DoesNotHold);
         assert!(matches!(of(&[&open, &open]), Verdict::CannotBeTested(reason) if reason.contains("18 of 20")));
         assert!(matches!(of(&[]), Verdict::CannotBeTested(_)));
-    }
-
-    #[test]
-    fn errors_of_differences_and_ratios() {
-        let (a, b) = (Value { value: 8.0, error: 0.3 }, Value { value: 2.0, error: 0.4 });
-        assert_eq!(a.minus(b), Value { value: 6.0, error: 0.5 });
-        assert_eq!(
-            Value::mean(&[a, b]),
-            Value {
-                value: 5.0,
-                error: 0.25
-            }
-        );
-        let ratio = a.over(b);
-        // sqrt((0.3 / 8)^2 + (0.4 / 2)^2) = 0.203485
-        assert!((ratio.value - 4.0).abs() < 1e-12 && (ratio.error - 4.0 * 0.203_485).abs() < 1e-5);
     }
 }

@@ -2,7 +2,10 @@
 
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 
-use super::{Claim, Finding};
+use super::{
+    claim::Claim,
+    finding::{Finding, Measured},
+};
 
 /// A table of claims, a row each, with what was measured in words and the first of the numbers.
 pub fn claims_table(findings: &[(Claim, Finding)]) -> OutputTable {
@@ -14,7 +17,7 @@ pub fn claims_table(findings: &[(Claim, Finding)]) -> OutputTable {
         name: name.to_owned(),
         values: ColumnValues::Whole(findings.iter().map(|(_, finding)| of(finding) as u64).collect()),
     };
-    let real = |name: &str, of: &dyn Fn(&super::Measured) -> f64| OutputColumn {
+    let real = |name: &str, of: &dyn Fn(&Measured) -> f64| OutputColumn {
         name: name.to_owned(),
         values: ColumnValues::Real(
             findings

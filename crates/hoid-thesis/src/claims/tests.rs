@@ -1,6 +1,6 @@
 use std::collections::BTreeSet;
 
-use super::*;
+use super::{settings::*, *};
 use crate::plans::TEXT_PLANS;
 use hoid_study::{
     Plan, Results, RunOptions,
@@ -160,7 +160,7 @@ fn traces_give_bias_and_settling() {
     let mut evidence = Evidence::new();
     evidence.add(&results);
     let study = evidence.study("recursive").unwrap();
-    let at = At {
+    let at = Setting {
         condition: "C4",
         m0: 1,
         level: 0.1,
@@ -172,7 +172,7 @@ fn traces_give_bias_and_settling() {
     assert!(settled.value <= 0.32 && settled.error >= 0.16 - 1e-9, "{settled:?}");
     assert!(
         study
-            .settling(&At { condition: "C1", ..at }.rpem(""), "K_e_dot")
+            .settling(&Setting { condition: "C1", ..at }.rpem(""), "K_e_dot")
             .is_err()
     );
     assert!(study.trace_bias(&at.rpem(""), "no_parameter").is_err());

@@ -2,13 +2,12 @@
 
 use hoid_study::{Query, Results};
 
-use super::{Data, Item, Made, REMNANT_ORDERS, level_name, order_titles};
+use super::{
+    axes::{DELAYS, LEVELS, REMNANT_ORDERS, level_name, order_titles},
+    item::{Item, ItemOutput},
+    table_builder::TableBuilder,
+};
 use hoid_report::figures::{BoxGrid, BoxPanel, BoxRange, BoxSeries, BoxStatistics, Shade, box_plots};
-
-/// Delays of the figures.
-pub(super) const DELAYS: [usize; 5] = [26, 27, 28, 29, 30];
-/// Noise levels of the figures.
-pub(super) const LEVELS: [f64; 4] = [0.0, 0.1, 0.2, 0.3];
 
 /// The estimator of a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -143,14 +142,14 @@ fn item(name: &str, condition: &'static str, model: Model, parameters: Parameter
     )
 }
 
-fn make(item: &Item, results: &Results, condition: &str, model: Model, parameters: Parameters) -> Made {
+fn make(item: &Item, results: &Results, condition: &str, model: Model, parameters: Parameters) -> ItemOutput {
     // Without remnant its parameters have no truth to be compared with.
     let levels = if parameters == Parameters::Remnant {
         &LEVELS[1..]
     } else {
         &LEVELS[..]
     };
-    let mut data = Data::new(
+    let mut data = TableBuilder::new(
         &["parameter", "outliers"],
         &[
             "remnant_order",
@@ -225,7 +224,7 @@ fn make(item: &Item, results: &Results, condition: &str, model: Model, parameter
         with_zero: true,
         least_reach: 0.1,
     };
-    Made {
+    ItemOutput {
         svg: Some(box_plots(&item.name, &item.title, &grid)),
         data: data.table(&item.title),
     }

@@ -4,7 +4,7 @@ use crate::claims::{Claim, Finding, Measured, Verdict};
 use hoid_io::{ColumnValues, OutputTable};
 use minijinja::{Value, context};
 
-use super::Item;
+use super::item::Item;
 use hoid_report::{numbers, render_with};
 
 use crate::ThesisError;

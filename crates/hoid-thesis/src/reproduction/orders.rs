@@ -2,7 +2,11 @@
 
 use hoid_study::{Query, Results};
 
-use super::{Data, Item, Made, REMNANT_ORDERS, bias::LEVELS, level_name};
+use super::{
+    axes::{LEVELS, REMNANT_ORDERS, level_name},
+    item::{Item, ItemOutput},
+    table_builder::TableBuilder,
+};
 use hoid_report::figures::{MapColours, MapGrid, MapPanel, maps};
 
 /// Delays of the maps.
@@ -69,13 +73,13 @@ fn item(name: String, condition: &'static str, m0: usize, shown: Shown) -> Item 
     )
 }
 
-fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: Shown) -> Made {
+fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: Shown) -> ItemOutput {
     let vaf = if shown == Shown::VafDifference {
         "delta_vaf"
     } else {
         "vaf"
     };
-    let mut data = Data::new(&["quantity"], &["noise_level", "nk", "m", "value"]);
+    let mut data = TableBuilder::new(&["quantity"], &["noise_level", "nk", "m", "value"]);
     let panels: Vec<(String, String, f64, String)> = match shown {
         Shown::Bias => BIASES
             .iter()
@@ -151,7 +155,7 @@ fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: Shown
         mark: "simulated".to_owned(),
     };
     let figure = grid(drawn, titles);
-    Made {
+    ItemOutput {
         svg: Some(maps(&item.name, &item.title, &figure)),
         data: data.table(&item.title),
     }

@@ -4,9 +4,10 @@ use hoid_model::{Complex64, Orders, PolynomialModel, Structure};
 use hoid_study::{Query, Results};
 
 use super::{
-    Data, Item, Made, REMNANT_ORDERS,
-    bias::{DELAYS, LEVELS, Model},
-    level_name,
+    axes::{DELAYS, LEVELS, REMNANT_ORDERS, level_name},
+    bias::Model,
+    item::{Item, ItemOutput},
+    table_builder::TableBuilder,
 };
 use hoid_report::figures::{BodeColumn, BodeCurve, BodeGrid, LineKind, Shade, bode_grid};
 
@@ -126,9 +127,9 @@ fn response(theta: &[f64], nk: usize, omega: &[f64]) -> Option<Vec<Complex64>> {
     Some(omega.iter().map(|w| model.response(*w)).collect())
 }
 
-fn make(item: &Item, results: &Results, condition: &str, curves: Curves) -> Made {
+fn make(item: &Item, results: &Results, condition: &str, curves: Curves) -> ItemOutput {
     let omega = omegas();
-    let mut data = Data::new(
+    let mut data = TableBuilder::new(
         &["model"],
         &[
             "remnant_order",
@@ -223,7 +224,7 @@ fn make(item: &Item, results: &Results, condition: &str, curves: Curves) -> Made
             curves: drawn,
         });
     }
-    Made {
+    ItemOutput {
         svg: Some(bode_grid(&item.name, &item.title, &BodeGrid { columns })),
         data: data.table(&item.title),
     }

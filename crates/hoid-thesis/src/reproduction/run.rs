@@ -1,4 +1,4 @@
-//! The whole reproduction in a directory: runs the plans that are needed, draws tables and figures, judges the claims, writes the index page.
+//! The whole reproduction in a directory: runs the plans that are needed, draws tables and figures, tests the claims, writes the index page.
 //!
 //! Studies stand in `studies/NAME`, pictures and numbers in `figures` and `tables`. A study that is there already is taken as it is, so that
 //! a reproduction that was stopped goes on.
@@ -13,7 +13,11 @@ use hoid_io::{OutputTable, make_directory, write_atomically, write_table};
 use hoid_study::{NamedPlan, Progress, Results, RunOptions, run};
 use rayon::prelude::*;
 
-use super::{IndexPage, Item, Studies, StudyEntry, items};
+use super::{
+    catalogue::items,
+    index::{IndexPage, StudyEntry},
+    item::{CLAIMS, Item, Studies},
+};
 use hoid_report::write_page;
 
 use crate::{
@@ -21,9 +25,6 @@ use crate::{
     claims::{Evidence, claims, claims_table, findings},
     plans::TEXT_PLANS,
 };
-
-/// Name of the claims among tables and figures.
-pub const CLAIMS: &str = "claims";
 
 /// What is to be reproduced.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,10 +47,10 @@ impl Default for Reproduction {
     }
 }
 
-/// What is told on the way.
+/// An event of a reproduction that runs.
 #[derive(Debug, Clone, Copy)]
-pub enum Told<'a> {
-    /// How far a study is.
+pub enum ReproductionEvent<'a> {
+    /// An estimate of a study is done.
     Progress(Progress),
     /// A study has its results.
     Study(&'a StudyEntry),
@@ -57,7 +58,7 @@ pub enum Told<'a> {
 
 /// What has been reproduced.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Reproduced {
+pub struct ReproductionSummary {
     /// The page that shows it all.
     pub index: PathBuf,
     /// Tables and figures.
@@ -77,9 +78,9 @@ pub struct Reproduced {
 pub fn reproduce(
     wanted: &Reproduction,
     directory: &Path,
-    tell: &(dyn Fn(Told<'_>) + Sync),
+    notify: &(dyn Fn(ReproductionEvent<'_>) + Sync),
     goes_on: &(dyn Fn() -> bool + Sync),
-) -> Result<Option<Reproduced>, ThesisError> {
+) -> Result<Option<ReproductionSummary>, ThesisError> {
     let begin = Instant::now();
     let (chosen, with_claims) = chosen(items(), &wanted.only)?;
     let mut plans: BTreeSet<&str> = chosen.iter().filter_map(|item| item.plan).collect();
@@ -89,10 +90,10 @@ pub fn reproduce(
     let mut index = IndexPage::default();
     let mut studies = Studies::new();
     for named in TEXT_PLANS.iter().filter(|named| plans.contains(named.name)) {
-        let Some((entry, results)) = study(named, wanted, directory, tell, goes_on)? else {
+        let Some((entry, results)) = study(named, wanted, directory, notify, goes_on)? else {
             return Ok(None);
         };
-        tell(Told::Study(&entry));
+        notify(ReproductionEvent::Study(&entry));
         index.add_study(&entry);
         studies.insert(named.name.to_owned(), results);
     }
@@ -109,7 +110,7 @@ pub fn reproduce(
         index.add(item, made.svg.as_deref(), &made.data, &made.table);
     }
     let tally = if with_claims {
-        Some(judge(&studies, &mut index, directory)?)
+        Some(test_claims(&studies, &mut index, directory)?)
     } else {
         None
     };
@@ -126,7 +127,7 @@ pub fn reproduce(
         ));
     }
     let index = write_page(directory, "index.html", &index.html()?)?;
-    Ok(Some(Reproduced {
+    Ok(Some(ReproductionSummary {
         index,
         items: chosen.len(),
         tally,
@@ -163,8 +164,8 @@ fn chosen(all: Vec<Item>, only: &[String]) -> Result<(Vec<Item>, bool), ThesisEr
     Ok((items.collect(), names.contains(&CLAIMS)))
 }
 
-/// Judges the claims of the text: their table, their part of the page, and how many hold.
-fn judge(studies: &Studies, index: &mut IndexPage, directory: &Path) -> Result<[usize; 4], ThesisError> {
+/// Tests the claims of the text: their table, their part of the page, and how many hold.
+fn test_claims(studies: &Studies, index: &mut IndexPage, directory: &Path) -> Result<[usize; 4], ThesisError> {
     let mut evidence = Evidence::new();
     for results in studies.values() {
         evidence.add(results);
@@ -180,7 +181,7 @@ fn study(
     named: &NamedPlan,
     wanted: &Reproduction,
     directory: &Path,
-    tell: &(dyn Fn(Told<'_>) + Sync),
+    notify: &(dyn Fn(ReproductionEvent<'_>) + Sync),
     goes_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Option<(StudyEntry, Results)>, ThesisError> {
     let plan = named.plan()?.with_replications(wanted.replications)?;
@@ -195,7 +196,7 @@ fn study(
         &plan,
         &directory,
         &options,
-        &|progress| tell(Told::Progress(progress)),
+        &|progress| notify(ReproductionEvent::Progress(progress)),
         goes_on,
     )?;
     if !outcome.finished {

@@ -11,12 +11,16 @@ use hoid_study::{Query, Results};
 
 use crate::plans;
 
-use super::{Data, Item, Made, REMNANT_ORDERS, order_titles};
+use super::{
+    axes::{REMNANT_ORDERS, order_titles},
+    item::{Item, ItemOutput},
+    table_builder::TableBuilder,
+};
 use hoid_report::figures::{Curve, CurveGrid, CurvePanel, LineKind, Shade, curves};
 
 pub(super) fn items() -> Vec<Item> {
     let table = |name: &str, title: &str, caption: &str, make: fn(&str) -> hoid_io::OutputTable| {
-        Item::new(name, title, caption, None, move |item, _| Made {
+        Item::new(name, title, caption, None, move |item, _| ItemOutput {
             svg: None,
             data: make(&item.title),
         })
@@ -71,7 +75,7 @@ pub(super) fn items() -> Vec<Item> {
 }
 
 fn forcing_table(title: &str) -> hoid_io::OutputTable {
-    let mut data = Data::new(&[], &["k", "n_t", "omega_rad_s", "amplitude_deg", "phase_rad"]);
+    let mut data = TableBuilder::new(&[], &["k", "n_t", "omega_rad_s", "amplitude_deg", "phase_rad"]);
     for (k, s) in ForcingFunction::reference().sinusoids().iter().enumerate() {
         let cycles = (s.omega_rad_s * REFERENCE_PERIOD_S / std::f64::consts::TAU).round();
         data.row(
@@ -89,7 +93,7 @@ fn margins_of(state: &OperatingState) -> Option<Margins> {
 }
 
 fn states_table(title: &str) -> hoid_io::OutputTable {
-    let mut data = Data::new(
+    let mut data = TableBuilder::new(
         &["state"],
         &[
             "K_c",
@@ -148,7 +152,7 @@ fn state_name(state: &OperatingState) -> &'static str {
 }
 
 fn conditions_table(title: &str) -> hoid_io::OutputTable {
-    let mut data = Data::new(&["condition", "states"], &["G_per_s", "t_M_s"]);
+    let mut data = TableBuilder::new(&["condition", "states"], &["G_per_s", "t_M_s"]);
     for condition in Condition::ALL {
         let scenario = Scenario::condition(condition);
         let rate = scenario.schedule.rate_per_s().unwrap_or(f64::NAN);
@@ -163,7 +167,7 @@ fn conditions_table(title: &str) -> hoid_io::OutputTable {
 }
 
 fn starts_table(title: &str) -> hoid_io::OutputTable {
-    let mut data = Data::new(&["start"], &["b0", "b1", "a1", "a2"]);
+    let mut data = TableBuilder::new(&["start"], &["b0", "b1", "a1", "a2"]);
     let plan = plans::find("initial-conditions").and_then(|named| named.plan().ok());
     let mut known: Vec<String> = Vec::new();
     for estimator in plan.iter().flat_map(|plan| &plan.estimators) {
@@ -177,7 +181,7 @@ fn starts_table(title: &str) -> hoid_io::OutputTable {
     data.table(title)
 }
 
-fn spectrum(item: &Item) -> Made {
+fn spectrum(item: &Item) -> ItemOutput {
     let forcing = ForcingFunction::reference();
     let x: Vec<f64> = forcing.sinusoids().iter().map(|s| s.omega_rad_s).collect();
     let y: Vec<f64> = forcing
@@ -185,7 +189,7 @@ fn spectrum(item: &Item) -> Made {
         .iter()
         .map(|s| 0.5 * s.amplitude_deg * s.amplitude_deg)
         .collect();
-    let mut data = Data::new(&[], &["omega_rad_s", "power_deg2"]);
+    let mut data = TableBuilder::new(&[], &["omega_rad_s", "power_deg2"]);
     x.iter().zip(&y).for_each(|(x, y)| data.row(&[], &[*x, *y]));
     let grid = CurveGrid {
         panels: vec![CurvePanel {
@@ -208,14 +212,14 @@ fn spectrum(item: &Item) -> Made {
         logarithmic_abscissa: true,
         ..CurveGrid::default()
     };
-    Made {
+    ItemOutput {
         svg: Some(curves(&item.name, &item.title, &grid)),
         data: data.table(&item.title),
     }
 }
 
-fn schedules(item: &Item) -> Made {
-    let mut data = Data::new(&["condition"], &["t", "K_e"]);
+fn schedules(item: &Item) -> ItemOutput {
+    let mut data = TableBuilder::new(&["condition"], &["t", "K_e"]);
     let groups = [
         ("constant", [Condition::C1, Condition::C2]),
         ("G = 0.5 s^{-1}", [Condition::C3, Condition::C5]),
@@ -263,14 +267,14 @@ fn schedules(item: &Item) -> Made {
         logarithmic_abscissa: false,
         shared_ordinates: true,
     };
-    Made {
+    ItemOutput {
         svg: Some(curves(&item.name, &item.title, &grid)),
         data: data.table(&item.title),
     }
 }
 
-fn noise_level(item: &Item, results: &Results) -> Made {
-    let mut data = Data::new(&[], &["remnant_order", "demanded", "mean", "mean_se", "sd", "runs"]);
+fn noise_level(item: &Item, results: &Results) -> ItemOutput {
+    let mut data = TableBuilder::new(&[], &["remnant_order", "demanded", "mean", "mean_se", "sd", "runs"]);
     let mut panels = Vec::new();
     for m0 in REMNANT_ORDERS {
         let rows = results.find(&Query::of("noise_level_obtained").remnant_order(m0));
@@ -321,7 +325,7 @@ fn noise_level(item: &Item, results: &Results) -> Made {
         logarithmic_abscissa: false,
         shared_ordinates: true,
     };
-    Made {
+    ItemOutput {
         svg: Some(curves(&item.name, &item.title, &grid)),
         data: data.table(&item.title),
     }

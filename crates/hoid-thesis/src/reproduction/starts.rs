@@ -3,9 +3,9 @@
 use hoid_study::{Query, Results};
 
 use super::{
-    Data, Item, Made, REMNANT_ORDERS,
-    bias::{DELAYS, LEVELS},
-    level_name, order_titles,
+    axes::{DELAYS, LEVELS, REMNANT_ORDERS, level_name, order_titles},
+    item::{Item, ItemOutput},
+    table_builder::TableBuilder,
 };
 use hoid_report::figures::{BoxGrid, BoxPanel, BoxRange, BoxSeries, BoxStatistics, Shade, box_plots};
 
@@ -24,8 +24,8 @@ pub(super) fn items() -> Vec<Item> {
         .collect()
 }
 
-fn make(item: &Item, results: &Results, start: usize) -> Made {
-    let mut data = Data::new(
+fn make(item: &Item, results: &Results, start: usize) -> ItemOutput {
+    let mut data = TableBuilder::new(
         &["parameter"],
         &[
             "remnant_order",
@@ -112,7 +112,7 @@ fn make(item: &Item, results: &Results, start: usize) -> Made {
         with_zero: true,
         least_reach: 0.01,
     };
-    Made {
+    ItemOutput {
         svg: Some(box_plots(&item.name, &item.title, &grid)),
         data: data.table(&item.title),
     }

@@ -2,7 +2,11 @@
 
 use hoid_study::{Query, Results, plan::Cell, statistics::quantile};
 
-use super::{Data, Item, Made, REMNANT_ORDERS, level_name, order_titles};
+use super::{
+    axes::{REMNANT_ORDERS, level_name, order_titles},
+    item::{Item, ItemOutput},
+    table_builder::TableBuilder,
+};
 use hoid_report::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels};
 
 /// Which parameters a figure shows: the column of RLS, that of RPEM, name and unit of the panel.
@@ -99,8 +103,8 @@ fn make(
     orders: &[usize],
     levels: &[f64],
     estimators: &[Curves],
-) -> Made {
-    let mut data = Data::new(
+) -> ItemOutput {
+    let mut data = TableBuilder::new(
         &["parameter", "estimator"],
         &[
             "remnant_order",
@@ -208,7 +212,7 @@ fn make(
         marks_s: Vec::new(),
         shared_ordinates: false,
     };
-    Made {
+    ItemOutput {
         svg: Some(trace_panels(&item.name, &item.title, &grid)),
         data: data.table(&item.title),
     }

@@ -1,7 +1,7 @@
-//! Figures of merit of an estimate whose truth is known.
+//! Error measures of an estimate whose truth is known.
 //!
-//! - `vaf`, %: eq. 39 of the simulated output, no mean removed.
-//! - `delta_vaf`, %: `vaf` less that of another estimator with the same nk on the same run (eq. 40).
+//! - `vaf`, %: `100 (1 - sum (u - u_s)^2 / sum u^2)` of the simulated output u_s, no mean removed.
+//! - `delta_vaf`, %: `vaf` less that of another estimator with the same nk on the same run.
 //! - `response_error`, %: root of the mean over the lines of the forcing function of `|H - H0|^2 / |H0|^2`, where H0 is the simulated operator
 //!   as it is held at the sample time of the simulation. It needs no conversion, so that models of any order can be compared.
 //! - `rms_<p>`, %: root mean square of the relative error of a trace from 10 s after the start on, over what converts.
@@ -12,7 +12,7 @@
 //! - `false_alarms`: changes declared more than 5 s after a true one, or before the first; `hours`: the time in which they could be.
 //!   `found`, %: true changes after the start fit that were declared within 5 s; `lag`, s: mean time to the declaration of those.
 //! - `diverged`: a coefficient is no number, or its magnitude is beyond 10.
-//! - `noise_level_obtained`: `(var u - var u0) / var u` with u0 of the run without remnant (A.4), `noise_level_response`:
+//! - `noise_level_obtained`: `(var u - var u0) / var u` with u0 of the run without remnant, `noise_level_response`:
 //!   `var(u - u0) / var u`, which lacks the chance correlation of the two, and `noise_level_remnant`: `var n / var u`.
 
 use hoid_ident::Fit;
@@ -27,12 +27,12 @@ const ERRORS_FROM_S: f64 = 10.0;
 const DIVERGED: f64 = 10.0;
 
 /// The true response at the lines of the forcing function.
-pub(crate) struct Truth {
+pub(crate) struct TrueResponse {
     omega_rad_s: Vec<f64>,
     response: Vec<Complex64>,
 }
 
-impl Truth {
+impl TrueResponse {
     pub fn of(cell: &Cell) -> Option<Self> {
         let scenario = cell.resolved.scenario();
         let operator = scenario.initial.operator.discretise(scenario.sample_time).ok()?;
@@ -143,7 +143,7 @@ pub(crate) struct ChangeMeasures {
 struct Mean(f64, f64);
 
 impl Mean {
-    fn take(&mut self, value: f64) {
+    fn update(&mut self, value: f64) {
         self.0 += value;
         self.1 += 1.0;
     }
@@ -177,14 +177,14 @@ impl ChangeMeasures {
                     .standard_error
                     .map(|se| f64::from(u8::from(error.abs() <= BAND * se)));
                 if (ERRORS_FROM_S - 1e-9..first_s).contains(t) {
-                    before[i].take(error / true_value);
+                    before[i].update(error / true_value);
                 } else if *t >= end_s - END_S {
-                    after[i].take(error / true_value);
+                    after[i].update(error / true_value);
                 }
                 if let Some(inside) = inside.filter(|_| *t > fitted_s) {
-                    covered[i].take(inside);
+                    covered[i].update(inside);
                     if within(*t) {
-                        through[i].take(inside);
+                        through[i].update(inside);
                     }
                 }
             }

@@ -3,7 +3,10 @@
 use hoid_model::{Complex64, uncertainty::Estimate};
 use minijinja::{Value, context};
 
-use super::{GroupReport, id_of, reals, texts};
+use super::{
+    report::{GroupReport, id_of},
+    tables::{reals, rows_of, texts},
+};
 use crate::{
     figures::{BodeColumn, BodeCurve, BodeGrid, BodePoints, LineKind, Shade, bode_grid},
     numbers,
@@ -53,16 +56,16 @@ impl GroupReport<'_> {
     }
 
     /// Bode points of the describing functions, a figure for each condition with a column for each subject.
-    pub(super) fn describing(&self) -> Vec<Value> {
+    pub(super) fn describing_functions(&self) -> Vec<Value> {
         let Some((lines, margins)) = self.tables.frequencies.map(|f| (f.lines, f.margins)) else {
             return Vec::new();
         };
         let (subjects, conditions) = self.names();
         let column = |condition: &str, subject: &str| {
-            let rows = Self::rows_of(lines, subject, condition);
+            let rows = rows_of(lines, subject, condition);
             let pick = |name: &str| rows.iter().map(|i| reals(lines, name)[*i]).collect::<Vec<f64>>();
             let omega = pick("omega_rad_s");
-            let first = Self::rows_of(margins, subject, condition).first().copied();
+            let first = rows_of(margins, subject, condition).first().copied();
             let fit = first.map(|i| ["gain", "lead_s", "delay_s"].map(|name| reals(margins, name)[i]));
             let mut curves = Vec::new();
             if let (Some(low), Some(high)) = (omega.first(), omega.last()) {
@@ -129,7 +132,7 @@ impl GroupReport<'_> {
     fn fits(&self, subject: &str, condition: &str, (low, high): (f64, f64)) -> Vec<BodeCurve> {
         let table = self.tables.responses;
         let (estimators, omega) = (texts(table, "estimator"), reals(table, "omega_rad_s"));
-        let rows = Self::rows_of(table, subject, condition);
+        let rows = rows_of(table, subject, condition);
         let curve = |(estimator, method): (&str, usize)| {
             // A point more on either side, so that the curve reaches over the lines.
             let inside = |i: &&usize| estimators[**i] == estimator && (0.9 * low..=1.1 * high).contains(&omega[**i]);

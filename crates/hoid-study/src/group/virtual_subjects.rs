@@ -1,4 +1,4 @@
-//! A virtual experiment: subjects, conditions and runs of simulated people, with the truth beside the files.
+//! A virtual experiment: subjects, conditions and runs of simulated subjects, with the truth beside the files.
 //!
 //! The gain K_e, the lead T_L, omega_nm, zeta_nm and the noise level of subject s are those of the condition times `exp(a z)`, z a normal deviate of the subject, a the
 //! spread between subjects (0.15 is 15 %); in each run each of them is multiplied by `exp(b z)` again, b the spread between runs. The delay differs by whole
@@ -7,7 +7,7 @@
 
 use std::path::Path;
 
-use hoid_io::{ColumnKind, ColumnSchema, ColumnValues, OutputColumn, OutputTable, TableSchema};
+use hoid_io::{ColumnKind, ColumnSchema, TableSchema};
 use hoid_model::{
     Record,
     remnant_gain::NoiseDefinition,
@@ -17,9 +17,12 @@ use hoid_model::{
 use hoid_sim::{RunSeed, Simulator};
 
 use super::{
-    MANIFEST,
-    manifest::{Analysis, ConditionFacts, Manifest, Reading, RunEntry},
-    preparing::Preparing,
+    analysis_settings::AnalysisSettings,
+    condition_settings::ConditionSettings,
+    manifest::{MANIFEST, Manifest, RunEntry},
+    preparation_settings::PreparationSettings,
+    read_settings::ReadSettings,
+    sampling_defects::{SamplingDefect, recorded},
 };
 use crate::{
     StudyError,
@@ -45,57 +48,12 @@ pub struct VirtualExperiment {
     pub noise_level: f64,
     /// Seed of all random streams.
     pub seed: u64,
-    /// What is wrong with the sampling.
-    pub trouble: Vec<Trouble>,
+    /// Defects of the sampling.
+    pub defects: Vec<SamplingDefect>,
 }
 
-/// Sampling trouble, as recorded data have it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Trouble {
-    /// Times that scatter by a fifth of a sample.
-    Jitter,
-    /// One row of two hundred is missing.
-    Missing,
-    /// One row of two hundred is there twice.
-    Repeated,
-    /// A clock that runs slow by 0.2 %.
-    SlowClock,
-    /// A stick that goes no further than one and a half standard deviations of u.
-    Saturated,
-    /// A stick with 8 bits over its range.
-    Quantised,
-    /// A recorder that writes the same values for half a second, once.
-    Stalled,
-}
-
-impl Trouble {
-    /// All of them.
-    pub const ALL: [Self; 7] = [
-        Self::Jitter,
-        Self::Missing,
-        Self::Repeated,
-        Self::SlowClock,
-        Self::Saturated,
-        Self::Quantised,
-        Self::Stalled,
-    ];
-
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Jitter => "jitter",
-            Self::Missing => "missing",
-            Self::Repeated => "repeated",
-            Self::SlowClock => "slow-clock",
-            Self::Saturated => "saturated",
-            Self::Quantised => "quantised",
-            Self::Stalled => "stalled",
-        }
-    }
-}
-
-/// Streams of the people: no cell of a study has this number.
-const PEOPLE: u64 = u64::MAX;
+/// Random streams of the subjects: no cell of a study has this number.
+const SUBJECTS: u64 = u64::MAX;
 /// Draws after which a spread is too large for stable loops.
 const MOST_DRAWS: usize = 100;
 
@@ -122,7 +80,8 @@ pub fn simulate_group(
             for run in 1..=experiment.runs {
                 let (scenario, record) = experiment.run(subject, cell as u64, *condition, run)?;
                 let file = format!("S{subject}_{condition}_{run}.csv");
-                let table = experiment.troubled(&record, subject, cell as u64, run);
+                let noise = experiment.sampling_noise(subject, cell as u64, run, record.len());
+                let table = recorded(&record, &experiment.defects, &noise);
                 hoid_io::write_table(&directory.join(&file), &table)?;
                 truth_row(&mut truth, subject, *condition, run, &scenario);
                 runs.push(RunEntry {
@@ -142,30 +101,34 @@ pub fn simulate_group(
         let scenario = Scenario::condition(*condition);
         let change_s = scenario.schedule.change_s();
         let element = scenario.initial.controlled_element;
-        let facts = ConditionFacts {
+        let facts = ConditionSettings {
             // What is controlled in the whole run.
             controlled_element: change_s
                 .is_none()
                 .then(|| format!("{}/1,{},0", element.k_c, element.omega_b_rad_s)),
             excitation: Some("f_t".to_owned()),
             change_s,
-            ..ConditionFacts::default()
+            ..ConditionSettings::default()
         };
         (condition.to_string(), facts)
     };
-    let uneven = [Trouble::Jitter, Trouble::Missing, Trouble::Repeated]
-        .iter()
-        .any(|t| experiment.trouble.contains(t));
+    let uneven = [
+        SamplingDefect::Jitter,
+        SamplingDefect::Missing,
+        SamplingDefect::Repeated,
+    ]
+    .iter()
+    .any(|defect| experiment.defects.contains(defect));
     let manifest = Manifest {
         name: "virtual-experiment".to_owned(),
-        read: Reading {
+        read: ReadSettings {
             resample: uneven,
-            ..Reading::default()
+            ..ReadSettings::default()
         },
-        prepare: Preparing::default(),
-        analysis: Analysis {
+        prepare: PreparationSettings::default(),
+        analysis: AnalysisSettings {
             windows_s: Some([(0.0, 30.72), (51.2, 81.91)]),
-            ..Analysis::default()
+            ..AnalysisSettings::default()
         },
         conditions: experiment.conditions.iter().map(facts).collect(),
         runs,
@@ -203,7 +166,7 @@ impl VirtualExperiment {
         let deviates = |replication: u64| {
             let run_seed = RunSeed {
                 seed: self.seed,
-                cell: PEOPLE - subject,
+                cell: SUBJECTS - subject,
                 replication,
             };
             run_seed.white_noise(6 * MOST_DRAWS)
@@ -212,7 +175,7 @@ impl VirtualExperiment {
         let of_run = deviates(1 + cell * 1_000_000 + run);
         let mut reason = String::new();
         for draw in 0..MOST_DRAWS {
-            // The subject is drawn again when no run of his can be stable, the run before that.
+            // The subject is drawn again when none of their runs can be stable, the run before that.
             let (s, r) = (&of_subject[6 * (draw / 10)..], &of_run[6 * draw..]);
             let factor = |i: usize| (self.between_subjects * s[i] + self.between_runs * r[i]).exp();
             let mut scenario = Scenario::condition(condition);
@@ -248,79 +211,14 @@ impl VirtualExperiment {
         })
     }
 
-    /// The columns of a run as a recorder with troubles would have written them.
-    fn troubled(&self, record: &Record, subject: u64, cell: u64, run: u64) -> OutputTable {
-        let has = |trouble: Trouble| self.trouble.contains(&trouble);
-        let n = record.len();
-        let noise = RunSeed {
+    /// Normal deviates for the defects of a run, one a sample.
+    fn sampling_noise(&self, subject: u64, cell: u64, run: u64, samples: usize) -> Vec<f64> {
+        RunSeed {
             seed: self.seed,
-            cell: PEOPLE / 2 - subject * 1000 - cell,
+            cell: SUBJECTS / 2 - subject * 1000 - cell,
             replication: run,
         }
-        .white_noise(n);
-        let ts = record.sample_time().s();
-        let mut t = record.times_s();
-        if has(Trouble::SlowClock) {
-            t.iter_mut().for_each(|t| *t *= 0.998);
-        }
-        if has(Trouble::Jitter) {
-            // Less than half a sample, so that the order stays.
-            t.iter_mut()
-                .zip(&noise)
-                .for_each(|(t, z)| *t += (0.2 * z).clamp(-0.45, 0.45) * ts);
-        }
-        let mut u = record.output().to_vec();
-        let sd = (u.iter().map(|u| u * u).sum::<f64>() / n as f64).sqrt();
-        if has(Trouble::Saturated) {
-            u.iter_mut().for_each(|u| *u = u.clamp(-1.5 * sd, 1.5 * sd));
-        }
-        if has(Trouble::Quantised) {
-            let step = 8.0 * sd / 256.0;
-            u.iter_mut().for_each(|u| *u = (*u / step).round() * step);
-        }
-        // Where the values of each row come from; the times go on.
-        let held = |k: usize| {
-            let stall = n / 3..n / 3 + (0.5 / ts) as usize;
-            if has(Trouble::Stalled) && stall.contains(&k) {
-                stall.start
-            } else {
-                k
-            }
-        };
-        let mut rows: Vec<usize> = (0..n).collect();
-        // One in two hundred by a deviate that is anyhow drawn.
-        let rare = |k: usize| (noise[k] * 1e6).abs() as u64 % 200;
-        if has(Trouble::Missing) {
-            rows.retain(|k| *k == 0 || rare(*k) != 0);
-        }
-        if has(Trouble::Repeated) {
-            rows = rows
-                .into_iter()
-                .flat_map(|k| std::iter::repeat_n(k, if rare(k) == 1 { 2 } else { 1 }))
-                .collect();
-        }
-        let column = |name: &str, values: &[f64]| OutputColumn {
-            name: name.to_owned(),
-            values: ColumnValues::Real(
-                rows.iter()
-                    .map(|k| values[if name == "t" { *k } else { held(*k) }])
-                    .collect(),
-            ),
-        };
-        OutputTable {
-            comments: self
-                .trouble
-                .iter()
-                .map(|trouble| format!("trouble: {}", trouble.name()))
-                .collect(),
-            columns: vec![
-                column("t", &t),
-                column("f_t", record.channel("f_t").unwrap_or_default()),
-                column("e", record.input()),
-                column("u", &u),
-                column("x", record.channel("x").unwrap_or_default()),
-            ],
-        }
+        .white_noise(samples)
     }
 }
 

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 /// What is done to the runs before they are analysed. What is left out is not done, or as the group says.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Preparing {
+pub struct PreparationSettings {
     /// Factor, factor and unit, or two units by channel.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub scale: BTreeMap<String, NumberOrText>,
@@ -61,7 +61,7 @@ impl NumberOrText {
     }
 }
 
-impl Preparing {
+impl PreparationSettings {
     /// Whether it says nothing.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()

@@ -1,9 +1,5 @@
-//! Figures of merit of claims: medians, jackknifed functions of paired values, errors of median traces.
+//! The results of studies as evidence: figures of a cell with their Monte Carlo errors.
 //!
-//! - The error of a median is that of the module [`crate::statistics`].
-//! - Anything else that is made of the values of replications gets the error of the delete-a-group jackknife (Kott, *Journal of Official Statistics*
-//!   17, 2001): with the g-th tenth of the replications left out of all samples at once, `s^2 = (G - 1)/G sum (x_g - mean x_g)^2`.
-//!   Estimators that saw the same records stay paired.
 //! - *Bias of a median trace*: mean over a span of the relative error of the median over replications. Were all times of a run in error alike, its
 //!   error would be the mean over the span of that of a median, 0.93 IQR / sqrt(M) (of a normal sample 1.253 s / sqrt(M), IQR = 1.349 s).
 //!   A bootstrap over runs gave for the span of 30.72 s: 0.3 to 0.57 of it where all parameters forget in 2.56 s (RLS and RPEM), and
@@ -15,20 +11,24 @@
 
 use std::collections::BTreeMap;
 
+use hoid_study::{
+    OPERATOR, Query, Results, TraceSummary, TrueState,
+    plan::{EstimatorCell, Task},
+};
 use hoid_track::Memory;
 
-use hoid_study::{
-    OPERATOR, Query, Results, Statistics, TraceSummary, TrueState,
-    plan::{EstimatorCell, Task},
-    statistics::median,
+use super::{
+    statistics::{ENOUGH, NOTHING, jackknife, magnitudes, mean_of, median_of, share_of},
+    value::Value,
 };
 
-use super::rules::Value;
+/// Spans of the levels between which a trace steps, s: before the change and at the end.
+const BEFORE_S: f64 = 10.24;
 
-/// Groups of the jackknife.
-const GROUPS: usize = 10;
-/// Share of replications that a figure needs.
-const ENOUGH: f64 = 0.5;
+const AFTER_S: f64 = 15.36;
+
+/// The second span of the batch fits of section V.B starts here, s.
+const LAST_SPAN_FROM_S: f64 = 51.2;
 
 /// The results of studies, by the names of their plans.
 #[derive(Debug, Clone, Default)]
@@ -58,7 +58,7 @@ impl<'a> Evidence<'a> {
     }
 }
 
-/// A study that is asked for numbers; what it does not have is an error with the reason.
+/// The numbers of a study; what it does not have is an error with the reason.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Study<'a> {
     results: &'a Results,
@@ -245,201 +245,5 @@ fn forgets(estimator: &EstimatorCell, parameter: &str) -> bool {
     match given.memory_of.get("b") {
         Some(of_b) if ["K_e", "T_L", "K_e_dot"].contains(&parameter) => is_short(of_b),
         _ => given.memory.0.as_ref().is_some_and(is_short) && given.memory_of.values().all(is_short),
-    }
-}
-
-/// Spans of the levels between which a trace steps, s: before the change and at the end.
-const BEFORE_S: f64 = 10.24;
-const AFTER_S: f64 = 15.36;
-
-/// The second span of the batch fits of section V.B starts here, s.
-const LAST_SPAN_FROM_S: f64 = 51.2;
-
-const NOTHING: Value = Value {
-    value: f64::NAN,
-    error: f64::NAN,
-};
-
-/// Magnitudes of some values.
-pub(super) fn magnitudes(values: &[f64]) -> Vec<f64> {
-    values.iter().map(|v| v.abs()).collect()
-}
-
-/// Values enough to speak for all replications.
-fn enough(values: &[f64]) -> bool {
-    let finite = values.iter().filter(|v| v.is_finite()).count();
-    finite > 0 && finite as f64 >= ENOUGH * values.len() as f64
-}
-
-fn value_of(values: &[f64], figure: fn(&Statistics) -> (f64, f64)) -> Value {
-    if !enough(values) {
-        return NOTHING;
-    }
-    let (value, error) = figure(&Statistics::of(values));
-    Value {
-        value,
-        // A scenario without remnant has one replication, which says all.
-        error: if values.len() == 1 { 0.0 } else { error },
-    }
-}
-
-pub(super) fn median_of(values: &[f64]) -> Value {
-    value_of(values, |s| (s.median, s.median_se))
-}
-
-pub(super) fn mean_of(values: &[f64]) -> Value {
-    value_of(values, |s| (s.mean, s.mean_se))
-}
-
-pub(super) fn share_of(values: &[f64]) -> Value {
-    let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    let n = finite.len() as f64;
-    let p = finite.iter().sum::<f64>() / n;
-    Value {
-        value: p,
-        error: (p * (1.0 - p) / n).sqrt().max(1.5 / n),
-    }
-}
-
-/// The median of values that are enough.
-pub(super) fn med(values: &[f64]) -> f64 {
-    if enough(values) { median(values) } else { f64::NAN }
-}
-
-/// The magnitude of the median.
-pub(super) fn bias(values: &[f64]) -> f64 {
-    med(values).abs()
-}
-
-/// The median of the magnitude.
-pub(super) fn size(values: &[f64]) -> f64 {
-    med(&magnitudes(values))
-}
-
-/// The interquartile range.
-pub(super) fn range(values: &[f64]) -> f64 {
-    if !enough(values) {
-        return f64::NAN;
-    }
-    let s = Statistics::of(values);
-    s.upper_quartile - s.lower_quartile
-}
-
-/// Largest less smallest.
-pub(super) fn spread(values: impl Iterator<Item = f64>) -> f64 {
-    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
-    for value in values {
-        if value.is_nan() {
-            return value;
-        }
-        least = least.min(value);
-        most = most.max(value);
-    }
-    most - least
-}
-
-/// R^2 of the straight line through values at equal distances.
-pub(super) fn linearity(values: &[f64]) -> f64 {
-    let n = values.len() as f64;
-    let (x0, y0) = (0.5 * (n - 1.0), values.iter().sum::<f64>() / n);
-    let [mut xx, mut xy, mut yy] = [0.0; 3];
-    for (k, y) in values.iter().enumerate() {
-        let (x, y) = (k as f64 - x0, y - y0);
-        xx += x * x;
-        xy += x * y;
-        yy += y * y;
-    }
-    xy * xy / (xx * yy)
-}
-
-/// A function of samples with the error of the delete-a-group jackknife.
-pub(super) fn jackknife(samples: &[Vec<f64>], f: &dyn Fn(&[Vec<f64>]) -> f64) -> Value {
-    let value = f(samples);
-    let n = samples.iter().map(Vec::len).max().unwrap_or(0);
-    let groups = GROUPS.min(n);
-    if groups < 2 {
-        return Value { value, error: 0.0 };
-    }
-    let left: Vec<f64> = (0..groups)
-        .map(|group| {
-            let without = |sample: &Vec<f64>| match sample.len() {
-                1 => sample.clone(),
-                _ => sample
-                    .iter()
-                    .enumerate()
-                    .filter(|(i, _)| i % groups != group)
-                    .map(|(_, v)| *v)
-                    .collect(),
-            };
-            f(&samples.iter().map(without).collect::<Vec<_>>())
-        })
-        .collect();
-    let g = groups as f64;
-    let mean = left.iter().sum::<f64>() / g;
-    let squares: f64 = left.iter().map(|x| (x - mean).powi(2)).sum();
-    Value {
-        value,
-        error: ((g - 1.0) / g * squares).sqrt(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn normals(n: usize, seed: u64) -> Vec<f64> {
-        let mut state = seed;
-        let mut uniform = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
-        (0..n).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
-    }
-
-    #[test]
-    fn the_jackknife_of_a_mean_is_its_error() {
-        // The expectation of s^2 is exact for a mean; with 9 degrees of freedom s scatters by 24 % and 400 samples bring that to 1.2 %, the root of
-        // a chi-square of 9 degrees is 2.7 % below.
-        let errors: f64 = (0..400)
-            .map(|seed| jackknife(&[normals(100, seed)], &|s| s[0].iter().sum::<f64>() / s[0].len() as f64).error)
-            .sum();
-        assert!((errors / 400.0 - 0.1 * 0.973).abs() < 0.005, "{}", errors / 400.0);
-    }
-
-    #[test]
-    fn pairs_stay_pairs() {
-        let a = normals(100, 3);
-        let b: Vec<f64> = a.iter().map(|a| a + 1.0).collect();
-        let found = jackknife(&[a, b], &|s| med(&s[1]) - med(&s[0]));
-        assert!((found.value - 1.0).abs() < 1e-12 && found.error < 1e-12, "{found:?}");
-    }
-
-    #[test]
-    fn few_values_say_nothing() {
-        let most = [1.0, 2.0, f64::NAN];
-        let few = [1.0, f64::NAN, f64::NAN];
-        assert_eq!(median_of(&most).value, 1.5);
-        assert!(median_of(&few).value.is_nan() && med(&few).is_nan() && size(&few).is_nan() && range(&few).is_nan());
-        assert_eq!(median_of(&[7.0]), Value { value: 7.0, error: 0.0 });
-        assert_eq!(jackknife(&[vec![7.0]], &|s| s[0][0]), Value { value: 7.0, error: 0.0 });
-        assert_eq!(
-            share_of(&[0.0; 30]),
-            Value {
-                value: 0.0,
-                error: 0.05
-            }
-        );
-        assert_eq!(spread([3.0, -1.0, 2.0].into_iter()), 4.0);
-        assert!(spread([3.0, f64::NAN].into_iter()).is_nan());
-    }
-
-    #[test]
-    fn linearity_of_a_line_and_of_a_parabola() {
-        assert!((linearity(&[1.0, 3.0, 5.0, 7.0]) - 1.0).abs() < 1e-12);
-        assert!(linearity(&[1.0, 0.0, 0.0, 1.0]) < 1e-12);
-        // NumPy: corrcoef([0, 1, 2, 3], [0, 1, 4, 9])^2 = 0.9184
-        assert!((linearity(&[0.0, 1.0, 4.0, 9.0]) - 0.918_4).abs() < 1e-4);
     }
 }

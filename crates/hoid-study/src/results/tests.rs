@@ -1,5 +1,5 @@
 use super::*;
-use crate::{RunOptions, run};
+use crate::{Plan, Query, RunOptions, Statistics, StudyError, manifest::PLAN, run};
 
 const PLAN_TEXT: &str = r#"
 name = "tiny"

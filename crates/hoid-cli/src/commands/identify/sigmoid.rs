@@ -9,6 +9,7 @@ use hoid_model::{Channel, Record, uncertainty::Estimate};
 use hoid_report::numbers;
 use serde_json::{Map, Value, json};
 
+use super::{estimate::search, settings::common_settings};
 use crate::{
     args::IdentifyArgs,
     commands::reading::Account,
@@ -26,7 +27,7 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
     let mut estimator = TimeVarying {
         nd: noise_order(args)?,
         constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
-        search: super::estimate::search(args),
+        search: search(args),
         ..TimeVarying::default()
     };
     if let Some(delay) = args.delay {
@@ -39,7 +40,7 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
         ("orders".to_owned(), format!("nd={}", estimator.nd)),
         ("delay in s".to_owned(), format!("{low}..{high}")),
     ];
-    settings.extend(super::common_settings(args, true));
+    settings.extend(common_settings(args, true));
     if let Some(path) = &args.trace {
         write_record(path, &trace(&fit, &records[0])?)?;
         output::complain(&format!("trace of {}: {}", args.records[0].display(), path.display()));

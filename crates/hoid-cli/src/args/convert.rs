@@ -1,0 +1,94 @@
+//! Options of `hoid convert` and `hoid info`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use hoid_model::{ContinuousTransferFunction, discretise};
+
+use super::parse::parse_transfer_function;
+use crate::orders::parse_numbers;
+
+#[derive(Debug, Args)]
+pub struct InfoArgs {
+    /// File of any format that is read: CSV, Parquet, NPZ, NPY, MATLAB .mat, XDF
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// Print one JSON object instead of tables
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(group(clap::ArgGroup::new("what").required(true).args(["f", "operator", "transfer_function"])))]
+pub struct ConvertArgs {
+    /// F of the discrete operator: f1,f2
+    #[arg(
+        long,
+        value_name = "F1,F2",
+        value_delimiter = ',',
+        num_args = 1,
+        allow_hyphen_values = true,
+        requires = "b"
+    )]
+    pub f: Option<Vec<f64>>,
+    /// B of the discrete operator: b0,b1
+    #[arg(
+        long,
+        value_name = "B0,B1",
+        value_delimiter = ',',
+        num_args = 1,
+        allow_hyphen_values = true,
+        requires = "f"
+    )]
+    pub b: Option<Vec<f64>>,
+    /// Delay of b0 in samples
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub nk: usize,
+    /// Operator parameters: K_e=.09,T_L=.4,omega_nm=11.25,zeta_nm=.35,tau_e=.28 (K_e_dot may stand for T_L)
+    #[arg(long, value_name = "LIST", value_parser = parse_numbers, allow_hyphen_values = true)]
+    pub operator: Option<std::vec::Vec<(String, f64)>>,
+    /// Transfer function NUM/DEN to discretise, by descending powers of s, as 1,2/1,3,4
+    #[arg(long, value_name = "NUM/DEN", value_parser = parse_transfer_function, allow_hyphen_values = true)]
+    pub transfer_function: Option<ContinuousTransferFunction>,
+    /// Discretisation of the transfer function
+    #[arg(long, value_name = "NAME", default_value = "zoh")]
+    pub method: MethodName,
+    /// Prewarp frequency in rad/s, for --method prewarped
+    #[arg(long, value_name = "RAD/S", required_if_eq("method", "prewarped"))]
+    pub prewarp: Option<f64>,
+    /// Sample time Ts in s
+    #[arg(long, value_name = "S", default_value_t = 0.01)]
+    pub sample_time: f64,
+    /// Print one JSON object instead of text
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A discretisation; prewarping needs its frequency besides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MethodName {
+    Zoh,
+    Foh,
+    Tustin,
+    Prewarped,
+    ForwardEuler,
+    BackwardEuler,
+    Matched,
+}
+
+impl MethodName {
+    /// The method of the library.
+    pub fn method(self, prewarp_rad_s: Option<f64>) -> discretise::Method {
+        match self {
+            Self::Zoh => discretise::Method::ZeroOrderHold,
+            Self::Foh => discretise::Method::FirstOrderHold,
+            Self::Tustin => discretise::Method::Tustin,
+            Self::Prewarped => discretise::Method::TustinPrewarped {
+                omega_rad_s: prewarp_rad_s.unwrap_or(f64::NAN),
+            },
+            Self::ForwardEuler => discretise::Method::ForwardEuler,
+            Self::BackwardEuler => discretise::Method::BackwardEuler,
+            Self::Matched => discretise::Method::Matched,
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! What can be typed. The texts here are the help pages; each option states its default and unit.
+//!
+//! | module | options of |
+//! |---|---|
+//! | `cli` | the program: its commands |
+//! | `simulate` | `hoid demo`, `hoid simulate`, `hoid margins` |
+//! | `identify` | `hoid identify` |
+//! | `recursion`, `settings` | `hoid track`, `hoid stream`; the options of the methods, from the registry |
+//! | `reading` | all commands that read records |
+//! | `convert` | `hoid convert`, `hoid info` |
+//! | `group`, `study` | `hoid group`, `hoid simulate-group`; `hoid study`, `hoid reproduce` |
+
+#[macro_use]
+mod name_enum;
+
+mod choices;
+mod cli;
+mod convert;
+mod group;
+mod identify;
+mod names;
+mod parse;
+mod reading;
+mod recursion;
+mod settings;
+mod simulate;
+mod study;
+
+pub use cli::{Cli, Command};
+pub use convert::{ConvertArgs, InfoArgs};
+pub use group::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs};
+pub use identify::{FocusName, IdentifyArgs, InitialStateName, Kind, SearchMethodName};
+pub use names::CriterionName;
+pub use parse::parse_span;
+pub use reading::{MaskArgs, ReadArgs};
+pub use recursion::{RecursionArgs, StreamArgs, TrackArgs};
+#[cfg(test)]
+pub use settings::with_settings;
+pub use settings::{flag, methods_with};
+pub use simulate::{DemoArgs, MarginsArgs, ScenarioChoice, SimulateArgs, StateName};
+pub use study::{ReproduceArgs, StudyCommand, StudyMergeArgs, StudyRunArgs};

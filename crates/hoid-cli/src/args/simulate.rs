@@ -1,0 +1,98 @@
+//! Options of the commands that simulate: `hoid demo`, `hoid simulate`, `hoid margins`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use hoid_model::scenario::{Condition, Realisation};
+
+use super::choices::choice_of;
+
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// Directory for the record, the results and the report; it is made if it is not there
+    #[arg(long, value_name = "DIR", default_value = "hoid-demo")]
+    pub out: PathBuf,
+    /// Seed of the simulated run
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+}
+
+/// A condition of the reference text or a scenario file.
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+pub struct ScenarioChoice {
+    /// Condition of the reference text: C1 to C6
+    #[arg(long, value_name = "C1..C6")]
+    pub condition: Option<Condition>,
+    /// Scenario file (TOML)
+    #[arg(long, value_name = "FILE")]
+    pub scenario: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+pub struct SimulateArgs {
+    #[command(flatten)]
+    pub base: ScenarioChoice,
+    /// Order m of the remnant filter, 1 to 4 [default: 1, or the scenario's]
+    #[arg(long, value_name = "M")]
+    pub remnant_order: Option<usize>,
+    /// Noise level P_n; 0 is a run without remnant [default: 0.1, or the scenario's]
+    #[arg(long, value_name = "P_N")]
+    pub noise_level: Option<f64>,
+    /// What the noise level is a share of: var(u_n)/var(u) or var(n)/var(u) [default: response, or the scenario's]
+    #[arg(long, value_name = "WHICH", value_parser = choice_of(&NoiseDefinition::ALL))]
+    pub noise_definition: Option<NoiseDefinition>,
+    /// Remnant time constant T_n in s [default: 0.06, or the scenario's]
+    #[arg(long, value_name = "S")]
+    pub remnant_time_constant: Option<f64>,
+    /// Sample time Ts in s [default: 0.01, or the scenario's]
+    #[arg(long, value_name = "S")]
+    pub sample_time: Option<f64>,
+    /// Where K_c stands when it changes: in the input matrix (x stays continuous) or in the output matrix (as in the reference
+    /// text) [default: input, or the scenario's]
+    #[arg(long, value_name = "WHERE", value_parser = choice_of(&Realisation::ALL))]
+    pub realisation: Option<Realisation>,
+    /// Seed of the random streams
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Cell of a study, to repeat one of its runs: seed, cell and replication name the random stream
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub cell: u64,
+    /// Replication: runs with the same seed and another replication are independent
+    #[arg(long, value_name = "R", default_value_t = 0)]
+    pub replication: u64,
+    /// Keep the run-in (t < 0) in the file
+    #[arg(long)]
+    pub keep_run_in: bool,
+    /// File to write; - writes CSV to standard output
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+pub struct MarginsArgs {
+    #[command(flatten)]
+    pub base: ScenarioChoice,
+    /// Which state of a scenario that changes
+    #[arg(long, value_name = "WHICH", default_value = "initial")]
+    pub state: StateName,
+    /// Noise levels P_n for the remnant gains
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [0.01, 0.1, 0.2, 0.3])]
+    pub noise_levels: Vec<f64>,
+    /// What the noise level is a share of: var(u_n)/var(u) or var(n)/var(u)
+    #[arg(long, value_name = "WHICH", default_value = "response", value_parser = choice_of(&NoiseDefinition::ALL))]
+    pub noise_definition: NoiseDefinition,
+    /// Print one JSON object instead of tables
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Which state of a scenario.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum StateName {
+    Initial,
+    Last,
+}
+

@@ -1,0 +1,182 @@
+//! From records to a model: read, fit, judge, write.
+
+use hoid_ident::{
+    Fit, MarginEstimates,
+    validation::{Quality, nrmse_fit, vaf},
+};
+use hoid_model::{ContinuousTransferFunction, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
+use hoid_report::{ModelSection, Report, known_operator, write_report};
+
+use super::{
+    estimate::{self, Estimated},
+    settings::common_settings,
+    sigmoid,
+};
+use crate::{
+    args::{IdentifyArgs, Kind},
+    commands::reading::{self, ReadAll},
+    error::CliError,
+    json::{self, Identified},
+    output, text,
+};
+
+pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
+    let kind = estimate::kind(args)?;
+    let with_input = match kind {
+        Kind::Polynomial(structure) => structure.has_input(),
+        Kind::GreyBox | Kind::TimeVarying => true,
+    };
+    let ReadAll {
+        files,
+        records,
+        accounts,
+    } = reading::read_all(&args.records, &args.read, &args.mask, with_input)?;
+    if kind == Kind::TimeVarying {
+        return sigmoid::run(args, &files, &records, &accounts);
+    }
+    let Estimated {
+        fit,
+        choice,
+        grey_box,
+        settings: chosen,
+    } = estimate::fit(args, kind, &records)?;
+    // Read before anything is written: a bad validation file leaves nothing behind.
+    let validation = match &args.validate {
+        Some(path) => Some((
+            path.display().to_string(),
+            fit.quality(&[reading::read(path, &args.read, with_input)?.0])?,
+        )),
+        None => None,
+    };
+    let mut settings = chosen;
+    settings.extend(common_settings(args, with_input));
+    let operator = fit.operator();
+    let remnant = (fit.orders().nd > 0).then(|| fit.remnant(args.remnant_discretisation.into()));
+    let margins = args
+        .controlled_element
+        .as_ref()
+        .map(|element| loop_margins(&fit, element));
+    let validations = records.iter().map(|r| fit.validate(r)).collect::<Result<Vec<_>, _>>()?;
+    let ahead = args.horizon.map(|k| prediction_ahead(&fit, &records, k)).transpose()?;
+    let identified = Identified {
+        files: &files,
+        records: &records,
+        accounts: &accounts,
+        quality: Quality::together(records.iter().zip(&validations)),
+        fit: &fit,
+        choice: choice.as_ref(),
+        grey_box: grey_box.as_ref(),
+        operator: &operator,
+        remnant: remnant.as_ref(),
+        margins: margins.as_ref(),
+        validations: &validations,
+        ahead,
+        validation: validation.as_ref().map(|(file, q)| (file.as_str(), *q)),
+        settings: &settings,
+    };
+    if let Some(directory) = &args.report {
+        let title = match records.as_slice() {
+            [only] => format!("Identification of {}", only.label()),
+            all => format!("Identification of {} records", all.len()),
+        };
+        let mut facts = vec![
+            ("hoid".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+            ("records".to_owned(), files.join(", ")),
+        ];
+        facts.extend(settings.iter().cloned());
+        facts.extend(reading::accounts(&files, &accounts));
+        let report = Report {
+            title,
+            settings: facts,
+            models: vec![ModelSection {
+                name: fit.title(),
+                fit: &fit,
+                records: &records,
+                candidates: choice.as_ref(),
+                truth: known_operator(&records),
+                margins,
+            }],
+            notes: Vec::new(),
+        };
+        let page = write_report(directory, &report.to_html()?)?;
+        output::complain(&format!("report: {}", page.display()));
+    }
+    if args.json {
+        json::print(&identified.to_json());
+    } else {
+        output::print(&page(&identified));
+    }
+    Ok(())
+}
+
+/// VAF and NRMSE of the prediction k samples ahead, over all records together.
+fn prediction_ahead(fit: &Fit, records: &[Record], k: usize) -> Result<(usize, f64, f64), CliError> {
+    let (mut measured, mut predicted) = (Vec::new(), Vec::new());
+    for record in records {
+        let series = fit.predict_ahead(record, k)?;
+        measured.extend_from_slice(&record.output()[series.first..]);
+        predicted.extend(series.values);
+    }
+    Ok((k, vaf(&measured, &predicted), nrmse_fit(&measured, &predicted)))
+}
+
+fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> MarginEstimates {
+    let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
+    // The sampled model says nothing above half the sampling frequency.
+    let high = high.min(fit.model().sample_time().nyquist_rad_s());
+    fit.margins(|omega| element.response(omega), (low, high))
+}
+
+fn page(found: &Identified<'_>) -> String {
+    let fit = found.fit;
+    let mut page = text::records(found.files, found.records, found.accounts);
+    page.push('\n');
+    if let Some(choice) = found.choice {
+        page.push_str(&text::candidates(choice));
+        page.push('\n');
+    }
+    if let Some(grey_box) = found.grey_box {
+        page.push_str(&text::remnant_orders(grey_box));
+    }
+    page.push_str(&text::model(fit));
+    page.push_str(&text::quality(fit, &found.quality));
+    if fit.model().structure().has_input() {
+        page.push('\n');
+        page.push_str(&text::operator(found.operator));
+    }
+    if let Some(grey_box) = found.grey_box {
+        page.push_str(&text::other_records(grey_box, found.files));
+    }
+    if let Some(remnant) = found.remnant {
+        page.push_str(&text::remnant(remnant));
+    }
+    if let Some(m) = found.margins {
+        let whose = match found.grey_box {
+            Some(_) if found.files.len() > 1 => format!(" (operator of {})", found.files[0]),
+            _ => String::new(),
+        };
+        page.push_str(&format!(
+            "Open loop with the given controlled element{whose}: {}",
+            text::margins(m)
+        ));
+    }
+    page.push('\n');
+    page.push_str(&text::roots(fit));
+    // Residuals that are rounding say nothing.
+    if fit.covariance().is_some() {
+        page.push_str(&text::residual_tests(found.files, found.validations));
+    }
+    if let Some((k, vaf, nrmse)) = found.ahead {
+        page.push_str(&format!(
+            "Prediction {k} samples ahead: VAF {vaf:.2} %, NRMSE fit {nrmse:.2} %.\n"
+        ));
+    }
+    if let Some((file, q)) = &found.validation {
+        page.push_str(&format!(
+            "On {file}: VAF simulation {:.2} %, prediction {:.2} %; NRMSE fit simulation {:.2} %, prediction {:.2} %.\n",
+            q.vaf_simulation, q.vaf_prediction, q.nrmse_simulation, q.nrmse_prediction
+        ));
+    }
+    page.push_str(&text::settings(found.settings));
+    page
+}

@@ -1,0 +1,30 @@
+//! Errors of a trace against the truth in its record.
+
+use hoid_model::{NotConvertible, Record, uncertainty::OperatorEstimate};
+use hoid_track::{Trace, value_of};
+
+/// Root of the mean square of the relative error, of the rows from `first` on that converted, for each parameter whose truth the record
+/// holds.
+pub fn relative_errors(
+    record: &Record,
+    trace: &Trace,
+    operators: &[Result<OperatorEstimate, NotConvertible>],
+    first: usize,
+    columns: &[&'static str],
+) -> Vec<(&'static str, f64)> {
+    let (begin, ts) = (record.time_s(0), record.sample_time().s());
+    let of = |name: &'static str| {
+        let truth = record.channel(name)?;
+        let squares: Vec<f64> = (first..trace.len())
+            .filter_map(|row| {
+                let found = value_of(&operators[row], name)?.value;
+                let k = ((trace.times_s()[row] - begin) / ts).round() as usize;
+                let truth = truth.get(k).copied().filter(|v| *v != 0.0)?;
+                Some((found / truth - 1.0).powi(2))
+            })
+            .collect();
+        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+        (!squares.is_empty()).then(|| (name, mean.sqrt()))
+    };
+    columns.iter().copied().filter_map(of).collect()
+}

@@ -1,0 +1,116 @@
+//! A trace as JSON.
+
+use hoid_ident::Fit;
+use hoid_model::{Record, remnant::RemnantDiscretisation};
+use serde_json::{Map, Value, json};
+
+use super::result::Tracked;
+use crate::{
+    error::CliError,
+    json::{self, Identified, number},
+};
+
+impl Tracked<'_> {
+    /// The object of the contract.
+    ///
+    /// # Errors
+    /// Those of the quality of the start fit.
+    pub fn to_json(&self) -> Result<Value, CliError> {
+        let trace = self.trace;
+        let counts = trace.counts();
+        let mut map = Map::new();
+        let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
+        set("hoid", json!(env!("CARGO_PKG_VERSION")));
+        set(
+            "records",
+            json::records(
+                std::slice::from_ref(&self.file),
+                std::slice::from_ref(self.record),
+                std::slice::from_ref(self.account),
+            ),
+        );
+        set(
+            "warnings",
+            json::warnings(std::slice::from_ref(&self.file), std::slice::from_ref(self.account)),
+        );
+        set("method", json!(trace.options().method.name()));
+        set("structure", json!(trace.options().structure.name()));
+        set("orders", json::orders(&trace.options().orders));
+        let start = match (trace.start(), &self.span) {
+            (Some(fit), Some(span)) => self.start_json(fit, span)?,
+            _ => Value::Null,
+        };
+        set("start", start);
+        set("updated_from", number(trace.updated_from_s()));
+        set("last", self.last_json());
+        set("samples", json!(counts.samples));
+        set("skipped", json!(counts.skipped));
+        set("steps_shortened", json!(counts.shortened));
+        if !trace.change_odds().is_empty() {
+            let each = trace.changes().iter().map(|(t, c)| json::change(Some(*t), c));
+            set("changes", Value::Array(each.collect()));
+        }
+        set("rows", json!(trace.len()));
+        let none = self.not_converted();
+        set("rows_not_convertible", json!(none.rows));
+        set("not_convertible_reason", json!(none.reason));
+        let errors: Map<String, Value> = self
+            .relative_errors()
+            .into_iter()
+            .map(|(name, e)| (name.to_owned(), number(e)))
+            .collect();
+        set("rms_relative_error", Value::Object(errors));
+        set("trace", json!(self.out));
+        let settings: Map<String, Value> = self.settings.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
+        set("settings", Value::Object(settings));
+        Ok(Value::Object(map))
+    }
+
+    /// The start fit as `identify` gives it.
+    fn start_json(&self, fit: &Fit, span: &Record) -> Result<Value, CliError> {
+        let records = std::slice::from_ref(span);
+        let validation = fit.validate(span)?;
+        let operator = fit.operator();
+        let remnant = (fit.orders().nd > 0).then(|| fit.remnant(RemnantDiscretisation::ZeroOrderHold));
+        Ok(Identified {
+            files: std::slice::from_ref(&self.file),
+            records,
+            accounts: std::slice::from_ref(self.account),
+            fit,
+            choice: self.choice,
+            grey_box: None,
+            quality: validation.quality,
+            operator: &operator,
+            remnant: remnant.as_ref(),
+            margins: None,
+            validations: std::slice::from_ref(&validation),
+            ahead: None,
+            validation: None,
+            settings: &[(
+                "span in s".to_owned(),
+                format!("{} to {}", span.time_s(0), span.time_s(span.len())),
+            )],
+        }
+        .to_json())
+    }
+
+    fn last_json(&self) -> Value {
+        let trace = self.trace;
+        let Some(row) = trace.len().checked_sub(1) else {
+            return Value::Null;
+        };
+        let names = trace.parameter_names();
+        let parameters: Map<String, Value> = names
+            .into_iter()
+            .zip(trace.parameters(row))
+            .map(|(name, e)| (name, json::estimate(&e)))
+            .collect();
+        json!({
+            "t": number(trace.times_s()[row]),
+            "parameters": parameters,
+            "operator": json::operator(&self.operators[row]),
+            "innovation": number(trace.innovation()[row]),
+            "innovation_variance": number(trace.innovation_variance()[row]),
+        })
+    }
+}

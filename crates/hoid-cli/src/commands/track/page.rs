@@ -1,0 +1,162 @@
+//! A summary of a trace for people.
+
+use hoid_model::uncertainty::Estimate;
+use hoid_report::numbers;
+use hoid_track::value_of;
+
+use super::result::Tracked;
+use crate::{error::CliError, text};
+
+/// Rows of the trace that are printed.
+const ROWS_SHOWN: usize = 8;
+
+/// Coefficients that are printed where there is no operator.
+const COEFFICIENTS_SHOWN: usize = 6;
+
+impl Tracked<'_> {
+    /// A summary for people.
+    ///
+    /// # Errors
+    /// Those of the quality of the start fit.
+    pub fn page(&self) -> Result<String, CliError> {
+        let mut page = text::records(
+            std::slice::from_ref(&self.file),
+            std::slice::from_ref(self.record),
+            std::slice::from_ref(self.account),
+        );
+        if let Some(choice) = self.choice {
+            page.push('\n');
+            page.push_str(&text::candidates(choice));
+        }
+        if let (Some(fit), Some(span)) = (self.trace.start(), &self.span) {
+            let q = fit.quality(std::slice::from_ref(span))?;
+            page.push_str(&format!(
+                "\nStart: batch fit of {:.2} to {:.2} s, {}; VAF simulation {:.2} %, prediction {:.2} %.\n",
+                span.time_s(0),
+                span.time_s(span.len()),
+                fit.title(),
+                q.vaf_simulation,
+                q.vaf_prediction
+            ));
+        }
+        page.push_str(&self.rows_shown());
+        let errors = self.relative_errors();
+        if !errors.is_empty() {
+            let each: Vec<String> = errors
+                .iter()
+                .map(|(name, e)| format!("{name} {:.1} %", 100.0 * e))
+                .collect();
+            page.push_str(&format!(
+                "RMS relative error against the truth in the record, from {:.2} s on: {}.\n",
+                self.trace.times_s()[self.first_moved_row()],
+                each.join(", ")
+            ));
+        }
+        page.push_str(&self.changes());
+        page.push_str(&self.counts());
+        page.push_str(&text::settings(self.settings));
+        page.push_str(&format!("Trace: {}\n", self.out));
+        Ok(page)
+    }
+
+    /// The estimate at a handful of times.
+    fn rows_shown(&self) -> String {
+        let trace = self.trace;
+        if trace.is_empty() {
+            return String::new();
+        }
+        let (first, last) = (self.first_moved_row(), trace.len() - 1);
+        let shown = ROWS_SHOWN.min(last - first + 1);
+        let mut picked: Vec<usize> = (0..shown)
+            .map(|i| first + (last - first) * i / (shown - 1).max(1))
+            .collect();
+        picked.dedup();
+        let with_operator = self.has_operator();
+        let units = ["deg/deg", "s", "s", "rad/s", "", "s"];
+        let mut header = vec!["t in s".to_owned()];
+        if with_operator {
+            let named = self.trace.operator_columns().into_iter().zip(units);
+            header.extend(named.map(|(n, u)| {
+                if u.is_empty() {
+                    n.to_owned()
+                } else {
+                    format!("{n} ({u})")
+                }
+            }));
+        } else {
+            header.extend(trace.parameter_names().into_iter().take(COEFFICIENTS_SHOWN));
+        }
+        let mut rows = text::table(&header.iter().map(String::as_str).collect::<Vec<_>>());
+        for row in picked {
+            let mut cells = vec![format!("{:.2}", trace.times_s()[row])];
+            if with_operator {
+                let of = |name| value_of(&self.operators[row], name);
+                cells.extend(self.trace.operator_columns().into_iter().map(|n| plus_minus(of(n))));
+            } else {
+                let all = trace.parameters(row);
+                cells.extend(all.into_iter().take(COEFFICIENTS_SHOWN).map(|e| plus_minus(Some(e))));
+            }
+            rows.add_row(cells);
+        }
+        format!(
+            "\nEstimate by {} with one standard error; the trace has all {} rows.\n{rows}\n",
+            trace.options().method.name(),
+            trace.len()
+        )
+    }
+
+    /// The changes that were declared.
+    fn changes(&self) -> String {
+        let trace = self.trace;
+        if trace.change_odds().is_empty() {
+            return String::new();
+        }
+        if trace.changes().is_empty() {
+            return "No change was declared.\n".to_owned();
+        }
+        let mut lines = String::new();
+        for (t, c) in trace.changes() {
+            let changed = c.changed();
+            lines.push_str(&format!(
+                "Change declared at {t:.2} s, of {:.2} s before: {}; log odds {:.1}.\n",
+                c.seconds_ago,
+                if changed.is_empty() {
+                    "no single quantity by two standard errors".to_owned()
+                } else {
+                    changed.join(", ")
+                },
+                c.odds
+            ));
+        }
+        lines
+    }
+
+    fn counts(&self) -> String {
+        let c = self.trace.counts();
+        let mut text = format!(
+            "{} samples; {} skipped for a fault in e or u; {} made shorter to stay stable or within bounds.\n",
+            c.samples,
+            c.skipped,
+            text::steps(usize::try_from(c.shortened).unwrap_or(usize::MAX))
+        );
+        if self.has_operator() {
+            let none = self.not_converted();
+            text.push_str(&format!("{} of {} rows have no operator", none.rows, self.trace.len()));
+            text.push_str(&match none.reason {
+                Some(reason) => format!("; most often {reason}.\n"),
+                None => ".\n".to_owned(),
+            });
+        }
+        text
+    }
+}
+
+fn plus_minus(e: Option<Estimate>) -> String {
+    match e {
+        None => numbers::DASH.to_owned(),
+        Some(e) => match text::with_uncertainty(&e) {
+            (value, error) if error == numbers::DASH => value,
+            (value, error) => format!("{value} ± {error}"),
+        },
+    }
+}

@@ -1,0 +1,121 @@
+//! The run of the command: start fit, recursion, files.
+
+use hoid_io::{check_table_path, write_table};
+use hoid_model::Record;
+use hoid_track::{StartAt, TrackOptions, track};
+
+use super::{report, result::Tracked};
+use crate::{args::TrackArgs, commands::reading, error::CliError, json, output, recursion, recursion::Plan};
+
+pub fn run(args: &TrackArgs) -> Result<(), CliError> {
+    check_table_path(&args.out)?;
+    if !args.batch.is_empty() && args.report.is_none() {
+        return Err(CliError::Usage("--batch belongs to --report".to_owned()));
+    }
+    let with_input = recursion::structure(&args.recursion)?.has_input();
+    let (record, account) = reading::read(&args.record, &args.read, with_input)?;
+    let plan = Plan::new(&args.recursion, record.sample_time())?;
+    let span_s = start_span(args, &plan, &record)?;
+    let span = record.span(span_s.0, span_s.1);
+    let (options, choice) = if plan.is_settled() {
+        (plan.options().clone(), None)
+    } else {
+        plan.choose(span.as_ref().map_err(|e| e.clone())?)?
+    };
+    let start = match options.start {
+        StartAt::Span(_) => StartAt::Span(Some(span_s)),
+        other => other,
+    };
+    let options = TrackOptions {
+        start,
+        update_from_s: update_from(args, &record)?,
+        ..options
+    };
+    let trace = track(&record, &options, args.every)?;
+    let rows = averaged_rows(args, &record)?;
+    let trace = trace.moving_average(rows);
+
+    let mut settings = plan.settings(&options, choice.as_ref());
+    settings.push((
+        "start".to_owned(),
+        match &options.start {
+            StartAt::Span(Some((from, to))) => format!("batch fit of {from:.2} to {to:.2} s"),
+            StartAt::Span(None) => "batch fit of the first third".to_owned(),
+            StartAt::Theta(_) => "given".to_owned(),
+            StartAt::Nothing => "nothing".to_owned(),
+        },
+    ));
+    if options.method.smooths() {
+        settings.push(("estimate".to_owned(), "two-sided, of the whole record".to_owned()));
+    } else {
+        settings.push((
+            "estimate moves from".to_owned(),
+            format!("{:.2} s", trace.updated_from_s()),
+        ));
+    }
+    if rows > 1 {
+        let lag = (rows - 1) as f64 / 2.0 * args.every as f64 * record.sample_time().s();
+        settings.push(("moving average".to_owned(), format!("{rows} rows, lags by {lag:.3} s")));
+    }
+    settings.extend(reading::settings(&args.read, with_input));
+    settings.push(("rows of the trace".to_owned(), format!("every {} samples", args.every)));
+
+    let tracked = Tracked {
+        file: args.record.display().to_string(),
+        span: span.ok().filter(|_| trace.start().is_some()),
+        operators: trace.operators(),
+        out: args.out.display().to_string(),
+        record: &record,
+        account: &account,
+        trace: &trace,
+        choice: choice.as_ref(),
+        settings: &settings,
+    };
+    let batch = report::batch_fits(args, &tracked)?;
+    write_table(&args.out, &tracked.table())?;
+    if let Some(page) = report::write(args, &tracked, &batch)? {
+        output::complain(&format!("report: {}", page.display()));
+    }
+    if args.json {
+        json::print(&tracked.to_json()?);
+    } else {
+        output::print(&tracked.page()?);
+    }
+    Ok(())
+}
+
+/// The span of the start fit and of the search: as typed, else the first third.
+fn start_span(args: &TrackArgs, plan: &Plan, record: &Record) -> Result<(f64, f64), CliError> {
+    if args.start_span.is_some() && matches!(plan.options().start, StartAt::Theta(_)) {
+        return Err(CliError::Usage(
+            "--start-span is the span of the start fit, and --start gives the start itself; drop one".to_owned(),
+        ));
+    }
+    let begin = record.time_s(0);
+    let third = begin + record.len() as f64 * record.sample_time().s() / 3.0;
+    Ok(args.start_span.unwrap_or((begin, third)))
+}
+
+fn update_from(args: &TrackArgs, record: &Record) -> Result<Option<f64>, CliError> {
+    let end = record.time_s(record.len());
+    match args.update_from {
+        Some(t) if t.is_nan() || t >= end => Err(CliError::Usage(format!(
+            "--update-from {t}: the record ends at {end:.4} s; give a time before"
+        ))),
+        other => Ok(other),
+    }
+}
+
+/// Rows of the moving average.
+fn averaged_rows(args: &TrackArgs, record: &Record) -> Result<usize, CliError> {
+    let Some(length) = args.moving_average else {
+        return Ok(1);
+    };
+    let row = args.every as f64 * record.sample_time().s();
+    if !(length >= 0.0 && length <= record.len() as f64 * record.sample_time().s()) {
+        return Err(CliError::Usage(format!(
+            "--moving-average {length}: expected a length in s up to that of the record"
+        )));
+    }
+    Ok((length / row).round().max(1.0) as usize)
+}

@@ -1,0 +1,41 @@
+//! Symbols and numbers of the pages as values for the templates.
+
+use hoid_model::{Record, uncertainty::Estimate};
+use minijinja::Value;
+
+use crate::numbers::{DASH, with_uncertainty};
+
+pub fn html(text: impl Into<String>) -> Value {
+    Value::from_safe_string(text.into())
+}
+
+/// Name and unit of an operator parameter for the page.
+pub fn symbol(name: &str) -> (Value, &'static str) {
+    let (symbol, unit) = match name {
+        "K_e" => ("<i>K</i><sub>e</sub>", "deg/deg"),
+        "T_L" => ("<i>T</i><sub>L</sub>", "s"),
+        "K_e_dot" => ("<i>K</i><sub>\u{117}</sub>", "s"),
+        "omega_nm" => ("<i>\u{3c9}</i><sub>nm</sub>", "rad/s"),
+        "zeta_nm" => ("<i>\u{3b6}</i><sub>nm</sub>", "-"),
+        "tau_e" => ("<i>\u{3c4}</i><sub>e</sub>", "s"),
+        other => return (Value::from(other), ""),
+    };
+    (html(symbol), unit)
+}
+
+pub fn cell(estimate: Estimate) -> Value {
+    let (value, error) = with_uncertainty(estimate.value, estimate.standard_error);
+    Value::from(if error == DASH {
+        value
+    } else {
+        format!("{value} \u{b1} {error}")
+    })
+}
+
+/// Label of a record, or its number.
+pub fn record_name(record: &Record, index: usize) -> String {
+    match record.label() {
+        "" => format!("record {}", index + 1),
+        label => label.to_owned(),
+    }
+}

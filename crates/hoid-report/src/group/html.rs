@@ -1,0 +1,45 @@
+//! The page as HTML text.
+
+use minijinja::context;
+
+use super::{estimates, over_time, report::GroupReport};
+use crate::{ReportError, page};
+
+impl GroupReport<'_> {
+    /// The page as HTML text, with all styles and figures inside it. The same data give the same bytes.
+    ///
+    /// # Errors
+    /// [`ReportError::Template`] for a defect of this crate.
+    pub fn html(&self) -> Result<String, ReportError> {
+        let title = match self.subject {
+            Some(subject) => format!("{}: subject {subject}", self.manifest.name),
+            None => self.manifest.name.clone(),
+        };
+        page::render(
+            "group.html",
+            context! {
+                title,
+                settings => page::facts(&self.settings),
+                notes => self.notes(),
+                headings => estimates::headings(),
+                averages => self.averages(),
+                delays => self.delays(),
+                failures => self.failures(),
+                margins => self.margins(),
+                agreement => self.agreement(),
+                describing_functions => self.describing_functions(),
+                recursions => over_time::methods(),
+                settling => self.settling(),
+                figures => self.over_time(),
+            },
+        )
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let left_out = self.manifest.runs.iter().filter(|run| !run.counts).count();
+        if left_out == 0 {
+            return Vec::new();
+        }
+        vec![format!("{left_out} runs do not count and were left out.")]
+    }
+}

@@ -1,0 +1,49 @@
+//! What a page about a group shows: manifest, tables, and all subjects or one.
+
+use hoid_study::group::Manifest;
+
+use super::tables::GroupTables;
+
+/// The page.
+#[derive(Debug)]
+pub struct GroupReport<'a> {
+    /// What was analysed.
+    pub manifest: &'a Manifest,
+    /// What came out.
+    pub tables: GroupTables<'a>,
+    /// What was done and with what, as name and value.
+    pub settings: Vec<(String, String)>,
+    /// One subject alone, or all.
+    pub subject: Option<&'a str>,
+}
+
+impl GroupReport<'_> {
+    /// True for a subject that is on the page.
+    pub(super) fn shows(&self, subject: &str) -> bool {
+        self.subject.is_none_or(|only| only == subject)
+    }
+
+    /// Subjects, and conditions, in the order of the manifest.
+    pub(super) fn names(&self) -> (Vec<&str>, Vec<&str>) {
+        let (mut subjects, mut conditions): (Vec<&str>, Vec<&str>) = (Vec::new(), Vec::new());
+        for run in self
+            .manifest
+            .runs
+            .iter()
+            .filter(|run| run.counts && self.shows(&run.subject))
+        {
+            if !subjects.contains(&run.subject.as_str()) {
+                subjects.push(&run.subject);
+            }
+            if !conditions.contains(&run.condition.as_str()) {
+                conditions.push(&run.condition);
+            }
+        }
+        (subjects, conditions)
+    }
+}
+
+/// A name as a part of an id.
+pub(super) fn id_of(what: &str, name: &str) -> String {
+    format!("{what}-{}", name.replace(|c: char| !c.is_ascii_alphanumeric(), "-"))
+}

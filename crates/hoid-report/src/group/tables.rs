@@ -1,0 +1,57 @@
+//! The tables of a finished group and their columns.
+
+use hoid_io::{ColumnValues, OutputTable};
+
+/// The tables of a finished group.
+#[derive(Debug, Clone, Copy)]
+pub struct GroupTables<'a> {
+    /// All estimates in long form.
+    pub estimates: &'a OutputTable,
+    /// Averages over runs.
+    pub averages: &'a OutputTable,
+    /// Delays and T_n that were chosen beforehand.
+    pub delays: &'a OutputTable,
+    /// Averages of traces.
+    pub traces: &'a OutputTable,
+    /// Settling times and noise of the recursions, where a condition changes.
+    pub settling: &'a OutputTable,
+    /// Averages of the frequency responses of the fits.
+    pub responses: &'a OutputTable,
+    /// Describing functions, where the manifest names an excitation.
+    pub frequencies: Option<FrequencyTables<'a>>,
+}
+
+/// The tables of the describing functions.
+#[derive(Debug, Clone, Copy)]
+pub struct FrequencyTables<'a> {
+    /// A row a line.
+    pub lines: &'a OutputTable,
+    /// Crossover, margin, gain, lead, delay and noise, a row a subject and condition.
+    pub margins: &'a OutputTable,
+    /// How far each estimator is from it.
+    pub agreement: &'a OutputTable,
+}
+
+/// A column of texts; empty where there is none.
+pub(super) fn texts<'a>(table: &'a OutputTable, name: &str) -> &'a [String] {
+    match table.column(name) {
+        Some(ColumnValues::Text(values)) => values,
+        _ => &[],
+    }
+}
+
+/// A column of numbers; empty where there is none.
+pub(super) fn reals<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
+    match table.column(name) {
+        Some(ColumnValues::Real(values)) => values,
+        _ => &[],
+    }
+}
+
+/// The rows of a table that are about a subject and condition.
+pub(super) fn rows_of(table: &OutputTable, subject: &str, condition: &str) -> Vec<usize> {
+    let (s, c) = (texts(table, "subject"), texts(table, "condition"));
+    (0..s.len())
+        .filter(|i| s[*i] == subject && c[*i] == condition)
+        .collect()
+}

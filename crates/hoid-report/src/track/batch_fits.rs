@@ -1,0 +1,67 @@
+//! Batch fits that a recursive estimate is compared with.
+
+use hoid_ident::{Estimator, Fit, IdentError};
+use hoid_model::{Orders, Record};
+use hoid_track::{StartAt, Trace};
+
+/// A batch fit and its span, s.
+pub type BatchFit = ((f64, f64), Fit);
+
+/// The orders of a trace; where it tracks the delay, with the median of what it says of the delay in a span, s.
+fn orders_within(trace: &Trace, (from, to): (f64, f64)) -> Orders {
+    let orders = trace.options().orders;
+    if trace.options().method.track_delay_s().is_none() {
+        return orders;
+    }
+    let rows = trace
+        .times_s()
+        .iter()
+        .enumerate()
+        .filter(|(_, t)| (from..to).contains(*t));
+    let mut delays: Vec<f64> = rows
+        .filter_map(|(row, _)| Some(trace.operator_values(row).ok()?.tau_e_s.value))
+        .collect();
+    delays.sort_by(f64::total_cmp);
+    match delays.get(delays.len() / 2) {
+        Some(delay_s) => Orders {
+            nk: (delay_s / trace.sample_time().s()).round() as usize + 1,
+            ..orders
+        },
+        None => orders,
+    }
+}
+
+/// A fit of a span of a record with the structure and the orders of a trace; where the trace tracks the delay, with what it says of it there.
+///
+/// # Errors
+/// Those of the fit.
+pub fn batch_fit(trace: &Trace, record: &Record, (from, to): (f64, f64)) -> Result<BatchFit, IdentError> {
+    let options = trace.options();
+    let estimator = Estimator {
+        search: options.search,
+        ..Estimator::new(options.structure, orders_within(trace, (from, to)))
+    };
+    Ok(((from, to), estimator.fit(&[record.span(from, to)?])?))
+}
+
+/// The batch fits that a page compares a trace with, where none are named: that of the start, and one of the last third of the record; with the
+/// reason where the last third cannot be fitted.
+pub fn usual_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Option<IdentError>) {
+    let mut all = Vec::new();
+    if let (Some(start), StartAt::Span(Some((from, to)))) = (trace.start(), &trace.options().start)
+        && let Ok(span) = record.span(*from, *to)
+    {
+        all.push(((span.time_s(0), span.time_s(span.len())), start.clone()));
+    }
+    let last_third = (
+        record.time_s(record.len() - record.len() / 3),
+        record.time_s(record.len()),
+    );
+    match batch_fit(trace, record, last_third) {
+        Ok(last) => {
+            all.push(last);
+            (all, None)
+        }
+        Err(error) => (all, Some(error)),
+    }
+}

@@ -1,0 +1,49 @@
+//! A trace with the operator of each of its rows, and the operator's parameters by name.
+
+use hoid_model::{
+    NotConvertible,
+    uncertainty::{Estimate, OperatorEstimate},
+};
+use hoid_track::OPERATOR_COLUMNS;
+
+use super::section::TraceSection;
+
+/// A trace with the operator of each row.
+pub struct Evaluated<'a> {
+    pub section: &'a TraceSection<'a>,
+    pub operators: Vec<Result<OperatorEstimate, NotConvertible>>,
+}
+
+impl<'a> Evaluated<'a> {
+    pub fn new(section: &'a TraceSection<'a>) -> Self {
+        let rows = 0..section.trace.len();
+        Self {
+            section,
+            operators: rows.map(|row| section.trace.operator(row)).collect(),
+        }
+    }
+}
+
+/// The estimate of an operator's parameter.
+pub fn of_name(operator: &OperatorEstimate, name: &str) -> Option<Estimate> {
+    operator.rows().into_iter().find(|r| r.0 == name).map(|r| r.2)
+}
+
+/// Names of the parameters that are shown; tau_e only where a method tracks it.
+pub fn operator_names(traces: &[Evaluated<'_>]) -> Vec<&'static str> {
+    let mut names = OPERATOR_COLUMNS.to_vec();
+    if traces.iter().any(|t| t.section.trace.options().method.track_delay_s().is_some()) {
+        names.push("tau_e");
+    }
+    names
+}
+
+pub fn unit(name: &str) -> &'static str {
+    match name {
+        "K_e" => "deg/deg",
+        "T_L" | "K_e_dot" | "tau_e" => "s",
+        "omega_nm" => "rad/s",
+        "zeta_nm" => "-",
+        _ => "",
+    }
+}

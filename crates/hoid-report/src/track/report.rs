@@ -1,0 +1,140 @@
+//! The page of recursive estimates, from its sections.
+
+use hoid_model::Record;
+use minijinja::{Value, context};
+
+use super::{evaluated::Evaluated, panels, section::TraceSection, tables};
+use crate::{
+    ReportError,
+    figures::{self, TraceGrid},
+    page, tables as of_fits,
+};
+
+/// Most traces of a page: more curves over each other cannot be told apart.
+const MOST_TRACES: usize = 4;
+
+/// What the page is about.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackReport<'a> {
+    /// Heading of the page.
+    pub title: String,
+    /// What was done and with what, as name and value: command, versions, record, seed.
+    pub settings: Vec<(String, String)>,
+    /// The record that was tracked. Columns with the names of the operator's parameters (`K_e`, `T_L`, `K_e_dot`, `omega_nm`, `zeta_nm`,
+    /// `tau_e`) are the truth, as in every simulation.
+    pub record: &'a Record,
+    /// One to four estimates of that record, drawn over each other.
+    pub traces: Vec<TraceSection<'a>>,
+    /// Remarks for the reader, such as warnings of the command.
+    pub notes: Vec<String>,
+}
+
+impl TrackReport<'_> {
+    /// The page as HTML text, with all styles and figures inside it. The same data give the same bytes.
+    ///
+    /// # Errors
+    /// [`ReportError::NoTraces`], [`ReportError::TooManyTraces`], [`ReportError::EmptyTrace`]; [`ReportError::Template`] for a defect of
+    /// this crate.
+    pub fn to_html(&self) -> Result<String, ReportError> {
+        self.check()?;
+        let traces: Vec<Evaluated<'_>> = self.traces.iter().map(Evaluated::new).collect();
+        let sections: Vec<Value> = traces.iter().enumerate().map(|(i, t)| self.section(i, t)).collect();
+        let operator = panels::operator_grid(&traces, self.record);
+        let coefficients = panels::coefficient_grid(&traces, self.record);
+        let innovation = panels::innovation_grid(&traces, self.record);
+        let errors = panels::error_grid(&traces, self.record);
+        let shortened = panels::shortened_grid(&traces, self.record);
+        let draw =
+            |id: &str, title: &str, grid: &TraceGrid| Value::from_safe_string(figures::trace_panels(id, title, grid));
+        let values = context! {
+            title => self.title.clone(),
+            settings => page::facts(&self.settings),
+            notes => self.notes.clone(),
+            names => self.traces.iter().map(|t| t.name.clone()).collect::<Vec<_>>(),
+            has_start => self.traces.iter().any(|t| t.trace.start().is_some()),
+            has_batch => self.traces.iter().any(|t| !t.batch.is_empty()),
+            has_truth => self.record.channel("K_e").is_some(),
+            methods => tables::methods(&traces, self.record),
+            counts => tables::counts(&traces),
+            errors => tables::errors(&traces, self.record),
+            operator => draw("operator", "Parameters of the operator over time", &operator),
+            operator_beyond => beyond(&operator),
+            coefficients => draw("coefficients", "Coefficients over time", &coefficients),
+            coefficients_beyond => beyond(&coefficients),
+            innovation => draw("innovation", "Innovations over time", &innovation),
+            spread => draw("errors", "Standard errors over time", &errors),
+            spread_of_operator => panels::of_operator(&traces),
+            shortened => shortened.map(|s| draw("shortened", "Shortened steps over time", &s)),
+            traces => sections,
+        };
+        page::render("track.html", values)
+    }
+
+    /// The parameters of the operator over time, one panel each, for figures of one's own with [`figures::trace_panels`].
+    ///
+    /// # Errors
+    /// [`ReportError::NoTraces`], [`ReportError::TooManyTraces`], [`ReportError::EmptyTrace`].
+    pub fn operator_grid(&self) -> Result<TraceGrid, ReportError> {
+        self.check()?;
+        let traces: Vec<Evaluated<'_>> = self.traces.iter().map(Evaluated::new).collect();
+        Ok(panels::operator_grid(&traces, self.record))
+    }
+
+    /// The coefficients over time, as [`TrackReport::operator_grid`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn coefficient_grid(&self) -> Result<TraceGrid, ReportError> {
+        self.check()?;
+        let traces: Vec<Evaluated<'_>> = self.traces.iter().map(Evaluated::new).collect();
+        Ok(panels::coefficient_grid(&traces, self.record))
+    }
+
+    fn check(&self) -> Result<(), ReportError> {
+        let most = MOST_TRACES;
+        match self.traces.len() {
+            0 => return Err(ReportError::NoTraces { most }),
+            found if found > most => return Err(ReportError::TooManyTraces { found, most }),
+            _ => {}
+        }
+        match self.traces.iter().find(|t| t.trace.is_empty()) {
+            Some(empty) => Err(ReportError::EmptyTrace {
+                name: empty.name.clone(),
+            }),
+            None => Ok(()),
+        }
+    }
+
+    fn section(&self, index: usize, trace: &Evaluated<'_>) -> Value {
+        let start = trace.section.trace.start();
+        context! {
+            name => trace.section.name.clone(),
+            anchor => format!("trace-{index}"),
+            start => start.map(|fit| context! {
+                title => fit.title(),
+                converged => fit.termination().converged(),
+                coefficients => of_fits::coefficients(fit),
+                operator => of_fits::operator(fit, None),
+            }),
+            watched => !trace.section.trace.change_odds().is_empty(),
+            changes => tables::changes(trace),
+            batch => tables::batch(trace, self.record),
+        }
+    }
+}
+
+/// For a caption: rows of each panel and method that lie beyond the axes.
+fn beyond(grid: &TraceGrid) -> Vec<Value> {
+    let of = |panel: &figures::TracePanel| -> Vec<Value> {
+        let label = tables::symbol_of(&panel.name);
+        let rows = panel.beyond().into_iter();
+        rows.map(|b| {
+            context! {
+                label => label.clone(), name => grid.methods.get(b.method).cloned(),
+                outside => b.outside, rows => b.rows,
+            }
+        })
+        .collect()
+    };
+    grid.panels.iter().flat_map(of).collect()
+}

@@ -1,0 +1,26 @@
+//! One recursive estimate of a page and the batch fits beside it.
+
+use hoid_ident::Fit;
+use hoid_track::Trace;
+
+/// One recursive estimate of the page.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TraceSection<'a> {
+    /// Heading and legend text, such as `RPEM`.
+    pub name: String,
+    /// The estimate.
+    pub trace: &'a Trace,
+    /// Batch fits to compare it with.
+    pub batch: Vec<BatchLine<'a>>,
+}
+
+/// A batch fit of a span, drawn as a dashed line over that span.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BatchLine<'a> {
+    /// Begin of the span, s.
+    pub from_s: f64,
+    /// End of the span, s.
+    pub to_s: f64,
+    /// The fit.
+    pub fit: &'a Fit,
+}

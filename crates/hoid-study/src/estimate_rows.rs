@@ -1,0 +1,297 @@
+//! The estimates of a cell as rows of the tables of fits and traces.
+
+use hoid_ident::{Fit, Termination};
+use hoid_io::OutputTable;
+use hoid_model::{
+    Record,
+    remnant::RemnantDiscretisation,
+    remnant_gain::NoiseDefinition,
+    scenario::RemnantStrength,
+    uncertainty::{Estimate, OperatorEstimate},
+};
+use hoid_track::Trace;
+
+use crate::{
+    columns::{OPERATOR, Rows, Schemas, TRACED, extra_axes},
+    error_measures::{ChangeMeasures, TraceErrors, TrueResponse, variance},
+    plan::{Cell, EstimatorCell, Plan},
+};
+
+/// The rows of a block.
+pub(crate) struct BlockTables {
+    pub fits: OutputTable,
+    pub traces: Option<OutputTable>,
+}
+
+/// The tables of a block while they are filled.
+pub(crate) struct EstimateRows<'a> {
+    plan: &'a Plan,
+    cell: &'a Cell,
+    /// Axes with a column of their own.
+    extra: Vec<String>,
+    true_response: Option<TrueResponse>,
+    /// VAF of the estimators on this replication, by name and nk.
+    vafs: Vec<(&'a str, usize, f64)>,
+    fits: Rows,
+    traces: Option<Rows>,
+}
+
+impl<'a> EstimateRows<'a> {
+    pub fn new(plan: &'a Plan, cell: &'a Cell, schemas: &Schemas) -> Self {
+        Self {
+            plan,
+            cell,
+            extra: extra_axes(plan),
+            true_response: TrueResponse::of(cell),
+            vafs: Vec::new(),
+            fits: Rows::new(&schemas.fits),
+            traces: schemas.traces.as_ref().map(Rows::new),
+        }
+    }
+
+    pub fn into_tables(self, schemas: &Schemas) -> BlockTables {
+        BlockTables {
+            fits: self.fits.into_table(schemas.fits.comments.clone()),
+            traces: self
+                .traces
+                .zip(schemas.traces.as_ref())
+                .map(|(rows, schema)| rows.into_table(schema.comments.clone())),
+        }
+    }
+
+    /// Begins a replication: its estimators are compared with each other.
+    pub fn begin_replication(&mut self) {
+        self.vafs.clear();
+    }
+
+    /// What was simulated and what is estimated.
+    pub fn begin(&mut self, estimator: &EstimatorCell, replication: u64) {
+        let (cell, rows) = (self.cell, &mut self.fits);
+        let scenario = cell.resolved.scenario();
+        rows.begin();
+        rows.whole("cell", cell.index);
+        rows.text("scenario", &cell.scenario);
+        rows.text("condition", &cell.condition);
+        rows.whole("remnant_order", scenario.remnant.order as u64);
+        if let RemnantStrength::Level { level, definition } = scenario.remnant.strength {
+            rows.real("noise_level", level);
+            rows.text(
+                "noise_definition",
+                match definition {
+                    NoiseDefinition::Response => "response",
+                    NoiseDefinition::Remnant => "remnant",
+                },
+            );
+        }
+        rows.real("T_n_true", scenario.remnant.time_constant_s);
+        rows.real("sample_time_s", scenario.sample_time.s());
+        for name in &self.extra {
+            let axis = cell.axes.iter().chain(&estimator.axes).find(|axis| axis.key == *name);
+            rows.text(name, axis.map_or("", |axis| axis.value.as_str()));
+        }
+        rows.whole("replication", replication);
+        rows.text("estimator", &estimator.label);
+        rows.text("name", &estimator.name);
+        rows.text("method", estimator.method());
+        if let Some(structure) = estimator.structure() {
+            rows.text("structure", structure.name());
+            let orders = estimator.orders(&cell.resolved);
+            for (name, n) in [
+                ("na", orders.na),
+                ("nb", orders.nb),
+                ("nc", orders.nc),
+                ("nd", orders.nd),
+                ("nf", orders.nf),
+                ("nk", orders.nk),
+            ] {
+                rows.real(name, n as f64);
+            }
+        }
+        rows.text("start", &estimator.start);
+        rows.whole("decimate", estimator.decimate as u64);
+        let (from, to) = estimator.span_s.unwrap_or((0.0, scenario.measurement_s));
+        rows.real("from_s", from);
+        rows.real("to_s", to);
+    }
+
+    /// The estimate that was begun has failed.
+    pub fn failed(&mut self, reason: &str) {
+        self.fits.text("status", "failed");
+        self.fits.text("reason", reason);
+    }
+
+    /// Noise levels and powers of a run; `u0` is the output of the same run without remnant.
+    pub fn noise_row(&mut self, record: &Record, u0: &[f64]) {
+        let u = record.output();
+        let difference: Vec<f64> = u.iter().zip(u0).map(|(u, u0)| u - u0).collect();
+        let power = variance(u);
+        let n = record.channel("n").unwrap_or_default();
+        let rows = &mut self.fits;
+        rows.real("noise_level_obtained", (power - variance(u0)) / power);
+        rows.real("noise_level_response", variance(&difference) / power);
+        rows.real("noise_level_remnant", variance(n) / power);
+        for (name, values) in [("rms_e", record.input()), ("rms_u", u), ("rms_n", n)] {
+            rows.real(
+                name,
+                (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt(),
+            );
+        }
+        rows.text("status", "ok");
+    }
+
+    /// How a search ended.
+    pub fn termination(&mut self, termination: Termination) {
+        let rows = &mut self.fits;
+        rows.text("termination", &termination.reason.to_string());
+        rows.whole("converged", u64::from(termination.converged()));
+        rows.whole("iterations", termination.iterations as u64);
+    }
+
+    pub fn fit_row(
+        &mut self,
+        estimator: &'a EstimatorCell,
+        fit: &Fit,
+        record: &Record,
+        operator: Result<OperatorEstimate, String>,
+    ) -> Result<(), String> {
+        let simulated = fit.simulate(record).map_err(|error| error.to_string())?;
+        let vaf = hoid_ident::validation::vaf(&record.output()[simulated.first..], &simulated.values);
+        let nk = fit.orders().nk;
+        let other = estimator
+            .versus
+            .as_ref()
+            .and_then(|name| self.vafs.iter().find(|v| v.0 == *name && v.1 == nk));
+        let delta = other.map_or(f64::NAN, |other| vaf - other.2);
+        self.vafs.push((&estimator.name, nk, vaf));
+        self.termination(fit.termination());
+        let rows = &mut self.fits;
+        rows.real("delta_vaf", delta);
+        rows.real("loss", fit.loss());
+        rows.real("innovation_variance", fit.innovation_variance());
+        rows.real("vaf", vaf);
+        if let Some(true_response) = &self.true_response {
+            rows.real("response_error", true_response.error_percent(fit));
+        }
+        for (name, estimate) in fit.parameters() {
+            set(rows, &name, estimate);
+        }
+        if fit.orders().nd > 0 {
+            if let Ok(remnant) = fit.remnant(RemnantDiscretisation::ZeroOrderHold) {
+                set(rows, "T_n", remnant.t_n_s);
+                set(rows, "K_n", remnant.k_n);
+            }
+            if let Ok(remnant) = fit.remnant(RemnantDiscretisation::BackwardEuler) {
+                rows.real("T_n_backward_euler", remnant.t_n_s.value);
+                rows.real("K_n_backward_euler", remnant.k_n.value);
+            }
+        }
+        match operator {
+            Ok(operator) => {
+                for (name, _, estimate) in operator.rows() {
+                    set(rows, name, estimate);
+                }
+                rows.text("status", "ok");
+            }
+            Err(reason) => {
+                rows.text("status", "not convertible");
+                rows.text("reason", &reason);
+            }
+        }
+        Ok(())
+    }
+
+    pub fn track_row(&mut self, trace: &Trace, record: &Record) {
+        if let Some(start) = trace.start() {
+            self.termination(start.termination());
+        }
+        let errors = TraceErrors::of(trace, record, self.cell);
+        let rows = &mut self.fits;
+        for (i, name) in TRACED.iter().enumerate() {
+            rows.real(&format!("rms_{name}"), errors.rms_percent[i]);
+            rows.real(&format!("settle50_{name}"), errors.settled_s[0][i]);
+            rows.real(&format!("settle90_{name}"), errors.settled_s[1][i]);
+        }
+        if self.plan.changes {
+            let measures = ChangeMeasures::of(trace, record, self.cell);
+            for (i, name) in TRACED.iter().enumerate() {
+                rows.real(&format!("before_{name}"), measures.before_percent[i]);
+                rows.real(&format!("after_{name}"), measures.after_percent[i]);
+                rows.real(&format!("covered_{name}"), measures.covered_percent[i]);
+                rows.real(&format!("covered_through_{name}"), measures.covered_through_percent[i]);
+            }
+            rows.real("false_alarms", measures.false_alarms);
+            rows.real("hours", measures.hours);
+            rows.real("found", measures.found_percent);
+            rows.real("lag", measures.lag_s);
+        }
+        rows.whole("diverged", u64::from(errors.diverged));
+        rows.whole("steps_shortened", trace.counts().shortened);
+        rows.real("share_not_convertible", errors.share_not_convertible);
+        let Some(last) = trace.len().checked_sub(1) else { return };
+        rows.real("innovation_variance", trace.innovation_variance()[last]);
+        for (name, estimate) in trace.parameter_names().iter().zip(trace.parameters(last)) {
+            set(rows, name, estimate);
+        }
+        match trace.operator(last) {
+            Ok(operator) => {
+                for (name, _, estimate) in operator.rows() {
+                    set(rows, name, estimate);
+                }
+                rows.text("status", "ok");
+            }
+            Err(reason) => {
+                rows.text("status", "not convertible");
+                rows.text("reason", &reason.to_string());
+            }
+        }
+    }
+
+    pub fn trace_rows(&mut self, trace: &Trace, step: usize, estimator: &EstimatorCell, replication: u64) {
+        let Some(rows) = &mut self.traces else { return };
+        let with_errors = self.plan.standard_errors;
+        let place = |rows: &Rows, name: &str| (rows.position(name), rows.position(&format!("{name}_se")));
+        let theta: Vec<_> = trace.parameter_names().iter().map(|name| place(rows, name)).collect();
+        let operator = OPERATOR.map(|name| place(rows, name));
+        let put = |rows: &mut Rows, (value, error): (Option<usize>, Option<usize>), estimate: Estimate| {
+            if let Some(position) = value {
+                rows.real_at(position, estimate.value);
+            }
+            if let (Some(position), Some(se)) = (error, estimate.standard_error) {
+                rows.real_at(position, se);
+            }
+        };
+        for k in (step - 1..trace.len()).step_by(step) {
+            rows.begin();
+            rows.whole("cell", self.cell.index);
+            rows.whole("replication", replication);
+            rows.text("estimator", &estimator.label);
+            rows.real("t", trace.times_s()[k]);
+            if with_errors {
+                for (places, estimate) in theta.iter().zip(trace.parameters(k)) {
+                    put(rows, *places, estimate);
+                }
+            } else {
+                for (places, value) in theta.iter().zip(trace.theta(k)) {
+                    put(rows, *places, Estimate::fixed(*value));
+                }
+            }
+            let operator_of_row = if with_errors {
+                trace.operator(k)
+            } else {
+                trace.operator_values(k)
+            };
+            if let Ok(found) = operator_of_row {
+                for (places, (_, _, estimate)) in operator.iter().zip(found.rows()) {
+                    put(rows, *places, estimate);
+                }
+            }
+        }
+    }
+}
+
+fn set(rows: &mut Rows, name: &str, estimate: Estimate) {
+    rows.real(name, estimate.value);
+    if let Some(se) = estimate.standard_error {
+        rows.real(&format!("{name}_se"), se);
+    }
+}

@@ -1,0 +1,57 @@
+//! How the files of a group are read: the keys of `[read]`.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How files are read, as in `hoid identify`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ReadSettings {
+    /// Column of the input, or a difference such as `r-y`.
+    pub input: String,
+    /// Column of the output.
+    pub output: String,
+    /// Sampling frequency, Hz; that of the column t where it is left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sampling_hz: Option<f64>,
+    /// Begin of the span that counts, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub from_s: Option<f64>,
+    /// End of the span that counts, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub to_s: Option<f64>,
+    /// Interpolate an uneven t.
+    pub resample: bool,
+    /// Bridge missing values.
+    pub fill: bool,
+    /// What is taken out of e and u: none, mean or linear.
+    pub detrend: Detrending,
+}
+
+/// What is taken out of e and u.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Detrending {
+    /// Nothing.
+    #[default]
+    None,
+    /// The mean.
+    Mean,
+    /// A straight line.
+    Linear,
+}
+
+impl Default for ReadSettings {
+    fn default() -> Self {
+        Self {
+            input: "e".to_owned(),
+            output: "u".to_owned(),
+            sampling_hz: None,
+            from_s: None,
+            to_s: None,
+            resample: false,
+            fill: false,
+            detrend: Detrending::None,
+        }
+    }
+}

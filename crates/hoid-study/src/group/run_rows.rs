@@ -1,0 +1,200 @@
+//! The estimates of one run as rows: coefficients, operator, responses, and what failed with its reason.
+
+use hoid_ident::{Fit, frequency::Crossover};
+use hoid_io::{OutputTable, TableSchema};
+use hoid_model::{
+    Complex64, ContinuousTransferFunction, NotConvertible, Record,
+    uncertainty::{Estimate, OperatorEstimate},
+};
+use hoid_track::Trace;
+
+use super::{
+    condition_settings::ConditionSettings,
+    controlled_element::transfer_function,
+    manifest::{Manifest, RunEntry},
+    responses::{followed_phases_deg, grid, responses_schema},
+    tables::{real, schema, text},
+    traces::{self, TraceColumns},
+    windows::{WHOLE, Window},
+};
+use crate::columns::Rows;
+
+/// The tables of one run.
+pub(super) struct RunTables {
+    pub estimates: OutputTable,
+    pub responses: OutputTable,
+    pub traces: OutputTable,
+    /// What was done to its files and what is wrong with their sampling, by the name of the table; none of all runs at once.
+    pub account: Vec<(&'static str, OutputTable)>,
+}
+
+/// One estimate a row, in long form.
+pub(super) fn estimates_schema() -> TableSchema {
+    schema(
+        text(&["subject", "condition", "run", "window"])
+            .chain(real(&["from_s", "to_s"]))
+            .chain(text(&["estimator", "parameter"]))
+            .chain(real(&["value", "standard_error"]))
+            .chain(text(&["status", "reason"])),
+    )
+}
+
+/// The tables of a run while they are filled.
+pub(super) struct RunRows<'a> {
+    entry: &'a RunEntry,
+    /// What is known of its condition.
+    pub condition: ConditionSettings,
+    element: Option<ContinuousTransferFunction>,
+    columns: TraceColumns,
+    estimates: Rows,
+    responses: Rows,
+    traces: Rows,
+}
+
+impl<'a> RunRows<'a> {
+    pub fn new(manifest: &Manifest, entry: &'a RunEntry) -> Self {
+        let condition = manifest.conditions.get(&entry.condition).cloned().unwrap_or_default();
+        let columns = TraceColumns::of(&manifest.analysis);
+        Self {
+            entry,
+            element: condition
+                .controlled_element
+                .as_deref()
+                .and_then(|e| transfer_function(e).ok()),
+            condition,
+            estimates: Rows::new(&estimates_schema()),
+            responses: Rows::new(&responses_schema()),
+            traces: Rows::new(&columns.schema()),
+            columns,
+        }
+    }
+
+    pub fn into_tables(self) -> RunTables {
+        RunTables {
+            estimates: self.estimates.into_table(Vec::new()),
+            responses: self.responses.into_table(Vec::new()),
+            traces: self.traces.into_table(Vec::new()),
+            account: Vec::new(),
+        }
+    }
+
+    /// Coefficients, quality, responses and operator of a fit.
+    pub fn fit_rows(&mut self, window: Window, label: &str, fit: &Fit, record: &Record) {
+        for (name, estimate) in fit.parameters() {
+            self.row(Some(window), label, &name, estimate);
+        }
+        self.row(
+            Some(window),
+            label,
+            "innovation_variance",
+            Estimate::fixed(fit.innovation_variance()),
+        );
+        if let Ok(part) = record.span(window.from_s, window.to_s)
+            && let Ok(simulated) = fit.simulate(&part)
+        {
+            let vaf = hoid_ident::validation::vaf(&part.output()[simulated.first..], &simulated.values);
+            self.row(Some(window), label, "vaf", Estimate::fixed(vaf));
+        }
+        self.response_rows(window, label, fit, record.sample_time().s());
+        self.operator_rows(window, label, fit.operator());
+    }
+
+    /// The operator of a fit, or why it has none.
+    pub fn operator_rows(&mut self, window: Window, label: &str, operator: Result<OperatorEstimate, NotConvertible>) {
+        match operator {
+            Ok(operator) => {
+                for (name, _, estimate) in operator.rows() {
+                    self.row(Some(window), label, name, estimate);
+                }
+            }
+            Err(reason) => self.not_convertible(window, label, &reason.to_string()),
+        }
+    }
+
+    /// Frequency response of the fit of the whole run, and crossover and phase margin with the controlled element, where that is known.
+    pub fn response_rows(&mut self, window: Window, label: &str, fit: &Fit, sample_time_s: f64) {
+        if window.name != WHOLE {
+            return;
+        }
+        let omega = grid(sample_time_s);
+        let advance = self.condition.offset_samples * sample_time_s;
+        let response: Vec<Complex64> = omega
+            .iter()
+            .map(|w| fit.model().response(*w) * Complex64::from_polar(1.0, w * advance))
+            .collect();
+        for ((w, h), phase_deg) in omega.iter().zip(&response).zip(followed_phases_deg(&response)) {
+            let rows = &mut self.responses;
+            rows.begin();
+            rows.text("subject", &self.entry.subject);
+            rows.text("condition", &self.entry.condition);
+            rows.text("run", &self.entry.run);
+            rows.text("estimator", label);
+            rows.real("omega_rad_s", *w);
+            rows.real("magnitude_db", 20.0 * h.norm().log10());
+            rows.real("phase_deg", phase_deg);
+        }
+        let Some(element) = &self.element else { return };
+        let open_loop: Vec<Complex64> = omega
+            .iter()
+            .zip(&response)
+            .map(|(w, h)| h * element.response(*w))
+            .collect();
+        if let Some(found) = Crossover::of(&omega, &open_loop, 0.0) {
+            self.row(
+                Some(window),
+                label,
+                "crossover_rad_s",
+                Estimate::fixed(found.omega_rad_s),
+            );
+            self.row(
+                Some(window),
+                label,
+                "phase_margin_deg",
+                Estimate::fixed(found.phase_margin_deg),
+            );
+        }
+    }
+
+    /// The moving rows of a trace.
+    pub fn trace_rows(&mut self, trace: &Trace) {
+        traces::write(&mut self.traces, &self.columns, self.entry, trace);
+    }
+
+    fn begin(&mut self, window: Option<Window>, estimator: &str) {
+        let rows = &mut self.estimates;
+        rows.begin();
+        rows.text("subject", &self.entry.subject);
+        rows.text("condition", &self.entry.condition);
+        rows.text("run", &self.entry.run);
+        rows.text("estimator", estimator);
+        if let Some(window) = window {
+            rows.text("window", window.name);
+            rows.real("from_s", window.from_s);
+            rows.real("to_s", window.to_s);
+        }
+    }
+
+    /// A number that was estimated in a window, or of the whole run.
+    pub fn row(&mut self, window: Option<Window>, estimator: &str, parameter: &str, estimate: Estimate) {
+        self.begin(window, estimator);
+        self.estimates.text("parameter", parameter);
+        self.estimates.real("value", estimate.value);
+        if let Some(se) = estimate.standard_error {
+            self.estimates.real("standard_error", se);
+        }
+        self.estimates.text("status", "ok");
+    }
+
+    fn not_convertible(&mut self, window: Window, estimator: &str, reason: &str) {
+        self.begin(Some(window), estimator);
+        self.estimates.text("status", "not convertible");
+        self.estimates.text("reason", reason);
+    }
+
+    /// What could not be estimated, and why.
+    pub fn failed(&mut self, window: Option<Window>, estimator: &str, reason: &str) {
+        self.begin(window, estimator);
+        self.estimates.text("status", "failed");
+        self.estimates.text("reason", reason);
+    }
+}

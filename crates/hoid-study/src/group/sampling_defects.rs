@@ -1,0 +1,117 @@
+//! Defects of the sampling that a virtual experiment can have.
+
+use hoid_io::{ColumnValues, OutputColumn, OutputTable};
+use hoid_model::Record;
+
+/// A defect of the sampling, as recorded data have it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SamplingDefect {
+    /// Times that scatter by a fifth of a sample.
+    Jitter,
+    /// One row of two hundred is missing.
+    Missing,
+    /// One row of two hundred is there twice.
+    Repeated,
+    /// A clock that runs slow by 0.2 %.
+    SlowClock,
+    /// A stick that goes no further than one and a half standard deviations of u.
+    Saturated,
+    /// A stick with 8 bits over its range.
+    Quantised,
+    /// A recorder that writes the same values for half a second, once.
+    Stalled,
+}
+
+impl SamplingDefect {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::Jitter,
+        Self::Missing,
+        Self::Repeated,
+        Self::SlowClock,
+        Self::Saturated,
+        Self::Quantised,
+        Self::Stalled,
+    ];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Jitter => "jitter",
+            Self::Missing => "missing",
+            Self::Repeated => "repeated",
+            Self::SlowClock => "slow-clock",
+            Self::Saturated => "saturated",
+            Self::Quantised => "quantised",
+            Self::Stalled => "stalled",
+        }
+    }
+}
+
+/// The columns of a run as a recorder with these defects would have written them. `noise` are normal deviates, one a sample.
+pub(super) fn recorded(record: &Record, defects: &[SamplingDefect], noise: &[f64]) -> OutputTable {
+    let has = |defect: SamplingDefect| defects.contains(&defect);
+    let n = record.len();
+    let ts = record.sample_time().s();
+    let mut t = record.times_s();
+    if has(SamplingDefect::SlowClock) {
+        t.iter_mut().for_each(|t| *t *= 0.998);
+    }
+    if has(SamplingDefect::Jitter) {
+        // Less than half a sample, so that the order stays.
+        t.iter_mut()
+            .zip(noise)
+            .for_each(|(t, z)| *t += (0.2 * z).clamp(-0.45, 0.45) * ts);
+    }
+    let mut u = record.output().to_vec();
+    let sd = (u.iter().map(|u| u * u).sum::<f64>() / n as f64).sqrt();
+    if has(SamplingDefect::Saturated) {
+        u.iter_mut().for_each(|u| *u = u.clamp(-1.5 * sd, 1.5 * sd));
+    }
+    if has(SamplingDefect::Quantised) {
+        let step = 8.0 * sd / 256.0;
+        u.iter_mut().for_each(|u| *u = (*u / step).round() * step);
+    }
+    // Where the values of each row come from; the times go on.
+    let held = |k: usize| {
+        let stall = n / 3..n / 3 + (0.5 / ts) as usize;
+        if has(SamplingDefect::Stalled) && stall.contains(&k) {
+            stall.start
+        } else {
+            k
+        }
+    };
+    let mut rows: Vec<usize> = (0..n).collect();
+    // One in two hundred by a deviate that is drawn in any case.
+    let rare = |k: usize| (noise[k] * 1e6).abs() as u64 % 200;
+    if has(SamplingDefect::Missing) {
+        rows.retain(|k| *k == 0 || rare(*k) != 0);
+    }
+    if has(SamplingDefect::Repeated) {
+        rows = rows
+            .into_iter()
+            .flat_map(|k| std::iter::repeat_n(k, if rare(k) == 1 { 2 } else { 1 }))
+            .collect();
+    }
+    let column = |name: &str, values: &[f64]| OutputColumn {
+        name: name.to_owned(),
+        values: ColumnValues::Real(
+            rows.iter()
+                .map(|k| values[if name == "t" { *k } else { held(*k) }])
+                .collect(),
+        ),
+    };
+    OutputTable {
+        comments: defects
+            .iter()
+            .map(|defect| format!("trouble: {}", defect.name()))
+            .collect(),
+        columns: vec![
+            column("t", &t),
+            column("f_t", record.channel("f_t").unwrap_or_default()),
+            column("e", record.input()),
+            column("u", &u),
+            column("x", record.channel("x").unwrap_or_default()),
+        ],
+    }
+}

@@ -1,0 +1,25 @@
+//! Reading a finished study back: rows of its summary, values of its replications, traces.
+//!
+//! What describes a cell and an estimator comes from the plan that stands beside the tables, numbers come from the tables. Rows are found by
+//! what describes them:
+//!
+//! ```no_run
+//! use hoid_study::{Query, Results};
+//!
+//! let results = Results::read("out".as_ref())?;
+//! let query = Query::of("bias_b0").condition("C1").remnant_order(2).noise_level(0.1).name("BJ").nd(1).nk(29);
+//! let median = results.one(&query).map(|row| row.statistics.median);
+//! let each = results.values(&query);
+//! # Ok::<(), hoid_study::StudyError>(())
+//! ```
+
+mod read;
+mod rows;
+mod study_results;
+#[cfg(any(test, feature = "synthetic"))]
+mod synthetic;
+#[cfg(test)]
+mod tests;
+
+pub use rows::{Bands, SummaryRow, TraceSummary};
+pub use study_results::Results;

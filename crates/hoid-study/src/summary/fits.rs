@@ -1,0 +1,220 @@
+//! The summary of the fits.
+
+use std::{collections::BTreeMap, path::Path};
+
+use hoid_io::{ColumnKind, ColumnValues, OutputTable, TableWriter};
+
+use super::{
+    layout::{BUDGET, PartsOfCell, begin_row, schema, setting_columns},
+    traces::SettlingOfMedians,
+};
+use crate::{
+    Plan, StudyError,
+    columns::{Rows, Schemas, extra_axes},
+    manifest::part,
+    plan::EstimatorCell,
+    statistics::{Statistics, rate},
+    true_value::true_value,
+};
+
+/// Settings among the real columns.
+const SETTINGS: [&str; 11] = [
+    "noise_level",
+    "T_n_true",
+    "sample_time_s",
+    "na",
+    "nb",
+    "nc",
+    "nd",
+    "nf",
+    "nk",
+    "from_s",
+    "to_s",
+];
+
+/// Statistics of a row of the summary, in the order of their columns.
+const FIGURES: [&str; 14] = [
+    "mean",
+    "mean_se",
+    "sd",
+    "sd_se",
+    "least",
+    "lower_whisker",
+    "lower_quartile",
+    "median",
+    "median_se",
+    "upper_quartile",
+    "upper_whisker",
+    "most",
+    "absolute_mean",
+    "truth",
+];
+
+/// Writes the summary of the fits.
+pub(crate) fn write_fits(
+    plan: &Plan,
+    schemas: &Schemas,
+    parts: &PartsOfCell<'_>,
+    medians: &SettlingOfMedians,
+    path: &Path,
+) -> Result<(), StudyError> {
+    use ColumnKind::{Real, Text, Whole};
+    let mut columns = setting_columns(plan);
+    columns.push(("quantity".to_owned(), Text));
+    columns.extend(["count", "missing", "outliers"].map(|name| (name.to_owned(), Whole)));
+    columns.extend(FIGURES.map(|name| (name.to_owned(), Real)));
+    let schema = schema(plan, columns);
+    let extra = extra_axes(plan);
+    let mut writer = TableWriter::create(path, &schema)?;
+    let quantities: Vec<&str> = schemas
+        .fits
+        .columns
+        .iter()
+        .filter(|c| c.kind == Real && !SETTINGS.contains(&c.name.as_str()))
+        .map(|c| c.name.as_str())
+        .collect();
+    for (at, cell) in plan.cells.iter().enumerate() {
+        let estimators: Vec<&EstimatorCell> = plan.estimators_of(cell).map(|(_, e)| e).collect();
+        let each = (quantities.len() + 4) * cell.replications as usize;
+        let together = (BUDGET / each.max(1)).clamp(1, estimators.len().max(1));
+        for group in estimators.chunks(together) {
+            let mut collected = Collected::new(group, &quantities);
+            for (directory, block) in parts.get(&at).into_iter().flatten() {
+                collected.add(&hoid_io::read_table(&part(directory, *block, "fits"))?);
+            }
+            let mut rows = Rows::new(&schema);
+            for (estimator, found) in group.iter().zip(&collected.estimators) {
+                let mut put = |quantity: &str, values: &[f64], truth: f64| {
+                    let statistics = Statistics::of(values);
+                    if statistics.count == 0 {
+                        return;
+                    }
+                    begin_row(&mut rows, &extra, cell, estimator);
+                    statistics_row(&mut rows, quantity, &statistics, values, truth);
+                };
+                for (name, values) in quantities.iter().zip(&found.values) {
+                    let truth = true_value(cell, estimator, name);
+                    put(name, values, truth);
+                    if truth.is_finite() && truth != 0.0 {
+                        let bias: Vec<f64> = values.iter().map(|v| 100.0 * (v - truth) / truth).collect();
+                        put(&format!("bias_{name}"), &bias, 0.0);
+                    }
+                }
+                for (name, hits) in [
+                    ("failed", found.failed),
+                    ("not_convertible", found.not_convertible),
+                    ("converged", found.converged),
+                    ("diverged", found.diverged),
+                ] {
+                    let (p, se) = rate(hits, found.count);
+                    begin_row(&mut rows, &extra, cell, estimator);
+                    rows.text("quantity", name);
+                    rows.whole("count", found.count as u64);
+                    rows.real("mean", p);
+                    rows.real("mean_se", se);
+                }
+                for (name, value) in medians
+                    .get(&(cell.index, estimator.label.clone()))
+                    .into_iter()
+                    .flatten()
+                {
+                    begin_row(&mut rows, &extra, cell, estimator);
+                    rows.text("quantity", name);
+                    rows.whole("count", found.count as u64);
+                    rows.real("median", *value);
+                }
+            }
+            writer.append(&rows.into_table(Vec::new()))?;
+        }
+    }
+    Ok(writer.finish()?)
+}
+
+fn statistics_row(rows: &mut Rows, quantity: &str, s: &Statistics, values: &[f64], truth: f64) {
+    rows.text("quantity", quantity);
+    rows.whole("count", s.count as u64);
+    rows.whole("missing", s.missing as u64);
+    rows.whole("outliers", s.outliers.len() as u64);
+    let finite = values.iter().filter(|v| v.is_finite());
+    let absolute_mean = finite.map(|v| v.abs()).sum::<f64>() / s.count as f64;
+    let all = [
+        s.mean,
+        s.mean_se,
+        s.sd,
+        s.sd_se,
+        s.least,
+        s.lower_whisker,
+        s.lower_quartile,
+        s.median,
+        s.median_se,
+        s.upper_quartile,
+        s.upper_whisker,
+        s.most,
+        absolute_mean,
+        truth,
+    ];
+    for (name, value) in FIGURES.iter().zip(all) {
+        rows.real(name, value);
+    }
+}
+
+/// The values of the replications of a cell, by estimator.
+struct Collected<'a> {
+    at: BTreeMap<&'a str, usize>,
+    quantities: &'a [&'a str],
+    estimators: Vec<OfEstimator>,
+}
+
+#[derive(Clone, Default)]
+struct OfEstimator {
+    values: Vec<Vec<f64>>,
+    count: usize,
+    failed: usize,
+    not_convertible: usize,
+    converged: usize,
+    diverged: usize,
+}
+
+impl<'a> Collected<'a> {
+    fn new(group: &[&'a EstimatorCell], quantities: &'a [&'a str]) -> Self {
+        let empty = OfEstimator {
+            values: vec![Vec::new(); quantities.len()],
+            ..OfEstimator::default()
+        };
+        Self {
+            at: group.iter().enumerate().map(|(i, e)| (e.label.as_str(), i)).collect(),
+            quantities,
+            estimators: vec![empty; group.len()],
+        }
+    }
+
+    fn add(&mut self, table: &OutputTable) {
+        let Some(ColumnValues::Text(labels)) = table.column("estimator") else {
+            return;
+        };
+        let places: Vec<Option<usize>> = labels
+            .iter()
+            .map(|label| self.at.get(label.as_str()).copied())
+            .collect();
+        for (q, name) in self.quantities.iter().enumerate() {
+            if let Some(ColumnValues::Real(values)) = table.column(name) {
+                for (place, value) in places.iter().zip(values) {
+                    if let Some(i) = place {
+                        self.estimators[*i].values[q].push(*value);
+                    }
+                }
+            }
+        }
+        let is = |name: &str, row: usize, what: &str| matches!(table.column(name), Some(ColumnValues::Text(v)) if v[row] == what);
+        let flag = |name: &str, row: usize| matches!(table.column(name), Some(ColumnValues::Whole(v)) if v[row] == 1);
+        for (row, place) in places.iter().enumerate() {
+            let Some(i) = place else { continue };
+            let of = &mut self.estimators[*i];
+            of.count += 1;
+            of.failed += usize::from(is("status", row, "failed"));
+            of.not_convertible += usize::from(is("status", row, "not convertible"));
+            of.converged += usize::from(flag("converged", row));
+            of.diverged += usize::from(flag("diverged", row));
+        }
+    }
+}

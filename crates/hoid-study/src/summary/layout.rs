@@ -1,0 +1,75 @@
+//! What both summaries share: the columns of the settings, and how much is in memory at a time.
+
+use std::{collections::BTreeMap, path::Path};
+
+use hoid_io::{ColumnKind, ColumnSchema, TableSchema};
+
+use crate::{
+    Plan,
+    columns::{Rows, comments, extra_axes},
+    plan::{Cell, EstimatorCell, Task},
+};
+
+/// Numbers in memory at a time: 256 MB.
+pub(super) const BUDGET: usize = 1 << 25;
+
+/// Parts of each cell: where they stand and their numbers.
+pub(crate) type PartsOfCell<'a> = BTreeMap<usize, Vec<(&'a Path, u64)>>;
+
+/// Columns that say which cell and which estimator a row is about.
+pub(super) fn setting_columns(plan: &Plan) -> Vec<(String, ColumnKind)> {
+    use ColumnKind::{Real, Text, Whole};
+    let mut columns: Vec<(String, ColumnKind)> = Vec::new();
+    let mut add = |kind, names: &[&str]| columns.extend(names.iter().map(|name| ((*name).to_owned(), kind)));
+    add(Whole, &["cell"]);
+    add(Text, &["scenario", "condition"]);
+    add(Whole, &["remnant_order"]);
+    add(Real, &["noise_level", "T_n_true", "sample_time_s"]);
+    let extra = extra_axes(plan);
+    add(Text, &extra.iter().map(String::as_str).collect::<Vec<_>>());
+    add(Text, &["estimator", "name", "method"]);
+    add(Real, &["nd", "nk"]);
+    add(Text, &["start"]);
+    add(Whole, &["decimate"]);
+    columns
+}
+
+/// A table of a study with these columns.
+pub(super) fn schema(plan: &Plan, columns: Vec<(String, ColumnKind)>) -> TableSchema {
+    TableSchema {
+        comments: comments(plan),
+        columns: columns
+            .into_iter()
+            .map(|(name, kind)| ColumnSchema { name, kind })
+            .collect(),
+    }
+}
+
+/// Begins a row with the settings of cell and estimator.
+pub(super) fn begin_row(rows: &mut Rows, extra: &[String], cell: &Cell, estimator: &EstimatorCell) {
+    let scenario = cell.resolved.scenario();
+    rows.begin();
+    rows.whole("cell", cell.index);
+    rows.text("scenario", &cell.scenario);
+    rows.text("condition", &cell.condition);
+    rows.whole("remnant_order", scenario.remnant.order as u64);
+    if let hoid_model::scenario::RemnantStrength::Level { level, .. } = scenario.remnant.strength {
+        rows.real("noise_level", level);
+    }
+    rows.real("T_n_true", scenario.remnant.time_constant_s);
+    rows.real("sample_time_s", scenario.sample_time.s());
+    for name in extra {
+        let axis = cell.axes.iter().chain(&estimator.axes).find(|axis| axis.key == *name);
+        rows.text(name, axis.map_or("", |axis| axis.value.as_str()));
+    }
+    rows.text("estimator", &estimator.label);
+    rows.text("name", &estimator.name);
+    rows.text("method", estimator.method());
+    if estimator.task != Task::Describe {
+        let orders = estimator.orders(&cell.resolved);
+        rows.real("nd", orders.nd as f64);
+        rows.real("nk", orders.nk as f64);
+    }
+    rows.text("start", &estimator.start);
+    rows.whole("decimate", estimator.decimate as u64);
+}

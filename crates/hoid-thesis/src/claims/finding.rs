@@ -1,0 +1,115 @@
+//! What the data say of a claim.
+
+use hoid_study::Statistics;
+
+use super::{
+    claim::{Claim, Source},
+    evidence::Evidence,
+    rules::{self, CellOutcome, CellTest, Part, Verdict},
+};
+
+/// What the data say of a claim.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// Whether it holds.
+    pub verdict: Verdict,
+    /// Its parts with all cells.
+    pub parts: Vec<Part>,
+    /// The numbers, a few for each part.
+    pub measured: Vec<Measured>,
+    /// Cells that pass.
+    pub passed: usize,
+    /// Cells that fail.
+    pub failed: usize,
+    /// Cells in all; those that neither pass nor fail are undecided.
+    pub of: usize,
+    /// What was found, in words.
+    pub text: String,
+}
+
+/// A number that was measured, over the cells of a part.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// What it is.
+    pub label: String,
+    /// Median over the cells that have a value.
+    pub value: f64,
+    /// Monte Carlo error of one cell, the median over the cells.
+    pub error: f64,
+    /// Smallest value of a cell.
+    pub least: f64,
+    /// Largest value of a cell.
+    pub most: f64,
+    /// Cells with a value.
+    pub cells: usize,
+}
+
+impl Claim {
+    /// What the data say of it.
+    pub fn evaluate(&self, evidence: &Evidence<'_>) -> Finding {
+        let found = match self.source {
+            Source::Data(measure) => measure(evidence),
+            Source::Untested(reason) => Err(reason.to_owned()),
+        };
+        let (verdict, parts) = match found {
+            Ok(parts) => (rules::verdict(&parts), parts),
+            Err(reason) => (Verdict::CannotBeTested(reason), Vec::new()),
+        };
+        let count = |outcome| parts.iter().map(|part| part.count(outcome)).sum();
+        Finding {
+            passed: count(CellOutcome::Passes),
+            failed: count(CellOutcome::Fails),
+            of: parts.iter().map(|part| part.tests.len()).sum(),
+            measured: parts.iter().flat_map(measured).collect(),
+            text: in_words(&verdict, &parts),
+            verdict,
+            parts,
+        }
+    }
+}
+
+fn measured(part: &Part) -> Vec<Measured> {
+    let of = |figure: fn(&CellTest) -> f64| Statistics::of(&part.tests.iter().map(figure).collect::<Vec<_>>());
+    let values = of(|test| test.measured.value);
+    let over_cells = Measured {
+        label: part.label.clone(),
+        value: values.median,
+        error: of(|test| test.measured.error).median,
+        least: values.least,
+        most: values.most,
+        cells: values.count,
+    };
+    let shown = part.shown.iter().map(|(label, value)| Measured {
+        label: label.clone(),
+        value: value.value,
+        error: value.error,
+        least: value.value,
+        most: value.value,
+        cells: 1,
+    });
+    std::iter::once(over_cells).chain(shown).collect()
+}
+
+fn in_words(verdict: &Verdict, parts: &[Part]) -> String {
+    let of_part = |part: &Part| {
+        let (above, below) = part.beyond();
+        let open = part.count(CellOutcome::Undecided);
+        let mut text = format!(
+            "{}: {} of {} cells pass",
+            part.label,
+            part.count(CellOutcome::Passes),
+            part.tests.len()
+        );
+        for (count, what) in [(above, "above"), (below, "below"), (open, "undecided")] {
+            if count > 0 {
+                text.push_str(&format!(", {count} {what}"));
+            }
+        }
+        text
+    };
+    let parts: Vec<String> = parts.iter().map(of_part).collect();
+    match verdict {
+        Verdict::CannotBeTested(reason) if parts.is_empty() => reason.clone(),
+        _ => parts.join("; "),
+    }
+}

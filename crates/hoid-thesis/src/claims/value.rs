@@ -1,0 +1,71 @@
+//! Numbers with Monte Carlo errors, and those of their differences, means and ratios.
+
+/// A number and its Monte Carlo error, 0 for one that does not depend on chance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Value {
+    /// The number; not a number where too few replications give one.
+    pub value: f64,
+    /// Its Monte Carlo error.
+    pub error: f64,
+}
+
+impl Value {
+    /// The magnitude, with the same error.
+    #[must_use]
+    pub fn abs(self) -> Self {
+        Self {
+            value: self.value.abs(),
+            ..self
+        }
+    }
+
+    /// The difference to a number from other replications.
+    #[must_use]
+    pub fn minus(self, other: Self) -> Self {
+        Self {
+            value: self.value - other.value,
+            error: self.error.hypot(other.error),
+        }
+    }
+
+    /// The mean of numbers from different replications.
+    #[must_use]
+    pub fn mean(values: &[Self]) -> Self {
+        let n = values.len() as f64;
+        Self {
+            value: values.iter().map(|v| v.value).sum::<f64>() / n,
+            error: values.iter().map(|v| v.error * v.error).sum::<f64>().sqrt() / n,
+        }
+    }
+
+    /// The ratio to a number from other replications; errors to first order.
+    #[must_use]
+    pub fn over(self, other: Self) -> Self {
+        let value = self.value / other.value;
+        Self {
+            value,
+            error: value.abs() * (self.error / self.value).hypot(other.error / other.value),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_of_differences_and_ratios() {
+        let (a, b) = (Value { value: 8.0, error: 0.3 }, Value { value: 2.0, error: 0.4 });
+        assert_eq!(a.minus(b), Value { value: 6.0, error: 0.5 });
+        assert_eq!(
+            Value::mean(&[a, b]),
+            Value {
+                value: 5.0,
+                error: 0.25
+            }
+        );
+        let ratio = a.over(b);
+        // sqrt((0.3 / 8)^2 + (0.4 / 2)^2) = 0.203485
+        assert!((ratio.value - 4.0).abs() < 1e-12 && (ratio.error - 4.0 * 0.203_485).abs() < 1e-5);
+    }
+}

@@ -1,0 +1,93 @@
+//! The error of the frequency response by sample time, with whole, fractional and Pade delays.
+
+use hoid_report::figures::{CurveGrid, CurvePanel, Shade, curves};
+use hoid_study::{Query, Results};
+
+use super::{
+    super::{
+        item::{Item, ItemOutput},
+        table_builder::TableBuilder,
+    },
+    quartiles::with_quartiles,
+};
+
+pub(super) fn items() -> Vec<Item> {
+    vec![Item::of_study(
+        "decimation",
+        "Error of the frequency response by sample time, condition C1, P_n = 0.1",
+        "Median over the runs of the relative error of the response over the lines of the forcing function; bars: quartiles. Every k-th sample of runs at \
+             100 Hz; the delay is 0.28 s.",
+        "decimation",
+        decimation,
+    )]
+}
+
+fn decimation(item: &Item, results: &Results) -> ItemOutput {
+    const ESTIMATORS: [&str; 7] = [
+        "ARX",
+        "BJ, whole delay",
+        "BJ, fractional delay",
+        "BJ, Pade 1",
+        "BJ, Pade 2",
+        "BJ, Pade 3",
+        "grey box",
+    ];
+    let mut data = TableBuilder::new(
+        &["estimator"],
+        &[
+            "remnant_order",
+            "sample_time_s",
+            "lower_quartile",
+            "median",
+            "upper_quartile",
+        ],
+    );
+    let orders = [1, 2];
+    let mut panels = Vec::new();
+    for m0 in orders {
+        let mut drawn = Vec::new();
+        for (i, name) in ESTIMATORS.into_iter().enumerate() {
+            let mut points = Vec::new();
+            for k in 1..=8 {
+                if let Some(row) = results.one(&Query::of("response_error").remnant_order(m0).name(name).decimate(k)) {
+                    let s = &row.statistics;
+                    data.row(
+                        &[name],
+                        &[m0 as f64, 0.01 * k as f64, s.lower_quartile, s.median, s.upper_quartile],
+                    );
+                    points.push((0.01 * k as f64, row));
+                }
+            }
+            // Blue for ARX, shades of vermillion for Box-Jenkins, green for the grey box.
+            let shade = match i {
+                0 => Shade::of_method(0),
+                6 => Shade::of_method(2),
+                i => Shade {
+                    method: 1,
+                    level: i - 1,
+                    levels: 5,
+                },
+            };
+            drawn.push(with_quartiles(name, shade, &points));
+        }
+        panels.push(CurvePanel {
+            name: "response error".to_owned(),
+            unit: "%".to_owned(),
+            logarithmic: true,
+            within: None,
+            curves: drawn,
+        });
+    }
+    let grid = CurveGrid {
+        panels,
+        columns: orders.len(),
+        titles: orders.iter().map(|m| format!("m^0 = {m}")).collect(),
+        abscissa: "T_s (s)".to_owned(),
+        logarithmic_abscissa: false,
+        shared_ordinates: true,
+    };
+    ItemOutput {
+        svg: Some(curves(&item.name, &item.title, &grid)),
+        data: data.table(&item.title),
+    }
+}

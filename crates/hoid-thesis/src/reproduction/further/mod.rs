@@ -1,0 +1,22 @@
+//! What the text leaves for later: decimation, T_n = 0.2 s, the second definition of the noise level, memories, forgetting matrix; and the
+//! example of a study of one's own.
+
+mod boxes;
+mod decimation;
+mod forgetting;
+mod lead_change;
+mod memory;
+mod quartiles;
+mod remnant;
+mod symbols;
+
+use super::Item;
+
+pub(super) fn items() -> Vec<Item> {
+    let mut all = decimation::items();
+    all.extend(memory::items());
+    all.extend(forgetting::items());
+    all.extend(lead_change::items());
+    all.extend(remnant::items());
+    all
+}

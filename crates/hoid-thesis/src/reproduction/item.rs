@@ -1,0 +1,83 @@
+//! A table or figure of the text, and how it is made from the results of its study.
+
+use std::collections::BTreeMap;
+
+use hoid_io::OutputTable;
+use hoid_study::Results;
+
+/// Name of the claims among tables and figures.
+pub const CLAIMS: &str = "claims";
+
+/// Results of the named plans, by name.
+pub type Studies = BTreeMap<String, Results>;
+
+/// Makes an item from the results of its plan.
+type Maker = Box<dyn Fn(&Item, Option<&Results>) -> ItemOutput + Send + Sync>;
+
+/// One table or figure.
+pub struct Item {
+    /// Its name, as `fig-5`, `C.1` or `table-2`.
+    pub name: String,
+    /// What it is, one line.
+    pub title: String,
+    /// What to know to read it.
+    pub caption: String,
+    /// The plan whose results it shows; none where nothing is simulated.
+    pub plan: Option<&'static str>,
+    make: Maker,
+}
+
+impl std::fmt::Debug for Item {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Item").field("name", &self.name).finish_non_exhaustive()
+    }
+}
+
+/// The figure and the numbers of an item.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ItemOutput {
+    /// The figure; none for a table.
+    pub svg: Option<String>,
+    /// Its numbers, or the table itself.
+    pub data: OutputTable,
+}
+
+impl Item {
+    pub(super) fn new(
+        name: impl Into<String>,
+        title: impl Into<String>,
+        caption: impl Into<String>,
+        plan: Option<&'static str>,
+        make: impl Fn(&Self, Option<&Results>) -> ItemOutput + Send + Sync + 'static,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            title: title.into(),
+            caption: caption.into(),
+            plan,
+            make: Box::new(make),
+        }
+    }
+
+    /// A figure of a study.
+    pub(super) fn of_study(
+        name: impl Into<String>,
+        title: impl Into<String>,
+        caption: impl Into<String>,
+        plan: &'static str,
+        make: impl Fn(&Self, &Results) -> ItemOutput + Send + Sync + 'static,
+    ) -> Self {
+        Self::new(name, title, caption, Some(plan), move |item, results| match results {
+            Some(results) => make(item, results),
+            None => ItemOutput {
+                svg: None,
+                data: OutputTable::default(),
+            },
+        })
+    }
+
+    /// Makes it from the results of the studies; without those of its plan it is empty.
+    pub fn make(&self, studies: &Studies) -> ItemOutput {
+        (self.make)(self, self.plan.and_then(|plan| studies.get(plan)))
+    }
+}

@@ -1,0 +1,98 @@
+//! The options of `cargo xtask bench`.
+
+pub const USAGE: &str = "cargo xtask bench [--only TASK,...] [--peers none|installed|install] [--rounds N] [--reproduce M] [--growth [--quick]] [--instructions [--keep]] [--dry]";
+
+/// Which peers take part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Peers {
+    None,
+    Installed,
+    Install,
+}
+
+/// What is measured, and how.
+#[derive(Debug, PartialEq)]
+pub struct Options {
+    pub only: Vec<String>,
+    pub peers: Peers,
+    pub rounds: usize,
+    pub reproduce: Option<u64>,
+    pub growth: bool,
+    pub quick: bool,
+    pub instructions: bool,
+    pub keep: bool,
+    pub dry: bool,
+}
+
+impl Options {
+    pub fn read(arguments: &[String]) -> Result<Self, String> {
+        let mut options = Self {
+            only: Vec::new(),
+            peers: Peers::Installed,
+            rounds: 2,
+            reproduce: None,
+            growth: false,
+            quick: false,
+            instructions: false,
+            keep: false,
+            dry: false,
+        };
+        let mut rest = arguments.iter();
+        while let Some(argument) = rest.next() {
+            let mut value = || rest.next().ok_or(format!("{argument} needs a value\nusage: {USAGE}"));
+            let number = |text: &String| {
+                text.parse::<u64>()
+                    .map_err(|_| format!("{argument}: {text} is not a number"))
+            };
+            match argument.as_str() {
+                "--only" => options.only = value()?.split(',').map(str::to_owned).collect(),
+                "--peers" => {
+                    options.peers = match value()?.as_str() {
+                        "none" => Peers::None,
+                        "installed" => Peers::Installed,
+                        "install" => Peers::Install,
+                        other => return Err(format!("--peers: found {other}; expected none, installed or install")),
+                    }
+                }
+                "--rounds" => options.rounds = number(value()?)?.max(1) as usize,
+                "--reproduce" => options.reproduce = Some(number(value()?)?),
+                "--growth" => options.growth = true,
+                "--quick" => options.quick = true,
+                "--instructions" => options.instructions = true,
+                "--keep" => options.keep = true,
+                "--dry" => options.dry = true,
+                _ => return Err(format!("unknown {argument}\nusage: {USAGE}")),
+            }
+        }
+        Ok(options)
+    }
+
+    /// True for a task that takes part.
+    pub fn chooses(&self, task: &str) -> bool {
+        self.only.is_empty() || self.only.iter().any(|name| name == task)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Options, String> {
+        Options::read(&text.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn options_are_read_and_nonsense_is_refused() {
+        let options = read("--only arx,bj --peers none --rounds 3 --dry").unwrap();
+        assert_eq!((options.peers, options.rounds, options.dry), (Peers::None, 3, true));
+        assert!(options.chooses("arx") && !options.chooses("rls"));
+        assert!(read("").unwrap().chooses("rls"));
+        assert!(
+            read("--peers some")
+                .unwrap_err()
+                .contains("expected none, installed or install")
+        );
+        assert!(read("--rounds").unwrap_err().contains("needs a value"));
+        assert!(read("--what").unwrap_err().contains("usage"));
+    }
+}

@@ -1,0 +1,183 @@
+//! The run: our tasks, the peers in turn, and the tables.
+
+use std::{
+    env, fs,
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+};
+
+use super::{
+    growth, instructions,
+    lines::{self, Line, Outcome},
+    options::{Options, Peers},
+    page, table,
+};
+use crate::process::{cargo_command, output, run};
+
+const PEERS: &str = "crates/hoid/benches/peers";
+/// Belongs to the example `evidence` and prints no lines.
+const OF_EVIDENCE: &str = "scipy_bj.py";
+const WORK: &str = "target/bench";
+
+/// Runs it.
+///
+/// # Errors
+/// What cannot be run or written, in words.
+pub fn bench(arguments: &[String]) -> Result<(), String> {
+    let options = Options::read(arguments)?;
+    if options.instructions {
+        // Of the whole workspace, as the tests: with other features the same crates would be built twice.
+        let ours = build(&["--workspace", "--example", "tasks"], "examples/tasks", Profile::Tests)?;
+        return instructions::gate(&ours, &data(), options.keep);
+    }
+    let ours = build(
+        &["-p", "hoid", "--example", "tasks"],
+        "examples/tasks",
+        Profile::Release,
+    )?;
+    if options.growth {
+        let hoid = build(&["-p", "hoid-cli"], "hoid", Profile::Release)?;
+        let text = growth::tables(&ours, &hoid, Path::new(WORK), options.quick)?;
+        println!("\n{text}");
+        return page::write("growth", &text, options.dry);
+    }
+    let interpreter = interpreter(options.peers)?;
+    let mut lines = Vec::new();
+    for round in 0..options.rounds {
+        eprintln!("round {} of {}", round + 1, options.rounds);
+        lines.extend(run_ours(&ours, &options, round == 0)?);
+        if options.peers != Peers::None {
+            for script in scripts()? {
+                lines.extend(run_peer(&script, &interpreter, &options));
+            }
+        }
+    }
+    lines.retain(|line| options.chooses(&line.task));
+    let text = table::ratios(&lines::best(lines), &machine());
+    println!("\n{text}");
+    // A part of the tasks is for the eye, not for the page.
+    page::write("ratios", &text, options.dry || !options.only.is_empty())
+}
+
+/// How a program is built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Profile {
+    Release,
+    /// As the tests are, which have compiled all of it before.
+    Tests,
+}
+
+/// Builds a program and says where it is.
+fn build(arguments: &[&str], program: &str, profile: Profile) -> Result<PathBuf, String> {
+    let mut command = cargo_command();
+    command.args(["build", "--quiet"]).args(arguments);
+    if profile == Profile::Release {
+        command.arg("--release");
+    }
+    run(&mut command)?;
+    let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| PathBuf::from("target"), PathBuf::from);
+    let folder = if profile == Profile::Release {
+        "release"
+    } else {
+        "debug"
+    };
+    let name = format!("{program}{}", env::consts::EXE_SUFFIX);
+    Ok(target.join(folder).join(name))
+}
+
+fn run_ours(program: &Path, options: &Options, first: bool) -> Result<Vec<Line>, String> {
+    let mut command = Command::new(program);
+    command.arg(data()).env("RAYON_NUM_THREADS", "1");
+    if !options.only.is_empty() {
+        command.args(["--task", &options.only.join(",")]);
+    }
+    let mut lines = lines::of(&output(&mut command)?);
+    // On all cores, and once: it takes minutes.
+    if let (true, Some(replications)) = (first, options.reproduce) {
+        let mut command = Command::new(program);
+        command
+            .arg(data())
+            .args(["--task", "none", "--reproduce", &replications.to_string()]);
+        lines.extend(lines::of(&output(&mut command)?).into_iter().map(|line| Line {
+            task: format!("reproduce, M = {replications}"),
+            ..line
+        }));
+    }
+    Ok(lines)
+}
+
+/// A peer that does not run is a line that says so.
+fn run_peer(script: &Path, python: &str, options: &Options) -> Vec<Line> {
+    let record = data().join("record.csv");
+    let (program, before, behind): (&str, &[&str], &[&str]) = match script.extension().and_then(|e| e.to_str()) {
+        Some("m") => ("octave-cli", &[], &[]),
+        Some("sce") => ("scilab-cli", &["-nb", "-f"], &["-args"]),
+        _ => (python, &[], &[]),
+    };
+    let mut command = Command::new(program);
+    command
+        .args(before)
+        .arg(script)
+        .args(behind)
+        .arg(record)
+        .args(["50", &options.only.join(",")])
+        .envs(["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"].map(|name| (name, "1")))
+        .stderr(Stdio::null());
+    let name = script.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    eprintln!("  {name}");
+    match command.output() {
+        Ok(output) => lines::of(&String::from_utf8_lossy(&output.stdout)),
+        Err(error) => vec![Line {
+            task: String::new(),
+            peer: name,
+            outcome: Outcome::Skipped(format!("{program}: {error}")),
+        }],
+    }
+}
+
+fn data() -> PathBuf {
+    Path::new(WORK).join("data")
+}
+
+/// Peers: scripts whose names begin with a letter.
+fn scripts() -> Result<Vec<PathBuf>, String> {
+    let entries = fs::read_dir(PEERS).map_err(|e| format!("{PEERS}: {e}"))?;
+    let mut found: Vec<PathBuf> = entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| path.extension().is_some_and(|e| e == "py" || e == "m" || e == "sce"))
+        .filter(|path| {
+            !path.ends_with(OF_EVIDENCE) && !path.file_name().is_some_and(|n| n.to_string_lossy().starts_with('_'))
+        })
+        .collect();
+    found.sort();
+    Ok(found)
+}
+
+/// The interpreter for the peers: that of the environment in `target/bench`, which is made when asked for, else `python3`.
+fn interpreter(peers: Peers) -> Result<String, String> {
+    let environment = Path::new(WORK).join("venv");
+    let folder = if cfg!(windows) { "Scripts" } else { "bin" };
+    let own = environment.join(folder).join("python");
+    if peers == Peers::Install {
+        if !own.exists() {
+            run(Command::new("python3").args(["-m", "venv"]).arg(&environment))?;
+        }
+        let requirements = Path::new(PEERS).join("requirements.txt");
+        run(Command::new(&own)
+            .args(["-m", "pip", "install", "--quiet", "-r"])
+            .arg(requirements))?;
+    }
+    let found = if own.exists() { own } else { PathBuf::from("python3") };
+    Ok(found.to_string_lossy().into_owned())
+}
+
+/// The processor, its cores and the system.
+fn machine() -> String {
+    let model = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = model
+        .lines()
+        .find_map(|line| line.strip_prefix("model name"))
+        .map_or(env::consts::ARCH, |rest| rest.trim_start_matches([' ', '\t', ':']));
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    format!("{model}, {cores} cores, {}", env::consts::OS)
+}

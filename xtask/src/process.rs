@@ -1,0 +1,49 @@
+//! Commands that the chores run: their output, and what they say when they fail.
+
+use std::{
+    env,
+    io::{BufRead, BufReader},
+    process::{Command, ExitStatus, Stdio},
+};
+
+/// Runs a command, and prints and shows each line of its output.
+pub fn each_line(command: &mut Command, mut show: impl FnMut(&str)) -> Result<ExitStatus, String> {
+    let shown = format!("{command:?}");
+    let cannot_run = |error: std::io::Error| format!("cannot run {shown}: {error}");
+    let mut child = command.stdout(Stdio::piped()).spawn().map_err(cannot_run)?;
+    if let Some(output) = child.stdout.take() {
+        for line in BufReader::new(output).lines() {
+            let line = line.map_err(cannot_run)?;
+            println!("{line}");
+            show(&line);
+        }
+    }
+    child.wait().map_err(cannot_run)
+}
+
+pub fn cargo(arguments: &[&str], environment: &[(&str, &str)]) -> Result<(), String> {
+    run(cargo_command().args(arguments).envs(environment.iter().copied()))
+}
+
+pub fn cargo_command() -> Command {
+    Command::new(env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned()))
+}
+
+pub fn run(command: &mut Command) -> Result<(), String> {
+    let shown = format!("{command:?}");
+    match command.status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(format!("failed ({status}): {shown}")),
+        Err(error) => Err(format!("cannot run {shown}: {error}")),
+    }
+}
+
+/// Runs a command and returns what it prints.
+pub fn output(command: &mut Command) -> Result<String, String> {
+    let shown = format!("{command:?}");
+    match command.stderr(Stdio::inherit()).output() {
+        Ok(output) if output.status.success() => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
+        Ok(output) => Err(format!("failed ({}): {shown}", output.status)),
+        Err(error) => Err(format!("cannot run {shown}: {error}")),
+    }
+}
