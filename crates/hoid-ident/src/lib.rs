@@ -20,7 +20,6 @@
 //! | `derived` | poles, zeros, crossover and margins with standard errors |
 //! | [`Fit`] | model, covariance, how it ended; prediction, simulation, frequency response |
 
-mod checks;
 mod constraint;
 mod derived;
 mod error;
@@ -28,6 +27,7 @@ mod estimator;
 mod fit;
 pub mod frequency;
 pub mod grey_box;
+mod informative_data;
 mod initial_guess;
 pub mod iv;
 pub mod linalg;
@@ -47,7 +47,7 @@ pub use iv::{InstrumentalVariable, Instruments, IvMethod};
 pub use optimize::{Reason, SearchMethod, SearchOptions, Termination};
 pub use order_selection::{Candidate, Choice, OrderRanges, choose_orders};
 pub use pem::criterion::{InitialState, first_residual};
-pub use pem::robust::Loss;
+pub use pem::loss::Loss;
 pub use sigmoid::{
     ChangeParameter, Comparison, GainsAt, NoiseLevel, Remark, TIME_VARYING_NAMES, TimeVarying, TimeVaryingFit,
 };

@@ -36,7 +36,7 @@ use std::fmt;
 use hoid_model::{Orders, PolynomialModel, Record, Structure};
 
 use crate::{
-    Fit, IdentError, InitialState, Reason, Termination, checks,
+    Fit, IdentError, InitialState, Reason, Termination, informative_data,
     linalg::least_squares::dot,
     pem::criterion::{Criterion, Data, Workspace, first_residual, output_variance},
 };
@@ -167,10 +167,10 @@ impl InstrumentalVariable {
         let structure = self.method.structure();
         self.orders.check(structure)?;
         self.check_options()?;
-        let sample_time = checks::common_sample_time(records)?;
+        let sample_time = informative_data::common_sample_time(records)?;
         let first = first_residual(&self.orders, InitialState::Estimate);
         for record in records {
-            checks::record(structure, &self.orders, record, first)?;
+            informative_data::check_record(structure, &self.orders, record, first)?;
         }
         let criterion = Criterion {
             orders: self.orders,
@@ -179,7 +179,7 @@ impl InstrumentalVariable {
             first,
             weights: None,
         };
-        checks::degrees_of_freedom(&criterion, records)?;
+        informative_data::check_degrees_of_freedom(&criterion, records)?;
         let sources = match &self.instruments {
             Instruments::Simulated => Source::measured(&criterion.data),
             Instruments::External(name) => external::noise_free(&external::signals(records, name)?, &criterion.data),

@@ -1,18 +1,19 @@
-//! What asks for the criterion at one theta after the other and is told, so that the searches of several records go on side by side.
+//! A search by reverse communication: it names the theta at which it needs the linearisation of the criterion, and is updated
+//! with it. Whoever drives it decides how to linearise: alone, or for several records side by side.
 
 use crate::{
     optimize::Linearisation,
     pem::criterion::{Block, Criterion, Workspace},
 };
 
-/// What asks for a criterion at one theta after the other.
+/// A computation that needs the linearisation of a criterion at one theta after the other.
 pub(crate) trait LinearisationClient {
     /// The criterion.
     fn criterion(&self) -> &Criterion<'_>;
-    /// Where it is wanted next; nowhere when all has been found.
-    fn asked(&self) -> Option<&[f64]>;
-    /// The polynomial to which derivatives are wanted; all where none is named.
+    /// Theta at which the linearisation is needed next; `None` when the computation has ended.
+    fn evaluation_point(&self) -> Option<&[f64]>;
+    /// The polynomial with respect to which derivatives are needed; `None` for all.
     fn block(&self) -> Option<Block>;
-    /// Takes what was found there.
-    fn take(&mut self, there: Linearisation, workspace: &mut Workspace);
+    /// Goes on with the linearisation at [`LinearisationClient::evaluation_point`].
+    fn update(&mut self, there: Linearisation, workspace: &mut Workspace);
 }

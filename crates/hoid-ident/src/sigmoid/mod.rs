@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use hoid_model::{Orders, Record, SampleTime, Structure, delayed_operator::whole_samples};
 
 use crate::{
-    Constraint, IdentError, Reason, SearchOptions, checks,
+    Constraint, IdentError, Reason, SearchOptions, informative_data,
     linalg::least_squares::dot,
     optimize::{Minimum, minimise},
     pem::criterion::Workspace,
@@ -108,7 +108,7 @@ impl TimeVarying {
     /// # Errors
     /// [`IdentError`]; how the search ended, and what the data do not determine, is part of the fit.
     pub fn fit(&self, records: &[Record]) -> Result<TimeVaryingFit, IdentError> {
-        let sample_time = checks::common_sample_time(records)?;
+        let sample_time = informative_data::common_sample_time(records)?;
         let mut criterion = self.criterion(records, sample_time)?;
         let (mut start, minimum) = self.best_minimum(&criterion, records)?;
         let (mut minimum, mut levels) = self.with_levels(&mut criterion, minimum)?;
@@ -232,7 +232,7 @@ impl TimeVarying {
             weights: None,
         };
         for record in records {
-            checks::record(Structure::BoxJenkins, &orders, record, criterion.first)?;
+            informative_data::check_record(Structure::BoxJenkins, &orders, record, criterion.first)?;
         }
         let unknowns = criterion.limits.len() + criterion.states();
         if criterion.residuals() <= unknowns {

@@ -13,7 +13,7 @@ use super::{
     layout::{Instant, K_E, LOG_RATE, MIDPOINT, NOISE, T_L, TIME_VARYING_NAMES, names},
     objective::{ChangeCriterion, Data},
 };
-use crate::{IdentError, Series, Termination, checks, optimize::Minimum};
+use crate::{IdentError, Series, Termination, informative_data, optimize::Minimum};
 
 /// Why a parameter has no standard error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -357,7 +357,7 @@ impl TimeVaryingFit {
             nk: self.first - self.nd,
             ..Orders::default()
         };
-        checks::record(Structure::BoxJenkins, &orders, record, first)?;
+        informative_data::check_record(Structure::BoxJenkins, &orders, record, first)?;
         let criterion = ChangeCriterion {
             data: vec![Data {
                 e: record.input(),
