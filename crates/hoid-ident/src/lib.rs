@@ -13,13 +13,14 @@
 //! | `arx`, `least_squares` | linear regression by QR with column pivoting |
 //! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
 //! | [`instrumental`] | instrumental variables, in open and closed loop |
-//! | [`TimeVarying`] | gains that follow a sigmoid, with the time and the rate of the change |
+//! | [`SigmoidChange`] | gains that follow a sigmoid, with the time and the rate of the change |
 //! | [`describing`] | describing function, coherence, remnant spectrum and margins by Fourier coefficients |
 //! | [`order_search`] | ranges of orders and delay, criteria, the chosen model |
 //! | [`validation`] | VAF, NRMSE, residual tests |
 //! | `derived` | poles, zeros, crossover and margins with standard errors |
 //! | [`Fit`] | model, covariance, how it ended; prediction, simulation, frequency response |
 
+mod assembled_fit;
 mod constraint;
 mod derived;
 mod error;
@@ -31,6 +32,7 @@ mod informative_data;
 mod initial_guess;
 pub mod iv;
 pub mod linalg;
+mod noise_model;
 mod optimize;
 pub mod order_selection;
 mod pem;
@@ -48,6 +50,4 @@ pub use optimize::{Reason, SearchMethod, SearchOptions, Termination};
 pub use order_selection::{Candidate, Choice, OrderRanges, choose_orders};
 pub use pem::criterion::{InitialState, first_residual};
 pub use pem::loss::Loss;
-pub use sigmoid::{
-    ChangeParameter, Comparison, GainsAt, NoiseLevel, Remark, TIME_VARYING_NAMES, TimeVarying, TimeVaryingFit,
-};
+pub use sigmoid::{ChangeParameter, Comparison, GainsAt, NoiseLevel, Remark, SIGMOID_NAMES, SigmoidChange, SigmoidFit};

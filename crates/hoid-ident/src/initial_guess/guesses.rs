@@ -22,13 +22,13 @@ use hoid_model::{Orders, SampleTime, polynomial::reflected_inside};
 use super::{
     arx_poles::{arx_poles, reduced_arx, steiglitz_mcbride},
     continuation::{self, Slow},
-    noise_model::noise_model,
+    instrument_chain::instrument_chain,
     pole_grid::pole_grid,
     shared_poles,
     start::Start,
 };
 use crate::{
-    iv::instrument_chain,
+    noise_model::noise_model,
     optimize::Objective,
     pem::criterion::{Criterion, InitialState, Workspace},
 };

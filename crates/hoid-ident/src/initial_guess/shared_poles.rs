@@ -14,8 +14,8 @@
 use hoid_model::{Complex64, Orders, polynomial, polynomial_model::monic};
 
 use crate::{
-    initial_guess::{arx_poles::arx_poles, noise_model::noise_model, start::Start},
-    iv::instrument_chain,
+    initial_guess::{arx_poles::arx_poles, instrument_chain::instrument_chain, start::Start},
+    noise_model::noise_model,
     optimize::{SearchOptions, minimise},
     pem::criterion::{Criterion, Workspace},
 };

@@ -14,9 +14,9 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::{
     Fit, IdentError, Reason, Termination,
+    assembled_fit::{Solution, assembled_fit},
     linalg::least_squares::{LeastSquares, add_scaled},
     linalg::products::{Lagged, OfResiduals, gram},
-    pem::assembled_fit::{Solution, assembled_fit},
     pem::criterion::{Criterion, Data},
 };
 

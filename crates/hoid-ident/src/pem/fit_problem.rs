@@ -4,12 +4,12 @@ use hoid_model::{SampleTime, polynomial::reflected_inside};
 
 use crate::{
     Fit, IdentError, Loss, Reason,
+    assembled_fit::{Solution, assembled_fit, held},
     initial_guess::{c_drawn_inside::with_c_drawn_inside, start::Start},
     linalg::information::inverse_of_free,
     optimize::{Linearisation, Objective, free_parameters, minimise},
     pem::multistart::MultiStart,
     pem::{
-        assembled_fit::{Solution, assembled_fit, held},
         constraints::ConstrainedCriterion,
         criterion::{Block, Criterion, Workspace},
         fit_settings::FitSettings,

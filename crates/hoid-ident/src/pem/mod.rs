@@ -13,10 +13,8 @@
 //! | `linearisation_client` | what one search and the searches of many records have in common |
 //! | `batched` | the fits of many records at a time |
 //! | `loss`, `robust` | a loss that outliers cannot dominate, and its reweighted searches |
-//! | `assembled_fit` | the fit that belongs to a minimum |
 
 pub mod arx;
-pub mod assembled_fit;
 pub mod batched;
 pub mod constraints;
 pub mod criterion;

@@ -13,10 +13,10 @@ use hoid_model::SampleTime;
 
 use crate::{
     Fit, IdentError, Reason, Termination,
+    assembled_fit::{Solution, assembled_fit, held},
     linalg::{information::inverse_of_free, least_squares::dot},
     optimize::{Minimum, Objective, free_parameters, minimise},
     pem::{
-        assembled_fit::{Solution, assembled_fit, held},
         constraints::ConstrainedCriterion,
         criterion::{Criterion, Workspace},
         fit_settings::FitSettings,
