@@ -8,7 +8,7 @@ use hoid_model::{PolynomialModel, SampleTime, Structure};
 
 use crate::{
     Fit, IdentError, Termination,
-    pem::criterion::{Criterion, output_variance},
+    criterion::{Criterion, output_variance},
 };
 
 /// Where a fit was found.

@@ -5,7 +5,7 @@
 
 use hoid_model::{Orders, Record, SampleTime, Structure};
 
-use crate::{IdentError, pem::criterion::Criterion};
+use crate::{IdentError, criterion::Criterion};
 
 /// The sample time that all records have.
 ///

@@ -22,6 +22,7 @@
 
 mod assembled_fit;
 mod constraint;
+mod criterion;
 mod derived;
 mod error;
 mod estimator;
@@ -32,6 +33,7 @@ mod informative_data;
 mod initial_guess;
 pub mod iv;
 pub mod linalg;
+mod multistart;
 mod noise_model;
 mod optimize;
 pub mod order_selection;
@@ -40,6 +42,7 @@ mod sigmoid;
 pub mod validation;
 
 pub use constraint::{Constraint, Prior};
+pub use criterion::{InitialState, first_residual};
 pub use derived::{MarginEstimates, Root};
 pub use error::IdentError;
 pub use estimator::{Estimator, Focus};
@@ -48,6 +51,5 @@ pub use grey_box::{GreyBox, GreyBoxFit};
 pub use iv::{InstrumentalVariable, Instruments, IvMethod};
 pub use optimize::{Reason, SearchMethod, SearchOptions, Termination};
 pub use order_selection::{Candidate, Choice, OrderRanges, choose_orders};
-pub use pem::criterion::{InitialState, first_residual};
 pub use pem::loss::Loss;
 pub use sigmoid::{ChangeParameter, Comparison, GainsAt, NoiseLevel, Remark, SIGMOID_NAMES, SigmoidChange, SigmoidFit};

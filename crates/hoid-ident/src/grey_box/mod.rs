@@ -23,11 +23,11 @@ use hoid_model::{PolynomialModel, Record, SampleTime, Structure, remnant::HIGHES
 
 use crate::{
     Constraint, Fit, IdentError, InitialState, Reason, SearchOptions,
+    criterion::{Data, Workspace, first_residual, output_variance},
     fit::Physical,
     informative_data,
     linalg::information::inverse_of_free,
     optimize::{Minimum, Objective, lies_in_basin},
-    pem::criterion::{Data, Workspace, first_residual, output_variance},
 };
 
 pub use layout::GREY_BOX_NAMES;

@@ -10,12 +10,11 @@
 use hoid_model::{Complex64, Orders, SampleTime, polynomial, polynomial_model::monic};
 
 use crate::{
-    initial_guess::{pole_grid::pole_grid, start::Start},
+    criterion::{Block, Criterion, Data, InitialState, Workspace, first_residual},
+    initial_guess::pole_grid::pole_grid,
+    multistart::{LinearisationClient, MultiStart, Start},
     optimize::Linearisation,
     optimize::{Objective, SearchMethod, SearchOptions},
-    pem::criterion::{Block, Criterion, Data, InitialState, Workspace, first_residual},
-    pem::linearisation_client::LinearisationClient,
-    pem::multistart::MultiStart,
 };
 
 /// Samples that each record keeps at least.

@@ -9,10 +9,10 @@ use hoid_model::Orders;
 
 use crate::{
     InitialState,
+    criterion::{Criterion, Workspace, first_residual},
     iv::equation::{IvProblem, Prefilter, Source},
     noise_model::noise_model,
     optimize::Objective,
-    pem::criterion::{Criterion, Workspace, first_residual},
 };
 
 /// Theta for the orders of the criterion; `None` where A and F are both there (the chain does not tell their poles apart), where
@@ -60,7 +60,7 @@ mod tests {
     use hoid_core::filter::{divide_in_place, moving_sum, multiply};
 
     use super::*;
-    use crate::pem::criterion::Data;
+    use crate::criterion::Data;
 
     /// Zero-mean numbers of a linear congruential generator (D. E. Knuth, MMIX).
     fn white(n: usize, mut state: u64) -> Vec<f64> {

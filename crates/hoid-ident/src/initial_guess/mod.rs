@@ -2,7 +2,6 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | `start` | a start, and what is still to be found of it |
 //! | `guesses` | the starts of a criterion, from the proposals of the others |
 //! | `continuation` | poles of the averaged record |
 //! | `pole_grid`, `arx_poles` | poles as people have them; poles by linear least squares |
@@ -17,4 +16,3 @@ pub mod guesses;
 pub mod instrument_chain;
 pub mod pole_grid;
 pub mod shared_poles;
-pub mod start;

@@ -3,7 +3,7 @@
 use hoid_model::Structure;
 
 use super::equation::IvProblem;
-use crate::{IdentError, Termination, pem::criterion::Criterion};
+use crate::{IdentError, Termination, criterion::Criterion};
 
 /// A method: each stands in a file of its own and is listed in [`IvMethod`](super::IvMethod).
 pub(super) struct Algorithm {

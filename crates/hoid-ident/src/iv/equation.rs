@@ -19,9 +19,9 @@ use hoid_model::{
 use super::columns::{Columns, orthonormal, with_past};
 use crate::{
     IdentError,
+    criterion::Data,
+    criterion::initial_state_responses::{InitialStateResponses, Past},
     linalg::least_squares::{LeastSquares, add_scaled, dot},
-    pem::criterion::Data,
-    pem::initial_states::{FreeResponses, Past},
 };
 
 /// `D/(C F)`.
@@ -213,7 +213,7 @@ impl<'a> IvProblem<'a> {
     }
 
     /// Initial-state responses of 1/(C F) in each record, with its rows.
-    fn initial_state_responses(&self, filter: Prefilter<'_>) -> Vec<(FreeResponses, usize)> {
+    fn initial_state_responses(&self, filter: Prefilter<'_>) -> Vec<(InitialStateResponses, usize)> {
         let poles = product(&monic(filter.c), &monic(filter.f));
         let past = Past {
             c: &[],
@@ -224,7 +224,9 @@ impl<'a> IvProblem<'a> {
             weights: None,
         };
         let rows = self.rows(filter.d.len());
-        rows.into_iter().map(|n| (FreeResponses::of(&past, n), n)).collect()
+        rows.into_iter()
+            .map(|n| (InitialStateResponses::of(&past, n), n))
+            .collect()
     }
 
     /// Least squares on the filtered equation.
@@ -308,7 +310,7 @@ impl Equation {
 }
 
 /// Projects the initial-state responses out of a column.
-fn eliminate(free: &[(FreeResponses, usize)], column: &mut [f64]) {
+fn eliminate(free: &[(InitialStateResponses, usize)], column: &mut [f64]) {
     let mut rest = column;
     for (responses, rows) in free {
         let (part, others) = rest.split_at_mut(*rows);

@@ -12,9 +12,9 @@ use super::{
 use crate::{
     Fit, IdentError, InitialState, Reason,
     assembled_fit::{Solution, assembled_fit},
+    criterion::{Criterion, Data, Workspace, first_residual},
     informative_data::{check_degrees_of_freedom, check_record, common_sample_time},
     linalg::least_squares::dot,
-    pem::criterion::{Criterion, Data, Workspace, first_residual},
 };
 
 /// Residuals below this share of the output, in amplitude, are rounding.

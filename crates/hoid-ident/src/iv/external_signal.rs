@@ -23,8 +23,8 @@ use hoid_model::Record;
 
 use crate::{
     IdentError,
+    criterion::Data,
     linalg::least_squares::{add_scaled, dot, solve_symmetric},
-    pem::criterion::Data,
 };
 
 use super::{

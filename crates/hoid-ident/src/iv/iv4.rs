@@ -17,7 +17,7 @@ use super::{
     covariance::covariance,
     equation::{IvProblem, Prefilter},
 };
-use crate::{IdentError, Reason, Termination, noise_model::noise_model, pem::criterion::Criterion};
+use crate::{IdentError, Reason, Termination, criterion::Criterion, noise_model::noise_model};
 
 pub(super) const ALGORITHM: Algorithm = Algorithm {
     name: "iv4",

@@ -10,8 +10,8 @@
 
 use crate::{
     IdentError, Reason, Termination,
+    criterion::Data,
     linalg::least_squares::{add_scaled, dot},
-    pem::criterion::Data,
 };
 
 use super::{

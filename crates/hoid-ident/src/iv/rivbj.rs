@@ -19,9 +19,9 @@ use super::{
 };
 use crate::{
     IdentError, InitialState, Reason, SearchOptions,
+    criterion::{Criterion, Data, Workspace, first_residual},
     noise_model::noise_model,
     optimize::minimise,
-    pem::criterion::{Criterion, Data, Workspace, first_residual},
 };
 
 pub(super) const ALGORITHM: Algorithm = Algorithm {

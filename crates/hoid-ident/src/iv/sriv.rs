@@ -13,7 +13,7 @@ use super::{
     equation::IvProblem,
     refined::{self, NoiseModel},
 };
-use crate::{IdentError, Reason, pem::criterion::Criterion};
+use crate::{IdentError, Reason, criterion::Criterion};
 
 pub(super) const ALGORITHM: Algorithm = Algorithm {
     name: "sriv",

@@ -15,9 +15,9 @@ use nalgebra::{DMatrix, DVector};
 use crate::{
     Fit, IdentError, Reason, Termination,
     assembled_fit::{Solution, assembled_fit},
+    criterion::{Criterion, Data},
     linalg::least_squares::{LeastSquares, add_scaled},
     linalg::products::{Lagged, OfResiduals, gram},
-    pem::criterion::{Criterion, Data},
 };
 
 /// Condition of the scaled normal matrix (an upper bound, `p tr(G^-1)`) up to which it is used: refined, the solution keeps all digits but three, the

@@ -5,17 +5,12 @@ use hoid_model::{SampleTime, polynomial::reflected_inside};
 use crate::{
     Fit, IdentError, Loss, Reason,
     assembled_fit::{Solution, assembled_fit, held},
-    initial_guess::{c_drawn_inside::with_c_drawn_inside, start::Start},
+    criterion::{Block, Criterion, Workspace},
+    initial_guess::c_drawn_inside::with_c_drawn_inside,
     linalg::information::inverse_of_free,
+    multistart::{LinearisationClient, MultiStart, Start},
     optimize::{Linearisation, Objective, free_parameters, minimise},
-    pem::multistart::MultiStart,
-    pem::{
-        constraints::ConstrainedCriterion,
-        criterion::{Block, Criterion, Workspace},
-        fit_settings::FitSettings,
-        linearisation_client::LinearisationClient,
-        robust,
-    },
+    pem::{constraints::ConstrainedCriterion, fit_settings::FitSettings, robust},
 };
 
 /// The searches of one fit.

@@ -6,9 +6,9 @@ use hoid_model::{Orders, Record, SampleTime, Structure};
 
 use crate::{
     Constraint, IdentError, InitialState, Loss, Prior, SearchOptions,
+    criterion::{Criterion, Data, first_residual},
     informative_data::{check_degrees_of_freedom, check_record, common_sample_time},
     pem::constraints::ConstrainedCriterion,
-    pem::criterion::{Criterion, Data, first_residual},
 };
 
 /// The options of an estimator once they are checked and the automatic ones decided.

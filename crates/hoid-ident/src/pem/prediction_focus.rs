@@ -3,8 +3,8 @@
 use hoid_model::Record;
 
 use crate::{
-    Fit, IdentError, initial_guess::guesses::initial_guesses, optimize::Objective, pem::arx, pem::criterion::Workspace,
-    pem::fit_problem::FitProblem, pem::fit_settings::FitSettings, pem::linearisation_client::LinearisationClient,
+    Fit, IdentError, criterion::Workspace, initial_guess::guesses::initial_guesses, multistart::LinearisationClient,
+    optimize::Objective, pem::arx, pem::fit_problem::FitProblem, pem::fit_settings::FitSettings,
 };
 
 /// One model for all records, with residuals from sample `first` of each record on at the earliest.

@@ -14,13 +14,10 @@ use hoid_model::SampleTime;
 use crate::{
     Fit, IdentError, Reason, Termination,
     assembled_fit::{Solution, assembled_fit, held},
+    criterion::{Criterion, Workspace},
     linalg::{information::inverse_of_free, least_squares::dot},
     optimize::{Minimum, Objective, free_parameters, minimise},
-    pem::{
-        constraints::ConstrainedCriterion,
-        criterion::{Criterion, Workspace},
-        fit_settings::FitSettings,
-    },
+    pem::{constraints::ConstrainedCriterion, fit_settings::FitSettings},
 };
 
 /// Rounds in which the scale is estimated anew.

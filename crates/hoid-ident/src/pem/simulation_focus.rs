@@ -17,9 +17,9 @@ use hoid_model::{Orders, PolynomialModel, Record, Structure, polynomial::product
 
 use crate::{
     Constraint, Fit, IdentError,
+    criterion::{Criterion, Data, Workspace, first_residual},
     linalg::information::inverse_information,
     linalg::least_squares::dot,
-    pem::criterion::{Criterion, Data, Workspace, first_residual},
     pem::fit_settings::FitSettings,
     pem::prediction_focus,
 };

@@ -7,8 +7,8 @@ use super::{
 };
 use crate::{
     IdentError, SearchOptions,
+    criterion::Workspace,
     optimize::{Minimum, minimise},
-    pem::criterion::Workspace,
 };
 
 /// Steps from each start before the best of them is followed to its end.

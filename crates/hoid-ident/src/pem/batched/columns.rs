@@ -7,7 +7,7 @@ use hoid_core::number::Number;
 
 use super::{
     lane_products::{four_products, two_products},
-    span_signals::SpanSignals,
+    signal_buffers::SignalBuffers,
 };
 
 /// The columns whose products are summed: `[eps, x_b(t).., v(t-1).., x_f(t-1)..]`.
@@ -29,7 +29,14 @@ impl Columns {
 
     /// The values of a column in these rows of the span.
     #[inline(always)]
-    pub fn rows<'r>(&self, signals: &'r SpanSignals, column: usize, from: usize, to: usize, width: usize) -> &'r [f64] {
+    pub fn rows<'r>(
+        &self,
+        signals: &'r SignalBuffers,
+        column: usize,
+        from: usize,
+        to: usize,
+        width: usize,
+    ) -> &'r [f64] {
         let (signal, lag) = if column == 0 {
             (&*signals.eps, 0)
         } else if column <= self.nb {
@@ -47,7 +54,7 @@ impl Columns {
     pub fn add_products<R: Number>(
         &self,
         zero: R,
-        signals: &SpanSignals,
+        signals: &SignalBuffers,
         from: usize,
         to: usize,
         products: &mut [f64],
@@ -94,7 +101,7 @@ impl Columns {
     /// The products of the columns that both follow others: those of the columns before them over the same rows, `sign` times their
     /// products in one row more.
     #[inline(always)]
-    pub fn add_row<R: Number>(&self, zero: R, signals: &SpanSignals, row: usize, sign: f64, products: &mut [f64]) {
+    pub fn add_row<R: Number>(&self, zero: R, signals: &SignalBuffers, row: usize, sign: f64, products: &mut [f64]) {
         let (p1, width) = (self.count(), zero.lanes());
         for i in 0..p1 {
             for j in 0..=i {

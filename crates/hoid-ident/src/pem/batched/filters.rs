@@ -2,7 +2,7 @@
 
 use hoid_core::number::Number;
 
-use super::{lane_products::add_scaled, span_signals::SpanSignals};
+use super::{lane_products::add_scaled, signal_buffers::SignalBuffers};
 
 /// All signals of a span whose past is known, in one pass, where the poles are two, and B and D short: s and r wait for their own last values
 /// side by side, and what is not multiplied later is not kept. The same operations as one after the other. False for other orders.
@@ -11,7 +11,7 @@ pub(super) fn all_at_once<R: Number>(
     zero: R,
     [b, d, f]: [&[f64]; 3],
     data: [&[f64]; 2],
-    signals: &mut SpanSignals,
+    signals: &mut SignalBuffers,
     at: usize,
 ) -> bool {
     let width = zero.lanes();
@@ -47,7 +47,7 @@ fn all_of_orders<R: Number, const NB: usize, const ND: usize>(
     zero: R,
     [b, d, f]: [&[f64]; 3],
     [e, u]: [&[f64]; 2],
-    signals: &mut SpanSignals,
+    signals: &mut SignalBuffers,
     at: usize,
 ) {
     let (width, end) = (zero.lanes(), at + e.len());
@@ -98,7 +98,7 @@ pub(super) fn respond<R: Number>(
     zero: R,
     [b, f]: [&[f64]; 2],
     [e, u]: [&[f64]; 2],
-    signals: &mut SpanSignals,
+    signals: &mut SignalBuffers,
     at: usize,
 ) {
     let (width, end) = (zero.lanes(), at + e.len());

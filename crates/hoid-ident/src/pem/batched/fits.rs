@@ -6,10 +6,10 @@ use hoid_model::{Record, SampleTime, Structure};
 use super::lanes::search;
 use crate::{
     Fit, IdentError, InitialState,
+    criterion::{Criterion, Workspace},
     initial_guess::continuation::{Averaged, Continuation, Slow},
     initial_guess::guesses::initial_guesses_beside,
     pem::constraints::ConstrainedCriterion,
-    pem::criterion::{Criterion, Workspace},
     pem::fit_problem::FitProblem,
     pem::fit_settings::FitSettings,
 };

@@ -4,14 +4,14 @@
 //! `x_k g(t-k)` from the residuals. The columns `g(t-k)` over the residuals are made orthogonal by the factor of Cholesky of their products, twice, as
 //! once leaves what rounding makes of columns that are nearly parallel (Y. Yamamoto et al., *Electronic Trans. Numerical Analysis* 44 (2015) 306-326). As
 //! they are shifts of one, the first matrix takes nf products. The criterion alone has an orthonormal basis by Gram and Schmidt
-//! ([`crate::pem::initial_states`]), the same but for rounding; a lane whose columns depend on each other is left to it.
+//! ([`crate::criterion::initial_state_responses`]), the same but for rounding; a lane whose columns depend on each other is left to it.
 
 use hoid_core::number::Number;
 
 use super::{
     columns::Columns,
     lane_products::{add_scaled, four_products, two_products},
-    span_signals::SpanSignals,
+    signal_buffers::SignalBuffers,
 };
 
 /// Samples of an impulse response between two looks at whether it has died away.
@@ -21,7 +21,7 @@ const NOTHING: f64 = 1e-17;
 /// Share of a column's square that must not lie in the space of those before it.
 const OWN: f64 = 1e-12;
 
-/// The responses: h and g stand in [`SpanSignals::h`] and [`SpanSignals::g`] with nf zeros before and behind, the orthogonal columns q in [`SpanSignals::q`].
+/// The responses: h and g stand in [`SignalBuffers::h`] and [`SignalBuffers::g`] with nf zeros before and behind, the orthogonal columns q in [`SignalBuffers::q`].
 pub(super) struct InitialStateResponses<R> {
     /// Rows of a column, from the first residual on.
     pub rows: usize,
@@ -41,7 +41,7 @@ impl<R: Number> InitialStateResponses<R> {
         zero: R,
         [d, f]: [&[f64]; 2],
         residuals: usize,
-        signals: &mut SpanSignals,
+        signals: &mut SignalBuffers,
         dependent: &mut Vec<bool>,
     ) -> Self {
         let width = zero.lanes();
@@ -74,7 +74,7 @@ impl<R: Number> InitialStateResponses<R> {
     }
 
     #[inline(always)]
-    fn make_orthogonal(&mut self, zero: R, signals: &mut SpanSignals, dependent: &mut [bool]) {
+    fn make_orthogonal(&mut self, zero: R, signals: &mut SignalBuffers, dependent: &mut [bool]) {
         let (width, nf, rows) = (zero.lanes(), self.nf, self.rows);
         let mut s = vec![zero; nf * nf];
         for j in (0..nf).step_by(2) {
@@ -124,27 +124,27 @@ impl<R: Number> InitialStateResponses<R> {
 
     /// Column k as it was: g, k samples later.
     #[inline(always)]
-    fn shift<'r>(&self, signals: &'r SpanSignals, k: usize, width: usize) -> &'r [f64] {
+    fn shift<'r>(&self, signals: &'r SignalBuffers, k: usize, width: usize) -> &'r [f64] {
         let first = self.nf + self.nd - k;
         &signals.g[first * width..(first + self.rows) * width]
     }
 
     /// Its element in a row, which may be the one before the first.
     #[inline(always)]
-    fn at(&self, zero: R, signals: &SpanSignals, k: usize, row: isize) -> R {
+    fn at(&self, zero: R, signals: &SignalBuffers, k: usize, row: isize) -> R {
         zero.load(&signals.g[(self.nf + self.nd - k).wrapping_add_signed(row) * zero.lanes()..])
     }
 
     /// Column k, orthogonal to those before it.
     #[inline(always)]
-    fn column<'r>(&self, signals: &'r SpanSignals, k: usize, width: usize) -> &'r [f64] {
+    fn column<'r>(&self, signals: &'r SignalBuffers, k: usize, width: usize) -> &'r [f64] {
         &signals.q[k * self.rows * width..(k + 1) * self.rows * width]
     }
 
     /// Takes the best initial states into w (in the place of r), v and eps: w begins in row `regressed` of the span, the residuals in row
     /// `counted`.
     #[inline(always)]
-    pub fn eliminate(&self, zero: R, signals: &mut SpanSignals, regressed: usize, counted: usize) {
+    pub fn eliminate(&self, zero: R, signals: &mut SignalBuffers, regressed: usize, counted: usize) {
         let (width, nf) = (zero.lanes(), self.nf);
         let (from, to) = (counted * width, (counted + self.rows) * width);
         let eps = &signals.eps[from..to];
@@ -183,7 +183,7 @@ impl<R: Number> InitialStateResponses<R> {
 
     /// Components of each column of psi in the space of the responses, a row for each column. eps, the first, has none left.
     #[inline(always)]
-    pub fn components(&self, zero: R, columns: &Columns, signals: &SpanSignals, counted: usize) -> Vec<R> {
+    pub fn components(&self, zero: R, columns: &Columns, signals: &SignalBuffers, counted: usize) -> Vec<R> {
         let (width, nf, count) = (zero.lanes(), self.nf, columns.count());
         let mut inside = vec![zero; count * nf];
         let end = counted + self.rows;

@@ -5,11 +5,11 @@ use std::cell::Cell;
 use hoid_lanes::Path;
 use hoid_model::Orders;
 
-use super::{normal_equations::NormalEquations, pass::Pass, rows::Rows, span_signals::SpanSignals};
+use super::{normal_equations::NormalEquations, pass::Pass, rows::Rows, signal_buffers::SignalBuffers};
 use crate::{
+    criterion::{Data, Workspace},
+    multistart::LinearisationClient,
     optimize::{Linearisation, Objective},
-    pem::criterion::{Data, Workspace},
-    pem::linearisation_client::LinearisationClient,
 };
 
 /// Runs all searches to their end, side by side; the records are of one length and the orders the same.
@@ -36,7 +36,7 @@ pub(super) struct Memory {
     e: Rows,
     u: Rows,
     pub theta: Rows,
-    signals: SpanSignals,
+    signals: SignalBuffers,
     pub sums: NormalEquations,
 }
 

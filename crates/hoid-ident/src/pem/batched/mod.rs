@@ -1,7 +1,7 @@
 //! Fits of one model to each of many records, side by side.
 //!
 //! A search is a chain of passes over its record, each a chain of filters that wait for their own last value
-//! ([`crate::pem::criterion`]). Searches of different records wait for nothing of each other: each has a lane of the registers,
+//! ([`crate::criterion`]). Searches of different records wait for nothing of each other: each has a lane of the registers,
 //! and when it has ended the next record takes its place; the search on the averaged records
 //! ([`crate::initial_guess::continuation`]) goes first in the same way. What needs more than the criterion (the border of
 //! stability, starts where the averages do not say enough, free responses that are not independent) is done alone.
@@ -14,7 +14,7 @@
 //! | `initial_state_responses` | the responses to the initial states, and the states of least squares |
 //! | `columns` | products of eps and the columns of psi |
 //! | `filters` | the filters of the signals |
-//! | `span_signals`, `normal_equations`, `rows` | the numbers of all lanes |
+//! | `signal_buffers`, `normal_equations`, `rows` | the numbers of all lanes |
 //! | `lane_products` | products and sums of two signals |
 
 mod columns;
@@ -26,7 +26,7 @@ mod lanes;
 mod normal_equations;
 mod pass;
 mod rows;
-mod span_signals;
+mod signal_buffers;
 
 pub(crate) use fits::fit_each;
 

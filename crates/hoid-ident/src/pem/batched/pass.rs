@@ -1,6 +1,6 @@
 //! The criterion and its derivatives for several records at once, each with a theta of its own.
 //!
-//! What [`crate::pem::criterion`] says of one Box-Jenkins model without C, with its initial states eliminated, for a record in each lane:
+//! What [`crate::criterion`] says of one Box-Jenkins model without C, with its initial states eliminated, for a record in each lane:
 //!
 //! `s = e(t-nk)/F`,  `w = B s`,  `v = u - w`,  `eps = D v`,  `x_b = D s`,  `r = w/F`,  `x_f = D r`
 //!
@@ -22,7 +22,7 @@ use super::{
     filters::{all_at_once, filter_response, respond, whiten},
     initial_state_responses::InitialStateResponses,
     normal_equations::NormalEquations,
-    span_signals::SpanSignals,
+    signal_buffers::SignalBuffers,
 };
 
 /// Samples that are made and multiplied at a time.
@@ -40,7 +40,7 @@ pub(super) struct Pass<'a> {
     pub u: &'a [f64],
     /// theta, a row for each parameter.
     pub theta: &'a [f64],
-    pub signals: &'a mut SpanSignals,
+    pub signals: &'a mut SignalBuffers,
     pub sums: &'a mut NormalEquations,
 }
 

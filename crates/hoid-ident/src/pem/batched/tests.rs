@@ -7,8 +7,8 @@ use hoid_model::{Orders, Record, Structure};
 use super::lanes::Lanes;
 use crate::{
     Estimator, Fit, IdentError, InitialState,
+    criterion::{Criterion, Data, Workspace, first_residual},
     optimize::{Linearisation, Objective},
-    pem::criterion::{Criterion, Data, Workspace, first_residual},
 };
 
 /// The fits of an estimator, in lanes alone.

@@ -4,7 +4,7 @@ use super::rows::Rows;
 
 /// Signals of a span, a row for each sample and in it a number for each lane. The rows before the first hold the end of the span before.
 #[derive(Debug, Default)]
-pub(super) struct SpanSignals {
+pub(super) struct SignalBuffers {
     pub s: Rows,
     pub v: Rows,
     pub eps: Rows,
@@ -18,7 +18,7 @@ pub(super) struct SpanSignals {
     pub q: Rows,
 }
 
-impl SpanSignals {
+impl SignalBuffers {
     /// Makes room for spans of so many samples, with zeros before the first.
     pub fn begin(&mut self, history: usize, longest: usize, width: usize) {
         for signal in [

@@ -11,13 +11,13 @@ use hoid_model::Orders;
 
 use crate::{
     SearchOptions,
-    initial_guess::start::Start,
+    criterion::Block,
+    multistart::Start,
     optimize::{
         Linearisation, Minimum, Objective,
         basin::lies_in_basin,
         gauss_newton::{GaussNewton, Progress},
     },
-    pem::criterion::Block,
 };
 
 /// The searches.

@@ -3,9 +3,9 @@
 use hoid_model::Orders;
 
 use crate::{
+    criterion::Block,
     linalg::least_squares::{add_scaled, dot, solve_symmetric},
     optimize::Linearisation,
-    pem::criterion::Block,
 };
 
 /// A start of the search, with its name.

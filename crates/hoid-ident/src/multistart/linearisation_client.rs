@@ -2,8 +2,8 @@
 //! with it. Whoever drives it decides how to linearise: alone, or for several records side by side.
 
 use crate::{
+    criterion::{Block, Criterion, Workspace},
     optimize::Linearisation,
-    pem::criterion::{Block, Criterion, Workspace},
 };
 
 /// A computation that needs the linearisation of a criterion at one theta after the other.
