@@ -10,7 +10,7 @@ use hoid_model::{
 
 use crate::{
     IdentError, InitialState, Termination,
-    pem::criterion::{Criterion, Data, Workspace, first_residual},
+    criterion::{Criterion, Data, Workspace, first_residual},
 };
 
 /// A fitted model.

@@ -13,24 +13,28 @@
 //! | `arx`, `least_squares` | linear regression by QR with column pivoting |
 //! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
 //! | [`instrumental`] | instrumental variables, in open and closed loop |
-//! | [`TimeVarying`] | gains that follow a sigmoid, with the time and the rate of the change |
+//! | [`SigmoidChange`] | gains that follow a sigmoid, with the time and the rate of the change |
 //! | [`describing`] | describing function, coherence, remnant spectrum and margins by Fourier coefficients |
 //! | [`order_search`] | ranges of orders and delay, criteria, the chosen model |
 //! | [`validation`] | VAF, NRMSE, residual tests |
 //! | `derived` | poles, zeros, crossover and margins with standard errors |
 //! | [`Fit`] | model, covariance, how it ended; prediction, simulation, frequency response |
 
-mod checks;
+mod assembled_fit;
 mod constraint;
+mod criterion;
 mod derived;
 mod error;
 mod estimator;
 mod fit;
 pub mod frequency;
 pub mod grey_box;
+mod informative_data;
 mod initial_guess;
 pub mod iv;
 pub mod linalg;
+mod multistart;
+mod noise_model;
 mod optimize;
 pub mod order_selection;
 mod pem;
@@ -39,6 +43,7 @@ mod sigmoid;
 pub mod validation;
 
 pub use constraint::{Constraint, Prior};
+pub use criterion::{InitialState, first_residual};
 pub use derived::{MarginEstimates, Root};
 pub use error::IdentError;
 pub use estimator::{Estimator, Focus};
@@ -47,8 +52,5 @@ pub use grey_box::{GreyBox, GreyBoxFit};
 pub use iv::{InstrumentalVariable, Instruments, IvMethod};
 pub use optimize::{Reason, SearchMethod, SearchOptions, Termination};
 pub use order_selection::{Candidate, Choice, OrderRanges, choose_orders};
-pub use pem::criterion::{InitialState, first_residual};
-pub use pem::robust::Loss;
-pub use sigmoid::{
-    ChangeParameter, Comparison, GainsAt, NoiseLevel, Remark, TIME_VARYING_NAMES, TimeVarying, TimeVaryingFit,
-};
+pub use pem::loss::Loss;
+pub use sigmoid::{ChangeParameter, Comparison, GainsAt, NoiseLevel, Remark, SIGMOID_NAMES, SigmoidChange, SigmoidFit};

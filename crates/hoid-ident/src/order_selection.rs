@@ -9,7 +9,7 @@ use std::{fmt, ops::RangeInclusive};
 use hoid_model::{Orders, Record, Structure};
 use rayon::prelude::*;
 
-use crate::{Estimator, Fit, IdentError, SearchOptions, pem::criterion::first_residual};
+use crate::{Estimator, Fit, IdentError, SearchOptions, criterion::first_residual};
 
 /// A range for each order and for the delay.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -123,15 +123,6 @@ impl PolynomialModel {
         DiscreteTransferFunction::new(&num, &den, self.sample_time)
     }
 
-    /// `C / (A D)`.
-    ///
-    /// # Errors
-    /// As [`PolynomialModel::system`].
-    pub fn noise_filter(&self) -> Result<DiscreteTransferFunction, ModelError> {
-        let den = polynomial::product(&monic(self.a()), &monic(self.d()));
-        DiscreteTransferFunction::new(&monic(self.c()), &den, self.sample_time)
-    }
-
     /// Frequency response from e to u, `B q^-nk/(A F)` at `e^{j omega Ts}`.
     pub fn response(&self, omega_rad_s: f64) -> Complex64 {
         self.response_and_gradient(omega_rad_s).0

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use hoid_ident::{
     Choice, Estimator, Fit, GreyBox, GreyBoxFit, IdentError, InitialState, InstrumentalVariable, Instruments, Loss,
-    SearchOptions, TimeVarying, TimeVaryingFit,
+    SearchOptions, SigmoidChange, SigmoidFit,
     order_selection::{default_operator_ranges, fit_or_choose},
 };
 use hoid_model::Record;
@@ -25,7 +25,7 @@ const LONG: usize = 50_000;
 /// What a fit gave.
 enum Found {
     Model(Box<(Fit, Option<Choice>, Option<GreyBoxFit>)>),
-    Change(Box<TimeVaryingFit>),
+    Change(Box<SigmoidFit>),
 }
 
 /// Fits a model to records. The package has brought all options into plain form.
@@ -149,13 +149,13 @@ pub fn identify<'py>(
                      give \"auto\" or \"estimate\"",
                 ));
             }
-            let usual = TimeVarying::default();
+            let usual = SigmoidChange::default();
             let nd = match orders.iter().next() {
                 None => usual.nd,
                 Some((name, (low, high))) if orders.len() == 1 && name == "nd" && low == high => *low,
                 Some(_) => return Err(bad_option("the time-varying fit takes only nd, a single number")),
             };
-            let mut estimator = TimeVarying {
+            let mut estimator = SigmoidChange {
                 nd,
                 constraints,
                 search,

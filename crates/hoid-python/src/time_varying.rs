@@ -1,6 +1,6 @@
 //! The fit of an operator whose gains change once.
 
-use hoid_ident::{GainsAt, TimeVaryingFit, validation::whiteness};
+use hoid_ident::{GainsAt, SigmoidFit, validation::whiteness};
 use hoid_model::uncertainty::Estimate;
 use numpy::{PyArray1, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
@@ -14,11 +14,11 @@ use crate::{
 /// The package wraps it in `pyhoid.TimeVaryingFit`.
 #[pyclass(name = "TimeVaryingFit", module = "pyhoid._pyhoid", frozen)]
 pub struct PyTimeVaryingFit {
-    fit: TimeVaryingFit,
+    fit: SigmoidFit,
 }
 
 impl PyTimeVaryingFit {
-    pub fn new(fit: TimeVaryingFit) -> Self {
+    pub fn new(fit: SigmoidFit) -> Self {
         Self { fit }
     }
 }

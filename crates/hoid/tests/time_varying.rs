@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use hoid::{
-    ident::{Constraint, IdentError, NoiseLevel, Reason, Remark, TimeVarying, TimeVaryingFit},
+    ident::{Constraint, IdentError, NoiseLevel, Reason, Remark, SigmoidChange, SigmoidFit},
     model::scenario::RemnantStrength,
     prelude::*,
 };
@@ -61,15 +61,15 @@ fn truth(condition: Condition) -> Vec<(&'static str, f64)> {
     ]
 }
 
-fn value(fit: &TimeVaryingFit, name: &str) -> Estimate {
+fn value(fit: &SigmoidFit, name: &str) -> Estimate {
     fit.parameter(name).unwrap().estimate
 }
 
 /// Without the walks along t_M and G.
-fn quick() -> TimeVarying {
-    TimeVarying {
+fn quick() -> SigmoidChange {
+    SigmoidChange {
         likelihood_intervals: false,
-        ..TimeVarying::default()
+        ..SigmoidChange::default()
     }
 }
 
@@ -81,7 +81,7 @@ fn one(record: &Record) -> &[Record] {
 fn a_change_without_noise_is_recovered() {
     for condition in [Condition::C3, Condition::C4, Condition::C5, Condition::C6] {
         let record = without_noise(condition);
-        let fit = TimeVarying::default().fit(one(&record)).unwrap();
+        let fit = SigmoidChange::default().fit(one(&record)).unwrap();
         let worst = truth(condition)
             .into_iter()
             .filter(|(name, _)| *name != "d1")
@@ -113,7 +113,7 @@ fn study(condition: Condition, n: u64) {
     let (mut midpoints, mut rates, mut change_points) = (0, 0, 0);
     let mut widths = Vec::new();
     for record in runs(condition, n) {
-        let fit = TimeVarying::default().fit(one(&record)).unwrap();
+        let fit = SigmoidChange::default().fit(one(&record)).unwrap();
         assert!(fit.termination().converged(), "{}", fit.termination().reason);
         assert!(fit.change_found());
         for (i, (name, true_value)) in truth.iter().enumerate() {
@@ -201,7 +201,7 @@ fn where_nothing_changes_it_is_said() {
         let (mut inside, mut largest) = (0, 0.0_f64);
         let n = 10;
         for record in runs(condition, n) {
-            let fit = TimeVarying::default().fit(one(&record)).unwrap();
+            let fit = SigmoidChange::default().fit(one(&record)).unwrap();
             assert!(fit.termination().converged(), "{}", fit.termination().reason);
             assert!(!fit.change_found() && fit.comparison().extra_parameters == 4);
             largest = largest.max(fit.comparison().likelihood_ratio);
@@ -226,7 +226,7 @@ fn where_nothing_changes_it_is_said() {
         // 20 intervals in pairs: a standard error of 7 %; four of that.
         assert!(inside >= 13);
     }
-    let exact = TimeVarying::default().fit(&[without_noise(Condition::C1)]).unwrap();
+    let exact = SigmoidChange::default().fit(&[without_noise(Condition::C1)]).unwrap();
     assert!(!exact.change_found());
     assert!((exact.constant_operator().k_e.value - 0.09).abs() < 1e-9);
 }
@@ -234,7 +234,7 @@ fn where_nothing_changes_it_is_said() {
 #[test]
 fn a_record_without_a_change_agrees_with_box_jenkins() {
     let record = &runs(Condition::C1, 1)[0];
-    let ours = TimeVarying {
+    let ours = SigmoidChange {
         delay_range_s: (0.28, 0.28),
         noise_level: NoiseLevel::Constant,
         ..quick()
@@ -281,9 +281,9 @@ fn parameters_can_be_held_and_the_time_axis_moved() {
         ("G".to_owned(), Constraint::Fixed(0.5)),
         ("tau_e".to_owned(), Constraint::Fixed(0.28)),
     ]);
-    let held = TimeVarying {
+    let held = SigmoidChange {
         constraints,
-        ..TimeVarying::default()
+        ..SigmoidChange::default()
     };
     let fit = held.fit(one(record)).unwrap();
     for (name, fixed) in [("G", 0.5), ("tau_e", 0.28)] {
@@ -312,7 +312,7 @@ fn parameters_can_be_held_and_the_time_axis_moved() {
 #[test]
 fn residuals_and_simulation_of_a_fit() {
     let record = &runs(Condition::C6, 1)[0];
-    let fit = TimeVarying {
+    let fit = SigmoidChange {
         noise_level: NoiseLevel::Constant,
         ..quick()
     }
@@ -347,7 +347,7 @@ fn residuals_and_simulation_of_a_fit() {
 #[test]
 fn what_cannot_be_fitted_is_refused() {
     let record = runs(Condition::C4, 1).remove(0);
-    let error = |estimator: TimeVarying, records: &[Record]| estimator.fit(records).unwrap_err();
+    let error = |estimator: SigmoidChange, records: &[Record]| estimator.fit(records).unwrap_err();
     assert!(matches!(error(quick(), &[]), IdentError::NoRecords));
     let short = record.span(0.0, 0.65).unwrap();
     assert!(matches!(error(quick(), one(&short)), IdentError::TooFewSamples { .. }));
@@ -356,7 +356,7 @@ fn what_cannot_be_fitted_is_refused() {
     let apart = [record.span(0.0, 20.0).unwrap(), record.span(30.0, 50.0).unwrap()];
     assert!(error(quick(), &apart).to_string().contains("no time in common"));
     for range in [(0.3, 0.2), (-0.1, 0.2), (f64::NAN, 0.3), (0.1, f64::INFINITY)] {
-        let estimator = TimeVarying {
+        let estimator = SigmoidChange {
             delay_range_s: range,
             ..quick()
         };
@@ -365,7 +365,7 @@ fn what_cannot_be_fitted_is_refused() {
             "{range:?}"
         );
     }
-    let start = |start: Vec<f64>| TimeVarying {
+    let start = |start: Vec<f64>| SigmoidChange {
         start: Some(start),
         ..quick()
     };
@@ -392,7 +392,7 @@ fn what_cannot_be_fitted_is_refused() {
     assert!(matches!(error(quick(), one(&silent)), IdentError::NoExcitation { .. }));
     // A few seconds only: whatever comes out, it is said.
     let brief = record.span(39.0, 44.0).unwrap();
-    if let Ok(fit) = TimeVarying::default().fit(one(&brief)) {
+    if let Ok(fit) = SigmoidChange::default().fit(one(&brief)) {
         assert!(fit.parameters().iter().all(|p| p.estimate.value.is_finite()));
     }
 }

@@ -9,7 +9,7 @@ use super::{
     remnant::{Control, RemnantBand, share_and_ratio, spectrum},
     window::{Window, advanced},
 };
-use crate::{IdentError, checks::common_sample_time};
+use crate::{IdentError, informative_data::common_sample_time};
 
 /// Amplitude of a line, as a part of the rms of its channel, below which it is rounding.
 const LEAST_LINE: f64 = 1e-12;

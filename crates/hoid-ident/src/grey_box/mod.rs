@@ -22,11 +22,12 @@ use std::{collections::BTreeMap, ops::RangeInclusive};
 use hoid_model::{PolynomialModel, Record, SampleTime, Structure, remnant::HIGHEST_ORDER};
 
 use crate::{
-    Constraint, Fit, IdentError, InitialState, Reason, SearchOptions, checks,
+    Constraint, Fit, IdentError, InitialState, Reason, SearchOptions,
+    criterion::{Data, Workspace, first_residual, output_variance},
     fit::Physical,
+    informative_data,
     linalg::information::inverse_of_free,
     optimize::{Minimum, Objective, lies_in_basin},
-    pem::criterion::{Data, Workspace, first_residual, output_variance},
 };
 
 pub use layout::GREY_BOX_NAMES;
@@ -78,7 +79,7 @@ impl GreyBox {
     /// # Errors
     /// [`IdentError`]; how a search ended is part of the fit. With several orders an error means that none could be fitted.
     pub fn fit(&self, records: &[Record]) -> Result<GreyBoxFit, IdentError> {
-        let sample_time = checks::common_sample_time(records)?;
+        let sample_time = informative_data::common_sample_time(records)?;
         self.check_orders()?;
         let layouts = self.layouts(records.len(), sample_time)?;
         let mut first = 0;
@@ -89,7 +90,7 @@ impl GreyBox {
         for layout in &layouts {
             let orders = layout::orders(layout.order, layout.longest_nk()?);
             for record in records {
-                checks::record(Structure::BoxJenkins, &orders, record, first)?;
+                informative_data::check_record(Structure::BoxJenkins, &orders, record, first)?;
             }
         }
         let data: Vec<Data<'_>> = Data::of(records);

@@ -6,10 +6,10 @@
 
 use crate::{
     IdentError, InitialState,
+    criterion::{Criterion, Data, Workspace},
     linalg::least_squares::dot,
     optimize::Linearisation,
     optimize::{Minimum, Objective, SearchOptions, minimise},
-    pem::criterion::{Criterion, Data, Workspace},
 };
 
 use super::layout::{DELAY, Layout, Polynomials};
@@ -238,7 +238,7 @@ mod tests {
     use hoid_model::SampleTime;
 
     use super::*;
-    use crate::{Constraint, pem::criterion::first_residual};
+    use crate::{Constraint, criterion::first_residual};
 
     fn signals(n: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
         let mut state = 7_u64;

@@ -10,7 +10,7 @@
 
 use hoid_model::{Record, Structure};
 
-use crate::{Estimator, pem::criterion::Workspace};
+use crate::{Estimator, criterion::Workspace};
 
 use super::{
     layout::{DELAY, LEAD, Layout, Lead, SLOTS, TIME_CONSTANT},

@@ -6,7 +6,7 @@ use hoid_core::{
 };
 use hoid_model::{Orders, polynomial::reflected_inside};
 
-use crate::pem::criterion::{Criterion, Data, InitialState, Workspace, first_residual};
+use crate::criterion::{Criterion, Data, InitialState, Workspace, first_residual};
 
 /// Steps of Steiglitz and McBride.
 const STEIGLITZ_MCBRIDE_STEPS: usize = 4;

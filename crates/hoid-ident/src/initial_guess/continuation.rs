@@ -10,12 +10,11 @@
 use hoid_model::{Complex64, Orders, SampleTime, polynomial, polynomial_model::monic};
 
 use crate::{
-    initial_guess::{pole_grid::pole_grid, start::Start},
+    criterion::{Block, Criterion, Data, InitialState, Workspace, first_residual},
+    initial_guess::pole_grid::pole_grid,
+    multistart::{LinearisationClient, MultiStart, Start},
     optimize::Linearisation,
-    optimize::multistart::MultiStart,
     optimize::{Objective, SearchMethod, SearchOptions},
-    pem::criterion::{Block, Criterion, Data, InitialState, Workspace, first_residual},
-    pem::linearisation_client::LinearisationClient,
 };
 
 /// Samples that each record keeps at least.
@@ -53,12 +52,12 @@ pub(crate) fn slow_poles(criterion: &Criterion<'_>, sample_time: SampleTime, wor
     };
     let low = averaged.criterion();
     let mut continuation = Continuation::new(&averaged, &low);
-    while let Some(theta) = continuation.asked() {
+    while let Some(theta) = continuation.evaluation_point() {
         let there = match continuation.block() {
             Some(block) => low.linearise_block(theta, block, workspace),
             None => low.linearise(theta, workspace),
         };
-        continuation.take(there, workspace);
+        continuation.update(there, workspace);
     }
     continuation.slow()
 }
@@ -189,32 +188,32 @@ impl LinearisationClient for Continuation<'_> {
         self.low
     }
 
-    fn asked(&self) -> Option<&[f64]> {
+    fn evaluation_point(&self) -> Option<&[f64]> {
         match (&self.trial, &self.searches) {
             (Some(trial), _) => Some(&trial.theta),
-            (None, Some(searches)) => searches.asked(),
+            (None, Some(searches)) => searches.evaluation_point(),
             (None, None) => None,
         }
     }
 
     fn block(&self) -> Option<Block> {
         match (&self.trial, &self.searches) {
-            (Some(trial), _) => trial.wanted(),
+            (Some(trial), _) => trial.next_block(),
             (None, Some(searches)) => searches.block(),
             (None, None) => None,
         }
     }
 
-    fn take(&mut self, there: Linearisation, workspace: &mut Workspace) {
+    fn update(&mut self, there: Linearisation, workspace: &mut Workspace) {
         let o = &self.low.orders;
         let Some(mut trial) = self.trial.take() else {
             if let Some(searches) = &mut self.searches {
-                searches.take(there, workspace);
+                searches.update(there, workspace);
             }
             return;
         };
-        trial.take(o, &there);
-        if trial.wanted().is_some() {
+        trial.update(o, &there);
+        if trial.next_block().is_some() {
             self.trial = Some(trial);
             return;
         }

@@ -22,15 +22,15 @@ use hoid_model::{Orders, SampleTime, polynomial::reflected_inside};
 use super::{
     arx_poles::{arx_poles, reduced_arx, steiglitz_mcbride},
     continuation::{self, Slow},
-    noise_model::noise_model,
+    instrument_chain::instrument_chain,
     pole_grid::pole_grid,
     shared_poles,
-    start::Start,
 };
 use crate::{
-    iv::instrument_chain,
+    criterion::{Criterion, InitialState, Workspace},
+    multistart::Start,
+    noise_model::noise_model,
     optimize::Objective,
-    pem::criterion::{Criterion, InitialState, Workspace},
 };
 
 /// Proposals that are completed with a noise model of their own.
@@ -202,7 +202,7 @@ fn time_series(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Star
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pem::criterion::{Data, first_residual};
+    use crate::criterion::{Data, first_residual};
 
     /// `u = (B/F) q^-1 e + v` with noise of its own poles, the input white.
     fn record(n: usize, noise: f64) -> (Vec<f64>, Vec<f64>) {

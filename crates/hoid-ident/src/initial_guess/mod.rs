@@ -2,19 +2,17 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | `start` | a start, and what is still to be found of it |
 //! | `guesses` | the starts of a criterion, from the proposals of the others |
 //! | `continuation` | poles of the averaged record |
 //! | `pole_grid`, `arx_poles` | poles as people have them; poles by linear least squares |
 //! | `shared_poles` | models whose A stands beside a noise model or beside F |
-//! | `noise_model` | C and D of a disturbance |
+//! | `instrument_chain` | instrumental variables, and C and D of what is left |
 //! | `c_drawn_inside` | starts for a search that ended on the unit circle |
 
 pub mod arx_poles;
 pub mod c_drawn_inside;
 pub mod continuation;
 pub mod guesses;
-pub mod noise_model;
+pub mod instrument_chain;
 pub mod pole_grid;
 pub mod shared_poles;
-pub mod start;

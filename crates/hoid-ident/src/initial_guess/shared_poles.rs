@@ -14,10 +14,11 @@
 use hoid_model::{Complex64, Orders, polynomial, polynomial_model::monic};
 
 use crate::{
-    initial_guess::{arx_poles::arx_poles, noise_model::noise_model, start::Start},
-    iv::instrument_chain,
+    criterion::{Criterion, Workspace},
+    initial_guess::{arx_poles::arx_poles, instrument_chain::instrument_chain},
+    multistart::Start,
+    noise_model::noise_model,
     optimize::{SearchOptions, minimise},
-    pem::criterion::{Criterion, Workspace},
 };
 
 /// Starts that are tried by a few steps, the best by their loss.

@@ -9,11 +9,20 @@
 //! noise-free input. The book takes L of the order na + nb, as an example; here it is four times that, because v of a process that
 //! is sampled fast (`A = F`, `v = F n` with noise n) has zeros near the unit circle, which an autoregression needs many terms for.
 
-use crate::{IdentError, Reason, Termination, initial_guess::noise_model::noise_model};
+use hoid_model::Structure;
 
 use super::{
-    Solution,
-    equation::{self, Prefilter, Problem, cut},
+    algorithm::{Algorithm, IterationLimits, IvSolution},
+    columns::cut,
+    covariance::covariance,
+    equation::{IvProblem, Prefilter},
+};
+use crate::{IdentError, Reason, Termination, criterion::Criterion, noise_model::noise_model};
+
+pub(super) const ALGORITHM: Algorithm = Algorithm {
+    name: "iv4",
+    structure: Structure::Arx,
+    solve,
 };
 
 /// Order of the autoregression, as a multiple of na + nb.
@@ -21,7 +30,7 @@ const ORDERS: usize = 4;
 /// Rows for each term of the autoregression, at least.
 const ROWS_EACH: usize = 10;
 
-pub(super) fn solve(problem: &Problem<'_>) -> Result<Solution, IdentError> {
+fn solve(problem: &IvProblem<'_>, _: &Criterion<'_>, _: IterationLimits) -> Result<IvSolution, IdentError> {
     let (start, _) = problem.stabilised(&problem.least_squares(Prefilter::default())?)?;
     let second = problem.equation(Prefilter::default(), &start);
     let system = problem.solve(&second)?;
@@ -37,8 +46,8 @@ pub(super) fn solve(problem: &Problem<'_>) -> Result<Solution, IdentError> {
     let last = problem.equation(filter, &stable);
     let theta = problem.solve(&last)?;
     let residual = cut(&last.residual(&theta), &problem.rows(order));
-    Ok(Solution {
-        covariance: equation::covariance(&last.z, &last.phi, |_| true, &residual),
+    Ok(IvSolution {
+        covariance: covariance(&last.z, &last.phi, |_| true, &residual),
         theta,
         termination: Termination {
             reason: Reason::Direct,

@@ -10,14 +10,14 @@
 
 use crate::{
     IdentError, Reason, Termination,
+    criterion::Data,
     linalg::least_squares::{add_scaled, dot},
-    pem::criterion::Data,
 };
 
 use super::{
-    InstrumentalVariable,
-    equation::{Equation, Prefilter, Problem},
-    external::following,
+    algorithm::IterationLimits,
+    equation::{Equation, IvProblem, Prefilter},
+    external_signal::following,
 };
 
 /// Iterations of the start.
@@ -29,15 +29,15 @@ const ROUNDING: f64 = 1e-12;
 
 /// Numerator and denominator of the noise model.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Noise {
+pub(super) struct NoiseModel {
     pub c: Vec<f64>,
     pub d: Vec<f64>,
 }
 
-/// Where the iteration came to rest.
-pub(super) struct Rest {
+/// Where the iteration ended.
+pub(super) struct LastIterate {
     pub system: Vec<f64>,
-    pub noise: Noise,
+    pub noise: NoiseModel,
     /// The last filtered equation.
     pub equation: Equation,
     pub termination: Termination,
@@ -45,10 +45,10 @@ pub(super) struct Rest {
 
 /// Iterates; `noise_of` gives the noise model that belongs to a system.
 pub(super) fn iterate(
-    settings: &InstrumentalVariable,
-    problem: &Problem<'_>,
-    mut noise_of: impl FnMut(&[f64]) -> Noise,
-) -> Result<Rest, IdentError> {
+    limits: IterationLimits,
+    problem: &IvProblem<'_>,
+    mut noise_of: impl FnMut(&[f64]) -> NoiseModel,
+) -> Result<LastIterate, IdentError> {
     let (mut system, _) = problem.stabilised(&start(problem)?)?;
     let mut iterations = 0;
     loop {
@@ -68,17 +68,17 @@ pub(super) fn iterate(
         let residual = equation.residual(&next);
         let variance = dot(&residual, &residual) / residual.len() as f64;
         let moved = dot(&step, &step);
-        let settled = moved <= settings.tolerance * settings.tolerance * variance
+        let settled = moved <= limits.tolerance * limits.tolerance * variance
             || moved <= ROUNDING * ROUNDING * dot(&equation.y, &equation.y);
         let (next, reflected) = problem.stabilised(&next)?;
-        let reason = match (settled || iterations >= settings.max_iterations, reflected, settled) {
+        let reason = match (settled || iterations >= limits.max_iterations, reflected, settled) {
             (true, true, _) => Some(Reason::UnstableEstimate),
             (true, false, true) => Some(Reason::Settled),
             (true, false, false) => Some(Reason::IterationLimit),
             (false, ..) => None,
         };
         if let Some(reason) = reason {
-            return Ok(Rest {
+            return Ok(LastIterate {
                 noise: noise_of(&next),
                 system: next,
                 equation,
@@ -93,14 +93,14 @@ pub(super) fn iterate(
     }
 }
 
-fn start(problem: &Problem<'_>) -> Result<Vec<f64>, IdentError> {
+fn start(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> {
     match of_noise_free_parts(problem) {
         Ok(system) => Ok(system),
         Err(_) => problem.least_squares(Prefilter::default()),
     }
 }
 
-fn of_noise_free_parts(problem: &Problem<'_>) -> Result<Vec<f64>, IdentError> {
+fn of_noise_free_parts(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> {
     let Some(source) = problem.sources.first() else {
         return problem.least_squares(Prefilter::default());
     };

@@ -9,56 +9,68 @@
 //! loop it falls into Young's `sigma^2 (Z'Z)^-1` and the covariance of the ARMA model; in a closed loop C and D inherit errors of
 //! the system. Where the noise model is too small, the colour that is left in eps is taken into account for B and F.
 
-use crate::{
-    IdentError, InitialState, Reason, SearchOptions,
-    initial_guess::noise_model::noise_model,
-    optimize::minimise,
-    pem::criterion::{Criterion, Data, Workspace, first_residual},
-};
-use hoid_model::Orders;
+use hoid_model::{Orders, Structure};
 
 use super::{
-    InstrumentalVariable, Solution,
-    equation::{self, Problem},
-    refined::{self, Noise, Rest},
+    algorithm::{Algorithm, IterationLimits, IvSolution},
+    covariance,
+    equation::IvProblem,
+    refined::{self, LastIterate, NoiseModel},
+};
+use crate::{
+    IdentError, InitialState, Reason, SearchOptions,
+    criterion::{Criterion, Data, Workspace, first_residual},
+    noise_model::noise_model,
+    optimize::minimise,
 };
 
-pub(super) fn solve(
-    settings: &InstrumentalVariable,
-    problem: &Problem<'_>,
+pub(super) const ALGORITHM: Algorithm = Algorithm {
+    name: "rivbj",
+    structure: Structure::BoxJenkins,
+    solve,
+};
+
+fn solve(
+    problem: &IvProblem<'_>,
     criterion: &Criterion<'_>,
-) -> Result<Solution, IdentError> {
-    let mut noise_before: Option<Noise> = None;
-    let rest = refined::iterate(settings, problem, |system| {
+    limits: IterationLimits,
+) -> Result<IvSolution, IdentError> {
+    let mut noise_before: Option<NoiseModel> = None;
+    let last = refined::iterate(limits, problem, |system| {
         let noise = noise_of(system, problem, criterion, noise_before.as_ref());
         noise_before = Some(noise.clone());
         noise
     })?;
-    let (poles, b) = rest.system.split_at(problem.poles);
-    let theta = [b, &rest.noise.c, &rest.noise.d, poles].concat();
-    let covariance = if rest.termination.reason == Reason::UnstableEstimate {
+    let (poles, b) = last.system.split_at(problem.poles);
+    let theta = [b, &last.noise.c, &last.noise.d, poles].concat();
+    let covariance = if last.termination.reason == Reason::UnstableEstimate {
         None
     } else {
-        covariance(&theta, &rest, problem, criterion)
+        covariance(&theta, &last, problem, criterion)
     };
-    Ok(Solution {
+    Ok(IvSolution {
         theta,
         covariance,
-        termination: rest.termination,
+        termination: last.termination,
     })
 }
 
 /// C and D for a system with stable F.
-fn noise_of(system: &[f64], problem: &Problem<'_>, criterion: &Criterion<'_>, before: Option<&Noise>) -> Noise {
+fn noise_of(
+    system: &[f64],
+    problem: &IvProblem<'_>,
+    criterion: &Criterion<'_>,
+    before: Option<&NoiseModel>,
+) -> NoiseModel {
     let Orders { nc, nd, .. } = criterion.orders;
     if nc + nd == 0 {
-        return Noise::default();
+        return NoiseModel::default();
     }
     let (poles, b) = system.split_at(problem.poles);
     let left = simulation_error(&[b, poles].concat(), criterion);
     let (c, d) = noise_model(&left, nc, nd);
     if nc == 0 {
-        return Noise { c, d };
+        return NoiseModel { c, d };
     }
     let orders = Orders {
         na: nd,
@@ -82,12 +94,12 @@ fn noise_of(system: &[f64], problem: &Problem<'_>, criterion: &Criterion<'_>, be
     ) {
         Some(minimum) => {
             let (d, c) = minimum.theta.split_at(nd);
-            Noise {
+            NoiseModel {
                 c: c.to_vec(),
                 d: d.to_vec(),
             }
         }
-        None => Noise { c, d },
+        None => NoiseModel { c, d },
     }
 }
 
@@ -109,7 +121,12 @@ fn simulation_error(theta: &[f64], criterion: &Criterion<'_>) -> Vec<Vec<f64>> {
         .collect()
 }
 
-fn covariance(theta: &[f64], rest: &Rest, problem: &Problem<'_>, criterion: &Criterion<'_>) -> Option<Vec<f64>> {
+fn covariance(
+    theta: &[f64],
+    last: &LastIterate,
+    problem: &IvProblem<'_>,
+    criterion: &Criterion<'_>,
+) -> Option<Vec<f64>> {
     let o = criterion.orders;
     let noise = o.nb..o.nb + o.nc + o.nd;
     // Rows that both the equation and the residuals have.
@@ -133,9 +150,9 @@ fn covariance(theta: &[f64], rest: &Rest, problem: &Problem<'_>, criterion: &Cri
                 w[i].extend_from_slice(column);
             } else {
                 let z = if i < o.nb { problem.poles + i } else { i - noise.end };
-                w[i].extend_from_slice(&rest.equation.z[z][from..end]);
+                w[i].extend_from_slice(&last.equation.z[z][from..end]);
             }
         }
     }
-    equation::covariance(&w, &psi, |i| !noise.contains(&i), &residual)
+    covariance::covariance(&w, &psi, |i| !noise.contains(&i), &residual)
 }

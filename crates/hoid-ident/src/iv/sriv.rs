@@ -4,37 +4,45 @@
 //! The equation `F u = B q^-nk e + F eps` is filtered with 1/F of the iteration before, which makes its noise eps again. Consistent
 //! for coloured eps as well, of the smallest variance for white eps; the covariance is that of the colour found.
 
-use crate::IdentError;
+use hoid_model::Structure;
 
 use super::{
-    InstrumentalVariable, Solution,
-    equation::{self, Problem, cut},
-    refined::{self, Noise},
+    algorithm::{Algorithm, IterationLimits, IvSolution},
+    columns::cut,
+    covariance::covariance,
+    equation::IvProblem,
+    refined::{self, NoiseModel},
 };
-use crate::Reason;
+use crate::{IdentError, Reason, criterion::Criterion};
 
-pub(super) fn solve(settings: &InstrumentalVariable, problem: &Problem<'_>) -> Result<Solution, IdentError> {
-    let rest = refined::iterate(settings, problem, |_| Noise::default())?;
-    let (poles, b) = rest.system.split_at(problem.poles);
+pub(super) const ALGORITHM: Algorithm = Algorithm {
+    name: "sriv",
+    structure: Structure::OutputError,
+    solve,
+};
+
+fn solve(problem: &IvProblem<'_>, _: &Criterion<'_>, limits: IterationLimits) -> Result<IvSolution, IdentError> {
+    let last = refined::iterate(limits, problem, |_| NoiseModel::default())?;
+    let (poles, b) = last.system.split_at(problem.poles);
     let theta: Vec<f64> = b.iter().chain(poles).copied().collect();
-    let covariance = (rest.termination.reason != Reason::UnstableEstimate)
+    let covariance = (last.termination.reason != Reason::UnstableEstimate)
         .then(|| {
-            let residual = cut(&rest.equation.residual(&rest.system), &problem.rows(0));
+            let residual = cut(&last.equation.residual(&last.system), &problem.rows(0));
             let in_order = |columns: &[Vec<f64>]| {
                 let (poles, b) = columns.split_at(problem.poles);
                 [b, poles].concat()
             };
-            equation::covariance(
-                &in_order(&rest.equation.z),
-                &in_order(&rest.equation.phi),
+            covariance(
+                &in_order(&last.equation.z),
+                &in_order(&last.equation.phi),
                 |_| true,
                 &residual,
             )
         })
         .flatten();
-    Ok(Solution {
+    Ok(IvSolution {
         theta,
         covariance,
-        termination: rest.termination,
+        termination: last.termination,
     })
 }

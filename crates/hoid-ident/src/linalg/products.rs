@@ -23,7 +23,7 @@ struct Tile<F> {
     x: usize,
     ys: [usize; 4],
     count: usize,
-    /// Four partial sums of each product. A product alone has eight, in the first two.
+    /// FourLanes partial sums of each product. A product alone has eight, in the first two.
     sums: [F; 4],
 }
 

@@ -1,4 +1,5 @@
-//! A search that asks for one linearisation after the other.
+//! A damped Gauss-Newton search by reverse communication: it names the theta at which it needs the derivatives and is updated
+//! with them.
 
 use super::{
     objective::{Linearisation, Objective},
@@ -14,7 +15,7 @@ const NEAR: f64 = 1e-2;
 /// digits.
 const ROUNDING: f64 = 1e-10;
 
-/// A search that asks for one linearisation after the other, so that several can go on side by side.
+/// A search that is driven from outside, so that several can go on side by side.
 pub(crate) struct GaussNewton<'s, O> {
     pub(super) objective: &'s O,
     pub(super) options: &'s SearchOptions,
@@ -31,11 +32,11 @@ pub(crate) struct GaussNewton<'s, O> {
     /// used.
     secant: Vec<f64>,
     trial: Trial,
-    /// Where the derivatives are wanted next.
-    asked: Vec<f64>,
+    /// Where the derivatives are needed next.
+    evaluation_point: Vec<f64>,
 }
 
-/// What the linearisation that is asked for decides.
+/// What the next linearisation decides.
 enum Trial {
     /// Whether the start is any good.
     Start,
@@ -50,8 +51,8 @@ enum Trial {
 /// Whether a search goes on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Progress {
-    /// It asks for another linearisation.
-    GoesOn,
+    /// It needs another linearisation.
+    Continues,
     /// It has ended; without a reason where the loss is not finite or the rival will not be beaten.
     Ended(Option<Reason>),
 }
@@ -69,7 +70,7 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
             options,
             rival,
             output_power: objective.output_power(),
-            asked: theta.clone(),
+            evaluation_point: theta.clone(),
             theta,
             at: Linearisation::default(),
             iterations: 0,
@@ -81,9 +82,9 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
         })
     }
 
-    /// Where the derivatives are wanted.
-    pub fn asked(&self) -> &[f64] {
-        &self.asked
+    /// Where the derivatives are needed.
+    pub fn evaluation_point(&self) -> &[f64] {
+        &self.evaluation_point
     }
 
     /// True while nothing is known of it but its start.
@@ -94,15 +95,15 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
     /// Until it ends, alone.
     pub(super) fn run(&mut self, workspace: &mut O::Workspace) -> Option<Reason> {
         loop {
-            let there = self.objective.linearise(&self.asked, workspace);
-            if let Progress::Ended(reason) = self.take(there) {
+            let there = self.objective.linearise(&self.evaluation_point, workspace);
+            if let Progress::Ended(reason) = self.update(there) {
                 return reason;
             }
         }
     }
 
-    /// Takes what was found where it was asked for.
-    pub fn take(&mut self, there: Linearisation) -> Progress {
+    /// Goes on with the linearisation at [`GaussNewton::evaluation_point`].
+    pub fn update(&mut self, there: Linearisation) -> Progress {
         let finite = there.sum_of_squares.is_finite();
         match std::mem::replace(&mut self.trial, Trial::Last) {
             Trial::Start => {
@@ -148,7 +149,7 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
         } else {
             self.secant.clear();
         }
-        std::mem::swap(&mut self.theta, &mut self.asked);
+        std::mem::swap(&mut self.theta, &mut self.evaluation_point);
         self.at = there;
     }
 
@@ -156,7 +157,12 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
     fn learn(&mut self, there: &Linearisation) {
         let p = self.theta.len();
         self.secant.resize(p * p, 0.0);
-        let step: Vec<f64> = self.asked.iter().zip(&self.theta).map(|(new, old)| new - old).collect();
+        let step: Vec<f64> = self
+            .evaluation_point
+            .iter()
+            .zip(&self.theta)
+            .map(|(new, old)| new - old)
+            .collect();
         let missing: Vec<f64> = (0..p)
             .map(|i| {
                 let known = dot(&there.gram[i * p..(i + 1) * p], &step) + dot(&self.secant[i * p..(i + 1) * p], &step);
@@ -199,7 +205,7 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
         {
             return if self.ask(&step.delta, 1.0) {
                 self.trial = Trial::Last;
-                Progress::GoesOn
+                Progress::Continues
             } else {
                 Progress::Ended(Some(Reason::SmallDecrease))
             };
@@ -237,7 +243,7 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
                 self.trial = Trial::Damped {
                     promised: step.promised,
                 };
-                return Progress::GoesOn;
+                return Progress::Continues;
             }
             self.damp();
         }
@@ -254,7 +260,7 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
         while factor > 1e-12 {
             if self.ask(&delta, factor) {
                 self.trial = Trial::Share { delta, factor };
-                return Progress::GoesOn;
+                return Progress::Continues;
             }
             factor *= 0.5;
         }
@@ -267,18 +273,18 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
         Progress::Ended(Some(if lost { Reason::SmallDecrease } else { Reason::NoDescent }))
     }
 
-    /// Asks for theta behind a step; false where there is no predictor.
+    /// Makes theta behind a step the next evaluation point; false where there is no predictor.
     fn ask(&mut self, delta: &[f64], factor: f64) -> bool {
-        self.asked.clear();
-        self.asked
+        self.evaluation_point.clear();
+        self.evaluation_point
             .extend(self.theta.iter().zip(delta).map(|(t, s)| t + factor * s));
         if let Some(limits) = self.objective.limits() {
             // Against rounding: a step that was cut at a bound ends on it.
-            for (t, (low, high)) in self.asked.iter_mut().zip(limits) {
+            for (t, (low, high)) in self.evaluation_point.iter_mut().zip(limits) {
                 *t = t.max(*low).min(*high);
             }
         }
-        self.objective.is_feasible(&self.asked)
+        self.objective.is_feasible(&self.evaluation_point)
     }
 
     /// `(H + S + mu diag H)^-1 g` of the free parameters, cut where it meets a bound, and the decrease of the sum of squares that

@@ -26,10 +26,9 @@
 //! `sqrt(tolerance N)`, 1e-4 for the default and 8192 samples; that last step is still taken. Where no step lowers the loss any
 //! more and the promise is as small as the rounding of the loss, it has converged as well.
 
-mod basin;
+pub mod basin;
 mod border;
-mod gauss_newton;
-pub mod multistart;
+pub mod gauss_newton;
 mod objective;
 pub mod reflection_coefficients;
 mod search_options;

@@ -1,8 +1,8 @@
 use hoid_model::Orders;
 
 use super::*;
-use crate::pem::criterion::Workspace;
-use crate::pem::criterion::{Criterion, Data, InitialState, first_residual};
+use crate::criterion::Workspace;
+use crate::criterion::{Criterion, Data, InitialState, first_residual};
 
 fn signals(n: usize, noise: f64) -> (Vec<f64>, Vec<f64>) {
     let mut state = 99_u64;

@@ -9,14 +9,15 @@
 //! Problems*, 1996, sec. 2.9.3). Where the regressors are too close to dependence for it, where the fit is exact, and where
 //! zeros stand before the record, QR with column pivoting decides and solves.
 
-use hoid_model::Orders;
+use hoid_model::{Orders, SampleTime, Structure};
 use nalgebra::{DMatrix, DVector};
 
 use crate::{
-    IdentError,
+    Fit, IdentError, Reason, Termination,
+    assembled_fit::{Solution, assembled_fit},
+    criterion::{Criterion, Data},
     linalg::least_squares::{LeastSquares, add_scaled},
     linalg::products::{Lagged, OfResiduals, gram},
-    pem::criterion::Data,
 };
 
 /// Condition of the scaled normal matrix (an upper bound, `p tr(G^-1)`) up to which it is used: refined, the solution keeps all digits but three, the
@@ -28,15 +29,36 @@ const EXACT: f64 = 1e-12;
 
 /// Solution of the regression with what its uncertainty needs.
 #[derive(Debug)]
-pub(crate) struct Regression {
+struct Regression {
     pub theta: Vec<f64>,
     pub sum_of_squares: f64,
     /// `(Phi' Phi)^-1` by rows.
     pub inverse_gram: Vec<f64>,
 }
 
-/// Fits over all records, residuals from sample `first` on.
-pub(crate) fn regress(orders: &Orders, data: &[Data<'_>], first: usize) -> Result<Regression, IdentError> {
+/// The fit of a criterion whose residual is linear in theta.
+///
+/// # Errors
+/// [`IdentError::SingularRegressors`].
+pub(crate) fn fit(structure: Structure, criterion: &Criterion<'_>, sample_time: SampleTime) -> Result<Fit, IdentError> {
+    let solved = regress(&criterion.orders, &criterion.data, criterion.first)?;
+    let solution = Solution {
+        held: vec![false; solved.theta.len()],
+        theta: solved.theta,
+        sum_of_squares: solved.sum_of_squares,
+        termination: Termination {
+            reason: Reason::Direct,
+            iterations: 0,
+        },
+        start: "none needed".to_owned(),
+    };
+    let fit = assembled_fit(criterion, structure, sample_time, solution)?;
+    let sigma2 = fit.innovation_variance;
+    Ok(fit.with_covariance(sigma2, &solved.inverse_gram))
+}
+
+/// Least squares over all records, residuals from sample `first` on.
+fn regress(orders: &Orders, data: &[Data<'_>], first: usize) -> Result<Regression, IdentError> {
     if let Some(solved) = by_normal_equations(orders, data, first) {
         return Ok(solved);
     }

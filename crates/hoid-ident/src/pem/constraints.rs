@@ -9,9 +9,9 @@ use hoid_core::stability::roots_inside;
 
 use crate::{
     constraint::Prior,
+    criterion::{Criterion, Workspace},
     optimize::Linearisation,
     optimize::Objective,
-    pem::criterion::{Criterion, Workspace},
 };
 
 /// The criterion, its limits and its prior.

@@ -1,52 +1,50 @@
 //! The search for the lowest minimum from all starts of one fit, and the fit there.
 
-use hoid_model::SampleTime;
+use hoid_model::{SampleTime, polynomial::reflected_inside};
 
 use crate::{
-    Estimator, Fit, IdentError, Loss, Reason,
-    estimator::held,
-    initial_guess::{c_drawn_inside::with_c_drawn_inside, start::Start},
+    Fit, IdentError, Loss, Reason,
+    assembled_fit::{Solution, assembled_fit, held},
+    criterion::{Block, Criterion, Workspace},
+    initial_guess::c_drawn_inside::with_c_drawn_inside,
     linalg::information::inverse_of_free,
-    optimize::Linearisation,
-    optimize::multistart::MultiStart,
-    optimize::{free_parameters, minimise},
-    pem::constraints::ConstrainedCriterion,
-    pem::criterion::{Block, Criterion, Workspace},
-    pem::linearisation_client::LinearisationClient,
+    multistart::{LinearisationClient, MultiStart, Start},
+    optimize::{Linearisation, Objective, free_parameters, minimise},
+    pem::{constraints::ConstrainedCriterion, fit_settings::FitSettings, robust},
 };
 
-/// All that is under way for one fit.
+/// The searches of one fit.
 pub(crate) struct FitProblem<'q, 'a> {
-    estimator: &'q Estimator,
-    informed: &'q ConstrainedCriterion<'q, 'a>,
+    settings: &'q FitSettings,
+    constrained: &'q ConstrainedCriterion<'q, 'a>,
     sample_time: SampleTime,
     searches: MultiStart<'q, ConstrainedCriterion<'q, 'a>>,
 }
 
 impl<'q, 'a> FitProblem<'q, 'a> {
-    /// From the start that the estimator was given, or from those that `own` makes.
+    /// From the start that was given, or from those that `own_starts` makes.
     ///
     /// # Errors
     /// [`IdentError::BadStart`].
     pub fn new(
-        estimator: &'q Estimator,
-        informed: &'q ConstrainedCriterion<'q, 'a>,
+        settings: &'q FitSettings,
+        constrained: &'q ConstrainedCriterion<'q, 'a>,
         sample_time: SampleTime,
-        own: impl FnOnce() -> Vec<Start>,
+        own_starts: impl FnOnce() -> Vec<Start>,
     ) -> Result<Self, IdentError> {
-        let starts = match &estimator.start {
-            Some(theta) => vec![Start::complete("given", estimator.check_start(theta, informed)?, 0.0)],
-            None => own()
+        let starts = match &settings.start {
+            Some(theta) => vec![Start::complete("given", checked_start(theta, constrained)?, 0.0)],
+            None => own_starts()
                 .into_iter()
-                .filter_map(|start| estimator.stabilised(start))
+                .filter_map(|start| stabilised(start, constrained))
                 .collect(),
         };
-        let (orders, most) = (estimator.orders, estimator.starts.max(1));
+        let (orders, most) = (settings.orders, settings.starts.max(1));
         Ok(Self {
-            estimator,
-            informed,
+            settings,
+            constrained,
             sample_time,
-            searches: MultiStart::new(informed, orders, &estimator.search, most, starts),
+            searches: MultiStart::new(constrained, orders, &settings.search, most, starts),
         })
     }
 
@@ -56,16 +54,16 @@ impl<'q, 'a> FitProblem<'q, 'a> {
     /// [`IdentError::NoFiniteLoss`] where no search came anywhere, [`IdentError::SingularInformation`].
     pub fn fit(self, workspace: &mut Workspace) -> Result<Fit, IdentError> {
         let Self {
-            estimator, informed, ..
+            settings, constrained, ..
         } = self;
         let (mut start, mut minimum) = self.searches.lowest().ok_or(IdentError::NoFiniteLoss)?;
-        if estimator.start.is_none() && matches!(minimum.termination.reason, Reason::Border | Reason::NoDescent) {
+        if settings.start.is_none() && matches!(minimum.termination.reason, Reason::Border | Reason::NoDescent) {
             // The loss often has a minimum on the border besides a lower one inside.
-            let inside = with_c_drawn_inside(&estimator.orders, &minimum.theta);
+            let inside = with_c_drawn_inside(&settings.orders, &minimum.theta);
             let known = minimum.at.sum_of_squares;
             let others = inside
                 .into_iter()
-                .filter_map(|theta| minimise(informed, theta, &estimator.search, Some(known), workspace));
+                .filter_map(|theta| minimise(constrained, theta, &settings.search, Some(known), workspace));
             if let Some(lower) = others.min_by(|a, b| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares))
                 && lower.at.sum_of_squares < known
             {
@@ -74,48 +72,82 @@ impl<'q, 'a> FitProblem<'q, 'a> {
             }
         }
         let exact = minimum.termination.reason == Reason::ExactFit;
-        if let (Loss::Huber { threshold }, false) = (estimator.loss, exact) {
-            let fit = estimator.fit_robustly(informed, self.sample_time, minimum, threshold, workspace)?;
-            return Ok(Fit { start, ..fit });
+        if let (Loss::Huber { threshold }, false) = (settings.loss, exact) {
+            return robust::fit(
+                settings,
+                threshold,
+                constrained,
+                self.sample_time,
+                minimum,
+                start,
+                workspace,
+            );
         }
-        let sum_of_squares = informed.without_prior(&minimum.theta, &minimum.at);
-        let free = free_parameters(informed, &minimum.theta, &minimum.at.descent);
-        let p = estimator.orders.parameters();
-        let fit = estimator.result(
-            informed.criterion,
-            self.sample_time,
-            minimum.theta,
-            sum_of_squares,
-            minimum.termination,
-            held(&free, p),
-        )?;
-        let fit = Fit { start, ..fit };
+        let free = free_parameters(constrained, &minimum.theta, &minimum.at.descent);
+        let solution = Solution {
+            sum_of_squares: constrained.without_prior(&minimum.theta, &minimum.at),
+            held: held(&free, settings.orders.parameters()),
+            theta: minimum.theta,
+            termination: minimum.termination,
+            start,
+        };
+        let fit = assembled_fit(constrained.criterion, settings.structure, self.sample_time, solution)?;
         if exact {
             return Ok(fit);
         }
-        let inverse = inverse_of_free(&minimum.at.gram, &free, &estimator.orders.parameter_names())?;
+        let inverse = inverse_of_free(&minimum.at.gram, &free, &settings.orders.parameter_names())?;
         let sigma2 = fit.innovation_variance;
-        Ok(Fit {
-            covariance: Some(inverse.iter().map(|g| sigma2 * g).collect()),
-            ..fit
-        })
+        Ok(fit.with_covariance(sigma2, &inverse))
     }
+}
+
+/// The start with a stable A where that was asked for; `None` where the roots of A cannot be found.
+fn stabilised(mut start: Start, constrained: &ConstrainedCriterion<'_, '_>) -> Option<Start> {
+    if constrained.stable {
+        let na = constrained.criterion.orders.na;
+        let a = reflected_inside(&start.theta[..na])?;
+        start.theta[..na].copy_from_slice(&a);
+    }
+    Some(start)
+}
+
+/// A start that was given, of the right length and with a predictor that exists.
+fn checked_start(theta: &[f64], constrained: &ConstrainedCriterion<'_, '_>) -> Result<Vec<f64>, IdentError> {
+    let orders = constrained.criterion.orders;
+    let bad = |reason: &str| IdentError::BadStart {
+        reason: reason.to_owned(),
+    };
+    if theta.len() != orders.parameters() {
+        return Err(bad(&format!(
+            "it has {} coefficients, the orders {} need {}",
+            theta.len(),
+            orders,
+            orders.parameters()
+        )));
+    }
+    if !constrained.is_feasible(theta) {
+        return Err(bad(
+            "C or F (or a polynomial that was asked to be stable) has a root on or outside the unit circle; give a stable \
+             start or none",
+        ));
+    }
+    Ok(theta.to_vec())
 }
 
 impl LinearisationClient for FitProblem<'_, '_> {
     fn criterion(&self) -> &Criterion<'_> {
-        self.informed.criterion
+        self.constrained.criterion
     }
 
-    fn asked(&self) -> Option<&[f64]> {
-        self.searches.asked()
+    fn evaluation_point(&self) -> Option<&[f64]> {
+        self.searches.evaluation_point()
     }
 
     fn block(&self) -> Option<Block> {
         self.searches.block()
     }
 
-    fn take(&mut self, there: Linearisation, workspace: &mut Workspace) {
-        self.searches.take(there, workspace);
+    fn update(&mut self, there: Linearisation, workspace: &mut Workspace) {
+        self.searches.update(there, workspace);
     }
 }

@@ -1,23 +1,21 @@
-//! The prediction error method.
+//! The fit by the prediction error method: what it minimises is [`crate::criterion`], how is [`crate::optimize`].
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | `criterion`, `spans` | the criterion of the general model and its gradients; long records span by span |
-//! | `initial_states` | what a record does not say about its past, eliminated exactly |
-//! | `stationary_noise` | the noise before the record, when it was stationary |
 //! | `constraints` | bounds and priors |
+//! | `fit_settings` | what a fit needs to know beside the records |
+//! | `prediction_focus`, `simulation_focus` | the fit by the prediction error, and of models that are to simulate |
 //! | `arx` | structures that are linear in theta |
 //! | `fit_problem` | the searches from all starts of one fit, and the fit at the lowest minimum |
 //! | `batched` | the fits of many records at a time |
-//! | `robust`, `simulation_focus` | a loss against outliers, models that are to simulate |
+//! | `loss`, `robust` | a loss that outliers cannot dominate, and its reweighted searches |
 
 pub mod arx;
 pub mod batched;
 pub mod constraints;
-pub mod criterion;
 pub mod fit_problem;
-pub mod initial_states;
-pub mod linearisation_client;
+pub mod fit_settings;
+pub mod loss;
+pub mod prediction_focus;
 pub mod robust;
 pub mod simulation_focus;
-pub mod stationary_noise;

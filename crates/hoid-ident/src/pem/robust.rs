@@ -1,37 +1,37 @@
 //! A loss that outliers cannot dominate.
 //!
-//! Huber's loss of a residual in units of the scale s, `rho(r) = r^2/2` for `|r| <= k` and `k |r| - k^2/2` beyond (P. J. Huber,
-//! *Robust Statistics*, 1981, section 7.8), is minimised by iteratively reweighted least squares: the weights
-//! `w = min(1, k/|r|)` of one search are those of the residuals that the search before left. Each round lowers the loss. The
+//! Huber's loss ([`Loss`](crate::Loss)) with the threshold k is minimised by iteratively reweighted least squares (P. J. Huber,
+//! *Robust Statistics*, 1981, section 7.8): the weights `w = min(1, k/|r|)` of one search are those of the residuals that the
+//! search before left, in units of the scale s. Each round lowers the loss. The
 //! scale is the median absolute residual over 0.6745, from the residuals of the round before; it is held after [`SCALES`] rounds,
 //! so that the rounds settle.
 //!
 //! Covariance (Huber, eq. 7.6.8, for residuals that are independent of the gradient):
 //! `s^2 kappa (psi' psi)^-1`, `kappa = mean(rho'^2) / mean(rho'')^2`, with the unweighted psi.
 
+use hoid_model::SampleTime;
+
+use crate::{
+    Fit, IdentError, Reason, Termination,
+    assembled_fit::{Solution, assembled_fit, held},
+    criterion::{Criterion, Workspace},
+    linalg::{information::inverse_of_free, least_squares::dot},
+    optimize::{Minimum, Objective, free_parameters, minimise},
+    pem::{constraints::ConstrainedCriterion, fit_settings::FitSettings},
+};
+
 /// Rounds in which the scale is estimated anew.
 const SCALES: usize = 10;
 
 /// Largest number of rounds.
-pub(crate) const ROUNDS: usize = 50;
+const ROUNDS: usize = 50;
 
-/// How a residual counts.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Loss {
-    /// By its square.
-    #[default]
-    Quadratic,
-    /// By its square up to `threshold` times the scale of the residuals, linearly beyond (Huber). 1.345 keeps 95 % of the
-    /// efficiency where the noise is Gaussian after all.
-    Huber {
-        /// Threshold k in units of the scale.
-        threshold: f64,
-    },
-}
+/// Rounds end when theta moves by less than this share of its standard errors.
+const SETTLED: f64 = 1e-5;
 
 /// Weights of Huber's loss over the rounds.
 #[derive(Debug)]
-pub(crate) struct Reweighting {
+struct Reweighting {
     threshold: f64,
     pub scale: f64,
     round: usize,
@@ -70,6 +70,81 @@ impl Reweighting {
         let (n, inside) = (n as f64, inside as f64);
         self.scale * self.scale * (square / (n - unknowns as f64)) / (inside / n).powi(2)
     }
+}
+
+/// Rounds of reweighted searches from the minimum of the squares, which was found from `start`.
+///
+/// # Errors
+/// [`IdentError::NoFiniteLoss`], [`IdentError::SingularInformation`].
+pub(crate) fn fit(
+    settings: &FitSettings,
+    threshold: f64,
+    constrained: &ConstrainedCriterion<'_, '_>,
+    sample_time: SampleTime,
+    mut minimum: Minimum,
+    start: String,
+    workspace: &mut Workspace,
+) -> Result<Fit, IdentError> {
+    let criterion = constrained.criterion;
+    let mut rounds = Reweighting::new(threshold);
+    let mut residuals = all_residuals(criterion, &minimum.theta, workspace);
+    let (mut iterations, mut settled) = (minimum.termination.iterations, false);
+    for _ in 0..ROUNDS {
+        let Some(weights) = rounds.next(&residuals) else { break };
+        let weighted = Criterion {
+            weights: Some(&weights),
+            ..criterion.clone()
+        };
+        let objective = ConstrainedCriterion {
+            criterion: &weighted,
+            limits: constrained.limits.clone(),
+            prior: constrained.prior.clone(),
+            stable: constrained.stable,
+        };
+        let next = minimise(&objective, minimum.theta.clone(), &settings.search, None, workspace)
+            .ok_or(IdentError::NoFiniteLoss)?;
+        iterations += next.termination.iterations;
+        let step: Vec<f64> = next.theta.iter().zip(&minimum.theta).map(|(a, b)| a - b).collect();
+        let p = step.len();
+        let curvature: f64 = (0..p)
+            .map(|i| step[i] * dot(&next.at.gram[i * p..(i + 1) * p], &step))
+            .sum();
+        settled = curvature * criterion.residuals() as f64 <= SETTLED * SETTLED * next.at.sum_of_squares;
+        minimum = next;
+        residuals = all_residuals(&weighted, &minimum.theta, workspace);
+        if settled {
+            break;
+        }
+    }
+    let reason = match minimum.termination.reason {
+        Reason::SmallDecrease if !settled => Reason::IterationLimit,
+        reason => reason,
+    };
+    let free = free_parameters(constrained, &minimum.theta, &minimum.at.descent);
+    let names = criterion.orders.parameter_names();
+    let plain = constrained.linearise(&minimum.theta, workspace);
+    let inverse = inverse_of_free(&plain.gram, &free, &names)?;
+    let variance = rounds.variance(&residuals, names.len() + criterion.states());
+    let sum_of_squares = residuals.iter().map(|r| dot(r, r)).sum();
+    let solution = Solution {
+        held: held(&free, names.len()),
+        theta: minimum.theta,
+        sum_of_squares,
+        termination: Termination { reason, iterations },
+        start,
+    };
+    let fit = assembled_fit(criterion, settings.structure, sample_time, solution)?;
+    Ok(Fit {
+        innovation_variance: rounds.scale * rounds.scale,
+        robust: true,
+        ..fit.with_covariance(variance, &inverse)
+    })
+}
+
+fn all_residuals(criterion: &Criterion<'_>, theta: &[f64], workspace: &mut Workspace) -> Vec<Vec<f64>> {
+    (0..criterion.data.len())
+        .map(|record| criterion.residuals_of(theta, record, workspace))
+        .collect()
 }
 
 fn median_absolute(residuals: &[Vec<f64>]) -> f64 {

@@ -16,56 +16,43 @@ use hoid_core::filter::divide_in_place;
 use hoid_model::{Orders, PolynomialModel, Record, Structure, polynomial::product, polynomial_model::monic};
 
 use crate::{
-    Constraint, Estimator, Fit, Focus, IdentError,
+    Constraint, Fit, IdentError,
+    criterion::{Criterion, Data, Workspace, first_residual},
     linalg::information::inverse_information,
     linalg::least_squares::dot,
-    pem::criterion::{Criterion, Data, Workspace, first_residual},
+    pem::fit_settings::FitSettings,
+    pem::prediction_focus,
 };
 
-/// Fits the structure of the estimator with the focus on simulation.
-pub(crate) fn fit(estimator: &Estimator, records: &[Record], first: usize) -> Result<Fit, IdentError> {
-    let o = estimator.orders;
-    let simulating = Orders {
-        nb: o.nb,
-        nf: o.na + o.nf,
-        nk: o.nk,
-        ..Orders::default()
-    };
-    let system = Estimator {
-        focus: Focus::Prediction,
+/// Fits a structure so that its system simulates well; `settings` are those of the structure.
+///
+/// # Errors
+/// [`IdentError`] of either fit.
+pub(crate) fn fit(settings: &FitSettings, records: &[Record], first: usize) -> Result<Fit, IdentError> {
+    let o = settings.orders;
+    let of_system = FitSettings {
+        structure: Structure::OutputError,
+        orders: Orders {
+            nb: o.nb,
+            nf: o.na + o.nf,
+            nk: o.nk,
+            ..Orders::default()
+        },
         start: None,
-        constraints: as_poles_of_f(&estimator.constraints),
-        priors: as_poles_of_f(&estimator.priors),
-        ..Estimator::new(Structure::OutputError, simulating)
+        constraints: as_poles_of_f(&settings.constraints),
+        priors: as_poles_of_f(&settings.priors),
+        stable: false,
+        ..settings.clone()
     };
-    let system = Estimator {
-        initial_state: estimator.initial_state,
-        search: estimator.search,
-        starts: estimator.starts,
-        loss: estimator.loss,
-        ..system
-    };
-    let simulated = system.fit_from(records, first)?;
+    let simulated = prediction_focus::fit(&of_system, records, first)?;
     let held = hold(simulated.model(), &o);
-    let noise = Estimator {
-        focus: Focus::Prediction,
-        constraints: estimator
-            .constraints
-            .iter()
-            .filter(|(name, _)| name.starts_with(['c', 'd']))
-            .map(|(name, c)| (name.clone(), *c))
-            .chain(held)
-            .collect(),
-        priors: estimator
-            .priors
-            .iter()
-            .filter(|(name, _)| name.starts_with(['c', 'd']))
-            .map(|(name, p)| (name.clone(), *p))
-            .collect(),
+    let of_noise = FitSettings {
         start: None,
-        ..estimator.clone()
+        constraints: of_noise_model(&settings.constraints).chain(held).collect(),
+        priors: of_noise_model(&settings.priors).collect(),
+        ..settings.clone()
     };
-    let fit = noise.fit_from(records, first)?;
+    let fit = prediction_focus::fit(&of_noise, records, first)?;
     let covariance = covariance(&simulated, &fit, records, first)?;
     let start = simulated.start().to_owned();
     let mut iterations = fit.termination();
@@ -97,6 +84,12 @@ fn as_poles_of_f<T: Copy>(named: &BTreeMap<String, T>) -> BTreeMap<String, T> {
         .filter(|(name, _)| !name.starts_with(['c', 'd']))
         .map(|(name, value)| (name.replace('a', "f"), *value))
         .collect()
+}
+
+/// Those named after a coefficient of C or D.
+fn of_noise_model<T: Copy>(named: &BTreeMap<String, T>) -> impl Iterator<Item = (String, T)> {
+    let of_noise = named.iter().filter(|(name, _)| name.starts_with(['c', 'd']));
+    of_noise.map(|(name, value)| (name.clone(), *value))
 }
 
 /// The system's coefficients, held at their values.

@@ -20,7 +20,7 @@ pub(crate) const NOISE: usize = 9;
 pub(crate) const OF_THE_CHANGE: [usize; 4] = [K_E[1], T_L[1], MIDPOINT, LOG_RATE];
 
 /// Names of the parameters before the coefficients d1, d2 ... of the noise model, with their units.
-pub const TIME_VARYING_NAMES: [(&str, &str); NOISE] = [
+pub const SIGMOID_NAMES: [(&str, &str); NOISE] = [
     ("K_e1", "deg/deg"),
     ("K_e2", "deg/deg"),
     ("T_L1", "s"),
@@ -61,7 +61,7 @@ pub(crate) struct Frame {
 
 /// Names of theta.
 pub(crate) fn names(nd: usize) -> Vec<String> {
-    let physical = TIME_VARYING_NAMES.iter().map(|(name, _)| (*name).to_owned());
+    let physical = SIGMOID_NAMES.iter().map(|(name, _)| (*name).to_owned());
     physical.chain((1..=nd).map(|i| format!("d{i}"))).collect()
 }
 

@@ -7,6 +7,16 @@
 
 use crate::linalg::least_squares::dot;
 
+/// Size of the innovations over the record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum NoiseLevel {
+    /// The same throughout.
+    Constant,
+    /// One level before and one after the change, with the same sigmoid between them.
+    #[default]
+    Changing,
+}
+
 /// Smallest ratio of the two levels: what lies below is a record without noise on one side.
 const SMALLEST_RATIO: f64 = 1e-3;
 

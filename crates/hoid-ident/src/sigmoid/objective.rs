@@ -10,7 +10,7 @@
 //!
 //! **Initial states.** The state of the operator where a record begins is unknown, two numbers. Any state is reached from rest
 //! by two held errors before the record; those are the unknowns, so that the same filters give the responses to them and
-//! all derivatives. They enter eps linearly and are eliminated exactly for each theta, as in [`crate::pem::initial_states`]:
+//! all derivatives. They enter eps linearly and are eliminated exactly for each theta, as in [`crate::criterion::initial_state_responses`]:
 //! `eps = (I - Q Q') eps_0`, psi with the best states, `psi' (I - Q Q') psi` (G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10
 //! (1973) 413-432; L. Kaufman, *BIT* 15 (1975) 49-57).
 
@@ -22,10 +22,10 @@ use hoid_model::{
 
 use super::layout::{DELAY, Instant, K_E, LOG_RATE, MIDPOINT, NOISE, OMEGA, T_L, ZETA};
 use crate::{
+    criterion::Workspace,
     linalg::least_squares::{add_scaled, dot},
     optimize::Linearisation,
     optimize::Objective,
-    pem::criterion::Workspace,
 };
 
 /// Held errors before the record that stand for its initial state.

@@ -51,7 +51,7 @@ struct Frozen {
 }
 
 /// Starts, the best first: one for each rate.
-pub(crate) fn propose(criterion: &ChangeCriterion<'_>, records: &[Record]) -> Vec<Start> {
+pub(crate) fn initial_guesses(criterion: &ChangeCriterion<'_>, records: &[Record]) -> Vec<Start> {
     let mut frozen = of_windows(criterion, records);
     if frozen.is_empty() {
         frozen = of_grid(criterion);

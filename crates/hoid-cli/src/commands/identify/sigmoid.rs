@@ -1,7 +1,7 @@
 //! `hoid identify --structure time-varying`: the operator whose gains change once.
 
 use hoid_ident::{
-    GainsAt, InitialState, TimeVarying, TimeVaryingFit,
+    GainsAt, InitialState, SigmoidChange, SigmoidFit,
     validation::{LjungBox, whiteness},
 };
 use hoid_io::write_record;
@@ -24,11 +24,11 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
             "--initial-state: the time-varying fit estimates the initial states; give auto or estimate".to_owned(),
         ));
     }
-    let mut estimator = TimeVarying {
+    let mut estimator = SigmoidChange {
         nd: noise_order(args)?,
         constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
         search: search(args),
-        ..TimeVarying::default()
+        ..SigmoidChange::default()
     };
     if let Some(delay) = args.delay {
         estimator.delay_range_s = delay;
@@ -70,7 +70,7 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
 fn noise_order(args: &IdentifyArgs) -> Result<usize, CliError> {
     let wrong = || CliError::Usage("--orders: the time-varying fit takes nd=N alone, as --orders nd=2".to_owned());
     match args.orders.as_deref() {
-        None => Ok(TimeVarying::default().nd),
+        None => Ok(SigmoidChange::default().nd),
         Some(text) => match orders::parse_pairs(text).map_err(CliError::Usage)?.as_slice() {
             [(name, value)] if name == "nd" => value.parse().map_err(|_| wrong()),
             _ => Err(wrong()),
@@ -79,7 +79,7 @@ fn noise_order(args: &IdentifyArgs) -> Result<usize, CliError> {
 }
 
 /// The gains over the time of a record, with their standard errors where they have them.
-fn trace(fit: &TimeVaryingFit, record: &Record) -> Result<Record, CliError> {
+fn trace(fit: &SigmoidFit, record: &Record) -> Result<Record, CliError> {
     type Gain = fn(&GainsAt) -> Estimate;
     let gains = fit.trace(record);
     let columns: [(&str, &str, Gain); 3] = [
@@ -106,7 +106,7 @@ fn trace(fit: &TimeVaryingFit, record: &Record) -> Result<Record, CliError> {
 
 /// Everything that was found.
 struct Found<'a> {
-    fit: &'a TimeVaryingFit,
+    fit: &'a SigmoidFit,
     files: &'a [String],
     records: &'a [Record],
     accounts: &'a [Account],

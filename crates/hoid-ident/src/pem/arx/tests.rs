@@ -7,7 +7,7 @@ use hoid_model::{
 use hoid_sim::{RunSeed, Simulator};
 
 use super::{by_normal_equations, regress};
-use crate::pem::criterion::Data;
+use crate::criterion::Data;
 
 fn orders(na: usize, nb: usize, nk: usize) -> Orders {
     Orders {

@@ -5,7 +5,10 @@
 
 use hoid_lanes::Number;
 
-use super::pass::Room;
+use super::{
+    lane_products::{four_products, two_products},
+    signal_buffers::SignalBuffers,
+};
 
 /// The columns whose products are summed: `[eps, x_b(t).., v(t-1).., x_f(t-1)..]`.
 pub(super) struct Columns {
@@ -26,28 +29,42 @@ impl Columns {
 
     /// The values of a column in these rows of the span.
     #[inline(always)]
-    pub fn rows<'r>(&self, room: &'r Room, column: usize, from: usize, to: usize, width: usize) -> &'r [f64] {
+    pub fn rows<'r>(
+        &self,
+        signals: &'r SignalBuffers,
+        column: usize,
+        from: usize,
+        to: usize,
+        width: usize,
+    ) -> &'r [f64] {
         let (signal, lag) = if column == 0 {
-            (&*room.eps, 0)
+            (&*signals.eps, 0)
         } else if column <= self.nb {
-            (&*room.x_b, column - 1)
+            (&*signals.x_b, column - 1)
         } else if column <= self.nb + self.nd {
-            (&*room.v, column - self.nb)
+            (&*signals.v, column - self.nb)
         } else {
-            (&*room.x_f, column - self.nb - self.nd)
+            (&*signals.x_f, column - self.nb - self.nd)
         };
         &signal[(from - lag) * width..(to - lag) * width]
     }
 
     /// Adds the products over these rows for which a pass is needed: those of a column that follows none with all others.
     #[inline(always)]
-    pub fn add_products<R: Number>(&self, zero: R, room: &Room, from: usize, to: usize, products: &mut [f64]) {
+    pub fn add_products<R: Number>(
+        &self,
+        zero: R,
+        signals: &SignalBuffers,
+        from: usize,
+        to: usize,
+        products: &mut [f64],
+    ) {
         let (p1, width) = (self.count(), zero.lanes());
         for i in 0..p1 {
             if self.follows(i) {
                 continue;
             }
-            let x = self.rows(room, i, from, to, width);
+            let x = self.rows(signals, i, from, to, width);
             let mut others = [0; 4];
             let mut count = 0;
             for j in 0..p1 {
@@ -59,15 +76,15 @@ impl Columns {
                 if count == 4 || (j == p1 - 1 && count > 0) {
                     let mut sums = [zero; 4];
                     if count <= 2 {
-                        let last = self.rows(room, others[count - 1], from, to, width);
-                        let pair = [self.rows(room, others[0], from, to, width), last];
+                        let last = self.rows(signals, others[count - 1], from, to, width);
+                        let pair = [self.rows(signals, others[0], from, to, width), last];
                         [sums[0], sums[1]] = two_products(zero, x, pair);
                     } else {
                         // Three: the last is multiplied twice.
-                        let last = self.rows(room, others[count - 1], from, to, width);
-                        let a = self.rows(room, others[0], from, to, width);
-                        let b = self.rows(room, others[1], from, to, width);
-                        let c = self.rows(room, others[2], from, to, width);
+                        let last = self.rows(signals, others[count - 1], from, to, width);
+                        let a = self.rows(signals, others[0], from, to, width);
+                        let b = self.rows(signals, others[1], from, to, width);
+                        let c = self.rows(signals, others[2], from, to, width);
                         sums = four_products(zero, x, [a, b, c, last]);
                     }
                     for k in 0..count {
@@ -84,13 +101,13 @@ impl Columns {
     /// The products of the columns that both follow others: those of the columns before them over the same rows, `sign` times their
     /// products in one row more.
     #[inline(always)]
-    pub fn add_row<R: Number>(&self, zero: R, room: &Room, row: usize, sign: f64, products: &mut [f64]) {
+    pub fn add_row<R: Number>(&self, zero: R, signals: &SignalBuffers, row: usize, sign: f64, products: &mut [f64]) {
         let (p1, width) = (self.count(), zero.lanes());
         for i in 0..p1 {
             for j in 0..=i {
                 if self.follows(i) && self.follows(j) {
-                    let x = zero.load(self.rows(room, i, row, row + 1, width));
-                    let y = zero.load(self.rows(room, j, row, row + 1, width));
+                    let x = zero.load(self.rows(signals, i, row, row + 1, width));
+                    let y = zero.load(self.rows(signals, j, row, row + 1, width));
                     let at = (i * p1 + j) * width;
                     let place = &mut products[at..at + width];
                     (zero.load(place) + zero.splat(sign) * (x * y)).store(place);
@@ -129,38 +146,4 @@ impl Columns {
             }
         }
     }
-}
-
-/// `x' y` for four y.
-#[inline(always)]
-pub(super) fn four_products<R: Number>(zero: R, x: &[f64], [a, b, c, d]: [&[f64]; 4]) -> [R; 4] {
-    let width = zero.lanes();
-    let mut sums = (zero, zero, zero, zero);
-    let others =
-        (a.chunks_exact(width).zip(b.chunks_exact(width))).zip(c.chunks_exact(width).zip(d.chunks_exact(width)));
-    for (x, ((a, b), (c, d))) in x.chunks_exact(width).zip(others) {
-        let x = zero.load(x);
-        sums.0 = sums.0 + x * zero.load(a);
-        sums.1 = sums.1 + x * zero.load(b);
-        sums.2 = sums.2 + x * zero.load(c);
-        sums.3 = sums.3 + x * zero.load(d);
-    }
-    [sums.0, sums.1, sums.2, sums.3]
-}
-
-/// `x' y` for two y.
-#[inline(always)]
-pub(super) fn two_products<R: Number>(zero: R, x: &[f64], [a, b]: [&[f64]; 2]) -> [R; 2] {
-    let width = zero.lanes();
-    let mut sums = (zero, zero);
-    for ((x, a), b) in x
-        .chunks_exact(width)
-        .zip(a.chunks_exact(width))
-        .zip(b.chunks_exact(width))
-    {
-        let x = zero.load(x);
-        sums.0 = sums.0 + x * zero.load(a);
-        sums.1 = sums.1 + x * zero.load(b);
-    }
-    [sums.0, sums.1]
 }

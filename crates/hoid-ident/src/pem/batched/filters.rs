@@ -2,7 +2,7 @@
 
 use hoid_lanes::Number;
 
-use super::pass::{Room, add_scaled};
+use super::{lane_products::add_scaled, signal_buffers::SignalBuffers};
 
 /// All signals of a span whose past is known, in one pass, where the poles are two, and B and D short: s and r wait for their own last values
 /// side by side, and what is not multiplied later is not kept. The same operations as one after the other. False for other orders.
@@ -11,7 +11,7 @@ pub(super) fn all_at_once<R: Number>(
     zero: R,
     [b, d, f]: [&[f64]; 3],
     data: [&[f64]; 2],
-    room: &mut Room,
+    signals: &mut SignalBuffers,
     at: usize,
 ) -> bool {
     let width = zero.lanes();
@@ -19,12 +19,12 @@ pub(super) fn all_at_once<R: Number>(
         return false;
     }
     match (b.len() / width, d.len() / width) {
-        (2, 0) => all_of_orders::<R, 2, 0>(zero, [b, d, f], data, room, at),
-        (2, 1) => all_of_orders::<R, 2, 1>(zero, [b, d, f], data, room, at),
-        (2, 2) => all_of_orders::<R, 2, 2>(zero, [b, d, f], data, room, at),
-        (3, 0) => all_of_orders::<R, 3, 0>(zero, [b, d, f], data, room, at),
-        (3, 1) => all_of_orders::<R, 3, 1>(zero, [b, d, f], data, room, at),
-        (3, 2) => all_of_orders::<R, 3, 2>(zero, [b, d, f], data, room, at),
+        (2, 0) => all_of_orders::<R, 2, 0>(zero, [b, d, f], data, signals, at),
+        (2, 1) => all_of_orders::<R, 2, 1>(zero, [b, d, f], data, signals, at),
+        (2, 2) => all_of_orders::<R, 2, 2>(zero, [b, d, f], data, signals, at),
+        (3, 0) => all_of_orders::<R, 3, 0>(zero, [b, d, f], data, signals, at),
+        (3, 1) => all_of_orders::<R, 3, 1>(zero, [b, d, f], data, signals, at),
+        (3, 2) => all_of_orders::<R, 3, 2>(zero, [b, d, f], data, signals, at),
         _ => return false,
     }
     true
@@ -47,7 +47,7 @@ fn all_of_orders<R: Number, const NB: usize, const ND: usize>(
     zero: R,
     [b, d, f]: [&[f64]; 3],
     [e, u]: [&[f64]; 2],
-    room: &mut Room,
+    signals: &mut SignalBuffers,
     at: usize,
 ) {
     let (width, end) = (zero.lanes(), at + e.len());
@@ -55,16 +55,16 @@ fn all_of_orders<R: Number, const NB: usize, const ND: usize>(
     let (d1, d2) = (row_below(zero, d, 0, ND), row_below(zero, d, 1, ND));
     let (f1, f2) = (row(zero, f, 0), row(zero, f, 1));
     let now = at / width;
-    let (mut s1, mut s2) = (row(zero, &room.s, now - 1), row(zero, &room.s, now - 2));
-    let (mut v1, mut v2) = (row(zero, &room.v, now - 1), row(zero, &room.v, now - 2));
-    let (mut r1, mut r2) = (row(zero, &room.r, now - 1), row(zero, &room.r, now - 2));
+    let (mut s1, mut s2) = (row(zero, &signals.s, now - 1), row(zero, &signals.s, now - 2));
+    let (mut v1, mut v2) = (row(zero, &signals.v, now - 1), row(zero, &signals.v, now - 2));
+    let (mut r1, mut r2) = (row(zero, &signals.r, now - 1), row(zero, &signals.r, now - 2));
     let inputs = e.chunks_exact(width).zip(u.chunks_exact(width));
-    let of_v = room.v[at..end]
+    let of_v = signals.v[at..end]
         .chunks_exact_mut(width)
-        .zip(room.eps[at..end].chunks_exact_mut(width));
-    let of_x = room.x_b[at..end]
+        .zip(signals.eps[at..end].chunks_exact_mut(width));
+    let of_x = signals.x_b[at..end]
         .chunks_exact_mut(width)
-        .zip(room.x_f[at..end].chunks_exact_mut(width));
+        .zip(signals.x_f[at..end].chunks_exact_mut(width));
     for ((e, u), ((v, eps), (x_b, x_f))) in inputs.zip(of_v.zip(of_x)) {
         let s0 = (zero.load(e) - f2 * s2) - f1 * s1;
         let mut w = b0 * s0 + b1 * s1;
@@ -86,7 +86,7 @@ fn all_of_orders<R: Number, const NB: usize, const ND: usize>(
         by_f.store(x_f);
         (s2, s1, v2, v1, r2, r1) = (s1, s0, v1, v0, r1, r0);
     }
-    for (signal, [one, two]) in [(&mut room.s, [s1, s2]), (&mut room.r, [r1, r2])] {
+    for (signal, [one, two]) in [(&mut signals.s, [s1, s2]), (&mut signals.r, [r1, r2])] {
         two.store(&mut signal[end - 2 * width..]);
         one.store(&mut signal[end - width..]);
     }
@@ -94,18 +94,27 @@ fn all_of_orders<R: Number, const NB: usize, const ND: usize>(
 
 /// `s = e/F`, `w = B s` (in the place of r) and `v = u - w` from place `at` on.
 #[inline(always)]
-pub(super) fn respond<R: Number>(zero: R, [b, f]: [&[f64]; 2], [e, u]: [&[f64]; 2], room: &mut Room, at: usize) {
+pub(super) fn respond<R: Number>(
+    zero: R,
+    [b, f]: [&[f64]; 2],
+    [e, u]: [&[f64]; 2],
+    signals: &mut SignalBuffers,
+    at: usize,
+) {
     let (width, end) = (zero.lanes(), at + e.len());
     if (b.len(), f.len()) == (2 * width, 2 * width) {
         // The orders of the operator in one pass.
         let (b0, b1) = (zero.load(b), zero.load(&b[width..]));
         let (f1, f2) = (zero.load(f), zero.load(&f[width..]));
-        let (mut s1, mut s2) = (zero.load(&room.s[at - width..]), zero.load(&room.s[at - 2 * width..]));
+        let (mut s1, mut s2) = (
+            zero.load(&signals.s[at - width..]),
+            zero.load(&signals.s[at - 2 * width..]),
+        );
         let inputs = e.chunks_exact(width).zip(u.chunks_exact(width));
-        let signals = room.s[at..end]
+        let responses = signals.s[at..end]
             .chunks_exact_mut(width)
-            .zip(room.r[at..end].chunks_exact_mut(width));
-        for (((e, u), (s, w)), v) in inputs.zip(signals).zip(room.v[at..end].chunks_exact_mut(width)) {
+            .zip(signals.r[at..end].chunks_exact_mut(width));
+        for (((e, u), (s, w)), v) in inputs.zip(responses).zip(signals.v[at..end].chunks_exact_mut(width)) {
             let s0 = (zero.load(e) - f2 * s2) - f1 * s1;
             let w0 = b0 * s0 + b1 * s1;
             s0.store(s);
@@ -115,11 +124,11 @@ pub(super) fn respond<R: Number>(zero: R, [b, f]: [&[f64]; 2], [e, u]: [&[f64]; 
         }
         return;
     }
-    divide(zero, f, e, &mut room.s, at);
-    fir(zero, b, &room.s, &mut room.r[at..end], at);
-    let rows = room.v[at..end]
+    divide(zero, f, e, &mut signals.s, at);
+    fir(zero, b, &signals.s, &mut signals.r[at..end], at);
+    let rows = signals.v[at..end]
         .chunks_exact_mut(width)
-        .zip(room.r[at..end].chunks_exact(width));
+        .zip(signals.r[at..end].chunks_exact(width));
     for ((v, w), u) in rows.zip(u.chunks_exact(width)) {
         (zero.load(u) - zero.load(w)).store(v);
     }

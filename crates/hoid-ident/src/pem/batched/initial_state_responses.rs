@@ -4,13 +4,14 @@
 //! `x_k g(t-k)` from the residuals. The columns `g(t-k)` over the residuals are made orthogonal by the factor of Cholesky of their products, twice, as
 //! once leaves what rounding makes of columns that are nearly parallel (Y. Yamamoto et al., *Electronic Trans. Numerical Analysis* 44 (2015) 306-326). As
 //! they are shifts of one, the first matrix takes nf products. The criterion alone has an orthonormal basis by Gram and Schmidt
-//! ([`crate::pem::initial_states`]), the same but for rounding; a lane whose columns depend on each other is left to it.
+//! ([`crate::criterion::initial_state_responses`]), the same but for rounding; a lane whose columns depend on each other is left to it.
 
 use hoid_lanes::Number;
 
 use super::{
-    columns::{Columns, four_products, two_products},
-    pass::{Room, add_scaled},
+    columns::Columns,
+    lane_products::{add_scaled, four_products, two_products},
+    signal_buffers::SignalBuffers,
 };
 
 /// Samples of an impulse response between two looks at whether it has died away.
@@ -20,8 +21,8 @@ const NOTHING: f64 = 1e-17;
 /// Share of a column's square that must not lie in the space of those before it.
 const OWN: f64 = 1e-12;
 
-/// The responses: h and g stand in [`Room::h`] and [`Room::g`] with nf zeros before and behind, the orthogonal columns q in [`Room::q`].
-pub(super) struct FreeResponses<R> {
+/// The responses: h and g stand in [`SignalBuffers::h`] and [`SignalBuffers::g`] with nf zeros before and behind, the orthogonal columns q in [`SignalBuffers::q`].
+pub(super) struct InitialStateResponses<R> {
     /// Rows of a column, from the first residual on.
     pub rows: usize,
     nd: usize,
@@ -33,24 +34,30 @@ pub(super) struct FreeResponses<R> {
     second: Vec<R>,
 }
 
-impl<R: Number> FreeResponses<R> {
+impl<R: Number> InitialStateResponses<R> {
     /// Those of so many residuals.
     #[inline(always)]
-    pub fn of(zero: R, [d, f]: [&[f64]; 2], residuals: usize, room: &mut Room, dependent: &mut Vec<bool>) -> Self {
+    pub fn of(
+        zero: R,
+        [d, f]: [&[f64]; 2],
+        residuals: usize,
+        signals: &mut SignalBuffers,
+        dependent: &mut Vec<bool>,
+    ) -> Self {
         let width = zero.lanes();
         let (nd, nf) = (d.len() / width, f.len() / width);
         let longest = residuals + nd;
-        room.h.make_room((longest + 2 * nf) * width);
-        room.g.make_room((longest + nd + 2 * nf) * width);
-        let length = impulse_response(zero, f, longest, &mut room.h);
+        signals.h.make_room((longest + 2 * nf) * width);
+        signals.g.make_room((longest + nd + 2 * nf) * width);
+        let length = impulse_response(zero, f, longest, &mut signals.h);
         let (from, to) = (nf * width, (nf + length + nd + nf) * width);
-        let g = &mut room.g[..to];
+        let g = &mut signals.g[..to];
         g[..from].fill(0.0);
         g[from..to].fill(0.0);
-        g[from..from + length * width].copy_from_slice(&room.h[from..from + length * width]);
+        g[from..from + length * width].copy_from_slice(&signals.h[from..from + length * width]);
         for (i, di) in d.chunks_exact(width).enumerate() {
             let at = from + (i + 1) * width;
-            add_scaled(zero.load(di), &room.h[from..from + length * width], &mut g[at..]);
+            add_scaled(zero.load(di), &signals.h[from..from + length * width], &mut g[at..]);
         }
         let mut responses = Self {
             rows: (length + nf - 1).min(residuals),
@@ -62,25 +69,25 @@ impl<R: Number> FreeResponses<R> {
         };
         dependent.clear();
         dependent.resize(width, false);
-        responses.make_orthogonal(zero, room, dependent);
+        responses.make_orthogonal(zero, signals, dependent);
         responses
     }
 
     #[inline(always)]
-    fn make_orthogonal(&mut self, zero: R, room: &mut Room, dependent: &mut [bool]) {
+    fn make_orthogonal(&mut self, zero: R, signals: &mut SignalBuffers, dependent: &mut [bool]) {
         let (width, nf, rows) = (zero.lanes(), self.nf, self.rows);
         let mut s = vec![zero; nf * nf];
         for j in (0..nf).step_by(2) {
             let last = (j + 1).min(nf - 1);
-            let pair = [self.shift(room, j, width), self.shift(room, last, width)];
-            [s[j * nf], s[last * nf]] = two_products(zero, self.shift(room, 0, width), pair);
+            let pair = [self.shift(signals, j, width), self.shift(signals, last, width)];
+            [s[j * nf], s[last * nf]] = two_products(zero, self.shift(signals, 0, width), pair);
         }
         for k in 1..nf {
             for i in k..nf {
                 // The row that enters in front, and the last that leaves, of the columns before these.
-                let entering = self.at(zero, room, k - 1, -1) * self.at(zero, room, i - 1, -1);
+                let entering = self.at(zero, signals, k - 1, -1) * self.at(zero, signals, i - 1, -1);
                 let last = rows as isize - 1;
-                let leaving = self.at(zero, room, k - 1, last) * self.at(zero, room, i - 1, last);
+                let leaving = self.at(zero, signals, k - 1, last) * self.at(zero, signals, i - 1, last);
                 s[i * nf + k] = s[(i - 1) * nf + k - 1] + entering - leaving;
             }
         }
@@ -93,12 +100,12 @@ impl<R: Number> FreeResponses<R> {
         }
         self.first = s;
 
-        room.q.make_room(nf * rows * width);
+        signals.q.make_room(nf * rows * width);
         for k in 0..nf {
             let from = (nf + self.nd - k) * width;
-            let (before, rest) = room.q.split_at_mut(k * rows * width);
+            let (before, rest) = signals.q.split_at_mut(k * rows * width);
             let column = &mut rest[..rows * width];
-            column.copy_from_slice(&room.g[from..from + rows * width]);
+            column.copy_from_slice(&signals.g[from..from + rows * width]);
             for (j, q) in before.chunks_exact(rows * width).enumerate() {
                 add_scaled(-self.first[k * nf + j], q, column);
             }
@@ -107,8 +114,8 @@ impl<R: Number> FreeResponses<R> {
         for k in 0..nf {
             for i in (k..nf).step_by(2) {
                 let last = (i + 1).min(nf - 1);
-                let pair = [self.column(room, i, width), self.column(room, last, width)];
-                [s[i * nf + k], s[last * nf + k]] = two_products(zero, self.column(room, k, width), pair);
+                let pair = [self.column(signals, i, width), self.column(signals, last, width)];
+                [s[i * nf + k], s[last * nf + k]] = two_products(zero, self.column(signals, k, width), pair);
             }
         }
         factor(zero, nf, &mut s, dependent);
@@ -117,34 +124,34 @@ impl<R: Number> FreeResponses<R> {
 
     /// Column k as it was: g, k samples later.
     #[inline(always)]
-    fn shift<'r>(&self, room: &'r Room, k: usize, width: usize) -> &'r [f64] {
+    fn shift<'r>(&self, signals: &'r SignalBuffers, k: usize, width: usize) -> &'r [f64] {
         let first = self.nf + self.nd - k;
-        &room.g[first * width..(first + self.rows) * width]
+        &signals.g[first * width..(first + self.rows) * width]
     }
 
     /// Its element in a row, which may be the one before the first.
     #[inline(always)]
-    fn at(&self, zero: R, room: &Room, k: usize, row: isize) -> R {
-        zero.load(&room.g[(self.nf + self.nd - k).wrapping_add_signed(row) * zero.lanes()..])
+    fn at(&self, zero: R, signals: &SignalBuffers, k: usize, row: isize) -> R {
+        zero.load(&signals.g[(self.nf + self.nd - k).wrapping_add_signed(row) * zero.lanes()..])
     }
 
     /// Column k, orthogonal to those before it.
     #[inline(always)]
-    fn column<'r>(&self, room: &'r Room, k: usize, width: usize) -> &'r [f64] {
-        &room.q[k * self.rows * width..(k + 1) * self.rows * width]
+    fn column<'r>(&self, signals: &'r SignalBuffers, k: usize, width: usize) -> &'r [f64] {
+        &signals.q[k * self.rows * width..(k + 1) * self.rows * width]
     }
 
     /// Takes the best initial states into w (in the place of r), v and eps: w begins in row `regressed` of the span, the residuals in row
     /// `counted`.
     #[inline(always)]
-    pub fn eliminate(&self, zero: R, room: &mut Room, regressed: usize, counted: usize) {
+    pub fn eliminate(&self, zero: R, signals: &mut SignalBuffers, regressed: usize, counted: usize) {
         let (width, nf) = (zero.lanes(), self.nf);
         let (from, to) = (counted * width, (counted + self.rows) * width);
-        let eps = &room.eps[from..to];
+        let eps = &signals.eps[from..to];
         let mut x = Vec::with_capacity(nf);
         for k in (0..nf).step_by(2) {
             let last = (k + 1).min(nf - 1);
-            let pair = [self.column(room, k, width), self.column(room, last, width)];
+            let pair = [self.column(signals, k, width), self.column(signals, last, width)];
             x.extend_from_slice(&two_products(zero, eps, pair)[..=last - k]);
         }
         self.forward(&mut x);
@@ -155,8 +162,8 @@ impl<R: Number> FreeResponses<R> {
             x[k] = x[k] / self.second[k * nf + k];
         }
         for k in 0..nf {
-            let q = &room.q[k * self.rows * width..(k + 1) * self.rows * width];
-            add_scaled(-x[k], q, &mut room.eps[from..to]);
+            let q = &signals.q[k * self.rows * width..(k + 1) * self.rows * width];
+            add_scaled(-x[k], q, &mut signals.eps[from..to]);
         }
         // From the share of each q to that of the columns as they were.
         for k in (0..nf).rev() {
@@ -168,25 +175,25 @@ impl<R: Number> FreeResponses<R> {
         for k in 0..nf {
             minus.push(-x[k]);
         }
-        let count = (self.length + nf).min(room.r.len() / width - regressed);
+        let count = (self.length + nf).min(signals.r.len() / width - regressed);
         let (from, to) = (regressed * width, (regressed + count) * width);
-        add_shifts(zero, &x, &room.h, nf, &mut room.r[from..to]);
-        add_shifts(zero, &minus, &room.h, nf, &mut room.v[from..to]);
+        add_shifts(zero, &x, &signals.h, nf, &mut signals.r[from..to]);
+        add_shifts(zero, &minus, &signals.h, nf, &mut signals.v[from..to]);
     }
 
     /// Components of each column of psi in the space of the responses, a row for each column. eps, the first, has none left.
     #[inline(always)]
-    pub fn components(&self, zero: R, columns: &Columns, room: &Room, counted: usize) -> Vec<R> {
+    pub fn components(&self, zero: R, columns: &Columns, signals: &SignalBuffers, counted: usize) -> Vec<R> {
         let (width, nf, count) = (zero.lanes(), self.nf, columns.count());
         let mut inside = vec![zero; count * nf];
         let end = counted + self.rows;
         for k in 0..nf {
-            let x = self.column(room, k, width);
+            let x = self.column(signals, k, width);
             for i in (1..count).step_by(4) {
-                let a = columns.rows(room, i, counted, end, width);
-                let b = columns.rows(room, (i + 1).min(count - 1), counted, end, width);
-                let c = columns.rows(room, (i + 2).min(count - 1), counted, end, width);
-                let d = columns.rows(room, (i + 3).min(count - 1), counted, end, width);
+                let a = columns.rows(signals, i, counted, end, width);
+                let b = columns.rows(signals, (i + 1).min(count - 1), counted, end, width);
+                let c = columns.rows(signals, (i + 2).min(count - 1), counted, end, width);
+                let d = columns.rows(signals, (i + 3).min(count - 1), counted, end, width);
                 let sums = four_products(zero, x, [a, b, c, d]);
                 for j in i..(i + 4).min(count) {
                     inside[j * nf + k] = sums[j - i];

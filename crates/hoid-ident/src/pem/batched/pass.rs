@@ -1,6 +1,6 @@
 //! The criterion and its derivatives for several records at once, each with a theta of its own.
 //!
-//! What [`crate::pem::criterion`] says of one Box-Jenkins model without C, with its initial states eliminated, for a record in each lane:
+//! What [`crate::criterion`] says of one Box-Jenkins model without C, with its initial states eliminated, for a record in each lane:
 //!
 //! `s = e(t-nk)/F`,  `w = B s`,  `v = u - w`,  `eps = D v`,  `x_b = D s`,  `r = w/F`,  `x_f = D r`
 //!
@@ -20,37 +20,13 @@ use hoid_model::Orders;
 use super::{
     columns::Columns,
     filters::{all_at_once, filter_response, respond, whiten},
-    initial_state_responses::FreeResponses,
-    rows::Rows,
+    initial_state_responses::InitialStateResponses,
+    normal_equations::NormalEquations,
+    signal_buffers::SignalBuffers,
 };
 
 /// Samples that are made and multiplied at a time.
 const SPAN: usize = 64;
-
-/// Signals of a span, a row for each sample and in it a number for each lane. The rows before the first hold the end of the span before.
-#[derive(Debug, Default)]
-pub(super) struct Room {
-    pub s: Rows,
-    pub v: Rows,
-    pub eps: Rows,
-    pub x_b: Rows,
-    pub r: Rows,
-    pub x_f: Rows,
-    /// Impulse responses of 1/F and of D/F.
-    pub h: Rows,
-    pub g: Rows,
-    /// Responses to the initial states, orthogonal, one after the other.
-    pub q: Rows,
-}
-
-/// Sums over one record in each lane.
-#[derive(Debug, Default)]
-pub(super) struct Sums {
-    /// Products of eps and the columns of psi without their signs, `[eps, x_b.., v.., x_f..]` by rows, the initial states projected out.
-    pub products: Vec<f64>,
-    /// Lanes whose free responses are not independent: nothing is said of them.
-    pub dependent: Vec<bool>,
-}
 
 /// One pass.
 pub(super) struct Pass<'a> {
@@ -64,8 +40,8 @@ pub(super) struct Pass<'a> {
     pub u: &'a [f64],
     /// theta, a row for each parameter.
     pub theta: &'a [f64],
-    pub room: &'a mut Room,
-    pub sums: &'a mut Sums,
+    pub signals: &'a mut SignalBuffers,
+    pub sums: &'a mut NormalEquations,
 }
 
 impl LaneTask for Pass<'_> {
@@ -81,7 +57,7 @@ impl LaneTask for Pass<'_> {
             e,
             u,
             theta,
-            room,
+            signals,
             sums,
         } = self;
         let (b, rest) = theta.split_at(o.nb * width);
@@ -93,10 +69,10 @@ impl LaneTask for Pass<'_> {
             nd: o.nd,
             nf: o.nf,
         };
-        let states = FreeResponses::of(zero, [d, f], n - first, room, &mut sums.dependent);
+        let states = InitialStateResponses::of(zero, [d, f], n - first, signals, &mut sums.dependent);
         let begin = o.nk;
         let mut to = first + states.rows;
-        room.begin(history, (to - begin).max(SPAN), width);
+        signals.begin(history, (to - begin).max(SPAN), width);
         sums.products.clear();
         sums.products.resize(columns.count() * columns.count() * width, 0.0);
         let products = &mut sums.products;
@@ -112,24 +88,24 @@ impl LaneTask for Pass<'_> {
                 &u[from * width..to * width],
             );
             let mut counted = history;
-            if from == begin || !all_at_once(zero, [b, d, f], [inputs, outputs], room, at) {
-                respond(zero, [b, f], [inputs, outputs], room, at);
+            if from == begin || !all_at_once(zero, [b, d, f], [inputs, outputs], signals, at) {
+                respond(zero, [b, f], [inputs, outputs], signals, at);
                 if from == begin {
                     // Nothing is known of w before all of its regressors lie inside the record.
-                    room.r[at..at + (regressed - begin) * width].fill(0.0);
-                    room.v[at..at + (regressed - begin) * width].fill(0.0);
+                    signals.r[at..at + (regressed - begin) * width].fill(0.0);
+                    signals.v[at..at + (regressed - begin) * width].fill(0.0);
                 }
-                whiten(zero, d, &room.v, &mut room.eps[at..end], at);
-                whiten(zero, d, &room.s, &mut room.x_b[at..end], at);
+                whiten(zero, d, &signals.v, &mut signals.eps[at..end], at);
+                whiten(zero, d, &signals.s, &mut signals.x_b[at..end], at);
                 if from == begin {
                     counted += first - begin;
-                    states.eliminate(zero, room, history + regressed - begin, counted);
+                    states.eliminate(zero, signals, history + regressed - begin, counted);
                 }
-                filter_response(zero, [d, f], &mut room.r[..end], &mut room.x_f[at..end], at);
+                filter_response(zero, [d, f], &mut signals.r[..end], &mut signals.x_f[at..end], at);
             }
             if from == begin {
-                inside = states.components(zero, &columns, room, counted);
-                columns.add_row(zero, room, counted, 1.0, products);
+                inside = states.components(zero, &columns, signals, counted);
+                columns.add_row(zero, signals, counted, 1.0, products);
             }
             // In spans of the same samples however long the first is: its length is that of the slowest lane.
             let mut done = counted;
@@ -140,50 +116,17 @@ impl LaneTask for Pass<'_> {
                     done + SPAN
                 };
                 let next = next.min(history + count);
-                columns.add_products(zero, room, done, next, products);
+                columns.add_products(zero, signals, done, next, products);
                 done = next;
             }
             if to == n {
                 // One row later than the last, a column that follows is the one before it in the last.
-                columns.add_row(zero, room, history + count, -1.0, products);
+                columns.add_row(zero, signals, history + count, -1.0, products);
                 break;
             }
-            room.go_on(history, count, width);
+            signals.carry(history, count, width);
             (from, to) = (to, (to + SPAN).min(n));
         }
         columns.complete(zero, &inside, o.nf, products);
-    }
-}
-
-impl Room {
-    /// Room for spans of so many samples, with zeros before the first.
-    fn begin(&mut self, history: usize, longest: usize, width: usize) {
-        for signal in [
-            &mut self.s,
-            &mut self.v,
-            &mut self.eps,
-            &mut self.x_b,
-            &mut self.r,
-            &mut self.x_f,
-        ] {
-            signal.make_room((history + longest) * width);
-            signal[..history * width].fill(0.0);
-        }
-    }
-
-    /// Keeps the end of a span for the next.
-    fn go_on(&mut self, history: usize, count: usize, width: usize) {
-        for signal in [&mut self.s, &mut self.v, &mut self.x_b, &mut self.r, &mut self.x_f] {
-            signal.copy_within(count * width..(count + history) * width, 0);
-        }
-    }
-}
-
-/// `y += k x`.
-#[inline(always)]
-pub(super) fn add_scaled<R: Number>(k: R, x: &[f64], y: &mut [f64]) {
-    let width = k.lanes();
-    for (y, x) in y.chunks_exact_mut(width).zip(x.chunks_exact(width)) {
-        (k.load(y) + k * k.load(x)).store(y);
     }
 }

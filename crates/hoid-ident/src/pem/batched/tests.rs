@@ -1,8 +1,20 @@
 use hoid_model::scenario::{Condition, RemnantStrength, Scenario};
 use hoid_sim::{RunSeed, Simulator};
 
-use super::*;
-use crate::pem::criterion::{Criterion, Data, first_residual};
+use hoid_lanes::InstructionSet;
+use hoid_model::{Orders, Record, Structure};
+
+use super::lanes::Lanes;
+use crate::{
+    Estimator, Fit, IdentError, InitialState,
+    criterion::{Criterion, Data, Workspace, first_residual},
+    optimize::{Linearisation, Objective},
+};
+
+/// The fits of an estimator, in lanes alone.
+fn fit_each(estimator: &Estimator, records: &[&Record], path: InstructionSet) -> Option<Vec<Result<Fit, IdentError>>> {
+    super::fit_each(&estimator.settings(), records, path)
+}
 
 /// Runs of C1, each with another remnant.
 fn runs(count: u64, samples: usize) -> Vec<Record> {

@@ -3,19 +3,21 @@
 //! First what is left to find of each start, then the search from the best of them, and from the next ones. A start that turns out to lie in the
 //! basin of a minimum that is known is left out, and a search that comes close to one without a promise to end lower is stopped.
 //!
-//! All of it asks for the criterion at one theta and is told, so that those of several records can go on side by side ([`crate::pem::batched`]).
+//! The searches do not evaluate the criterion themselves: they name the theta at which they need its linearisation and are
+//! updated with it (reverse communication), so that those of several records can go on side by side
+//! ([`crate::pem::batched`]).
 
 use hoid_model::Orders;
 
 use crate::{
     SearchOptions,
-    initial_guess::start::Start,
+    criterion::Block,
+    multistart::Start,
     optimize::{
+        Linearisation, Minimum, Objective,
         basin::lies_in_basin,
         gauss_newton::{GaussNewton, Progress},
-        objective::{Linearisation, Minimum, Objective},
     },
-    pem::criterion::Block,
 };
 
 /// The searches.
@@ -27,7 +29,7 @@ pub(crate) struct MultiStart<'s, O> {
     most: usize,
     /// The starts; once nothing is left to find of them, those whose turn is still to come, the best last.
     starts: Vec<Start>,
-    /// The start of the search that is under way, and the search.
+    /// The present search, with the label of its start.
     searching: Option<(String, GaussNewton<'s, O>)>,
     /// The minima, each with its start.
     pub minima: Vec<(String, Minimum)>,
@@ -51,28 +53,28 @@ impl<'s, O: Objective> MultiStart<'s, O> {
         searches
     }
 
-    /// Where the criterion is wanted next; nowhere when all has been found.
-    pub fn asked(&self) -> Option<&[f64]> {
+    /// Theta at which the linearisation is needed next; `None` when all searches have ended.
+    pub fn evaluation_point(&self) -> Option<&[f64]> {
         match &self.searching {
-            Some((_, descent)) => Some(descent.asked()),
+            Some((_, descent)) => Some(descent.evaluation_point()),
             None => self.incomplete().map(|at| self.starts[at].theta.as_slice()),
         }
     }
 
-    /// The polynomial to which derivatives are wanted; all where none is named.
+    /// The polynomial with respect to which derivatives are needed; `None` for all.
     pub fn block(&self) -> Option<Block> {
-        self.incomplete().and_then(|at| self.starts[at].wanted())
+        self.incomplete().and_then(|at| self.starts[at].next_block())
     }
 
-    /// Takes what was found there.
-    pub fn take(&mut self, there: Linearisation, workspace: &mut O::Workspace) {
+    /// Goes on with the linearisation at [`MultiStart::evaluation_point`].
+    pub fn update(&mut self, there: Linearisation, workspace: &mut O::Workspace) {
         if let Some((label, mut descent)) = self.searching.take() {
             let known = self.best().filter(|_| descent.is_at_its_start());
-            if known.is_some_and(|known| lies_in_basin(known, descent.asked(), there.sum_of_squares)) {
+            if known.is_some_and(|known| lies_in_basin(known, descent.evaluation_point(), there.sum_of_squares)) {
                 return self.begin();
             }
-            match descent.take(there) {
-                Progress::GoesOn => self.searching = Some((label, descent)),
+            match descent.update(there) {
+                Progress::Continues => self.searching = Some((label, descent)),
                 Progress::Ended(reason) => {
                     let minimum = reason.and_then(|reason| descent.finish(reason, workspace));
                     self.minima.extend(minimum.map(|minimum| (label, minimum)));
@@ -80,7 +82,7 @@ impl<'s, O: Objective> MultiStart<'s, O> {
                 }
             }
         } else if let Some(at) = self.incomplete() {
-            self.starts[at].take(&self.orders, &there);
+            self.starts[at].update(&self.orders, &there);
             if self.incomplete().is_none() {
                 self.rank();
             }
@@ -89,7 +91,7 @@ impl<'s, O: Objective> MultiStart<'s, O> {
 
     /// The first start of which something is still to be found.
     fn incomplete(&self) -> Option<usize> {
-        self.starts.iter().position(|start| start.wanted().is_some())
+        self.starts.iter().position(|start| start.next_block().is_some())
     }
 
     /// Begins the searches, with the best start.

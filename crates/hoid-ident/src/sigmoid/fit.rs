@@ -1,50 +1,17 @@
 //! The fitted change with its uncertainty.
 
-use std::fmt;
-
 use hoid_model::{
     Orders, Record, SampleTime, Structure,
     uncertainty::{Estimate, OperatorEstimate, variance_along},
 };
 
 use super::{
-    assemble::{estimate, operator},
-    interval::{Interval, Walk, likelihood_interval},
-    layout::{Instant, K_E, LOG_RATE, MIDPOINT, NOISE, T_L, TIME_VARYING_NAMES, names},
+    inference::{Comparison, Remark, constant_operator, estimate, inference, operator},
+    layout::{Instant, K_E, LOG_RATE, MIDPOINT, NOISE, SIGMOID_NAMES, T_L, names},
     objective::{ChangeCriterion, Data},
+    profile_likelihood::{Interval, Profile, profile_likelihood_interval},
 };
-use crate::{IdentError, Series, Termination, checks, optimize::Minimum};
-
-/// Why a parameter has no standard error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Remark {
-    /// It was fixed.
-    Fixed,
-    /// It rests at a bound.
-    AtBound,
-    /// G rests at its upper bound: the change takes no longer than two samples, and how fast it was cannot be told.
-    Abrupt,
-    /// The records show no change (BIC): t_M and G mean nothing, and gains on either side of it are chosen by chance.
-    NoChange,
-    /// The change is too fast for a normal error: the likelihood interval holds.
-    ChangePoint,
-    /// The data do not determine it.
-    Undetermined,
-}
-
-impl fmt::Display for Remark {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Fixed => "fixed",
-            Self::AtBound => "rests at a bound",
-            Self::Abrupt => "at its upper bound: the change takes no longer than two samples, its rate cannot be told",
-            Self::NoChange => "the records show no change: take the fit without one",
-            Self::ChangePoint => "the change is too fast for a normal error: take the likelihood interval",
-            Self::Undetermined => "not determined by the data",
-        })
-    }
-}
+use crate::{IdentError, Series, Termination, informative_data::check_record, optimize::Minimum};
 
 /// One parameter of the fit.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,49 +39,69 @@ pub struct GainsAt {
     pub k_e_dot: Estimate,
 }
 
-/// The fit against the one without a change.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Comparison {
-    /// `n ln(V_0/V_1)`.
-    pub likelihood_ratio: f64,
-    /// Parameters that the change adds: those of K_e2, T_L2, t_M and G that were not fixed.
-    pub extra_parameters: usize,
-    /// BIC without the change minus BIC with it; positive where the change is worth its parameters.
-    pub bic_difference: f64,
-}
-
 /// An operator who changes once.
 #[derive(Debug, Clone, PartialEq)]
-pub struct TimeVaryingFit {
-    pub(super) nd: usize,
-    pub(super) sample_time: SampleTime,
-    pub(super) first: usize,
+pub struct SigmoidFit {
+    nd: usize,
+    sample_time: SampleTime,
+    first: usize,
     /// With ln G.
-    pub(super) theta: Vec<f64>,
-    pub(super) covariance: Option<Vec<f64>>,
-    pub(super) remarks: Vec<Option<Remark>>,
-    pub(super) midpoint_interval: Option<Interval>,
-    pub(super) rate_interval: Option<Interval>,
-    pub(super) change_point: bool,
-    pub(super) loss: f64,
-    pub(super) innovation_variance: f64,
-    pub(super) levels: Option<[f64; 2]>,
-    pub(super) residuals: usize,
-    pub(super) states: usize,
-    pub(super) termination: Termination,
-    pub(super) start: String,
-    pub(super) comparison: Comparison,
-    pub(super) constant: OperatorEstimate,
+    theta: Vec<f64>,
+    covariance: Option<Vec<f64>>,
+    remarks: Vec<Option<Remark>>,
+    midpoint_interval: Option<Interval>,
+    rate_interval: Option<Interval>,
+    change_point: bool,
+    loss: f64,
+    innovation_variance: f64,
+    levels: Option<[f64; 2]>,
+    residuals: usize,
+    states: usize,
+    termination: Termination,
+    start: String,
+    comparison: Comparison,
+    constant: OperatorEstimate,
 }
 
-impl TimeVaryingFit {
-    /// All parameters: those of [`TIME_VARYING_NAMES`], then d1 ... d_nd.
+impl SigmoidFit {
+    /// The fit at the minimum with a change, compared with the one without, `constant`.
+    pub(super) fn new(
+        criterion: &ChangeCriterion<'_>,
+        minimum: &Minimum,
+        start: String,
+        constant: &Minimum,
+        levels: Option<[f64; 2]>,
+    ) -> Result<Self, IdentError> {
+        let found = inference(criterion, minimum, constant)?;
+        Ok(Self {
+            nd: criterion.nd,
+            sample_time: criterion.sample_time,
+            first: criterion.first,
+            loss: minimum.at.sum_of_squares / criterion.residuals() as f64,
+            innovation_variance: found.innovation_variance,
+            levels,
+            residuals: criterion.residuals(),
+            states: criterion.states(),
+            termination: minimum.termination,
+            start,
+            comparison: found.comparison,
+            constant: constant_operator(criterion, constant)?,
+            theta: minimum.theta.clone(),
+            covariance: found.covariance,
+            remarks: found.remarks,
+            midpoint_interval: None,
+            rate_interval: None,
+            change_point: found.change_point,
+        })
+    }
+
+    /// All parameters: those of [`SIGMOID_NAMES`], then d1 ... d_nd.
     pub fn parameters(&self) -> Vec<ChangeParameter> {
         let names = names(self.nd).into_iter().enumerate();
         names
             .map(|(i, name)| ChangeParameter {
                 name,
-                unit: TIME_VARYING_NAMES.get(i).map_or("", |(_, unit)| unit),
+                unit: SIGMOID_NAMES.get(i).map_or("", |(_, unit)| unit),
                 estimate: self.estimate_of(i),
                 remark: self.remarks[i],
             })
@@ -138,7 +125,7 @@ impl TimeVaryingFit {
         }
     }
 
-    /// Covariance of the parameters in the order and the units of [`TimeVaryingFit::parameters`], by rows; zero for what was
+    /// Covariance of the parameters in the order and the units of [`SigmoidFit::parameters`], by rows; zero for what was
     /// held, `None` for an exact fit.
     pub fn covariance(&self) -> Option<Vec<f64>> {
         let p = self.theta.len();
@@ -167,10 +154,10 @@ impl TimeVaryingFit {
             if self.remarks[place] == Some(Remark::Fixed) {
                 continue;
             }
-            match likelihood_interval(criterion, minimum, place, standard_error, self.change_point, stay) {
-                Walk::Lower(theta) => return Some(theta),
-                Walk::Found(interval) if place == MIDPOINT => self.midpoint_interval = Some(interval),
-                Walk::Found(interval) => self.rate_interval = Some(interval),
+            match profile_likelihood_interval(criterion, minimum, place, standard_error, self.change_point, stay) {
+                Profile::Lower(theta) => return Some(theta),
+                Profile::Interval(interval) if place == MIDPOINT => self.midpoint_interval = Some(interval),
+                Profile::Interval(interval) => self.rate_interval = Some(interval),
             }
         }
         if self.change_point
@@ -194,7 +181,7 @@ impl TimeVaryingFit {
     }
 
     /// 95 % likelihood interval of G in 1/s, open to infinity where the change may have been abrupt; else as
-    /// [`TimeVaryingFit::midpoint_interval`].
+    /// [`SigmoidFit::midpoint_interval`].
     pub fn rate_interval(&self) -> Option<(f64, f64)> {
         self.rate_interval.map(|i| (i.low, i.high))
     }
@@ -204,7 +191,7 @@ impl TimeVaryingFit {
         self.change_point
     }
 
-    /// The operator before the change, where there was one ([`TimeVaryingFit::change_found`]).
+    /// The operator before the change, where there was one ([`SigmoidFit::change_found`]).
     pub fn initial_operator(&self) -> OperatorEstimate {
         operator(&self.theta, self.covariance.as_deref(), 0)
     }
@@ -225,7 +212,7 @@ impl TimeVaryingFit {
     }
 
     /// True where the change is worth its parameters by the BIC. Otherwise t_M and G mean nothing
-    /// ([`Remark::NoChange`]), and [`TimeVaryingFit::constant_operator`] describes the records.
+    /// ([`Remark::NoChange`]), and [`SigmoidFit::constant_operator`] describes the records.
     pub fn change_found(&self) -> bool {
         self.comparison.bic_difference > 0.0
     }
@@ -274,7 +261,7 @@ impl TimeVaryingFit {
         }
     }
 
-    /// [`TimeVaryingFit::gains_at`] at every sample of a record.
+    /// [`SigmoidFit::gains_at`] at every sample of a record.
     pub fn trace(&self, record: &Record) -> Vec<GainsAt> {
         record.times_s().into_iter().map(|t| self.gains_at(t)).collect()
     }
@@ -331,7 +318,7 @@ impl TimeVaryingFit {
     /// Output of the operator alone, without noise model; the initial state is that of the least simulation error.
     ///
     /// # Errors
-    /// As [`TimeVaryingFit::residuals`].
+    /// As [`SigmoidFit::residuals`].
     pub fn simulate(&self, record: &Record) -> Result<Series, IdentError> {
         let errors = self.errors_of(&self.theta[..NOISE], 0, record)?;
         let output = &record.output()[errors.first..];
@@ -357,7 +344,7 @@ impl TimeVaryingFit {
             nk: self.first - self.nd,
             ..Orders::default()
         };
-        checks::record(Structure::BoxJenkins, &orders, record, first)?;
+        check_record(Structure::BoxJenkins, &orders, record, first)?;
         let criterion = ChangeCriterion {
             data: vec![Data {
                 e: record.input(),

@@ -23,11 +23,14 @@ use hoid_model::Record;
 
 use crate::{
     IdentError,
+    criterion::Data,
     linalg::least_squares::{add_scaled, dot, solve_symmetric},
-    pem::criterion::Data,
 };
 
-use super::equation::{Source, cut, orthonormal, with_past};
+use super::{
+    columns::{cut, orthonormal, with_past},
+    equation::Source,
+};
 
 /// Time constants of the filters in samples; the one with the smallest rest is taken.
 const TIME_CONSTANTS: [f64; 3] = [4.0, 16.0, 64.0];

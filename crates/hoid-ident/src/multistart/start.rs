@@ -3,9 +3,9 @@
 use hoid_model::Orders;
 
 use crate::{
+    criterion::Block,
     linalg::least_squares::{add_scaled, dot, solve_symmetric},
     optimize::Linearisation,
-    pem::criterion::Block,
 };
 
 /// A start of the search, with its name.
@@ -60,12 +60,12 @@ impl Start {
     }
 
     /// The polynomial that is to be found next.
-    pub fn wanted(&self) -> Option<Block> {
+    pub fn next_block(&self) -> Option<Block> {
         self.left.last().copied()
     }
 
     /// Takes the criterion at theta. The residual is affine in B, and in D: one step of least squares finds either with the rest as it is.
-    pub fn take(&mut self, o: &Orders, there: &Linearisation) {
+    pub fn update(&mut self, o: &Orders, there: &Linearisation) {
         let Some(block) = self.left.pop() else { return };
         let (p, place) = (self.theta.len(), block.place(o));
         let rows = place.clone().map(|i| &there.gram[i * p..(i + 1) * p]);

@@ -1,32 +1,89 @@
-//! From the two minima to the fit: covariance, remarks, the comparison.
+//! What the two minima, with a change and without, say: covariance, which parameters have a standard error, and whether there was
+//! a change.
 //!
 //! The covariance is `sigma^2 (psi' psi)^-1` of the parameters that were free, with the initial states eliminated and the weights
-//! taken as known.
+//! taken as known. The comparison is by the likelihood ratio `n ln(V_0/V_1)` and the BIC.
+
+use std::fmt;
 
 use hoid_model::uncertainty::{Estimate, OperatorEstimate, variance_along};
 
 use super::{
-    interval::is_change_point,
     layout::{DELAY, FASTEST, K_E, LOG_RATE, MIDPOINT, OF_THE_CHANGE, OMEGA, T_L, ZETA, names},
     objective::ChangeCriterion,
-    result::{Comparison, Remark, TimeVaryingFit},
+    profile_likelihood::is_change_point,
 };
 use crate::{
     IdentError, Reason,
     linalg::information::inverse_of_free,
-    optimize::Linearisation,
-    optimize::{Minimum, free_parameters},
+    optimize::{Linearisation, Minimum, free_parameters},
 };
 
-/// Everything from the two minima.
-pub(super) fn assemble(
+/// Why a parameter has no standard error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Remark {
+    /// It was fixed.
+    Fixed,
+    /// It rests at a bound.
+    AtBound,
+    /// G rests at its upper bound: the change takes no longer than two samples, and how fast it was cannot be told.
+    Abrupt,
+    /// The records show no change (BIC): t_M and G mean nothing, and gains on either side of it are chosen by chance.
+    NoChange,
+    /// The change is too fast for a normal error: the likelihood interval holds.
+    ChangePoint,
+    /// The data do not determine it.
+    Undetermined,
+}
+
+impl fmt::Display for Remark {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Fixed => "fixed",
+            Self::AtBound => "rests at a bound",
+            Self::Abrupt => "at its upper bound: the change takes no longer than two samples, its rate cannot be told",
+            Self::NoChange => "the records show no change: take the fit without one",
+            Self::ChangePoint => "the change is too fast for a normal error: take the likelihood interval",
+            Self::Undetermined => "not determined by the data",
+        })
+    }
+}
+
+/// The fit against the one without a change.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Comparison {
+    /// `n ln(V_0/V_1)`.
+    pub likelihood_ratio: f64,
+    /// Parameters that the change adds: those of K_e2, T_L2, t_M and G that were not fixed.
+    pub extra_parameters: usize,
+    /// BIC without the change minus BIC with it; positive where the change is worth its parameters.
+    pub bic_difference: f64,
+}
+
+/// What the minimum with a change says beside theta.
+pub(super) struct Inference {
+    /// Variance of the innovations, weighted where the noise level changes.
+    pub innovation_variance: f64,
+    /// Covariance of theta by rows; `None` for an exact fit.
+    pub covariance: Option<Vec<f64>>,
+    /// Why an element of theta has no standard error, where it has none.
+    pub remarks: Vec<Option<Remark>>,
+    pub comparison: Comparison,
+    /// True where the change is too fast for t_M to have a normal error.
+    pub change_point: bool,
+}
+
+/// The inference from the minimum with a change and the one without, `constant`.
+///
+/// # Errors
+/// [`IdentError::SingularInformation`].
+pub(super) fn inference(
     criterion: &ChangeCriterion<'_>,
     minimum: &Minimum,
-    start: String,
     constant: &Minimum,
-    levels: Option<[f64; 2]>,
-) -> Result<TimeVaryingFit, IdentError> {
-    let theta = minimum.theta.clone();
+) -> Result<Inference, IdentError> {
+    let theta = &minimum.theta;
     let p = theta.len();
     let (n, states) = (criterion.residuals(), criterion.states());
     let sum_of_squares = minimum.at.sum_of_squares;
@@ -47,7 +104,7 @@ pub(super) fn assemble(
     };
     let change_found = comparison.bic_difference > 0.0;
 
-    let mut free = free_parameters(criterion, &theta, &minimum.at.descent);
+    let mut free = free_parameters(criterion, theta, &minimum.at.descent);
     let mut remarks: Vec<Option<Remark>> = (0..p)
         .map(|i| {
             let (low, high) = criterion.limits[i];
@@ -73,31 +130,17 @@ pub(super) fn assemble(
     let of_midpoint = covariance
         .as_ref()
         .map(|c: &Vec<f64>| c[MIDPOINT * p + MIDPOINT].sqrt());
-    let change_point = change_found && of_midpoint.is_some_and(|s| is_change_point(&theta, s));
+    let change_point = change_found && of_midpoint.is_some_and(|s| is_change_point(theta, s));
     if change_point {
         for place in [MIDPOINT, LOG_RATE] {
             remarks[place] = remarks[place].or(Some(Remark::ChangePoint));
         }
     }
-    let constant_operator = constant_operator(criterion, constant)?;
-    Ok(TimeVaryingFit {
-        nd: criterion.nd,
-        sample_time: criterion.sample_time,
-        first: criterion.first,
-        loss: sum_of_squares / n as f64,
+    Ok(Inference {
         innovation_variance,
-        levels,
-        residuals: n,
-        states,
-        termination: minimum.termination,
-        start,
-        comparison,
-        constant: constant_operator,
-        theta,
         covariance,
         remarks,
-        midpoint_interval: None,
-        rate_interval: None,
+        comparison,
         change_point,
     })
 }
@@ -126,7 +169,14 @@ fn invert(
     }
 }
 
-fn constant_operator(criterion: &ChangeCriterion<'_>, minimum: &Minimum) -> Result<OperatorEstimate, IdentError> {
+/// The operator at the minimum without a change.
+///
+/// # Errors
+/// [`IdentError::SingularInformation`].
+pub(super) fn constant_operator(
+    criterion: &ChangeCriterion<'_>,
+    minimum: &Minimum,
+) -> Result<OperatorEstimate, IdentError> {
     let theta = &minimum.theta;
     let mut constant = ChangeCriterion {
         changes: false,

@@ -1,4 +1,15 @@
-use super::*;
+use hoid_model::Orders;
+
+use super::{
+    Criterion, Data, InitialState, Workspace, first_residual,
+    initial_state_responses::{InitialStateResponses, Past},
+    polynomials::{Block, Polynomials},
+    signals::EliminatedStates,
+};
+use crate::{
+    linalg::least_squares::dot,
+    optimize::{Linearisation, Objective},
+};
 
 /// A closed-loop-like record with coloured noise and a start away from rest.
 fn record(n: usize) -> (Vec<f64>, Vec<f64>) {
@@ -166,7 +177,7 @@ fn estimated_states_leave_nothing_to_gain() {
     for (orders, theta) in cases() {
         let c = criterion(orders, vec![Data { e: &e, u: &u }], InitialState::Estimate);
         let eps = c.residuals_of(&theta, 0, &mut Workspace::default());
-        let parts = Parts::split(&orders, &theta);
+        let parts = Polynomials::split(&orders, &theta);
         let past = Past {
             c: parts.c,
             d: parts.d,
@@ -175,7 +186,7 @@ fn estimated_states_leave_nothing_to_gain() {
             noise: None,
             weights: None,
         };
-        let free = FreeResponses::of(&past, eps.len());
+        let free = InitialStateResponses::of(&past, eps.len());
         assert_eq!(free.basis().count(), orders.nf + orders.nc, "{orders}");
         for q in free.basis() {
             assert!(dot(q, &eps[..q.len()]).abs() < 1e-12);
@@ -310,11 +321,11 @@ fn add_in_spans(
     head: usize,
     ws: &mut Workspace,
     total: &mut Linearisation,
-) -> Option<Passed> {
-    let parts = Parts::split(&c.orders, theta);
-    c.pass_in_spans(theta, blocks, 0, head, ws, &mut |passed, counted, ws| {
+) -> Option<EliminatedStates> {
+    let parts = Polynomials::split(&c.orders, theta);
+    c.pass_in_spans(theta, blocks, 0, head, ws, &mut |states, counted, ws| {
         let columns = c.columns(&parts, counted.clone(), ws, blocks);
-        c.accumulate(passed, &columns, 0, &ws.eps[counted], total);
+        c.accumulate(states, &columns, 0, &ws.eps[counted], total);
     })
 }
 
@@ -341,8 +352,8 @@ fn long_records_pass_span_by_span_to_the_same_sums() {
                 let (mut whole, mut spans) = (nothing.clone(), nothing);
                 let mut ws = Workspace::default();
                 c.add_record(&theta, &blocks, 0, &mut ws, &mut whole);
-                let passed = add_in_spans(&c, &theta, &blocks, head, &mut ws, &mut spans);
-                assert!(passed.is_some(), "{initial:?} {orders}");
+                let states = add_in_spans(&c, &theta, &blocks, head, &mut ws, &mut spans);
+                assert!(states.is_some(), "{initial:?} {orders}");
                 assert!((whole.sum_of_squares - spans.sum_of_squares).abs() < 1e-12 * whole.sum_of_squares);
                 let mut residuals = Vec::new();
                 c.pass_in_spans(&theta, &[], 0, head, &mut ws, &mut |_, counted, ws| {
@@ -390,13 +401,13 @@ fn what_does_not_die_away_passes_whole() {
             gram: vec![0.0; 4],
         };
         let (theta, mut ws) = (vec![0.2, -pole], Workspace::default());
-        let passed = add_in_spans(c, &theta, &Block::ALL, head, &mut ws, &mut total);
+        let states = add_in_spans(c, &theta, &Block::ALL, head, &mut ws, &mut total);
         assert_eq!(
-            passed.is_some(),
+            states.is_some(),
             total.sum_of_squares > 0.0,
             "nothing is added where nothing passes"
         );
-        passed.is_some()
+        states.is_some()
     };
     let c = criterion(orders, data.clone(), InitialState::Estimate);
     assert!(by_spans(&c, 0.99, 4096));

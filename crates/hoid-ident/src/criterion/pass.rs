@@ -1,10 +1,10 @@
-//! A long record, span by span.
+//! A pass over a record at one theta; a long record is passed span by span.
 //!
 //! What the normal equations need of a record are sums over time, and every signal in them is the output of a filter that goes forward: the
-//! first part of the record ([`HEAD`](super::HEAD)) is passed as any record, the rest in spans that stay in the memory near the processor, each with
+//! first part of the record (32 768 samples) is passed as any record, the rest in spans that stay in the memory near the processor, each with
 //! the last samples of the span before in front of it. Nothing then grows with the record, and a sample costs the same in a long one.
 //!
-//! The initial states act on the beginning alone. Their responses must have died away within the head ([`FreeResponses::have_died`](crate::pem::initial_states::FreeResponses::have_died)); where a pole is so
+//! The initial states act on the beginning alone. Their responses must have died away within the head ([`InitialStateResponses::have_died`](crate::criterion::initial_state_responses::InitialStateResponses::have_died)); where a pole is so
 //! near the circle that they have not, the record is passed whole. So it is with weights, of which there is one a sample, and with a stationary
 //! past, whose columns are whitened one by one. The sums differ from those over the whole by rounding alone.
 
@@ -13,13 +13,43 @@ use std::ops::Range;
 use hoid_core::filter::divide_from;
 use hoid_model::{polynomial::product, polynomial_model::monic};
 
-use super::{Block, Criterion, Data, InitialState, Parts, Passed, Workspace, whiten_on};
+use super::{
+    initial_state::InitialState,
+    polynomials::{Block, Polynomials},
+    prediction_error::{Criterion, Data},
+    signals::EliminatedStates,
+    whitening::whiten_on,
+    workspace::Workspace,
+};
 
 /// Samples of a span: its signals fill a quarter of the second cache.
 const SPAN: usize = 1 << 11;
 
+/// Samples of the first part. A record twice as long counts as long: others, all of some minutes, pass whole.
+const HEAD: usize = 1 << 15;
+
 impl Criterion<'_> {
-    /// As [`Criterion::pass`] span after span, with what the pass over the head has found (for the other spans nothing); `None`, and nothing shown,
+    /// Passes a record and calls `show` with the eliminated initial states, the places in the workspace of the residuals that
+    /// count, and the workspace; for a long record, span by span, once for each span. Returns the eliminated initial states.
+    pub(super) fn pass(
+        &self,
+        theta: &[f64],
+        blocks: &[Block],
+        record: usize,
+        ws: &mut Workspace,
+        mut show: impl FnMut(&EliminatedStates, Range<usize>, &Workspace),
+    ) -> EliminatedStates {
+        if let Some(states) = self.pass_in_spans(theta, blocks, record, HEAD, ws, &mut show) {
+            return states;
+        }
+        let data = self.data[record];
+        let states = self.residual_pass(theta, record, data, ws);
+        self.gradient_pass(theta, blocks, data, ws);
+        show(&states, ws.pad + self.first..ws.pad + data.u.len(), ws);
+        states
+    }
+
+    /// Passes a record span after span, with what the pass over the head has found (for the other spans nothing); `None`, and nothing shown,
     /// where the record has to pass whole.
     pub(super) fn pass_in_spans(
         &self,
@@ -28,8 +58,8 @@ impl Criterion<'_> {
         record: usize,
         head: usize,
         ws: &mut Workspace,
-        show: &mut dyn FnMut(&Passed, Range<usize>, &Workspace),
-    ) -> Option<Passed> {
+        show: &mut dyn FnMut(&EliminatedStates, Range<usize>, &Workspace),
+    ) -> Option<EliminatedStates> {
         let Data { e, u } = self.data[record];
         let plain = self.weights.is_none() && self.initial != InitialState::Backcast;
         // Long lags leave the head no residuals.
@@ -41,27 +71,34 @@ impl Criterion<'_> {
             e: &e[..head.min(e.len())],
             u: &u[..head],
         };
-        let passed = self.residual_pass(theta, record, begin, ws);
-        if !passed.free.have_died(head - self.first) {
+        let states = self.residual_pass(theta, record, begin, ws);
+        if !states.responses.have_died(head - self.first) {
             return None;
         }
         self.gradient_pass(theta, blocks, begin, ws);
-        show(&passed, ws.pad + self.first..ws.pad + head, ws);
-        let parts = Parts::split(&self.orders, theta);
-        let nothing = Passed::default();
+        show(&states, ws.pad + self.first..ws.pad + head, ws);
+        let parts = Polynomials::split(&self.orders, theta);
+        let nothing = EliminatedStates::default();
         let mut behind = head;
         for from in (head..u.len()).step_by(SPAN) {
             let to = (from + SPAN).min(u.len());
             ws.carry(behind);
             behind = to - from;
-            self.go_on(&parts, blocks, self.data[record], from..to, ws);
+            self.next_span(&parts, blocks, self.data[record], from..to, ws);
             show(&nothing, ws.pad..ws.pad + behind, ws);
         }
-        Some(passed)
+        Some(states)
     }
 
     /// The signals of the next span, behind their last samples, which stand in front.
-    fn go_on(&self, parts: &Parts<'_>, blocks: &[Block], data: Data<'_>, span: Range<usize>, ws: &mut Workspace) {
+    fn next_span(
+        &self,
+        parts: &Polynomials<'_>,
+        blocks: &[Block],
+        data: Data<'_>,
+        span: Range<usize>,
+        ws: &mut Workspace,
+    ) {
         let o = &self.orders;
         let (pad, end) = (ws.pad, ws.pad + span.len());
         if o.nb > 0 {

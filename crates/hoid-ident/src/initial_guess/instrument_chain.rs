@@ -9,12 +9,11 @@ use hoid_model::Orders;
 
 use crate::{
     InitialState,
-    initial_guess::noise_model::noise_model,
+    criterion::{Criterion, Workspace, first_residual},
+    iv::equation::{IvProblem, Prefilter, Source},
+    noise_model::noise_model,
     optimize::Objective,
-    pem::criterion::{Criterion, Workspace, first_residual},
 };
-
-use super::equation::{Prefilter, Problem, Source};
 
 /// Theta for the orders of the criterion; `None` where A and F are both there (the chain does not tell their poles apart), where
 /// there is no input, and where the data do not carry it.
@@ -23,7 +22,7 @@ pub(crate) fn instrument_chain(criterion: &Criterion<'_>) -> Option<Vec<f64>> {
     if o.nb == 0 || (o.na > 0 && o.nf > 0) {
         return None;
     }
-    let problem = Problem::new(&o, criterion.data.clone(), Source::measured(&criterion.data));
+    let problem = IvProblem::new(&o, criterion.data.clone(), Source::measured(&criterion.data));
     let white_orders = Orders { nc: 0, nd: 0, ..o };
     let white = Criterion {
         orders: white_orders,
@@ -61,7 +60,7 @@ mod tests {
     use hoid_core::filter::{divide_in_place, fir, multiply};
 
     use super::*;
-    use crate::pem::criterion::Data;
+    use crate::criterion::Data;
 
     /// Zero-mean numbers of a linear congruential generator (D. E. Knuth, MMIX).
     fn white(n: usize, mut state: u64) -> Vec<f64> {

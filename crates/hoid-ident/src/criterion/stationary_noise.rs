@@ -24,14 +24,14 @@ const DOUBLINGS: usize = 60;
 
 /// Covariance of the initial state of a noise model.
 #[derive(Debug)]
-pub(crate) struct StationaryPast {
+pub(crate) struct StationaryNoise {
     transition: DMatrix<f64>,
     gain: DVector<f64>,
     covariance: DMatrix<f64>,
     factor: DMatrix<f64>,
 }
 
-impl StationaryPast {
+impl StationaryNoise {
     /// The past of `(C/D) eps` with unit variance of eps. `None` when D has a root on or outside the unit circle.
     pub fn of(c: &[f64], d: &[f64]) -> Option<Self> {
         let r = c.len().max(d.len());
@@ -142,19 +142,19 @@ mod tests {
     #[test]
     fn covariance_of_first_order_noise_is_known() {
         // AR(1): x = -d v, var v = 1/(1 - d^2).
-        let ar = StationaryPast::of(&[], &[-0.8]).unwrap();
+        let ar = StationaryNoise::of(&[], &[-0.8]).unwrap();
         assert!((ar.covariance[(0, 0)] - 0.64 / 0.36).abs() < 1e-14);
         // MA(1): x = c eps.
-        let ma = StationaryPast::of(&[0.5], &[]).unwrap();
+        let ma = StationaryNoise::of(&[0.5], &[]).unwrap();
         assert!((ma.covariance[(0, 0)] - 0.25).abs() < 1e-15);
         // ARMA(1, 1): x' = -d x + (c - d) eps.
-        let arma = StationaryPast::of(&[0.3], &[-0.9]).unwrap();
+        let arma = StationaryNoise::of(&[0.3], &[-0.9]).unwrap();
         assert!((arma.covariance[(0, 0)] - 1.44 / 0.19).abs() < 1e-12);
     }
 
     #[test]
     fn covariance_solves_its_equation_and_the_factor_gives_it_back() {
-        let past = StationaryPast::of(&[0.4, 0.1], &[-1.6, 0.8, -0.1]).unwrap();
+        let past = StationaryNoise::of(&[0.4, 0.1], &[-1.6, 0.8, -0.1]).unwrap();
         let (phi, k) = (&past.transition, &past.gain);
         let again = phi * &past.covariance * phi.transpose() + k * k.transpose();
         assert!((again - &past.covariance).amax() < 1e-12 * past.covariance.amax());
@@ -164,11 +164,11 @@ mod tests {
 
     #[test]
     fn noise_that_is_not_stationary_has_no_past() {
-        assert!(StationaryPast::of(&[], &[-1.0]).is_none());
-        assert!(StationaryPast::of(&[], &[-2.0, 1.1]).is_none());
-        assert!(StationaryPast::of(&[f64::NAN], &[0.1]).is_none());
+        assert!(StationaryNoise::of(&[], &[-1.0]).is_none());
+        assert!(StationaryNoise::of(&[], &[-2.0, 1.1]).is_none());
+        assert!(StationaryNoise::of(&[f64::NAN], &[0.1]).is_none());
         // White noise has a past that says nothing.
-        let white = StationaryPast::of(&[-0.5], &[-0.5]).unwrap();
+        let white = StationaryNoise::of(&[-0.5], &[-0.5]).unwrap();
         assert_eq!(white.descent(&[0.0], 1, 1), (vec![0.0], vec![0.0]));
     }
 
@@ -177,10 +177,10 @@ mod tests {
         let (c, d) = ([0.4, 0.1], [-1.5, 0.7]);
         let g = DVector::from_vec(vec![0.7, -0.3]);
         let penalty = |c: &[f64], d: &[f64]| {
-            let past = StationaryPast::of(c, d).unwrap();
+            let past = StationaryNoise::of(c, d).unwrap();
             (g.transpose() * past.covariance.try_inverse().unwrap() * &g)[(0, 0)]
         };
-        let past = StationaryPast::of(&c, &d).unwrap();
+        let past = StationaryNoise::of(&c, &d).unwrap();
         let z = past.factor.clone().try_inverse().unwrap() * &g;
         let (by_c, by_d) = past.descent(z.as_slice(), 2, 2);
         let h = 1e-6;

@@ -6,20 +6,20 @@
 //! `eps = (I - Q Q') eps_0`. The responses die away, so that Q is short beside the record.
 //! Source: G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432.
 //!
-//! With a stationary past ([`crate::pem::stationary_noise`]) the states of the noise model have a known covariance `sigma^2 L L'`:
+//! With a stationary past ([`crate::criterion::stationary_noise`]) the states of the noise model have a known covariance `sigma^2 L L'`:
 //! they are `L z` with z of variance sigma^2, and z counts as further residuals. G then has the rows `[I; G L]` for them.
 
 use hoid_core::filter::{SecondOrder, divide_in_place};
 
 use crate::{
+    criterion::stationary_noise::StationaryNoise,
     linalg::least_squares::{add_scaled, dot},
-    pem::stationary_noise::StationaryPast,
 };
 
 /// Orthonormal basis of the responses to the initial states of a record, and the way back to the states.
 #[derive(Debug, Default)]
-pub(crate) struct FreeResponses {
-    /// Basis vectors: first [`FreeResponses::prior_rows`] of z, then from the first residual on; what follows their end is
+pub(crate) struct InitialStateResponses {
+    /// Basis vectors: first [`InitialStateResponses::prior_rows`] of z, then from the first residual on; what follows their end is
     /// zero.
     q: Vec<Vec<f64>>,
     /// `G[:, kept[k]] = sum over l <= k of Q_l r[k][l]`.
@@ -41,12 +41,12 @@ pub(crate) struct Past<'a> {
     /// Samples from the first value of w to the first residual.
     pub lead: usize,
     /// The past of the noise when it was stationary; else nothing is known of it.
-    pub noise: Option<&'a StationaryPast>,
+    pub noise: Option<&'a StationaryNoise>,
     /// Square roots of the weights of the residuals, from the first residual on; none where all count the same.
     pub weights: Option<&'a [f64]>,
 }
 
-impl FreeResponses {
+impl InitialStateResponses {
     /// Responses of `rows` residuals, from the first one on, to the nf initial values of w and the states of the noise model.
     ///
     /// Any free response of 1/F is a combination of its impulse response `h` started at the first nf samples (that basis stays
@@ -73,7 +73,7 @@ impl FreeResponses {
                 columns.push(shifted(&s, i, lead, rows));
             }
         }
-        let prior_rows = past.noise.map_or(0, StationaryPast::states);
+        let prior_rows = past.noise.map_or(0, StationaryNoise::states);
         let unknown = if past.noise.is_some() { prior_rows } else { c.len() };
         if unknown > 0 {
             let k = impulse_response(c, rows);

@@ -1,4 +1,4 @@
-//! Likelihood intervals of t_M and G.
+//! Profile likelihood intervals of t_M and G.
 //!
 //! An interval holds the values at which the other parameters, searched anew, lose little: `n ln(V(x)/V) <= q`. It needs no
 //! parabola. For G, and for t_M where the change is resolved (two standard errors are less than the width 1/G of the change), the
@@ -9,7 +9,7 @@
 use super::{
     layout::{LOG_RATE, MIDPOINT},
     objective::ChangeCriterion,
-    search,
+    search::search,
 };
 use crate::optimize::{Minimum, SearchMethod, SearchOptions};
 
@@ -35,11 +35,11 @@ pub(crate) struct Interval {
     pub high: f64,
 }
 
-/// What a walk came to.
+/// What a walk along the profile came upon.
 #[derive(Debug)]
-pub(crate) enum Walk {
+pub(crate) enum Profile {
     /// An interval.
-    Found(Interval),
+    Interval(Interval),
     /// A lower loss than that of the minimum, here.
     Lower(Vec<f64>),
 }
@@ -52,14 +52,14 @@ pub(crate) fn is_change_point(theta: &[f64], standard_error: f64) -> bool {
 
 /// 95 % interval of t_M or ln G around a minimum, `standard_error` its own where it has one; with `stay` a lower loss on the
 /// way only counts as inside.
-pub(crate) fn likelihood_interval(
+pub(crate) fn profile_likelihood_interval(
     criterion: &ChangeCriterion<'_>,
     minimum: &Minimum,
     place: usize,
     standard_error: Option<f64>,
     change_point: bool,
     stay: bool,
-) -> Walk {
+) -> Profile {
     let quantile = if change_point && place == MIDPOINT {
         CHANGE_POINT
     } else {
@@ -128,10 +128,10 @@ pub(crate) fn likelihood_interval(
         *end = 0.5 * (inside[place] + beyond);
     }
     if let Some(theta) = lower {
-        return Walk::Lower(theta);
+        return Profile::Lower(theta);
     }
     let [low_end, high_end] = ends;
-    Walk::Found(if place == LOG_RATE {
+    Profile::Interval(if place == LOG_RATE {
         Interval {
             low: low_end.exp(),
             high: if high_end >= high {

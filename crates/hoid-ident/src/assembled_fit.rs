@@ -1,0 +1,75 @@
+//! The fit that belongs to a minimum: loss, innovation variance and what else follows from the sum of squares.
+//!
+//! With n residuals, p free parameters and s initial states, `V = sum eps^2 / n` and
+//! `sigma^2 = sum eps^2 / (n - p - s)`. The covariance of theta is `sigma^2 (psi' psi)^-1` over the free parameters (L. Ljung,
+//! *System Identification*, 1999, eq. 9.19 and 9.42).
+
+use hoid_model::{PolynomialModel, SampleTime, Structure};
+
+use crate::{
+    Fit, IdentError, Termination,
+    criterion::{Criterion, output_variance},
+};
+
+/// Where a fit was found.
+pub(crate) struct Solution {
+    pub theta: Vec<f64>,
+    pub sum_of_squares: f64,
+    pub termination: Termination,
+    /// Parameters that are not free.
+    pub held: Vec<bool>,
+    /// Name of the start.
+    pub start: String,
+}
+
+/// The fit there, without a covariance.
+///
+/// # Errors
+/// Those of [`PolynomialModel::new`].
+pub(crate) fn assembled_fit(
+    criterion: &Criterion<'_>,
+    structure: Structure,
+    sample_time: SampleTime,
+    solution: Solution,
+) -> Result<Fit, IdentError> {
+    let Solution {
+        theta,
+        sum_of_squares,
+        termination,
+        held,
+        start,
+    } = solution;
+    let n = criterion.residuals();
+    let free = held.iter().filter(|held| !**held).count();
+    let freedom = n - free - criterion.states();
+    Ok(Fit {
+        held,
+        model: PolynomialModel::new(structure, criterion.orders, sample_time, theta)?,
+        covariance: None,
+        loss: sum_of_squares / n as f64,
+        innovation_variance: sum_of_squares / freedom as f64,
+        residuals: n,
+        states: criterion.states(),
+        initial_state: criterion.initial,
+        termination,
+        start,
+        output_variance: output_variance(&criterion.data, criterion.first),
+        robust: false,
+        physical: None,
+    })
+}
+
+impl Fit {
+    /// The same fit with the covariance `variance (psi' psi)^-1`.
+    pub(crate) fn with_covariance(self, variance: f64, inverse_gram: &[f64]) -> Self {
+        Self {
+            covariance: Some(inverse_gram.iter().map(|g| variance * g).collect()),
+            ..self
+        }
+    }
+}
+
+/// Which of p parameters are not free.
+pub(crate) fn held(free: &[usize], p: usize) -> Vec<bool> {
+    (0..p).map(|i| !free.contains(&i)).collect()
+}

@@ -1,0 +1,78 @@
+//! The criterion: the records, the orders, and which residuals count.
+
+use hoid_model::{Orders, Record};
+
+use super::{initial_state::InitialState, polynomials::Polynomials};
+use crate::linalg::products::variance;
+
+/// Input and output of one record.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Data<'a> {
+    pub e: &'a [f64],
+    pub u: &'a [f64],
+}
+
+impl<'a> Data<'a> {
+    /// Input and output of each record.
+    pub fn of(records: &'a [Record]) -> Vec<Self> {
+        let one = |r: &'a Record| Self {
+            e: r.input(),
+            u: r.output(),
+        };
+        records.iter().map(one).collect()
+    }
+}
+
+/// The criterion over one or several records with a common theta.
+#[derive(Debug, Clone)]
+pub(crate) struct Criterion<'a> {
+    pub orders: Orders,
+    pub data: Vec<Data<'a>>,
+    pub initial: InitialState,
+    /// First sample whose residual counts, in each record; at least [`first_residual`](super::first_residual).
+    pub first: usize,
+    /// Square roots of the weights of the residuals of each record, from the first residual on; none where all count the
+    /// same.
+    pub weights: Option<&'a [Vec<f64>]>,
+}
+
+/// Variance of the output around its mean, from sample `first` of each record on.
+pub(crate) fn output_variance(data: &[Data<'_>], first: usize) -> f64 {
+    let outputs: Vec<&[f64]> = data.iter().map(|d| &d.u[first..]).collect();
+    variance(&outputs)
+}
+
+impl Criterion<'_> {
+    /// Number of residuals over all records.
+    pub fn residuals(&self) -> usize {
+        self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
+    }
+
+    /// Number of initial states over all records.
+    pub fn states(&self) -> usize {
+        match self.initial {
+            InitialState::Zero => 0,
+            InitialState::Estimate => self.data.len() * (self.orders.nf + self.orders.nc),
+            // The states of the noise are random numbers with a known variance, not parameters.
+            InitialState::Backcast => self.data.len() * self.orders.nf,
+        }
+    }
+
+    /// First sample at which w and v are computed.
+    pub(super) fn first_regressed(&self) -> usize {
+        match self.initial {
+            InitialState::Zero => 0,
+            InitialState::Estimate => self.first - self.orders.nd,
+            InitialState::Backcast => self.first,
+        }
+    }
+
+    /// The polynomial whose past is that of the noise: D, and A where there is no input.
+    pub(super) fn noise_poles<'t>(&self, parts: &Polynomials<'t>) -> &'t [f64] {
+        if self.orders.nb == 0 && self.orders.nd == 0 {
+            parts.a
+        } else {
+            parts.d
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! The signals of a record: w, v and eps with the best initial states in them, and those whose shifts are the columns of psi.
+
+use std::ops::Range;
+
+use hoid_core::filter::divide;
+
+use super::{
+    initial_state::InitialState,
+    initial_state_responses::{InitialStateResponses, Past},
+    polynomials::{Block, Polynomials},
+    prediction_error::{Criterion, Data},
+    stationary_noise::StationaryNoise,
+    whitening::{divide_and_whiten, whiten},
+    workspace::{Workspace, passes_once},
+};
+use crate::linalg::least_squares::add_scaled;
+
+/// The initial states that a pass over a record has eliminated.
+#[derive(Default)]
+pub(super) struct EliminatedStates {
+    pub responses: InitialStateResponses,
+    pub noise: Option<StationaryNoise>,
+    pub z: Vec<f64>,
+}
+
+impl Criterion<'_> {
+    /// w, v and eps of a record, or of its first part, with the best initial states in them.
+    pub(super) fn residual_pass(
+        &self,
+        theta: &[f64],
+        record: usize,
+        data: Data<'_>,
+        ws: &mut Workspace,
+    ) -> EliminatedStates {
+        let parts = Polynomials::split(&self.orders, theta);
+        let n = data.u.len();
+        let o = &self.orders;
+        ws.make_room(o, n);
+        let pad = ws.pad;
+        let regressed = self.first_regressed();
+        let start = match self.initial {
+            InitialState::Zero => 0,
+            InitialState::Estimate | InitialState::Backcast => self.first,
+        };
+
+        self.filter_input(&parts, data, ws);
+        let from = pad + regressed;
+        ws.w[..from].fill(0.0);
+        ws.v[..from].fill(0.0);
+        self.response(&parts, data, regressed..n, from, ws);
+        whiten(parts.c, parts.d, &ws.v, &mut ws.eps, pad + start);
+
+        let weights = self.weights.map(|all| all[record].as_slice());
+        let eps = &mut ws.eps[pad + self.first..];
+        if let Some(weights) = weights {
+            eps.iter_mut().zip(weights).for_each(|(x, w)| *x *= w);
+        }
+        let mut states = EliminatedStates::default();
+        if self.initial != InitialState::Zero {
+            if self.initial == InitialState::Backcast {
+                states.noise = StationaryNoise::of(parts.c, self.noise_poles(&parts));
+            }
+            let past = Past {
+                c: parts.c,
+                d: parts.d,
+                f: parts.f,
+                lead: self.first - regressed,
+                noise: states.noise.as_ref(),
+                weights,
+            };
+            states.responses = InitialStateResponses::of(&past, n - self.first);
+            states.z = states
+                .responses
+                .eliminate(&mut ws.w[pad + regressed..], &mut ws.v[pad + regressed..], eps);
+        }
+        if let Some(weights) = weights {
+            eps.iter_mut().zip(weights).for_each(|(x, w)| *x /= w);
+        }
+        states
+    }
+
+    /// `w = B s` and `v = A u - w` of these samples, the first of which stands at `from` in the workspace.
+    pub(super) fn response(
+        &self,
+        parts: &Polynomials<'_>,
+        data: Data<'_>,
+        samples: Range<usize>,
+        from: usize,
+        ws: &mut Workspace,
+    ) {
+        let to = from + samples.len();
+        let u = &data.u[samples.clone()];
+        let (w, v) = (&mut ws.w[from..to], &mut ws.v[from..to]);
+        match *parts.b {
+            // The orders of the operator in one pass.
+            [b0, b1] => {
+                let inputs = ws.s[from..to].iter().zip(&ws.s[from - 1..to - 1]).zip(u);
+                for ((w, v), ((s0, s1), u)) in w.iter_mut().zip(&mut *v).zip(inputs) {
+                    *w = b0 * s0 + b1 * s1;
+                    *v = u - *w;
+                }
+            }
+            _ => {
+                w.fill(0.0);
+                for (j, &bj) in parts.b.iter().enumerate() {
+                    add_scaled(w, bj, &ws.s[from - j..to - j]);
+                }
+                for ((v, w), u) in v.iter_mut().zip(&*w).zip(u) {
+                    *v = u - w;
+                }
+            }
+        }
+        for (i, &ai) in parts.a.iter().enumerate() {
+            let first = samples.start.max(i + 1);
+            if first < samples.end {
+                add_scaled(
+                    &mut v[first - samples.start..],
+                    ai,
+                    &data.u[first - i - 1..samples.end - i - 1],
+                );
+            }
+        }
+    }
+
+    /// The signals whose shifts are the columns of psi.
+    pub(super) fn gradient_pass(&self, theta: &[f64], blocks: &[Block], data: Data<'_>, ws: &mut Workspace) {
+        let parts = Polynomials::split(&self.orders, theta);
+        let (o, pad) = (&self.orders, ws.pad);
+        let regressed = self.first_regressed();
+        if blocks.contains(&Block::A) {
+            self.filter_output(&parts, data, ws);
+        }
+        if blocks.contains(&Block::B) {
+            self.whiten_input(&parts, ws);
+        }
+        let [_, _, xc, xd, xf] = &mut ws.filtered;
+        if o.nc > 0 && blocks.contains(&Block::C) {
+            xc[..pad].fill(0.0);
+            divide(parts.c, &ws.eps[pad..], &mut xc[pad..]);
+        }
+        // Without C the signal of D is v itself.
+        if o.nd > 0 && o.nc > 0 && blocks.contains(&Block::D) {
+            xd[..pad].fill(0.0);
+            divide(parts.c, &ws.v[pad..], &mut xd[pad..]);
+        }
+        if o.nf > 0 && blocks.contains(&Block::F) {
+            let from = pad + regressed;
+            if passes_once(o) {
+                // w is zero before.
+                let d1 = parts.d.first().copied().unwrap_or(0.0);
+                xf[..from].fill(0.0);
+                divide_and_whiten([parts.f[0], parts.f[1]], d1, &ws.w[from..], &mut xf[from..]);
+            } else {
+                ws.scratch[..from].copy_from_slice(&ws.w[..from]);
+                divide(parts.f, &ws.w[from..], &mut ws.scratch[from..]);
+                whiten(parts.c, parts.d, &ws.scratch, xf, from);
+            }
+        }
+    }
+
+    /// `(D/C) u`; with a stationary past u, because each shift is cut at the first residual before it is whitened.
+    fn filter_output(&self, parts: &Polynomials<'_>, data: Data<'_>, ws: &mut Workspace) {
+        if self.orders.na == 0 {
+            return;
+        }
+        let pad = ws.pad;
+        ws.scratch[..pad].fill(0.0);
+        ws.scratch[pad..].copy_from_slice(data.u);
+        let signal = &mut ws.filtered[Block::A as usize];
+        if self.initial == InitialState::Backcast {
+            signal.copy_from_slice(&ws.scratch);
+        } else {
+            whiten(parts.c, parts.d, &ws.scratch, signal, pad);
+        }
+    }
+
+    /// `s = (1/F) e(t-nk)`, of which w is a moving sum: `w = B s`. Where the initial states are estimated, w may differ from the
+    /// response that starts at rest by a free response of 1/F.
+    fn filter_input(&self, parts: &Polynomials<'_>, data: Data<'_>, ws: &mut Workspace) {
+        let (pad, n) = (ws.pad, data.u.len());
+        if self.orders.nb == 0 {
+            return;
+        }
+        let from = pad + self.orders.nk.min(n);
+        ws.s[..from].fill(0.0);
+        divide(parts.f, &data.e[..pad + n - from], &mut ws.s[from..]);
+    }
+
+    /// `(D/C) s`; with a stationary past s.
+    fn whiten_input(&self, parts: &Polynomials<'_>, ws: &mut Workspace) {
+        if self.orders.nb == 0 {
+            return;
+        }
+        let from = ws.pad + self.orders.nk.min(ws.s.len() - ws.pad);
+        let signal = &mut ws.filtered[Block::B as usize];
+        if self.initial == InitialState::Backcast {
+            signal.copy_from_slice(&ws.s);
+        } else {
+            whiten(parts.c, parts.d, &ws.s, signal, from);
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! The whitening filter D/C, also of a signal whose past has gone through it already.
+
+use hoid_core::filter::{SecondOrder, divide_from};
+
+use crate::linalg::least_squares::add_scaled;
+
+/// `y = (1 + d1 q^-1) / (1 + f1 q^-1 + f2 q^-2) x` from rest.
+pub(super) fn divide_and_whiten([f1, f2]: [f64; 2], d1: f64, x: &[f64], y: &mut [f64]) {
+    let mut filter = SecondOrder::new(f1, f2);
+    let mut before = 0.0;
+    let (x_blocks, x_rest) = x.as_chunks::<4>();
+    let (y_blocks, y_rest) = y.as_chunks_mut::<4>();
+    for (y, x) in y_blocks.iter_mut().zip(x_blocks) {
+        let s = filter.four(*x);
+        *y = [s[0] + d1 * before, s[1] + d1 * s[0], s[2] + d1 * s[1], s[3] + d1 * s[2]];
+        before = s[3];
+    }
+    for (y, x) in y_rest.iter_mut().zip(x_rest) {
+        let s = filter.one(*x);
+        *y = s + d1 * before;
+        before = s;
+    }
+}
+
+/// `y = (D/C) x` from index `from` on, zero before: zero state of 1/C, x as it is before.
+pub(super) fn whiten(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
+    if from >= x.len() {
+        y.fill(0.0);
+        return;
+    }
+    y[..from].fill(0.0);
+    whiten_on(c, d, x, y, from);
+}
+
+/// `y = (D/C) x` from index `from` on; what stands before is what has gone into the filter and come out of it so far.
+pub(super) fn whiten_on(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
+    match *d {
+        // The first lag in the same pass as the copy.
+        [d1, ref rest @ ..] if from > 0 => {
+            for ((y, x0), x1) in y[from..].iter_mut().zip(&x[from..]).zip(&x[from - 1..]) {
+                *y = x0 + d1 * x1;
+            }
+            add_lags(rest, 2, x, y, from);
+        }
+        _ => {
+            y[from..].copy_from_slice(&x[from..]);
+            add_lags(d, 1, x, y, from);
+        }
+    }
+    divide_from(c, y, from);
+}
+
+/// `y(t) += sum_i d_i x(t - first_lag - i)` from index `from` on.
+fn add_lags(d: &[f64], first_lag: usize, x: &[f64], y: &mut [f64], from: usize) {
+    for (i, &di) in d.iter().enumerate() {
+        let lag = first_lag + i;
+        let start = from.max(lag);
+        if start < x.len() {
+            add_scaled(&mut y[start..], di, &x[start - lag..x.len() - lag]);
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! What a method of instrumental variables gives to the estimator, and gets from it.
+
+use hoid_model::Structure;
+
+use super::equation::IvProblem;
+use crate::{IdentError, Termination, criterion::Criterion};
+
+/// A method: each stands in a file of its own and is listed in [`IvMethod`](super::IvMethod).
+pub(super) struct Algorithm {
+    /// Short name, as in options and tables.
+    pub name: &'static str,
+    /// The structure that it fits.
+    pub structure: Structure,
+    /// Theta, its covariance, and how the iteration ended.
+    pub solve: fn(&IvProblem<'_>, &Criterion<'_>, IterationLimits) -> Result<IvSolution, IdentError>,
+}
+
+/// When a refined method ends.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct IterationLimits {
+    /// Largest number of iterations.
+    pub max_iterations: usize,
+    /// Largest step of the last iteration, as a share of the standard errors.
+    pub tolerance: f64,
+}
+
+/// What a method found.
+pub(super) struct IvSolution {
+    /// Theta in the order of [`Orders::parameter_names`](hoid_model::Orders::parameter_names).
+    pub theta: Vec<f64>,
+    /// Covariance by rows, where the method has one.
+    pub covariance: Option<Vec<f64>>,
+    pub termination: Termination,
+}

@@ -1,0 +1,89 @@
+//! Columns over the rows of all records, one record after the other.
+
+use crate::linalg::least_squares::{add_scaled, dot};
+
+/// Columns over the rows of all records, one after the other.
+pub(crate) type Columns = Vec<Vec<f64>>;
+
+/// Part of a column that must be its own, in amplitude, for it not to count as a combination of those before it. Twice
+/// orthogonalised columns keep 1e-15.
+const OWN_PART: f64 = 1e-10;
+/// Longest invented past in samples.
+const PAST: usize = 256;
+
+/// The signal behind an invented past, and the length of that past: reflected at the first sample and faded in, so that what is
+/// simulated from it starts without a jump.
+pub(super) fn with_past(x: &[f64]) -> (Vec<f64>, usize) {
+    let length = PAST.min(x.len().saturating_sub(1));
+    let fade = |k: usize| 0.5 + 0.5 * (std::f64::consts::PI * k as f64 / (length + 1) as f64).cos();
+    let mut extended: Vec<f64> = (1..=length).rev().map(|k| fade(k) * (2.0 * x[0] - x[k])).collect();
+    extended.extend_from_slice(x);
+    (extended, length)
+}
+
+/// Orthonormal basis of the columns by Gram-Schmidt, twice, and the indices of the columns that have a part of their own.
+pub(super) fn orthonormal(columns: &[Vec<f64>]) -> (Columns, Vec<usize>) {
+    let mut q: Columns = Vec::new();
+    let mut kept = Vec::new();
+    for (index, column) in columns.iter().enumerate() {
+        let size = dot(column, column).sqrt();
+        let mut own = column.clone();
+        for _ in 0..2 {
+            for q in &q {
+                let component = dot(q, &own);
+                add_scaled(&mut own, -component, q);
+            }
+        }
+        let rest = dot(&own, &own).sqrt();
+        // Written so that NaN is dropped too.
+        if rest > OWN_PART * size {
+            own.iter_mut().for_each(|v| *v /= rest);
+            q.push(own);
+            kept.push(index);
+        }
+    }
+    (q, kept)
+}
+
+/// A residual cut into its records.
+pub(super) fn cut(residual: &[f64], rows: &[usize]) -> Columns {
+    let mut at = 0;
+    rows.iter()
+        .map(|n| {
+            at += n;
+            residual[at - n..at].to_vec()
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wave(n: u32, w: f64) -> Vec<f64> {
+        (0..n)
+            .map(|t| (w * f64::from(t)).sin() + 0.3 * (2.3 * w * f64::from(t)).cos())
+            .collect()
+    }
+
+    #[test]
+    fn an_invented_past_ends_where_the_record_begins() {
+        let x = wave(2000, 0.01);
+        let (extended, past) = with_past(&x);
+        assert_eq!(past, PAST);
+        assert_eq!(extended[past..], x);
+        let steepest = extended.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
+        assert!(steepest < 0.03, "{steepest}");
+        assert_eq!(with_past(&[5.0]), (vec![5.0], 0));
+        assert_eq!(with_past(&[]), (vec![], 0));
+    }
+
+    #[test]
+    fn dependent_columns_are_left_out_of_the_basis() {
+        let (a, b) = (wave(100, 0.2), wave(100, 0.9));
+        let sum: Vec<f64> = a.iter().zip(&b).map(|(x, y)| x - 3.0 * y).collect();
+        let (basis, kept) = orthonormal(&[a, vec![0.0; 100], b, sum, vec![f64::NAN; 100]]);
+        assert_eq!(kept, [0, 2]);
+        assert!(dot(&basis[0], &basis[1]).abs() < 1e-14);
+    }
+}

@@ -1,0 +1,162 @@
+//! The estimator by instrumental variables: options, and the fit.
+
+use hoid_model::{Orders, Record, SampleTime};
+
+use super::{
+    IvMethod,
+    algorithm::{IterationLimits, IvSolution},
+    equation::{IvProblem, Source},
+    external_signal,
+    instruments::Instruments,
+};
+use crate::{
+    Fit, IdentError, InitialState, Reason,
+    assembled_fit::{Solution, assembled_fit},
+    criterion::{Criterion, Data, Workspace, first_residual},
+    informative_data::{check_degrees_of_freedom, check_record, common_sample_time},
+    linalg::least_squares::dot,
+};
+
+/// Residuals below this share of the output, in amplitude, are rounding.
+const EXACT: f64 = 1e-11;
+
+/// An estimator by instrumental variables.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InstrumentalVariable {
+    /// The method; it decides the structure.
+    pub method: IvMethod,
+    /// The orders.
+    pub orders: Orders,
+    /// What the instruments are made of.
+    pub instruments: Instruments,
+    /// Largest number of iterations of the refined methods. Default 100.
+    pub max_iterations: usize,
+    /// The refined methods have settled when an iteration moves theta by less than this share of its standard errors. Default
+    /// 1e-4.
+    pub tolerance: f64,
+}
+
+impl InstrumentalVariable {
+    /// An estimator with the default options and simulated instruments.
+    pub fn new(method: IvMethod, orders: Orders) -> Self {
+        Self {
+            method,
+            orders,
+            instruments: Instruments::default(),
+            max_iterations: 100,
+            tolerance: 1e-4,
+        }
+    }
+
+    /// Fits one model to all records: a common theta, initial states of each for the residuals.
+    ///
+    /// # Errors
+    /// [`IdentError`]; how an iteration ended is part of the fit.
+    pub fn fit(&self, records: &[Record]) -> Result<Fit, IdentError> {
+        let structure = self.method.structure();
+        self.orders.check(structure)?;
+        self.check_options()?;
+        let sample_time = common_sample_time(records)?;
+        let first = first_residual(&self.orders, InitialState::Estimate);
+        for record in records {
+            check_record(structure, &self.orders, record, first)?;
+        }
+        let criterion = Criterion {
+            orders: self.orders,
+            data: Data::of(records),
+            initial: InitialState::Estimate,
+            first,
+            weights: None,
+        };
+        check_degrees_of_freedom(&criterion, records)?;
+        let sources = match &self.instruments {
+            Instruments::Simulated => Source::measured(&criterion.data),
+            Instruments::External(name) => {
+                external_signal::noise_free(&external_signal::signals(records, name)?, &criterion.data)
+            }
+        };
+        let problem = IvProblem::new(&self.orders, criterion.data.clone(), sources);
+        self.check_rows(&problem, records)?;
+        let limits = IterationLimits {
+            max_iterations: self.max_iterations,
+            tolerance: self.tolerance,
+        };
+        let solution = (self.method.algorithm().solve)(&problem, &criterion, limits)?;
+        self.assemble(&criterion, solution, sample_time)
+    }
+
+    fn assemble(
+        &self,
+        criterion: &Criterion<'_>,
+        solution: IvSolution,
+        sample_time: SampleTime,
+    ) -> Result<Fit, IdentError> {
+        let mut workspace = Workspace::of_thread();
+        let sum_of_squares: f64 = (0..criterion.data.len())
+            .map(|record| {
+                let eps = criterion.residuals_of(&solution.theta, record, &mut workspace);
+                dot(&eps, &eps)
+            })
+            .sum();
+        if !sum_of_squares.is_finite() {
+            return Err(IdentError::NoFiniteLoss);
+        }
+        let power: f64 = criterion.data.iter().map(|d| dot(d.u, d.u)).sum();
+        let exact = sum_of_squares <= EXACT * EXACT * power;
+        let mut termination = solution.termination;
+        if exact {
+            termination.reason = Reason::ExactFit;
+        }
+        let minimum = Solution {
+            held: vec![false; solution.theta.len()],
+            theta: solution.theta,
+            sum_of_squares,
+            termination,
+            start: format!("{}, {}", self.method, self.instruments),
+        };
+        Ok(Fit {
+            covariance: solution.covariance.filter(|_| !exact),
+            ..assembled_fit(criterion, self.method.structure(), sample_time, minimum)?
+        })
+    }
+
+    /// Refuses fewer rows of the filtered equation than parameters and initial states of the filter.
+    fn check_rows(&self, problem: &IvProblem<'_>, records: &[Record]) -> Result<(), IdentError> {
+        let o = &self.orders;
+        let states = o.nf + o.nc;
+        let each = problem.rows(o.nd);
+        let rows: usize = each.iter().sum();
+        let short = each.iter().position(|n| *n <= states);
+        if rows > o.parameters() + states * records.len() && short.is_none() {
+            return Ok(());
+        }
+        let record = &records[short.unwrap_or(0)];
+        Err(IdentError::TooFewSamples {
+            label: record.label().to_owned(),
+            samples: record.len(),
+            orders: o.to_string(),
+            needed: problem.first + o.nd + states + o.parameters().div_ceil(records.len()),
+        })
+    }
+
+    fn check_options(&self) -> Result<(), IdentError> {
+        let refuse = |option: &str, found: String, expected: &str| {
+            Err(IdentError::BadOption {
+                option: option.to_owned(),
+                found,
+                expected: expected.to_owned(),
+            })
+        };
+        if self.max_iterations == 0 {
+            return refuse("the limit of iterations", "0".to_owned(), "1 or more");
+        }
+        if !(self.tolerance.is_finite() && self.tolerance > 0.0) {
+            return refuse(
+                "the tolerance",
+                self.tolerance.to_string(),
+                "a positive share of the standard errors, such as 1e-4",
+            );
+        }
+        Ok(())
+    }
+}

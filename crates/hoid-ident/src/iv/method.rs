@@ -1,0 +1,57 @@
+//! The methods of instrumental variables. A new one is a file with its [`Algorithm`] and a line in the list below.
+
+use std::fmt;
+
+use hoid_model::Structure;
+
+use super::{algorithm::Algorithm, iv4, rivbj, sriv};
+
+/// The list of the methods: variant, and the file that holds its algorithm.
+macro_rules! methods {
+    ($($(#[$doc:meta])* $method:ident = $file:ident,)+) => {
+        /// Which instrumental variable method.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[non_exhaustive]
+        pub enum IvMethod {
+            $($(#[$doc])* $method,)+
+        }
+
+        impl IvMethod {
+            /// All methods.
+            pub const ALL: [Self; [$(stringify!($method)),+].len()] = [$(Self::$method),+];
+
+            pub(super) fn algorithm(self) -> &'static Algorithm {
+                match self {
+                    $(Self::$method => &$file::ALGORITHM,)+
+                }
+            }
+        }
+    };
+}
+
+methods! {
+    /// The four-step method for ARX models.
+    Iv4 = iv4,
+    /// Simplified refined instrumental variable, for output-error models.
+    Sriv = sriv,
+    /// Refined instrumental variable, for Box-Jenkins models.
+    RivBj = rivbj,
+}
+
+impl IvMethod {
+    /// Short name: `iv4`, `sriv`, `rivbj`.
+    pub fn name(self) -> &'static str {
+        self.algorithm().name
+    }
+
+    /// The structure that the method fits.
+    pub fn structure(self) -> Structure {
+        self.algorithm().structure
+    }
+}
+
+impl fmt::Display for IvMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}

@@ -1,0 +1,88 @@
+//! The fit of each record, with its search in a lane.
+
+use hoid_lanes::InstructionSet;
+use hoid_model::{Record, SampleTime, Structure};
+
+use super::lanes::search;
+use crate::{
+    Fit, IdentError, InitialState,
+    criterion::{Criterion, Workspace},
+    initial_guess::continuation::{Averaged, Continuation, Slow},
+    initial_guess::guesses::initial_guesses_beside,
+    pem::constraints::ConstrainedCriterion,
+    pem::fit_problem::FitProblem,
+    pem::fit_settings::FitSettings,
+};
+
+/// A fit to each record; `None` for what is not searched side by side: anything but Box-Jenkins models without C, with their
+/// initial states estimated, without constraints, priors or a robust loss; records of different lengths; registers that this
+/// processor has not.
+pub(crate) fn fit_each(
+    settings: &FitSettings,
+    records: &[&Record],
+    path: InstructionSet,
+) -> Option<Vec<Result<Fit, IdentError>>> {
+    let o = &settings.orders;
+    let plain = settings.structure == Structure::BoxJenkins
+        && (o.nb > 0 && o.nc == 0 && o.nf > 0)
+        && settings.initial_state == InitialState::Estimate
+        && settings.is_unconstrained();
+    let n = records.first()?.len();
+    if !plain || records.iter().any(|record| record.len() != n) {
+        return None;
+    }
+    path.lanes()?;
+    let mut workspace = Workspace::of_thread();
+    let criteria: Vec<_> = (records.iter())
+        .map(|record| settings.criterion(std::slice::from_ref(*record), 0))
+        .collect();
+    let constrained: Vec<_> = (criteria.iter())
+        .map(|found| {
+            found
+                .as_ref()
+                .map(|(criterion, ts)| (settings.constrained(criterion), *ts))
+        })
+        .collect();
+    let mut slow = if settings.start.is_none() {
+        poles_of_averages(&constrained, path, &mut workspace)
+    } else {
+        Vec::new()
+    }
+    .into_iter();
+    let mut problems: Vec<Result<FitProblem<'_, '_>, IdentError>> = (constrained.iter())
+        .map(|found| {
+            let slow = slow.next().unwrap_or_default();
+            let (constrained, sample_time) = found.as_ref().map_err(|error| (*error).clone())?;
+            let own_starts = || initial_guesses_beside(slow, constrained.criterion, *sample_time, &mut workspace);
+            FitProblem::new(settings, constrained, *sample_time, own_starts)
+        })
+        .collect();
+    search(problems.iter_mut().flatten().collect(), path, &mut workspace);
+    Some(
+        problems
+            .into_iter()
+            .map(|problem| problem?.fit(&mut workspace))
+            .collect(),
+    )
+}
+
+/// What the averages of each record propose.
+fn poles_of_averages(
+    constrained: &[Result<(ConstrainedCriterion<'_, '_>, SampleTime), &IdentError>],
+    path: InstructionSet,
+    workspace: &mut Workspace,
+) -> Vec<Slow> {
+    let averaged: Vec<Option<Averaged>> = (constrained.iter())
+        .map(|found| (found.as_ref().ok()).and_then(|(constrained, ts)| Averaged::of(constrained.criterion, *ts)))
+        .collect();
+    let low: Vec<Option<Criterion<'_>>> = (averaged.iter())
+        .map(|averaged| averaged.as_ref().map(Averaged::criterion))
+        .collect();
+    let mut all: Vec<Option<Continuation<'_>>> = (averaged.iter().zip(&low))
+        .map(|(averaged, low)| Some(Continuation::new(averaged.as_ref()?, low.as_ref()?)))
+        .collect();
+    search(all.iter_mut().flatten().collect(), path, workspace);
+    (all.into_iter())
+        .map(|continuation| continuation.map(Continuation::slow).unwrap_or_default())
+        .collect()
+}

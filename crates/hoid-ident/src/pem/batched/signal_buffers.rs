@@ -1,0 +1,43 @@
+//! The signals of a span of samples, with the end of the span before in front.
+
+use super::rows::Rows;
+
+/// Signals of a span, a row for each sample and in it a number for each lane. The rows before the first hold the end of the span before.
+#[derive(Debug, Default)]
+pub(super) struct SignalBuffers {
+    pub s: Rows,
+    pub v: Rows,
+    pub eps: Rows,
+    pub x_b: Rows,
+    pub r: Rows,
+    pub x_f: Rows,
+    /// Impulse responses of 1/F and of D/F.
+    pub h: Rows,
+    pub g: Rows,
+    /// Responses to the initial states, orthogonal, one after the other.
+    pub q: Rows,
+}
+
+impl SignalBuffers {
+    /// Makes room for spans of so many samples, with zeros before the first.
+    pub fn begin(&mut self, history: usize, longest: usize, width: usize) {
+        for signal in [
+            &mut self.s,
+            &mut self.v,
+            &mut self.eps,
+            &mut self.x_b,
+            &mut self.r,
+            &mut self.x_f,
+        ] {
+            signal.make_room((history + longest) * width);
+            signal[..history * width].fill(0.0);
+        }
+    }
+
+    /// Keeps the end of a span for the next.
+    pub fn carry(&mut self, history: usize, count: usize, width: usize) {
+        for signal in [&mut self.s, &mut self.v, &mut self.x_b, &mut self.r, &mut self.x_f] {
+            signal.copy_within(count * width..(count + history) * width, 0);
+        }
+    }
+}

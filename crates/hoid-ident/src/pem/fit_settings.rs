@@ -1,0 +1,91 @@
+//! What a fit by the prediction error method needs to know beside the records.
+
+use std::collections::BTreeMap;
+
+use hoid_model::{Orders, Record, SampleTime, Structure};
+
+use crate::{
+    Constraint, IdentError, InitialState, Loss, Prior, SearchOptions,
+    criterion::{Criterion, Data, first_residual},
+    informative_data::{check_degrees_of_freedom, check_record, common_sample_time},
+    pem::constraints::ConstrainedCriterion,
+};
+
+/// The options of an estimator once they are checked and the automatic ones decided.
+#[derive(Debug, Clone)]
+pub(crate) struct FitSettings {
+    pub structure: Structure,
+    pub orders: Orders,
+    pub initial_state: InitialState,
+    pub search: SearchOptions,
+    /// Number of own starts from which the search runs to its end.
+    pub starts: usize,
+    /// Start of the search instead of the own ones.
+    pub start: Option<Vec<f64>>,
+    pub constraints: BTreeMap<String, Constraint>,
+    pub priors: BTreeMap<String, Prior>,
+    pub loss: Loss,
+    /// True when A must be stable too.
+    pub stable: bool,
+}
+
+impl FitSettings {
+    /// The criterion over these records, with residuals from sample `first` on at the earliest, and their sample time.
+    ///
+    /// # Errors
+    /// [`IdentError`] where the records are not informative enough.
+    pub fn criterion<'r>(
+        &self,
+        records: &'r [Record],
+        first: usize,
+    ) -> Result<(Criterion<'r>, SampleTime), IdentError> {
+        let sample_time = common_sample_time(records)?;
+        let first = first.max(first_residual(&self.orders, self.initial_state));
+        for record in records {
+            check_record(self.structure, &self.orders, record, first)?;
+        }
+        let criterion = Criterion {
+            orders: self.orders,
+            data: Data::of(records),
+            initial: self.initial_state,
+            first,
+            weights: None,
+        };
+        check_degrees_of_freedom(&criterion, records)?;
+        Ok((criterion, sample_time))
+    }
+
+    /// The criterion with the constraints and the priors.
+    pub fn constrained<'c, 'a>(&self, criterion: &'c Criterion<'a>) -> ConstrainedCriterion<'c, 'a> {
+        let names = self.orders.parameter_names();
+        let unlimited = (f64::NEG_INFINITY, f64::INFINITY);
+        let limit = |name: &String| self.constraints.get(name).map_or(unlimited, |c| c.limits());
+        let n = criterion.residuals() as f64;
+        let guess = |(i, name): (usize, &String)| {
+            let prior = self.priors.get(name)?;
+            Some((
+                i,
+                Prior {
+                    weight: n * prior.weight,
+                    ..*prior
+                },
+            ))
+        };
+        ConstrainedCriterion {
+            criterion,
+            limits: (!self.constraints.is_empty()).then(|| names.iter().map(limit).collect()),
+            prior: names.iter().enumerate().filter_map(guess).collect(),
+            stable: self.stable,
+        }
+    }
+
+    /// True for the plain sum of squares: no constraint, no prior, no other loss.
+    pub fn is_unconstrained(&self) -> bool {
+        self.constraints.is_empty() && self.priors.is_empty() && self.loss == Loss::Quadratic && !self.stable
+    }
+
+    /// True when least squares gives the fit in one step.
+    pub fn is_linear(&self) -> bool {
+        self.structure.is_linear() && self.initial_state != InitialState::Backcast && self.is_unconstrained()
+    }
+}

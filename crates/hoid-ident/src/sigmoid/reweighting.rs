@@ -1,0 +1,82 @@
+//! The fit with a noise level before the change and another after it: fit and levels in turn, until the ratio of the levels
+//! settles. The squared residuals are weighted with the inverse of the level in force ([`super::noise_level`]).
+
+use super::{
+    layout::Instant,
+    noise_level::{levels, weights},
+    objective::{ChangeCriterion, Data},
+    search::search,
+};
+use crate::{
+    IdentError, Reason, SearchOptions,
+    linalg::least_squares::dot,
+    optimize::{Minimum, Objective},
+};
+
+/// Rounds of fit and noise levels in turn.
+const ROUNDS: usize = 20;
+/// Rounds end when the ratio of the levels moves by less than this share; its own standard error is `1/sqrt n`, about 1 %.
+const SETTLED: f64 = 1e-6;
+/// Relative change of the loss that does not matter: of the log-likelihood of 10000 residuals, a two-hundredth.
+const NO_MATTER: f64 = 1e-6;
+
+/// The minimum with the noise levels found in turn with the fit, and the levels; `None` where the residuals are rounding.
+///
+/// # Errors
+/// [`IdentError::NoFiniteLoss`].
+pub(super) fn with_levels(
+    criterion: &mut ChangeCriterion<'_>,
+    mut minimum: Minimum,
+    options: &SearchOptions,
+) -> Result<(Minimum, Option<[f64; 2]>), IdentError> {
+    let mut levels = None;
+    let mut iterations = minimum.termination.iterations;
+    for round in 0..ROUNDS {
+        let Some(found) = levels_at(criterion, &minimum.theta) else {
+            break;
+        };
+        let before = levels.replace(found);
+        let ratio = |s: [f64; 2]| s[1] / s[0];
+        if before.is_some_and(|b: [f64; 2]| (ratio(found) / ratio(b) - 1.0).abs() < SETTLED) {
+            break;
+        }
+        let weights = weights(found, &shares(criterion, &minimum.theta));
+        let kept = criterion.weights.replace(weights);
+        let next = search(criterion, minimum.theta.clone(), options, None).ok_or(IdentError::NoFiniteLoss)?;
+        iterations += next.termination.iterations;
+        let change = next.at.sum_of_squares / minimum.at.sum_of_squares - 1.0;
+        if round > 0 && change > NO_MATTER {
+            // Two changes that each look worse with the noise levels of the other: the likelier one stays.
+            (criterion.weights, levels) = (kept, before);
+            break;
+        }
+        minimum = next;
+        if round + 1 == ROUNDS && change < -NO_MATTER && minimum.termination.converged() {
+            minimum.termination.reason = Reason::IterationLimit;
+        }
+    }
+    minimum.termination.iterations = iterations;
+    Ok((minimum, levels))
+}
+
+/// Share of the change at the time of each residual, without the delay: the remnant has none.
+fn shares(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> Vec<Vec<f64>> {
+    let ts = criterion.sample_time.s();
+    let of = |d: &Data<'_>| {
+        (criterion.first..d.u.len())
+            .map(|t| Instant::at(theta, d.start_s + t as f64 * ts).share)
+            .collect()
+    };
+    criterion.data.iter().map(of).collect()
+}
+
+fn levels_at(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> Option<[f64; 2]> {
+    let residuals: Option<Vec<Vec<f64>>> = (0..criterion.data.len())
+        .map(|record| criterion.residuals_of(theta, record))
+        .collect();
+    let residuals = residuals?;
+    let size: f64 = residuals.iter().map(|r| dot(r, r)).sum();
+    let power = criterion.output_power();
+    // Rounding has no level.
+    (size > 1e-24 * power).then(|| levels(&residuals, &shares(criterion, theta)))?
+}
