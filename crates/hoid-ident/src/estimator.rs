@@ -179,7 +179,9 @@ impl Estimator {
     /// Those of [`Estimator::fit`], for each record by itself.
     pub fn fit_each(&self, records: &[&Record]) -> Vec<Result<Fit, IdentError>> {
         let batched = match self.check() {
-            Ok(()) if self.focus == Focus::Prediction => batched::fit_each(&self.settings(), records, InstructionSet::Best),
+            Ok(()) if self.focus == Focus::Prediction => {
+                batched::fit_each(&self.settings(), records, InstructionSet::Best)
+            }
             _ => None,
         };
         batched.unwrap_or_else(|| {

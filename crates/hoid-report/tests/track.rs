@@ -8,7 +8,7 @@ use hoid_model::{
 };
 use hoid_report::{BatchLine, ReportError, TraceSection, TrackReport, batch_fit};
 use hoid_sim::{RunSeed, Simulator};
-use hoid_track::{Method, StartAt, StartCovariance, Trace, TrackOptions, track};
+use hoid_track::{Method, StartAt, Trace, TrackOptions, track};
 
 const SPANS: [(f64, f64); 2] = [(0.0, 30.72), (51.20, 81.92)];
 
@@ -166,7 +166,9 @@ fn three_methods_over_each_other_show_all_that_is_asked_for() {
     let b0 = bj[1].parameters()[0].1;
     let (value, error) = hoid_report::numbers::with_uncertainty(b0.value, b0.standard_error);
     assert!(html.contains(&format!("<td class=\"n\">{value} \u{b1} {error}</td>")));
-    assert!(html.contains("exponential, memory 2.56 s for b0, b1; 20.48 s for d1, f1, f2"));
+    assert!(html.contains(
+        "exponential forgetting, memory 2.56 s (256 samples) for b0, b1; 20.48 s (2048 samples) for d1, f1, f2"
+    ));
 }
 
 #[test]
@@ -193,7 +195,7 @@ fn a_start_from_nothing_and_shortened_steps_are_told() {
     let record = run();
     let mut options = options(Method::rpem());
     options.start = StartAt::Nothing;
-    options.covariance = StartCovariance::Multiple(1e4);
+    options.method.set("covariance", "1e4").unwrap();
     let trace = track(&record, &options, 1).unwrap();
     assert!(trace.counts().shortened > 0);
     let html = report(&record, vec![section("RPEM", &trace, &[])]).to_html().unwrap();
@@ -257,7 +259,7 @@ fn short_records_and_averages_have_their_page() {
 fn the_delay_is_shown_where_it_is_tracked() {
     let record = run();
     let mut with_delay = options(Method::physical());
-    with_delay.track_delay_s = Some((0.2, 0.4));
+    with_delay.method.set("track_delay", "0.2..0.4").unwrap();
     let trace = track(&record, &with_delay, 8).unwrap();
     let html = report(&record, vec![section("physical", &trace, &[])])
         .to_html()
@@ -277,7 +279,7 @@ fn a_batch_fit_beside_a_delay_that_changed_has_the_delay_of_its_span() {
         .unwrap();
     let mut with_delay = options(Method::adaptive());
     with_delay.orders = Method::adaptive().usual_orders(29);
-    with_delay.track_delay_s = Some((0.2, 0.4));
+    with_delay.method.set("track_delay", "0.2..0.4").unwrap();
     let trace = track(&record, &with_delay, 8).unwrap();
     let (_, fit) = batch_fit(&trace, &record, SPANS[1]).unwrap();
     assert!((34..=36).contains(&fit.orders().nk), "{}", fit.orders());
@@ -289,12 +291,12 @@ fn a_batch_fit_beside_a_delay_that_changed_has_the_delay_of_its_span() {
 fn windows_and_instruments_have_their_page() {
     let record = run();
     let mut window = options(Method::window());
-    window.every = 500;
+    window.method.set("refit", "500").unwrap();
     let traces = [track(&record, &window, 8).unwrap(), tracked(Method::rriv(), &record)];
     let sections = vec![section("window", &traces[0], &[]), section("RRIV", &traces[1], &[])];
     let html = report(&record, sections).to_html().unwrap();
     check_page(&html);
-    assert!(html.contains("window of 20 s, a fit every 500 samples"));
+    assert!(html.contains("window of 20s, a fit every 500 samples"));
     assert_eq!(figure(&html, "innovation").matches("rotate(-90").count(), 2);
 }
 

@@ -2,7 +2,7 @@
 
 use hoid_ident::{Fit, IdentError};
 use hoid_model::Record;
-use hoid_sim::{Simulator, Stream};
+use hoid_sim::{RunSeed, Simulator};
 use hoid_track::track_from;
 
 use crate::{

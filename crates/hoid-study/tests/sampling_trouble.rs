@@ -61,12 +61,12 @@ fn only(found: &[Found], kinds: &[QualityIssueKind]) {
 #[test]
 fn jitter_and_clocks_have_the_size_that_was_planted() {
     for (found, _) in found(&[SamplingDefect::Jitter], &resampled()) {
-        only(&found, &[TroubleKind::Jitter]);
+        only(&found, &[QualityIssueKind::Jitter]);
         // 0.2 of a sample, clamped at 2.25 standard deviations, which leaves 0.194.
         assert!((found[0].size / 0.01 - 0.194).abs() < 0.006, "{}", found[0]);
     }
     for (found, _) in found(&[SamplingDefect::SlowClock], &ReadOptions::default()) {
-        only(&found, &[TroubleKind::Clock]);
+        only(&found, &[QualityIssueKind::Clock]);
         assert!((found[0].size - (1.0 / 0.998 - 1.0)).abs() < 1e-6, "{}", found[0]);
     }
 }
@@ -92,7 +92,7 @@ fn missing_and_repeated_rows_are_counted_one_by_one() {
         }
     }
     for (found, _) in found(&[SamplingDefect::Repeated], &ReadOptions::default()) {
-        only(&found, &[TroubleKind::Repeated]);
+        only(&found, &[QualityIssueKind::Repeated]);
         assert!((15..70).contains(&found[0].rows), "{}", found[0]);
     }
 }
@@ -100,19 +100,19 @@ fn missing_and_repeated_rows_are_counted_one_by_one() {
 #[test]
 fn rails_steps_and_stalls_are_found_where_they_are() {
     for (found, record) in found(&[SamplingDefect::Saturated], &ReadOptions::default()) {
-        only(&found, &[TroubleKind::Saturated, TroubleKind::Saturated]);
+        only(&found, &[QualityIssueKind::Saturated, QualityIssueKind::Saturated]);
         let u = record.output();
         let sd = (u.iter().map(|u| u * u).sum::<f64>() / u.len() as f64).sqrt();
         let beyond = u.iter().filter(|u| u.abs() > 1.5 * sd).count();
         assert_eq!(found.iter().map(|one| one.rows).sum::<usize>(), beyond);
     }
     for (found, record) in found(&[SamplingDefect::Quantised], &ReadOptions::default()) {
-        only(&found, &[TroubleKind::Quantised]);
+        only(&found, &[QualityIssueKind::Quantised]);
         let sd = (record.output().iter().map(|u| u * u).sum::<f64>() / record.len() as f64).sqrt();
         assert!((found[0].size / (8.0 * sd / 256.0) - 1.0).abs() < 1e-9, "{}", found[0]);
     }
     for (found, record) in found(&[SamplingDefect::Stalled], &ReadOptions::default()) {
-        only(&found, &[TroubleKind::Stalled]);
+        only(&found, &[QualityIssueKind::Stalled]);
         let place = found[0].places[0];
         // Rows are counted from 1; the first row of a stall still has a value of its own.
         assert_eq!((place.row, place.rows), (record.len() / 3 + 2, 49));

@@ -61,7 +61,7 @@ fn options(method: Method) -> TrackOptions {
 fn of_the_text(method: Method) -> TrackOptions {
     let mut settings = vec![("memory", "256"), ("covariance", "0.1"), ("limit", "inf")];
     settings.extend((method != Method::rls()).then_some(("stable", "noise")));
-    options(method).with(&settings).unwrap()
+    options(method.clone()).with(&settings).unwrap()
 }
 
 /// What one run of one method gave.

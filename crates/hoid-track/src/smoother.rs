@@ -21,10 +21,10 @@
 
 use hoid_core::adaptive::{
     bank::Bank,
-    signal_ring::DelayedSignals,
     hypothesis::Hypothesis,
     prior::{ChangePrior, OPERATOR},
     response::{Response, Signals},
+    signal_ring::DelayedSignals,
 };
 use hoid_model::Record;
 

@@ -13,7 +13,7 @@ use hoid::{
         scenario::{Realisation, RemnantStrength},
     },
     prelude::*,
-    track::{Memory, Method, Stable, StartAt, StartCovariance, Trace, TrackOptions, Tracker, track},
+    track::{Method, StartAt, Trace, TrackOptions, Tracker, track},
 };
 use rayon::prelude::*;
 
@@ -68,7 +68,7 @@ fn options(method: Method) -> TrackOptions {
 fn of_the_text(method: Method) -> TrackOptions {
     let mut settings = vec![("memory", "256"), ("covariance", "0.1"), ("limit", "inf")];
     settings.extend((method != Method::rls()).then_some(("stable", "noise")));
-    options(method).with(&settings).unwrap()
+    options(method.clone()).with(&settings).unwrap()
 }
 
 /// RMS of the relative error over t in [10, 81.92], per cent, and the share of rows that convert.
@@ -175,15 +175,16 @@ fn divergence(runs: usize) {
                 total += runs;
                 let found = on_all_cores(runs, |r| {
                     let record = run(&simulator, cell, r);
-                    Method::ALL.map(|method| {
-                        let trace = track(&record, &options(method), 1);
+                    let diverges = |method: Method| {
+                        let trace = track(&record, &options(method.clone()), 1);
                         trace.map_or(true, |trace| {
                             let bad = |v: &f64| !v.is_finite() || v.abs() > 10.0;
                             (0..trace.len()).any(|k| trace.theta(k).iter().any(bad))
                         })
-                    })
+                    };
+                    Method::all().into_iter().map(diverges).collect::<Vec<bool>>()
                 });
-                for (i, method) in Method::ALL.into_iter().enumerate() {
+                for (i, method) in Method::all().into_iter().enumerate() {
                     let n = found.iter().filter(|f| f[i]).count();
                     *diverged.entry(method.name()).or_default() += n;
                     if n > 0 {
@@ -215,7 +216,7 @@ fn endurance(samples: usize) {
     let span = record.span(0.0, 30.72).unwrap();
     let methods = [Method::rls(), Method::rpem(), Method::physical(), Method::rriv()];
     let lines = on_all_cores(methods.len(), |i| {
-        let options = options(methods[i as usize]);
+        let options = options(methods[i as usize].clone());
         let mut tracker = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
         let begin = std::time::Instant::now();
         let (mut largest, mut largest_variance) = (0.0_f64, 0.0_f64);

@@ -87,7 +87,7 @@ fn the_two_sided_estimate_is_closer_and_its_bands_hold() {
 fn the_methods_of_the_literature_follow_a_change() {
     for method in [Method::fused(), Method::ekf(), Method::ukf()] {
         let all: Vec<_> = (0..4)
-            .map(|replication| errors(&run(Condition::C3, 2, 0.1, replication), &options(method)))
+            .map(|replication| errors(&run(Condition::C3, 2, 0.1, replication), &options(method.clone())))
             .collect();
         let found: [f64; 5] = std::array::from_fn(|i| mean(&all, 0, i));
         println!("{}: {found:.3?}", method.name());

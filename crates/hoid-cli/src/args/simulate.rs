@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use hoid_model::scenario::{Condition, Realisation};
+use hoid_model::{
+    remnant_gain::NoiseDefinition,
+    scenario::{Condition, Realisation},
+};
 
 use super::choices::choice_of;
 
@@ -95,4 +98,3 @@ pub enum StateName {
     Initial,
     Last,
 }
-

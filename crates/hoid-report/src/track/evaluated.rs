@@ -32,7 +32,10 @@ pub fn of_name(operator: &OperatorEstimate, name: &str) -> Option<Estimate> {
 /// Names of the parameters that are shown; tau_e only where a method tracks it.
 pub fn operator_names(traces: &[Evaluated<'_>]) -> Vec<&'static str> {
     let mut names = OPERATOR_COLUMNS.to_vec();
-    if traces.iter().any(|t| t.section.trace.options().method.track_delay_s().is_some()) {
+    if traces
+        .iter()
+        .any(|t| t.section.trace.options().method.track_delay_s().is_some())
+    {
         names.push("tau_e");
     }
     names

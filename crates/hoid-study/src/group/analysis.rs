@@ -12,7 +12,7 @@ use std::path::Path;
 
 use hoid_ident::{Estimator, Fit, GreyBox, choose_orders, order_selection::Criterion};
 use hoid_model::{Record, Structure, uncertainty::Estimate};
-use hoid_track::{Method, StartAt, TrackOptions, track};
+use hoid_track::{StartAt, TrackOptions, track};
 
 use super::{
     analysis_settings::AnalysisSettings,
@@ -111,8 +111,8 @@ impl<'a> RunAnalysis<'a> {
                     Err(reason) => self.rows.failed(Some(window), label, &reason),
                 }
             }
-            for method in self.settings.methods.clone() {
-                let method = Method::from(method);
+            // Their names were checked with the manifest.
+            for method in self.settings.recursions().unwrap_or_default() {
                 if method.usual_structure() == structure {
                     let options = TrackOptions {
                         start: StartAt::Span(Some((windows[0].from_s, windows[0].to_s))),

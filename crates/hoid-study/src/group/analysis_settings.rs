@@ -52,7 +52,10 @@ impl AnalysisSettings {
     /// # Errors
     /// A name that no method has.
     pub(super) fn recursions(&self) -> Result<Vec<Method>, String> {
-        let of = |name: &String| name.parse::<Method>().map_err(|error| format!("analysis.methods: {error}"));
+        let of = |name: &String| {
+            name.parse::<Method>()
+                .map_err(|error| format!("analysis.methods: {error}"))
+        };
         self.methods.iter().map(of).collect()
     }
 

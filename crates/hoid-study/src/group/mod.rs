@@ -43,7 +43,7 @@ mod traces;
 mod virtual_subjects;
 mod windows;
 
-pub use analysis_settings::{AnalysisSettings, MethodName};
+pub use analysis_settings::AnalysisSettings;
 pub use condition_settings::ConditionSettings;
 pub use manifest::{MANIFEST, Manifest, RunEntry};
 pub use pattern::{Matched, Pattern};

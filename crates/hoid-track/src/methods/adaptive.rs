@@ -342,8 +342,8 @@ impl<const M: usize> AdaptiveRecursion<M> {
         let first = first_hypothesis(from, 1.0, sample_time)?.with_extra_delay(nk - shortest);
         let d = &from.values[OPERATOR..];
         let memory = vec![[0.0; 6]; delays.count()];
-        let model =
-            AdaptiveFilter::with_delays(first, d, change_prior(options, setup, sample_time)?, memory).ok_or_else(outside)?;
+        let model = AdaptiveFilter::with_delays(first, d, change_prior(options, setup, sample_time)?, memory)
+            .ok_or_else(outside)?;
         Ok(Self {
             model: Box::new(model),
             delay: DelayLine::new(vec![0.0; shortest]),

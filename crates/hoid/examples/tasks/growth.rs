@@ -13,7 +13,7 @@ use std::{hint::black_box, time::Instant};
 
 use hoid::{
     prelude::*,
-    track::{Method, StartAt, StartCovariance, TrackOptions, track},
+    track::{Method, StartAt, TrackOptions, track},
 };
 
 use super::{data::NK, traced};

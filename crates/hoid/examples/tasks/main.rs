@@ -44,7 +44,7 @@ use hoid::{
     prelude::*,
     sim::Signals,
     thesis::reproduction::{Reproduction, reproduce},
-    track::{Memory, Method, StartAt, StartCovariance, TrackOptions, track},
+    track::{Method, StartAt, TrackOptions, track},
 };
 
 /// Start of the recursive prediction-error method: b0, b1, d1, f1, f2.

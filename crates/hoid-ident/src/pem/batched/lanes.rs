@@ -119,7 +119,7 @@ impl Lanes {
 
     /// The criterion of all lanes.
     pub fn pass(&mut self, path: InstructionSet) {
-        path.do_with(Pass {
+        path.with_lanes(Pass {
             orders: self.orders,
             first: self.first,
             n: self.n,
