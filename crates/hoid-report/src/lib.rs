@@ -12,7 +12,6 @@
 mod error;
 pub mod figures;
 mod group;
-pub mod numbers;
 mod page;
 mod report;
 mod tables;
@@ -20,6 +19,7 @@ mod track;
 
 pub use error::ReportError;
 pub use group::{FrequencyTables, GroupReport, GroupTables, write_group_pages};
+pub use hoid_model::numbers;
 pub use page::{render_with, write_page, write_report};
 pub use report::{ModelSection, Report, known_operator};
 pub use track::{BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, usual_batch_fits};

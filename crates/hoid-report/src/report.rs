@@ -2,7 +2,7 @@
 
 use hoid_ident::{
     Choice, Fit, MarginEstimates,
-    validation::{Correlation, Quality, Validation},
+    validation::{Correlation, GoodnessOfFit, Validation},
 };
 use hoid_model::{OperatorParameters, Record};
 use minijinja::{Value, context};
@@ -56,7 +56,7 @@ impl Report<'_> {
             return Err(ReportError::NoModels);
         }
         let validations: Vec<Vec<Result<Validation, String>>> = self.models.iter().map(validate).collect();
-        let qualities: Vec<Result<Quality, String>> = self
+        let qualities: Vec<Result<GoodnessOfFit, String>> = self
             .models
             .iter()
             .zip(&validations)
@@ -132,13 +132,13 @@ fn validate(model: &ModelSection<'_>) -> Vec<Result<Validation, String>> {
 }
 
 /// VAF and NRMSE over all records together, or the reason why there are none.
-fn quality_of(model: &ModelSection<'_>, validations: &[Result<Validation, String>]) -> Result<Quality, String> {
+fn quality_of(model: &ModelSection<'_>, validations: &[Result<Validation, String>]) -> Result<GoodnessOfFit, String> {
     if model.records.is_empty() {
         return Err("no record was given".to_owned());
     }
     let validations = validations.iter().map(|v| v.as_ref().map_err(Clone::clone));
     let validations: Vec<&Validation> = validations.collect::<Result<_, _>>()?;
-    Ok(Quality::together(model.records.iter().zip(validations)))
+    Ok(GoodnessOfFit::pooled(model.records.iter().zip(validations)))
 }
 
 fn section(index: usize, model: &ModelSection<'_>, validations: &[Result<Validation, String>]) -> Value {
