@@ -3,7 +3,7 @@
 use hoid_ident::{
     Choice, Fit, GreyBoxFit, IdentError, MarginEstimates, Root,
     grey_box::OrderCandidate,
-    validation::{LjungBox, Quality, Validation},
+    validation::{GoodnessOfFit, LjungBox, Validation},
 };
 use hoid_model::{
     NotConvertible, Orders, Record,
@@ -135,7 +135,7 @@ pub fn ljung_box(test: Option<&LjungBox>) -> Value {
 }
 
 fn residual_tests(v: &Validation) -> Value {
-    let signs = v.signs();
+    let signs = v.diagnostics();
     json!({
         "ljung_box": ljung_box(v.ljung_box.as_ref()),
         "coloured_residuals": signs.coloured_residuals,
@@ -144,7 +144,7 @@ fn residual_tests(v: &Validation) -> Value {
     })
 }
 
-fn quality(q: &Quality, fit: &Fit) -> Value {
+fn quality(q: &GoodnessOfFit, fit: &Fit) -> Value {
     json!({
         "vaf_simulation": number(q.vaf_simulation),
         "vaf_prediction": number(q.vaf_prediction),
@@ -167,7 +167,7 @@ pub struct Identified<'a> {
     pub fit: &'a Fit,
     pub choice: Option<&'a Choice>,
     pub grey_box: Option<&'a GreyBoxFit>,
-    pub quality: Quality,
+    pub quality: GoodnessOfFit,
     pub operator: &'a Result<OperatorEstimate, NotConvertible>,
     pub remnant: Option<&'a Result<RemnantEstimate, NotConvertible>>,
     pub margins: Option<&'a MarginEstimates>,
@@ -175,7 +175,7 @@ pub struct Identified<'a> {
     pub validations: &'a [Validation],
     /// Horizon, VAF and NRMSE of the prediction that far ahead.
     pub ahead: Option<(usize, f64, f64)>,
-    pub validation: Option<(&'a str, Quality)>,
+    pub validation: Option<(&'a str, GoodnessOfFit)>,
     pub settings: &'a [(String, String)],
 }
 

@@ -4,7 +4,7 @@ use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 use hoid_ident::{
     Choice, Fit, GreyBoxFit, MarginEstimates,
     order_selection::Criterion,
-    validation::{Quality, Validation},
+    validation::{GoodnessOfFit, Validation},
 };
 use hoid_model::{
     NotConvertible, Record,
@@ -132,7 +132,7 @@ pub fn steps(n: usize) -> String {
 }
 
 /// Loss and fit percentages.
-pub fn quality(fit: &Fit, q: &Quality) -> String {
+pub fn quality(fit: &Fit, q: &GoodnessOfFit) -> String {
     let variance = if fit.is_robust() {
         "square of the robust scale (median absolute residual / 0.6745)".to_owned()
     } else {
@@ -270,7 +270,7 @@ pub fn residual_tests(files: &[String], validations: &[Validation]) -> String {
     let mut rows = table(&["residuals of", "Ljung-Box Q", "degrees", "p", "signs"]);
     let (mut coloured, mut missed, mut feedback) = (false, false, false);
     for (file, v) in files.iter().zip(validations) {
-        let signs = v.signs();
+        let signs = v.diagnostics();
         let mut words = Vec::new();
         for (there, seen, word) in [
             (signs.coloured_residuals, &mut coloured, "not white"),

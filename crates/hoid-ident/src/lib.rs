@@ -1,24 +1,73 @@
-//! Batch estimators: from a [`Record`](hoid_model::Record) to a [`Fit`].
+//! Identification of the human operator from records: batch estimators.
+//!
+//! **The problem.** A person tracks a target: they see the error e and move the control, u. Both are sampled with the period Ts.
+//! What dynamics lead from e to u, how well are they determined, and what of u do they leave unexplained, the remnant?
+//!
+//! **The model.** Everything here is a case of
+//!
+//! `A(q) u(t) = (B(q)/F(q)) q^-nk e(t) + (C(q)/D(q)) eps(t)`
+//!
+//! with polynomials in the backward shift `q^-1`, `A = 1 + a1 q^-1 + ..`, `B = b0 + b1 q^-1 + ..`, and white innovations eps
+//! with the variance sigma^2. B/F with nk is the operator with the delay, C/D shapes the remnant; structures set some of the
+//! polynomials to one (ARX: A and B; Box-Jenkins: B, C, D and F).
+//!
+//! **The method.** For given coefficients theta the best prediction of u(t) from all that was before leaves
+//!
+//! `eps(t, theta) = (D/C) (A u(t) - (B/F) q^-nk e(t))`
+//!
+//! and theta minimises `V = (1/N) sum eps(t, theta)^2`: the prediction error method (L. Ljung, *System Identification*, 1999,
+//! ch. 7). It is consistent where the structure holds the true dynamics, in a closed loop too if there is a delay in the loop, and
+//! it attains the Cramér-Rao bound for normal innovations. Its covariance is `sigma^2 (psi' psi)^-1` with `psi = -d eps/d theta`.
+//! What a record does not say about the time before it, the initial states, enters eps linearly and is eliminated exactly for
+//! each theta. ARX is linear in theta and solved in one step; the others by damped Gauss-Newton from several starts.
+//!
+//! ```
+//! use hoid_ident::Estimator;
+//! use hoid_model::{Structure, scenario::{Condition, Scenario}};
+//! use hoid_sim::Simulator;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // A run of a simulated person in condition C1, 81.92 s at 100 Hz.
+//! let record = Simulator::new(&Scenario::condition(Condition::C1))?.run(Default::default(), false)?;
+//! // Box-Jenkins with two poles and a delay of 28 samples, 0.28 s.
+//! let estimator = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29));
+//! let fit = estimator.fit(std::slice::from_ref(&record))?;
+//! // Coefficients with standard errors, loss, how the search ended.
+//! println!("{fit}");
+//! // K_e, T_L, omega_nm, zeta_nm and tau_e with standard errors.
+//! let operator = fit.operator()?;
+//! println!("{operator}");
+//! // Does it describe the record, and are the residuals white?
+//! println!("{}", fit.validate(&record)?);
+//! let k_e = operator.k_e;
+//! assert!((k_e.value - 0.09).abs() < 4.0 * k_e.standard_error.unwrap_or(0.0));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! **Where to find what**
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`Estimator`] | structure, orders and options; `fit` |
-//! | `prediction_error` | the criterion of the general model and its gradients |
-//! | `initial_states` | what a record does not say about its past, eliminated exactly |
-//! | `stationary_past` | the noise before the record, when it was stationary |
-//! | `search`, `stable_coordinates` | damped Gauss-Newton, also along the border of stability |
-//! | `searches`, `quest`, `side_by_side` | the searches from all starts, the fit at the lowest minimum; those of many records at a time |
-//! | `objective`, `robust`, `simulation_focus` | bounds and priors, a loss against outliers, models that are to simulate |
-//! | `starts`, `continuation`, `shared_poles` | where the search begins when nobody says |
-//! | `arx`, `least_squares` | linear regression by QR with column pivoting |
-//! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
-//! | [`instrumental`] | instrumental variables, in open and closed loop |
-//! | [`SigmoidChange`] | gains that follow a sigmoid, with the time and the rate of the change |
-//! | [`describing`] | describing function, coherence, remnant spectrum and margins by Fourier coefficients |
-//! | [`order_search`] | ranges of orders and delay, criteria, the chosen model |
+//! | [`Estimator`] | the prediction error method: structure, orders, options; `fit`, `fit_each` |
+//! | [`Fit`] | the model, its covariance and criteria; prediction, simulation, frequency response, poles and margins |
 //! | [`validation`] | VAF, NRMSE, residual tests |
-//! | `derived` | poles, zeros, crossover and margins with standard errors |
-//! | [`Fit`] | model, covariance, how it ended; prediction, simulation, frequency response |
+//! | [`order_selection`] | ranges of orders and delay, criteria, the chosen model |
+//! | [`iv`] | instrumental variables, in open and closed loop |
+//! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
+//! | [`SigmoidChange`] | gains that follow a sigmoid, with the time and the rate of the change |
+//! | [`frequency`] | describing function, coherence, remnant spectrum and margins by Fourier coefficients |
+//! | [`linalg`] | sums of products, least squares by QR, the inverse of an information matrix |
+//!
+//! and inside, each using those before it:
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | `optimize` | minimisation of a sum of squares, also along the border of stability |
+//! | `criterion` | the prediction-error criterion of the general model and its gradients; initial states |
+//! | `multistart` | searches from several starts |
+//! | `initial_guess` | where a search begins |
+//! | `pem` | bounds, priors, robust loss, focus; fits of one record or of many side by side |
 
 mod assembled_fit;
 mod constraint;
@@ -40,6 +89,7 @@ pub mod order_selection;
 mod pem;
 pub mod settings;
 mod sigmoid;
+mod summary;
 pub mod validation;
 
 pub use constraint::{Constraint, Prior};

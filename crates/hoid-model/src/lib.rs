@@ -17,18 +17,22 @@
 //! | [`remnant`] | the remnant filter, its discretisations and its retrieval |
 //! | [`remnant_noise`] | the noise model of the exactly held remnant as a function of T_n, with derivatives |
 //! | [`uncertainty`] | standard errors of derived quantities by the delta method |
+//! | [`numbers`], [`estimate_table`] | numbers with as many digits as their standard error allows, also as a table |
 //! | [`controlled_element`], [`forcing`], [`schedule`], [`scenario`] | the task: plant, target signal, change over time, conditions C1-C6 |
 //! | [`margins`] | crossover frequency, phase and gain margin |
 //! | [`remnant_gain`] | the gain K_n that gives a demanded noise level |
 
 mod error;
 mod named_choice;
+mod estimate;
 
 pub mod controlled_element;
 pub mod delayed_operator;
 pub mod discretise;
+pub mod estimate_table;
 pub mod forcing;
 pub mod margins;
+pub mod numbers;
 pub mod operator;
 pub mod polynomial;
 pub mod polynomial_model;

@@ -5,38 +5,16 @@
 //! lead time is the ratio `T_L = K_e_dot / K_e`, whose first-order error is good as long as K_e stands several standard errors
 //! away from zero. Source: A. W. van der Vaart, *Asymptotic Statistics*, 1998, section 3.1.
 
+use std::fmt;
+
 use crate::{
     NotConvertible, OperatorParameters, PolynomialModel,
+    estimate_table::write_rows,
     operator::retrieval_jacobian,
     remnant::{self, RemnantDiscretisation},
 };
 
-/// A number with its standard error; `None` where the data give none (a delay that was fixed, a singular information matrix).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
-    /// The estimate.
-    pub value: f64,
-    /// Its standard error.
-    pub standard_error: Option<f64>,
-}
-
-impl Estimate {
-    /// An estimate with the variance of its error; a variance that is not finite or negative means no standard error.
-    pub fn with_variance(value: f64, variance: f64) -> Self {
-        Self {
-            value,
-            standard_error: (variance >= 0.0 && variance.is_finite()).then(|| variance.sqrt()),
-        }
-    }
-
-    /// A number without uncertainty of its own.
-    pub fn fixed(value: f64) -> Self {
-        Self {
-            value,
-            standard_error: None,
-        }
-    }
-}
+pub use crate::estimate::Estimate;
 
 /// The operator with the uncertainty of each parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,6 +72,20 @@ impl OperatorEstimate {
     }
 }
 
+impl fmt::Display for OperatorEstimate {
+    /// A row for each parameter: name, value ± standard error, unit.
+    ///
+    /// ```
+    /// # use hoid_model::{OperatorParameters, uncertainty::OperatorEstimate};
+    /// let operator = OperatorParameters { k_e: 0.09, t_l_s: 0.4, omega_nm_rad_s: 11.25, zeta_nm: 0.35, tau_e_s: 0.28 };
+    /// let table = OperatorEstimate::from(operator).to_string();
+    /// assert!(table.starts_with("K_e        0.09  deg/deg\n"));
+    /// ```
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_rows(f, self.rows().map(|(name, unit, estimate)| (name, estimate, unit)))
+    }
+}
+
 /// The remnant filter with the uncertainty of its parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RemnantEstimate {
@@ -105,6 +97,13 @@ pub struct RemnantEstimate {
     pub t_n_s: Estimate,
     /// Gain K_n.
     pub k_n: Estimate,
+}
+
+impl fmt::Display for RemnantEstimate {
+    /// A row for each parameter: name, value ± standard error, unit.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_rows(f, [("T_n", self.t_n_s, "s"), ("K_n", self.k_n, "")])
+    }
 }
 
 /// `gradient' P gradient` for a covariance by rows.

@@ -2,7 +2,7 @@
 
 use hoid_ident::{
     MarginEstimates,
-    validation::{LjungBox, Quality},
+    validation::{GoodnessOfFit, LjungBox},
 };
 use hoid_model::{
     NotConvertible, Orders,
@@ -101,7 +101,7 @@ pub fn plain_margins<'py>(py: Python<'py>, m: &Margins) -> PyResult<Bound<'py, P
     Ok(all)
 }
 
-pub fn quality<'py>(py: Python<'py>, q: &Quality) -> PyResult<Bound<'py, PyDict>> {
+pub fn quality<'py>(py: Python<'py>, q: &GoodnessOfFit) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     all.set_item("vaf_simulation", q.vaf_simulation)?;
     all.set_item("vaf_prediction", q.vaf_prediction)?;

@@ -209,7 +209,7 @@ impl PyFit {
 
     fn validate<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyDict>> {
         let v = self.over(py, record, Fit::validate)?;
-        let (all, signs) = (PyDict::new(py), v.signs());
+        let (all, signs) = (PyDict::new(py), v.diagnostics());
         all.set_item("first", v.first)?;
         all.set_item("quality", figures::quality(py, &v.quality)?)?;
         all.set_item("ljung_box", figures::ljung_box(py, v.ljung_box.as_ref())?)?;

@@ -2,7 +2,7 @@
 
 use hoid_ident::{
     Choice, Fit, MarginEstimates,
-    validation::{Quality, Validation},
+    validation::{GoodnessOfFit, Validation},
 };
 use hoid_model::{OperatorParameters, Record};
 
@@ -31,13 +31,13 @@ impl ModelSection<'_> {
     }
 
     /// VAF and NRMSE over all records together, or the reason why there are none.
-    pub(crate) fn quality(&self, validations: &[Result<Validation, String>]) -> Result<Quality, String> {
+    pub(crate) fn quality(&self, validations: &[Result<Validation, String>]) -> Result<GoodnessOfFit, String> {
         if self.records.is_empty() {
             return Err("no record was given".to_owned());
         }
         let validations = validations.iter().map(|v| v.as_ref().map_err(Clone::clone));
         let validations: Vec<&Validation> = validations.collect::<Result<_, _>>()?;
-        Ok(Quality::together(self.records.iter().zip(validations)))
+        Ok(GoodnessOfFit::pooled(self.records.iter().zip(validations)))
     }
 }
 

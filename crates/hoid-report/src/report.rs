@@ -1,6 +1,6 @@
 //! One self-contained HTML page about the models fitted to a record or to several.
 
-use hoid_ident::validation::{Correlation, Quality, Validation};
+use hoid_ident::validation::{Correlation, GoodnessOfFit, Validation};
 use hoid_model::Record;
 use minijinja::{Value, context};
 
@@ -38,7 +38,7 @@ impl Report<'_> {
         }
         let validations: Vec<Vec<Result<Validation, String>>> =
             self.models.iter().map(ModelSection::validate).collect();
-        let qualities: Vec<Result<Quality, String>> = self
+        let qualities: Vec<Result<GoodnessOfFit, String>> = self
             .models
             .iter()
             .zip(&validations)

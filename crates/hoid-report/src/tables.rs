@@ -3,7 +3,7 @@
 use hoid_ident::{
     Choice, Fit, InitialState, MarginEstimates,
     order_selection::Criterion,
-    validation::{Quality, Validation},
+    validation::{GoodnessOfFit, Validation},
 };
 use hoid_model::{OperatorParameters, Record, remnant::RemnantDiscretisation};
 use minijinja::{Value, context};
@@ -32,7 +32,7 @@ fn true_value(name: &str, truth: &OperatorParameters) -> Option<f64> {
 const OPERATOR_NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
 /// One column a model, one row a quantity.
-pub fn comparison(models: &[ModelSection<'_>], qualities: &[Result<Quality, String>]) -> Value {
+pub fn comparison(models: &[ModelSection<'_>], qualities: &[Result<GoodnessOfFit, String>]) -> Value {
     let row = |label: Value, unit: &str, cells: Vec<Value>, truth: Option<String>| {
         context! { label, unit, cells, truth => truth.unwrap_or_default() }
     };
@@ -42,7 +42,7 @@ pub fn comparison(models: &[ModelSection<'_>], qualities: &[Result<Quality, Stri
     let criterion =
         |f: &dyn Fn(&Fit) -> f64| -> Vec<Value> { models.iter().map(|m| Value::from(fixed(f(m.fit), 1))).collect() };
     let mut rows = vec![row(html("loss <i>V</i>"), &squared(&unit), each(&Fit::loss), None)];
-    type Part = fn(&Quality) -> f64;
+    type Part = fn(&GoodnessOfFit) -> f64;
     let percentages: [(&str, Part); 4] = [
         ("VAF, simulation<sup>1</sup>", |q| q.vaf_simulation),
         ("VAF, prediction<sup>1</sup>", |q| q.vaf_prediction),

@@ -36,6 +36,7 @@ mod memory;
 mod method;
 mod methods;
 mod options;
+mod outcome;
 mod over_record;
 mod past;
 mod plan;
@@ -60,13 +61,14 @@ pub use methods::{
     UkfOptions, WindowOptions,
 };
 pub use options::TrackOptions;
+pub use outcome::{Counts, Outcome};
 pub use over_record::{track, track_from};
 pub use plan::{TrackPlan, narrowed};
 pub use recursion::Sample;
 pub use setup::StartAt;
 pub use shared_options::{BoundOptions, DelayOptions, GainOptions, StabilityOptions};
 pub use trace::{OPERATOR_COLUMNS, Trace};
-pub use tracker::{Counts, Outcome, Tracker};
+pub use tracker::Tracker;
 
 /// Regressor and stability of the recursions, options of the kernel.
 pub use hoid_core::{predictor::Regressor, recursion::Stable};

@@ -5,10 +5,11 @@ use hoid_model::Record;
 
 use crate::{
     options::TrackOptions,
+    outcome::Counts,
     recursion::Sample,
     smoother,
     trace::{self, Trace, pack, packed_len},
-    tracker::{Counts, Tracker},
+    tracker::Tracker,
 };
 
 /// Tracks a record: the estimate after every `every`-th sample.

@@ -9,32 +9,11 @@ use hoid_model::{
 use crate::{
     change::Change,
     options::TrackOptions,
+    outcome::{Counts, Outcome},
     recursion::{Recursion, Sample},
     start::StartState,
     trace::operator_of,
 };
-
-/// Samples that were not as they should be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Counts {
-    /// Samples given.
-    pub samples: u64,
-    /// Samples with a fault in e or u, at which the estimate stayed.
-    pub skipped: u64,
-    /// Steps that stability or a bound made shorter.
-    pub shortened: u64,
-}
-
-/// What a tracker says of a sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outcome {
-    /// A-priori innovation; `None` at a skipped sample.
-    pub innovation: Option<f64>,
-    /// True when e or u was a fault.
-    pub skipped: bool,
-    /// True when stability or a bound made the step shorter.
-    pub shortened: bool,
-}
 
 /// A recursive estimate that takes one sample at a time.
 pub struct Tracker {

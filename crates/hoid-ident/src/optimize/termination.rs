@@ -61,3 +61,14 @@ impl Termination {
         )
     }
 }
+
+impl fmt::Display for Termination {
+    /// The reason, and the number of steps where there was a search.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.reason, self.iterations) {
+            (Reason::Direct, _) => write!(f, "{}", self.reason),
+            (_, 1) => write!(f, "{}; 1 iteration", self.reason),
+            (_, n) => write!(f, "{}; {n} iterations", self.reason),
+        }
+    }
+}

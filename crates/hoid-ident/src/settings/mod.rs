@@ -29,10 +29,12 @@
 //! into that form first, so that there is one reader of each type ([`Value`]).
 
 mod declare;
+mod kind;
 mod setting;
 mod value;
 
-pub use setting::{Bounds, Kind, MethodSpec, Setting};
+pub use kind::{Bounds, Kind};
+pub use setting::{MethodSpec, Setting};
 pub use value::{Value, named_pairs};
 
 use crate::IdentError;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use hoid_core::recursion::Stable;
 
-use super::Kind;
+use super::kind::Kind;
 use crate::Constraint;
 
 /// A type of values: its name, how it is read and written.

@@ -18,9 +18,9 @@ use hoid_model::{Detrend, Orders, SampleTime, Structure, scenario::ResolvedScena
 use hoid_track::{Method, StartAt, TrackOptions};
 
 use super::{
-    PlanProblem,
     estimator_table::{EstimatorTable, FIT, GREY_BOX, OfScenario, Order, OrdersTable, RECORD, StartValue},
     grid::{Axis, Variant},
+    problem::PlanProblem,
 };
 
 /// One estimator of a study: what is done with each record.

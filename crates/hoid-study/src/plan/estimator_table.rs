@@ -11,7 +11,7 @@ use hoid_track::{Method, StartAt, TrackOptions};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::PlanProblem;
+use super::problem::PlanProblem;
 
 /// Keys that want a list or a table as it stands.
 pub fn whole_keys() -> Vec<String> {

@@ -10,7 +10,7 @@ use toml::{
     de::{DeTable, DeValue},
 };
 
-use super::PlanProblem;
+use super::problem::PlanProblem;
 
 /// Most combinations of one table, so that a slip does not ask for all memory.
 const MOST: usize = 1_000_000;

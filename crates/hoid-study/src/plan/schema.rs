@@ -8,8 +8,8 @@ use schemars::{SchemaGenerator, generate::SchemaSettings};
 use serde_json::{Map, Value, json};
 
 use super::{
-    Head,
     estimator_table::{EstimatorTable, plan_key, whole_keys},
+    head::Head,
 };
 
 /// The schema (draft 2020-12) as text.

@@ -2,7 +2,7 @@
 
 use hoid_ident::{
     Fit, MarginEstimates,
-    validation::{Quality, nrmse_fit, vaf},
+    validation::{GoodnessOfFit, nrmse_fit, vaf},
 };
 use hoid_model::{ContinuousTransferFunction, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
 use hoid_report::{ModelSection, Report, known_operator, write_report};
@@ -62,7 +62,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         files: &files,
         records: &records,
         accounts: &accounts,
-        quality: Quality::together(records.iter().zip(&validations)),
+        quality: GoodnessOfFit::pooled(records.iter().zip(&validations)),
         fit: &fit,
         choice: choice.as_ref(),
         grey_box: grey_box.as_ref(),

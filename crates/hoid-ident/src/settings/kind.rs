@@ -1,0 +1,74 @@
+//! Types of values, and what numbers may be.
+
+use std::fmt;
+
+/// Type of a value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Yes or no.
+    Flag,
+    /// A whole number.
+    Count,
+    /// A number; `inf` where the bounds allow it.
+    Number,
+    /// Samples (`256`), seconds (`2.56s`) or `inf`.
+    Memory,
+    /// `LO..HI`, two finite numbers in order.
+    Span,
+    /// `LO..HI`, of which either end may be left out.
+    OpenSpan,
+    /// One of these words.
+    Choice(&'static [&'static str]),
+    /// Name of a channel.
+    Channel,
+    /// Values of a type by name, as `b0=256,f=inf`.
+    Named(&'static Kind),
+}
+
+/// What numbers may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bounds {
+    /// Any number.
+    Any,
+    /// More than zero, finite or not.
+    Positive,
+    /// More than zero and finite.
+    PositiveFinite,
+    /// At least zero and finite.
+    NonNegative,
+    /// At least this, and finite.
+    AtLeast(f64),
+    /// More than the first and less than the second.
+    Between(f64, f64),
+    /// More than the first, and at most the second.
+    UpTo(f64, f64),
+}
+
+impl Bounds {
+    /// True for a number within them.
+    pub fn hold(self, x: f64) -> bool {
+        match self {
+            Self::Any => !x.is_nan(),
+            Self::Positive => x > 0.0,
+            Self::PositiveFinite => x > 0.0 && x.is_finite(),
+            Self::NonNegative => x >= 0.0 && x.is_finite(),
+            Self::AtLeast(least) => x >= least && x.is_finite(),
+            Self::Between(low, high) => x > low && x < high,
+            Self::UpTo(low, high) => x > low && x <= high,
+        }
+    }
+}
+
+impl fmt::Display for Bounds {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Any => f.write_str("a number"),
+            Self::Positive => f.write_str("a positive number, or inf"),
+            Self::PositiveFinite => f.write_str("a positive finite number"),
+            Self::NonNegative => f.write_str("a finite number of zero or more"),
+            Self::AtLeast(least) => write!(f, "{least} or more"),
+            Self::Between(low, high) => write!(f, "more than {low} and less than {high}"),
+            Self::UpTo(low, high) => write!(f, "more than {low} and at most {high}"),
+        }
+    }
+}

@@ -1,0 +1,222 @@
+//! A model against a record: simulated and predicted output, and the tests of the residuals.
+
+use std::fmt;
+
+use hoid_model::{Record, numbers::significant, polynomial::product, polynomial_model::monic};
+
+use super::{
+    correlation::{Correlation, autocorrelation, centred, cross_correlation},
+    goodness_of_fit::{ErrorSums, GoodnessOfFit},
+    whiteness::{LARGEST_LAG, LjungBox, ljung_box},
+};
+use crate::{Fit, IdentError, Series};
+
+/// What the residual tests say. A lag outside its 99 % bound is expected once in a hundred; more than [`OUTSIDE_ALLOWED`] of
+/// them is a sign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ResidualDiagnostics {
+    /// The residuals are not white at the 1 % level: the noise model is too small.
+    pub coloured_residuals: bool,
+    /// The residuals follow the input at positive lags: the model misses dynamics, or has the wrong delay.
+    pub under_modelled: bool,
+    /// The input follows the residuals at negative lags: the output is fed back to the input, as in every closed loop.
+    pub feedback: bool,
+}
+
+/// Share of lags outside the 99 % bound above which a correlation counts as present.
+pub const OUTSIDE_ALLOWED: f64 = 0.06;
+
+/// Simulated and predicted output of a model on a record, with what follows from them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Validation {
+    /// First sample that all of the series below cover.
+    pub first: usize,
+    /// Simulated output.
+    pub simulated: Vec<f64>,
+    /// One-step-ahead prediction.
+    pub predicted: Vec<f64>,
+    /// VAF and NRMSE.
+    pub quality: GoodnessOfFit,
+    /// Residual autocorrelation, lags 1 to [`LARGEST_LAG`].
+    pub autocorrelation: Correlation,
+    /// Cross-correlation of residuals and input, lags from minus to plus [`LARGEST_LAG`]; no lags without an input.
+    pub cross_correlation: Correlation,
+    /// Whiteness of the residuals; `None` when there are fewer lags than coefficients of the noise model.
+    pub ljung_box: Option<LjungBox>,
+}
+
+impl Validation {
+    /// What the residual tests say.
+    pub fn diagnostics(&self) -> ResidualDiagnostics {
+        let outside = |keep: fn(i64) -> bool| {
+            let c = &self.cross_correlation;
+            let lags = || c.lags.iter().zip(&c.values).filter(|(k, _)| keep(**k));
+            let beyond = lags().filter(|(_, r)| r.abs() > c.bound_99).count();
+            beyond as f64 > OUTSIDE_ALLOWED * lags().count() as f64
+        };
+        ResidualDiagnostics {
+            coloured_residuals: self.ljung_box.is_some_and(|t| t.p_value < 0.01),
+            under_modelled: outside(|k| k >= 0),
+            feedback: outside(|k| k < 0),
+        }
+    }
+}
+
+impl fmt::Display for Validation {
+    /// VAF and NRMSE of simulation and prediction, then what each residual test says.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let q = &self.quality;
+        let found = self.diagnostics();
+        writeln!(f, "                       VAF    NRMSE")?;
+        writeln!(
+            f,
+            "simulation         {:5.1} %  {:5.1} %",
+            q.vaf_simulation, q.nrmse_simulation
+        )?;
+        writeln!(
+            f,
+            "prediction         {:5.1} %  {:5.1} %",
+            q.vaf_prediction, q.nrmse_prediction
+        )?;
+        match self.ljung_box {
+            Some(test) => writeln!(
+                f,
+                "whiteness          Q = {} with {} degrees of freedom, p = {}: residuals {} at the 1 % level",
+                significant(test.statistic, 3),
+                test.degrees_of_freedom,
+                significant(test.p_value, 2),
+                if found.coloured_residuals { "coloured" } else { "white" }
+            )?,
+            None => writeln!(
+                f,
+                "whiteness          not tested: fewer lags than coefficients of the noise model"
+            )?,
+        }
+        let outside = |from: i64| {
+            let c = &self.cross_correlation;
+            let lags = c.lags.iter().zip(&c.values).filter(|(k, _)| (**k >= 0) == (from >= 0));
+            let beyond = lags.clone().filter(|(_, r)| r.abs() > c.bound_99).count();
+            format!("{beyond} of {} lags outside the 99 % bound", lags.count())
+        };
+        if self.cross_correlation.lags.is_empty() {
+            return f.write_str("input              not tested: the record has no input");
+        }
+        let missed = if found.under_modelled {
+            "dynamics are missing"
+        } else {
+            "no sign of missing dynamics"
+        };
+        let fed_back = if found.feedback {
+            "feedback from the output"
+        } else {
+            "no sign of feedback"
+        };
+        writeln!(f, "input, lags >= 0   {}: {missed}", outside(0))?;
+        write!(f, "input, lags < 0    {}: {fed_back}", outside(-1))
+    }
+}
+
+impl Fit {
+    /// Compares the model with a record, the one it was fitted on or another.
+    ///
+    /// # Errors
+    /// As [`Fit::residuals`].
+    pub fn validate(&self, record: &Record) -> Result<Validation, IdentError> {
+        let (first, simulated, predicted) = self.model_outputs(record)?;
+        let output = &record.output()[first..];
+        let residuals = centred(output.iter().zip(&predicted).map(|(u, p)| u - p).collect());
+        let autocorrelation = autocorrelation(&residuals, LARGEST_LAG);
+        let o = self.orders();
+        let of_noise = |name: &str| name.starts_with(['a', 'c', 'd']);
+        let free = o
+            .parameter_names()
+            .iter()
+            .zip(self.held())
+            .filter(|(name, held)| of_noise(name) && !**held)
+            .count();
+        // A grey box has one parameter in its noise model, T_n.
+        let free = if self.is_grey_box() { free.min(1) } else { free };
+        Ok(Validation {
+            ljung_box: ljung_box(&autocorrelation, residuals.len(), free),
+            quality: ErrorSums::default().and(output, &simulated, &predicted).quality(),
+            autocorrelation,
+            cross_correlation: match record.input_channel() {
+                Some(input) => cross_correlation(&residuals, &centred(input.values[first..].to_vec()), LARGEST_LAG),
+                None => Correlation {
+                    lags: Vec::new(),
+                    values: Vec::new(),
+                    bound_99: 0.0,
+                },
+            },
+            first,
+            simulated,
+            predicted,
+        })
+    }
+
+    /// The first sample that both cover, and from there on the simulated output and the prediction one step ahead.
+    fn model_outputs(&self, record: &Record) -> Result<(usize, Vec<f64>, Vec<f64>), IdentError> {
+        let (simulated, predicted) = (self.simulate(record)?, self.predict(record)?);
+        let first = simulated.first.max(predicted.first);
+        let from_there = |mut series: Series| {
+            series.values.drain(..first - series.first);
+            series.values
+        };
+        Ok((first, from_there(simulated), from_there(predicted)))
+    }
+
+    /// Prediction of the output k samples ahead, the input being known: `u - sum_{j<k} h_j eps(t-j)` with h the impulse response
+    /// of the noise filter C/(A D) (L. Ljung, *System Identification*, 1999, eq. 3.31). k = 1 is [`Fit::predict`]; for large k,
+    /// and a stable noise filter, it goes over into [`Fit::simulate`].
+    ///
+    /// # Errors
+    /// As [`Fit::residuals`]; [`IdentError::BadOption`] for k = 0.
+    pub fn predict_ahead(&self, record: &Record, k: usize) -> Result<Series, IdentError> {
+        if k == 0 {
+            return Err(IdentError::BadOption {
+                option: "the prediction horizon".to_owned(),
+                found: "0".to_owned(),
+                expected: "one sample or more".to_owned(),
+            });
+        }
+        let eps = self.residuals(record)?;
+        let m = self.model();
+        let mut h = monic(m.c());
+        h.resize(k, 0.0);
+        let poles = product(&monic(m.a()), &monic(m.d()));
+        hoid_core::filter::divide_in_place(&poles[1..], &mut h);
+        let mut errors = vec![0.0; eps.values.len()];
+        hoid_core::filter::fir(&h, 0, &eps.values, &mut errors);
+        // Before that the residuals of the last k samples are not all known.
+        let skipped = (k - 1).min(errors.len());
+        let first = eps.first + skipped;
+        let output = &record.output()[first..];
+        Ok(Series {
+            first,
+            values: output.iter().zip(&errors[skipped..]).map(|(u, e)| u - e).collect(),
+        })
+    }
+
+    /// VAF and NRMSE over several records together: the squared errors of all of them against the power (for NRMSE, the
+    /// spread around the mean of each record) of all of them.
+    ///
+    /// # Errors
+    /// As [`Fit::residuals`].
+    pub fn quality(&self, records: &[Record]) -> Result<GoodnessOfFit, IdentError> {
+        let all = records.iter().try_fold(ErrorSums::default(), |all, record| {
+            let (first, simulated, predicted) = self.model_outputs(record)?;
+            Ok::<_, IdentError>(all.and(&record.output()[first..], &simulated, &predicted))
+        });
+        all.map(|all| all.quality())
+    }
+}
+
+impl GoodnessOfFit {
+    /// That of several records together, as [`Fit::quality`], where their validations are at hand.
+    pub fn pooled<'a>(validated: impl Iterator<Item = (&'a Record, &'a Validation)>) -> Self {
+        let with = |all: ErrorSums, (record, v): (&'a Record, &'a Validation)| {
+            all.and(&record.output()[v.first..], &v.simulated, &v.predicted)
+        };
+        validated.fold(ErrorSums::default(), with).quality()
+    }
+}

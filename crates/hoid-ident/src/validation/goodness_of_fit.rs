@@ -1,0 +1,105 @@
+//! How much of the measured output a model explains: VAF and NRMSE, of one record or of several together.
+
+use crate::linalg::{least_squares::dot, products::variance};
+
+/// Fit percentages on one record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GoodnessOfFit {
+    /// VAF of the simulated output, %.
+    pub vaf_simulation: f64,
+    /// VAF of the one-step-ahead prediction, %.
+    pub vaf_prediction: f64,
+    /// NRMSE fit of the simulated output, %.
+    pub nrmse_simulation: f64,
+    /// NRMSE fit of the one-step-ahead prediction, %.
+    pub nrmse_prediction: f64,
+}
+
+/// Sums of squares over records.
+#[derive(Default)]
+pub(super) struct ErrorSums {
+    power: f64,
+    spread: f64,
+    of_simulation: f64,
+    of_prediction: f64,
+}
+
+impl ErrorSums {
+    /// With one more record.
+    pub fn and(self, measured: &[f64], simulated: &[f64], predicted: &[f64]) -> Self {
+        Self {
+            power: self.power + dot(measured, measured),
+            spread: self.spread + spread_of(measured),
+            of_simulation: self.of_simulation + squared_distance(measured, simulated),
+            of_prediction: self.of_prediction + squared_distance(measured, predicted),
+        }
+    }
+
+    pub fn quality(&self) -> GoodnessOfFit {
+        GoodnessOfFit {
+            vaf_simulation: vaf_of(self.of_simulation, self.power),
+            vaf_prediction: vaf_of(self.of_prediction, self.power),
+            nrmse_simulation: nrmse_of(self.of_simulation, self.spread),
+            nrmse_prediction: nrmse_of(self.of_prediction, self.spread),
+        }
+    }
+}
+
+/// Variance accounted for (eq. 39), %. Zero where the measured signal is zero.
+pub fn vaf(measured: &[f64], model: &[f64]) -> f64 {
+    vaf_of(squared_distance(measured, model), dot(measured, measured))
+}
+
+/// NRMSE fit, %. Zero where the measured signal is constant.
+pub fn nrmse_fit(measured: &[f64], model: &[f64]) -> f64 {
+    nrmse_of(squared_distance(measured, model), spread_of(measured))
+}
+
+/// Sum of the squared distances from the mean; zero for a constant.
+fn spread_of(x: &[f64]) -> f64 {
+    if x.is_empty() {
+        0.0
+    } else {
+        variance(&[x]) * x.len() as f64
+    }
+}
+
+fn vaf_of(squared_error: f64, power: f64) -> f64 {
+    if power == 0.0 {
+        0.0
+    } else {
+        (100.0 * (1.0 - squared_error / power)).max(0.0)
+    }
+}
+
+fn nrmse_of(squared_error: f64, spread: f64) -> f64 {
+    if spread == 0.0 {
+        0.0
+    } else {
+        100.0 * (1.0 - (squared_error / spread).sqrt())
+    }
+}
+
+fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vaf_and_nrmse_of_known_signals() {
+        let u = [1.0, 3.0, 1.0, 3.0];
+        assert_eq!(vaf(&u, &u), 100.0);
+        assert_eq!(nrmse_fit(&u, &u), 100.0);
+        // Error of 1 in each sample: sum of squares 4 of 20, and as large as the spread around the mean.
+        let off = [2.0, 2.0, 2.0, 2.0];
+        assert!((vaf(&u, &off) - 80.0).abs() < 1e-12);
+        assert!(nrmse_fit(&u, &off).abs() < 1e-12);
+        assert_eq!(vaf(&u, &[-9.0; 4]), 0.0);
+        assert!(nrmse_fit(&u, &[-9.0; 4]) < 0.0);
+        assert_eq!(vaf(&[0.0; 3], &[1.0; 3]), 0.0);
+        assert_eq!(nrmse_fit(&[2.0; 3], &[1.0; 3]), 0.0);
+    }
+}

@@ -1,0 +1,392 @@
+//! A plan as a whole: read, taken apart into cells and estimators, checked.
+
+use std::{collections::BTreeSet, path::Path};
+
+use hoid_io::ScenarioFileError;
+use hoid_model::{
+    ModelError,
+    scenario::{RemnantStrength, ResolvedScenario, Scenario},
+};
+use serde::Deserialize;
+use sha2::{Digest, Sha256};
+use toml::{
+    Spanned,
+    de::{DeTable, DeValue},
+};
+
+use super::{
+    estimator::EstimatorCell,
+    estimator_table,
+    grid::{Axis, Variant, line_at, variants},
+    head::Head,
+    problem::PlanProblem,
+};
+use crate::StudyError;
+
+/// A plan that has been checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Name of the study.
+    pub name: String,
+    /// One line on what it is.
+    pub title: String,
+    /// What it shows, or what to know of it.
+    pub description: String,
+    /// Seed of its random streams.
+    pub seed: u64,
+    /// Replications of each cell.
+    pub replications: u64,
+    /// Replications that are run and stored together.
+    pub block: u64,
+    /// Samples from one kept point of a trace to the next; none keeps no traces.
+    pub trace_every: Option<usize>,
+    /// Whether the points of traces are kept, not only their summary.
+    pub trace_points: bool,
+    /// Whether standard errors are kept.
+    pub standard_errors: bool,
+    /// Whether bias, bands and declared changes of recursions are measured.
+    pub changes: bool,
+    /// The scenarios of the grid.
+    pub cells: Vec<Cell>,
+    /// The estimators of the grid.
+    pub estimators: Vec<EstimatorCell>,
+    text: String,
+}
+
+/// One scenario of the grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell {
+    /// Its number in the study, from 0.
+    pub index: u64,
+    /// Name of its table in the plan.
+    pub scenario: String,
+    /// The condition from which it started, empty for none.
+    pub condition: String,
+    /// What stands for the lists of its table.
+    pub axes: Vec<Axis>,
+    /// The scenario, ready to be simulated.
+    pub resolved: ResolvedScenario,
+    /// Replications: those of the plan, or one without remnant.
+    pub replications: u64,
+}
+
+/// What a scenario of a plan has beside the keys of a scenario file.
+#[derive(Debug, Deserialize)]
+struct OwnKeys {
+    name: Option<String>,
+    condition: Option<String>,
+}
+
+/// Most replications of a cell.
+const MOST_REPLICATIONS: u64 = 100_000_000;
+
+impl Plan {
+    /// Reads and checks a plan.
+    ///
+    /// # Errors
+    /// [`StudyError::Plan`] with the file, the line and the remedy; [`StudyError::Io`] for a file that cannot be read.
+    pub fn read(path: &Path) -> Result<Self, StudyError> {
+        let text = hoid_io::read_text(path)?;
+        Self::parse(&text, &path.display().to_string())
+    }
+
+    /// A plan from its text; `path` is for messages.
+    ///
+    /// # Errors
+    /// [`StudyError::Plan`].
+    pub fn parse(text: &str, path: &str) -> Result<Self, StudyError> {
+        Self::of_text(text).map_err(|problem| StudyError::Plan {
+            path: path.to_owned(),
+            line: problem.line,
+            reason: problem.reason,
+        })
+    }
+
+    fn of_text(text: &str) -> Result<Self, PlanProblem> {
+        let document = DeTable::parse(text).map_err(|error| PlanProblem {
+            line: Some(error.span().map_or(1, |span| line_at(text, span.start))),
+            reason: error.message().trim_end().to_owned(),
+        })?;
+        let mut scenarios = Vec::new();
+        let mut estimators = Vec::new();
+        for (key, tables) in [("scenarios", &mut scenarios), ("estimators", &mut estimators)] {
+            *tables = tables_of(&document, key, text)?;
+        }
+        let mut rest = document.clone();
+        for key in ["scenarios", "estimators"] {
+            rest.get_mut().remove(key);
+        }
+        let keys: Vec<String> = rest.get_ref().keys().map(|key| key.get_ref().to_string()).collect();
+        let keys: Vec<&str> = keys.iter().map(String::as_str).filter(|key| *key != "keep").collect();
+        let head = single(&rest, text, &keys)?;
+        let at_head = |key: &str| head.line_of_key(key);
+        let head_text: Head = head.read()?;
+        check_head(&head_text, &at_head)?;
+        let mut plan = Self {
+            name: head_text.name,
+            title: head_text.title,
+            description: head_text.description,
+            seed: head_text.seed,
+            replications: head_text.replications,
+            block: head_text.block,
+            trace_every: head_text.keep.trace_every,
+            trace_points: head_text.keep.trace_points,
+            standard_errors: head_text.keep.standard_errors,
+            changes: head_text.keep.changes,
+            cells: Vec::new(),
+            estimators: Vec::new(),
+            text: text.to_owned(),
+        };
+        for table in &scenarios {
+            for variant in variants(table, text, &["forcing"])? {
+                let index = plan.cells.len() as u64;
+                plan.cells.push(cell(&variant, index, plan.replications)?);
+            }
+        }
+        let known: BTreeSet<&str> = plan.cells.iter().map(|cell| cell.scenario.as_str()).collect();
+        let mut names = BTreeSet::new();
+        let whole = estimator_table::whole_keys();
+        let whole: Vec<&str> = whole.iter().map(String::as_str).collect();
+        for table in &estimators {
+            let first_line = line_at(text, table.span().start);
+            for (i, variant) in variants(table, text, &whole)?.into_iter().enumerate() {
+                let estimator = EstimatorCell::of(&variant)?;
+                let problem = |key: &str, reason: String| PlanProblem {
+                    line: variant.line_of_key(key).or(Some(first_line)),
+                    reason,
+                };
+                if i == 0 && !names.insert(estimator.name.clone()) {
+                    return Err(problem(
+                        "name",
+                        format!("two estimators are called {}: rename one", estimator.name),
+                    ));
+                }
+                if let Some(name) = estimator
+                    .scenarios
+                    .iter()
+                    .flatten()
+                    .find(|name| !known.contains(name.as_str()))
+                {
+                    let known: Vec<&str> = known.iter().copied().collect();
+                    return Err(problem(
+                        "scenarios",
+                        format!("no scenario is called {name}, expected one of {}", known.join(", ")),
+                    ));
+                }
+                if let Some(name) = estimator
+                    .versus
+                    .as_ref()
+                    .filter(|name| !plan.estimators.iter().any(|e| e.name == **name))
+                {
+                    return Err(problem(
+                        "versus",
+                        format!("versus is {name}, expected the name of an estimator above this one"),
+                    ));
+                }
+                for cell in plan.cells.iter().filter(|cell| estimator.takes(&cell.scenario)) {
+                    estimator
+                        .check(&cell.resolved)
+                        .map_err(|(key, reason)| problem(key, format!("{}: {reason}", estimator.label)))?;
+                }
+                plan.estimators.push(estimator);
+            }
+        }
+        for cell in &plan.cells {
+            if !plan.estimators.iter().any(|estimator| estimator.takes(&cell.scenario)) {
+                return Err(PlanProblem {
+                    line: None,
+                    reason: format!(
+                        "no estimator takes the scenario {}: remove it or add an estimator",
+                        cell.scenario
+                    ),
+                });
+            }
+        }
+        Ok(plan)
+    }
+
+    /// The plan with another number of replications.
+    ///
+    /// # Errors
+    /// [`StudyError::Plan`] for none.
+    pub fn with_replications(mut self, replications: u64) -> Result<Self, StudyError> {
+        if !(1..=MOST_REPLICATIONS).contains(&replications) {
+            return Err(StudyError::Plan {
+                path: self.name,
+                line: None,
+                reason: format!("replications is {replications}, expected 1 to {MOST_REPLICATIONS}"),
+            });
+        }
+        for cell in &mut self.cells {
+            cell.replications = if cell.replications == 1 && is_noise_free(&cell.resolved) {
+                1
+            } else {
+                replications
+            };
+        }
+        self.replications = replications;
+        Ok(self)
+    }
+
+    /// The text of the plan as it was read.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// SHA-256 of what decides the results: the text of the plan and the replications.
+    pub fn hash(&self) -> String {
+        let mut hasher = Sha256::new();
+        hasher.update(self.text.as_bytes());
+        hasher.update(format!("\0replications {}", self.replications).as_bytes());
+        hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    /// The estimators that take the records of a cell, with their numbers.
+    pub fn estimators_of<'a>(&'a self, cell: &'a Cell) -> impl Iterator<Item = (usize, &'a EstimatorCell)> {
+        self.estimators
+            .iter()
+            .enumerate()
+            .filter(|(_, estimator)| estimator.takes(&cell.scenario))
+    }
+
+    /// Estimates of the whole study: one a replication and estimator.
+    pub fn estimates(&self) -> u64 {
+        let of = |cell: &Cell| cell.replications * self.estimators_of(cell).count() as u64;
+        self.cells.iter().map(of).sum()
+    }
+}
+
+fn check_head(head: &Head, at: &impl Fn(&str) -> Option<usize>) -> Result<(), PlanProblem> {
+    let bad = |key: &str, reason: String| {
+        Err(PlanProblem {
+            line: at(key),
+            reason: format!("{key} is {reason}"),
+        })
+    };
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    if head.name.is_empty() || !head.name.chars().all(is_plain) {
+        return bad(
+            "name",
+            format!("{:?}, expected letters, digits, - and _: it names files", head.name),
+        );
+    }
+    for (key, n) in [("replications", head.replications), ("block", head.block)] {
+        if !(1..=MOST_REPLICATIONS).contains(&n) {
+            return bad(key, format!("{n}, expected 1 to {MOST_REPLICATIONS}"));
+        }
+    }
+    if head.keep.trace_every == Some(0) {
+        return bad(
+            "keep.trace_every",
+            "0, expected 1 or more, or nothing to keep no traces".to_owned(),
+        );
+    }
+    Ok(())
+}
+
+/// The tables of an array.
+fn tables_of<'a>(
+    document: &Spanned<DeTable<'a>>,
+    key: &str,
+    text: &str,
+) -> Result<Vec<Spanned<DeTable<'a>>>, PlanProblem> {
+    let missing = |line| PlanProblem {
+        line,
+        reason: format!("expected at least one table [[{key}]]"),
+    };
+    let found = document.get_ref().iter().find(|(k, _)| k.get_ref().as_ref() == key);
+    let (at, value) = found.ok_or_else(|| missing(None))?;
+    let line = Some(line_at(text, at.span().start));
+    let DeValue::Array(array) = value.get_ref() else {
+        return Err(missing(line));
+    };
+    if array.is_empty() {
+        return Err(missing(line));
+    }
+    array
+        .iter()
+        .map(|entry| match entry.get_ref() {
+            DeValue::Table(table) => Ok(Spanned::new(entry.span(), table.clone())),
+            _ => Err(missing(Some(line_at(text, entry.span().start)))),
+        })
+        .collect()
+}
+
+/// A table without axes as it stands.
+fn single(table: &Spanned<DeTable<'_>>, text: &str, whole: &[&str]) -> Result<Variant, PlanProblem> {
+    let mut all = variants(table, text, whole)?;
+    match (all.pop(), all.is_empty()) {
+        (Some(one), true) => Ok(one),
+        _ => Err(PlanProblem {
+            line: Some(1),
+            reason: "[keep] has a list, expected single values".to_owned(),
+        }),
+    }
+}
+
+fn cell(variant: &Variant, index: u64, replications: u64) -> Result<Cell, PlanProblem> {
+    let own: OwnKeys = variant.read()?;
+    let usual = own.condition.clone().unwrap_or_else(|| "scenario".to_owned());
+    let name = own.name.unwrap_or_else(|| usual.clone());
+    let scenario: Scenario =
+        hoid_io::parse_scenario(&variant.text, "", &name).map_err(|error| of_scenario(error, variant))?;
+    let resolved = scenario.resolve().map_err(|error| of_model(&error, variant))?;
+    Ok(Cell {
+        index,
+        scenario: name,
+        condition: own.condition.unwrap_or_default(),
+        axes: variant.axes.clone(),
+        replications: if is_noise_free(&resolved) { 1 } else { replications },
+        resolved,
+    })
+}
+
+fn is_noise_free(resolved: &ResolvedScenario) -> bool {
+    match resolved.scenario().remnant.strength {
+        RemnantStrength::Level { level, .. } => level == 0.0,
+        RemnantStrength::Gain { initial, last } => initial == 0.0 && last == 0.0,
+    }
+}
+
+/// The problem of a scenario with the line of the plan.
+fn of_scenario(error: ScenarioFileError, variant: &Variant) -> PlanProblem {
+    match error {
+        ScenarioFileError::Syntax { line, reason, .. } => PlanProblem {
+            line: Some(variant.line(line)),
+            reason,
+        },
+        ScenarioFileError::Value {
+            line,
+            key,
+            found,
+            expected,
+            ..
+        } => PlanProblem {
+            line: Some(variant.line(line)),
+            reason: format!("{key} is {found}, expected {expected}"),
+        },
+        ScenarioFileError::Keys { reason, .. } => PlanProblem {
+            line: Some(variant.line(1)),
+            reason,
+        },
+        ScenarioFileError::Model { source, .. } => of_model(&source, variant),
+        other => PlanProblem {
+            line: Some(variant.line(1)),
+            reason: other.to_string(),
+        },
+    }
+}
+
+fn of_model(error: &ModelError, variant: &Variant) -> PlanProblem {
+    let line = match error {
+        ModelError::UnreachableNoiseLevel { .. } => variant.line_of_key("remnant.noise_level"),
+        ModelError::OutOfRange { quantity, .. } if quantity.starts_with("noise level") => {
+            variant.line_of_key("remnant.noise_level")
+        }
+        _ => None,
+    };
+    PlanProblem {
+        line: line.or_else(|| variant.lines.first().copied()),
+        reason: error.to_string(),
+    }
+}

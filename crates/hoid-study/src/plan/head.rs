@@ -1,0 +1,61 @@
+//! The keys of a plan outside its tables, and `[keep]`.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// The head of a plan.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Head {
+    /// Name of the study: letters, digits, - and _.
+    pub name: String,
+    /// One line on what it is.
+    #[serde(default)]
+    pub title: String,
+    /// What it shows, or what to know of it.
+    #[serde(default)]
+    pub description: String,
+    /// Seed of the random streams. Default 1.
+    #[serde(default = "one")]
+    pub seed: u64,
+    /// Replications of each cell.
+    pub replications: u64,
+    /// Replications that are run and stored together, which a stopped study loses at most. Default 50.
+    #[serde(default = "usual_block")]
+    pub block: u64,
+    /// What is kept.
+    #[serde(default)]
+    pub keep: Keep,
+}
+
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct Keep {
+    /// Samples from one kept point of a trace to the next. Default: no traces are kept.
+    pub trace_every: Option<usize>,
+    /// Whether the points of each trace are kept, or only the summary over replications. Default true.
+    pub trace_points: bool,
+    /// Whether standard errors are kept. Default true.
+    pub standard_errors: bool,
+    /// Whether bias before and after a change, coverage of the bands and declared changes of recursions are measured. Default false.
+    pub changes: bool,
+}
+
+impl Default for Keep {
+    fn default() -> Self {
+        Self {
+            trace_every: None,
+            trace_points: true,
+            standard_errors: true,
+            changes: false,
+        }
+    }
+}
+
+fn one() -> u64 {
+    1
+}
+
+fn usual_block() -> u64 {
+    50
+}

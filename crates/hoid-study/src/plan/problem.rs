@@ -1,0 +1,8 @@
+//! What is wrong in a plan, and where.
+
+/// What is wrong in a plan, and where.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct PlanProblem {
+    pub line: Option<usize>,
+    pub reason: String,
+}
