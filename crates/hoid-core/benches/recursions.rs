@@ -7,7 +7,8 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use hoid_core::{
-    adaptation::{Covariance, Forgetting},
+    adaptation::Forgetting,
+    covariance::Covariance,
     error_bars::{ErrorBars, NoErrorBars},
     innovation_variance::InnovationVariance,
     physical::{PhysicalModel, PhysicalRpem},

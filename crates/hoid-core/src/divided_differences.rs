@@ -123,45 +123,10 @@ impl DividedDifferences {
         }
         let h = s / 2.0;
         let x = h * h - q;
-        let r = libm::sqrt(x.abs());
-        if x < 0.0 {
-            let e = libm::exp(h);
-            let (sin, cos) = libm::sincos(r);
-            let mean = e * cos;
-            let (phi1, phi2_slope) = if x > -1.0 {
-                near_double(e, x)
-            } else {
-                let phi1 = e * sin / r;
-                (phi1, (mean - phi1) / (2.0 * x))
-            };
-            return Self {
-                sum: s,
-                product: q,
-                mean,
-                phi1,
-                // Here q > 2.
-                phi2: (1.0 - mean + h * phi1) / q,
-                phi2_slope,
-            };
-        }
-        let far = h + libm::copysign(r, h);
-        // From the product: the difference of h and r would cancel.
-        let near = q / far;
-        let (near_exp, near_expm1) = exp_and_expm1(near);
-        let (far_exp, far_expm1) = exp_and_expm1(far);
-        let mean = (near_exp + far_exp) / 2.0;
-        let (phi1, phi2_slope) = if x < 1.0 {
-            near_double(libm::exp(h), x)
+        let [mean, phi1, phi2_slope, phi2] = if x < 0.0 {
+            complex_poles(h, q, x)
         } else {
-            let phi1 = (far_exp - near_exp) / (far - near);
-            (phi1, (mean - phi1) / (2.0 * x))
-        };
-        let phi2 = if r > 0.25 {
-            let near_ratio = if near == 0.0 { 1.0 } else { near_expm1 / near };
-            (far_expm1 / far - near_ratio) / (far - near)
-        } else {
-            // Here q > 0.5.
-            (1.0 - mean + h * phi1) / q
+            real_poles(h, q, x)
         };
         Self {
             sum: s,
@@ -172,6 +137,47 @@ impl DividedDifferences {
             phi2_slope,
         }
     }
+}
+
+/// `[E C, Phi_1, D_2, Phi_2]` of complex poles, `x = h^2 - q < 0`.
+fn complex_poles(h: f64, q: f64, x: f64) -> [f64; 4] {
+    let r = libm::sqrt(-x);
+    let e = libm::exp(h);
+    let (sin, cos) = libm::sincos(r);
+    let mean = e * cos;
+    let (phi1, phi2_slope) = if x > -1.0 {
+        near_double(e, x)
+    } else {
+        let phi1 = e * sin / r;
+        (phi1, (mean - phi1) / (2.0 * x))
+    };
+    // Here q > 2.
+    [mean, phi1, phi2_slope, (1.0 - mean + h * phi1) / q]
+}
+
+/// The same of real poles, `x >= 0`.
+fn real_poles(h: f64, q: f64, x: f64) -> [f64; 4] {
+    let r = libm::sqrt(x);
+    let far = h + libm::copysign(r, h);
+    // From the product: the difference of h and r would cancel.
+    let near = q / far;
+    let (near_exp, near_expm1) = exp_and_expm1(near);
+    let (far_exp, far_expm1) = exp_and_expm1(far);
+    let mean = (near_exp + far_exp) / 2.0;
+    let (phi1, phi2_slope) = if x < 1.0 {
+        near_double(libm::exp(h), x)
+    } else {
+        let phi1 = (far_exp - near_exp) / (far - near);
+        (phi1, (mean - phi1) / (2.0 * x))
+    };
+    // Poles further apart than this by differences; there q may be zero, else it is above 0.5.
+    let phi2 = if r > 0.25 {
+        let near_ratio = if near == 0.0 { 1.0 } else { near_expm1 / near };
+        (far_expm1 / far - near_ratio) / (far - near)
+    } else {
+        (1.0 - mean + h * phi1) / q
+    };
+    [mean, phi1, phi2_slope, phi2]
 }
 
 /// `E S` and `E G` for `|x| < 1`, by `S = sum x^k/(2k+1)!`, `G = sum (k+1) x^k/(2k+3)!`.

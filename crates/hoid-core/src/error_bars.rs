@@ -33,7 +33,12 @@ use crate::{
     state::State,
 };
 
-/// Sigma over sigma^2, and sigma^2. N is the room for parameters, K that for the errors of the filters ([`ErrorLayout::filter_errors`]).
+/// Largest variance of a parameter relative to that at the start: beyond it nothing is known.
+pub const LARGEST_GROWTH: f64 = 1e6;
+/// Samples between two checks of the variances.
+const CHECK_PERIOD: u32 = 64;
+
+/// Sigma over sigma^2, and sigma^2. N is the capacity for parameters, K that for the errors of the filters ([`ErrorLayout::filter_errors`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorBars<const N: usize, const K: usize> {
     /// Covariance of theta.
@@ -43,32 +48,29 @@ pub struct ErrorBars<const N: usize, const K: usize> {
     /// Covariance of the errors of the filters.
     filters: [[f64; K]; K],
     /// Variances of theta at the start.
-    start: [f64; N],
+    initial_variances: [f64; N],
     innovation_variance: InnovationVariance,
+    /// Multiple of sigma at which innovations are clipped.
     limit: f64,
-    wait: u32,
+    /// Samples until the next check of the variances.
+    until_check: u32,
 }
 
 crate::state!([const N: usize, const K: usize] ErrorBars<N, K> {
-    theta, cross, filters, start, innovation_variance, limit, wait,
+    theta, cross, filters, initial_variances, innovation_variance, limit, until_check,
 });
 
-/// Variances of theta beyond this multiple of those at the start say that nothing is known.
-pub const LARGEST_GROWTH: f64 = 1e6;
-/// Samples between two looks whether that is so.
-const CHECK_PERIOD: u32 = 64;
-
-/// What follows the error of an estimate through its recursion: [`ErrorBars`], or [`NoErrorBars`] where nobody asks.
+/// Follows the error of an estimate through its recursion: [`ErrorBars`], or [`NoErrorBars`] where they are not wanted.
 pub trait ErrorPropagation<const N: usize, const K: usize>: State {
-    /// The innovation as far as it may move the estimate.
+    /// The innovation, clipped at the limit for outliers.
     fn clip(&self, eps: f64) -> f64;
-    /// Takes the innovation of a sample with the gain that was used, and the errors that the sample leaves in the filters.
+    /// The update by a step of the estimate: its gain, its innovation, and the errors that it leaves in the filters.
     fn update(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>, gain: &[f64; N], eps: f64);
-    /// The errors that a sample leaves in the filters, without a step of the estimate.
+    /// The errors that a sample leaves in the filters, when the estimate stays.
     fn propagate(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>);
-    /// Adds the variance by which parameter i drifts in a sample, until `bound`.
+    /// Adds the variance by which parameter i drifts in a sample, up to `bound`.
     fn add_drift(&mut self, i: usize, variance: f64, bound: f64);
-    /// Innovation variance sigma^2; `None` where it is not followed.
+    /// Innovation variance sigma^2; `None` where it is not estimated.
     fn variance(&self) -> Option<f64>;
 }
 
@@ -109,10 +111,10 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
             theta: *start,
             cross: [[0.0; N]; K],
             filters: [[0.0; K]; K],
-            start: core::array::from_fn(|i| start[i][i]),
+            initial_variances: core::array::from_fn(|i| start[i][i]),
             innovation_variance,
             limit,
-            wait: CHECK_PERIOD,
+            until_check: CHECK_PERIOD,
         }
     }
 
@@ -144,9 +146,44 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
     /// Puts the new dw, dv and de in front of those of their kind, from `Sigma h`.
     #[inline(always)]
     fn insert(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>, z: [f64; N], z_filters: [f64; K]) {
-        let count = layout.filter_errors();
+        let (with_theta, with_filters) = self.covariances_of_new(layout, rows, z, z_filters);
+        let among = Self::covariances_among_new(layout, rows, &with_theta, &with_filters);
+        self.shift(layout);
         let kinds = [layout.w, layout.v, layout.e];
-        let new = [&rows.w, &rows.v, &rows.e];
+        for i in 0..3 {
+            let (at, n) = kinds[i];
+            if n == 0 {
+                continue;
+            }
+            self.cross[at] = with_theta[i];
+            let mut row = with_filters[i];
+            for (j, (first, n)) in kinds.into_iter().enumerate() {
+                for at in (first + 1..first + n).rev() {
+                    row[at] = row[at - 1];
+                }
+                if n > 0 {
+                    row[first] = among[i][j];
+                }
+            }
+            self.filters[at] = row;
+            for c in 0..layout.filter_errors() {
+                self.filters[c][at] = row[c];
+            }
+        }
+    }
+
+    /// `Sigma a` for the rows a of the new dw, dv and de, from `Sigma h`: with theta, and with the past errors of the filters.
+    #[inline(always)]
+    fn covariances_of_new(
+        &self,
+        layout: &ErrorLayout,
+        rows: &Sensitivities<N, K>,
+        z: [f64; N],
+        z_filters: [f64; K],
+    ) -> ([[f64; N]; 3], [[f64; K]; 3]) {
+        let count = layout.filter_errors();
+        let kinds = [layout.w, layout.v];
+        let new = [&rows.w, &rows.v];
         let mut with_theta = [z; 3];
         let mut with_filters = [z_filters; 3];
         for kind in 0..2 {
@@ -175,6 +212,19 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
                 }
             }
         }
+        (with_theta, with_filters)
+    }
+
+    /// Covariances of the new dw, dv and de among one another.
+    #[inline(always)]
+    fn covariances_among_new(
+        layout: &ErrorLayout,
+        rows: &Sensitivities<N, K>,
+        with_theta: &[[f64; N]; 3],
+        with_filters: &[[f64; K]; 3],
+    ) -> [[f64; 3]; 3] {
+        let kinds = [layout.w, layout.v, layout.e];
+        let new = [&rows.w, &rows.v, &rows.e];
         let mut among = [[0.0; 3]; 3];
         for i in 0..3 {
             for j in 0..=i {
@@ -183,7 +233,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
                     for k in 0..N {
                         sum += new[j].theta[k] * with_theta[i][k];
                     }
-                    for k in 0..count {
+                    for k in 0..layout.filter_errors() {
                         sum += new[j].filters[k] * with_filters[i][k];
                     }
                     among[i][j] = sum;
@@ -191,6 +241,13 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
                 }
             }
         }
+        among
+    }
+
+    /// Moves the past errors on by one sample; the oldest of each kind is dropped.
+    #[inline(always)]
+    fn shift(&mut self, layout: &ErrorLayout) {
+        let kinds = [layout.w, layout.v, layout.e];
         for (first, n) in kinds {
             for at in (first + 1..first + n).rev() {
                 self.cross[at] = self.cross[at - 1];
@@ -198,36 +255,16 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
             }
         }
         for (first, n) in kinds {
-            for row in &mut self.filters[..count] {
+            for row in &mut self.filters[..layout.filter_errors()] {
                 for at in (first + 1..first + n).rev() {
                     row[at] = row[at - 1];
                 }
-            }
-        }
-        for i in 0..3 {
-            let (at, n) = kinds[i];
-            if n == 0 {
-                continue;
-            }
-            self.cross[at] = with_theta[i];
-            let mut row = with_filters[i];
-            for (j, (first, n)) in kinds.into_iter().enumerate() {
-                for at in (first + 1..first + n).rev() {
-                    row[at] = row[at - 1];
-                }
-                if n > 0 {
-                    row[first] = among[i][j];
-                }
-            }
-            self.filters[at] = row;
-            for c in 0..count {
-                self.filters[c][at] = row[c];
             }
         }
     }
 
-    /// To first order a recursion with large gains can be unstable where it is not: then the variances grow to what says that nothing
-    /// is known, and no further. What is not finite starts again from there.
+    /// Keeps the variances below [`LARGEST_GROWTH`] times those at the start. The equations of first order can be unstable for large gains where the
+    /// recursion is not. After an overflow all start again from there.
     #[cold]
     fn bound_variances(&mut self) {
         if !self.is_valid() {
@@ -235,12 +272,12 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
             self.filters = [[0.0; K]; K];
             self.theta = [[0.0; N]; N];
             for i in 0..N {
-                self.theta[i][i] = LARGEST_GROWTH * self.start[i];
+                self.theta[i][i] = LARGEST_GROWTH * self.initial_variances[i];
             }
         }
         for i in 0..N {
-            let limit = LARGEST_GROWTH * self.start[i];
-            if self.start[i] > 0.0 && self.theta[i][i] > limit {
+            let limit = LARGEST_GROWTH * self.initial_variances[i];
+            if self.initial_variances[i] > 0.0 && self.theta[i][i] > limit {
                 let share = libm::sqrt(limit / self.theta[i][i]);
                 for j in 0..N {
                     self.theta[i][j] *= share;
@@ -264,7 +301,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         self.innovation_variance.variance()
     }
 
-    /// True when every number inside is finite.
+    /// True when all numbers are finite.
     pub fn is_valid(&self) -> bool {
         let all = self.theta.iter().chain(&self.cross).flatten();
         let mut all = all.chain(self.filters.iter().flatten());
@@ -326,9 +363,9 @@ impl<const N: usize, const K: usize> ErrorPropagation<N, K> for ErrorBars<N, K> 
             let z_filters = core::array::from_fn(|c| z_filters[c] * (1.0 - g_h));
             self.insert(layout, rows, z, z_filters);
         }
-        self.wait -= 1;
-        if self.wait == 0 {
-            self.wait = CHECK_PERIOD;
+        self.until_check -= 1;
+        if self.until_check == 0 {
+            self.until_check = CHECK_PERIOD;
             self.bound_variances();
         }
     }
@@ -344,7 +381,6 @@ impl<const N: usize, const K: usize> ErrorPropagation<N, K> for ErrorBars<N, K> 
 
     #[inline]
     fn add_drift(&mut self, i: usize, variance: f64, bound: f64) {
-        // Beyond the bound nothing is known that could be forgotten.
         if self.theta[i][i] < bound {
             self.theta[i][i] += variance;
         }

@@ -20,7 +20,8 @@
 //!
 //! ```
 //! use hoid_core::{
-//!     adaptation::{Covariance, Forgetting},
+//!     adaptation::Forgetting,
+//!     covariance::Covariance,
 //!     error_bars::ErrorBars,
 //!     innovation_variance::InnovationVariance,
 //!     rls::Rls,
@@ -62,7 +63,7 @@
 //! | [`rls`], [`rpem`], [`physical`] | the recursions: least squares, prediction-error method in polynomials and in physical parameters |
 //! | [`adaptive`] | a bank of hypotheses about when the operator changed |
 //! | [`predictor`], [`shape`] | one-step predictor of the general model with its gradient; orders of the model |
-//! | [`adaptation`], [`window`] | from gradient to step: gain, forgetting, guard against windup; a rectangular window |
+//! | [`adaptation`], [`covariance`], [`window`] | from gradient to step: rules of forgetting; P with a guard against windup; a rectangular window |
 //! | [`ud_covariance`] | the covariance `U D U'` |
 //! | [`error_bars`], [`sensitivities`], [`innovation_variance`] | covariance of the estimate whatever the gain, errors in the filters, sigma^2 |
 //! | [`recursion`] | outcome of a step, polynomials that are kept stable |
@@ -79,6 +80,7 @@ pub mod state;
 
 pub mod adaptation;
 pub mod adaptive;
+pub mod covariance;
 pub mod delay;
 pub mod divided_differences;
 pub mod error_bars;

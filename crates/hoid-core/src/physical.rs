@@ -2,13 +2,13 @@
 //!
 //! `eta = [K_e, K_e_dot, omega_nm, zeta_nm, c.., d..]`, or with the delay `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, c.., d..]`. The
 //! predictor is that of Box-Jenkins with the polynomials `theta(eta)` of the exact zero-order hold ([`crate::held_operator`]); its gradient is
-//! `psi_eta = (d theta/d eta)' psi_theta`. The step is that of [`crate::rpem`], but what is remembered long and what is soon
-//! forgotten are now the quantities of which the user knows how fast they change: a person adapts the gains, hardly the neuromuscular system.
+//! `psi_eta = (d theta/d eta)' psi_theta`. The step is that of [`crate::rpem`], but each factor of forgetting now belongs to a quantity of which the
+//! user knows how fast it changes: operators adapt their gains, and hardly their neuromuscular system.
 //!
-//! Each parameter stays within its bounds: a step is cut where it meets one. C (and D, if asked for) is kept stable by halving the step.
+//! Each parameter stays within its bounds: a step is cut where it meets one. C (and D, with [`Stable::PredictorAndNoise`]) is kept stable by halving the step.
 //!
 //! With the delay as a parameter `tau_e = l Ts + delta`, B has three coefficients behind `nk = l + 1` samples; as tau_e grows over a
-//! whole sample, B moves on along the input that the predictor keeps, and no filter notices. The model is continuous there, its derivative
+//! whole sample, B moves on along the past input that the predictor keeps, without a transient. The model is continuous there, its derivative
 //! has a kink (see [`crate::held_operator`]).
 
 use crate::{
@@ -43,8 +43,8 @@ pub struct PhysicalModel<S, const N: usize> {
     pub stable: Stable,
 }
 
-/// The recursion. N is the room for parameters, K that for the errors of its filters ([`ErrorLayout::filter_errors`])
-/// (0 for the usual error bars), L that for the input: 2 without tau_e, 3 and the range of the delay with it; at least nc.
+/// The recursion. N is the capacity for parameters, K that for the errors of its filters ([`ErrorLayout::filter_errors`]; 0 for the usual error
+/// bars), L the number of past inputs that are kept: 2 without tau_e, 3 and the range of the delay with it; at least nc.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalRpem<S, const N: usize, const K: usize, const L: usize, A> {
     model: PhysicalModel<S, N>,
@@ -118,8 +118,8 @@ impl<S: Shape, const N: usize> PhysicalModel<S, N> {
 }
 
 impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>> PhysicalRpem<S, N, K, L, A> {
-    /// Starts from eta with filters at rest. `None` when the orders are others, N or L is too small, eta lies outside the bounds, the bounds let omega_nm or
-    /// zeta_nm become zero, or the noise model is not stable.
+    /// Starts from eta with filters at rest. `None` when the orders are not those of [`PhysicalModel::shape`], N, K or L is too small, eta lies outside
+    /// the bounds, the bounds let omega_nm or zeta_nm become zero, or the noise model is not stable.
     pub fn new(model: PhysicalModel<S, N>, eta: [f64; N], adaptation: A, bars: ErrorBars<N, K>) -> Option<Self> {
         let shape = model.shape;
         let predictor = Predictor::new(shape, Regressor::Gradient)?;
@@ -151,7 +151,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         Some(recursion)
     }
 
-    /// Lets B begin where the delay says.
+    /// Lets B begin at the delay of the estimate.
     fn apply_delay(&mut self) {
         if let Some(first) = self.model.smallest_nk {
             let nk = self.polynomials.whole_samples + 1;
@@ -166,7 +166,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         innovation
     }
 
-    /// A row that stands for theta as one that stands for eta: `J' psi_theta`.
+    /// A gradient by theta as one by eta: `J' psi_theta`.
     #[inline(always)]
     fn chain_rule(&self, of_theta: [f64; N]) -> [f64; N] {
         let shape = self.model.shape;
@@ -188,7 +188,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         row
     }
 
-    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`; with the delay as a parameter nk is the smallest one. Both must be finite.
+    /// The step by a sample `x(t) = e(t - nk)`, `u(t)`; nk is [`PhysicalModel::smallest_nk`] when the delay is a parameter. Both must be finite.
     #[inline]
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         let innovation = self.predict(x, u);
@@ -206,21 +206,10 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
             theta[operator - 2..operator - 2 + noise].copy_from_slice(&eta[operator..operator + noise]);
             stable.holds(&shape, &theta)
         });
-        let (mut gain, mut cut) = (moved.gain, false);
+        let (fraction, cut) = self.cut_at_bounds(&moved.step, allowed, &mut eta);
+        let mut gain = moved.gain;
         for i in 0..N {
-            let [low, high] = self.model.bounds[i];
-            let within = eta[i].clamp(low, high);
-            let mut part = allowed;
-            if within != eta[i] {
-                cut = true;
-                part = if moved.step[i] == 0.0 {
-                    0.0
-                } else {
-                    (within - self.eta[i]) / moved.step[i]
-                };
-                eta[i] = within;
-            }
-            gain[i] *= part * used;
+            gain[i] *= fraction[i] * used;
         }
         self.eta = eta;
         self.bars.update(&layout, &rows, &gain, innovation);
@@ -234,7 +223,28 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         }
     }
 
-    /// Takes a sample into the filters alone; the estimate stays.
+    /// Cuts the new estimate where it is outside the bounds. Returns the fraction of the step that is left of each parameter, `allowed` inside the bounds,
+    /// and whether one was cut.
+    #[inline(always)]
+    fn cut_at_bounds(&self, step: &[f64; N], allowed: f64, eta: &mut [f64; N]) -> ([f64; N], bool) {
+        let (mut fraction, mut cut) = ([allowed; N], false);
+        for i in 0..N {
+            let [low, high] = self.model.bounds[i];
+            let within = eta[i].clamp(low, high);
+            if within != eta[i] {
+                cut = true;
+                fraction[i] = if step[i] == 0.0 {
+                    0.0
+                } else {
+                    (within - self.eta[i]) / step[i]
+                };
+                eta[i] = within;
+            }
+        }
+        (fraction, cut)
+    }
+
+    /// As [`PhysicalRpem::step`], but the estimate stays: only the filters move on.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let innovation = self.predict(x, u);
         let (layout, rows) = self.sensitivities();
@@ -287,7 +297,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         }
     }
 
-    /// eta.
+    /// The estimate eta.
     pub fn eta(&self) -> &[f64; N] {
         &self.eta
     }

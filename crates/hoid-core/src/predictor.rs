@@ -20,7 +20,7 @@
 //! Identification*, 1983, section 3.7.3 and eq. 3.151).
 //!
 //! The input is kept over L samples, so that B may begin at any `offset` within them: a delay can be changed without a transient.
-//! N is the room for parameters; every order fits in it.
+//! N is the capacity for parameters.
 
 use core::hint::black_box;
 
@@ -29,7 +29,7 @@ use crate::{
     shape::Shape,
 };
 
-/// What psi is made of.
+/// The signals of which psi is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Regressor {
     /// The gradient: prediction-error method.
@@ -69,76 +69,6 @@ crate::state!([S, const N: usize, const L: usize] Predictor<S, N, L> {
     x, filtered_x, x_over_f, u, w, v, eps, filtered_u, filtered_eps, filtered_v, w_over_f, filtered_w, pending,
 });
 
-/// `sum_j c_j h_j` over the coefficients.
-#[inline(always)]
-pub(crate) fn dot(coefficients: &[f64], history: &[f64]) -> f64 {
-    // Not from zero: every addition is one more that the next sample waits for.
-    let mut pairs = coefficients.iter().zip(history);
-    let Some((c, h)) = pairs.next() else {
-        return 0.0;
-    };
-    let mut sum = c * h;
-    for (c, h) in pairs {
-        sum += c * h;
-    }
-    sum
-}
-
-/// The same, of a history that the sample before has pushed into number by number.
-///
-/// Each number is read by itself: one wide load of what was stored narrowly just before would wait until all of it has reached the
-/// memory, so that no two samples could overlap. The compiler likes to make such loads.
-#[inline(always)]
-fn dot_of_fresh(coefficients: &[f64], history: &[f64]) -> f64 {
-    let mut pairs = coefficients.iter().zip(history);
-    let Some((c, h)) = pairs.next() else {
-        return 0.0;
-    };
-    let mut sum = c * black_box(*h);
-    for (c, h) in pairs {
-        sum += c * black_box(*h);
-    }
-    sum
-}
-
-/// Puts a value in front of the n newest ones.
-#[inline(always)]
-fn push(history: &mut [f64], n: usize, value: f64) {
-    if n > 0 {
-        history.copy_within(0..n - 1, 1);
-        history[0] = value;
-    }
-}
-
-/// psi of the histories of x and of u, eps, v and w.
-// One move for each number: a wide copy of what was just pushed would wait as in [`dot_of_fresh`].
-#[allow(clippy::manual_memcpy)]
-#[inline(always)]
-fn gather<S: Shape, const N: usize>(shape: &S, x: &[f64], [u, eps, v, w]: [&[f64; N]; 4]) -> [f64; N] {
-    let mut psi = [0.0; N];
-    let (psi_a, rest) = psi.split_at_mut(shape.na());
-    let (psi_b, rest) = rest.split_at_mut(shape.nb());
-    let (psi_c, rest) = rest.split_at_mut(shape.nc());
-    let (psi_d, rest) = rest.split_at_mut(shape.nd());
-    let psi_f = &mut rest[..shape.nf()];
-    for j in 0..shape.na() {
-        psi_a[j] = -u[j];
-    }
-    for j in 0..shape.nb() {
-        psi_b[j] = x[j];
-    }
-    for j in 0..shape.nc() {
-        psi_c[j] = eps[j];
-    }
-    for j in 0..shape.nd() {
-        psi_d[j] = -v[j];
-    }
-    for j in 0..shape.nf() {
-        psi_f[j] = -w[j];
-    }
-    psi
-}
-
 impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
     /// All filters at rest. `None` when the shape does not fit in N and L, or has no parameter.
     pub fn new(shape: S, regressor: Regressor) -> Option<Self> {
@@ -168,23 +98,23 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         self.shape
     }
 
-    /// Lets B begin `offset` samples after x(t), as far as the kept input reaches; it reaches where L is larger than N.
+    /// Lets B begin `offset` samples before the newest input, as far as the kept input reaches; B can shift where L is larger than N.
     pub fn set_offset(&mut self, offset: usize) {
         self.offset = offset.min(L - self.shape.nb().min(L));
     }
 
-    /// Brings all filters to rest.
+    /// Brings all filters to rest; the offset of B stays.
     #[cold]
     #[inline(never)]
     pub fn reset(&mut self) {
         let offset = self.offset;
-        if let Some(rested) = Self::new(self.shape, self.regressor) {
-            *self = rested;
+        if let Some(at_rest) = Self::new(self.shape, self.regressor) {
+            *self = at_rest;
             self.offset = offset;
         }
     }
 
-    /// Where B begins. Without room for shifts it is at the newest input, which the compiler then knows.
+    /// Where B begins. Where it cannot shift, this is a constant that the compiler knows.
     #[inline(always)]
     fn offset(&self) -> usize {
         if L > N { self.offset } else { 0 }
@@ -196,7 +126,7 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         let shape = self.shape;
         let [_, _, c, d, f] = shape.split(theta);
         let offset = self.offset();
-        // Without a room for shifts of B, its own coefficients are all that is kept.
+        // Where B cannot shift, only the inputs under its own coefficients are kept.
         let input = if L > N { L } else { shape.nb() };
         push(&mut self.x, input, x);
         self.pending[0] = u;
@@ -226,7 +156,7 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         [w, v, v + dot(d, &self.v) - dot(c, &self.eps)]
     }
 
-    /// Takes the predicted sample into the filters, with the estimate after it. Returns the a-posteriori residual.
+    /// Moves the filters on by the predicted sample, with the estimate after it. Returns the a-posteriori residual.
     #[inline(always)]
     pub fn correct(&mut self, theta: &[f64; N]) -> f64 {
         let shape = self.shape;
@@ -278,7 +208,7 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         self.pending[0] = -self.residual(theta)[2];
     }
 
-    /// How dw, dv and de of the pending sample follow from the errors X of [`crate::error_bars`].
+    /// The sensitivities of dw, dv and de of the pending sample to the errors X of [`crate::error_bars`].
     #[inline(always)]
     pub fn sensitivities<const K: usize>(&self, theta: &[f64; N], layout: &ErrorLayout) -> Sensitivities<N, K> {
         let shape = self.shape;
@@ -311,4 +241,74 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         }
         Sensitivities { w, v, e }
     }
+}
+
+/// `sum_j c_j h_j` over the coefficients.
+#[inline(always)]
+pub(crate) fn dot(coefficients: &[f64], history: &[f64]) -> f64 {
+    // Not from zero: every addition is one more that the next sample waits for.
+    let mut pairs = coefficients.iter().zip(history);
+    let Some((c, h)) = pairs.next() else {
+        return 0.0;
+    };
+    let mut sum = c * h;
+    for (c, h) in pairs {
+        sum += c * h;
+    }
+    sum
+}
+
+/// The same, of a history that the sample before has pushed into number by number.
+///
+/// Each number is read by itself: one wide load of what was stored narrowly just before would wait until all of it has reached the
+/// memory, so that no two samples could overlap. The compiler likes to make such loads.
+#[inline(always)]
+fn dot_of_fresh(coefficients: &[f64], history: &[f64]) -> f64 {
+    let mut pairs = coefficients.iter().zip(history);
+    let Some((c, h)) = pairs.next() else {
+        return 0.0;
+    };
+    let mut sum = c * black_box(*h);
+    for (c, h) in pairs {
+        sum += c * black_box(*h);
+    }
+    sum
+}
+
+/// Puts a value in front of the n newest ones.
+#[inline(always)]
+fn push(history: &mut [f64], n: usize, value: f64) {
+    if n > 0 {
+        history.copy_within(0..n - 1, 1);
+        history[0] = value;
+    }
+}
+
+/// psi, from the histories of x and of u, eps, v and w.
+// One move for each number: a wide copy of what was just pushed would wait as in [`dot_of_fresh`].
+#[allow(clippy::manual_memcpy)]
+#[inline(always)]
+fn gather<S: Shape, const N: usize>(shape: &S, x: &[f64], [u, eps, v, w]: [&[f64; N]; 4]) -> [f64; N] {
+    let mut psi = [0.0; N];
+    let (psi_a, rest) = psi.split_at_mut(shape.na());
+    let (psi_b, rest) = rest.split_at_mut(shape.nb());
+    let (psi_c, rest) = rest.split_at_mut(shape.nc());
+    let (psi_d, rest) = rest.split_at_mut(shape.nd());
+    let psi_f = &mut rest[..shape.nf()];
+    for j in 0..shape.na() {
+        psi_a[j] = -u[j];
+    }
+    for j in 0..shape.nb() {
+        psi_b[j] = x[j];
+    }
+    for j in 0..shape.nc() {
+        psi_c[j] = eps[j];
+    }
+    for j in 0..shape.nd() {
+        psi_d[j] = -v[j];
+    }
+    for j in 0..shape.nf() {
+        psi_f[j] = -w[j];
+    }
+    psi
 }

@@ -1,8 +1,8 @@
-//! What all recursions share: the outcome of a step, and the step that keeps the predictor stable.
+//! The outcome of a step, and steps that are shortened until they keep the predictor stable.
 
 use crate::{shape::Shape, stability::roots_inside};
 
-/// What a recursion says of a sample.
+/// The outcome of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// A-priori innovation eps.
@@ -21,7 +21,7 @@ pub enum Stable {
     PredictorAndNoise,
 }
 
-/// A step is halved so often at most; then it is left out.
+/// Largest number of halvings of a step; after them the estimate stays.
 const HALVINGS: u32 = 12;
 
 impl Stable {
@@ -33,20 +33,20 @@ impl Stable {
     }
 }
 
-/// `part/whole`, 1 where both are zero.
+/// `part/whole`; 1 where the two are equal, so also where both are zero.
 #[inline(always)]
 pub fn ratio(part: f64, whole: f64) -> f64 {
     if part == whole { 1.0 } else { part / whole }
 }
 
-/// True when every number is finite. In the registers where the numbers are: no way through integers, and no branch for each.
+/// True when every number is finite; in floating-point registers and without a branch for each number.
 #[inline(always)]
 pub(crate) fn all_finite<const N: usize>(values: &[f64; N]) -> bool {
-    // Zero times what is not finite is not a number.
+    // Zero times infinity or NaN is NaN.
     values.iter().fold(0.0, |sum, v| sum + 0.0 * v) == 0.0
 }
 
-/// The largest of the shares 1, 1/2, 1/4 ... of a step that is allowed; 0 when none is.
+/// The largest of the fractions 1, 1/2, 1/4 ... of a step that is allowed, and theta after it; 0 and theta when none is.
 #[inline]
 pub fn backtrack<const N: usize>(
     theta: &[f64; N],
@@ -61,17 +61,17 @@ pub fn backtrack<const N: usize>(
     halved(&theta, &step, allowed)
 }
 
-/// Where the whole step is not allowed.
+/// The same for a whole step that is not allowed.
 #[cold]
 #[inline(never)]
 fn halved<const N: usize>(theta: &[f64; N], step: &[f64; N], allowed: impl Fn(&[f64; N]) -> bool) -> (f64, [f64; N]) {
-    let mut share = 0.5;
+    let mut fraction = 0.5;
     for _ in 0..HALVINGS {
-        let moved: [f64; N] = core::array::from_fn(|i| theta[i] + share * step[i]);
+        let moved: [f64; N] = core::array::from_fn(|i| theta[i] + fraction * step[i]);
         if moved.iter().all(|t| t.is_finite()) && allowed(&moved) {
-            return (share, moved);
+            return (fraction, moved);
         }
-        share *= 0.5;
+        fraction *= 0.5;
     }
     (0.0, *theta)
 }

@@ -12,7 +12,7 @@ use crate::{
     shape::Shape,
 };
 
-/// The recursion. N is the room for parameters; B is [`NoErrorBars`](crate::error_bars::NoErrorBars) where no error bars are asked for.
+/// The recursion. N is the capacity for parameters, B the error bars or [`NoErrorBars`](crate::error_bars::NoErrorBars).
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
 pub struct Rls<S, const N: usize, A, B = ErrorBars<N, 0>> {
@@ -28,7 +28,7 @@ crate::state!([S, const N: usize, A: crate::state::State, B: crate::state::State
 
 impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<S, N, A, B> {
     /// Starts from theta `[a.., b..]` with zeros before the first sample. `None` when there is no parameter, more than N, or one of
-    /// C, D or F; or when the way of forgetting needs the innovation variance and `bars` do not follow it.
+    /// C, D or F; or when the rule of forgetting needs the innovation variance and `bars` do not estimate it.
     pub fn new(shape: S, theta: [f64; N], adaptation: A, bars: B) -> Option<Self> {
         let linear = (shape.nc(), shape.nd(), shape.nf()) == (0, 0, 0);
         let known = bars.variance().is_some() || !adaptation.needs_innovation_variance();
@@ -42,7 +42,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         })
     }
 
-    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`. Both must be finite.
+    /// The step by a sample `x(t) = e(t - nk)`, `u(t)`. Both must be finite.
     #[inline]
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         // State is read once, worked on in locals and written once.
@@ -76,7 +76,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         }
     }
 
-    /// Takes a sample into the regressor alone; the estimate stays.
+    /// As [`Rls::step`], but the estimate stays: only the regressor moves on.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let (psi, innovation) = self.innovation(&self.theta, x, u);
         self.shift(psi, u);
@@ -96,7 +96,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
     #[inline(always)]
     fn innovation(&self, theta: &[f64; N], x: f64, u: f64) -> ([f64; N], f64) {
         let (na, nb) = (self.shape.na(), self.shape.nb());
-        // Each number by itself: a wide load right after the narrow stores of the sample before would wait for memory.
+        // Each number is read by itself: a wide load right after the narrow stores of the sample before would wait for memory.
         let mut psi = self.psi.map(core::hint::black_box);
         for j in (1..nb).rev() {
             psi[na + j] = psi[na + j - 1];
@@ -122,7 +122,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         self.psi = psi;
     }
 
-    /// theta.
+    /// The estimate theta.
     pub fn theta(&self) -> &[f64; N] {
         &self.theta
     }

@@ -13,8 +13,8 @@ use crate::{
     shape::Shape,
 };
 
-/// The recursion. N is the room for parameters, K that for the errors of its filters ([`ErrorLayout::filter_errors`]), or 0
-/// for the usual error bars and for none, B = [`NoErrorBars`](crate::error_bars::NoErrorBars).
+/// The recursion. N is the capacity for parameters, K that for the errors of its filters ([`ErrorLayout::filter_errors`]): 0 for the usual error bars
+/// and for none, B = [`NoErrorBars`](crate::error_bars::NoErrorBars).
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
 pub struct Rpem<S, const N: usize, const K: usize, A, B = ErrorBars<N, K>> {
@@ -33,7 +33,7 @@ crate::state!([S, const N: usize, const K: usize, A: crate::state::State, B: cra
 
 impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropagation<N, K>> Rpem<S, N, K, A, B> {
     /// Starts from `theta = [a.. b.. c.. d.. f..]` with filters at rest. `None` when the shape does not fit in N and K, theta is not
-    /// stable, or the way of forgetting needs the innovation variance and `bars` do not follow it.
+    /// stable, or the rule of forgetting needs the innovation variance and `bars` do not estimate it.
     pub fn new(
         shape: S,
         regressor: Regressor,
@@ -57,7 +57,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         })
     }
 
-    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`. Both must be finite.
+    /// The step by a sample `x(t) = e(t - nk)`, `u(t)`. Both must be finite.
     #[inline]
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         let shape = self.predictor.shape();
@@ -83,7 +83,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         }
     }
 
-    /// Takes a sample into the filters alone; the estimate stays.
+    /// As [`Rpem::step`], but the estimate stays: only the filters move on.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let theta = self.theta;
         let (psi, innovation) = self.predictor.predict(&theta, x, u);
@@ -129,7 +129,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         }
     }
 
-    /// theta.
+    /// The estimate theta.
     pub fn theta(&self) -> &[f64; N] {
         &self.theta
     }

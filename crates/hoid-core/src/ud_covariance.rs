@@ -1,23 +1,22 @@
 //! A covariance matrix in factors: `P = U D U'`, U unit upper triangular, D diagonal.
 //!
-//! P stays symmetric and positive whatever rounding does, as long as D does. Three operations are all that the ways of
-//! forgetting need:
+//! P stays symmetric and positive whatever rounding does, as long as D does. The rules of forgetting need three operations:
 //!
 //! - **measurement** with the regressor psi and the variance R: `g = P psi/(R + psi' P psi)`, `P <- P - g psi' P`. With
 //!   `f = U' psi`, `v = D f` and the partial sums `alpha_j = R + sum_{i<=j} f_i v_i`: `d_j <- d_j alpha_{j-1}/alpha_j`, and the columns of
 //!   U follow (G. J. Bierman, *Factorization Methods for Discrete Sequential Estimation*, 1977, section V.3). A negative R, with all
-//!   alpha negative, gives P back what a measurement took: the same lines hold.
+//!   alpha negative, undoes a measurement by the same equations.
 //! - **scaling** `P <- S P S` with a diagonal S: `U_ij <- U_ij s_i/s_j`, `d_j <- d_j s_j^2`. Exact; this is the forgetting matrix.
 //! - **rank one** `P <- P + c a a'` with `c >= 0` (W. S. Agee and R. H. Turner, 1972; Bierman, section III.4).
 //!
-//! N is the room for parameters. Where there are fewer, their d is zero and nothing happens to them.
+//! N is the capacity for parameters. Where there are fewer, the d of the others are zero and stay so.
 
 /// `U D U'` of an N x N matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
 pub struct UdCovariance<const N: usize> {
-    /// Column j holds `U_ij`, i < j, and `d_j` in the place of the 1; the rest is not used. The d stand apart, so that no compiler makes a
-    /// vector of them: the first would wait for the last.
+    /// Column j holds `U_ij`, i < j, and `d_j` in the place of the 1; the rest is not used. The d do not stand side by side, so that no
+    /// compiler makes a vector of them, whose first element would wait for the last.
     u: [[f64; N]; N],
 }
 
@@ -177,7 +176,7 @@ impl<const N: usize> UdCovariance<N> {
         for j in (0..N).rev() {
             let s = a[j];
             let d = self.u[j][j] + c * s * s;
-            // Zero only where both terms are: the direction is not there yet, and nothing is added to it.
+            // Zero only where both terms are: the vector has no component here.
             if d > 0.0 {
                 let share = c / d;
                 c = share * self.u[j][j];
@@ -214,7 +213,7 @@ impl<const N: usize> UdCovariance<N> {
         let mut positive = true;
         for j in 0..N {
             positive &= self.u[j][j] >= 0.0;
-            // Zero times what is not finite is not a number.
+            // Zero times infinity or NaN is NaN.
             for i in 0..=j {
                 sum += 0.0 * self.u[j][i];
             }

@@ -5,39 +5,41 @@
 //! `theta = R^{-1} sum psi y`, `R = sum psi psi'`, which for ARX and FIR is exact and for the others the recursive prediction-error method
 //! with that memory.
 //!
-//! NormalEquations from which the oldest term is subtracted would keep the rounding of all the past. Here the window is undetermined as two sums: one
-//! grows from a boundary on, the other, a sum that grew until that boundary, loses its terms; when it has lost all of them the first takes its
-//! place. No rounding lives longer than two windows.
+//! Sums from which the oldest term is subtracted would keep the rounding of all the past. Here the window is held as two sums: one grows from a
+//! boundary on; the other, a sum that grew until that boundary, loses its terms. When it has lost all of them the first takes its place. No rounding
+//! lives longer than two windows.
 //!
 //! The covariance of theta over sigma^2 is `R^{-1}`. Where the window does not determine theta (fewer samples than parameters, no
-//! excitation), theta stays and there is no covariance. Memory: `W (N + 1)` numbers, which the caller owns.
+//! excitation), theta stays and there is no covariance. The caller owns the memory of `W (N + 1)` numbers.
 
 use crate::adaptation::{Adaptation, ParameterStep};
 
-/// Smallest pivot of R scaled to a unit diagonal that counts as information.
-const SINGULAR: f64 = 1e-13;
+/// Smallest pivot of R, scaled to a unit diagonal, of a window that determines theta: some hundred units of rounding.
+const SMALLEST_PIVOT: f64 = 1e-13;
+/// Power of a parameter's gradient, relative to the largest so far, below which it is not excited.
+const NO_EXCITATION: f64 = 1e-20;
 
-/// Power of a gradient below which a window is silent, as a share of the largest so far.
-const SILENCE: f64 = 1e-20;
-
-/// NormalEquations over samples.
+/// The sums of the normal equations over some samples: `sum psi psi'` (lower triangle) and `sum psi y`.
 #[derive(Debug, Clone, PartialEq)]
 struct NormalEquations<const N: usize> {
-    gram: [[f64; N]; N],
-    right: [f64; N],
+    r: [[f64; N]; N],
+    psi_y: [f64; N],
 }
 
-crate::state!([const N: usize] NormalEquations<N> { gram, right });
+crate::state!([const N: usize] NormalEquations<N> { r, psi_y });
 
-/// The adaptation of the module, with its memory.
+/// The adaptation by a rectangular window. N is the capacity for parameters, M the memory of the samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Window<const N: usize, M> {
     memory: M,
     /// Parameters in use, at most N.
     parameters: usize,
+    /// W.
     length: usize,
+    /// Samples in the memory, and the place of the next.
     filled: usize,
     next: usize,
+    /// Sums since the boundary, and those before it that are still in the window.
     growing: NormalEquations<N>,
     fading: NormalEquations<N>,
     /// Largest power of each parameter's gradient over a window so far.
@@ -63,24 +65,24 @@ impl<const N: usize, M: AsMut<[f64]>> crate::state::State for Window<N, M> {
 
 impl<const N: usize> NormalEquations<N> {
     const ZERO: Self = Self {
-        gram: [[0.0; N]; N],
-        right: [0.0; N],
+        r: [[0.0; N]; N],
+        psi_y: [0.0; N],
     };
 
     #[inline]
     fn add(&mut self, sign: f64, psi: &[f64], y: f64) {
         for i in 0..psi.len() {
             let p = sign * psi[i];
-            self.right[i] += p * y;
+            self.psi_y[i] += p * y;
             for j in 0..=i {
-                self.gram[i][j] += p * psi[j];
+                self.r[i][j] += p * psi[j];
             }
         }
     }
 }
 
 impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
-    /// Numbers of memory for a window of this many samples.
+    /// Length of the memory for a window of this many samples.
     pub const fn memory_length(samples: usize) -> usize {
         samples * (N + 1)
     }
@@ -107,38 +109,52 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
         self.undetermined
     }
 
-    /// Cholesky factor of R scaled to a unit diagonal, and the scale; `None` when it is singular.
-    fn cholesky(&self) -> Option<([[f64; N]; N], [f64; N])> {
+    /// R in factors; `None` when it is singular.
+    fn cholesky(&self) -> Option<Cholesky<N>> {
         let p = self.parameters;
         let (mut l, mut scale) = ([[0.0; N]; N], [0.0; N]);
         for i in 0..p {
-            let power = self.growing.gram[i][i] + self.fading.gram[i][i];
-            if power.is_nan() || power <= SILENCE * self.largest[i] {
+            let power = self.growing.r[i][i] + self.fading.r[i][i];
+            if power.is_nan() || power <= NO_EXCITATION * self.largest[i] {
                 return None;
             }
             scale[i] = 1.0 / libm::sqrt(power);
         }
         for i in 0..p {
             for j in 0..=i {
-                let mut sum = (self.growing.gram[i][j] + self.fading.gram[i][j]) * scale[i] * scale[j];
+                let mut sum = (self.growing.r[i][j] + self.fading.r[i][j]) * scale[i] * scale[j];
                 for k in 0..j {
                     sum -= l[i][k] * l[j][k];
                 }
                 if i > j {
                     l[i][j] = sum / l[j][j];
-                } else if sum > SINGULAR {
+                } else if sum > SMALLEST_PIVOT {
                     l[i][i] = libm::sqrt(sum);
                 } else {
                     return None;
                 }
             }
         }
-        Some((l, scale))
+        Some(Cholesky {
+            l,
+            scale,
+            parameters: p,
+        })
     }
+}
 
-    fn solve(&self, factor: &([[f64; N]; N], [f64; N]), right: &[f64; N]) -> [f64; N] {
-        let (l, scale) = factor;
-        let p = self.parameters;
+/// `R = S^{-1} L L' S^{-1}` with a diagonal S that scales R to a unit diagonal.
+struct Cholesky<const N: usize> {
+    l: [[f64; N]; N],
+    /// Diagonal of S.
+    scale: [f64; N],
+    parameters: usize,
+}
+
+impl<const N: usize> Cholesky<N> {
+    /// `R^{-1} right`.
+    fn solve(&self, right: &[f64; N]) -> [f64; N] {
+        let (l, scale, p) = (&self.l, &self.scale, self.parameters);
         let mut x = [0.0; N];
         for i in 0..p {
             let known: f64 = (0..i).map(|k| l[i][k] * x[k]).sum();
@@ -174,22 +190,18 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Adaptation<N> for Window<N,
             self.next = 0;
             self.fading = core::mem::replace(&mut self.growing, NormalEquations::ZERO);
         }
-        let stay = ParameterStep {
-            step: [0.0; N],
-            gain: [0.0; N],
-        };
         for i in 0..p {
-            self.largest[i] = self.largest[i].max(self.growing.gram[i][i] + self.fading.gram[i][i]);
+            self.largest[i] = self.largest[i].max(self.growing.r[i][i] + self.fading.r[i][i]);
         }
         // With as many samples as parameters the residuals are zero and say nothing.
         let factor = if self.filled > p { self.cholesky() } else { None };
         let Some(factor) = factor else {
             self.undetermined += 1;
-            return stay;
+            return ParameterStep::NONE;
         };
-        let right: [f64; N] = core::array::from_fn(|i| self.growing.right[i] + self.fading.right[i]);
-        let best = self.solve(&factor, &right);
-        let gain = self.solve(&factor, psi);
+        let right: [f64; N] = core::array::from_fn(|i| self.growing.psi_y[i] + self.fading.psi_y[i]);
+        let best = factor.solve(&right);
+        let gain = factor.solve(psi);
         if best.iter().all(|v| v.is_finite()) && gain.iter().all(|v| v.is_finite()) {
             ParameterStep {
                 step: core::array::from_fn(|i| best[i] - theta[i]),
@@ -197,7 +209,7 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Adaptation<N> for Window<N,
             }
         } else {
             self.undetermined += 1;
-            stay
+            ParameterStep::NONE
         }
     }
 
@@ -207,7 +219,7 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Adaptation<N> for Window<N,
         for j in 0..self.parameters {
             let mut unit = [0.0; N];
             unit[j] = 1.0;
-            for (row, value) in spread.iter_mut().zip(self.solve(&factor, &unit)) {
+            for (row, value) in spread.iter_mut().zip(factor.solve(&unit)) {
                 row[j] = value;
             }
         }
@@ -215,7 +227,7 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Adaptation<N> for Window<N,
     }
 
     fn is_valid(&self) -> bool {
-        let sound = |s: &NormalEquations<N>| s.gram.iter().flatten().chain(&s.right).all(|v| v.is_finite());
+        let sound = |s: &NormalEquations<N>| s.r.iter().flatten().chain(&s.psi_y).all(|v| v.is_finite());
         sound(&self.growing) && sound(&self.fading)
     }
 }

@@ -6,7 +6,8 @@ mod common;
 
 use common::{Noise, Plain, box_jenkins, relative_difference};
 use hoid_core::{
-    adaptation::{Adaptation, Covariance, Forgetting},
+    adaptation::{Adaptation, Forgetting},
+    covariance::Covariance,
     error_bars::{ErrorBars, ErrorPropagation, NoErrorBars},
     innovation_variance::InnovationVariance,
     physical::{PhysicalModel, PhysicalRpem},

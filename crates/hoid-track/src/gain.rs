@@ -1,7 +1,8 @@
 //! The adaptation that the options ask for.
 
 use hoid_core::{
-    adaptation::{Adaptation, Covariance, Forgetting, ParameterStep},
+    adaptation::{Adaptation, Forgetting, ParameterStep},
+    covariance::Covariance,
     error_bars::{ErrorBars, ErrorPropagation},
     innovation_variance::InnovationVariance,
     state::State,

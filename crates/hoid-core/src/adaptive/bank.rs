@@ -53,21 +53,13 @@ impl<const M: usize> Bank<M> {
     /// Starts from one hypothesis. `None` when M is below two, the start is not finite or not within the bounds, the bounds let omega_nm or zeta_nm
     /// become zero, or a number of the prior is outside its range.
     pub fn new(first: Hypothesis, prior: ChangePrior) -> Option<Self> {
-        let s = &prior;
-        let eta = first.eta;
-        let inside = eta.iter().zip(&s.bounds).all(|(e, [low, high])| low <= e && e <= high);
-        let valid = M >= 2
-            && inside
-            && s.bounds[2][0] > 0.0
-            && s.bounds[3][0] > 0.0
-            && s.sample_time > 0.0
-            && s.birth_interval > 0
-            && (0.0..1.0).contains(&(s.hazard * f64::from(s.birth_interval)))
-            && (s.delay.propose_every > 0 && s.delay.proposals > 0 && first.extra_delay < s.delay.count)
-            && (0.0..0.5).contains(&s.delay.neighbour_probability)
-            && s.delay.jump > 0.0
-            && first.is_valid();
-        if !valid {
+        let within_bounds = first
+            .eta
+            .iter()
+            .zip(&prior.bounds)
+            .all(|(e, [low, high])| low <= e && e <= high);
+        let valid_start = first.is_valid() && within_bounds && first.extra_delay < prior.delay.count;
+        if M < 2 || !valid_start || !prior.is_valid() {
             return None;
         }
         let mut hypotheses = core::array::from_fn(|_| None);
@@ -75,7 +67,7 @@ impl<const M: usize> Bank<M> {
         let mut bank = Self {
             hypotheses,
             samples: 0,
-            until_birth: s.birth_interval,
+            until_birth: prior.birth_interval,
             births: 0,
             neuromuscular_from: 0,
             detector: ChangeDetector::default(),

@@ -85,52 +85,42 @@ const REGULARISATION: f64 = 1e-12;
 impl ChangeDetector {
     /// The update by the hypotheses after a sample. True where Lambda rises above zero: a change begins.
     pub fn update(&mut self, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) -> bool {
-        let (mut recent, mut older, mut neuromuscular) = (0.0, 0.0, 0.0);
-        let mut likeliest: Option<&Hypothesis> = None;
-        for h in hypotheses.iter().flatten() {
-            if !is_recent(h, now, prior) {
-                older += h.probability;
-                continue;
-            }
-            recent += h.probability;
-            neuromuscular += if h.neuromuscular_changed { h.probability } else { 0.0 };
-            if likeliest.is_none_or(|l| h.probability > l.probability) {
-                likeliest = Some(h);
-            }
-        }
+        let sums = Sums::over(hypotheses, now, prior);
         let before = self.log_odds;
-        self.log_odds = libm::log((recent + REGULARISATION) / (older + REGULARISATION));
+        self.log_odds = log_odds(sums.recent, sums.older);
         self.change = None;
         if self.log_odds < 0.0 {
             (self.declared, self.declared_neuromuscular, self.declared_delay) = (false, false, false);
         } else if self.log_odds > prior.log_odds_threshold {
-            let settled = likeliest.filter(|h| now - h.born >= prior.settling_time);
-            let others = recent + older - neuromuscular;
-            let neuromuscular_changed =
-                libm::log((neuromuscular + REGULARISATION) / (others.max(0.0) + REGULARISATION))
-                    > prior.log_odds_threshold;
-            // Most samples behind a change have nothing more to declare and end here.
-            let may_be_declared = |h: &&Hypothesis| {
-                !self.declared
-                    || neuromuscular_changed && h.neuromuscular_changed && !self.declared_neuromuscular
-                    || prior.delay.count > 1 && !self.declared_delay
-            };
-            if let Some(h) = settled.filter(may_be_declared) {
-                let of_recent = |h: &&Hypothesis| is_recent(h, now, prior);
-                let delay = delay_of(hypotheses.iter().flatten().filter(of_recent));
-                let change = change_of(h, delay, now, self.log_odds);
-                let delay_changed = change.z[OPERATOR + 1].abs() > DELAY_THRESHOLD;
-                let more = neuromuscular_changed && h.neuromuscular_changed && !self.declared_neuromuscular
-                    || delay_changed && !self.declared_delay;
-                if !self.declared || more {
-                    self.change = Some(change);
-                    self.declared = true;
-                    self.declared_neuromuscular |= h.neuromuscular_changed;
-                    self.declared_delay |= delay_changed;
-                }
-            }
+            self.declare(&sums, hypotheses, now, prior);
         }
         self.log_odds > 0.0 && before <= 0.0
+    }
+
+    /// Declares the change that the likeliest of the recent hypotheses stands for, once it has settled and if there is something new in it.
+    fn declare(&mut self, sums: &Sums<'_>, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) {
+        let Some(h) = sums.likeliest.filter(|h| now - h.born >= prior.settling_time) else {
+            return;
+        };
+        let others = sums.recent + sums.older - sums.neuromuscular;
+        let neuromuscular_changed =
+            h.neuromuscular_changed && log_odds(sums.neuromuscular, others.max(0.0)) > prior.log_odds_threshold;
+        let new_neuromuscular = neuromuscular_changed && !self.declared_neuromuscular;
+        let delay_may_be_new = prior.delay.count > 1 && !self.declared_delay;
+        // Most samples behind a change have nothing more to declare and end here.
+        if self.declared && !new_neuromuscular && !delay_may_be_new {
+            return;
+        }
+        let recent = hypotheses.iter().flatten().filter(|h| is_recent(h, now, prior));
+        let change = change_of(h, delay_of(recent), now, self.log_odds);
+        let delay_changed = change.z[OPERATOR + 1].abs() > DELAY_THRESHOLD;
+        let new_delay = delay_changed && !self.declared_delay;
+        if !self.declared || new_neuromuscular || new_delay {
+            self.change = Some(change);
+            self.declared = true;
+            self.declared_neuromuscular |= h.neuromuscular_changed;
+            self.declared_delay |= delay_changed;
+        }
     }
 
     /// Lambda.
@@ -144,7 +134,43 @@ impl ChangeDetector {
     }
 }
 
-/// The first hypothesis, born at sample 0, stands for no change.
+/// Sums of probabilities, and the likeliest of the recent hypotheses.
+struct Sums<'a> {
+    recent: f64,
+    older: f64,
+    /// Of the recent ones in which omega_nm and zeta_nm changed too.
+    neuromuscular: f64,
+    likeliest: Option<&'a Hypothesis>,
+}
+
+impl<'a> Sums<'a> {
+    fn over(hypotheses: &'a [Option<Hypothesis>], now: u64, prior: &ChangePrior) -> Self {
+        let mut sums = Self {
+            recent: 0.0,
+            older: 0.0,
+            neuromuscular: 0.0,
+            likeliest: None,
+        };
+        for h in hypotheses.iter().flatten() {
+            if !is_recent(h, now, prior) {
+                sums.older += h.probability;
+                continue;
+            }
+            sums.recent += h.probability;
+            sums.neuromuscular += if h.neuromuscular_changed { h.probability } else { 0.0 };
+            if sums.likeliest.is_none_or(|l| h.probability > l.probability) {
+                sums.likeliest = Some(h);
+            }
+        }
+        sums
+    }
+}
+
+fn log_odds(probability: f64, of_others: f64) -> f64 {
+    libm::log((probability + REGULARISATION) / (of_others + REGULARISATION))
+}
+
+/// True for a hypothesis within the change window. The first, born at sample 0, stands for no change.
 fn is_recent(h: &Hypothesis, now: u64, prior: &ChangePrior) -> bool {
     h.born > 0 && now - h.born < prior.change_window
 }

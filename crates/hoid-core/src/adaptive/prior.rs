@@ -51,6 +51,18 @@ pub struct ChangePrior {
     pub delay: DelayPrior,
 }
 
+impl ChangePrior {
+    /// True when omega_nm and zeta_nm cannot become zero and every probability, time and interval is in its range.
+    pub(super) fn is_valid(&self) -> bool {
+        self.bounds[2][0] > 0.0
+            && self.bounds[3][0] > 0.0
+            && self.sample_time > 0.0
+            && self.birth_interval > 0
+            && (0.0..1.0).contains(&(self.hazard * f64::from(self.birth_interval)))
+            && self.delay.is_valid()
+    }
+}
+
 /// Prior of the delay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DelayPrior {
@@ -82,4 +94,11 @@ impl DelayPrior {
         neighbour_probability: 0.0,
         error_per_sample: [0.0; OPERATOR],
     };
+
+    fn is_valid(&self) -> bool {
+        self.propose_every > 0
+            && self.proposals > 0
+            && (0.0..0.5).contains(&self.neighbour_probability)
+            && self.jump > 0.0
+    }
 }

@@ -29,15 +29,8 @@ use std::{hint::black_box, path::Path, time::Instant};
 use data::{NK, Shared};
 use hoid::{
     core::{
-        adaptation::{Covariance, Forgetting},
-        delay::DelayLine,
-        error_bars::NoErrorBars,
-        predictor::Regressor,
-        recursion::Stable,
-        rls::Rls,
-        rpem::Rpem,
-        shape::FixedShape,
-        ud_covariance::UdCovariance,
+        adaptation::Forgetting, covariance::Covariance, delay::DelayLine, error_bars::NoErrorBars,
+        predictor::Regressor, recursion::Stable, rls::Rls, rpem::Rpem, shape::FixedShape, ud_covariance::UdCovariance,
     },
     ident::order_selection::Criterion,
     lanes::InstructionSet,

@@ -5,7 +5,8 @@
 
 use hoid_core::state::{State, visit_all};
 use hoid_core::{
-    adaptation::{Adaptation, Covariance, Forgetting as Rule},
+    adaptation::{Adaptation, Forgetting as Rule},
+    covariance::Covariance,
     ud_covariance::UdCovariance,
 };
 

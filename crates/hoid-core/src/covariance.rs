@@ -1,0 +1,282 @@
+//! The gain of the prediction-error method: P with a rule of forgetting and a guard against windup.
+//!
+//! The equations stand in [`crate::adaptation`].
+//!
+//! **Windup.** Where nothing excites a direction, forgetting alone would let P grow without limit. In turn each parameter gets a
+//! pseudo-measurement of the value that it has: the estimate stays, and `P^{-1} >= diag(1/bound_i)` up to what is forgotten in one round. Its
+//! information is the part of `1/bound_i` that was forgotten since the last turn of that parameter.
+
+use crate::{
+    adaptation::{Adaptation, Forgetting, ParameterStep},
+    error_bars::ErrorPropagation,
+    ud_covariance::UdCovariance,
+};
+
+/// Rounds of the guard within the shortest memory, as far as N allows: between two of its turns a variance grows by e^{1/4} at most.
+const ROUNDS_PER_MEMORY: f64 = 4.0;
+/// `psi' P psi` below which nothing is measured.
+const NO_EXCITATION: f64 = 1e-100;
+/// Weight of the newest sample in the mean power of psi.
+const POWER_WEIGHT: f64 = 0.01;
+/// c of the normalised gradient, relative to the largest mean power of psi.
+const GRADIENT_OFFSET: f64 = 0.01;
+/// What an early sample forgets in addition is over below this.
+const NO_EARLY_FORGETTING: f64 = 1e-9;
+/// Longest period of the guard in samples.
+const LONGEST_PERIOD: f64 = 64.0;
+
+/// P in factors, with one rule of forgetting.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Covariance<const N: usize> {
+    factors: UdCovariance<N>,
+    /// P at the start.
+    initial: UdCovariance<N>,
+    forgetting: Forgetting<N>,
+    /// Diagonal of Lambda and of its inverse, for unequal factors.
+    scales: [[f64; N]; 2],
+    /// `1/lambda` when all factors are equal, else zero.
+    uniform_growth: f64,
+    /// Largest variance of each parameter.
+    bound: [f64; N],
+    /// Information of the pseudo-measurement of each parameter, per unit of what is forgotten.
+    guard: [f64; N],
+    /// What has been forgotten since the start, now and at the last pseudo-measurement of each parameter.
+    forgotten: f64,
+    forgotten_at_turn: [f64; N],
+    /// What an early sample forgets in addition, and the factor by which that decays from sample to sample.
+    early: f64,
+    early_decay: f64,
+    /// Mean power of psi, and the largest so far, for the gradient.
+    power: f64,
+    largest_power: f64,
+    /// Samples between two turns of the guard, those left until the next, and whose turn it is.
+    period: u32,
+    until_turn: u32,
+    turn: usize,
+}
+
+crate::state!([const N: usize] Covariance<N> {
+    factors, initial, scales, uniform_growth, bound, guard, forgotten, forgotten_at_turn, early, early_decay, power, largest_power, period, until_turn, turn,
+});
+
+impl<const N: usize> Covariance<N> {
+    /// `factors` is P at the start. `bound` is the largest variance of each parameter, in the units of P; infinite for none.
+    pub fn new(factors: UdCovariance<N>, forgetting: Forgetting<N>, bound: [f64; N]) -> Self {
+        let mut scales = [[1.0; N]; 2];
+        let mut uniform_growth = 0.0;
+        let mut shortest = f64::INFINITY;
+        match &forgetting {
+            Forgetting::Exponential { lambda } => {
+                shortest = lambda.iter().fold(f64::INFINITY, |m, l| m.min(1.0 / (1.0 - l)));
+                scales = [lambda.map(|l| 1.0 / libm::sqrt(l)), lambda.map(libm::sqrt)];
+                if lambda.iter().all(|l| *l == lambda[0]) {
+                    uniform_growth = 1.0 / lambda[0];
+                }
+            }
+            Forgetting::Variable { smallest, .. } => shortest = 1.0 / (1.0 - smallest),
+            Forgetting::Directional { lambda } => shortest = 1.0 / (1.0 - lambda),
+            Forgetting::RandomWalk { .. } | Forgetting::Gradient { .. } => {}
+        }
+        let period = guard_period(shortest, N);
+        let guard = core::array::from_fn(|i| {
+            let information = if bound[i] > 0.0 { 1.0 / bound[i] } else { 0.0 };
+            match &forgetting {
+                Forgetting::Exponential { lambda } => (1.0 - lambda[i]) * information,
+                Forgetting::RandomWalk { drift } => drift[i] * information * information,
+                Forgetting::Variable { .. } | Forgetting::Directional { .. } => information,
+                Forgetting::Gradient { .. } => 0.0,
+            }
+        });
+        Self {
+            initial: factors,
+            factors,
+            forgetting,
+            scales,
+            uniform_growth,
+            bound,
+            guard,
+            forgotten: 0.0,
+            forgotten_at_turn: [0.0; N],
+            early: 0.0,
+            early_decay: 0.0,
+            power: 0.0,
+            largest_power: 0.0,
+            period,
+            until_turn: period,
+            turn: 0,
+        }
+    }
+
+    /// With a memory that grows at the start, for a recursion that starts far from the truth: before the t-th sample all of P grows by
+    /// `1/(1 - early decay^t)` in addition (Ljung and Söderström, eq. 5.77). The gradients of the first estimates are then forgotten.
+    #[must_use]
+    pub fn with_growing_memory(mut self, early: f64, decay: f64) -> Self {
+        self.early = early;
+        self.early_decay = decay;
+        self
+    }
+
+    /// P itself.
+    pub fn matrix(&self) -> [[f64; N]; N] {
+        self.factors.matrix()
+    }
+
+    /// The step by every rule and at every time; [`Adaptation::update`] has the usual case beside it.
+    #[inline(never)]
+    fn update_by_rule(&mut self, psi: &[f64; N], eps: f64, variance: f64) -> ParameterStep<N> {
+        if self.early > NO_EARLY_FORGETTING {
+            self.factors.scale_all(1.0 / (1.0 - self.early));
+            self.count_forgotten(self.early);
+            self.early *= self.early_decay;
+        }
+        let mut growth = 1.0;
+        match &self.forgetting {
+            Forgetting::Exponential { .. } => {
+                if self.uniform_growth != 1.0 {
+                    if self.uniform_growth > 0.0 {
+                        growth = self.uniform_growth;
+                    } else {
+                        self.factors.scale(&self.scales[0], &self.scales[1]);
+                    }
+                    self.count_forgotten(1.0);
+                }
+            }
+            Forgetting::RandomWalk { drift } => {
+                for (i, q) in drift.iter().enumerate() {
+                    if *q > 0.0 {
+                        let mut unit = [0.0; N];
+                        unit[i] = 1.0;
+                        self.factors.rank_one_update(*q, unit);
+                    }
+                }
+                self.count_forgotten(1.0);
+            }
+            Forgetting::Variable { memory, smallest } => {
+                return self.update_variable(psi, eps, *memory * variance, *smallest);
+            }
+            Forgetting::Directional { lambda } => return self.update_directional(psi, eps, *lambda),
+            Forgetting::Gradient { rate } => return self.update_gradient(psi, eps, *rate),
+        }
+        scaled(self.factors.inflate_and_update(growth, psi, 1.0), eps)
+    }
+
+    /// `sum_of_squares` is N_0 sigma^2.
+    fn update_variable(&mut self, psi: &[f64; N], eps: f64, sum_of_squares: f64, smallest: f64) -> ParameterStep<N> {
+        let denominator = 1.0 + self.factors.quadratic_form(psi);
+        let gain = self.factors.measurement_update(psi, 1.0);
+        let expected = denominator * sum_of_squares;
+        let lambda = if expected > 0.0 {
+            (1.0 - eps * eps / expected).clamp(smallest, 1.0)
+        } else {
+            1.0
+        };
+        self.factors.scale_all(1.0 / lambda);
+        self.count_forgotten(1.0 - lambda);
+        scaled(gain, eps)
+    }
+
+    fn update_directional(&mut self, psi: &[f64; N], eps: f64, lambda: f64) -> ParameterStep<N> {
+        let power = self.factors.quadratic_form(psi);
+        let gain = self.factors.times(psi).map(|g| g / (1.0 + power));
+        let beta = lambda - (1.0 - lambda) / power;
+        // Without excitation nothing is measured, and there is no direction to forget along.
+        if power > NO_EXCITATION && beta != 0.0 {
+            self.factors.measurement_update(psi, 1.0 / beta);
+        }
+        self.count_forgotten(1.0 - lambda);
+        scaled(gain, eps)
+    }
+
+    fn update_gradient(&mut self, psi: &[f64; N], eps: f64, rate: f64) -> ParameterStep<N> {
+        let power: f64 = psi.iter().map(|p| p * p).sum();
+        self.power += (power - self.power) * POWER_WEIGHT;
+        self.largest_power = self.largest_power.max(self.power);
+        let denominator = GRADIENT_OFFSET * self.largest_power + power;
+        let scale = if denominator > 0.0 { rate / denominator } else { 0.0 };
+        scaled(psi.map(|p| scale * p), eps)
+    }
+
+    /// Counts what this sample forgets, and at the end of a period guards the parameter whose turn it is.
+    #[inline]
+    fn count_forgotten(&mut self, forgotten: f64) {
+        self.forgotten += forgotten;
+        self.until_turn -= 1;
+        if self.until_turn > 0 {
+            return;
+        }
+        self.guard_next();
+    }
+
+    /// The pseudo-measurement of the parameter whose turn it is.
+    #[inline(never)]
+    fn guard_next(&mut self) {
+        self.until_turn = self.period;
+        if !self.factors.is_valid() {
+            // After an overflow P starts again.
+            self.factors.clone_from(&self.initial);
+        }
+        let turn = self.turn;
+        self.turn = if turn + 1 < N { turn + 1 } else { 0 };
+        let information = (self.forgotten - self.forgotten_at_turn[turn]) * self.guard[turn];
+        self.forgotten_at_turn[turn] = self.forgotten;
+        if information > 0.0 {
+            let mut unit = [0.0; N];
+            unit[turn] = 1.0;
+            self.factors.measurement_update(&unit, 1.0 / information);
+        }
+    }
+}
+
+impl<const N: usize> Adaptation<N> for Covariance<N> {
+    #[inline(always)]
+    fn update(&mut self, psi: &[f64; N], eps: f64, _theta: &[f64; N], variance: f64) -> ParameterStep<N> {
+        let exponential = matches!(self.forgetting, Forgetting::Exponential { .. });
+        if !exponential || self.early > NO_EARLY_FORGETTING {
+            // A copy, so that psi can stay in registers in the usual case.
+            let psi = *psi;
+            return self.update_by_rule(&psi, eps, variance);
+        }
+        let mut growth = 1.0;
+        // At 1 nothing is forgotten.
+        if self.uniform_growth != 1.0 {
+            if self.uniform_growth > 0.0 {
+                growth = self.uniform_growth;
+            } else {
+                self.factors.scale(&self.scales[0], &self.scales[1]);
+            }
+            self.count_forgotten(1.0);
+        }
+        scaled(self.factors.inflate_and_update(growth, psi, 1.0), eps)
+    }
+
+    #[inline(always)]
+    fn add_drift_to<const K: usize, B: ErrorPropagation<N, K>>(&self, bars: &mut B) {
+        if let Forgetting::RandomWalk { drift } = &self.forgetting {
+            for (i, (variance, bound)) in drift.iter().zip(&self.bound).enumerate() {
+                bars.add_drift(i, *variance, *bound);
+            }
+        }
+    }
+
+    fn needs_innovation_variance(&self) -> bool {
+        matches!(self.forgetting, Forgetting::Variable { .. })
+    }
+
+    fn is_valid(&self) -> bool {
+        self.factors.is_valid()
+    }
+}
+
+/// Samples between two turns of the guard, for the shortest memory and the number of parameters.
+fn guard_period(shortest: f64, parameters: usize) -> u32 {
+    (shortest / (ROUNDS_PER_MEMORY * parameters as f64)).clamp(1.0, LONGEST_PERIOD) as u32
+}
+
+/// The step `g eps`.
+#[inline(always)]
+fn scaled<const N: usize>(gain: [f64; N], eps: f64) -> ParameterStep<N> {
+    ParameterStep {
+        step: gain.map(|g| g * eps),
+        gain,
+    }
+}
