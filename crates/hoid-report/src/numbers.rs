@@ -46,7 +46,7 @@ pub fn plain(value: f64) -> String {
     significant(value, DIGITS_ALONE)
 }
 
-/// A number with so many significant digits; a dash for what is not finite.
+/// A number with `digits` significant digits; a dash for what is not finite.
 pub fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return DASH.to_owned();

@@ -110,7 +110,7 @@ pub struct IdentifyArgs {
 
 /// What `identify` fits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum ModelKind {
     /// A polynomial structure.
     Polynomial(Structure),
     /// The operator and its remnant in physical parameters.
@@ -125,20 +125,20 @@ names!(FitMethodName for Option<IvMethod> {
     Sriv = Some(IvMethod::Sriv),
     Rivbj = Some(IvMethod::RivBj),
 });
-names!(StructureName for Kind {
-    Arx = Kind::Polynomial(Structure::Arx),
-    Armax = Kind::Polynomial(Structure::Armax),
-    Oe = Kind::Polynomial(Structure::OutputError),
-    Bj = Kind::Polynomial(Structure::BoxJenkins),
-    Fir = Kind::Polynomial(Structure::Fir),
-    Ar = Kind::Polynomial(Structure::Ar),
-    Ma = Kind::Polynomial(Structure::Ma),
-    Arma = Kind::Polynomial(Structure::Arma),
-    Ararx = Kind::Polynomial(Structure::Ararx),
-    Ararmax = Kind::Polynomial(Structure::Ararmax),
-    General = Kind::Polynomial(Structure::General),
-    GreyBox = Kind::GreyBox,
-    TimeVarying = Kind::TimeVarying,
+names!(StructureName for ModelKind {
+    Arx = ModelKind::Polynomial(Structure::Arx),
+    Armax = ModelKind::Polynomial(Structure::Armax),
+    Oe = ModelKind::Polynomial(Structure::OutputError),
+    Bj = ModelKind::Polynomial(Structure::BoxJenkins),
+    Fir = ModelKind::Polynomial(Structure::Fir),
+    Ar = ModelKind::Polynomial(Structure::Ar),
+    Ma = ModelKind::Polynomial(Structure::Ma),
+    Arma = ModelKind::Polynomial(Structure::Arma),
+    Ararx = ModelKind::Polynomial(Structure::Ararx),
+    Ararmax = ModelKind::Polynomial(Structure::Ararmax),
+    General = ModelKind::Polynomial(Structure::General),
+    GreyBox = ModelKind::GreyBox,
+    TimeVarying = ModelKind::TimeVarying,
 });
 names!(FocusName for Focus { Prediction = Focus::Prediction, Simulation = Focus::Simulation });
 names!(SearchMethodName for SearchMethod {
