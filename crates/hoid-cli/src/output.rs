@@ -9,13 +9,13 @@ pub fn print(text: &str) {
     let mut out = io::stdout().lock();
     let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
     if written.is_err() {
-        // Nobody reads any more: there is nothing left to do and nobody to tell.
+        // The reader has closed the pipe.
         std::process::exit(0);
     }
 }
 
 /// Writes a warning, a note or an error to standard error.
-pub fn complain(text: &str) {
+pub fn message(text: &str) {
     // When even standard error is closed there is no one to tell.
     let _ = writeln!(io::stderr().lock(), "{text}");
 }

@@ -23,8 +23,8 @@
 //! | [`remnant_gain`] | the gain K_n that gives a demanded noise level |
 
 mod error;
-mod named_choice;
 mod estimate;
+mod named_choice;
 
 pub mod controlled_element;
 pub mod delayed_operator;

@@ -7,7 +7,7 @@
 pub const DASH: &str = "\u{2013}";
 
 /// Two-sided 95 % point of the normal distribution.
-pub(crate) const Z_95: f64 = 1.959_963_984_540_054;
+pub const Z_95: f64 = 1.959_963_984_540_054;
 
 const DIGITS_OF_ERROR: i32 = 2;
 const DIGITS_ALONE: i32 = 5;
@@ -46,7 +46,7 @@ pub fn plain(value: f64) -> String {
     significant(value, DIGITS_ALONE)
 }
 
-/// A number with so many significant digits; a dash for what is not finite.
+/// A number with `digits` significant digits; a dash for what is not finite.
 pub fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return DASH.to_owned();

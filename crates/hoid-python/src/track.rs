@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use hoid_ident::{Choice, IdentError};
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
-use hoid_report::{BatchLine, TraceSection, TrackReport, usual_batch_fits, write_report};
+use hoid_report::{BatchLine, TraceSection, TrackReport, default_batch_fits, write_report};
 use hoid_track::{StartAt, Trace, TrackOptions, track as track_record};
 use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyDict};
@@ -194,7 +194,7 @@ impl PyTrace {
         let record = arrays::record(record, Wanted::All)?;
         let trace = &self.trace;
         let page = py.detach(|| {
-            let (fits, missing) = usual_batch_fits(trace, &record);
+            let (fits, missing) = default_batch_fits(trace, &record);
             let line = |((from_s, to_s), fit)| BatchLine { from_s, to_s, fit };
             let options = trace.options();
             let report = TrackReport {

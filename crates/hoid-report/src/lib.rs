@@ -34,7 +34,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`Report`], [`ModelSection`] | one self-contained HTML page about one or several fitted models |
-//! | [`TrackReport`], [`TraceSection`], [`BatchLine`], [`batch_fit`], [`usual_batch_fits`] | one such page about recursive estimates over a record |
+//! | [`TrackReport`], [`TraceSection`], [`BatchLine`], [`batch_fit`], [`default_batch_fits`] | one such page about recursive estimates over a record |
 //! | [`GroupReport`], [`GroupTables`], [`write_group_pages`] | one such page about a group of recorded runs |
 //! | [`figures`] | the figures of these pages, each as an SVG text of its own |
 //! | [`numbers`] | numbers with as many digits as their standard error allows |
@@ -54,8 +54,8 @@ mod track;
 
 pub use error::ReportError;
 pub use group::{FrequencyTables, GroupReport, GroupTables, write_group_pages};
-pub use model_section::{ModelSection, known_operator};
 pub use hoid_model::numbers;
+pub use model_section::{ModelSection, known_operator};
 pub use page::{render_with, write_page, write_report};
 pub use report::Report;
-pub use track::{BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, usual_batch_fits};
+pub use track::{BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, default_batch_fits};

@@ -47,8 +47,8 @@
 //! |---|---|
 //! | [`plan`] | [`Plan`]: scenarios and estimators as grids, read from TOML and checked |
 //! | [`plans`] | plans that come with the program |
-//! | `run` | [`run`], [`merge`]: blocks over threads, parts on disk |
-//! | `manifest` | `study.json` beside the results, [`Shard`] |
+//! | `run`, `merge`, `join` | [`run`]: blocks over threads, parts on disk; [`merge`]: shards; the tables from the parts |
+//! | `directory`, `run_record`, `shard` | what is where in the directory of a study, `study.json`, [`Shard`] |
 //! | `block`, `batch_fits`, `prepared` | the estimators of one cell on its replications |
 //! | `estimate_rows`, `error_measures` | the rows of an estimate, and its errors against the truth |
 //! | `columns`, `truth`, `true_value` | the tables of a study: fits, traces, cells; what the truth of each column is |
@@ -59,17 +59,21 @@
 mod batch_fits;
 mod block;
 mod columns;
+mod directory;
 mod error;
 mod error_measures;
 mod estimate_rows;
 pub mod group;
-mod manifest;
+mod join;
+mod merge;
 pub mod plan;
 pub mod plans;
 mod prepared;
 mod query;
 mod results;
 mod run;
+mod run_record;
+mod shard;
 pub mod statistics;
 mod summary;
 mod tables;
@@ -78,12 +82,13 @@ mod truth;
 
 pub use columns::OPERATOR;
 pub use error::StudyError;
-pub use manifest::Shard;
+pub use merge::merge;
 pub use plan::{Plan, plan_schema, plan_schema_of};
 pub use plans::{NamedPlan, PLANS};
 pub use query::Query;
-pub use results::{Bands, Results, SummaryRow, TraceSummary};
-pub use run::{Outcome, Progress, RunOptions, merge, run};
+pub use results::{Results, SummaryRow, TraceStatistics, TraceSummary};
+pub use run::{Outcome, Progress, RunOptions, run};
+pub use shard::Shard;
 pub use statistics::Statistics;
 pub use true_value::true_value;
 pub use truth::TrueState;

@@ -186,7 +186,7 @@ impl Query {
         self
     }
 
-    pub(crate) fn takes(&self, s: &RowKey) -> bool {
+    pub(crate) fn matches(&self, s: &RowKey) -> bool {
         fn is<T: PartialEq>(asked: Option<&T>, found: &T) -> bool {
             asked.is_none_or(|asked| asked == found)
         }

@@ -153,7 +153,7 @@ fn scripts() -> Result<Vec<PathBuf>, String> {
     Ok(found)
 }
 
-/// The interpreter for the peers: that of the environment in `target/bench`, which is made when asked for, else `python3`.
+/// The interpreter for the peers: that of the environment in `target/bench`, which `--peers install` makes, else `python3`.
 fn interpreter(peers: Peers) -> Result<String, String> {
     let environment = Path::new(WORK).join("venv");
     let folder = if cfg!(windows) { "Scripts" } else { "bin" };

@@ -25,8 +25,8 @@ pub struct IdentifyArgs {
     pub mask: MaskArgs,
     /// What is fitted: a polynomial structure, grey-box (operator and remnant in physical parameters, with a real delay), or
     /// time-varying (the operator's gains change once, by a sigmoid) [default: bj, or that of --method]
-    #[arg(long, value_name = "NAME", value_parser = by_name(Kind::named()))]
-    pub structure: Option<Kind>,
+    #[arg(long, value_name = "NAME", value_parser = by_name(ModelKind::named()))]
+    pub structure: Option<ModelKind>,
     /// How: pem the prediction error method; iv4 (for arx), sriv (for oe), rivbj (for bj) instrumental variables
     #[arg(long, value_name = "NAME", default_value = "pem")]
     pub method: FitMethodName,
@@ -111,7 +111,7 @@ pub struct IdentifyArgs {
 
 /// What `identify` fits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum ModelKind {
     /// A polynomial structure.
     Polynomial(Structure),
     /// The operator and its remnant in physical parameters.
@@ -120,7 +120,7 @@ pub enum Kind {
     TimeVarying,
 }
 
-impl Kind {
+impl ModelKind {
     /// The names that are typed, in the order of the help page.
     fn named() -> impl Iterator<Item = (&'static str, Self)> {
         let structures = Structure::ALL.map(|structure| (structure.name(), Self::Polynomial(structure)));

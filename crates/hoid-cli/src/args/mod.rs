@@ -29,7 +29,7 @@ mod study;
 pub use cli::{Cli, Command};
 pub use convert::{ConvertArgs, InfoArgs};
 pub use group::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs};
-pub use identify::{FocusName, IdentifyArgs, InitialStateName, Kind, SearchMethodName};
+pub use identify::{FocusName, IdentifyArgs, InitialStateName, ModelKind, SearchMethodName};
 pub use names::CriterionName;
 pub use parse::parse_span;
 pub use reading::{MaskArgs, ReadArgs};

@@ -37,7 +37,7 @@ pub struct ReadAll {
 /// Those of reading, and [`CliError::Usage`].
 pub fn read(path: &Path, args: &ReadArgs, with_input: bool) -> Result<(Record, Account), CliError> {
     let read = read_prepared(path, &options(args, with_input)?, &preparation(args)?)?;
-    Ok(told(path, read))
+    Ok(with_account(path, read))
 }
 
 /// As [`read`], for the segments between what is masked.
@@ -49,7 +49,7 @@ pub fn read_all(paths: &[PathBuf], args: &ReadArgs, mask: &MaskArgs, with_input:
     let mut all = ReadAll::default();
     for path in paths {
         for read in read_segments(path, &options, &preparation, &mask.mask, mask.shortest)? {
-            let (record, account) = told(path, read);
+            let (record, account) = with_account(path, read);
             // The label of a segment ends in its span.
             let span = record.label().rfind(" (").filter(|_| !mask.mask.is_empty());
             let span = span.map_or("", |at| &record.label()[at..]);
@@ -61,12 +61,12 @@ pub fn read_all(paths: &[PathBuf], args: &ReadArgs, mask: &MaskArgs, with_input:
     Ok(all)
 }
 
-fn told(path: &Path, read: ReadRecord) -> (Record, Account) {
+fn with_account(path: &Path, read: ReadRecord) -> (Record, Account) {
     for note in &read.notes {
-        output::complain(&format!("{}: {note}", path.display()));
+        output::message(&format!("{}: {note}", path.display()));
     }
     for issue in &read.quality_issues {
-        output::complain(&format!("warning: {}: {issue}", path.display()));
+        output::message(&format!("warning: {}: {issue}", path.display()));
     }
     let account = Account {
         steps: read.steps,

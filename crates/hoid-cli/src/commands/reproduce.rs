@@ -37,7 +37,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
         }
         ReproductionEvent::Study(study) => {
             let took = study.seconds.map_or("was there".to_owned(), |s| format!("{s:.1} s"));
-            bar.suspend(|| output::complain(&format!("{:22} {} estimates, {took}", study.name, study.estimates)));
+            bar.suspend(|| output::message(&format!("{:22} {} estimates, {took}", study.name, study.estimates)));
             bar.reset();
         }
     };

@@ -40,7 +40,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         },
     );
     if piped {
-        output::complain(summary.trim_end());
+        output::message(summary.trim_end());
     } else {
         output::print(&summary);
     }

@@ -18,7 +18,7 @@ const TICK_WIDTH: f64 = 34.0;
 /// The library draws no smaller number on a logarithmic axis.
 const LEAST: f64 = 1e-10;
 
-/// Step of 1, 2 or 5 times a power of ten that gives at most so many ticks.
+/// Step of 1, 2 or 5 times a power of ten that gives at most `most` ticks.
 pub fn tick_step(span: f64, most: f64) -> f64 {
     let least = span / most;
     let power = 10f64.powf(least.log10().floor());

@@ -8,7 +8,7 @@ use super::{
     style,
 };
 
-/// Whiskers end within so many interquartile ranges of the box.
+/// Longest whiskers, in interquartile ranges.
 const REACH: f64 = 1.5;
 
 /// What a box shows of a sample.

@@ -36,7 +36,7 @@ pub enum BoxRange {
     /// All boxes, whiskers and outliers.
     #[default]
     Full,
-    /// Boxes and whiskers; outliers beyond are counted above the panel, and a triangle at its edge tells whose they are.
+    /// Boxes and whiskers; outliers beyond are counted above the panel, and a triangle at its edge marks their group.
     Whiskers,
 }
 

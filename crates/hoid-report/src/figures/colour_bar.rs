@@ -1,4 +1,4 @@
-//! Colours of values, and the bar that tells them.
+//! Colours of values, and the bar that explains them.
 //!
 //! They are viridis (Smith and van der Walt, 2015), evenly spaced in lightness, or for differences those from red over white at zero to
 //! blue of Harrower and Brewer (2003), of which both ends are equally dark.

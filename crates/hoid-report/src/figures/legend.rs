@@ -60,7 +60,7 @@ pub fn add_legend(scene: &mut Scene, entries: &[Entry]) {
     add_legend_by(scene, entries, 1);
 }
 
-/// The same with a multiple of so many columns where there are several rows, so that what belongs together is not parted.
+/// The same with a whole multiple of `multiple` columns where there are several rows, so that entries of one kind stay together.
 pub fn add_legend_by(scene: &mut Scene, entries: &[Entry], multiple: usize) {
     if entries.is_empty() {
         return;

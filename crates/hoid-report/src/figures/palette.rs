@@ -1,4 +1,4 @@
-//! The colours of all figures: the hue tells the method, the shade of the hue the level (noise, sample time, memory), black the truth.
+//! The colours of all figures: the hue is the method, the shade of the hue the level (noise, sample time, memory), black the truth.
 //!
 //! Hues are those of Okabe and Ito (*Color Universal Design*, 2008). Shades of one hue are spaced evenly in lightness `L*` (CIE 1976),
 //! light for the lowest level and dark for the highest, so that their order is kept in grey print as well.

@@ -13,7 +13,7 @@ pub fn thinned(values: &[f64]) -> Vec<usize> {
     thinned_run(values, 0..values.len(), COLUMNS)
 }
 
-/// As [`thinned`], for a part of a series; the whole has so many columns. Values that are not finite are passed over.
+/// As [`thinned`], for a part of a series; the whole has `parts` columns. Values that are not finite are passed over.
 pub fn thinned_run(values: &[f64], run: Range<usize>, parts: usize) -> Vec<usize> {
     let finite = |k: &usize| values[*k].is_finite();
     if values.len() <= 2 * parts {

@@ -53,7 +53,7 @@ pub fn layout((x_low, x_high): (f64, f64), (y_low, y_high): (f64, f64), height: 
         .with_tick_format(TickFormat::Custom(Arc::new(tick)))
 }
 
-/// A tick as the shortest decimal that tells it: rounding noise of `0.1 + 0.2` is not shown.
+/// A tick as the shortest decimal: rounding noise of `0.1 + 0.2` is not shown.
 fn tick(value: f64) -> String {
     let text = format!("{value:.6}");
     let text = text.trim_end_matches('0').trim_end_matches('.');

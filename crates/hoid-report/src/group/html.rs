@@ -10,7 +10,7 @@ impl GroupReport<'_> {
     ///
     /// # Errors
     /// [`ReportError::Template`] for a defect of this crate.
-    pub fn html(&self) -> Result<String, ReportError> {
+    pub fn to_html(&self) -> Result<String, ReportError> {
         let title = match self.subject {
             Some(subject) => format!("{}: subject {subject}", self.manifest.name),
             None => self.manifest.name.clone(),

@@ -81,7 +81,7 @@ pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result
         let name = subject.map_or("report.html".to_owned(), |subject| {
             format!("subject-{}.html", plain(subject))
         });
-        pages.push(page::write_page(out, &name, &report.html()?)?);
+        pages.push(page::write_page(out, &name, &report.to_html()?)?);
     }
     Ok(pages)
 }

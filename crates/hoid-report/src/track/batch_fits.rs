@@ -46,7 +46,7 @@ pub fn batch_fit(trace: &Trace, record: &Record, (from, to): (f64, f64)) -> Resu
 
 /// The batch fits that a page compares a trace with, where none are named: that of the start, and one of the last third of the record; with the
 /// reason where the last third cannot be fitted.
-pub fn usual_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Option<IdentError>) {
+pub fn default_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Option<IdentError>) {
     let mut all = Vec::new();
     if let (Some(start), StartAt::Span(Some((from, to)))) = (trace.start(), &trace.options().start)
         && let Ok(span) = record.span(*from, *to)

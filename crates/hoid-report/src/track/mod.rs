@@ -10,6 +10,6 @@ mod section;
 mod tables;
 mod truth;
 
-pub use batch_fits::{BatchFit, batch_fit, usual_batch_fits};
+pub use batch_fits::{BatchFit, batch_fit, default_batch_fits};
 pub use report::TrackReport;
 pub use section::{BatchLine, TraceSection};

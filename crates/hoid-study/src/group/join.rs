@@ -18,7 +18,10 @@ use super::{
     tables::{numbers, texts},
     traces::TraceColumns,
 };
-use crate::{StudyError, manifest::part, run::table_path};
+use crate::{
+    StudyError,
+    directory::{part, table_path},
+};
 
 /// A table in each of its formats.
 struct Writers(Vec<TableWriter>);

@@ -1,4 +1,4 @@
-//! The manifest of a group, in TOML: which files belong to whom, and what is done with them.
+//! The manifest of a group, in TOML: which file is which run of which subject, and what is done with it.
 //!
 //! ```toml
 //! name = "tracking"

@@ -2,7 +2,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`Manifest`] | which files belong to whom, and what is done with them |
+//! | [`Manifest`] | which file is which run of which subject, and what is done with it |
 //! | [`ReadSettings`], [`PreparationSettings`], [`AnalysisSettings`], [`ConditionSettings`] | its tables: how runs are read, prepared and analysed, and what is known of a condition |
 //! | [`Pattern`] | subject, condition and run from names of files |
 //! | [`run_group`] | the analysis in a directory, part by part |
@@ -46,7 +46,7 @@ mod windows;
 pub use analysis_settings::AnalysisSettings;
 pub use condition_settings::ConditionSettings;
 pub use manifest::{MANIFEST, Manifest, RunEntry};
-pub use pattern::{Matched, Pattern};
+pub use pattern::{FileNameParts, Pattern};
 pub use preparation_settings::{NumberOrText, PreparationSettings};
 pub use read_settings::{Detrending, ReadSettings};
 pub use run::run_group;

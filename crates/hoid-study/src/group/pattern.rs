@@ -18,7 +18,7 @@ pub struct Pattern(Vec<Part>);
 
 /// What the names in braces stand for in one file name.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Matched {
+pub struct FileNameParts {
     /// `{subject}`.
     pub subject: String,
     /// `{condition}`; empty where the pattern has none.
@@ -76,13 +76,13 @@ impl Pattern {
     }
 
     /// What the names stand for in a file name; none where it does not match.
-    pub fn matches(&self, name: &str) -> Option<Matched> {
-        let mut found = Matched::default();
+    pub fn matches(&self, name: &str) -> Option<FileNameParts> {
+        let mut found = FileNameParts::default();
         found_in(&self.0, name, &mut found).then_some(found)
     }
 }
 
-fn found_in(parts: &[Part], text: &str, found: &mut Matched) -> bool {
+fn found_in(parts: &[Part], text: &str, found: &mut FileNameParts) -> bool {
     let Some((first, rest)) = parts.split_first() else {
         return text.is_empty();
     };

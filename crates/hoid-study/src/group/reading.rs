@@ -1,4 +1,4 @@
-//! Reading the runs of a group as the manifest wants it, with the account of it.
+//! Reading the runs of a group as the manifest says, and what was done to them.
 
 use std::path::Path;
 
@@ -88,7 +88,7 @@ pub(super) fn read_files<'a>(manifest: &Manifest, base: &Path, entry: &'a RunEnt
         .collect()
 }
 
-/// A run as the manifest wants it.
+/// A run, read and prepared as the manifest says.
 pub(super) struct Run {
     pub record: Record,
     /// Where the second file begins, s, for a run that is joined of two.

@@ -15,8 +15,9 @@ use super::{
 };
 use crate::{
     RunOptions, StudyError,
-    manifest::{Manifest as Record, part},
-    run::{Outcome, Progress, on_threads, remove_parts, sweep, table_path},
+    directory::{part, remove_parts, sweep, table_path},
+    run::{Outcome, Progress, on_threads},
+    run_record::RunRecord,
 };
 
 /// Analyses the runs that count. `base` is the directory from which the files are named.
@@ -32,7 +33,7 @@ pub fn run_group(
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Outcome, StudyError> {
     let blocks = blocks(manifest);
-    let record = Record {
+    let record = RunRecord {
         hoid: env!("CARGO_PKG_VERSION").to_owned(),
         study: manifest.name.clone(),
         plan_sha256: hash(manifest, base),
@@ -84,7 +85,7 @@ pub fn run_group(
         });
     }
     join(manifest, base, &blocks, directory, options.csv)?;
-    Record {
+    RunRecord {
         complete: true,
         ..record
     }
@@ -110,9 +111,9 @@ fn hash(manifest: &Manifest, base: &Path) -> String {
 }
 
 /// Makes the directory ready; true when it holds the finished group.
-fn prepare(manifest: &Manifest, directory: &Path, record: &Record, resume: bool) -> Result<bool, StudyError> {
+fn prepare(manifest: &Manifest, directory: &Path, record: &RunRecord, resume: bool) -> Result<bool, StudyError> {
     let shown = || directory.display().to_string();
-    if let Some(found) = Record::read(directory)? {
+    if let Some(found) = RunRecord::read(directory)? {
         if !resume {
             return Err(StudyError::Occupied { directory: shown() });
         }

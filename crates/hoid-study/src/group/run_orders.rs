@@ -10,7 +10,7 @@ pub(super) fn label_of(structure: Structure) -> &'static str {
     if structure == Structure::Arx { "ARX" } else { "BJ" }
 }
 
-/// The orders of a structure, chosen on the sub-batches; rows say what each of them wanted.
+/// The orders of a structure, chosen on the sub-batches; a row has the delay of each.
 pub(super) fn choose(
     settings: &AnalysisSettings,
     record: &Record,

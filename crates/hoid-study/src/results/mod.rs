@@ -21,5 +21,5 @@ mod synthetic;
 #[cfg(test)]
 mod tests;
 
-pub use rows::{Bands, SummaryRow, TraceSummary};
+pub use rows::{SummaryRow, TraceStatistics, TraceSummary};
 pub use study_results::Results;

@@ -3,12 +3,13 @@
 use std::{collections::HashMap, path::Path};
 
 use super::{
-    rows::{Bands, SummaryRow, TraceSummary},
+    rows::{SummaryRow, TraceStatistics, TraceSummary},
     study_results::Results,
 };
 use crate::{
     Plan, Statistics, StudyError,
-    manifest::{Manifest, PLAN},
+    directory::PLAN,
+    run_record::RunRecord,
     tables::{Columns, table_path},
 };
 
@@ -21,7 +22,7 @@ impl Results {
     /// [`StudyError::Io`] for one that cannot be read.
     pub fn read(directory: &Path) -> Result<Self, StudyError> {
         let shown = || directory.display().to_string();
-        let manifest = Manifest::read(directory)?.ok_or_else(|| StudyError::NoStudy { directory: shown() })?;
+        let manifest = RunRecord::read(directory)?.ok_or_else(|| StudyError::NoStudy { directory: shown() })?;
         if !manifest.complete {
             return Err(StudyError::Unfinished { directory: shown() });
         }
@@ -163,7 +164,7 @@ impl Results {
                 .filter(|(_, five)| five[3][span.clone()].iter().any(|v| v.is_finite()));
             let parameters = parameters.map(|(name, five)| {
                 let [mean, sd, lower_quartile, median, upper_quartile] = five.each_ref().map(|values| of(values));
-                let bands = Bands {
+                let bands = TraceStatistics {
                     mean,
                     sd,
                     lower_quartile,

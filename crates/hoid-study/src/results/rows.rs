@@ -53,12 +53,12 @@ pub struct TraceSummary {
     /// Times, s.
     pub times_s: Vec<f64>,
     /// By name of a parameter.
-    pub parameters: BTreeMap<String, Bands>,
+    pub parameters: BTreeMap<String, TraceStatistics>,
 }
 
-/// What the replications of a trace say together at each time.
+/// Statistics of a trace over the replications, at each time.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Bands {
+pub struct TraceStatistics {
     /// Mean.
     pub mean: Vec<f64>,
     /// Standard deviation.
@@ -71,7 +71,7 @@ pub struct Bands {
     pub upper_quartile: Vec<f64>,
 }
 
-impl Bands {
+impl TraceStatistics {
     /// Monte Carlo error of the median of a point, taken as that of a normal sample of the same interquartile range.
     pub fn error_of_median(&self, point: usize, replications: u64) -> f64 {
         match replications {

@@ -61,7 +61,7 @@ impl Results {
     /// The rows of the summary that a query describes, in the order of the table. A query without quantity takes all of them.
     pub fn find(&self, query: &Query) -> Vec<&SummaryRow> {
         let mut found = Vec::new();
-        for pair in self.pairs.iter().filter(|pair| query.takes(&pair.key)) {
+        for pair in self.pairs.iter().filter(|pair| query.matches(&pair.key)) {
             match query.quantity() {
                 Some(quantity) => found.extend(pair.rows.get(quantity).copied()),
                 None => {
@@ -94,7 +94,7 @@ impl Results {
             return Vec::new();
         };
         let mut values = Vec::new();
-        for pair in self.pairs.iter().filter(|pair| query.takes(&pair.key)) {
+        for pair in self.pairs.iter().filter(|pair| query.matches(&pair.key)) {
             let of_pair = pair.fits.iter().map(|row| column[*row]);
             match biased {
                 Some(name) => {
@@ -117,7 +117,7 @@ impl Results {
         let mut found: Vec<usize> = self
             .pairs
             .iter()
-            .filter(|pair| query.takes(&pair.key))
+            .filter(|pair| query.matches(&pair.key))
             .map(|pair| pair.cell)
             .collect();
         found.dedup();
@@ -125,8 +125,8 @@ impl Results {
     }
 
     /// How many estimators in how many cells a query describes, whatever their quantities.
-    pub fn describes(&self, query: &Query) -> usize {
-        self.pairs.iter().filter(|pair| query.takes(&pair.key)).count()
+    pub fn count(&self, query: &Query) -> usize {
+        self.pairs.iter().filter(|pair| query.matches(&pair.key)).count()
     }
 
     /// Whether there are values of the quantity of a query.
@@ -139,7 +139,7 @@ impl Results {
 
     /// The first estimator that a query describes.
     pub fn estimator(&self, query: &Query) -> Option<&EstimatorCell> {
-        let pair = self.pairs.iter().find(|pair| query.takes(&pair.key));
+        let pair = self.pairs.iter().find(|pair| query.matches(&pair.key));
         pair.map(|pair| &self.plan.estimators[pair.estimator])
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{
-    rows::{Bands, TraceSummary},
+    rows::{TraceStatistics, TraceSummary},
     study_results::Results,
 };
 use crate::{
@@ -92,7 +92,7 @@ impl Results {
                         .map(|t| factor * if *t < change_s { before } else { after })
                         .collect()
                 };
-                let bands = Bands {
+                let bands = TraceStatistics {
                     mean: at(off),
                     sd: at(0.01),
                     lower_quartile: at(off - 0.01 * after.signum()),

@@ -1,5 +1,5 @@
 use super::*;
-use crate::{Plan, Query, RunOptions, Statistics, StudyError, manifest::PLAN, run};
+use crate::{Plan, Query, RunOptions, Statistics, StudyError, directory::PLAN, run};
 
 const PLAN_TEXT: &str = r#"
 name = "tiny"

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     Plan, StudyError,
     columns::{Rows, Schemas, extra_axes},
-    manifest::part,
+    directory::part,
     plan::EstimatorCell,
     statistics::{Statistics, rate},
     true_value::true_value,

@@ -8,7 +8,7 @@ use super::layout::{BUDGET, PartsOfCell, schema};
 use crate::{
     Plan, StudyError,
     columns::{OPERATOR, Rows, Schemas},
-    manifest::part,
+    directory::part,
     plan::{Cell, EstimatorCell, Task},
     statistics::quantile,
 };

@@ -68,7 +68,7 @@ impl<'a> Study<'a> {
     /// The values of a quantity of one estimator in one cell, replication by replication.
     pub fn sample(&self, query: &Query) -> Result<Vec<f64>, String> {
         let name = &self.results.plan.name;
-        match self.results.describes(query) {
+        match self.results.count(query) {
             1 => {}
             n => return Err(format!("the study {name} has {n} estimators of {query}, expected one")),
         }
@@ -115,7 +115,7 @@ impl<'a> Study<'a> {
     /// Share of hits of a quantity of 0 and 1 over all replications of all that a query describes. None or all of n hits has an error of 1.5 / n:
     /// its limit of 95 % is 3 / n.
     pub fn share(&self, query: &Query) -> Result<Value, String> {
-        if self.results.describes(query) == 0 || !self.results.has_quantity(query) {
+        if self.results.count(query) == 0 || !self.results.has_quantity(query) {
             return Err(format!(
                 "the study {} has no column for {query}",
                 self.results.plan.name
@@ -203,7 +203,7 @@ impl<'a> Study<'a> {
         let ([cell], Some(estimator), 1) = (
             cells.as_slice(),
             self.results.estimator(query),
-            self.results.describes(query),
+            self.results.count(query),
         ) else {
             return Err(missing());
         };

@@ -90,7 +90,7 @@ pub enum CellOutcome {
     Undecided,
 }
 
-/// What is asked of the value of a cell.
+/// The bound that the value of a cell must keep.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bound {
     /// Larger than this.

@@ -94,7 +94,7 @@ impl IndexPage {
     ///
     /// # Errors
     /// [`ThesisError::Report`] for a defect of the template.
-    pub fn html(&self) -> Result<String, ThesisError> {
+    pub fn to_html(&self) -> Result<String, ThesisError> {
         let facts: Vec<_> = self
             .settings
             .iter()

@@ -63,7 +63,7 @@ pub struct ReproductionSummary {
     pub index: PathBuf,
     /// Tables and figures.
     pub items: usize,
-    /// Claims that hold, hold in part, do not hold, cannot be tested; none where they were not asked for.
+    /// Claims that hold, hold in part, do not hold, cannot be tested; none where they were not chosen.
     pub tally: Option<[usize; 4]>,
     /// Time that the studies took, s.
     pub simulated_s: f64,
@@ -126,7 +126,7 @@ pub fn reproduce(
             NamedPlan::REPLICATIONS
         ));
     }
-    let index = write_page(directory, "index.html", &index.html()?)?;
+    let index = write_page(directory, "index.html", &index.to_html()?)?;
     Ok(Some(ReproductionSummary {
         index,
         items: chosen.len(),
@@ -136,7 +136,7 @@ pub fn reproduce(
     }))
 }
 
-/// The items that were asked for, by their name, their plan or the letter of an appendix, and whether the claims were.
+/// The chosen items, by their name, their plan or the letter of an appendix, and whether the claims were.
 fn chosen(all: Vec<Item>, only: &[String]) -> Result<(Vec<Item>, bool), ThesisError> {
     if only.is_empty() {
         return Ok((all, true));

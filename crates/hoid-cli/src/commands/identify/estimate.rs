@@ -8,7 +8,7 @@ use hoid_ident::{
 use hoid_model::{Record, Structure};
 
 use crate::{
-    args::{FocusName, IdentifyArgs, InitialStateName, Kind, SearchMethodName},
+    args::{FocusName, IdentifyArgs, InitialStateName, ModelKind, SearchMethodName},
     error::CliError,
     orders, output,
 };
@@ -22,14 +22,14 @@ pub struct Estimated {
 }
 
 /// What is to be fitted, the options checked against each other.
-pub fn kind(args: &IdentifyArgs) -> Result<Kind, CliError> {
+pub fn kind(args: &IdentifyArgs) -> Result<ModelKind, CliError> {
     let method: Option<IvMethod> = args.method.into();
     let typed = args.structure;
     let kind = match (typed, method) {
         (Some(kind), None) => kind,
-        (None, None) => Kind::Polynomial(Structure::BoxJenkins),
+        (None, None) => ModelKind::Polynomial(Structure::BoxJenkins),
         (typed, Some(method)) => {
-            let own = Kind::Polynomial(method.structure());
+            let own = ModelKind::Polynomial(method.structure());
             if typed.is_some_and(|kind| kind != own) {
                 return Err(CliError::Usage(format!(
                     "--method {method} fits the structure {}; drop --structure, or take --method pem",
@@ -46,13 +46,13 @@ pub fn kind(args: &IdentifyArgs) -> Result<Kind, CliError> {
 }
 
 /// The first option that has no meaning for this kind of fit, and what it belongs to.
-fn misplaced(args: &IdentifyArgs, kind: Kind, by_instruments: bool) -> Option<(&'static str, &'static str)> {
-    let polynomial = matches!(kind, Kind::Polynomial(_));
+fn misplaced(args: &IdentifyArgs, kind: ModelKind, by_instruments: bool) -> Option<(&'static str, &'static str)> {
+    let polynomial = matches!(kind, ModelKind::Polynomial(_));
     let by_search = polynomial && !by_instruments;
-    let (grey_box, changing) = (kind == Kind::GreyBox, kind == Kind::TimeVarying);
+    let (grey_box, changing) = (kind == ModelKind::GreyBox, kind == ModelKind::TimeVarying);
     let search = "--method pem and a polynomial structure";
     let steady = "a model that does not change";
-    let input = !matches!(kind, Kind::Polynomial(structure) if !structure.has_input());
+    let input = !matches!(kind, ModelKind::Polynomial(structure) if !structure.has_input());
     let options = [
         (
             args.controlled_element.is_some() && !input,
@@ -126,10 +126,10 @@ fn misplaced(args: &IdentifyArgs, kind: Kind, by_instruments: bool) -> Option<(&
 }
 
 /// Fits what was asked for.
-pub fn fit(args: &IdentifyArgs, kind: Kind, records: &[Record]) -> Result<Estimated, CliError> {
+pub fn fit(args: &IdentifyArgs, kind: ModelKind, records: &[Record]) -> Result<Estimated, CliError> {
     match kind {
-        Kind::Polynomial(structure) => polynomial(args, structure, records),
-        Kind::GreyBox | Kind::TimeVarying => grey_box(args, records),
+        ModelKind::Polynomial(structure) => polynomial(args, structure, records),
+        ModelKind::GreyBox | ModelKind::TimeVarying => grey_box(args, records),
     }
 }
 

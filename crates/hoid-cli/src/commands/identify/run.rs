@@ -13,7 +13,7 @@ use super::{
     sigmoid,
 };
 use crate::{
-    args::{IdentifyArgs, Kind},
+    args::{IdentifyArgs, ModelKind},
     commands::reading::{self, ReadAll},
     error::CliError,
     json::{self, Identified},
@@ -23,15 +23,15 @@ use crate::{
 pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let kind = estimate::kind(args)?;
     let with_input = match kind {
-        Kind::Polynomial(structure) => structure.has_input(),
-        Kind::GreyBox | Kind::TimeVarying => true,
+        ModelKind::Polynomial(structure) => structure.has_input(),
+        ModelKind::GreyBox | ModelKind::TimeVarying => true,
     };
     let ReadAll {
         files,
         records,
         accounts,
     } = reading::read_all(&args.records, &args.read, &args.mask, with_input)?;
-    if kind == Kind::TimeVarying {
+    if kind == ModelKind::TimeVarying {
         return sigmoid::run(args, &files, &records, &accounts);
     }
     let Estimated {
@@ -99,7 +99,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
             notes: Vec::new(),
         };
         let page = write_report(directory, &report.to_html()?)?;
-        output::complain(&format!("report: {}", page.display()));
+        output::message(&format!("report: {}", page.display()));
     }
     if args.json {
         json::print(&identified.to_json());

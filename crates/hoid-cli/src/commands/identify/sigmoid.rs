@@ -43,7 +43,7 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
     settings.extend(common_settings(args, true));
     if let Some(path) = &args.trace {
         write_record(path, &trace(&fit, &records[0])?)?;
-        output::complain(&format!("trace of {}: {}", args.records[0].display(), path.display()));
+        output::message(&format!("trace of {}: {}", args.records[0].display(), path.display()));
     }
     let test = |record: &Record| Ok(whiteness(&fit.residuals(record)?.values, estimator.nd));
     let tests = records

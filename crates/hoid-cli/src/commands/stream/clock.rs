@@ -15,7 +15,7 @@ const AHEAD: f64 = 2.0;
 /// What the time of a line says.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Arrival {
-    /// The next sample, after so many missing ones that are to be bridged; `left_out` when the gap was longer than that.
+    /// The next sample, after a number of missing ones that are to be bridged; `left_out` when the gap was longer than that.
     Sample { missing: usize, left_out: bool },
     /// Not later than the last line.
     Behind { last_s: f64 },

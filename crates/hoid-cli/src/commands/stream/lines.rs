@@ -116,7 +116,7 @@ impl Columns {
         self.places.is_some_and(|p| p.t.is_some())
     }
 
-    /// True once a header or a line of numbers has told the columns.
+    /// True once a header or a line of numbers has given the columns.
     pub fn are_known(&self) -> bool {
         self.places.is_some()
     }

@@ -64,12 +64,12 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
         let mut out = io::stdout().lock();
         match out.write_all(&buffer).and_then(|()| out.flush()) {
             Ok(()) => {}
-            // Nobody reads any more: there is nothing left to do and nobody to tell.
+            // The reader has closed the pipe.
             Err(e) if e.kind() == ErrorKind::BrokenPipe => process::exit(0),
             Err(e) => return Err(CliError::Stream(format!("standard output cannot be written: {e}"))),
         }
     }
-    output::complain(&lock(&session).summary());
+    output::message(&lock(&session).summary());
     Ok(())
 }
 
@@ -89,7 +89,7 @@ struct Session {
     /// Time of the last sample, s.
     t: Option<f64>,
     innovation: Option<f64>,
-    /// A change that no line has told of yet, and when it was declared, s.
+    /// A change that no line has reported yet, and when it was declared, s.
     change: Option<(Option<f64>, Change)>,
     names: Vec<String>,
     faults: VecDeque<String>,
@@ -140,7 +140,7 @@ impl Session {
             settings.push(("scale".to_owned(), format!("e times {e}, u times {u}")));
         }
         let each: Vec<String> = settings.iter().map(|(k, v)| format!("{k}: {v}")).collect();
-        output::complain(&format!("{when}; {}.", each.join("; ")));
+        output::message(&format!("{when}; {}.", each.join("; ")));
     }
 
     /// Takes a line; true when the output has a line for it.
@@ -189,7 +189,7 @@ impl Session {
                 }
             }
             if self.clock.hurried() {
-                output::complain(&format!(
+                output::message(&format!(
                     "warning: at t = {t} s the lines run ahead of --fs {}: t advances by less than {} s a line",
                     1.0 / self.sample_time.s(),
                     self.sample_time.s()
@@ -298,7 +298,7 @@ fn end_on_interrupt(session: &Arc<Mutex<Session>>) -> Result<(), CliError> {
         let asked = Instant::now();
         loop {
             if let Ok(session) = session.try_lock() {
-                output::complain(&session.summary());
+                output::message(&session.summary());
                 process::exit(0);
             }
             // A start fit, or a reader that takes nothing: lines are written whole, so that none is cut.

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use hoid_report::{BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, usual_batch_fits, write_report};
+use hoid_report::{BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, default_batch_fits, write_report};
 
 use super::result::Tracked;
 use crate::{args::TrackArgs, commands::reading::accounts, error::CliError, output};
 
-/// Writes the page into the directory that was asked for, nothing where none was.
+/// Writes the page into the directory of `--report`; nothing without it.
 pub fn write(args: &TrackArgs, tracked: &Tracked<'_>, batch: &[BatchFit]) -> Result<Option<PathBuf>, CliError> {
     let Some(directory) = &args.report else {
         return Ok(None);
@@ -52,9 +52,9 @@ pub fn batch_fits(args: &TrackArgs, tracked: &Tracked<'_>) -> Result<Vec<BatchFi
             .map(|span| batch_fit(trace, record, *span))
             .collect::<Result<_, _>>()?);
     }
-    let (all, missing) = usual_batch_fits(trace, record);
+    let (all, missing) = default_batch_fits(trace, record);
     if let Some(error) = missing {
-        output::complain(&format!("the report has no batch fit of the last third: {error}"));
+        output::message(&format!("the report has no batch fit of the last third: {error}"));
     }
     Ok(all)
 }

@@ -74,7 +74,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     let batch = report::batch_fits(args, &tracked)?;
     write_table(&args.out, &tracked.table())?;
     if let Some(page) = report::write(args, &tracked, &batch)? {
-        output::complain(&format!("report: {}", page.display()));
+        output::message(&format!("report: {}", page.display()));
     }
     if args.json {
         json::print(&tracked.to_json()?);

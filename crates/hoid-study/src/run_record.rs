@@ -3,50 +3,15 @@
 //! It says which plan and which program made the parts of a directory, and which shard of the study they are. Two directories belong
 //! together when plan, replications, seed and version are the same.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Plan, StudyError};
-
-/// A shard of a study: part `index` of `of`, from 1.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Shard {
-    /// Which.
-    pub index: u64,
-    /// Of how many.
-    pub of: u64,
-}
-
-impl std::str::FromStr for Shard {
-    type Err = StudyError;
-
-    /// `I/N` with `1 <= I <= N`.
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let parts = text.split_once('/').map(|(i, n)| (i.trim().parse(), n.trim().parse()));
-        match parts {
-            Some((Ok(index), Ok(of))) if index >= 1 && index <= of => Ok(Self { index, of }),
-            _ => Err(StudyError::BadShard { found: text.to_owned() }),
-        }
-    }
-}
-
-impl std::fmt::Display for Shard {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}/{}", self.index, self.of)
-    }
-}
-
-impl Shard {
-    /// Whether a block belongs to it: blocks are dealt out in turn, so that shards take about the same time.
-    pub(crate) fn has(self, block: u64) -> bool {
-        block % self.of == self.index - 1
-    }
-}
+use crate::{Plan, Shard, StudyError};
 
 /// The content of `study.json`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Manifest {
+pub(crate) struct RunRecord {
     /// Version of the program.
     pub hoid: String,
     pub study: String,
@@ -60,10 +25,9 @@ pub(crate) struct Manifest {
     pub complete: bool,
 }
 
-pub(crate) const PLAN: &str = "plan.toml";
 const NAME: &str = "study.json";
 
-impl Manifest {
+impl RunRecord {
     pub fn of(plan: &Plan, blocks: u64, shard: Option<Shard>) -> Self {
         Self {
             hoid: env!("CARGO_PKG_VERSION").to_owned(),
@@ -118,9 +82,4 @@ impl Manifest {
             .find(|(_, a, b)| a != b)
             .map(|(name, a, b)| format!("{name} {a} there, {b} here"))
     }
-}
-
-/// Where the parts of a block stand.
-pub(crate) fn part(directory: &Path, block: u64, table: &str) -> PathBuf {
-    directory.join("parts").join(format!("{block:06}-{table}.parquet"))
 }

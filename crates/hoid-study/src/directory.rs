@@ -1,0 +1,70 @@
+//! The directory of a study: its plan, its parts and its tables.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use hoid_io::IoError;
+
+use crate::{Plan, StudyError};
+
+pub(crate) const PLAN: &str = "plan.toml";
+
+/// Where the parts of a block stand.
+pub(crate) fn part(directory: &Path, block: u64, table: &str) -> PathBuf {
+    directory.join("parts").join(format!("{block:06}-{table}.parquet"))
+}
+
+/// Writes the plan beside the results.
+pub(crate) fn write_plan(plan: &Plan, directory: &Path) -> Result<(), StudyError> {
+    let text = plan.text();
+    Ok(hoid_io::write_atomically(&directory.join(PLAN), |file| {
+        file.write_all(text.as_bytes())
+    })?)
+}
+
+/// Removes what a killed run was writing: everything in `parts` that has not got its name yet.
+pub(crate) fn sweep(parts: &Path) -> Result<(), StudyError> {
+    hoid_io::make_directory(parts)?;
+    let unwritable = |source| IoError::Unwritable {
+        file: parts.display().to_string(),
+        source,
+    };
+    for entry in fs::read_dir(parts).map_err(unwritable)? {
+        let path = entry.map_err(unwritable)?.path();
+        if path.extension().is_none_or(|extension| extension != "parquet") || is_hidden(&path) {
+            fs::remove_file(&path).map_err(unwritable)?;
+        }
+    }
+    Ok(())
+}
+
+fn is_hidden(path: &Path) -> bool {
+    path.file_name()
+        .is_some_and(|name| name.to_string_lossy().starts_with('.'))
+}
+
+/// Removes the parts of a study that has its tables.
+pub(crate) fn remove_parts(directory: &Path) -> Result<(), StudyError> {
+    let parts = directory.join("parts");
+    fs::remove_dir_all(&parts).map_err(|source| {
+        StudyError::Io(IoError::Unwritable {
+            file: parts.display().to_string(),
+            source,
+        })
+    })
+}
+
+/// Where a table of a study is written.
+pub(crate) fn table_path(directory: &Path, table: &str, csv: bool) -> PathBuf {
+    directory.join(format!("{table}.{}", if csv { "csv" } else { "parquet" }))
+}
+
+/// The tables that are there.
+pub(crate) fn tables(directory: &Path) -> Vec<PathBuf> {
+    let all = ["cells", "fits", "summary", "traces", "trace-summary"]
+        .into_iter()
+        .flat_map(|table| [false, true].map(|csv| table_path(directory, table, csv)));
+    all.filter(|path| path.exists()).collect()
+}

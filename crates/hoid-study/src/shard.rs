@@ -1,0 +1,40 @@
+//! Shards: parts of a study that are run apart.
+
+use serde::{Deserialize, Serialize};
+
+use crate::StudyError;
+
+/// A shard of a study: part `index` of `of`, from 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shard {
+    /// Which.
+    pub index: u64,
+    /// Of how many.
+    pub of: u64,
+}
+
+impl std::str::FromStr for Shard {
+    type Err = StudyError;
+
+    /// `I/N` with `1 <= I <= N`.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let parts = text.split_once('/').map(|(i, n)| (i.trim().parse(), n.trim().parse()));
+        match parts {
+            Some((Ok(index), Ok(of))) if index >= 1 && index <= of => Ok(Self { index, of }),
+            _ => Err(StudyError::BadShard { found: text.to_owned() }),
+        }
+    }
+}
+
+impl std::fmt::Display for Shard {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}/{}", self.index, self.of)
+    }
+}
+
+impl Shard {
+    /// Whether a block belongs to it: blocks are dealt out in turn, so that shards take about the same time.
+    pub(crate) fn has(self, block: u64) -> bool {
+        block % self.of == self.index - 1
+    }
+}
