@@ -87,7 +87,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "arx-only-gain-ideal",
         theme: Theme::BatchArx,
-        statement: "Setting the true delay \"only the HO gain K_e results achieve the ideal performance\" (ARX).",
+        statement: "At the true delay \"only the HO gain K_e results achieve the ideal performance\" (ARX).",
         place: "6.1.1, Fig. C.2",
         measure: "Magnitude of the median bias of K_e, and of T_L, omega_nm and zeta_nm, m0 = 2 to 4, C1, n_k* = 29.",
         plans: PLANS,

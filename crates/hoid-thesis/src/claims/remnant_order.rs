@@ -24,7 +24,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "vaf-lower-with-m4-at-m1",
         theme: Theme::RemnantOrder,
-        statement: "Setting m0 = 1 \"a model remnant order equal to 4 provides lower VAF results\".",
+        statement: "At m0 = 1 \"a model remnant order equal to 4 provides lower VAF results\".",
         place: "V.A.2; 6.1.3, Figs. E.1, E.9",
         measure: "Mean of the paired difference of VAF, m* = 4 less m* = 1, m0 = 1, C1 and C2, by n_k* and noise level: lower by more than 0.1 points.",
         plans: PLANS,
