@@ -1,0 +1,317 @@
+//! No circle of imports between the files of a crate.
+//!
+//! An arrow goes from a file to another file of which it names an item, by `use` or by a path. `mod` lines and re-exports
+//! (`pub use`) are the doors of a room and draw no arrow, and tests may look at everything. Names are resolved as the compiler does:
+//! through modules, imports and re-exports, to the file that defines the item.
+#![allow(clippy::unwrap_used)]
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    path::{Path, PathBuf},
+};
+
+use proc_macro2::{TokenStream, TokenTree};
+use syn::{
+    Attribute, Item, UseTree, Visibility,
+    visit::{self, Visit},
+};
+
+/// A module: where it stands, what it defines, and what it imports.
+#[derive(Default)]
+struct Module {
+    file: PathBuf,
+    parent: Option<usize>,
+    children: BTreeMap<String, usize>,
+    items: BTreeSet<String>,
+    /// Local name, the path that it stands for, and whether it is a re-export.
+    imports: Vec<(String, Vec<String>, bool)>,
+    globs: Vec<(Vec<String>, bool)>,
+    /// Paths in the code.
+    paths: Vec<Vec<String>>,
+}
+
+/// All modules of a crate; the first is its root.
+#[derive(Default)]
+struct Crate {
+    modules: Vec<Module>,
+}
+
+fn is_test(attributes: &[Attribute]) -> bool {
+    attributes.iter().any(|attribute| {
+        attribute.path().is_ident("cfg")
+            && matches!(&attribute.meta, syn::Meta::List(list) if list.tokens.to_string().contains("test"))
+    })
+}
+
+fn attributes(item: &Item) -> &[Attribute] {
+    match item {
+        Item::Const(i) => &i.attrs,
+        Item::Enum(i) => &i.attrs,
+        Item::Fn(i) => &i.attrs,
+        Item::Impl(i) => &i.attrs,
+        Item::Macro(i) => &i.attrs,
+        Item::Mod(i) => &i.attrs,
+        Item::Static(i) => &i.attrs,
+        Item::Struct(i) => &i.attrs,
+        Item::Trait(i) => &i.attrs,
+        Item::Type(i) => &i.attrs,
+        Item::Use(i) => &i.attrs,
+        _ => &[],
+    }
+}
+
+/// The name that an item gives to its module.
+fn name(item: &Item) -> Option<String> {
+    let name = match item {
+        Item::Const(i) => &i.ident,
+        Item::Enum(i) => &i.ident,
+        Item::Fn(i) => &i.sig.ident,
+        Item::Macro(i) => i.ident.as_ref()?,
+        Item::Static(i) => &i.ident,
+        Item::Struct(i) => &i.ident,
+        Item::Trait(i) => &i.ident,
+        Item::Type(i) => &i.ident,
+        _ => return None,
+    };
+    Some(name.to_string())
+}
+
+impl Module {
+    fn use_tree(&mut self, tree: &UseTree, mut before: Vec<String>, again: bool) {
+        match tree {
+            UseTree::Path(path) => {
+                before.push(path.ident.to_string());
+                self.use_tree(&path.tree, before, again);
+            }
+            UseTree::Name(name) if name.ident == "self" => {
+                let local = before.last().unwrap().clone();
+                self.imports.push((local, before, again));
+            }
+            UseTree::Name(name) => {
+                let local = name.ident.to_string();
+                before.push(local.clone());
+                self.imports.push((local, before, again));
+            }
+            UseTree::Rename(rename) => {
+                if rename.ident != "self" {
+                    before.push(rename.ident.to_string());
+                }
+                self.imports.push((rename.rename.to_string(), before, again));
+            }
+            UseTree::Glob(_) => self.globs.push((before, again)),
+            UseTree::Group(group) => {
+                for tree in &group.items {
+                    self.use_tree(tree, before.clone(), again);
+                }
+            }
+        }
+    }
+}
+
+/// Gathers the paths of a module's code, also those within the arguments of macros.
+struct Paths<'m>(&'m mut Module);
+
+impl<'ast> Visit<'ast> for Paths<'_> {
+    fn visit_path(&mut self, path: &'ast syn::Path) {
+        self.0
+            .paths
+            .push(path.segments.iter().map(|s| s.ident.to_string()).collect());
+        visit::visit_path(self, path);
+    }
+
+    fn visit_macro(&mut self, used: &'ast syn::Macro) {
+        self.visit_path(&used.path);
+        tokens(used.tokens.clone(), &mut self.0.paths);
+    }
+
+    fn visit_item_use(&mut self, item: &'ast syn::ItemUse) {
+        // An import within a function.
+        self.0.use_tree(&item.tree, Vec::new(), false);
+    }
+}
+
+/// Runs of names with `::` between them.
+fn tokens(stream: TokenStream, found: &mut Vec<Vec<String>>) {
+    let (mut run, mut colons) = (Vec::new(), 0);
+    for token in stream {
+        match token {
+            TokenTree::Ident(ident) if colons == 2 && !run.is_empty() => run.push(ident.to_string()),
+            TokenTree::Ident(ident) => {
+                found.push(std::mem::replace(&mut run, vec![ident.to_string()]));
+            }
+            TokenTree::Punct(punct) if punct.as_char() == ':' => {
+                colons += 1;
+                continue;
+            }
+            other => {
+                found.push(std::mem::take(&mut run));
+                if let TokenTree::Group(group) = other {
+                    tokens(group.stream(), found);
+                }
+            }
+        }
+        colons = 0;
+    }
+    found.push(run);
+}
+
+impl Crate {
+    fn read(root: &Path) -> Self {
+        let mut all = Self::default();
+        let code = syn::parse_file(&fs::read_to_string(root).unwrap()).unwrap();
+        all.module(root, root.parent().unwrap(), None, &code.items);
+        all
+    }
+
+    /// `folder` is where the files of child modules lie.
+    fn module(&mut self, file: &Path, folder: &Path, parent: Option<usize>, items: &[Item]) -> usize {
+        let at = self.modules.len();
+        self.modules.push(Module {
+            file: file.to_owned(),
+            parent,
+            ..Module::default()
+        });
+        for item in items.iter().filter(|item| !is_test(attributes(item))) {
+            self.modules[at].items.extend(name(item));
+            match item {
+                Item::Use(import) => {
+                    let again = !matches!(import.vis, Visibility::Inherited);
+                    self.modules[at].use_tree(&import.tree, Vec::new(), again);
+                }
+                Item::Mod(child) => {
+                    let name = child.ident.to_string();
+                    let inner = folder.join(&name);
+                    let index = if let Some((_, items)) = &child.content {
+                        self.module(file, &inner, Some(at), items)
+                    } else {
+                        let paths = [folder.join(format!("{name}.rs")), inner.join("mod.rs")];
+                        let path = paths.iter().find(|path| path.exists()).unwrap();
+                        let code = syn::parse_file(&fs::read_to_string(path).unwrap()).unwrap();
+                        self.module(path, &inner, Some(at), &code.items)
+                    };
+                    self.modules[at].children.insert(name, index);
+                }
+                other => Paths(&mut self.modules[at]).visit_item(other),
+            }
+        }
+        at
+    }
+
+    /// The module that defines the item at the end of a path; none for paths that lead out of the crate, or to a module.
+    fn resolve(&self, from: usize, path: &[String], depth: usize) -> Option<usize> {
+        let (first, rest) = path.split_first()?;
+        // Circles of re-exports, and names that lead nowhere.
+        if depth > 12 {
+            return None;
+        }
+        let module = &self.modules[from];
+        match first.as_str() {
+            "crate" => return self.resolve(0, rest, depth + 1),
+            "self" => return self.resolve(from, rest, depth + 1),
+            "super" => return self.resolve(module.parent?, rest, depth + 1),
+            _ => {}
+        }
+        if let Some(&child) = module.children.get(first)
+            && !rest.is_empty()
+        {
+            return self.resolve(child, rest, depth + 1);
+        }
+        if module.items.contains(first) {
+            return Some(from);
+        }
+        if let Some((_, import, _)) = module.imports.iter().find(|(local, _, _)| local == first) {
+            if import.first() == Some(first) && import.len() == 1 {
+                return None;
+            }
+            let whole: Vec<String> = import.iter().chain(rest).cloned().collect();
+            return self.resolve(from, &whole, depth + 1);
+        }
+        module.globs.iter().find_map(|(glob, _)| {
+            let whole: Vec<String> = glob.iter().chain(path).cloned().collect();
+            (glob.first() != Some(first))
+                .then(|| self.resolve(from, &whole, depth + 1))
+                .flatten()
+        })
+    }
+
+    /// The files that each file names.
+    fn arrows(&self) -> BTreeMap<&Path, BTreeSet<&Path>> {
+        let mut arrows: BTreeMap<&Path, BTreeSet<&Path>> = BTreeMap::new();
+        for (at, module) in self.modules.iter().enumerate() {
+            let imports = module
+                .imports
+                .iter()
+                .filter(|(_, _, again)| !again)
+                .map(|(_, path, _)| path);
+            let to = arrows.entry(&module.file).or_default();
+            for path in imports.chain(&module.paths) {
+                to.extend(self.resolve(at, path, 0).map(|to| self.modules[to].file.as_path()));
+            }
+            to.remove(module.file.as_path());
+        }
+        arrows
+    }
+}
+
+/// Groups of files each of which reaches all others of its group.
+fn circles<'p>(arrows: &BTreeMap<&'p Path, BTreeSet<&'p Path>>) -> Vec<Vec<&'p Path>> {
+    let reached = |from: &'p Path| {
+        let (mut seen, mut open) = (BTreeSet::new(), vec![from]);
+        while let Some(at) = open.pop() {
+            open.extend(arrows.get(at).into_iter().flatten().filter(|to| seen.insert(**to)));
+        }
+        seen
+    };
+    let reach: BTreeMap<&Path, BTreeSet<&Path>> = arrows.keys().map(|&file| (file, reached(file))).collect();
+    let mut left: BTreeSet<&Path> = reach
+        .iter()
+        .filter(|(file, seen)| seen.contains(*file))
+        .map(|(f, _)| *f)
+        .collect();
+    let mut found = Vec::new();
+    while let Some(&first) = left.first() {
+        let group: Vec<&Path> = left
+            .iter()
+            .copied()
+            .filter(|f| reach[first].contains(f) && reach[f].contains(first))
+            .collect();
+        left.retain(|file| !group.contains(file));
+        found.push(group);
+    }
+    found
+}
+
+#[test]
+fn no_circle_of_imports() {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let mut roots: Vec<PathBuf> = fs::read_dir(crates)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    roots.push(crates.parent().unwrap().join("xtask"));
+    roots.sort();
+    let mut found = String::new();
+    for folder in roots {
+        for root in ["src/lib.rs", "src/main.rs"].map(|name| folder.join(name)) {
+            if !root.exists() {
+                continue;
+            }
+            let all = Crate::read(&root);
+            let arrows = all.arrows();
+            for circle in circles(&arrows) {
+                found += &format!("{}\n", folder.file_name().unwrap().display());
+                for file in &circle {
+                    let short = |path: &Path| path.strip_prefix(folder.join("src")).unwrap().display().to_string();
+                    let to: Vec<String> = arrows[file]
+                        .iter()
+                        .filter(|to| circle.contains(to))
+                        .map(|to| short(to))
+                        .collect();
+                    found += &format!("    {} -> {}\n", short(file), to.join(", "));
+                }
+            }
+        }
+    }
+    assert!(found.is_empty(), "circles of imports:\n{found}");
+}
