@@ -72,8 +72,8 @@ impl Plan {
             largest: args.largest,
             ..TrackOptions::new(method, structure, largest)
         };
-        let plan = TrackPlan::new(options, ranges, args.criterion.into(), sample_time)
-            .map_err(|e| CliError::Usage(e.to_string()))?;
+        let plan =
+            TrackPlan::new(options, ranges, args.criterion, sample_time).map_err(|e| CliError::Usage(e.to_string()))?;
         Ok(Self { plan, sample_time })
     }
 
@@ -111,7 +111,7 @@ impl Plan {
             orders.push_str(&format!(
                 " (chosen from {} by {})",
                 self.plan.ranges(),
-                choice.criterion.name()
+                choice.criterion.label()
             ));
         }
         let mut list = vec![

@@ -321,7 +321,7 @@ pub fn candidates(choice: &Choice) -> String {
         .iter()
         .filter_map(|c| c.outcome.as_ref().ok().map(|f| (c.orders, f)))
         .collect();
-    let key = choice.criterion.name();
+    let key = choice.criterion.label();
     good.sort_by(|a, b| {
         let value = |f: &hoid_ident::order_selection::CandidateFigures| f.value(choice.criterion);
         value(a.1).total_cmp(&value(b.1))

@@ -23,6 +23,8 @@ pub enum Focus {
     Simulation,
 }
 
+hoid_model::named_choice!(Focus, "focus", 2, { Prediction => "prediction", Simulation => "simulation" });
+
 /// What is to be estimated, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimator {

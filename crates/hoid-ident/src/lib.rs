@@ -101,6 +101,6 @@ pub use fit::{Fit, ResponsePoint, Series};
 pub use grey_box::{GreyBox, GreyBoxFit};
 pub use iv::{InstrumentalVariable, Instruments, IvMethod};
 pub use optimize::{Reason, SearchMethod, SearchOptions, Termination};
-pub use order_selection::{Candidate, Choice, OrderRanges, choose_orders};
+pub use order_selection::{Candidate, Choice, OrderRanges, choose_orders, identify};
 pub use pem::loss::Loss;
 pub use sigmoid::{ChangeParameter, Comparison, GainsAt, NoiseLevel, Remark, SIGMOID_NAMES, SigmoidChange, SigmoidFit};

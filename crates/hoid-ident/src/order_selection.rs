@@ -122,9 +122,13 @@ pub enum Criterion {
     Yic,
 }
 
+hoid_model::named_choice!(Criterion, "criterion", 7, {
+    Loss => "loss", Aic => "aic", Aicc => "aicc", Bic => "bic", Fpe => "fpe", Mdl => "mdl", Yic => "yic",
+});
+
 impl Criterion {
     /// Name as in print.
-    pub fn name(self) -> &'static str {
+    pub fn label(self) -> &'static str {
         match self {
             Self::Loss => "loss",
             Self::Aic => "AIC",
@@ -207,6 +211,19 @@ pub struct Choice {
     pub candidates: Vec<Candidate>,
     /// What decided.
     pub criterion: Criterion,
+}
+
+/// Identifies a person as `hoid identify` does without options: the operator by a Box-Jenkins model, the delay searched over 0.05 to 0.6 s and
+/// the order of the noise model over 1 to 4, chosen by BIC.
+///
+/// # Errors
+/// As [`choose_orders`]; [`IdentError::NoRecords`] without a record.
+pub fn identify(records: &[Record]) -> Result<Choice, IdentError> {
+    let structure = Structure::BoxJenkins;
+    let first = records.first().ok_or(IdentError::NoRecords)?;
+    let ranges = default_operator_ranges(structure, first.sample_time());
+    let template = Estimator::new(structure, structure.operator_orders(1));
+    choose_orders(&template, &ranges, Criterion::Bic, records)
 }
 
 /// Fits every combination of orders and returns the best. `template` gives the options; its orders and start are not used.

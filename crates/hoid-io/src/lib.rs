@@ -54,7 +54,7 @@ pub use formats::{readable_endings, writable_endings};
 pub use output_table::{ColumnKind, ColumnSchema, ColumnValues, OutputColumn, OutputTable, TableSchema};
 pub use preparation::{NewRate, Offset, Preparation, Scaling, Step};
 pub use read_options::{ReadOptions, Repair};
-pub use record_file::{read_prepared, read_record, write_record, write_record_csv};
+pub use record_file::{read, read_prepared, read_record, write_record, write_record_csv};
 pub use record_from_table::ReadRecord;
 pub use scenario_file::{ScenarioFileError, parse_scenario, read_scenario, scenario_schema};
 pub use segments::read_segments;

@@ -19,6 +19,14 @@ use crate::record_columns::{channels, comments};
 use crate::record_from_table::{ReadRecord, record_of};
 use crate::table_writer::write_values;
 
+/// Reads a record with the defaults of the command line: columns e, u and t, and each other column of numbers as a channel of its own.
+///
+/// # Errors
+/// As [`read_record`].
+pub fn read(path: impl AsRef<Path>) -> Result<Record, IoError> {
+    Ok(read_record(path.as_ref(), &ReadOptions::default())?.record)
+}
+
 /// Reads a record from a file: input, output, and each other column of numbers as a channel of its own.
 ///
 /// # Errors

@@ -316,7 +316,7 @@ impl PyFit {
 
     #[getter]
     fn criterion(&self) -> Option<&'static str> {
-        self.choice.as_ref().map(|choice| choice.criterion.name())
+        self.choice.as_ref().map(|choice| choice.criterion.label())
     }
 
     #[getter]

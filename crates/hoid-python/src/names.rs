@@ -7,7 +7,7 @@ use hoid_ident::{
 };
 use hoid_io::QualityIssueKind;
 use hoid_model::{
-    Detrend, Structure, discretise, remnant::RemnantDiscretisation, remnant_gain::NoiseDefinition,
+    Detrend, NamedChoice, Structure, discretise, remnant::RemnantDiscretisation, remnant_gain::NoiseDefinition,
     scenario::Realisation,
 };
 
@@ -26,6 +26,15 @@ pub fn word<T: Clone>(option: &str, found: &str, words: &[(&str, T)]) -> Outcome
             )))
         }
     }
+}
+
+/// A choice of the library by its name.
+fn choice<T: NamedChoice>(option: &str, found: &str) -> Outcome<T> {
+    let words: Vec<_> = T::CHOICES
+        .iter()
+        .map(|choice| (choice.choice_name(), *choice))
+        .collect();
+    word(option, found, &words)
 }
 
 /// What can be left out of a record.
@@ -55,7 +64,7 @@ fn structures() -> impl Iterator<Item = (&'static str, Structure)> {
 }
 
 pub fn structure(found: &str) -> Outcome<Structure> {
-    word("structure", found, &structures().collect::<Vec<_>>())
+    choice("structure", found)
 }
 
 pub fn kind(found: &str) -> Outcome<Kind> {
@@ -66,84 +75,43 @@ pub fn kind(found: &str) -> Outcome<Kind> {
 
 /// None is the prediction error method.
 pub fn fit_method(found: &str) -> Outcome<Option<IvMethod>> {
-    let words = [
-        ("pem", None),
-        ("iv4", Some(IvMethod::Iv4)),
-        ("sriv", Some(IvMethod::Sriv)),
-        ("rivbj", Some(IvMethod::RivBj)),
-    ];
+    let instruments = IvMethod::ALL.map(|method| (method.name(), Some(method)));
+    let words: Vec<_> = [("pem", None)].into_iter().chain(instruments).collect();
     word("method", found, &words)
 }
 
 pub fn focus(found: &str) -> Outcome<Focus> {
-    let words = [("prediction", Focus::Prediction), ("simulation", Focus::Simulation)];
-    word("focus", found, &words)
+    choice("focus", found)
 }
 
 pub fn search_method(found: &str) -> Outcome<SearchMethod> {
-    let words = [
-        ("auto", SearchMethod::Automatic),
-        ("gn", SearchMethod::GaussNewton),
-        ("lm", SearchMethod::LevenbergMarquardt),
-        ("grad", SearchMethod::SteepestDescent),
-    ];
-    word("search_method", found, &words)
+    choice("search_method", found)
 }
 
 pub fn criterion(found: &str) -> Outcome<Criterion> {
-    let words = [
-        ("loss", Criterion::Loss),
-        ("aic", Criterion::Aic),
-        ("aicc", Criterion::Aicc),
-        ("bic", Criterion::Bic),
-        ("fpe", Criterion::Fpe),
-        ("mdl", Criterion::Mdl),
-        ("yic", Criterion::Yic),
-    ];
-    word("criterion", found, &words)
+    choice("criterion", found)
 }
 
 pub fn initial_state(found: &str) -> Outcome<Option<InitialState>> {
-    let words = [
-        ("auto", None),
-        ("zero", Some(InitialState::Zero)),
-        ("estimate", Some(InitialState::Estimate)),
-        ("backcast", Some(InitialState::Backcast)),
-    ];
+    let rules = InitialState::ALL.map(|rule| (rule.name(), Some(rule)));
+    let words: Vec<_> = [("auto", None)].into_iter().chain(rules).collect();
     word("initial_state", found, &words)
 }
 
 pub fn detrend(found: &str) -> Outcome<Detrend> {
-    let words = [
-        ("none", Detrend::None),
-        ("mean", Detrend::Mean),
-        ("linear", Detrend::Linear),
-    ];
-    word("detrend", found, &words)
+    choice("detrend", found)
 }
 
 pub fn noise_definition(found: &str) -> Outcome<NoiseDefinition> {
-    let words = [
-        ("response", NoiseDefinition::Response),
-        ("remnant", NoiseDefinition::Remnant),
-    ];
-    word("noise_definition", found, &words)
+    choice("noise_definition", found)
 }
 
 pub fn realisation(found: &str) -> Outcome<Realisation> {
-    word(
-        "realisation",
-        found,
-        &[("input", Realisation::Input), ("output", Realisation::Output)],
-    )
+    choice("realisation", found)
 }
 
 pub fn remnant_discretisation(found: &str) -> Outcome<RemnantDiscretisation> {
-    let words = [
-        ("zoh", RemnantDiscretisation::ZeroOrderHold),
-        ("backward-euler", RemnantDiscretisation::BackwardEuler),
-    ];
-    word("discretisation", found, &words)
+    choice("discretisation", found)
 }
 
 /// The keyword of an option: its name, but for a word that Python keeps for itself.

@@ -1,13 +1,16 @@
 //! One self-contained HTML page about the models fitted to a record or to several.
 
-use hoid_ident::validation::{Correlation, GoodnessOfFit, Validation};
+use hoid_ident::{
+    Choice,
+    validation::{Correlation, GoodnessOfFit, Validation},
+};
 use hoid_model::Record;
 use minijinja::{Value, context};
 
 use crate::{
     ReportError, cells,
     figures::{self, BodeModel, TrueResponse},
-    model_section::ModelSection,
+    model_section::{ModelSection, known_operator},
     page, tables,
 };
 
@@ -25,6 +28,28 @@ pub struct Report<'a> {
     pub models: Vec<ModelSection<'a>>,
     /// Remarks for the reader, such as warnings of the command.
     pub notes: Vec<String>,
+}
+
+impl<'a> Report<'a> {
+    /// A report about a fit to records, with the search that chose its orders.
+    pub fn of(title: &str, records: &'a [Record], choice: &'a Choice) -> Self {
+        Self {
+            title: title.to_owned(),
+            settings: vec![(
+                "records".to_owned(),
+                records.iter().map(Record::label).collect::<Vec<_>>().join(", "),
+            )],
+            models: vec![ModelSection {
+                name: choice.fit.title(),
+                fit: &choice.fit,
+                records,
+                candidates: Some(choice),
+                truth: known_operator(records),
+                margins: None,
+            }],
+            notes: Vec::new(),
+        }
+    }
 }
 
 impl Report<'_> {

@@ -313,7 +313,7 @@ pub fn margins(margins: &MarginEstimates) -> Vec<Value> {
 
 /// Candidates of an order search, best first.
 pub fn candidates(choice: &Choice) -> Value {
-    let name = choice.criterion.name();
+    let name = choice.criterion.label();
     let mut fitted = Vec::new();
     let mut failed = Vec::new();
     for candidate in &choice.candidates {

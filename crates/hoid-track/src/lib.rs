@@ -48,6 +48,7 @@ mod setup;
 mod shared_options;
 mod smoother;
 mod start;
+mod summary;
 mod trace;
 mod tracker;
 

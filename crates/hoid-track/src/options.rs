@@ -44,6 +44,12 @@ impl TrackOptions {
         }
     }
 
+    /// Default options with the structure and the orders that the method takes when none are named, for a delay of nk samples.
+    pub fn usual(method: Method, nk: usize) -> Self {
+        let (structure, orders) = (method.usual_structure(), method.usual_orders(nk));
+        Self::new(method, structure, orders)
+    }
+
     /// With options of the method set from their texts, as `[("memory", "256"), ("covariance", "0.1")]`.
     ///
     /// # Errors

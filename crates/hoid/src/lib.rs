@@ -1,7 +1,34 @@
 //! Human-operator identification: how a person controls a machine, from the tracking error e and the control output u.
 //!
-//! This crate has no code of its own: it gathers what a Rust user needs. Simulate a run, fit an ARX and a Box-Jenkins model,
-//! and read the operator's parameters with their standard errors:
+//! A pilot, driver or surgeon closes a control loop. Near the task they behave like a linear operator with a remnant,
+//!
+//! `u = K_e (T_L s + 1) e^(-tau_e s) omega_nm^2/(s^2 + 2 zeta_nm omega_nm s + omega_nm^2) e + n`,
+//!
+//! and hoid estimates these parameters with standard errors: in batch by the prediction error method on a Box-Jenkins model
+//! `u = (B/F) q^-nk e + (1/D) eps`, sample by sample by recursions, on recorded and on simulated runs.
+//!
+//! This crate has no code of its own. The prelude has what most programs use, from the file to the report:
+//!
+//! ```no_run
+//! use hoid::prelude::*;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let records = [read("run1.csv")?];                       // columns t, e and u
+//! let choice = identify(&records)?;                         // Box-Jenkins, delay and noise order by BIC
+//! println!("{}", choice.fit);
+//! println!("{}", choice.fit.validate(&records[0])?);
+//!
+//! let options = TrackOptions::usual(Method::adaptive(), choice.fit.orders().nk);
+//! let trace = track(&records[0], &options, 10)?;            // every tenth sample
+//! println!("{trace}");
+//!
+//! let page = Report::of("Run 1", &records, &choice).to_html()?;
+//! write_report("report".as_ref(), &page)?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! The same on a simulated run, where the truth is known:
 //!
 //! ```
 //! use hoid::prelude::*;
@@ -12,31 +39,53 @@
 //!
 //! let orders = Structure::BoxJenkins.operator_orders(29);
 //! let fit = Estimator::new(Structure::BoxJenkins, orders).fit(&[record])?;
-//! let operator = fit.operator()?;
-//! let omega = operator.omega_nm_rad_s;
+//! let omega = fit.operator()?.omega_nm_rad_s;
 //! assert!((omega.value - 11.25).abs() < 4.0 * omega.standard_error.unwrap_or(0.0));
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! | feature | brings | default |
+//! |---|---|---|
+//! | none | [`model`], [`ident`], [`track`], [`sim`]: what estimates | |
+//! | `io` | [`io`]: files | yes |
+//! | `study` | [`study`]: Monte Carlo studies and groups of runs | yes |
+//! | `report` | [`report`]: figures and HTML pages | yes |
+//! | `thesis` | [`thesis`]: the reference text, reproduced | yes |
+//!
+//! With `default-features = false` nothing that reads files or draws is built.
 
 pub use hoid_core as core;
 pub use hoid_ident as ident;
+#[cfg(feature = "io")]
 pub use hoid_io as io;
 pub use hoid_lanes as lanes;
 pub use hoid_model as model;
+#[cfg(feature = "report")]
 pub use hoid_report as report;
 pub use hoid_sim as sim;
+#[cfg(feature = "study")]
 pub use hoid_study as study;
+#[cfg(feature = "thesis")]
 pub use hoid_thesis as thesis;
 pub use hoid_track as track;
 
-/// What most programs use.
+/// What most programs use: read, identify, validate, track, report, simulate.
 pub mod prelude {
-    pub use hoid_ident::{Estimator, Fit, InitialState, OrderRanges, choose_orders};
+    pub use hoid_ident::{
+        Choice, Constraint, Estimator, Fit, GreyBox, IdentError, InitialState, OrderRanges, choose_orders, identify,
+    };
+    #[cfg(feature = "io")]
+    pub use hoid_io::{ReadOptions, read, read_record, write_record};
     pub use hoid_model::{
         Channel, OperatorParameters, Orders, PolynomialModel, Record, SampleTime, Structure,
         scenario::{Condition, Scenario},
-        uncertainty::Estimate,
+        uncertainty::{Estimate, OperatorEstimate},
     };
+    #[cfg(feature = "report")]
+    pub use hoid_report::{Report, TrackReport, write_report};
     pub use hoid_sim::{RunSeed, Simulator};
+    #[cfg(feature = "study")]
+    pub use hoid_study::{Plan, RunOptions, run as run_study};
+    pub use hoid_track::{Memory, Method, Sample, StartAt, Trace, TrackOptions, Tracker, track};
 }

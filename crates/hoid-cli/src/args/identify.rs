@@ -8,7 +8,6 @@ use hoid_model::{ContinuousTransferFunction, Structure, remnant::RemnantDiscreti
 
 use super::{
     choices::{by_name, choice_of},
-    names::CriterionName,
     parse::{parse_span, parse_transfer_function},
     reading::{MaskArgs, ReadArgs},
 };
@@ -28,8 +27,8 @@ pub struct IdentifyArgs {
     #[arg(long, value_name = "NAME", value_parser = by_name(ModelKind::named()))]
     pub structure: Option<ModelKind>,
     /// How: pem the prediction error method; iv4 (for arx), sriv (for oe), rivbj (for bj) instrumental variables
-    #[arg(long, value_name = "NAME", default_value = "pem")]
-    pub method: FitMethodName,
+    #[arg(long, value_name = "NAME", default_value = "pem", value_parser = by_name(fit_methods()))]
+    pub method: std::option::Option<IvMethod>,
     /// Instruments of iv4, sriv and rivbj: a channel that the noise does not reach, or `simulated` from the input, for an open
     /// loop [default: f_t where all records have it, else simulated]
     #[arg(long, value_name = "CHANNEL|simulated")]
@@ -54,11 +53,11 @@ pub struct IdentifyArgs {
     #[arg(long, value_name = "N|LO..HI", value_parser = parse_range)]
     pub nk: Option<RangeInclusive<usize>>,
     /// What decides between candidates when something is searched
-    #[arg(long, value_name = "NAME", default_value = "bic")]
-    pub criterion: CriterionName,
+    #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_of(&Criterion::ALL))]
+    pub criterion: Criterion,
     /// Initial states of each record; auto: estimate, and backcast for an output alone (ar, ma, arma)
-    #[arg(long, value_name = "RULE", default_value = "auto")]
-    pub initial_state: InitialStateName,
+    #[arg(long, value_name = "RULE", default_value = "auto", value_parser = by_name(initial_states()))]
+    pub initial_state: std::option::Option<InitialState>,
     /// Start of the search, all coefficients as f1=-1.9,f2=.92,b0=.04,... [default: own starts]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     pub start: Option<String>,
@@ -75,14 +74,14 @@ pub struct IdentifyArgs {
     #[arg(long, value_name = "K", num_args = 0..=1, default_missing_value = "1.345")]
     pub robust: Option<f64>,
     /// What the model is to be good at: one-step prediction, or simulation from the input alone
-    #[arg(long, value_name = "WHAT", default_value = "prediction")]
-    pub focus: FocusName,
+    #[arg(long, value_name = "WHAT", default_value = "prediction", value_parser = choice_of(&Focus::ALL))]
+    pub focus: Focus,
     /// Take only models that are stable from e to u (C and F always are stable)
     #[arg(long)]
     pub stable: bool,
     /// How the search steps: gn Gauss-Newton, lm Levenberg-Marquardt, grad steepest descent
-    #[arg(long, value_name = "METHOD", default_value = "auto")]
-    pub search_method: SearchMethodName,
+    #[arg(long, value_name = "METHOD", default_value = "auto", value_parser = choice_of(&SearchMethod::ALL))]
+    pub search_method: SearchMethod,
     /// Largest number of search steps from each start
     #[arg(long, value_name = "N", default_value_t = 100)]
     pub max_iterations: usize,
@@ -129,22 +128,14 @@ impl ModelKind {
     }
 }
 
-names!(FitMethodName for Option<IvMethod> {
-    Pem = None,
-    Iv4 = Some(IvMethod::Iv4),
-    Sriv = Some(IvMethod::Sriv),
-    Rivbj = Some(IvMethod::RivBj),
-});
-names!(FocusName for Focus { Prediction = Focus::Prediction, Simulation = Focus::Simulation });
-names!(SearchMethodName for SearchMethod {
-    Auto = SearchMethod::Automatic,
-    Gn = SearchMethod::GaussNewton,
-    Lm = SearchMethod::LevenbergMarquardt,
-    Grad = SearchMethod::SteepestDescent,
-});
-names!(InitialStateName for Option<InitialState> {
-    Auto = None,
-    Zero = Some(InitialState::Zero),
-    Estimate = Some(InitialState::Estimate),
-    Backcast = Some(InitialState::Backcast),
-});
+/// Instrumental variables by name, and the prediction error method, which is none of them.
+fn fit_methods() -> impl Iterator<Item = (&'static str, Option<IvMethod>)> {
+    let instruments = IvMethod::ALL.map(|method| (method.name(), Some(method)));
+    [("pem", None)].into_iter().chain(instruments)
+}
+
+/// The rules for initial states by name; automatic is none of them.
+fn initial_states() -> impl Iterator<Item = (&'static str, Option<InitialState>)> {
+    let rules = InitialState::ALL.map(|rule| (rule.name(), Some(rule)));
+    [("auto", None)].into_iter().chain(rules)
+}

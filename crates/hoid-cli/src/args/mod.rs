@@ -10,15 +10,11 @@
 //! | `convert` | `hoid convert`, `hoid info` |
 //! | `group`, `study` | `hoid group`, `hoid simulate-group`; `hoid study`, `hoid reproduce` |
 
-#[macro_use]
-mod name_enum;
-
 mod choices;
 mod cli;
 mod convert;
 mod group;
 mod identify;
-mod names;
 mod parse;
 mod reading;
 mod recursion;
@@ -29,8 +25,7 @@ mod study;
 pub use cli::{Cli, Command};
 pub use convert::{ConvertArgs, InfoArgs};
 pub use group::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs};
-pub use identify::{FocusName, IdentifyArgs, InitialStateName, ModelKind, SearchMethodName};
-pub use names::CriterionName;
+pub use identify::{IdentifyArgs, ModelKind};
 pub use parse::parse_span;
 pub use reading::{MaskArgs, ReadArgs};
 pub use recursion::{RecursionArgs, StreamArgs, TrackArgs};

@@ -4,14 +4,14 @@ use std::{ops::RangeInclusive, path::PathBuf};
 
 use clap::{
     Args,
-    builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
+    builder::{PossibleValue, PossibleValuesParser},
 };
-use hoid_ident::settings::MethodSpec;
+use hoid_ident::{order_selection::Criterion, settings::MethodSpec};
 use hoid_io::Scaling;
 use hoid_model::Structure;
 use hoid_track::Method;
 
-use super::{CriterionName, ReadArgs, parse_span, settings::SettingArgs};
+use super::{ReadArgs, choices::choice_of, parse_span, settings::SettingArgs};
 use crate::orders::parse_range;
 
 /// What is tracked, and how.
@@ -21,7 +21,7 @@ pub struct RecursionArgs {
     #[arg(long, value_name = "NAME", default_value = "physical", value_parser = method_names())]
     pub method: String,
     /// Polynomial structure [default: arx for rls, else bj]
-    #[arg(long, value_name = "NAME", value_parser = structures())]
+    #[arg(long, value_name = "NAME", value_parser = choice_of(&Structure::ALL))]
     pub structure: Option<Structure>,
     /// Orders, each a number or a range to search on the start span, as nb=2,nc=0,nd=1..4,nf=2
     /// [default: the operator's: bj nb=2,nd=1..4,nf=2, for adaptive nd=6; arx na=2,nb=2]
@@ -31,8 +31,8 @@ pub struct RecursionArgs {
     #[arg(long, value_name = "N|LO..HI", value_parser = parse_range)]
     pub nk: Option<RangeInclusive<usize>>,
     /// What decides between candidates when something is searched
-    #[arg(long, value_name = "NAME", default_value = "bic")]
-    pub criterion: CriterionName,
+    #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_of(&Criterion::ALL))]
+    pub criterion: Criterion,
     /// Where the recursion starts: all coefficients as f1=-1.9,f2=.92,b0=.04,... or `nothing`
     /// [default: a batch fit of the start span, or of the warm-up]
     #[arg(long, value_name = "LIST|nothing", allow_hyphen_values = true)]
@@ -111,15 +111,6 @@ pub struct StreamArgs {
 fn method_names() -> PossibleValuesParser {
     let value = |spec: MethodSpec| PossibleValue::new(spec.name).help(spec.help);
     PossibleValuesParser::new(Method::registry().into_iter().map(value))
-}
-
-/// The polynomial structures by name.
-pub fn structures() -> impl TypedValueParser<Value = Structure> {
-    let names = Structure::ALL.map(|structure| structure.name());
-    PossibleValuesParser::new(names).map(|name| {
-        let found = Structure::ALL.into_iter().find(|structure| structure.name() == name);
-        found.unwrap_or(Structure::BoxJenkins)
-    })
 }
 
 fn parse_count(text: &str) -> Result<usize, String> {

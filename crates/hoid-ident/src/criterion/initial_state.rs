@@ -15,6 +15,10 @@ pub enum InitialState {
     Backcast,
 }
 
+hoid_model::named_choice!(InitialState, "rule for initial states", 3, {
+    Zero => "zero", Estimate => "estimate", Backcast => "backcast",
+});
+
 /// First sample whose residual can be had under the rule for initial states, for these orders.
 pub fn first_residual(orders: &Orders, initial: InitialState) -> usize {
     match initial {

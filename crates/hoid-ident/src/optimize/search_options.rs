@@ -14,6 +14,10 @@ pub enum SearchMethod {
     SteepestDescent,
 }
 
+hoid_model::named_choice!(SearchMethod, "search method", 4, {
+    Automatic => "auto", GaussNewton => "gn", LevenbergMarquardt => "lm", SteepestDescent => "grad",
+});
+
 /// Method and limits of the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchOptions {

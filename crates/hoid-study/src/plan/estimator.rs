@@ -76,7 +76,9 @@ impl EstimatorCell {
         };
         let structure = match &table.structure {
             None => method.as_ref().map_or(Structure::BoxJenkins, Method::usual_structure),
-            Some(name) => structure(name).ok_or_else(|| at("structure", unknown_structure(name)))?,
+            Some(name) => name
+                .parse::<Structure>()
+                .map_err(|error| at("structure", format!("is wrong: {error}")))?,
         };
         table.check_placement(method.as_ref(), &at)?;
         if table.method == FIT && table.structure.is_none() {
@@ -130,7 +132,7 @@ impl EstimatorCell {
             scenarios: table.scenarios,
             span_s: table.span_s,
             decimate,
-            detrend: table.detrend.map_or(Detrend::None, Detrend::from),
+            detrend: table.detrend.unwrap_or(Detrend::None),
             task,
             start,
             orders: table.orders,
@@ -284,15 +286,6 @@ impl EstimatorCell {
             _ => None,
         }
     }
-}
-
-fn structure(name: &str) -> Option<Structure> {
-    Structure::ALL.into_iter().find(|structure| structure.name() == name)
-}
-
-fn unknown_structure(name: &str) -> String {
-    let known: Vec<&str> = Structure::ALL.iter().map(|structure| structure.name()).collect();
-    format!("is {name:?}, expected one of {}", known.join(", "))
 }
 
 fn unknown_method(name: &str) -> String {

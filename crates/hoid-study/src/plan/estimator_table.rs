@@ -6,10 +6,10 @@ use hoid_ident::{
     Estimator, GreyBox, InitialState, SearchOptions,
     settings::{Kind, Setting},
 };
-use hoid_model::{Detrend, Orders, Structure};
+use hoid_model::{Detrend, NamedChoice, Orders, Structure};
 use hoid_track::{Method, StartAt, TrackOptions};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer, de::Error as _};
 
 use super::problem::PlanProblem;
 
@@ -59,23 +59,6 @@ pub(crate) struct OrdersTable {
     pub nk: Option<Order>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum InitialKey {
-    Auto,
-    Zero,
-    Estimate,
-    Backcast,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum DetrendKey {
-    None,
-    Mean,
-    Linear,
-}
-
 /// What is estimated from each record, and how. Each value may be a list, which makes it an axis of the grid.
 #[derive(Debug, Deserialize, JsonSchema)]
 pub(crate) struct EstimatorTable {
@@ -99,9 +82,13 @@ pub(crate) struct EstimatorTable {
     /// Takes every so manieth sample of e and u, without a filter. Default 1.
     pub(super) decimate: Option<usize>,
     /// What is taken out of e and u before. Default: none.
-    pub(super) detrend: Option<DetrendKey>,
+    #[serde(default, deserialize_with = "choice")]
+    #[schemars(with = "Option<String>", extend("enum" = names::<Detrend>(&[])))]
+    pub(super) detrend: Option<Detrend>,
     /// Initial states of a fit. Default: auto.
-    pub(super) initial_state: Option<InitialKey>,
+    #[serde(default, deserialize_with = "choice_or_auto")]
+    #[schemars(with = "Option<String>", extend("enum" = names::<InitialState>(&["auto"])))]
+    pub(super) initial_state: Option<InitialState>,
     /// Start of a search or a recursion: coefficients by name, those left out are zero; `name` labels it.
     pub(super) start: Option<BTreeMap<String, StartValue>>,
     /// Own starts from which a search runs to its end. Default 2.
@@ -203,19 +190,10 @@ impl EstimatorTable {
         }
     }
 
-    fn initial_state(&self) -> Option<InitialState> {
-        match self.initial_state {
-            None | Some(InitialKey::Auto) => None,
-            Some(InitialKey::Zero) => Some(InitialState::Zero),
-            Some(InitialKey::Estimate) => Some(InitialState::Estimate),
-            Some(InitialKey::Backcast) => Some(InitialState::Backcast),
-        }
-    }
-
     pub(super) fn fit(&self, structure: Structure) -> Estimator {
         let usual = Estimator::new(structure, Orders::default());
         Estimator {
-            initial_state: self.initial_state(),
+            initial_state: self.initial_state,
             search: self.search(),
             starts: self.starts.unwrap_or(usual.starts),
             ..usual
@@ -233,7 +211,7 @@ impl EstimatorTable {
         }
         Ok(GreyBox {
             delay_range_s: range,
-            initial_state: self.initial_state().unwrap_or(usual.initial_state),
+            initial_state: self.initial_state.unwrap_or(usual.initial_state),
             search: self.search(),
             starts: self.starts.unwrap_or(usual.starts),
             ..usual
@@ -342,12 +320,23 @@ fn unknown_key(method: &Method) -> String {
     format!("is unknown; {method} has {}", keys.join(", "))
 }
 
-impl From<DetrendKey> for Detrend {
-    fn from(key: DetrendKey) -> Self {
-        match key {
-            DetrendKey::None => Self::None,
-            DetrendKey::Mean => Self::Mean,
-            DetrendKey::Linear => Self::Linear,
-        }
+/// The names of a choice, behind others.
+fn names<T: NamedChoice>(others: &[&'static str]) -> Vec<&'static str> {
+    let own = T::CHOICES.iter().map(|choice| choice.choice_name());
+    others.iter().copied().chain(own).collect()
+}
+
+/// A choice by its name.
+fn choice<'de, T: NamedChoice, D: Deserializer<'de>>(from: D) -> Result<Option<T>, D::Error> {
+    let name = String::deserialize(from)?;
+    T::of_name(&name).map(Some).map_err(D::Error::custom)
+}
+
+/// A choice by its name; none for `auto`.
+fn choice_or_auto<'de, T: NamedChoice, D: Deserializer<'de>>(from: D) -> Result<Option<T>, D::Error> {
+    let name = String::deserialize(from)?;
+    match name.as_str() {
+        "auto" => Ok(None),
+        name => T::of_name(name).map(Some).map_err(D::Error::custom),
     }
 }

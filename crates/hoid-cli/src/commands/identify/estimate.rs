@@ -8,7 +8,7 @@ use hoid_ident::{
 use hoid_model::{Record, Structure};
 
 use crate::{
-    args::{FocusName, IdentifyArgs, InitialStateName, ModelKind, SearchMethodName},
+    args::{IdentifyArgs, ModelKind},
     error::CliError,
     orders, output,
 };
@@ -23,7 +23,7 @@ pub struct Estimated {
 
 /// What is to be fitted, the options checked against each other.
 pub fn kind(args: &IdentifyArgs) -> Result<ModelKind, CliError> {
-    let method: Option<IvMethod> = args.method.into();
+    let method = args.method;
     let typed = args.structure;
     let kind = match (typed, method) {
         (Some(kind), None) => kind,
@@ -60,12 +60,12 @@ fn misplaced(args: &IdentifyArgs, kind: ModelKind, by_instruments: bool) -> Opti
             "a structure with an input",
         ),
         (
-            args.initial_state != InitialStateName::Auto && by_instruments,
+            args.initial_state.is_some() && by_instruments,
             "--initial-state",
             "--method pem",
         ),
         (
-            args.search_method != SearchMethodName::Auto && by_instruments,
+            args.search_method != SearchMethod::Automatic && by_instruments,
             "--search-method",
             "--method pem",
         ),
@@ -104,7 +104,7 @@ fn misplaced(args: &IdentifyArgs, kind: ModelKind, by_instruments: bool) -> Opti
         (args.prior.is_some() && !by_search, "--prior", search),
         (args.robust.is_some() && !by_search, "--robust", search),
         (args.stable && !by_search, "--stable", search),
-        (args.focus != FocusName::Prediction && !by_search, "--focus", search),
+        (args.focus != Focus::Prediction && !by_search, "--focus", search),
         (args.fix.is_some() && by_instruments, "--fix", "--method pem"),
         (args.bound.is_some() && by_instruments, "--bound", "--method pem"),
         (args.validate.is_some() && changing, "--validate", steady),
@@ -136,7 +136,7 @@ pub fn fit(args: &IdentifyArgs, kind: ModelKind, records: &[Record]) -> Result<E
 /// Method and limits of the search as typed.
 pub fn search(args: &IdentifyArgs) -> SearchOptions {
     SearchOptions {
-        method: args.search_method.into(),
+        method: args.search_method,
         max_iterations: args.max_iterations,
         tolerance: args.tolerance,
     }
@@ -152,8 +152,8 @@ fn polynomial(args: &IdentifyArgs, structure: Structure, records: &[Record]) -> 
     let mut settings = vec![
         ("structure".to_owned(), structure.name().to_owned()),
         ("orders".to_owned(), ranges.to_string()),
-        ("criterion".to_owned(), format!("{:?}", args.criterion).to_lowercase()),
-        ("focus".to_owned(), format!("{:?}", args.focus).to_lowercase()),
+        ("criterion".to_owned(), args.criterion.to_string()),
+        ("focus".to_owned(), args.focus.to_string()),
         ("start".to_owned(), args.start.clone().unwrap_or("own".to_owned())),
     ];
     if let Some(prior) = &args.prior {
@@ -167,7 +167,7 @@ fn polynomial(args: &IdentifyArgs, structure: Structure, records: &[Record]) -> 
         settings.push(("stable models only".to_owned(), "yes".to_owned()));
     }
     let (mut fit, choice) = prediction_error(args, structure, &ranges, records)?;
-    if let Some(method) = Option::<IvMethod>::from(args.method) {
+    if let Some(method) = args.method {
         let instruments = instruments(args, records);
         settings.push(("method".to_owned(), format!("{method}, {instruments}")));
         if choice.is_some() {
@@ -204,14 +204,14 @@ fn prediction_error(
 ) -> Result<(Fit, Option<Choice>), CliError> {
     let combinations = ranges.combinations()?;
     let mut estimator = Estimator {
-        initial_state: args.initial_state.into(),
+        initial_state: args.initial_state,
         search: search(args),
         constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
         priors: orders::priors(args.prior.as_deref())?,
         loss: args
             .robust
             .map_or(Loss::Quadratic, |threshold| Loss::Huber { threshold }),
-        focus: args.focus.into(),
+        focus: args.focus,
         stable: args.stable,
         ..Estimator::new(structure, combinations[0])
     };
@@ -231,7 +231,7 @@ fn prediction_error(
         ));
     }
     let bar = output::progress(combinations.len(), "candidates");
-    let found = fit_or_choose(&estimator, ranges, args.criterion.into(), records, &|| bar.inc(1));
+    let found = fit_or_choose(&estimator, ranges, args.criterion, records, &|| bar.inc(1));
     bar.finish_and_clear();
     Ok(found?)
 }
@@ -241,7 +241,7 @@ fn grey_box(args: &IdentifyArgs, records: &[Record]) -> Result<Estimated, CliErr
     let mut estimator = GreyBox {
         constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
         individual: args.individual.clone(),
-        initial_state: Option::<InitialState>::from(args.initial_state).unwrap_or_default(),
+        initial_state: args.initial_state.unwrap_or_default(),
         search: search(args),
         ..GreyBox::new(m.clone())
     };

@@ -6,7 +6,7 @@ use crate::{args::IdentifyArgs, commands::reading};
 pub fn common_settings(args: &IdentifyArgs, with_input: bool) -> Vec<(String, String)> {
     let mut list = vec![(
         "initial state".to_owned(),
-        format!("{:?}", args.initial_state).to_lowercase(),
+        args.initial_state.map_or("auto", InitialState::name).to_owned(),
     )];
     list.extend(reading::settings(&args.read, with_input));
     if !args.mask.mask.is_empty() {
@@ -24,11 +24,7 @@ pub fn common_settings(args: &IdentifyArgs, with_input: bool) -> Vec<(String, St
     list.extend([
         (
             "search".to_owned(),
-            format!(
-                "{}, relative tolerance {:e}",
-                format!("{:?}", args.search_method).to_lowercase(),
-                args.tolerance
-            ),
+            format!("{}, relative tolerance {:e}", args.search_method, args.tolerance),
         ),
         ("largest number of steps".to_owned(), args.max_iterations.to_string()),
     ]);

@@ -1,0 +1,68 @@
+//! A trace in a few lines.
+
+use std::fmt;
+
+use hoid_model::numbers::plain;
+
+use crate::trace::Trace;
+
+/// The method, what it remembers, where it started, the operator at the end, and the changes that were declared.
+impl fmt::Display for Trace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let options = self.options();
+        writeln!(
+            f,
+            "{} of {}({}), {} rows",
+            options.method,
+            options.structure,
+            options.orders,
+            self.len()
+        )?;
+        writeln!(f, "memory  {}", options.memory_in_words(self.sample_time()))?;
+        writeln!(f, "start   {}", options.start_in_words())?;
+        let counts = self.counts();
+        writeln!(
+            f,
+            "samples {}, of which {} were faults, and {} steps were shortened",
+            counts.samples, counts.skipped, counts.shortened
+        )?;
+        let Some(last) = self.len().checked_sub(1) else {
+            return write!(f, "no row");
+        };
+        for (t, change) in self.changes() {
+            writeln!(f, "change declared at {} s, log odds {}", plain(*t), plain(change.odds))?;
+        }
+        writeln!(f, "at {} s", plain(self.times_s()[last]))?;
+        match self.operator(last) {
+            Ok(operator) => write!(f, "{operator}"),
+            Err(reason) => write!(f, "not convertible: {reason}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::scenario::{Condition, Scenario};
+    use hoid_sim::{RunSeed, Simulator};
+
+    use crate::{Method, TrackOptions, track};
+
+    #[test]
+    fn a_trace_prints_what_it_is_and_where_it_ends() {
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        let record = simulator.run(RunSeed::default(), false).unwrap();
+        let trace = track(&record, &TrackOptions::usual(Method::physical(), 29), 64).unwrap();
+        let text = trace.to_string();
+        for part in [
+            "physical of BJ",
+            "128 rows",
+            "memory  exponential forgetting",
+            "batch fit of",
+            "at 81.91 s",
+            "K_e",
+        ] {
+            assert!(text.contains(part), "{part}\n{text}");
+        }
+    }
+}
