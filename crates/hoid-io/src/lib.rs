@@ -1,4 +1,26 @@
-//! File formats of hoid: the only crate that knows them.
+//! The file formats of hoid: the only crate that knows them.
+//!
+//! Recordings come as CSV, Parquet, NPZ, MATLAB or XDF, with columns of any name, clocks that jitter and rows that are missing.
+//! Reading takes the columns that are asked for, finds the sampling, checks every value in use, and gives an evenly sampled
+//! [`Record`](hoid_model::Record) or an error that names the place in the file. Nothing is repaired unasked; what is wrong with
+//! the data is said beside the record.
+//!
+//! ```
+//! use hoid_io::{ReadOptions, read_record};
+//!
+//! let path = std::env::temp_dir().join("hoid-io-lib-example.csv");
+//! std::fs::write(&path, "t,r,y,u\n0.00,1,0,0\n0.01,1,0.5,0.2\n0.02,1,0.75,0.3\n")?;
+//!
+//! let options = ReadOptions { input: Some("r-y".parse()?), ..ReadOptions::default() };
+//! let read = read_record(&path, &options)?;
+//! assert_eq!(read.record.input(), [1.0, 0.5, 0.25]);
+//! assert_eq!(read.record.sample_time().s(), 0.01);
+//! for issue in &read.quality_issues {
+//!     println!("{issue}; {}", issue.kind.remedy());
+//! }
+//! # std::fs::remove_file(&path)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! | module | what it holds |
 //! |---|---|

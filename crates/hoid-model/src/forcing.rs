@@ -10,7 +10,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::{ModelError, SampleTime, remnant_gain::Line};
+use crate::{ModelError, SampleTime, remnant_gain::SpectralLine};
 
 /// One term of the forcing function.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,8 +102,8 @@ impl ForcingFunction {
     }
 
     /// Amplitudes and frequencies, as the remnant gain needs them.
-    pub fn lines(&self) -> Vec<Line> {
-        let line = |s: &Sinusoid| Line {
+    pub fn lines(&self) -> Vec<SpectralLine> {
+        let line = |s: &Sinusoid| SpectralLine {
             amplitude: s.amplitude_deg,
             omega_rad_s: s.omega_rad_s,
         };

@@ -1,5 +1,36 @@
 //! What hoid identifies, and the mathematics that needs no data: records, polynomial models, exact discretisation, the
-//! operator's parameters and the task in which a person is measured.
+//! operator's parameters and the task in which an operator is measured.
+//!
+//! A person who tracks a target sees the error e and answers with the control u. The operator model is a gain, a lead, a delay and the
+//! neuromuscular dynamics, `K_e (1 + T_L s) omega^2 / (s^2 + 2 zeta omega s + omega^2) e^{-tau s}`, with a remnant of filtered white
+//! noise. What is estimated from samples is a polynomial model in `q^-1`. This crate takes one to the other, both ways and
+//! with derivatives, and describes the loop around the operator.
+//!
+//! ```
+//! use hoid_model::{
+//!     Structure,
+//!     margins::{MANUAL_CONTROL_RANGE_RAD_S, margins},
+//!     scenario::{Condition, Scenario},
+//! };
+//!
+//! let scenario = Scenario::condition(Condition::C1);
+//! let operator = scenario.initial.operator;
+//!
+//! // To discrete time and back: the conversion is exact.
+//! let discrete = operator.discretise(scenario.sample_time)?;
+//! assert!((discrete.parameters()?.t_l_s - operator.t_l_s).abs() < 1e-9);
+//!
+//! // Crossover frequency and phase margin of the loop.
+//! let element = scenario.initial.controlled_element.transfer_function()?;
+//! let open_loop = operator.transfer_function()?.series(&element);
+//! let found = margins(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S);
+//! assert!(found.phase_margin_deg.is_some_and(|margin| margin > 0.0));
+//!
+//! // The Box-Jenkins model of this operator and a remnant of first order has five parameters.
+//! let structure: Structure = "bj".parse()?;
+//! assert_eq!(structure.operator_orders(29).parameters(), 5);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! Notation and units are those of the symbol table in the documentation (`docs/src/symbols.md`).
 //!
@@ -21,6 +52,7 @@
 //! | [`controlled_element`], [`forcing`], [`schedule`], [`scenario`] | the task: plant, target signal, change over time, conditions C1-C6 |
 //! | [`margins`] | crossover frequency, phase and gain margin |
 //! | [`remnant_gain`] | the gain K_n that gives a demanded noise level |
+//! | [`named_choice!`], [`NamedChoice`] | the names that users type |
 
 mod error;
 mod estimate;

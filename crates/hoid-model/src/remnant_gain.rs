@@ -36,7 +36,7 @@ crate::named_choice!(NoiseDefinition, "noise definition", 2, { Response => "resp
 
 /// One sine of the forcing function.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Line {
+pub struct SpectralLine {
     /// Amplitude A_k, deg.
     pub amplitude: f64,
     /// Frequency omega_k, rad/s.
@@ -64,7 +64,7 @@ pub fn remnant_gain(
     time_constant_s: f64,
     operator: &ContinuousTransferFunction,
     controlled_element: &ContinuousTransferFunction,
-    lines: &[Line],
+    lines: &[SpectralLine],
     sample_time: SampleTime,
 ) -> Result<f64, ModelError> {
     let (limit, expected) = match definition {
@@ -298,7 +298,7 @@ mod tests {
     }
 
     /// Table 1: amplitudes in deg, frequencies as multiples of 2 pi / 81.92 s.
-    fn forcing() -> Vec<Line> {
+    fn forcing() -> Vec<SpectralLine> {
         ForcingFunction::reference().lines()
     }
 
@@ -403,7 +403,7 @@ mod tests {
         // No controlled element: u = H_HO f_t + n, so that var(u_n) = var(n) and both definitions are one.
         let [(operator, _), _] = states();
         let none = tf(&[0.0], &[1.0, 1.0]);
-        let line = [Line {
+        let line = [SpectralLine {
             amplitude: 2.0,
             omega_rad_s: 3.0,
         }];
@@ -444,7 +444,7 @@ mod tests {
     #[test]
     fn what_has_no_gain_is_refused() {
         let [(operator, element), _] = states();
-        let call = |level, definition, order, time, lines: &[Line]| {
+        let call = |level, definition, order, time, lines: &[SpectralLine]| {
             remnant_gain(level, definition, order, time, &operator, &element, lines, ts())
         };
         let f = forcing();
@@ -460,7 +460,7 @@ mod tests {
         assert!(call(0.1, NoiseDefinition::Response, 1, -0.06, &f).is_err());
         assert!(call(0.1, NoiseDefinition::Response, 1, 0.06, &[]).is_err());
         for (amplitude, omega_rad_s) in [(f64::NAN, 1.0), (1.0, 0.0), (1.0, f64::INFINITY)] {
-            let line = Line { amplitude, omega_rad_s };
+            let line = SpectralLine { amplitude, omega_rad_s };
             assert!(call(0.1, NoiseDefinition::Response, 1, 0.06, &[line]).is_err());
         }
         let louder = operator.series(&tf(&[3.0], &[1.0]));

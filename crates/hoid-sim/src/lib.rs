@@ -1,13 +1,35 @@
-//! The closed loop of operator and controlled element, simulated sample by sample.
+//! The closed loop of operator, remnant and controlled element, simulated sample by sample.
+//!
+//! Operator, remnant filter and controlled element are each held exactly over a sample (zero-order hold), so that the simulated
+//! record has the model that an estimator looks for and no error of integration. The random numbers of a run are named by
+//! seed, cell and replication, never by a thread: any run can be repeated alone.
+//!
+//! ```
+//! use hoid_model::scenario::{Condition, Scenario};
+//! use hoid_sim::{RunSeed, Simulator};
+//!
+//! let simulator = Simulator::new(&Scenario::condition(Condition::C1))?;
+//! let record = simulator.run(RunSeed { seed: 1, ..RunSeed::default() }, false)?;
+//! assert_eq!(record.len(), 8192);
+//!
+//! // Another replication is independent; the same one is the same to the last bit.
+//! let other = simulator.run(RunSeed { seed: 1, replication: 1, ..RunSeed::default() }, false)?;
+//! assert_ne!(record.output(), other.output());
+//! assert_eq!(record, simulator.run(RunSeed { seed: 1, ..RunSeed::default() }, false)?);
+//! # Ok::<(), hoid_sim::SimError>(())
+//! ```
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`Simulator`] | a scenario made ready, and its runs |
-//! | [`RunSeed`] | what names the random numbers of one run |
+//! | `simulator` | [`Simulator`]: a scenario made ready, and its runs |
+//! | `run_seed` | [`RunSeed`]: what names the random numbers of one run |
+//! | `normal_deviates` | standard normal deviates by the ziggurat |
 //! | `cascade` | exact zero-order hold of the remnant filter |
+//! | `error` | [`SimError`]: why a simulation gives no record |
 
 mod cascade;
 mod error;
+mod normal_deviates;
 mod run_seed;
 mod simulator;
 

@@ -157,8 +157,8 @@ impl Simulator {
     /// As [`Simulator::signals`]; the signals are then of no use.
     pub fn signals_into(&self, noise: &[f64], signals: &mut Signals) -> Result<(), SimError> {
         self.check_length(noise)?;
-        signals.make_room(self.samples());
-        let one = One {
+        signals.resize_to(self.samples());
+        let one = SingleRun {
             simulator: self,
             noise,
             into: signals,
@@ -166,7 +166,7 @@ impl Simulator {
         if with_one_lane(one) {
             Ok(())
         } else {
-            self.why_not_finite(noise, signals)
+            self.check_finite(noise, signals)
         }
     }
 
@@ -175,17 +175,17 @@ impl Simulator {
     ///
     /// # Errors
     /// As [`Simulator::signals`], for the first run that has one; [`SimError::NoSuchInstructionSet`].
-    pub fn signals_of_many(&self, noises: &[Vec<f64>], instructions: InstructionSet) -> Result<Vec<Signals>, SimError> {
+    pub fn batched_signals(&self, noises: &[Vec<f64>], instructions: InstructionSet) -> Result<Vec<Signals>, SimError> {
         let mut all = Vec::new();
-        self.signals_of_many_into(noises, instructions, &mut all)?;
+        self.batched_signals_into(noises, instructions, &mut all)?;
         Ok(all)
     }
 
-    /// As [`Simulator::signals_of_many`], into memory that was used before: new memory costs more than the runs.
+    /// As [`Simulator::batched_signals`], into memory that was used before: new memory costs more than the runs.
     ///
     /// # Errors
-    /// As [`Simulator::signals_of_many`].
-    pub fn signals_of_many_into(
+    /// As [`Simulator::batched_signals`].
+    pub fn batched_signals_into(
         &self,
         noises: &[Vec<f64>],
         instructions: InstructionSet,
@@ -196,9 +196,9 @@ impl Simulator {
         }
         into.resize_with(noises.len(), Signals::default);
         for signals in into.iter_mut() {
-            signals.make_room(self.samples());
+            signals.resize_to(self.samples());
         }
-        let many = Many {
+        let many = BatchedRuns {
             simulator: self,
             noises,
             into,
@@ -207,7 +207,7 @@ impl Simulator {
         if finite {
             return Ok(());
         }
-        (noises.iter().zip(&*into)).try_for_each(|(noise, signals)| self.why_not_finite(noise, signals))
+        (noises.iter().zip(&*into)).try_for_each(|(noise, signals)| self.check_finite(noise, signals))
     }
 
     fn longest_delay(&self) -> usize {
@@ -340,7 +340,7 @@ impl Simulator {
     }
 
     /// The first number that is not finite, where there is one.
-    fn why_not_finite(&self, noise: &[f64], signals: &Signals) -> Result<(), SimError> {
+    fn check_finite(&self, noise: &[f64], signals: &Signals) -> Result<(), SimError> {
         if let Some(index) = first_not_finite(noise) {
             let value = noise[index];
             return Err(SimError::NoiseNotFinite { index, value });
@@ -392,7 +392,7 @@ impl<R: Number> LoopState<R> {
 }
 
 impl Signals {
-    fn make_room(&mut self, samples: usize) {
+    fn resize_to(&mut self, samples: usize) {
         let Self { e, u, x, n } = self;
         for values in [e, u, x, n] {
             if values.capacity() < samples {
@@ -408,14 +408,14 @@ impl Signals {
 const BLOCK: usize = 64;
 
 /// One run.
-struct One<'a> {
+struct SingleRun<'a> {
     simulator: &'a Simulator,
     noise: &'a [f64],
     /// Signals as long as the run.
     into: &'a mut Signals,
 }
 
-impl LaneTask for One<'_> {
+impl LaneTask for SingleRun<'_> {
     /// True when all was finite.
     type Output = bool;
 
@@ -430,14 +430,14 @@ impl LaneTask for One<'_> {
 }
 
 /// Runs side by side.
-struct Many<'a> {
+struct BatchedRuns<'a> {
     simulator: &'a Simulator,
     noises: &'a [Vec<f64>],
     /// As many signals, as long as the runs.
     into: &'a mut [Signals],
 }
 
-impl LaneTask for Many<'_> {
+impl LaneTask for BatchedRuns<'_> {
     /// True when all was finite.
     type Output = bool;
 

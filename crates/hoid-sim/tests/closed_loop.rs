@@ -216,7 +216,7 @@ fn a_delay_that_changes_is_that_of_the_sample_at_which_the_response_arrives() {
     let simulator = Simulator::new(&with(0.28, 0.34)).unwrap();
     let noises = noises(&simulator, 3);
     for (many, noise) in simulator
-        .signals_of_many(&noises, InstructionSet::Best)
+        .batched_signals(&noises, InstructionSet::Best)
         .unwrap()
         .iter()
         .zip(&noises)
@@ -413,7 +413,7 @@ fn runs_side_by_side_have_the_bits_of_each_alone() {
         let alone: Vec<Signals> = noises.iter().map(|noise| simulator.signals(noise).unwrap()).collect();
         for path in InstructionSet::available() {
             assert_eq!(
-                simulator.signals_of_many(&noises, path).unwrap(),
+                simulator.batched_signals(&noises, path).unwrap(),
                 alone,
                 "{path:?} {condition:?}"
             );
@@ -428,7 +428,7 @@ fn a_run_that_is_wrong_is_refused_among_many() {
     let mut bad = good.clone();
     bad[3] = f64::NAN;
     let short = good[1..].to_vec();
-    let of = |noises: &[Vec<f64>]| simulator.signals_of_many(noises, InstructionSet::Best);
+    let of = |noises: &[Vec<f64>]| simulator.batched_signals(noises, InstructionSet::Best);
     assert!(matches!(
         of(&[good.clone(), bad]),
         Err(SimError::NoiseNotFinite { index: 3, .. })

@@ -42,7 +42,7 @@ fn endings(holds: impl Fn(&Format) -> bool) -> String {
 /// The format that the extension of a file stands for.
 fn format_of(path: &Path) -> Result<&'static Format, IoError> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    let known = |ending: &str| ALL.into_iter().find(|format| format.endings.contains(&ending));
+    let known = |ending: &str| ALL.iter().copied().find(|format| format.endings.contains(&ending));
     extension
         .as_deref()
         .and_then(known)

@@ -25,7 +25,7 @@ pub use lookup::{readable_endings, writable_endings};
 use crate::format::Format;
 
 /// All formats, in the order in which messages name them. No two have an ending in common.
-const ALL: [&Format; 7] = [
+const ALL: &[&Format] = &[
     &csv::CSV,
     &csv::TSV,
     &parquet::PARQUET,

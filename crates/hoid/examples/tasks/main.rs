@@ -158,7 +158,7 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
                     }
                     let simulator = &shared.simulator;
                     simulator
-                        .signals_of_many_into(&noises, InstructionSet::Best, &mut runs)
+                        .batched_signals_into(&noises, InstructionSet::Best, &mut runs)
                         .unwrap();
                     let count = (CELL_RUNS - begin) as usize;
                     records.extend(runs.iter().take(count).map(|run| shared.measured(run)));

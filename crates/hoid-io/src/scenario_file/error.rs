@@ -1,0 +1,58 @@
+//! Why a file gives no scenario.
+
+use hoid_model::ModelError;
+use thiserror::Error;
+
+/// Why a file gives no scenario.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ScenarioFileError {
+    /// A file that cannot be read.
+    #[error("scenario file {path}: {reason}; expected a readable text file")]
+    Unreadable {
+        /// The file.
+        path: String,
+        /// What the system says.
+        reason: String,
+    },
+    /// No TOML, or keys and types that do not belong to a scenario.
+    #[error("scenario file {path}, line {line}: {reason}")]
+    Syntax {
+        /// The file.
+        path: String,
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A value without meaning.
+    #[error("scenario file {path}, line {line}: {key} is {found}, expected {expected}")]
+    Value {
+        /// The file.
+        path: String,
+        /// Line, from 1.
+        line: usize,
+        /// The key.
+        key: String,
+        /// The value found.
+        found: String,
+        /// What has a meaning, and the remedy.
+        expected: String,
+    },
+    /// Keys that are missing or contradict each other.
+    #[error("scenario file {path}: {reason}")]
+    Keys {
+        /// The file.
+        path: String,
+        /// What is missing or too much, and the remedy.
+        reason: String,
+    },
+    /// Values that have a meaning each, but not together.
+    #[error("scenario file {path}: {source}")]
+    Model {
+        /// The file.
+        path: String,
+        /// What is wrong.
+        source: ModelError,
+    },
+}

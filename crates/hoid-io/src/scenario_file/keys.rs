@@ -1,0 +1,111 @@
+//! The keys of a scenario file.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+use toml::Spanned;
+
+pub(super) type Number = Spanned<f64>;
+
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct File {
+    #[schemars(with = "Option<String>")]
+    pub(super) condition: Option<Spanned<String>>,
+    pub(super) name: Option<String>,
+    #[schemars(with = "Option<f64>")]
+    pub(super) sample_time_s: Option<Number>,
+    #[schemars(with = "Option<f64>")]
+    pub(super) measurement_s: Option<Number>,
+    #[schemars(with = "Option<f64>")]
+    pub(super) run_in_s: Option<Number>,
+    #[schemars(with = "Option<f64>")]
+    pub(super) tau_e_s: Option<Number>,
+    pub(super) realisation: Option<RealisationKey>,
+    #[serde(default)]
+    pub(super) initial: StateTable,
+    pub(super) last: Option<StateTable>,
+    pub(super) schedule: Option<ScheduleTable>,
+    #[serde(default)]
+    pub(super) remnant: RemnantTable,
+    pub(super) forcing: Option<Vec<SinusoidTable>>,
+}
+
+#[derive(Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum RealisationKey {
+    Input,
+    Output,
+}
+
+#[derive(Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum DefinitionKey {
+    Response,
+    Remnant,
+}
+
+#[derive(Deserialize, JsonSchema, Default)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StateTable {
+    #[serde(rename = "K_e")]
+    #[schemars(with = "Option<f64>")]
+    pub(super) k_e: Option<Number>,
+    #[serde(rename = "T_L_s")]
+    #[schemars(with = "Option<f64>")]
+    pub(super) t_l_s: Option<Number>,
+    #[schemars(with = "Option<f64>")]
+    pub(super) omega_nm_rad_s: Option<Number>,
+    #[schemars(with = "Option<f64>")]
+    pub(super) zeta_nm: Option<Number>,
+    #[schemars(with = "Option<f64>")]
+    pub(super) tau_e_s: Option<Number>,
+    #[serde(rename = "K_c")]
+    #[schemars(with = "Option<f64>")]
+    pub(super) k_c: Option<Number>,
+    #[schemars(with = "Option<f64>")]
+    pub(super) omega_b_rad_s: Option<Number>,
+}
+
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ScheduleTable {
+    #[schemars(with = "Option<f64>")]
+    pub(super) rate_per_s: Option<Number>,
+    #[schemars(with = "Option<f64>")]
+    pub(super) midpoint_s: Option<Number>,
+    /// Time from one change to the next, for a person who changes there and back again.
+    #[schemars(with = "Option<f64>")]
+    pub(super) interval_s: Option<Number>,
+}
+
+#[derive(Deserialize, JsonSchema, Default)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RemnantTable {
+    #[schemars(with = "Option<i64>")]
+    pub(super) order: Option<Spanned<i64>>,
+    #[serde(rename = "T_n_s")]
+    #[schemars(with = "Option<f64>")]
+    pub(super) t_n_s: Option<Number>,
+    #[schemars(with = "Option<f64>")]
+    pub(super) noise_level: Option<Number>,
+    pub(super) noise_definition: Option<DefinitionKey>,
+    #[serde(rename = "K_n_initial_deg")]
+    #[schemars(with = "Option<f64>")]
+    pub(super) k_n_initial_deg: Option<Number>,
+    #[serde(rename = "K_n_last_deg")]
+    #[schemars(with = "Option<f64>")]
+    pub(super) k_n_last_deg: Option<Number>,
+}
+
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SinusoidTable {
+    #[schemars(with = "f64")]
+    pub(super) amplitude_deg: Number,
+    #[schemars(with = "f64")]
+    pub(super) phase_rad: Number,
+    #[schemars(with = "Option<f64>")]
+    pub(super) omega_rad_s: Option<Number>,
+    #[schemars(with = "Option<f64>")]
+    pub(super) cycles: Option<Number>,
+}

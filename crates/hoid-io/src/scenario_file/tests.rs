@@ -1,0 +1,210 @@
+use std::path::Path;
+
+use hoid_model::{
+    remnant_gain::NoiseDefinition,
+    scenario::{Condition, Realisation, RemnantStrength, Scenario},
+    schedule::Schedule,
+};
+
+use super::*;
+
+fn parse(text: &str) -> Result<Scenario, ScenarioFileError> {
+    parse_scenario(text, "x.toml", "x")
+}
+
+fn refusal(text: &str) -> String {
+    parse(text).unwrap_err().to_string()
+}
+
+fn named(condition: Condition) -> Scenario {
+    Scenario {
+        name: "x".to_owned(),
+        ..Scenario::condition(condition)
+    }
+}
+
+#[test]
+fn the_example_of_the_documentation_is_read() {
+    let example: String = include_str!("mod.rs")
+        .lines()
+        .skip_while(|l| *l != "//! ```toml")
+        .skip(1)
+        .take_while(|l| *l != "//! ```")
+        .map(|l| format!("{}\n", l.trim_start_matches("//!").trim_start()))
+        .collect();
+    let mut expected = named(Condition::C4);
+    expected.realisation = Realisation::Output;
+    for state in [&mut expected.initial, &mut expected.last] {
+        state.operator.tau_e_s = 0.3;
+    }
+    expected.last.operator.k_e = 0.08;
+    expected.last.operator.t_l_s = 1.0;
+    expected.schedule = Schedule::Sigmoid {
+        rate_per_s: 0.5,
+        midpoint_s: 40.96,
+    };
+    expected.remnant.order = 2;
+    expected.remnant.strength = RemnantStrength::Level {
+        level: 0.2,
+        definition: NoiseDefinition::Response,
+    };
+    assert_eq!(parse(&example), Ok(expected));
+}
+
+#[test]
+fn a_delay_of_its_own_for_each_state() {
+    let delays = |text: &str| {
+        let scenario = parse(text).unwrap();
+        [scenario.initial, scenario.last].map(|state| state.operator.tau_e_s)
+    };
+    assert_eq!(delays("condition = \"C4\"\n[last]\ntau_e_s = 0.34"), [0.28, 0.34]);
+    assert_eq!(
+        delays("condition = \"C4\"\ntau_e_s = 0.3\n[last]\ntau_e_s = 0.34"),
+        [0.3, 0.34]
+    );
+    assert_eq!(delays("condition = \"C1\"\n[initial]\ntau_e_s = 0.2"), [0.2, 0.2]);
+}
+
+#[test]
+fn an_interval_is_there_and_back_again() {
+    let mut expected = named(Condition::C4);
+    expected.schedule = Schedule::Alternating {
+        rate_per_s: 100.0,
+        midpoint_s: 40.96,
+        interval_s: 10.0,
+    };
+    assert_eq!(parse("condition = \"C4\"\n[schedule]\ninterval_s = 10"), Ok(expected));
+    assert!(parse("condition = \"C4\"\n[schedule]\ninterval_s = -1").is_err());
+}
+
+#[test]
+fn a_condition_alone_is_that_condition() {
+    for condition in Condition::ALL {
+        assert_eq!(parse(&format!("condition = \"{condition}\"")), Ok(named(condition)));
+    }
+}
+
+#[test]
+fn a_file_with_every_key_is_c4() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/scenario/full.toml");
+    let expected = Scenario {
+        name: "s1 to s2, fast".to_owned(),
+        realisation: Realisation::Output,
+        ..Scenario::condition(Condition::C4)
+    };
+    // The last state takes omega_nm and zeta_nm from the initial one, cycles give Table 1 to the last bit.
+    assert_eq!(read_scenario(&path), Ok(expected));
+}
+
+#[test]
+fn constant_conditions_stay_constant() {
+    let own = parse("condition = \"C1\"\n[initial]\nK_e = 0.08").unwrap();
+    assert_eq!(own.initial.operator.k_e, 0.08);
+    assert_eq!(own.last, own.initial);
+    let text = "condition = \"C1\"\n[remnant]\nK_n_initial_deg = 0.1";
+    let RemnantStrength::Gain { initial, last } = parse(text).unwrap().remnant.strength else {
+        panic!("no gain");
+    };
+    assert_eq!([initial, last], [0.1, 0.1]);
+    let at_rest = parse("condition = \"C1\"\nforcing = []\n[remnant]\nnoise_level = 0").unwrap();
+    assert_eq!(at_rest.forcing.value(1.0), 0.0);
+}
+
+#[test]
+fn bad_values_name_line_key_and_remedy() {
+    for (text, parts) in [
+        ("\n\ncondition = \"C7\"", ["line 3", "condition is C7", "C1, C2"]),
+        (
+            "condition = \"C1\"\n[initial]\nK_e = nan",
+            ["line 3", "initial.K_e is NaN", "finite"],
+        ),
+        (
+            "condition = \"C4\"\n[last]\nzeta_nm = -0.1",
+            ["line 3", "last.zeta_nm is -0.1", "positive"],
+        ),
+        (
+            "condition = \"C1\"\ntau_e_s = 0.285",
+            ["line 2", "tau_e_s is 0.285", "change sample_time_s"],
+        ),
+        (
+            "condition = \"C4\"\n[last]\ntau_e_s = 0.285",
+            ["line 3", "last.tau_e_s is 0.285", "change sample_time_s"],
+        ),
+        (
+            "condition = \"C1\"\nsample_time_s = 0.03",
+            ["tau_e_s is 0.28", "does not give it", "0.03 s"],
+        ),
+        (
+            "condition = \"C1\"\nmeasurement_s = 1e12",
+            ["line 2", "measurement_s", "1e7 samples"],
+        ),
+        (
+            "condition = \"C1\"\nsample_time_s = 0",
+            ["line 2", "sample_time_s is 0", "positive"],
+        ),
+        (
+            "condition = \"C1\"\n[remnant]\norder = 5",
+            ["line 3", "remnant.order is 5", "1, 2, 3 or 4"],
+        ),
+        (
+            "condition = \"C1\"\n[remnant]\nnoise_level = -1",
+            ["line 3", "noise_level is -1", "zero or more"],
+        ),
+        (
+            "condition = \"C1\"\n[[forcing]]\namplitude_deg = inf\nphase_rad = 0\ncycles = 2",
+            ["line 3", "amplitude_deg is inf", "finite"],
+        ),
+    ] {
+        let message = refusal(text);
+        for part in ["x.toml", parts[0], parts[1], parts[2]] {
+            assert!(message.contains(part), "{text}: {message} lacks {part}");
+        }
+    }
+}
+
+#[test]
+fn keys_that_do_not_fit_are_refused() {
+    let c1 = "condition = \"C1\"\n";
+    for (text, part) in [
+        (String::new(), "initial.omega_b_rad_s"),
+        (format!("{c1}K_e = 1"), "unknown field `K_e`"),
+        (format!("{c1}[initial]\nk_e = 1"), "unknown field `k_e`"),
+        (format!("{c1}run_in_s = \"long\""), "line 2"),
+        (format!("{c1}realisation = \"both\""), "unknown variant `both`"),
+        (format!("{c1}[initial"), "line 2"),
+        (format!("{c1}[last]\nK_e = 1"), "add [schedule]"),
+        (
+            format!("{c1}[schedule]\nrate_per_s = 1\nmidpoint_s = 9"),
+            "both states are the same",
+        ),
+        (
+            format!("{c1}[last]\nK_e = 1\n[schedule]\nrate_per_s = 1"),
+            "lacks midpoint_s",
+        ),
+        (
+            format!("{c1}[remnant]\nnoise_level = 0.1\nK_n_initial_deg = 1"),
+            "give one of them",
+        ),
+        (format!("{c1}[remnant]\nK_n_last_deg = 1"), "give both"),
+        (
+            "condition = \"C4\"\n[remnant]\nK_n_initial_deg = 1".to_owned(),
+            "no K_n_last_deg",
+        ),
+        (
+            format!("{c1}[[forcing]]\namplitude_deg = 1\nphase_rad = 0"),
+            "either omega_rad_s or cycles",
+        ),
+    ] {
+        let message = refusal(&text);
+        assert!(message.contains(part), "{text}: {message} lacks {part}");
+    }
+}
+
+#[test]
+fn what_the_model_refuses_names_the_file() {
+    let unreachable = "condition = \"C1\"\n[remnant]\nnoise_level = 3\nnoise_definition = \"remnant\"";
+    assert!(refusal(unreachable).contains("largest reachable"));
+    assert!(refusal("condition = \"C1\"\n[initial]\nK_e = 5").contains("x.toml"));
+    let nowhere = read_scenario(Path::new("/nowhere/a.toml")).unwrap_err();
+    assert!(matches!(nowhere, ScenarioFileError::Unreadable { .. }));
+}

@@ -1,0 +1,45 @@
+//! Poles and zeros by `z = e^{s Ts}`.
+
+use num_complex::Complex64;
+
+use crate::{ContinuousTransferFunction, polynomial};
+
+/// Poles and zeros by `z = e^{s Ts}`, by descending powers of z. `None` when the roots are not found.
+pub(super) fn matched(h: &ContinuousTransferFunction, ts: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+    let poles = polynomial::roots(h.den())?;
+    let leading = h.num()[0];
+    if leading == 0.0 {
+        return Some((vec![0.0], image(&poles, ts)));
+    }
+    let zeros = polynomial::roots(h.num())?;
+    let at_infinity = poles.len() - zeros.len();
+    let gain = leading * static_ratio(&zeros, ts) / static_ratio(&poles, ts);
+    let mut num = image(&zeros, ts);
+    if at_infinity > 0 {
+        for _ in 1..at_infinity {
+            num = polynomial::product(&num, &[0.5, 0.5]);
+        }
+        num.insert(0, 0.0);
+    }
+    Some((num.iter().map(|c| gain * c).collect(), image(&poles, ts)))
+}
+
+/// `prod (z - e^{p Ts})` by descending powers of z.
+fn image(roots: &[Complex64], ts: f64) -> Vec<f64> {
+    polynomial::from_roots(&roots.iter().map(|p| (p * ts).exp()).collect::<Vec<_>>())
+}
+
+/// `prod p / (e^{p Ts} - 1)`, the product that a factor `s - p` brings over its image at s = 0.
+fn static_ratio(roots: &[Complex64], ts: f64) -> f64 {
+    let ratio = |p: &Complex64| {
+        let z = p * ts;
+        if z.norm() < 1e-8 {
+            return (1.0 - z / 2.0) / ts;
+        }
+        // e^z - 1 without cancellation for small z.
+        let sine = (z.im / 2.0).sin();
+        let real = z.re.exp_m1() * z.im.cos() - 2.0 * sine * sine;
+        p / Complex64::new(real, z.re.exp() * z.im.sin())
+    };
+    roots.iter().map(ratio).product::<Complex64>().re
+}

@@ -1,0 +1,132 @@
+//! The methods of Table 5.2, and the substitutions `s = c (z - 1) / q(z)` among them.
+
+use super::hold::hold;
+use super::matched::matched;
+use crate::{ContinuousTransferFunction, DiscreteTransferFunction, ModelError, SampleTime, polynomial};
+
+/// How a continuous transfer function becomes a discrete one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Method {
+    /// Rectangle rule at the start of the sample.
+    ForwardEuler,
+    /// Rectangle rule at the end of the sample.
+    BackwardEuler,
+    /// Trapezoid rule (bilinear transformation).
+    Tustin,
+    /// Trapezoid rule scaled to be exact at one frequency.
+    TustinPrewarped {
+        /// The frequency omega_p in rad/s, between 0 and pi/Ts.
+        omega_rad_s: f64,
+    },
+    /// Exact for an input that is held over each sample.
+    ZeroOrderHold,
+    /// Exact for an input that is linear over each sample.
+    FirstOrderHold,
+    /// Poles and zeros by `z = e^{s Ts}`.
+    Matched,
+}
+
+/// Longest delay that is written out as leading zeros of a numerator.
+const LONGEST_DELAY_SAMPLES: f64 = 1e6;
+
+/// The discrete transfer function of `h` by one of the methods of Table 5.2. The numerator starts with as many zeros as there
+/// are samples of delay.
+///
+/// # Errors
+/// [`ModelError::OutOfRange`] when the delay is no whole number of samples (the two holds take any delay) or the prewarping
+/// frequency does not lie between 0 and pi/Ts; [`ModelError::TransferFunction`] when the method sends a pole to infinity or the
+/// result is not finite.
+pub fn discretise(
+    h: &ContinuousTransferFunction,
+    sample_time: SampleTime,
+    method: Method,
+) -> Result<DiscreteTransferFunction, ModelError> {
+    let ts = sample_time.s();
+    if h.delay_s() / ts > LONGEST_DELAY_SAMPLES {
+        return Err(ModelError::OutOfRange {
+            quantity: "delay tau in s",
+            found: h.delay_s(),
+            expected: "at most a million samples; check the units of delay and sample time",
+        });
+    }
+    let held = matches!(method, Method::ZeroOrderHold | Method::FirstOrderHold);
+    let (whole, fraction) = match sample_time.whole_samples(h.delay_s()) {
+        Some(samples) => (samples, 0.0),
+        None if held => ((h.delay_s() / ts).floor() as usize, (h.delay_s() / ts).fract()),
+        None => {
+            return Err(ModelError::OutOfRange {
+                quantity: "delay tau in s",
+                found: h.delay_s(),
+                expected: "a whole number of samples for this method: round it, change the sample time, or use the zero-order \
+                           or first-order hold, which take any delay",
+            });
+        }
+    };
+    let (num, den) = match method {
+        Method::ForwardEuler => substitute(h, 1.0 / ts, [0.0, 1.0])?,
+        Method::BackwardEuler => substitute(h, 1.0 / ts, [1.0, 0.0])?,
+        Method::Tustin => substitute(h, 2.0 / ts, [1.0, 1.0])?,
+        Method::TustinPrewarped { omega_rad_s } => {
+            if !(omega_rad_s > 0.0 && omega_rad_s < sample_time.nyquist_rad_s()) {
+                return Err(ModelError::OutOfRange {
+                    quantity: "prewarping frequency omega_p in rad/s",
+                    found: omega_rad_s,
+                    expected: "a frequency between 0 and pi/Ts",
+                });
+            }
+            substitute(h, omega_rad_s / (omega_rad_s * ts / 2.0).tan(), [1.0, 1.0])?
+        }
+        Method::ZeroOrderHold | Method::FirstOrderHold => {
+            hold(h, ts, fraction, method == Method::FirstOrderHold).ok_or_else(|| no_finite_result(h))?
+        }
+        Method::Matched => matched(h, ts).ok_or_else(|| no_finite_result(h))?,
+    };
+    if num.iter().chain(&den).any(|c| !c.is_finite()) {
+        return Err(no_finite_result(h));
+    }
+    let delayed: Vec<f64> = std::iter::repeat_n(0.0, whole).chain(num).collect();
+    DiscreteTransferFunction::new(&delayed, &den, sample_time)
+}
+
+fn no_finite_result(h: &ContinuousTransferFunction) -> ModelError {
+    ModelError::TransferFunction {
+        found: format!("{:?} / {:?}", h.num(), h.den()),
+        expected: "poles whose image e^{s Ts} is a finite number; use a shorter sample time or slower unstable poles"
+            .to_owned(),
+    }
+}
+
+/// Numerator and denominator, by descending powers of z, after `s = c (z - 1) / q(z)`.
+fn substitute(h: &ContinuousTransferFunction, c: f64, q: [f64; 2]) -> Result<(Vec<f64>, Vec<f64>), ModelError> {
+    let order = h.den().len() - 1;
+    let den = substitute_in_polynomial(h.den(), order, c, q);
+    let powers = (0..=order).rev().map(|k| c.powi(k as i32));
+    let size: f64 = h.den().iter().zip(powers).map(|(a, c)| (a * c).abs()).sum();
+    // The leading coefficient is the denominator at s = c (backward Euler, Tustin): zero when a pole lies there.
+    if q[0] != 0.0 && den[0].abs() <= 1e-13 * size {
+        return Err(ModelError::TransferFunction {
+            found: format!("{:?} / {:?}", h.num(), h.den()),
+            expected: format!(
+                "no pole at s = {c} 1/s, which this method sends to infinity; use a shorter sample time or a hold"
+            ),
+        });
+    }
+    Ok((substitute_in_polynomial(h.num(), order, c, q), den))
+}
+
+/// `q(z)^order p(s)` for p by descending powers of s, of degree `order` or less.
+fn substitute_in_polynomial(p: &[f64], order: usize, c: f64, q: [f64; 2]) -> Vec<f64> {
+    let mut result = vec![p[0]];
+    let mut q_power = vec![1.0];
+    for &coefficient in &p[1..] {
+        result = polynomial::product(&result, &[c, -c]);
+        q_power = polynomial::product(&q_power, &q);
+        for (r, q) in result.iter_mut().zip(&q_power) {
+            *r += coefficient * q;
+        }
+    }
+    for _ in p.len()..=order {
+        result = polynomial::product(&result, &q);
+    }
+    result
+}

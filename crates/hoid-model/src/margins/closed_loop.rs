@@ -1,0 +1,143 @@
+//! The stability of the closed loop.
+
+use std::f64::consts::PI;
+
+use num_complex::Complex64;
+
+use super::crossings::LARGEST_TURN_RAD;
+use crate::{ContinuousTransferFunction, polynomial};
+
+/// Bounds the work of the stability test, which gives no proof beyond.
+const MOST_EVALUATIONS: usize = 4_000_000;
+
+/// True when unit negative feedback around the open loop gives a stable loop: all closed-loop poles in the open left half
+/// plane. Poles of the open loop may lie anywhere, also at the origin.
+///
+/// Stable means proven stable. A closed-loop pole nearer to the imaginary axis than rounding can tell counts as not stable, and
+/// so do a biproper open loop with delay whose gain at infinite frequency is one or more (it has infinitely many poles in the
+/// right half plane) and a delay of millions of radians at the frequencies where the gain exceeds 1/2.
+pub fn closed_loop_is_stable(open_loop: &ContinuousTransferFunction) -> bool {
+    Characteristic::new(open_loop).and_then(|f| f.zeros_in_right_half_plane()) == Some(0)
+}
+
+/// `F(s) / (s + a)^n` on the imaginary axis.
+pub(super) struct Characteristic<'a> {
+    open_loop: &'a ContinuousTransferFunction,
+    order: usize,
+    /// The shift a, 1/s: the size of the open-loop poles.
+    scale: f64,
+    /// Beyond this frequency `F/(s + a)^n` stays near its limit and makes no round about zero.
+    last: f64,
+}
+
+impl<'a> Characteristic<'a> {
+    /// `None` when the gain at infinite frequency alone makes the loop unstable.
+    pub(super) fn new(open_loop: &'a ContinuousTransferFunction) -> Option<Self> {
+        let (num, den, tau) = (open_loop.num(), open_loop.den(), open_loop.delay_s());
+        let order = den.len() - 1;
+        let biproper = num.len() == den.len();
+        let at_infinity = if biproper { num[0].abs() } else { 0.0 };
+        if biproper && (tau > 0.0 && at_infinity >= 1.0 || num[0] == -1.0) {
+            return None;
+        }
+        let root_size = |p: &[f64]| {
+            let relative = (1..p.len()).map(|k| (p[k] / p[0]).abs().powf(1.0 / k as f64));
+            relative.fold(0.0, f64::max)
+        };
+        let scale = match root_size(den) {
+            0.0 => 1.0,
+            size => size,
+        };
+        // Smallest distance of 1 + L from zero at infinite frequency.
+        let clearance = if tau > 0.0 || !biproper {
+            1.0 - at_infinity
+        } else {
+            (1.0 + num[0]).abs()
+        };
+        let mut last = scale;
+        for _ in 0..400 {
+            let below = |p: &[f64], degree: usize| -> f64 {
+                let powers = p.iter().rev().enumerate().take(degree);
+                powers.map(|(k, c)| c.abs() / last.powi((degree - k) as i32)).sum()
+            };
+            // Terms below s^n in D and in N: F/s^n is 1 + L(infinity) up to these.
+            let rest = below(den, order) + below(num, order);
+            if rest < 0.3 * clearance && scale * (order as f64) < 0.1 * last {
+                return Some(Self {
+                    open_loop,
+                    order,
+                    scale,
+                    last,
+                });
+            }
+            last *= 2.0;
+        }
+        None
+    }
+
+    /// `F/(s + a)^n`, its smallest meaningful size (what rounding can make of a zero), and `|L|`.
+    fn at(&self, omega: f64) -> (Complex64, f64, f64) {
+        let s = Complex64::new(0.0, omega);
+        let horner = |p: &[f64]| p.iter().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * s + c);
+        let (num, den) = (horner(self.open_loop.num()), horner(self.open_loop.den()));
+        let shifted = Complex64::new(self.scale, omega).powu(self.order as u32);
+        let f = den + num * (-s * self.open_loop.delay_s()).exp();
+        let size = den.norm() + num.norm();
+        (f / shifted, 1e-12 * size / shifted.norm(), num.norm() / den.norm())
+    }
+
+    /// Zeros of F in the open right half plane; `None` when one lies on the imaginary axis, as far as rounding can tell, or
+    /// the delay turns too often to follow.
+    pub(super) fn zeros_in_right_half_plane(&self) -> Option<usize> {
+        let tau = self.open_loop.delay_s();
+        let mut grid = vec![0.0];
+        let first = 1e-6 * self.last.min(self.scale);
+        let steps = ((self.last / first).log10() * 30.0).ceil();
+        grid.extend((0..=steps as usize).map(|i| first * (self.last / first).powf(i as f64 / steps)));
+        // A lightly damped pole turns the phase within a band narrower than the grid.
+        for p in [self.open_loop.num(), self.open_loop.den()] {
+            for root in polynomial::roots(p)? {
+                let (centre, width) = (root.im, root.re.abs());
+                let around = [centre - width, centre, centre + width];
+                grid.extend(around.into_iter().filter(|w| *w > 0.0 && *w < self.last));
+            }
+        }
+        grid.sort_by(f64::total_cmp);
+
+        let (mut turned, mut evaluations) = (0.0, 0);
+        let mut pending = Vec::new();
+        let mut here = (0.0, self.at(0.0));
+        for &omega in &grid[1..] {
+            pending.push((omega, self.at(omega), 0));
+            while let Some((omega, next, depth)) = pending.pop() {
+                let (f, smallest, gain) = here.1;
+                if !(f.norm() > smallest && next.0.norm() > next.1) {
+                    return None;
+                }
+                let turn = (next.0 * f.conj()).arg();
+                let delay_turn = tau * (omega - here.0);
+                let loop_matters = gain.max(next.2) > 0.5;
+                if turn.abs() > LARGEST_TURN_RAD || (delay_turn > LARGEST_TURN_RAD && loop_matters) {
+                    evaluations += 1;
+                    if depth > 60 || evaluations > MOST_EVALUATIONS {
+                        return None;
+                    }
+                    let middle = 0.5 * (here.0 + omega);
+                    pending.push((omega, next, depth + 1));
+                    pending.push((middle, self.at(middle), depth + 1));
+                } else {
+                    turned += turn;
+                    here = (omega, next);
+                }
+            }
+        }
+        // From here to infinity the argument goes back to that of the limit without another round.
+        let limit = if tau == 0.0 && self.open_loop.num().len() == self.order + 1 {
+            Complex64::new(1.0 + self.open_loop.num()[0], 0.0)
+        } else {
+            Complex64::new(1.0, 0.0)
+        };
+        turned += (limit * here.1.0.conj()).arg();
+        Some((-turned / PI).round().max(0.0) as usize)
+    }
+}

@@ -1,0 +1,69 @@
+//! The two ways from continuous to discrete time, each with its pole and gain.
+
+use super::held_numerator::Factored;
+
+/// Smallest Ts/T_n, and the inverse of the largest, for which the filter is worked out.
+pub(super) const SMALLEST_RATIO: f64 = 1e-9;
+
+/// How the remnant filter is taken to discrete time, or was.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum RemnantDiscretisation {
+    /// Exact for noise held over each sample.
+    #[default]
+    ZeroOrderHold,
+    /// `s = (1 - z^-1)/Ts`, the form of the reference text (eq. 13, B.11).
+    BackwardEuler,
+}
+
+crate::named_choice!(RemnantDiscretisation, "discretisation of the remnant", 2, {
+    ZeroOrderHold => "zoh",
+    BackwardEuler => "backward-euler",
+});
+
+impl RemnantDiscretisation {
+    /// The pole alpha, from `a = Ts/T_n`.
+    pub(super) fn pole(self, a: f64) -> f64 {
+        match self {
+            Self::ZeroOrderHold => (-a).exp(),
+            Self::BackwardEuler => 1.0 / (1.0 + a),
+        }
+    }
+
+    /// `T_n/Ts` from the pole, and its derivative.
+    pub(super) fn time_constant(self, alpha: f64) -> (f64, f64) {
+        match self {
+            Self::ZeroOrderHold => {
+                let log = alpha.ln();
+                (-1.0 / log, 1.0 / (alpha * log * log))
+            }
+            Self::BackwardEuler => (alpha / (1.0 - alpha), 1.0 / ((1.0 - alpha) * (1.0 - alpha))),
+        }
+    }
+
+    /// sigma' of the filter with K_n = 1, and its logarithmic derivative with respect to `a = Ts/T_n`.
+    pub(super) fn innovation_sd(self, order: usize, a: f64) -> (f64, f64) {
+        match self {
+            Self::ZeroOrderHold => {
+                let held = Factored::new(order, a);
+                (held.innovation_sd, held.log_derivative)
+            }
+            Self::BackwardEuler => (backward_gain(order, a), order as f64 / (a * (1.0 + a))),
+        }
+    }
+}
+
+/// `(1 - alpha q^-1)^m`.
+pub(crate) fn denominator(order: usize, alpha: f64) -> Vec<f64> {
+    (0..=order)
+        .map(|i| binomial(order, i) * (-alpha).powi(i as i32))
+        .collect()
+}
+
+/// `(Ts/(T_n + Ts))^m` (B.12).
+pub(super) fn backward_gain(order: usize, a: f64) -> f64 {
+    (a / (1.0 + a)).powi(order as i32)
+}
+
+pub(super) fn binomial(n: usize, k: usize) -> f64 {
+    (1..=k).fold(1.0, |b, i| b * (n + 1 - i) as f64 / i as f64)
+}

@@ -1,0 +1,120 @@
+//! The filter, its discrete transfer function and its monic noise model.
+
+use super::discretisation::{RemnantDiscretisation, SMALLEST_RATIO, backward_gain, denominator};
+use super::held_numerator::{Factored, HIGHEST_ORDER, held_numerator};
+use crate::{DiscreteTransferFunction, ModelError, SampleTime};
+
+/// `K_n / (T_n s + 1)^m`, driven by white noise of unit variance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RemnantFilter {
+    /// Gain K_n.
+    pub gain: f64,
+    /// Time constant T_n in s.
+    pub time_constant_s: f64,
+    /// Order m, 1 to 4.
+    pub order: usize,
+}
+
+/// `C(q^-1)/D(q^-1) eps'`, both monic with all roots inside the unit circle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoiseModel {
+    /// `[1, c1, ...]` by ascending powers of `q^-1`.
+    pub c: Vec<f64>,
+    /// `[1, d1, ..., dm]` by ascending powers of `q^-1`.
+    pub d: Vec<f64>,
+    /// Standard deviation sigma' of eps'.
+    pub innovation_sd: f64,
+}
+
+impl RemnantFilter {
+    /// A remnant filter with parameters that have a meaning.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] unless the gain is zero or more, the time constant positive, both finite, and the order 1 to 4.
+    pub fn new(gain: f64, time_constant_s: f64, order: usize) -> Result<Self, ModelError> {
+        let filter = Self {
+            gain,
+            time_constant_s,
+            order,
+        };
+        filter.check()?;
+        Ok(filter)
+    }
+
+    fn check(&self) -> Result<(), ModelError> {
+        let refuse = |quantity, found, expected| {
+            Err(ModelError::OutOfRange {
+                quantity,
+                found,
+                expected,
+            })
+        };
+        if !(self.gain.is_finite() && self.gain >= 0.0) {
+            return refuse("remnant gain K_n", self.gain, "a finite number, zero or more");
+        }
+        if !(self.time_constant_s.is_finite() && self.time_constant_s > 0.0) {
+            let found = self.time_constant_s;
+            return refuse("remnant time constant T_n in s", found, "a positive finite number");
+        }
+        if !(1..=HIGHEST_ORDER).contains(&self.order) {
+            return refuse("remnant order m", self.order as f64, "1, 2, 3 or 4");
+        }
+        Ok(())
+    }
+
+    /// `a = Ts/T_n` of a filter that passes the checks.
+    pub(crate) fn ratio(&self, sample_time: SampleTime) -> Result<f64, ModelError> {
+        self.check()?;
+        let a = sample_time.s() / self.time_constant_s;
+        if !(SMALLEST_RATIO..=1.0 / SMALLEST_RATIO).contains(&a) {
+            return Err(ModelError::OutOfRange {
+                quantity: "remnant time constant T_n in s",
+                found: self.time_constant_s,
+                expected: "a time between 1e-9 and 1e9 samples; check its unit against that of the sample time",
+            });
+        }
+        Ok(a)
+    }
+
+    /// The discrete filter from the noise, one draw a sample, to the remnant n.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] as for [`RemnantFilter::new`], and when T_n is not between 1e-9 and 1e9 samples.
+    pub fn discrete(
+        &self,
+        sample_time: SampleTime,
+        how: RemnantDiscretisation,
+    ) -> Result<DiscreteTransferFunction, ModelError> {
+        let a = self.ratio(sample_time)?;
+        let num: Vec<f64> = match how {
+            RemnantDiscretisation::ZeroOrderHold => {
+                let numerator = held_numerator(self.order, a);
+                std::iter::once(0.0)
+                    .chain(numerator.iter().map(|n| self.gain * n))
+                    .collect()
+            }
+            RemnantDiscretisation::BackwardEuler => vec![self.gain * backward_gain(self.order, a)],
+        };
+        DiscreteTransferFunction::new(&num, &denominator(self.order, how.pole(a)), sample_time)
+    }
+
+    /// The monic noise model of the same spectrum.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] as for [`RemnantFilter::new`], and when T_n is not between 1e-9 and 1e9 samples.
+    pub fn noise_model(&self, sample_time: SampleTime, how: RemnantDiscretisation) -> Result<NoiseModel, ModelError> {
+        let a = self.ratio(sample_time)?;
+        let (c, unit) = match how {
+            RemnantDiscretisation::ZeroOrderHold => {
+                let held = Factored::new(self.order, a);
+                (held.c, held.innovation_sd)
+            }
+            RemnantDiscretisation::BackwardEuler => (vec![1.0], backward_gain(self.order, a)),
+        };
+        Ok(NoiseModel {
+            c,
+            d: denominator(self.order, how.pole(a)),
+            innovation_sd: self.gain * unit,
+        })
+    }
+}
