@@ -1,4 +1,4 @@
-//! What is known of a parameter beforehand: a value, a range, or a guess with a weight.
+//! Prior knowledge of a parameter: a value, a range, or a guess with a weight.
 
 /// A parameter that is not free.
 #[derive(Debug, Clone, Copy, PartialEq)]

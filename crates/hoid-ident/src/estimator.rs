@@ -43,7 +43,7 @@ pub struct Estimator {
     pub start: Option<Vec<f64>>,
     /// Fixed and bounded coefficients, by name.
     pub constraints: BTreeMap<String, Constraint>,
-    /// Coefficients that are drawn to a guess, by name.
+    /// Prior guesses of coefficients, by name.
     pub priors: BTreeMap<String, Prior>,
     /// How a residual counts. Default: by its square.
     pub loss: Loss,

@@ -78,7 +78,7 @@ impl Fit {
     }
 
     /// Covariance of theta by rows, `sigma^2 (psi' psi)^-1` with the initial states eliminated; `None` for an exact fit, whose
-    /// residuals say nothing about the noise.
+    /// residuals carry no information about the noise.
     pub fn covariance(&self) -> Option<&[f64]> {
         self.covariance.as_deref()
     }

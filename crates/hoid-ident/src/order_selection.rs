@@ -395,7 +395,7 @@ impl Choice {
 /// 95 % point of chi-square with one degree of freedom.
 const CHI_SQUARE_95: f64 = 3.841_458_820_694_124;
 
-/// Delays from 0.05 to 0.6 s, as people have them, in samples: the default range of nk.
+/// Delays of human operators, 0.05 to 0.6 s, in samples: the default range of nk.
 pub fn default_delay_range(sample_time: hoid_model::SampleTime) -> RangeInclusive<usize> {
     // tau_e = (nk - 1) Ts.
     let samples = |delay_s: f64| (delay_s / sample_time.s()).round() as usize + 1;

@@ -16,7 +16,7 @@ use crate::{
     linalg::least_squares::{add_scaled, dot},
 };
 
-/// Orthonormal basis of the responses to the initial states of a record, and the way back to the states.
+/// Orthonormal basis of the responses to the initial states of a record, and the map back to the states.
 #[derive(Debug, Default)]
 pub(crate) struct InitialStateResponses {
     /// Basis vectors: first [`InitialStateResponses::prior_rows`] of z, then from the first residual on; what follows their end is

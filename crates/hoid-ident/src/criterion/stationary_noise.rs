@@ -67,7 +67,7 @@ impl StationaryNoise {
 
     /// `(1/2) y' dP y` for the coefficients of C and of D, at the best z: what the penalty adds to the descent `psi' eps`.
     pub fn descent(&self, z: &[f64], nc: usize, nd: usize) -> (Vec<f64>, Vec<f64>) {
-        // Nothing to remember, or nothing that could be different.
+        // No state, or none with a variance.
         if self.states() == 0 {
             return (Vec::new(), Vec::new());
         }
@@ -167,7 +167,7 @@ mod tests {
         assert!(StationaryNoise::of(&[], &[-1.0]).is_none());
         assert!(StationaryNoise::of(&[], &[-2.0, 1.1]).is_none());
         assert!(StationaryNoise::of(&[f64::NAN], &[0.1]).is_none());
-        // White noise has a past that says nothing.
+        // The past of white noise carries no information.
         let white = StationaryNoise::of(&[-0.5], &[-0.5]).unwrap();
         assert_eq!(white.descent(&[0.0], 1, 1), (vec![0.0], vec![0.0]));
     }

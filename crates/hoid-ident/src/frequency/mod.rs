@@ -1,4 +1,4 @@
-//! Describing functions: how a person answers at the lines of a periodic excitation, without a model.
+//! Describing functions: how a human operator responds at the lines of a periodic excitation, without a model.
 //!
 //! With `E_i, U_i` the Fourier coefficients of e and u at a line in run i, `H_i = U_i/E_i` is the describing function of that
 //! run. The remnant n, `U = H E + N`, goes round the loop, so that the mean of the ratios is biased, by more the smaller E is.
@@ -43,9 +43,9 @@ mod spectrum;
 mod window;
 
 #[cfg(test)]
-mod made_up_records;
-#[cfg(test)]
 mod simulated_runs;
+#[cfg(test)]
+mod synthetic_records;
 
 pub use describe::{DescribingFunction, Line, RunSummary, describe};
 pub use excitation::{Excitation, LineSearch};

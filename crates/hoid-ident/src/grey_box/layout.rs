@@ -42,7 +42,7 @@ pub(crate) enum Lead {
     Time,
 }
 
-/// What is asked of the parameters, checked.
+/// The parameters as constrained, checked.
 #[derive(Debug, Clone)]
 pub(crate) struct Layout {
     /// Order m of the remnant filter.

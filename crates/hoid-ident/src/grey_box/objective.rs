@@ -92,7 +92,7 @@ impl<'a> PhysicalCriterion<'a> {
         (value.is_finite() && eta.iter().all(|v| v.is_finite())).then_some(value)
     }
 
-    /// Searches from eta. The loss has kinks where a delay is a whole number of samples, and a search may come to rest in
+    /// Searches from eta. The loss has kinks where a delay is a whole number of samples, and a search may end in
     /// one; then it is finished inside each of the samples that meet there.
     pub fn search(
         &self,

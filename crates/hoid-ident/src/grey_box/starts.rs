@@ -1,7 +1,7 @@
 //! Where the search in physical parameters starts.
 //!
 //! 1. `grid`: delays every 0.04 s over their range with a usual neuromuscular system, then at the best of them frequencies and
-//!    dampings as people have them. The residual is affine in K_e and K_e_dot, so that both are eliminated at each point; the
+//!    dampings in the range of human operators. The residual is affine in K_e and K_e_dot, so that both are eliminated at each point; the
 //!    noise model is that of one T_n. The best points by loss are starts.
 //! 2. `box-jenkins`: the operator that a Box-Jenkins fit at the delay of the best point converts to, where it does.
 //! 3. `order m - 1`: the minimum of the order before, when several orders are tried.

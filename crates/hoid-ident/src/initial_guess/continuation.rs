@@ -5,7 +5,7 @@
 //! of the grid for about 1/K of the cost, and the poles of the minimum that it finds, taken back by the K-th root, start the
 //! search on the record itself. The delay becomes a fraction of a sample, so that B gets one coefficient more.
 //!
-//! Only a start: where the system is fast beside K samples it is a bad one, and others are asked as well.
+//! Only a start: where the system is fast beside K samples it is a bad one, and others are tried as well.
 
 use hoid_model::{Complex64, Orders, SampleTime, polynomial, polynomial_model::monic};
 
@@ -36,19 +36,19 @@ const SEARCH: SearchOptions = SearchOptions {
 /// is pi).
 const SLOW: f64 = 1.3;
 
-/// What the averaged record proposes.
+/// The poles that the averaged record gives.
 #[derive(Debug, Default)]
-pub(crate) struct Slow {
+pub(crate) struct SlowPoles {
     /// Polynomials F, best first; none where the records are short or the model has no poles in F alone.
     pub f: Vec<Vec<f64>>,
-    /// True when all poles of the best one are slow beside the average, so that it says nearly all that the record does.
+    /// True when all poles of the best one are slow beside the average, so that it determines nearly all that the record does.
     pub complete: bool,
 }
 
 /// Proposals for F.
-pub(crate) fn slow_poles(criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> Slow {
-    let Some(averaged) = Averaged::of(criterion, sample_time) else {
-        return Slow::default();
+pub(crate) fn slow_poles(criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> SlowPoles {
+    let Some(averaged) = AveragedRecords::of(criterion, sample_time) else {
+        return SlowPoles::default();
     };
     let low = averaged.criterion();
     let mut continuation = Continuation::new(&averaged, &low);
@@ -63,14 +63,14 @@ pub(crate) fn slow_poles(criterion: &Criterion<'_>, sample_time: SampleTime, wor
 }
 
 /// The averaged records of a criterion.
-pub(crate) struct Averaged {
+pub(crate) struct AveragedRecords {
     factor: usize,
     orders: Orders,
     sample_time: SampleTime,
     records: Vec<[Vec<f64>; 2]>,
 }
 
-impl Averaged {
+impl AveragedRecords {
     /// `None` where the records are too short, or the model has no poles in F alone.
     pub fn of(criterion: &Criterion<'_>, sample_time: SampleTime) -> Option<Self> {
         let shortest = criterion.data.iter().map(|d| d.u.len()).min().unwrap_or(0);
@@ -127,7 +127,7 @@ pub(crate) struct Continuation<'c> {
 
 impl<'c> Continuation<'c> {
     /// On these records, of which `low` is the criterion.
-    pub fn new(averaged: &Averaged, low: &'c Criterion<'c>) -> Self {
+    pub fn new(averaged: &AveragedRecords, low: &'c Criterion<'c>) -> Self {
         let grid = pole_grid(low.orders.nf, averaged.sample_time);
         let mut continuation = Self {
             low,
@@ -164,7 +164,7 @@ impl<'c> Continuation<'c> {
     }
 
     /// What it has come to.
-    pub fn slow(self) -> Slow {
+    pub fn slow(self) -> SlowPoles {
         let o = &self.low.orders;
         let mut minima = self.searches.map(|searches| searches.minima).unwrap_or_default();
         minima.sort_by(|(_, a), (_, b)| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares));
@@ -176,7 +176,7 @@ impl<'c> Continuation<'c> {
         let slow = |f: &Vec<f64>| {
             polynomial::roots(&monic(f)).is_some_and(|z| z.iter().all(|z| z.ln().norm() * (self.factor as f64) < SLOW))
         };
-        Slow {
+        SlowPoles {
             complete: f.first().is_some_and(slow),
             f,
         }

@@ -1,11 +1,11 @@
-//! Starts of the Box-Jenkins search, so that no guess is asked of the user.
+//! Starts of the Box-Jenkins search, so that the user need not guess.
 //!
-//! Everything hangs on the poles: given F, the model is linear in B, and given B and F the noise model is a linear
+//! The poles decide: given F, the model is linear in B, and given B and F the noise model is a linear
 //! autoregression. So each start is a proposal for F that is completed by linear least squares:
 //!
 //! 1. `low-pass continuation`: the minimum on the averaged record ([`crate::initial_guess::continuation`]), searched from the pole grid.
 //! 2. `pole grid`, where the record is too short for that: for two poles and more, neuromuscular frequencies from 3 to 24 rad/s
-//!    with damping 0.25 and 0.7, as people have them, through the exact zero-order hold.
+//!    with damping 0.25 and 0.7, the range of human operators, through the exact zero-order hold.
 //! 3. `steiglitz-mcbride`: ARX, and again on input and output filtered by 1/F of the step before, a few times (K. Steiglitz and
 //!    L. E. McBride, *IEEE Trans. Automatic Control* 10 (1965) 461-464). The `arx` poles themselves, badly biased where the
 //!    noise poles are not those of the system (m0 = 1: a2 near 0), only where that fails.
@@ -13,7 +13,7 @@
 //!    by Steiglitz and McBride (B. Wahlberg, *Automatica* 25 (1989) 829-841, in its simplest form).
 //! 5. `instruments`: ARX, instrumental variables twice, the residual, C and D from it ([`crate::iv`]).
 //!
-//! The last three only where the poles of the first are not all slow beside its average: there it says nearly all that the record
+//! The last three only where the poles of the first are not all slow beside its average: there it determines nearly all that the record
 //! does. The proposals are ranked by their loss with the initial states eliminated; the search runs from the best of them, and the
 //! best minimum wins.
 
@@ -21,7 +21,7 @@ use hoid_model::{Orders, SampleTime, polynomial::reflected_inside};
 
 use super::{
     arx_poles::{arx_poles, reduced_arx, steiglitz_mcbride},
-    continuation::{self, Slow},
+    continuation::{self, SlowPoles},
     instrument_chain::instrument_chain,
     pole_grid::pole_grid,
     shared_poles,
@@ -46,9 +46,9 @@ pub(crate) fn initial_guesses(
     initial_guesses_beside(slow, criterion, sample_time, workspace)
 }
 
-/// As [`initial_guesses`], with what the averaged record has said.
+/// As [`initial_guesses`], with the poles that the averaged record has given.
 pub(crate) fn initial_guesses_beside(
-    slow: Slow,
+    slow: SlowPoles,
     criterion: &Criterion<'_>,
     sample_time: SampleTime,
     workspace: &mut Workspace,
@@ -61,7 +61,12 @@ pub(crate) fn initial_guesses_beside(
 }
 
 /// Starts from proposals for F.
-fn from_poles(slow: Slow, criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> Vec<Start> {
+fn from_poles(
+    slow: SlowPoles,
+    criterion: &Criterion<'_>,
+    sample_time: SampleTime,
+    workspace: &mut Workspace,
+) -> Vec<Start> {
     if criterion.orders.nb == 0 {
         return time_series(criterion, workspace);
     }

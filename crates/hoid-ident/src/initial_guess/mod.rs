@@ -1,10 +1,10 @@
-//! Where a search begins when nobody says: everything hangs on the poles.
+//! Where a search begins if no start is given: the poles decide.
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | `guesses` | the starts of a criterion, from the proposals of the others |
 //! | `continuation` | poles of the averaged record |
-//! | `pole_grid`, `arx_poles` | poles as people have them; poles by linear least squares |
+//! | `pole_grid`, `arx_poles` | poles in the range of human operators; poles by linear least squares |
 //! | `shared_poles` | models whose A stands beside a noise model or beside F |
 //! | `instrument_chain` | instrumental variables, and C and D of what is left |
 //! | `c_drawn_inside` | starts for a search that ended on the unit circle |

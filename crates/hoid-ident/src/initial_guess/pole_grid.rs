@@ -1,4 +1,4 @@
-//! Poles as people have them: F of an operator's neuromuscular system at a few frequencies and dampings, through the exact
+//! Poles in the range of human operators: F of an operator's neuromuscular system at a few frequencies and dampings, through the exact
 //! zero-order hold.
 
 use hoid_model::{Complex64, SampleTime, polynomial};

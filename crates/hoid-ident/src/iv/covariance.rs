@@ -36,7 +36,7 @@ fn coloured_noise(residual: &[Vec<f64>], parameters: usize) -> (Vec<f64>, f64) {
     (d, total / rows.max(1) as f64 * freedom)
 }
 
-/// `(Z' Phi)^-1 lambda K' K (Phi' Z)^-1` by rows, where K is Z with the colour of the residual laid over those columns that do
+/// `(Z' Phi)^-1 lambda K' K (Phi' Z)^-1` by rows, where K is Z with the spectrum of the residual applied to those columns that do
 /// not depend on it. `None` where `Z' Phi` has no inverse.
 pub(super) fn covariance(
     z: &[Vec<f64>],

@@ -1,6 +1,6 @@
 //! The filtered equation, its instruments and its solution.
 //!
-//! With poles `f_1 .. f_n` (of A or F) the equation reads `u(t) = -f_1 u(t-1) - .. + b_0 e(t-nk) + .. + r(t)`; a filter L is laid over
+//! With poles `f_1 .. f_n` (of A or F) the equation reads `u(t) = -f_1 u(t-1) - .. + b_0 e(t-nk) + .. + r(t)`; a filter L is applied to
 //! each of its columns, at rest at the first row. The instruments are the same columns made of the noise-free input x and of
 //! `(B/F) q^-nk x`, under the same filter.
 //!

@@ -14,7 +14,7 @@
 //! Econ. Stat.* 13 (1995) 225-235), whose noise is independent of that in the block. Poor weights then cost variance, not bias.
 //!
 //! The construction of instruments from an external signal is that of M. Gilson, H. Garnier, P. C. Young and P. Van den Hof, *IET
-//! Control Theory Appl.* 5 (2011) 1147-1154; they use the known controller, which a person in the loop does not offer.
+//! Control Theory Appl.* 5 (2011) 1147-1154; they use the known controller, which is unknown for a human operator.
 
 use std::{borrow::Cow, ops::Range};
 

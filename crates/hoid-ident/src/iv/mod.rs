@@ -6,7 +6,7 @@
 //!
 //! `Z' Phi theta = Z' y`                                                        (L. Ljung, *System Identification*, 1999, eq. 7.118)
 //!
-//! is consistent whatever the noise. The methods differ in their instruments and in the filter that is laid over the equation:
+//! is consistent whatever the noise. The methods differ in their instruments and in the filter that is applied to the equation:
 //!
 //! | method | model | filter |
 //! |---|---|---|

@@ -282,12 +282,12 @@ fn add_two_of_each<F: FourLanes>(tiles: &mut [Tile<F>], columns: [&[f64]; 5]) {
 
 /// Residuals of a combination of columns: their power, and their products with the columns.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct OfResiduals {
+pub(crate) struct ResidualProducts {
     pub squares: f64,
     pub products: Vec<f64>,
 }
 
-impl OfResiduals {
+impl ResidualProducts {
     /// None yet, of p columns.
     pub fn new(p: usize) -> Self {
         Self {
@@ -309,7 +309,7 @@ impl OfResiduals {
 struct Residuals<'c, 'a> {
     columns: &'c [Lagged<'a>],
     factors: &'c [f64],
-    of: &'c mut OfResiduals,
+    of: &'c mut ResidualProducts,
 }
 
 impl FourLaneTask for Residuals<'_, '_> {

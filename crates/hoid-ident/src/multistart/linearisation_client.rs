@@ -14,6 +14,6 @@ pub(crate) trait LinearisationClient {
     fn evaluation_point(&self) -> Option<&[f64]>;
     /// The polynomial with respect to which derivatives are needed; `None` for all.
     fn block(&self) -> Option<Block>;
-    /// Goes on with the linearisation at [`LinearisationClient::evaluation_point`].
+    /// Continues with the linearisation at [`LinearisationClient::evaluation_point`].
     fn update(&mut self, there: Linearisation, workspace: &mut Workspace);
 }

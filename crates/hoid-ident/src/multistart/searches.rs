@@ -4,7 +4,7 @@
 //! basin of a minimum that is known is left out, and a search that comes close to one without a promise to end lower is stopped.
 //!
 //! The searches do not evaluate the criterion themselves: they name the theta at which they need its linearisation and are
-//! updated with it (reverse communication), so that those of several records can go on side by side
+//! updated with it (reverse communication), so that those of several records can run side by side
 //! ([`crate::pem::batched`]).
 
 use hoid_model::Orders;
@@ -66,7 +66,7 @@ impl<'s, O: Objective> MultiStart<'s, O> {
         self.incomplete().and_then(|at| self.starts[at].next_block())
     }
 
-    /// Goes on with the linearisation at [`MultiStart::evaluation_point`].
+    /// Continues with the linearisation at [`MultiStart::evaluation_point`].
     pub fn update(&mut self, there: Linearisation, workspace: &mut O::Workspace) {
         if let Some((label, mut descent)) = self.searching.take() {
             let known = self.best().filter(|_| descent.is_at_its_start());

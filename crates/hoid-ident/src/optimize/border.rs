@@ -1,4 +1,4 @@
-//! Where a search comes to rest, and how it goes on along the border of stability.
+//! Where a search ends, and how it continues along the border of stability.
 
 use super::{
     gauss_newton::GaussNewton,
@@ -9,7 +9,7 @@ use super::{
 };
 
 /// Searches from `theta`. `None` when the start is unstable or its loss is not finite, or when the search comes close to
-/// `rival`, the sum of squares of a minimum that is known already, and promises to end no lower.
+/// `rival`, the sum of squares of a minimum that is known already, and is predicted to end no lower.
 pub(crate) fn minimise<O: Objective>(
     objective: &O,
     theta: Vec<f64>,
@@ -23,7 +23,7 @@ pub(crate) fn minimise<O: Objective>(
 }
 
 impl<O: Objective> GaussNewton<'_, O> {
-    /// Where it came to rest, once it has ended for this reason; the automatic search may go on along the border of stability.
+    /// The minimum, once the search has ended for this reason; the automatic search may continue along the border of stability.
     pub fn finish(mut self, reason: Reason, workspace: &mut O::Workspace) -> Option<Minimum> {
         let reason = if self.options.method == SearchMethod::Automatic && reason == Reason::NoDescent {
             self.follow_the_border(workspace)?

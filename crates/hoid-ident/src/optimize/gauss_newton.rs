@@ -8,14 +8,14 @@ use super::{
 };
 use crate::linalg::least_squares::{dot, solve_symmetric};
 
-/// Relative decrease of the loss that a step promises from which on the second derivative is learnt from the gradients.
+/// Relative decrease of the loss that a step predicts from which on the second derivative is learnt from the gradients.
 const NEAR: f64 = 1e-2;
 
 /// Relative decrease of the loss that its rounding may hide: filters with poles near the unit circle lose five of the sixteen
 /// digits.
 const ROUNDING: f64 = 1e-10;
 
-/// A search that is driven from outside, so that several can go on side by side.
+/// A search that is driven from outside, so that several can run side by side.
 pub(crate) struct GaussNewton<'s, O> {
     pub(super) objective: &'s O,
     pub(super) options: &'s SearchOptions,
@@ -26,8 +26,8 @@ pub(crate) struct GaussNewton<'s, O> {
     pub(super) iterations: usize,
     mu: f64,
     growth: f64,
-    /// Decrease that the undamped step of this iteration promises.
-    promise: f64,
+    /// Decrease that the quadratic model predicts for the undamped step of this iteration.
+    predicted_decrease: f64,
     /// What the Gauss-Newton matrix lacks of half the second derivative, from the gradients of the last steps; empty where that is not
     /// used.
     secant: Vec<f64>,
@@ -40,15 +40,15 @@ pub(crate) struct GaussNewton<'s, O> {
 enum Trial {
     /// Whether the start is any good.
     Start,
-    /// A step of Levenberg and Marquardt, and the decrease that it promises.
-    Damped { promised: f64 },
+    /// A step of Levenberg and Marquardt, and the decrease that the quadratic model predicts for it.
+    Damped { predicted: f64 },
     /// A share of a step that is halved until the loss falls.
     Share { delta: Vec<f64>, factor: f64 },
     /// The step that is left when the search has converged.
     Last,
 }
 
-/// Whether a search goes on.
+/// Whether a search continues.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Progress {
     /// It needs another linearisation.
@@ -76,7 +76,7 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
             iterations: 0,
             mu: 1e-6,
             growth: 8.0,
-            promise: f64::INFINITY,
+            predicted_decrease: f64::INFINITY,
             secant: Vec::new(),
             trial: Trial::Start,
         })
@@ -102,7 +102,7 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
         }
     }
 
-    /// Goes on with the linearisation at [`GaussNewton::evaluation_point`].
+    /// Continues with the linearisation at [`GaussNewton::evaluation_point`].
     pub fn update(&mut self, there: Linearisation) -> Progress {
         let finite = there.sum_of_squares.is_finite();
         match std::mem::replace(&mut self.trial, Trial::Last) {
@@ -110,9 +110,9 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
                 self.at = there;
                 self.iterate()
             }
-            Trial::Damped { promised } => {
+            Trial::Damped { predicted } => {
                 if finite && there.sum_of_squares < self.at.sum_of_squares {
-                    let ratio = (self.at.sum_of_squares - there.sum_of_squares) / promised;
+                    let ratio = (self.at.sum_of_squares - there.sum_of_squares) / predicted;
                     self.mu = (self.mu * (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(1.0 / 3.0, 2.0)).max(1e-12);
                     self.growth = 2.0;
                     self.move_to(there);
@@ -134,7 +134,7 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
                 }
             }
             Trial::Last => {
-                // It promises less than the rounding of the loss may hide, which must not decide about it.
+                // The predicted decrease is less than the rounding of the loss may hide, which must not decide about it.
                 if finite && there.sum_of_squares <= self.at.sum_of_squares * (1.0 + ROUNDING) {
                     self.move_to(there);
                 }
@@ -144,7 +144,7 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
     }
 
     fn move_to(&mut self, there: Linearisation) {
-        if self.options.method == SearchMethod::Automatic && self.promise <= NEAR * self.at.sum_of_squares {
+        if self.options.method == SearchMethod::Automatic && self.predicted_decrease <= NEAR * self.at.sum_of_squares {
             self.learn(&there);
         } else {
             self.secant.clear();
@@ -196,12 +196,12 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
         let undamped = self.damped_step(0.0, &[]);
         if let (Some(rival), Some(step)) = (self.rival, &undamped) {
             let close = self.at.sum_of_squares < rival * (1.0 + 1e-3);
-            if close && self.at.sum_of_squares - step.promised > rival * (1.0 - 1e-7) {
+            if close && self.at.sum_of_squares - step.predicted > rival * (1.0 - 1e-7) {
                 return Progress::Ended(None);
             }
         }
         if let Some(step) = &undamped
-            && step.promised <= self.options.tolerance * self.at.sum_of_squares
+            && step.predicted <= self.options.tolerance * self.at.sum_of_squares
         {
             return if self.ask(&step.delta, 1.0) {
                 self.trial = Trial::Last;
@@ -213,7 +213,7 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
         if self.iterations >= self.options.max_iterations {
             return Progress::Ended(Some(Reason::IterationLimit));
         }
-        self.promise = undamped.as_ref().map_or(f64::INFINITY, |step| step.promised);
+        self.predicted_decrease = undamped.as_ref().map_or(f64::INFINITY, |step| step.predicted);
         self.iterations += 1;
         let delta = match self.options.method {
             SearchMethod::Automatic | SearchMethod::LevenbergMarquardt => return self.try_damped(),
@@ -241,7 +241,7 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
             {
                 // Most trials are accepted: derivatives at once cost less than a second pass.
                 self.trial = Trial::Damped {
-                    promised: step.promised,
+                    predicted: step.predicted,
                 };
                 return Progress::Continues;
             }
@@ -268,8 +268,8 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
     }
 
     fn give_up(&self) -> Progress {
-        // What is promised may be lost in the rounding of the loss.
-        let lost = self.promise <= ROUNDING * self.at.sum_of_squares;
+        // The predicted decrease may be lost in the rounding of the loss.
+        let lost = self.predicted_decrease <= ROUNDING * self.at.sum_of_squares;
         Progress::Ended(Some(if lost { Reason::SmallDecrease } else { Reason::NoDescent }))
     }
 
@@ -288,7 +288,7 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
     }
 
     /// `(H + S + mu diag H)^-1 g` of the free parameters, cut where it meets a bound, and the decrease of the sum of squares that
-    /// the quadratic model promises for it. `None` when the matrix is not positive definite.
+    /// the quadratic model predicts for it. `None` when the matrix is not positive definite.
     fn damped_step(&self, mu: f64, secant: &[f64]) -> Option<Step> {
         let p = self.theta.len();
         let mut free = self.free();
@@ -320,7 +320,7 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
                 let room = cut(&self.theta, &delta, limits);
                 delta.iter_mut().for_each(|d| *d *= room);
             }
-            return self.promise(delta, secant);
+            return self.step(delta, secant);
         }
     }
 
@@ -347,12 +347,12 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
     }
 
     /// `V(theta + step) ~ V - 2 g' step + step' H step`.
-    fn promise(&self, delta: Vec<f64>, secant: &[f64]) -> Option<Step> {
-        let mut promised = 2.0 * dot(&self.at.descent, &delta) - curvature(&self.at.gram, &delta);
+    fn step(&self, delta: Vec<f64>, secant: &[f64]) -> Option<Step> {
+        let mut predicted = 2.0 * dot(&self.at.descent, &delta) - curvature(&self.at.gram, &delta);
         if !secant.is_empty() {
-            promised -= curvature(secant, &delta);
+            predicted -= curvature(secant, &delta);
         }
-        (promised >= 0.0 && delta.iter().all(|s| s.is_finite())).then_some(Step { delta, promised })
+        (predicted >= 0.0 && delta.iter().all(|s| s.is_finite())).then_some(Step { delta, predicted })
     }
 
     fn free(&self) -> Vec<usize> {
@@ -391,5 +391,5 @@ fn cut(theta: &[f64], delta: &[f64], limits: &[(f64, f64)]) -> f64 {
 
 struct Step {
     delta: Vec<f64>,
-    promised: f64,
+    predicted: f64,
 }

@@ -4,7 +4,7 @@
 //!
 //! | method | step |
 //! |---|---|
-//! | Levenberg-Marquardt | `(H + mu diag H)^-1 g`, mu by the ratio of gained to promised decrease (H. B. Nielsen, *Damping parameter in Marquardt's method*, IMM-REP-1999-05, DTU) |
+//! | Levenberg-Marquardt | `(H + mu diag H)^-1 g`, mu by the ratio of gained to predicted decrease (H. B. Nielsen, *Damping parameter in Marquardt's method*, IMM-REP-1999-05, DTU) |
 //! | Gauss-Newton | `H^-1 g`, halved until the loss falls |
 //! | steepest descent | `alpha (diag H)^-1 g`, alpha best for the quadratic model, halved until the loss falls |
 //! | automatic | Levenberg-Marquardt, near the minimum with a secant; where it finds no lower loss although the gradient is not zero, it goes on in coordinates in which the border of stability is a bound ([`reflection_coefficients`]) |
@@ -21,10 +21,10 @@
 //! a bound while the loss falls outwards takes no part in it (an active set; J. Nocedal and S. J. Wright, *Numerical
 //! Optimization*, 2006, section 16.5).
 //!
-//! The search has converged when the undamped Gauss-Newton step of the free parameters promises less than `tolerance` of
+//! The search has converged when the undamped Gauss-Newton step of the free parameters predicts less than `tolerance` of
 //! relative decrease of the loss: `g' H^-1 g <= tolerance V`. In units of standard errors the distance left is about
 //! `sqrt(tolerance N)`, 1e-4 for the default and 8192 samples; that last step is still taken. Where no step lowers the loss any
-//! more and the promise is as small as the rounding of the loss, it has converged as well.
+//! more and the predicted decrease is as small as the rounding of the loss, it has converged as well.
 
 pub mod basin;
 mod border;

@@ -33,7 +33,7 @@ pub(crate) trait Objective {
     }
 }
 
-/// Where a search came to rest.
+/// Where a search ended.
 #[derive(Debug, Clone)]
 pub(crate) struct Minimum {
     pub theta: Vec<f64>,

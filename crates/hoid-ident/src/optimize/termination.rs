@@ -20,7 +20,7 @@ pub enum Reason {
     NoDescent,
     /// An iteration of instrumental variables that moves the parameters no more.
     Settled,
-    /// Instrumental variables came to rest with a pole outside the unit circle, which was then reflected into it.
+    /// Instrumental variables ended with a pole outside the unit circle, which was then reflected into it.
     UnstableEstimate,
 }
 

@@ -17,7 +17,7 @@ use crate::{
     assembled_fit::{Solution, assembled_fit},
     criterion::{Criterion, Data},
     linalg::least_squares::{LeastSquares, add_scaled},
-    linalg::products::{Lagged, OfResiduals, gram},
+    linalg::products::{Lagged, ResidualProducts, gram},
 };
 
 /// Condition of the scaled normal matrix (an upper bound, `p tr(G^-1)`) up to which it is used: refined, the solution keeps all digits but three, the
@@ -142,7 +142,7 @@ fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Opti
     let mut theta = solve(&|i| sign(i) * all[i + 1]);
     // Residuals, their power, and their products with the regressors.
     let factors: Vec<f64> = (0..p).map(|i| sign(i) * theta[i]).collect();
-    let mut residuals = OfResiduals::new(p);
+    let mut residuals = ResidualProducts::new(p);
     for d in data {
         residuals.add(&columns(orders, d, first), &factors);
     }

@@ -93,7 +93,7 @@ pub(super) fn inference(
         .iter()
         .filter(|&&i| criterion.limits[i].0 < criterion.limits[i].1)
         .count();
-    // An exact fit without a change leaves two losses of rounding errors, which say nothing.
+    // An exact fit without a change leaves two losses of rounding errors.
     let both_exact = constant.termination.reason == Reason::ExactFit;
     let ratio = (constant.at.sum_of_squares / sum_of_squares).ln();
     let likelihood_ratio = if both_exact { 0.0 } else { n as f64 * ratio };

@@ -68,7 +68,7 @@ pub(super) fn without_change(
     search(&constant, start, options, None).ok_or(IdentError::NoFiniteLoss)
 }
 
-/// Searches from theta. The loss has kinks where tau_e is a whole number of samples, and a search may come to rest in one;
+/// Searches from theta. The loss has kinks where tau_e is a whole number of samples, and a search may end in one;
 /// it is then finished inside each of the samples that meet there.
 pub(super) fn search(
     criterion: &ChangeCriterion<'_>,

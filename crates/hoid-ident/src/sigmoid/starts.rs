@@ -1,4 +1,4 @@
-//! Where the search begins when nobody says.
+//! The starts of the search where none is given.
 //!
 //! Poles, delay and noise model come from Box-Jenkins fits to the first and the last third of the records; where those give no
 //! operator, from a small grid of poles. With these and t_M and G given the residual is linear in the gains at both ends

@@ -98,7 +98,7 @@ fn residuals_of_any_number_of_inputs_have_the_same_bits_on_each_path() {
     for n in LENGTHS {
         for p in 1..=7 {
             let columns = waves(n, p + 1);
-            let mut defined = OfResiduals::new(p);
+            let mut defined = ResidualProducts::new(p);
             for stretch in (0..n).collect::<Vec<_>>().chunks(512) {
                 let of = |j: usize| &columns[j][stretch[0]..stretch[0] + stretch.len()];
                 let mut r = of(0).to_vec();
@@ -116,7 +116,7 @@ fn residuals_of_any_number_of_inputs_have_the_same_bits_on_each_path() {
                 }
             }
             for path in InstructionSet::available() {
-                let mut found = OfResiduals::new(p);
+                let mut found = ResidualProducts::new(p);
                 let task = Residuals {
                     columns: &leading(&columns),
                     factors: &factors[..p],

@@ -116,7 +116,7 @@ impl Columns {
         }
     }
 
-    /// All products from those that were summed, with what lies in the space of the initial states taken away.
+    /// All products from those that were summed, with the initial states projected out.
     #[inline(always)]
     pub fn complete<R: Number>(&self, zero: R, inside: &[R], nf: usize, products: &mut [f64]) {
         let (p1, width) = (self.count(), zero.lanes());

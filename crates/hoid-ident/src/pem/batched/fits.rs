@@ -7,7 +7,7 @@ use super::lanes::search;
 use crate::{
     Fit, IdentError, InitialState,
     criterion::{Criterion, Workspace},
-    initial_guess::continuation::{Averaged, Continuation, Slow},
+    initial_guess::continuation::{AveragedRecords, Continuation, SlowPoles},
     initial_guess::guesses::initial_guesses_beside,
     pem::constraints::ConstrainedCriterion,
     pem::fit_problem::FitProblem,
@@ -71,12 +71,14 @@ fn poles_of_averages(
     constrained: &[Result<(ConstrainedCriterion<'_, '_>, SampleTime), &IdentError>],
     path: InstructionSet,
     workspace: &mut Workspace,
-) -> Vec<Slow> {
-    let averaged: Vec<Option<Averaged>> = (constrained.iter())
-        .map(|found| (found.as_ref().ok()).and_then(|(constrained, ts)| Averaged::of(constrained.criterion, *ts)))
+) -> Vec<SlowPoles> {
+    let averaged: Vec<Option<AveragedRecords>> = (constrained.iter())
+        .map(|found| {
+            (found.as_ref().ok()).and_then(|(constrained, ts)| AveragedRecords::of(constrained.criterion, *ts))
+        })
         .collect();
     let low: Vec<Option<Criterion<'_>>> = (averaged.iter())
-        .map(|averaged| averaged.as_ref().map(Averaged::criterion))
+        .map(|averaged| averaged.as_ref().map(AveragedRecords::criterion))
         .collect();
     let mut all: Vec<Option<Continuation<'_>>> = (averaged.iter().zip(&low))
         .map(|(averaged, low)| Some(Continuation::new(averaged.as_ref()?, low.as_ref()?)))

@@ -93,7 +93,7 @@ impl Lanes {
                     self.put(lane, next.criterion().data[0]);
                     searching[lane] = Some(next);
                 }
-                // A lane that is left over goes on with what it has.
+                // A lane without a record keeps its last theta.
                 let theta = searching[lane]
                     .iter()
                     .filter_map(|client| client.evaluation_point())

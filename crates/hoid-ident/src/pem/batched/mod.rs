@@ -4,7 +4,7 @@
 //! ([`crate::criterion`]). Searches of different records wait for nothing of each other: each has a lane of the registers,
 //! and when it has ended the next record takes its place; the search on the averaged records
 //! ([`crate::initial_guess::continuation`]) goes first in the same way. What needs more than the criterion (the border of
-//! stability, starts where the averages do not say enough, free responses that are not independent) is done alone.
+//! stability, starts where the averages do not suffice, dependent responses to the initial states) is done alone.
 //!
 //! | module | what it holds |
 //! |---|---|

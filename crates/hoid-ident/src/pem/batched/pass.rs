@@ -1,6 +1,6 @@
 //! The criterion and its derivatives for several records at once, each with a theta of its own.
 //!
-//! What [`crate::criterion`] says of one Box-Jenkins model without C, with its initial states eliminated, for a record in each lane:
+//! The criterion ([`crate::criterion`]) of one Box-Jenkins model without C, with its initial states eliminated, for a record in each lane:
 //!
 //! `s = e(t-nk)/F`,  `w = B s`,  `v = u - w`,  `eps = D v`,  `x_b = D s`,  `r = w/F`,  `x_f = D r`
 //!
