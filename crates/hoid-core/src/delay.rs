@@ -1,6 +1,6 @@
 //! A delay line: `y(t) = x(t - n)`, zero before the first sample.
 
-/// A delay of as many samples as its memory is long: a slice, an array or a vector. An empty memory passes its input through.
+/// A delay of n samples, with n the length of its memory: a slice, an array or a vector. An empty memory passes its input through.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DelayLine<M> {
     memory: M,
@@ -15,13 +15,13 @@ impl<M: AsMut<[f64]>> crate::state::State for DelayLine<M> {
 }
 
 impl<M: AsMut<[f64]>> DelayLine<M> {
-    /// Takes the memory of the line and fills it with zeros (the state of rest).
+    /// At rest: the memory is filled with zeros.
     pub fn new(mut memory: M) -> Self {
         memory.as_mut().fill(0.0);
         Self { memory, oldest: 0 }
     }
 
-    /// Takes `x(t)` and returns `x(t - n)`, with `n` the length of the memory.
+    /// Puts `x(t)` in and returns `x(t - n)`, with `n` the length of the memory.
     #[inline]
     pub fn step(&mut self, x: f64) -> f64 {
         let memory = self.memory.as_mut();

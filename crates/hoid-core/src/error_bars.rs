@@ -17,13 +17,13 @@
 //! `Sigma a = z - Sigma (h - a)`: two thirds of the products are shared. No assumption is made about g: the
 //! error bars hold for a scalar factor, where they tend to `P/(1 + lambda)` for ARX (L. Ljung and T. Söderström, *Theory and Practice of
 //! Recursive Identification*, 1983, eq. 4.136), for a forgetting matrix, a shortened step, or a gradient. Without forgetting `Sigma`
-//! becomes P. The usual `h = psi` is the same for an estimate that does not move within the memory of the filters; where the memory of
-//! the estimate is not much longer than that of 1/F, it promises up to a third too little, at half the cost of a step; room for no
-//! errors of filters (K = 0) takes it.
+//! becomes P. The usual `h = psi` is the same for an estimate that does not move within the memory of the filters. Where the memory of
+//! the estimate is not much longer than that of 1/F, its variances are up to a third too small; a step costs half. K = 0 (no errors of filters)
+//! chooses it.
 //!
 //! **Outliers.** An innovation beyond a few sigma moves the estimate as if it were at that limit (P. J. Huber, *Robust Statistics*, 1981,
-//! section 7.3; the gain in the equations above is then the smaller one that was used). The variance takes it as it is, so that what
-//! lasts is believed.
+//! section 7.3; the gain in the equations above is then the smaller one that was used). The innovation variance takes it unclipped, so that a lasting
+//! change of the noise is followed.
 //!
 //! The innovation variance sigma^2 is the mean of `eps^2/(1 + h' Sigma h)`, each term of which has the expectation sigma^2.
 
@@ -74,7 +74,7 @@ pub trait ErrorPropagation<const N: usize, const K: usize>: State {
     fn variance(&self) -> Option<f64>;
 }
 
-/// No error bars, no innovation variance and no limit on outliers: a recursion that is its estimate alone, at no cost besides.
+/// No error bars, no innovation variance and no limit on outliers: the recursion is its estimate alone, without further cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct NoErrorBars;
 
@@ -278,13 +278,13 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         for i in 0..N {
             let limit = LARGEST_GROWTH * self.initial_variances[i];
             if self.initial_variances[i] > 0.0 && self.theta[i][i] > limit {
-                let share = libm::sqrt(limit / self.theta[i][i]);
+                let scale = libm::sqrt(limit / self.theta[i][i]);
                 for j in 0..N {
-                    self.theta[i][j] *= share;
-                    self.theta[j][i] *= share;
+                    self.theta[i][j] *= scale;
+                    self.theta[j][i] *= scale;
                 }
                 for cross in &mut self.cross {
-                    cross[i] *= share;
+                    cross[i] *= scale;
                 }
             }
         }

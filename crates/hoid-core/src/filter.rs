@@ -21,7 +21,7 @@ pub fn divide_in_place(d: &[f64], x: &mut [f64]) {
     divide_from(d, x, 0);
 }
 
-/// As [`divide_in_place`] from index `from` on: what stands before is what has come out of the filter so far, and zeros before that.
+/// As [`divide_in_place`] from index `from` on; the values before it are the past output of the filter, with zeros before the first.
 pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
     let before = |lag: usize, x: &[f64]| from.checked_sub(lag).map_or(0.0, |t| x[t]);
     match *d {
@@ -87,7 +87,7 @@ impl SecondOrder {
     #[inline(always)]
     pub fn four(&mut self, [x0, x1, x2, x3]: [f64; 4]) -> [f64; 4] {
         let Self { h, g, y1, y2 } = *self;
-        // The own share of the inputs first: only the last sums wait for the block before.
+        // The terms of the inputs first: only the last two sums wait for the block before.
         let y = [
             (x0 + g[0] * y2) + h[0] * y1,
             ((x1 + h[0] * x0) + g[1] * y2) + h[1] * y1,

@@ -5,7 +5,7 @@
 
 use crate::shape::Shape;
 
-/// ErrorLayout in X: which parameters belong to A, which to C and D, and how many past errors of the filters are kept.
+/// The layout of X: which parameters belong to A, which to C and D, and how many past errors of the filters are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ErrorLayout {
     /// Number of coefficients of A, which come first.
@@ -21,7 +21,7 @@ pub struct ErrorLayout {
 }
 
 impl ErrorLayout {
-    /// The places for a shape, in the order of theta.
+    /// The layout for a shape, with the parameters in the order of theta.
     #[inline(always)]
     pub fn of<S: Shape>(shape: &S) -> Self {
         let w = if shape.na() == 0 {
@@ -48,7 +48,7 @@ impl ErrorLayout {
         e: (0, 0),
     };
 
-    /// The places where there is room for K errors of filters, none for K = 0.
+    /// The layout for a shape, or [`ErrorLayout::NONE`] for K = 0.
     #[inline(always)]
     pub fn for_capacity<S: Shape, const K: usize>(shape: &S) -> Self {
         if K == 0 { Self::NONE } else { Self::of(shape) }
@@ -85,10 +85,14 @@ impl<const N: usize, const K: usize> Sensitivities<N, K> {
     /// Those of an estimate that does not move within the memory of its filters: `h = psi`, and no errors in the filters.
     #[inline(always)]
     pub fn from_gradient(psi: &[f64; N]) -> Self {
-        let row = LinearForm {
+        let form = LinearForm {
             theta: *psi,
             filters: [0.0; K],
         };
-        Self { w: row, v: row, e: row }
+        Self {
+            w: form,
+            v: form,
+            e: form,
+        }
     }
 }

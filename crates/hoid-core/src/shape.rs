@@ -5,8 +5,8 @@
 
 /// Numbers of coefficients of A, B, C, D and F.
 ///
-/// [`AnyShape`] holds them as numbers. [`FixedShape`] has them in its type, so that the compiler writes out every loop over
-/// coefficients: the same operations in the same order, at half the time.
+/// [`AnyShape`] holds them as numbers. [`FixedShape`] has them in its type, so that the compiler unrolls every loop over
+/// coefficients: the same operations in the same order, in half the time.
 pub trait Shape: Copy {
     /// Coefficients `a_1 ...`.
     fn na(&self) -> usize;

@@ -1,16 +1,16 @@
 //! The numbers that change while a recursion runs, so that it can be saved and go on elsewhere.
 //!
-//! One function visits them for both ways: what reads them saves, what writes them restores, and the two cannot differ in order. A
-//! recursion that was restored goes on with the same digits. Counters are numbers as well; those of a recursion stay below `2^53`,
-//! up to which f64 holds them exactly. Shape and options are not part of the state: a state belongs to a recursion that was made alike.
+//! One function visits them in both directions: to read them is to save, to write them is to restore, and the two cannot differ in order. A
+//! restored recursion goes on with the same digits. Counters are numbers as well; those of a recursion stay below `2^53`,
+//! up to which f64 holds them exactly. Shape and options are not part of the state: restore it into a recursion that was made with the same ones.
 
-/// What has numbers to be saved.
+/// A part of a recursion with numbers to be saved.
 pub trait State {
     /// Shows every number to `each`, which may change it.
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64));
 }
 
-/// Visits one after the other.
+/// Visits the parts in their order.
 pub fn visit_all(parts: &mut [&mut dyn State], each: &mut dyn FnMut(&mut f64)) {
     for part in parts {
         part.visit(each);

@@ -230,7 +230,7 @@ fn a_change_is_declared_once_with_its_time_and_its_gains() {
 }
 
 #[test]
-fn a_steady_person_raises_no_alarm_and_memory_grows() {
+fn a_steady_operator_raises_no_alarm_and_memory_grows() {
     // Ten minutes.
     let data = operator(60_000, 33, 0.02, |_| S1);
     let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], prior_of());

@@ -51,7 +51,7 @@ fn bank(later: usize, delay: DelayPrior) -> Bank {
     .unwrap()
 }
 
-/// Error and control of an operator with so many samples of delay at each sample, with AR(1) noise.
+/// Error and control of an operator whose delay is given at each sample, in samples, with AR(1) noise.
 fn operator(samples: usize, seed: u64, delay: impl Fn(usize) -> usize) -> Vec<(f64, f64)> {
     let mut noise = Noise(seed);
     let mut response = Response::new([S1[2], S1[3]], TS);
@@ -143,7 +143,7 @@ fn a_first_delay_that_was_wrong_is_mended_without_an_alarm() {
 }
 
 #[test]
-fn a_steady_person_raises_no_alarm() {
+fn a_steady_operator_raises_no_alarm() {
     // Ten minutes.
     let data = operator(60_000, 34, |_| 8);
     let mut bank = bank(8, OPEN);
