@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let outcome = run_study(&plan, &folder, &RunOptions::default(), &|_| (), &|| true)?;
     println!("{} estimates, finished: {}", plan.estimates(), outcome.finished);
     let results = hoid::study::Results::read(&folder)?;
-    for row in results.summary().iter().filter(|row| row.quantity == "bias_omega_nm") {
+    for row in results.find(&hoid::study::Query::of("bias_omega_nm")) {
         println!(
             "cell {} {}: median {:+.3} %",
             row.cell, row.estimator, row.statistics.median

@@ -2,8 +2,8 @@
 
 use std::{ops::RangeInclusive, path::PathBuf};
 
-use clap::{Args, ValueEnum};
-use hoid_ident::{Focus, InitialState, IvMethod, SearchMethod};
+use clap::Args;
+use hoid_ident::{Focus, InitialState, IvMethod, SearchMethod, order_selection::Criterion};
 use hoid_model::{ContinuousTransferFunction, Structure, remnant::RemnantDiscretisation};
 
 use super::{

@@ -1,7 +1,7 @@
 //! From the options of `hoid identify` to a fit.
 
 use hoid_ident::{
-    Choice, Estimator, Fit, GreyBox, GreyBoxFit, InitialState, InstrumentalVariable, Instruments, IvMethod, Loss,
+    Choice, Estimator, Fit, Focus, GreyBox, GreyBoxFit, InstrumentalVariable, Instruments, Loss, SearchMethod,
     SearchOptions,
     order_selection::{OrderRanges, fit_or_choose},
 };

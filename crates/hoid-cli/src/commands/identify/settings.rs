@@ -6,7 +6,9 @@ use crate::{args::IdentifyArgs, commands::reading};
 pub fn common_settings(args: &IdentifyArgs, with_input: bool) -> Vec<(String, String)> {
     let mut list = vec![(
         "initial state".to_owned(),
-        args.initial_state.map_or("auto", InitialState::name).to_owned(),
+        args.initial_state
+            .map_or("auto", hoid_ident::InitialState::name)
+            .to_owned(),
     )];
     list.extend(reading::settings(&args.read, with_input));
     if !args.mask.mask.is_empty() {
