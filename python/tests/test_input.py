@@ -97,7 +97,7 @@ def test_what_is_wrong_is_said(e: Any, message: str) -> None:
         ({"nd": 1.5}, "expected whole numbers"),
         ({"nd": (3, 1)}, "the smaller first"),
         ({"nk": range(5, 20, 2)}, "step 1"),
-        ({"structure": "grey-box", "nk": 29}, "nk belongs to a polynomial structure"),
+        ({"structure": "grey-box", "nk": 29}, 'nk belongs to method="pem"'),
         ({"instruments": "f_t"}, "instruments belongs to method"),
         ({"method": "iv4", "structure": "bj"}, "fits the structure arx"),
         ({"start": {"f1": 1.0}, "nk": 29, "nd": 1}, "start lacks"),

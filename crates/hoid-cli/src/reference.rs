@@ -2,7 +2,10 @@
 //!
 //! `HOID_UPDATE_DOCS=1 cargo test -p hoid-cli` renews them.
 
-use hoid_ident::settings::{Kind, MethodSpec, Setting};
+use hoid_ident::{
+    estimators,
+    settings::{Kind, MethodSpec, Setting},
+};
 use hoid_track::Method;
 
 /// The type of a value in words.
@@ -26,11 +29,13 @@ fn kind_in_words(kind: Kind) -> String {
 
 /// The page of the book.
 fn options_page(methods: &[MethodSpec]) -> String {
-    let mut page = "# Options of the recursive methods\n\nEach option is a flag of `hoid track` and `hoid stream` (with hyphens), a key of an estimator in a \
-                    plan, and a keyword of `pyhoid.track` and `pyhoid.Tracker`. In a plan a range of times carries its unit (`track_delay_s`); in \
-                    Python `lambda` is called `forgetting_factor`.\n"
+    let mut page = "# Options of estimators and recursive methods\n\nThe recursive methods come first, the batch estimators after them. An option of a \
+                    recursive method is a flag of `hoid track` and `hoid stream` (with hyphens), a key of an estimator in a plan, and a keyword \
+                    of `pyhoid.track` and `pyhoid.Tracker`. In a plan a range of times carries its unit (`track_delay_s`); in Python `lambda` \
+                    is called `forgetting_factor`. An option of a batch estimator is a flag of `hoid identify` and a keyword of \
+                    `pyhoid.identify`.\n"
         .to_owned();
-    for spec in methods {
+    for spec in methods.iter().chain(&estimators()) {
         let structures: Vec<&str> = spec.structures.iter().map(|structure| structure.name()).collect();
         page.push_str(&format!(
             "\n## {}\n\nWhat it is: {}.\nStructures: {}.\nSource: {}.\n\n",
@@ -183,11 +188,11 @@ fn python_settings(methods: &[MethodSpec]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use clap::Command;
+    use clap::{Command, CommandFactory};
     use hoid_ident::settings::Bounds;
 
     use super::*;
-    use crate::args::with_settings;
+    use crate::args::{Cli, with_settings};
 
     fn is_as_written(path: &str, expected: &str) {
         let path = format!("{}/../../{path}", env!("CARGO_MANIFEST_DIR"));
@@ -209,6 +214,32 @@ mod tests {
     #[test]
     fn python_has_the_options_of_the_registry() {
         is_as_written("python/src/pyhoid/_settings.py", &python_settings(&Method::registry()));
+    }
+
+    /// Every option of the registry of estimators is a flag of `hoid identify`, with its default where clap knows one.
+    #[test]
+    fn identify_has_the_options_of_the_registry() {
+        let mut cli = Cli::command();
+        cli.build();
+        let identify = cli.find_subcommand("identify").unwrap();
+        for setting in estimators().into_iter().flat_map(|spec| spec.settings) {
+            let name = setting.name.replace('_', "-");
+            let flag = identify
+                .get_arguments()
+                .find(|arg| arg.get_long() == Some(name.as_str()));
+            let flag = flag.unwrap_or_else(|| panic!("identify has no --{name}"));
+            let help = flag.get_help().unwrap().to_string();
+            assert!(help.starts_with(&setting.help), "--{name}: {help}");
+            if let Some(default) = flag.get_default_values().first() {
+                let default = default.to_str().unwrap();
+                let same = default == setting.default || default.parse::<f64>().ok() == setting.default.parse().ok();
+                assert!(
+                    same || setting.kind == Kind::Flag,
+                    "--{name}: {default} {}",
+                    setting.default
+                );
+            }
+        }
     }
 
     /// An option that is declared once is there wherever options are.

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use hoid_ident::{
     Choice, Estimator, Fit, GreyBox, GreyBoxFit, IdentError, InitialState, InstrumentalVariable, Instruments, Loss,
-    SearchOptions, SigmoidChange, SigmoidFit,
+    SearchOptions, SigmoidChange, SigmoidFit, estimators,
     order_selection::{default_operator_ranges, fit_or_choose},
+    settings::MethodSpec,
 };
 use hoid_model::Record;
 use pyo3::prelude::*;
@@ -180,4 +181,11 @@ pub fn identify<'py>(
         }
         Found::Change(fit) => Bound::new(py, PyTimeVaryingFit::new(*fit))?.into_any(),
     })
+}
+
+/// Name of each batch estimator, and the keywords that it takes.
+#[pyfunction]
+pub fn batch_estimators() -> Vec<(&'static str, Vec<&'static str>)> {
+    let keywords = |spec: &MethodSpec| spec.settings.iter().map(|setting| setting.name).collect();
+    estimators().iter().map(|spec| (spec.name, keywords(spec))).collect()
 }

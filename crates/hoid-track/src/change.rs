@@ -1,4 +1,4 @@
-//! When a person changed: by the odds of the hypotheses of [`super::Method::Adaptive`], and the published baseline.
+//! When a person changed: by the odds of the hypotheses of [`crate::Method::Adaptive`], and the published baseline.
 //!
 //! The baseline looks at the loop from outside: an adaptation is taken to be needed while the tracking error or its rate is larger than k of its
 //! standard deviations before the change (R. A. Hess, *Journal of Guidance, Control, and Dynamics* 32 (2009): three; here either

@@ -151,7 +151,7 @@ impl Tracker {
         }
     }
 
-    /// Logarithm of the odds that the person changed within the last four seconds, by [`Method::Adaptive`].
+    /// Logarithm of the odds that the person changed within the last four seconds, by [`crate::Method::Adaptive`].
     pub fn change_odds(&self) -> Option<f64> {
         self.recursion.change_odds()
     }

@@ -15,41 +15,31 @@ from .time_varying import TimeVaryingFit
 __all__ = ["identify"]
 
 
-#: What keywords belong to that only some fits have.
-_STEADY_POLYNOMIAL = 'method="pem" and a polynomial structure'
+#: The keywords that each batch estimator takes, from the registry of the library.
+_KEYWORDS = {name: set(keywords) for name, keywords in _pyhoid.batch_estimators()}
+#: What to give in place of a keyword.
+_INSTEAD = {
+    "delay": "; else give nk",
+    "nk": "; else give delay in s",
+    "orders": "; a grey box has remnant_order",
+}
 
 
 def _check(structure: str, method: str, given: Mapping[str, object]) -> None:
-    grey, changing = structure == "grey-box", structure == "time-varying"
-    polynomial = not (grey or changing)
-    searched = polynomial and method == "pem"
-    if searched and given.keys().isdisjoint(
-        ("instruments", "remnant_order", "individual", "delay")
-    ):
-        # None of the rules below can apply; a fit of a millisecond should not wait for them.
+    """Refuse a keyword that belongs to another estimator."""
+    own = _KEYWORDS.get(structure) or _KEYWORDS.get(method)
+    if own is None:
+        # The native module names the methods that there are.
         return
-    rules = [
-        ("initial_state", method != "pem", 'method="pem"'),
-        ("search_method", method != "pem", 'method="pem"'),
-        ("fix", method != "pem", 'method="pem"'),
-        ("bound", method != "pem", 'method="pem"'),
-        ("instruments", method == "pem", 'method="iv4", "sriv" or "rivbj"'),
-        ("remnant_order", not grey, 'structure="grey-box"'),
-        ("individual", not grey, 'structure="grey-box"'),
-        ("delay", polynomial, 'structure="grey-box" or "time-varying"; else give nk'),
-        ("nk", not polynomial, "a polynomial structure; else give delay in s"),
-        *(
-            (name, grey, "a polynomial structure; a grey box has remnant_order")
-            for name in ("na", "nb", "nc", "nd", "nf")
-        ),
-        *(
-            (name, not searched, _STEADY_POLYNOMIAL)
-            for name in ("start", "prior", "robust", "stable", "focus")
-        ),
-    ]
-    for name, wrong, belongs in rules:
-        if wrong and name in given:
-            raise OptionError(f"{name} belongs to {belongs}")
+    for name in given:
+        option = "orders" if name in ("na", "nb", "nc", "nd", "nf") else name
+        of = [estimator for estimator, keywords in _KEYWORDS.items() if option in keywords]
+        if of and option not in own:
+            names = ", ".join(
+                f'structure="{one}"' if one in ("grey-box", "time-varying") else f'method="{one}"'
+                for one in of
+            )
+            raise OptionError(f"{name} belongs to {names}{_INSTEAD.get(option, '')}")
 
 
 if TYPE_CHECKING:

@@ -3,7 +3,11 @@
 use std::{ops::RangeInclusive, path::PathBuf};
 
 use clap::Args;
-use hoid_ident::{Focus, InitialState, IvMethod, SearchMethod, order_selection::Criterion};
+use hoid_ident::{
+    Focus, InitialState, IvMethod, SearchMethod, estimator_setting, estimators,
+    order_selection::Criterion,
+    settings::{Kind, MethodSpec},
+};
 use hoid_model::{ContinuousTransferFunction, Structure, remnant::RemnantDiscretisation};
 
 use super::{
@@ -29,64 +33,45 @@ pub struct IdentifyArgs {
     /// How: pem the prediction error method; iv4 (for arx), sriv (for oe), rivbj (for bj) instrumental variables
     #[arg(long, value_name = "NAME", default_value = "pem", value_parser = by_name(fit_methods()))]
     pub method: std::option::Option<IvMethod>,
-    /// Instruments of iv4, sriv and rivbj: a channel that the noise does not reach, or `simulated` from the input, for an open
-    /// loop [default: f_t where all records have it, else simulated]
-    #[arg(long, value_name = "CHANNEL|simulated")]
+    #[arg(long, help = about("instruments"), value_name = "CHANNEL|simulated")]
     pub instruments: Option<String>,
-    /// Order m of the remnant, a number or a range to search, for grey-box [default: 1..4]
-    #[arg(long, value_name = "M|LO..HI", value_parser = parse_range)]
+    #[arg(long, help = about("remnant_order"), value_name = "M|LO..HI", value_parser = parse_range)]
     pub remnant_order: Option<RangeInclusive<usize>>,
-    /// Shortest and longest delay tau_e in s, for grey-box and time-varying [default: 0.05..0.6]
-    #[arg(long, value_name = "LO..HI", value_parser = parse_span)]
+    #[arg(long, help = about("delay"), value_name = "LO..HI", value_parser = parse_span)]
     pub delay: Option<(f64, f64)>,
-    /// Parameters that each record has for itself, as K_e,T_L, for grey-box
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(long, help = about("individual"), value_name = "NAMES", value_delimiter = ',')]
     pub individual: Vec<String>,
     /// Write K_e, T_L and K_e_dot over time into this file (CSV, Parquet, NPZ or .mat), for time-varying
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
-    /// Orders, each a number or a range to search, as nb=2,nc=0,nd=1..4,nf=2; nb counts b0, b1, ...
-    /// [default: the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2]
-    #[arg(long, value_name = "LIST")]
+    #[arg(long, help = about("orders"), value_name = "LIST")]
     pub orders: Option<String>,
-    /// Delay of b0 in samples, a number or a range to search [default: 0.05 to 0.6 s]
-    #[arg(long, value_name = "N|LO..HI", value_parser = parse_range)]
+    #[arg(long, help = about("nk"), value_name = "N|LO..HI", value_parser = parse_range)]
     pub nk: Option<RangeInclusive<usize>>,
     /// What decides between candidates when something is searched
     #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_of(&Criterion::ALL))]
     pub criterion: Criterion,
-    /// Initial states of each record; auto: estimate, and backcast for an output alone (ar, ma, arma)
-    #[arg(long, value_name = "RULE", default_value = "auto", value_parser = by_name(initial_states()))]
+    #[arg(long, help = about("initial_state"), value_name = "RULE", default_value = "auto", value_parser = by_name(initial_states()))]
     pub initial_state: std::option::Option<InitialState>,
-    /// Start of the search, all coefficients as f1=-1.9,f2=.92,b0=.04,... [default: own starts]
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    #[arg(long, help = about("start"), value_name = "LIST", allow_hyphen_values = true)]
     pub start: Option<String>,
-    /// Coefficients held at a value, as d1=-0.85,f1=-1.9
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    #[arg(long, help = about("fix"), value_name = "LIST", allow_hyphen_values = true)]
     pub fix: Option<String>,
-    /// Bounds of coefficients, as b0=0..0.2,f2=..0.99; an end may be left open
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    #[arg(long, help = about("bound"), value_name = "LIST", allow_hyphen_values = true)]
     pub bound: Option<String>,
-    /// Guesses of coefficients with a weight W, as f1=-1.9:0.5: the loss grows by W (f1 + 1.9)^2
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    #[arg(long, help = about("prior"), value_name = "LIST", allow_hyphen_values = true)]
     pub prior: Option<String>,
-    /// Loss of Huber instead of squares: residuals beyond K standard deviations count linearly
-    #[arg(long, value_name = "K", num_args = 0..=1, default_missing_value = "1.345")]
+    #[arg(long, help = about("robust"), value_name = "K", num_args = 0..=1, default_missing_value = "1.345")]
     pub robust: Option<f64>,
-    /// What the model is to be good at: one-step prediction, or simulation from the input alone
-    #[arg(long, value_name = "WHAT", default_value = "prediction", value_parser = choice_of(&Focus::ALL))]
+    #[arg(long, help = about("focus"), value_name = "WHAT", default_value = "prediction", value_parser = choice_of(&Focus::ALL))]
     pub focus: Focus,
-    /// Take only models that are stable from e to u (C and F always are stable)
-    #[arg(long)]
+    #[arg(long, help = about("stable"))]
     pub stable: bool,
-    /// How the search steps: gn Gauss-Newton, lm Levenberg-Marquardt, grad steepest descent
-    #[arg(long, value_name = "METHOD", default_value = "auto", value_parser = choice_of(&SearchMethod::ALL))]
+    #[arg(long, help = about("search_method"), value_name = "METHOD", default_value = "auto", value_parser = choice_of(&SearchMethod::ALL))]
     pub search_method: SearchMethod,
-    /// Largest number of search steps from each start
-    #[arg(long, value_name = "N", default_value_t = 100)]
+    #[arg(long, help = about("max_iterations"), value_name = "N", default_value_t = 100)]
     pub max_iterations: usize,
-    /// Relative decrease of the loss below which the search has converged
-    #[arg(long, value_name = "X", default_value = "1e-12")]
+    #[arg(long, help = about("tolerance"), value_name = "X", default_value = "1e-12")]
     pub tolerance: f64,
     /// Discretisation that is inverted to get T_n and K_n from the noise model
     #[arg(long, value_name = "NAME", default_value = "zoh", value_parser = choice_of(&RemnantDiscretisation::ALL))]
@@ -138,4 +123,32 @@ fn fit_methods() -> impl Iterator<Item = (&'static str, Option<IvMethod>)> {
 fn initial_states() -> impl Iterator<Item = (&'static str, Option<InitialState>)> {
     let rules = InitialState::ALL.map(|rule| (rule.name(), Some(rule)));
     [("auto", None)].into_iter().chain(rules)
+}
+
+/// Help of an option, from the registry of estimators: what it does, what it belongs to where that is not all, its default.
+fn about(name: &str) -> String {
+    let all = estimators();
+    let Some(setting) = estimator_setting(name) else {
+        return String::new();
+    };
+    let of = estimators_with(name, &all);
+    let mut text = setting.help;
+    if !setting.unit.is_empty() {
+        text.push_str(&format!(", {}", setting.unit));
+    }
+    if of.len() < all.len() {
+        text.push_str(&format!(" [for {}]", of.join(", ")));
+    }
+    // Where clap knows the default it prints it itself.
+    let known = matches!(setting.kind, Kind::Choice(_) | Kind::Flag) || ["max_iterations", "tolerance"].contains(&name);
+    if !known && !setting.default.is_empty() {
+        text.push_str(&format!(" [default: {}]", setting.default));
+    }
+    text
+}
+
+/// The estimators that have an option.
+pub fn estimators_with<'s>(name: &str, all: &'s [MethodSpec]) -> Vec<&'s str> {
+    let has = |spec: &&MethodSpec| spec.settings.iter().any(|setting| setting.name == name);
+    all.iter().filter(has).map(|spec| spec.name).collect()
 }

@@ -25,7 +25,7 @@ mod study;
 pub use cli::{Cli, Command};
 pub use convert::{ConvertArgs, InfoArgs};
 pub use group::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs};
-pub use identify::{IdentifyArgs, ModelKind};
+pub use identify::{IdentifyArgs, ModelKind, estimators_with};
 pub use parse::parse_span;
 pub use reading::{MaskArgs, ReadArgs};
 pub use recursion::{RecursionArgs, StreamArgs, TrackArgs};

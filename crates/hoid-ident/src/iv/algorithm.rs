@@ -9,8 +9,12 @@ use crate::{IdentError, Termination, criterion::Criterion};
 pub(super) struct Algorithm {
     /// Short name, as in options and tables.
     pub name: &'static str,
-    /// The structure that it fits.
-    pub structure: Structure,
+    /// What it is, in a line without a full stop.
+    pub help: &'static str,
+    /// Where it comes from.
+    pub source: &'static str,
+    /// The structure that it fits, alone.
+    pub structures: &'static [Structure; 1],
     /// Theta, its covariance, and how the iteration ended.
     pub solve: fn(&IvProblem<'_>, &Criterion<'_>, IterationLimits) -> Result<IvSolution, IdentError>,
 }

@@ -21,7 +21,9 @@ use crate::{IdentError, Reason, Termination, criterion::Criterion, noise_model::
 
 pub(super) const ALGORITHM: Algorithm = Algorithm {
     name: "iv4",
-    structure: Structure::Arx,
+    help: "four-step instrumental variables",
+    source: "Ljung 1999, section 15.3",
+    structures: &[Structure::Arx],
     solve,
 };
 

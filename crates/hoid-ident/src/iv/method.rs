@@ -44,9 +44,24 @@ impl IvMethod {
         self.algorithm().name
     }
 
+    /// What it is, in a line without a full stop.
+    pub fn help(self) -> &'static str {
+        self.algorithm().help
+    }
+
+    /// Where it comes from.
+    pub fn source(self) -> &'static str {
+        self.algorithm().source
+    }
+
     /// The structure that the method fits.
     pub fn structure(self) -> Structure {
-        self.algorithm().structure
+        self.algorithm().structures[0]
+    }
+
+    /// The structure that the method fits, as a list.
+    pub fn structures(self) -> &'static [Structure] {
+        self.algorithm().structures
     }
 }
 

@@ -26,7 +26,9 @@ use crate::{
 
 pub(super) const ALGORITHM: Algorithm = Algorithm {
     name: "rivbj",
-    structure: Structure::BoxJenkins,
+    help: "refined instrumental variable",
+    source: "Young 2011, chapter 7; Young 2015",
+    structures: &[Structure::BoxJenkins],
     solve,
 };
 

@@ -17,7 +17,9 @@ use crate::{IdentError, Reason, criterion::Criterion};
 
 pub(super) const ALGORITHM: Algorithm = Algorithm {
     name: "sriv",
-    structure: Structure::OutputError,
+    help: "simplified refined instrumental variable",
+    source: "Young 2011, chapter 6",
+    structures: &[Structure::OutputError],
     solve,
 };
 

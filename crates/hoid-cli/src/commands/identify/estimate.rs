@@ -2,13 +2,13 @@
 
 use hoid_ident::{
     Choice, Estimator, Fit, Focus, GreyBox, GreyBoxFit, InstrumentalVariable, Instruments, Loss, SearchMethod,
-    SearchOptions,
+    SearchOptions, estimators,
     order_selection::{OrderRanges, fit_or_choose},
 };
 use hoid_model::{Record, Structure};
 
 use crate::{
-    args::{IdentifyArgs, ModelKind},
+    args::{IdentifyArgs, ModelKind, estimators_with, flag},
     error::CliError,
     orders, output,
 };
@@ -39,74 +39,54 @@ pub fn kind(args: &IdentifyArgs) -> Result<ModelKind, CliError> {
             own
         }
     };
-    match misplaced(args, kind, method.is_some()) {
+    match misplaced(args, kind) {
         Some((option, with)) => Err(CliError::Usage(format!("{option} belongs to {with}"))),
         None => Ok(kind),
     }
 }
 
 /// The first option that has no meaning for this kind of fit, and what it belongs to.
-fn misplaced(args: &IdentifyArgs, kind: ModelKind, by_instruments: bool) -> Option<(&'static str, &'static str)> {
-    let polynomial = matches!(kind, ModelKind::Polynomial(_));
-    let by_search = polynomial && !by_instruments;
-    let (grey_box, changing) = (kind == ModelKind::GreyBox, kind == ModelKind::TimeVarying);
-    let search = "--method pem and a polynomial structure";
-    let steady = "a model that does not change";
+fn misplaced(args: &IdentifyArgs, kind: ModelKind) -> Option<(String, String)> {
+    let estimator = match (kind, args.method) {
+        (ModelKind::GreyBox, _) => "grey-box",
+        (ModelKind::TimeVarying, _) => "time-varying",
+        (_, Some(method)) => method.name(),
+        (_, None) => "pem",
+    };
+    let given = [
+        ("instruments", args.instruments.is_some()),
+        ("remnant_order", args.remnant_order.is_some()),
+        ("individual", !args.individual.is_empty()),
+        ("delay", args.delay.is_some()),
+        ("nk", args.nk.is_some()),
+        ("orders", args.orders.is_some()),
+        ("initial_state", args.initial_state.is_some()),
+        ("start", args.start.is_some()),
+        ("fix", args.fix.is_some()),
+        ("bound", args.bound.is_some()),
+        ("prior", args.prior.is_some()),
+        ("robust", args.robust.is_some()),
+        ("focus", args.focus != Focus::default()),
+        ("stable", args.stable),
+        ("search_method", args.search_method != SearchMethod::default()),
+    ];
+    let all = estimators();
+    for (name, _) in given.into_iter().filter(|(_, given)| *given) {
+        let of = estimators_with(name, &all);
+        if !of.contains(&estimator) {
+            return Some((format!("--{}", flag(name)), belongs_to(name, &of)));
+        }
+    }
+    let changing = kind == ModelKind::TimeVarying;
     let input = !matches!(kind, ModelKind::Polynomial(structure) if !structure.has_input());
-    let options = [
+    let steady = "a model that does not change";
+    let others = [
         (
             args.controlled_element.is_some() && !input,
             "--controlled-element",
             "a structure with an input",
         ),
-        (
-            args.initial_state.is_some() && by_instruments,
-            "--initial-state",
-            "--method pem",
-        ),
-        (
-            args.search_method != SearchMethod::Automatic && by_instruments,
-            "--search-method",
-            "--method pem",
-        ),
-        (
-            args.instruments.is_some() && !by_instruments,
-            "--instruments",
-            "--method iv4, sriv or rivbj",
-        ),
-        (
-            args.remnant_order.is_some() && !grey_box,
-            "--remnant-order",
-            "--structure grey-box",
-        ),
-        (
-            !args.individual.is_empty() && !grey_box,
-            "--individual",
-            "--structure grey-box",
-        ),
-        (
-            args.delay.is_some() && polynomial,
-            "--delay",
-            "--structure grey-box or time-varying; else give --nk",
-        ),
-        (
-            args.nk.is_some() && !polynomial,
-            "--nk",
-            "a polynomial structure; else give --delay in s",
-        ),
-        (
-            args.orders.is_some() && grey_box,
-            "--orders",
-            "a polynomial structure; a grey box has --remnant-order",
-        ),
         (args.trace.is_some() && !changing, "--trace", "--structure time-varying"),
-        (args.start.is_some() && !by_search, "--start", search),
-        (args.prior.is_some() && !by_search, "--prior", search),
-        (args.robust.is_some() && !by_search, "--robust", search),
-        (args.stable && !by_search, "--stable", search),
-        (args.focus != Focus::Prediction && !by_search, "--focus", search),
-        (args.fix.is_some() && by_instruments, "--fix", "--method pem"),
-        (args.bound.is_some() && by_instruments, "--bound", "--method pem"),
         (args.validate.is_some() && changing, "--validate", steady),
         (args.horizon.is_some() && changing, "--horizon", steady),
         (
@@ -120,9 +100,24 @@ fn misplaced(args: &IdentifyArgs, kind: ModelKind, by_instruments: bool) -> Opti
             "a model that does not change; --trace writes the gains",
         ),
     ];
-    options
-        .into_iter()
-        .find_map(|(wrong, option, with)| wrong.then_some((option, with)))
+    let found = others.into_iter().find(|(wrong, _, _)| *wrong);
+    found.map(|(_, option, with)| (option.to_owned(), with.to_owned()))
+}
+
+/// What an option belongs to, and what to give in its place.
+fn belongs_to(name: &str, of: &[&str]) -> String {
+    let flag = |name: &&str| match *name {
+        "grey-box" | "time-varying" => format!("--structure {name}"),
+        _ => format!("--method {name}"),
+    };
+    let instead = match name {
+        "delay" => "; else give --nk",
+        "nk" => "; else give --delay in s",
+        "orders" => "; a grey box has --remnant-order",
+        _ => "",
+    };
+    let flags: Vec<String> = of.iter().map(flag).collect();
+    format!("{}{instead}", flags.join(", "))
 }
 
 /// Fits what was asked for.
