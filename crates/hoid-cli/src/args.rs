@@ -2,17 +2,16 @@
 
 use std::{ops::RangeInclusive, path::PathBuf};
 
-use clap::{
-    Args, Parser, Subcommand, ValueEnum,
-    builder::{PossibleValuesParser, TypedValueParser},
-};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use hoid_ident::{Focus, InitialState, IvMethod, SearchMethod, order_selection::Criterion};
 use hoid_model::{
-    ContinuousTransferFunction, NamedChoice, Structure, discretise,
+    ContinuousTransferFunction, Structure, discretise,
     remnant::RemnantDiscretisation,
     remnant_gain::NoiseDefinition,
     scenario::{Condition, Realisation},
 };
+
+use choice::{by_name, choice_of};
 
 use crate::orders::{parse_numbers, parse_range};
 
@@ -309,25 +308,6 @@ impl Kind {
     }
 }
 
-/// One of some choices of the library, by its name.
-fn choice_of<T: NamedChoice + Send + Sync>(choices: &'static [T]) -> impl TypedValueParser<Value = T> {
-    by_name(choices.iter().map(|choice| (choice.choice_name(), *choice)))
-}
-
-/// One of some values by its name.
-fn by_name<T: Clone + Send + Sync + 'static>(
-    values: impl IntoIterator<Item = (&'static str, T)>,
-) -> impl TypedValueParser<Value = T> {
-    let values: Vec<(&str, T)> = values.into_iter().collect();
-    let names: Vec<&'static str> = values.iter().map(|(name, _)| *name).collect();
-    PossibleValuesParser::new(names).try_map(move |typed| {
-        let found = values.iter().find(|(name, _)| *name == typed);
-        found
-            .map(|(_, value)| value.clone())
-            .ok_or("not among the possible values")
-    })
-}
-
 /// `LO..HI`, finite and in order.
 fn parse_span(text: &str) -> Result<(f64, f64), String> {
     let number = |part: &str| part.trim().parse::<f64>().ok().filter(|v| v.is_finite());
@@ -353,6 +333,7 @@ macro_rules! names {
     };
 }
 
+mod choice;
 mod group;
 mod reading;
 mod recursion;

@@ -4,7 +4,7 @@ use clap::Args;
 use hoid_io::{Offset, QualityIssueKind, Scaling};
 use hoid_model::Detrend;
 
-use super::choice_of;
+use super::choice::choice_of;
 
 /// How record files are read.
 #[derive(Debug, Args)]

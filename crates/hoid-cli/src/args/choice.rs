@@ -1,0 +1,23 @@
+//! Options whose values are choices of the library: the names are the library's own.
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use hoid_model::NamedChoice;
+
+/// One of some choices of the library, by its name.
+pub fn choice_of<T: NamedChoice + Send + Sync>(choices: &'static [T]) -> impl TypedValueParser<Value = T> {
+    by_name(choices.iter().map(|choice| (choice.choice_name(), *choice)))
+}
+
+/// One of some values by its name.
+pub fn by_name<T: Clone + Send + Sync + 'static>(
+    values: impl IntoIterator<Item = (&'static str, T)>,
+) -> impl TypedValueParser<Value = T> {
+    let values: Vec<(&str, T)> = values.into_iter().collect();
+    let names: Vec<&'static str> = values.iter().map(|(name, _)| *name).collect();
+    PossibleValuesParser::new(names).try_map(move |typed| {
+        let found = values.iter().find(|(name, _)| *name == typed);
+        found
+            .map(|(_, value)| value.clone())
+            .ok_or("not among the possible values")
+    })
+}
