@@ -7,19 +7,21 @@ use super::{ALL, csv};
 use crate::IoError;
 use crate::format::{Format, Writing};
 
-/// The endings of the files that can be read, for help texts: ".csv (also as .txt), .tsv, ... or .xdf".
+/// The endings of the files that can be read, for help texts and messages: `.csv (also as .txt), .tsv, ... or .xdf`.
 #[must_use]
 pub fn readable_endings() -> String {
-    endings(|_| true)
+    endings(ALL)
 }
 
-/// The endings of the files that can be written, for help texts.
+/// The endings of the files that can be written, for help texts and messages.
 #[must_use]
 pub fn writable_endings() -> String {
-    endings(Format::is_written)
+    let written: Vec<&Format> = ALL.iter().copied().filter(|format| format.is_written()).collect();
+    endings(&written)
 }
 
-fn endings(holds: impl Fn(&Format) -> bool) -> String {
+/// The endings of some formats in words.
+fn endings(formats: &[&Format]) -> String {
     let of_one = |format: &&Format| {
         let dotted: Vec<String> = format.endings.iter().map(|ending| format!(".{ending}")).collect();
         match dotted.as_slice() {
@@ -27,12 +29,7 @@ fn endings(holds: impl Fn(&Format) -> bool) -> String {
             all => all.concat(),
         }
     };
-    let all: Vec<String> = ALL
-        .iter()
-        .copied()
-        .filter(|format| holds(format))
-        .map(|f| of_one(&f))
-        .collect();
+    let all: Vec<String> = formats.iter().map(of_one).collect();
     match all.as_slice() {
         [others @ .., last] if !others.is_empty() => format!("{} or {last}", others.join(", ")),
         all => all.concat(),
@@ -102,13 +99,12 @@ mod tests {
 
     #[test]
     fn endings_in_words() {
+        assert_eq!(endings(&[&csv::CSV]), ".csv (also as .txt)");
         assert_eq!(
-            readable_endings(),
-            ".csv (also as .txt), .tsv, .parquet (also as .pq), .npz, .npy, .mat or .xdf"
+            endings(&[&csv::CSV, &csv::TSV, &csv::TSV]),
+            ".csv (also as .txt), .tsv or .tsv"
         );
-        assert_eq!(
-            writable_endings(),
-            ".csv (also as .txt), .tsv, .parquet (also as .pq), .npz or .mat"
-        );
+        assert!(readable_endings().contains(".xdf"));
+        assert!(!writable_endings().contains(".xdf"));
     }
 }
