@@ -22,7 +22,8 @@ impl Counts {
         }
     }
 
-    /// Adds a line such as `test result: ok. 7 passed; 0 failed; 0 ignored; ...`; other lines count nothing.
+    /// Adds a line such as `test result: ok. 7 passed; 0 failed; 0 ignored; ...`; other lines count
+    /// nothing.
     pub fn add(&mut self, line: &str) {
         let Some(numbers) = line.strip_prefix("test result: ") else {
             return;
@@ -41,7 +42,8 @@ impl Counts {
         }
     }
 
-    /// Adds the last line of pytest, as `=== 2 failed, 85 passed, 1 skipped in 61.20s (0:01:01) ===`.
+    /// Adds the last line of pytest, as
+    /// `=== 2 failed, 85 passed, 1 skipped in 61.20s (0:01:01) ===`.
     pub fn add_pytest(&mut self, line: &str) {
         let Some((numbers, time)) = line.trim_matches(['=', ' ']).rsplit_once(" in ") else {
             return;

@@ -45,8 +45,9 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs all tests, passing further arguments on to `cargo test`, and closes with their number over all crates and the Python package, whose
-/// tests are left out where the arguments choose some tests of Rust.
+/// Runs all tests, passing further arguments on to `cargo test`, and closes with their number over
+/// all crates and the Python package, whose tests are left out where the arguments choose some
+/// tests of Rust.
 fn test(arguments: &[String]) -> Result<(), String> {
     let mut command = cargo_command();
     command.args(["test", "--workspace", "--no-fail-fast"]).args(arguments);

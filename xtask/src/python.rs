@@ -1,7 +1,8 @@
 //! The tests of the Python package: a fresh virtual environment, the wheel, pytest.
 //!
-//! The wheel is built with the profile of the tests and in their target folder, so that what they have compiled is not compiled again; the test
-//! requirements come from PyPI. `HOID_PYTHON` names another interpreter than `python3`.
+//! The wheel is built with the profile of the tests and in their target folder, so that what they
+//! have compiled is not compiled again; the test requirements come from PyPI. `HOID_PYTHON` names
+//! another interpreter than `python3`.
 
 use std::{
     env, fs,
@@ -29,7 +30,8 @@ pub fn test(arguments: &[String]) -> Result<Counts, String> {
     let wheels = work.join("wheels");
     let _ = fs::remove_dir_all(&wheels);
     pip(&python, &["maturin>=1.9.4,<2"])?;
-    // The same command line as the tests', to compare with; with the tests, because alone it has other features and would be compiled again.
+    // The same command line as the tests', to compare with; with the tests, because alone it has
+    // other features and would be compiled again.
     cargo(&["build", "--quiet", "--workspace", "--bins", "--tests"], &[])?;
     run(Command::new(&python)
         .args(["-m", "maturin", "build", "--profile", "dev"])

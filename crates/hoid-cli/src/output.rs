@@ -1,4 +1,5 @@
-//! Standard output and standard error. A reader that closes the pipe early (`hoid ... | head`) ends the program quietly.
+//! Standard output and standard error. A reader that closes the pipe early (`hoid ... | head`) ends
+//! the program quietly.
 
 use std::io::{self, Write};
 
@@ -20,7 +21,8 @@ pub fn message(text: &str) {
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
-/// A progress bar on standard error with rate and time left; invisible where standard error is no terminal.
+/// A progress bar on standard error with rate and time left; invisible where standard error is no
+/// terminal.
 pub fn progress(total: usize, what: &str) -> ProgressBar {
     let bar = ProgressBar::new(total as u64);
     // Should the template be wrong, the plain bar does as well.

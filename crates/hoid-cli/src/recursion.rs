@@ -10,7 +10,8 @@ use crate::{
     orders, output,
 };
 
-/// A recursion as it was typed, its options checked against each other; of the orders some may still be ranges.
+/// A recursion as it was typed, its options checked against each other; of the orders some may
+/// still be ranges.
 pub struct Plan {
     plan: TrackPlan,
     sample_time: SampleTime,
@@ -141,7 +142,8 @@ impl Plan {
     }
 }
 
-/// Orders as typed; what would be searched is that of the start where one was typed, and the delay lies within the range that is tracked.
+/// Orders as typed; what would be searched is that of the start where one was typed, and the delay
+/// lies within the range that is tracked.
 fn ranges(
     args: &RecursionArgs,
     method: &Method,

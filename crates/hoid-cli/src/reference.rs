@@ -1,4 +1,5 @@
-//! Pages and types that are made from the registry of methods: the book's page of options and the keywords of the Python package.
+//! Pages and types that are made from the registry of methods: the book's page of options and the
+//! keywords of the Python package.
 //!
 //! `HOID_UPDATE_DOCS=1 cargo test -p hoid-cli` renews them.
 
@@ -216,7 +217,8 @@ mod tests {
         is_as_written("python/src/pyhoid/_settings.py", &python_settings(&Method::registry()));
     }
 
-    /// Every option of the registry of estimators is a flag of `hoid identify`, with its default where clap knows one.
+    /// Every option of the registry of estimators is a flag of `hoid identify`, with its default
+    /// where clap knows one.
     #[test]
     fn identify_has_the_options_of_the_registry() {
         let mut cli = Cli::command();

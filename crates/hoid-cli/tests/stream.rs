@@ -18,7 +18,8 @@ use tempfile::TempDir;
 
 use common::{bad, good, json};
 
-/// Far beyond what a line takes, so that a slow machine fails no test and a line that never comes does not hang.
+/// Far beyond what a line takes, so that a slow machine fails no test and a line that never comes
+/// does not hang.
 const PATIENCE: Duration = Duration::from_secs(60);
 const AT_ONCE: [&str; 8] = [
     "--method", "rpem", "--nk", "29", "--orders", "nd=1", "--start", "nothing",

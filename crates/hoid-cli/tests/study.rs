@@ -192,7 +192,8 @@ fn a_run_of_a_study_can_be_repeated_by_hand() {
         .iter()
         .find(|l| l[column("cell")] == "1" && l[column("replication")] == "1" && l[column("nd")] == "2.0")
         .unwrap();
-    // A study fits its runs side by side, which differs from a fit alone by rounding: less than 1e-7 of a standard error, here of about 0.01.
+    // A study fits its runs side by side, which differs from a fit alone by rounding: less than
+    // 1e-7 of a standard error, here of about 0.01.
     let of_study = row[column("f1")].parse::<f64>().unwrap();
     assert!((of_study - value).abs() < 1e-9, "{of_study} {value}");
 }

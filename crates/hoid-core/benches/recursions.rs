@@ -1,5 +1,5 @@
-//! Cost of a step of each recursion with its history kept: 8192 samples, divide by 8192 for a sample.
-//! Run with `cargo bench -p hoid-core`.
+//! Cost of a step of each recursion with its history kept: 8192 samples, divide by 8192 for a
+//! sample. Run with `cargo bench -p hoid-core`.
 
 #![allow(missing_docs, clippy::unwrap_used)]
 
@@ -22,7 +22,8 @@ use hoid_core::{
 
 const SAMPLES: usize = 8192;
 
-/// Input and output of a Box-Jenkins model with the poles of the operator, and noise of a fixed generator.
+/// Input and output of a Box-Jenkins model with the poles of the operator, and noise of a fixed
+/// generator.
 fn data() -> Vec<(f64, f64)> {
     let mut state = 1u64;
     let mut noise = move || {
@@ -107,7 +108,8 @@ fn rpem<S: Shape, const N: usize, const K: usize>(
     }
 }
 
-/// As a user without error bars would have it, for the comparison with peers that have none: no guard, no limit on outliers.
+/// As a user without error bars would have it, for the comparison with peers that have none: no
+/// guard, no limit on outliers.
 fn bare_rls(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
     history.clear();
     let adaptation = Covariance::new(UdCovariance::diagonal([0.1; 4]), scalar(), [f64::INFINITY; 4]);
@@ -166,7 +168,8 @@ fn physical<S: Shape, const N: usize, const K: usize, const L: usize>(
     }
 }
 
-/// The yardstick: recursive least squares with one triangle of a plain covariance and nothing else, no guard, no error bars.
+/// The yardstick: recursive least squares with one triangle of a plain covariance and nothing else,
+/// no guard, no error bars.
 fn plain(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
     history.clear();
     let (mut theta, mut psi) = ([0.0; 4], [0.0; 4]);

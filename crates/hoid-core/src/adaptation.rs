@@ -1,8 +1,10 @@
 //! From the gradient and the innovation to the step of the estimate.
 //!
-//! A recursion with the negative gradient psi and the innovation eps moves by `g eps`. The gain is that of the prediction-error
-//! method, `g = P psi/(1 + psi' P psi)`, `P <- P - g psi' P` (eq. 5.26, 31; L. Ljung and T. Söderström, *Theory and Practice of Recursive
-//! Identification*, 1983, section 3.4), with P in units of the innovation variance. Before that, P grows by what is forgotten:
+//! A recursion with the negative gradient psi and the innovation eps moves by `g eps`. The gain is
+//! that of the prediction-error method, `g = P psi/(1 + psi' P psi)`, `P <- P - g psi' P` (eq.
+//! 5.26, 31; L. Ljung and T. Söderström, *Theory and Practice of Recursive Identification*, 1983,
+//! section 3.4), with P in units of the innovation variance. Before that, P grows by what is
+//! forgotten:
 //!
 //! | way of forgetting | P | source |
 //! |---|---|---|
@@ -12,15 +14,17 @@
 //! | [`Forgetting::Directional`] | along psi only: measurement with `R = 1/beta`, `beta = lambda - (1 - lambda)/(psi' P psi)` | R. Kulhavý, *Automatica* 23 (1987) 589-600 |
 //! | [`Forgetting::Gradient`] | none: `g = gamma psi/(c + psi' psi)`, c a hundredth of the largest mean power of psi so far | Ljung and Söderström, section 3.5 |
 //!
-//! [`crate::covariance`] carries out these rules; a rectangular window is an adaptation of its own, [`crate::window`]. The uncertainty of an estimate
-//! that was made with such a gain: [`crate::error_bars`].
+//! [`crate::covariance`] carries out these rules; a rectangular window is an adaptation of its own,
+//! [`crate::window`]. The uncertainty of an estimate that was made with such a gain:
+//! [`crate::error_bars`].
 
 use crate::error_bars::{ErrorBars, ErrorPropagation};
 
 /// How the weight of old information decays.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Forgetting<const N: usize> {
-    /// A factor `0 < lambda_i <= 1` for each parameter; all equal for the scalar factor, all 1 for an infinite memory.
+    /// A factor `0 < lambda_i <= 1` for each parameter; all equal for the scalar factor, all 1 for
+    /// an infinite memory.
     Exponential {
         /// The factors.
         lambda: [f64; N],
@@ -66,9 +70,11 @@ impl<const N: usize> ParameterStep<N> {
     };
 }
 
-/// What turns gradients into steps: [`crate::covariance::Covariance`] and [`crate::window::Window`].
+/// What turns gradients into steps: [`crate::covariance::Covariance`] and
+/// [`crate::window::Window`].
 pub trait Adaptation<const N: usize> {
-    /// The step for psi and the innovation eps at theta. `variance` is sigma^2, zero where it is not known.
+    /// The step for psi and the innovation eps at theta. `variance` is sigma^2, zero where it is
+    /// not known.
     fn update(&mut self, psi: &[f64; N], eps: f64, theta: &[f64; N], variance: f64) -> ParameterStep<N>;
     /// Covariance of theta over sigma^2, for an adaptation that knows it without [`ErrorBars`].
     fn own_covariance(&self) -> Option<[[f64; N]; N]> {

@@ -2,9 +2,10 @@
 //!
 //! The equations stand in [`crate::adaptation`].
 //!
-//! **Windup.** Where nothing excites a direction, forgetting alone would let P grow without limit. In turn each parameter gets a
-//! pseudo-measurement of the value that it has: the estimate stays, and `P^{-1} >= diag(1/bound_i)` up to what is forgotten in one round. Its
-//! information is the part of `1/bound_i` that was forgotten since the last turn of that parameter.
+//! **Windup.** Where nothing excites a direction, forgetting alone would let P grow without limit.
+//! In turn each parameter gets a pseudo-measurement of the value that it has: the estimate stays,
+//! and `P^{-1} >= diag(1/bound_i)` up to what is forgotten in one round. Its information is the
+//! part of `1/bound_i` that was forgotten since the last turn of that parameter.
 
 use crate::{
     adaptation::{Adaptation, Forgetting, ParameterStep},
@@ -12,7 +13,8 @@ use crate::{
     ud_covariance::UdCovariance,
 };
 
-/// Rounds of the guard within the shortest memory, as far as N allows: between two of its turns a variance grows by e^{1/4} at most.
+/// Rounds of the guard within the shortest memory, as far as N allows: between two of its turns a
+/// variance grows by e^{1/4} at most.
 const ROUNDS_PER_MEMORY: f64 = 4.0;
 /// `psi' P psi` below which nothing is measured.
 const NO_EXCITATION: f64 = 1e-100;
@@ -40,10 +42,12 @@ pub struct Covariance<const N: usize> {
     bound: [f64; N],
     /// Information of the pseudo-measurement of each parameter, per unit of what is forgotten.
     guard: [f64; N],
-    /// What has been forgotten since the start, now and at the last pseudo-measurement of each parameter.
+    /// What has been forgotten since the start, now and at the last pseudo-measurement of each
+    /// parameter.
     forgotten: f64,
     forgotten_at_turn: [f64; N],
-    /// What an early sample forgets in addition, and the factor by which that decays from sample to sample.
+    /// What an early sample forgets in addition, and the factor by which that decays from sample to
+    /// sample.
     early: f64,
     early_decay: f64,
     /// Mean power of psi, and the largest so far, for the gradient.
@@ -60,7 +64,8 @@ crate::state!([const N: usize] Covariance<N> {
 });
 
 impl<const N: usize> Covariance<N> {
-    /// `factors` is P at the start. `bound` is the largest variance of each parameter, in the units of P; infinite for none.
+    /// `factors` is P at the start. `bound` is the largest variance of each parameter, in the units
+    /// of P; infinite for none.
     pub fn new(factors: UdCovariance<N>, forgetting: Forgetting<N>, bound: [f64; N]) -> Self {
         let mut scales = [[1.0; N]; 2];
         let mut uniform_growth = 0.0;
@@ -107,8 +112,9 @@ impl<const N: usize> Covariance<N> {
         }
     }
 
-    /// With a memory that grows at the start, for a recursion that starts far from the truth: before the t-th sample all of P grows by
-    /// `1/(1 - early decay^t)` in addition (Ljung and Söderström, eq. 5.77). The gradients of the first estimates are then forgotten.
+    /// With a memory that grows at the start, for a recursion that starts far from the truth:
+    /// before the t-th sample all of P grows by `1/(1 - early decay^t)` in addition (Ljung and
+    /// Söderström, eq. 5.77). The gradients of the first estimates are then forgotten.
     #[must_use]
     pub fn with_growing_memory(mut self, early: f64, decay: f64) -> Self {
         self.early = early;
@@ -121,7 +127,8 @@ impl<const N: usize> Covariance<N> {
         self.factors.matrix()
     }
 
-    /// The step by every rule and at every time; [`Adaptation::update`] has the usual case beside it.
+    /// The step by every rule and at every time; [`Adaptation::update`] has the usual case beside
+    /// it.
     #[inline(never)]
     fn update_by_rule(&mut self, psi: &[f64; N], eps: f64, variance: f64) -> ParameterStep<N> {
         if self.early > NO_EARLY_FORGETTING {
@@ -196,7 +203,8 @@ impl<const N: usize> Covariance<N> {
         scaled(psi.map(|p| scale * p), eps)
     }
 
-    /// Counts what this sample forgets, and at the end of a period guards the parameter whose turn it is.
+    /// Counts what this sample forgets, and at the end of a period guards the parameter whose turn
+    /// it is.
     #[inline]
     fn count_forgotten(&mut self, forgotten: f64) {
         self.forgotten += forgotten;

@@ -1,6 +1,7 @@
 //! A delay line: `y(t) = x(t - n)`, zero before the first sample.
 
-/// A delay of n samples, with n the length of its memory: a slice, an array or a vector. An empty memory passes its input through.
+/// A delay of n samples, with n the length of its memory: a slice, an array or a vector. An empty
+/// memory passes its input through.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DelayLine<M> {
     memory: M,

@@ -1,22 +1,27 @@
 //! Divided differences of the exponential at two poles, from which every second-order hold follows.
 //!
-//! Poles `z1, z2` times the time enter by their sum `s = z1 + z2` and product `q = z1 z2`. With the complete symmetric polynomials
-//! `h_k = s h_{k-1} - q h_{k-2}`, `h_0 = 1`,
+//! Poles `z1, z2` times the time enter by their sum `s = z1 + z2` and product `q = z1 z2`. With the
+//! complete symmetric polynomials `h_k = s h_{k-1} - q h_{k-2}`, `h_0 = 1`,
 //!
-//! `Phi_j = sum over k of h_k/(k+j)!`: `Phi_1 = exp[z1, z2]`, `Phi_2 = exp[0, z1, z2]`, and `Phi_j = 1/j! + s Phi_{j+1} - q Phi_{j+2}`.
+//! `Phi_j = sum over k of h_k/(k+j)!`: `Phi_1 = exp[z1, z2]`, `Phi_2 = exp[0, z1, z2]`, and
+//! `Phi_j = 1/j! + s Phi_{j+1} - q Phi_{j+2}`.
 //!
-//! All are entire in (s, q): complex, real and double poles and poles at the origin of s are the same functions, only evaluated in
-//! different ways so that nothing cancels:
+//! All are entire in (s, q): complex, real and double poles and poles at the origin of s are the
+//! same functions, only evaluated in different ways so that nothing cancels:
 //!
-//! - small poles: the relation between the Phi_j downwards from `Phi_j = 1/j!` (Clenshaw's summation), beside it the same for the
-//!   slopes `D_j = dPhi_j/ds`, `D_j = Phi_{j+1} + s D_{j+1} - q D_{j+2}`. No division, and no elementary function;
-//! - other poles: with `h = s/2`, `x = h^2 - q`, `E = e^h`, `C = cosh sqrt x`, `S = sinh sqrt x/sqrt x`, `G = dS/dx = (C - S)/(2x)`,
-//!   `Phi_1 = E S`, `q Phi_2 = 1 - E C + h E S`, `D_2 = E G`; for real poles that are far apart by the differences themselves.
+//! - small poles: the relation between the Phi_j downwards from `Phi_j = 1/j!` (Clenshaw's
+//!   summation), beside it the same for the slopes `D_j = dPhi_j/ds`,
+//!   `D_j = Phi_{j+1} + s D_{j+1} - q D_{j+2}`. No division, and no elementary function;
+//! - other poles: with `h = s/2`, `x = h^2 - q`, `E = e^h`, `C = cosh sqrt x`,
+//!   `S = sinh sqrt x/sqrt x`, `G = dS/dx = (C - S)/(2x)`, `Phi_1 = E S`,
+//!   `q Phi_2 = 1 - E C + h E S`, `D_2 = E G`; for real poles that are far apart by the differences
+//!   themselves.
 //!
-//! Sources: N. J. Higham, *Functions of Matrices*, 2008, sections 2.4 and B.16; C. W. Clenshaw, *Mathematical Tables and Other Aids
-//! to Computation* 9, 1955, 118-120.
+//! Sources: N. J. Higham, *Functions of Matrices*, 2008, sections 2.4 and B.16; C. W. Clenshaw,
+//! *Mathematical Tables and Other Aids to Computation* 9, 1955, 118-120.
 
-/// Divided differences of the exponential at one pair of poles; all NaN when the pair is not finite.
+/// Divided differences of the exponential at one pair of poles; all NaN when the pair is not
+/// finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DividedDifferences {
     /// `s = z1 + z2`.
@@ -79,7 +84,8 @@ impl DividedDifferences {
 
     /// `chi = exp[0, z1] exp[0, z2] = (1 - e^z1)(1 - e^z2)/q`.
     ///
-    /// The determinant of `I - e^A` of the companion matrix A over q: for stable poles a sum of positive terms.
+    /// The determinant of `I - e^A` of the companion matrix A over q: for stable poles a sum of
+    /// positive terms.
     pub fn chi(&self) -> f64 {
         self.phi1 * (self.phi1 - self.sum * self.phi2) + self.product * self.phi2 * self.phi2
     }
@@ -231,8 +237,9 @@ mod tests {
         ]
     }
 
-    /// What rounding is measured by: the values themselves; where they pass zero, which they do among fast complex poles, the
-    /// amplitudes of sine and cosine; for those that are sums of others, the sum of the magnitudes.
+    /// What rounding is measured by: the values themselves; where they pass zero, which they do
+    /// among fast complex poles, the amplitudes of sine and cosine; for those that are sums of
+    /// others, the sum of the magnitudes.
     fn scales(s: f64, q: f64, values: &[f64; 8]) -> [f64; 8] {
         let [mut mean, mut phi1, phi2, mut phi2_slope, ..] = values.map(f64::abs);
         let x = s * s / 4.0 - q;
@@ -278,13 +285,15 @@ mod tests {
             let number: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
             let (s, q) = (number[0], number[1]);
             let expected = core::array::from_fn(|i| number[i + 2]);
-            // An ulp each from exponential, root, sine and quotient, and |z|/2 more from their argument, |z| up to 6 for complex
-            // poles. The largest are 2.1 for |z| < 1.4, 2.9 for all but phi2, 8.7 for phi2 at |z| = 6, a difference of its terms.
+            // An ulp each from exponential, root, sine and quotient, and |z|/2 more from their
+            // argument, |z| up to 6 for complex poles. The largest are 2.1 for |z| < 1.4, 2.9 for
+            // all but phi2, 8.7 for phi2 at |z| = 6, a difference of its terms.
             assert_close(s, q, &values(&DividedDifferences::at(s, q)), &expected, 16.0);
         }
     }
 
-    /// A pair of every kind whose size is that of the threshold: complex, double, real, one pole at the origin, on both sides.
+    /// A pair of every kind whose size is that of the threshold: complex, double, real, one pole at
+    /// the origin, on both sides.
     fn pairs_of_size(size: f64) -> Vec<(f64, f64)> {
         let mut all = Vec::new();
         for sign in [-1.0, 1.0] {
@@ -370,7 +379,8 @@ mod tests {
             );
             for (value, slope) in [(1, 5), (2, 3), (6, 7)] {
                 let difference = (up[value] - down[value]) / (2.0 * h);
-                // Rounding eps/h = 2e-11 of the value; truncation h^2/6 of the third derivative, less.
+                // Rounding eps/h = 2e-11 of the value; truncation h^2/6 of the third derivative,
+                // less.
                 assert!(
                     (exact[slope] - difference).abs() < 2e-10 * exact[value].abs(),
                     "{} at s = {s}, q = {q}: {} and {difference}",

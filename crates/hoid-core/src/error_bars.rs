@@ -1,31 +1,37 @@
 //! The covariance of a recursive estimate, whatever the gain.
 //!
-//! Let `theta~ = theta - theta^` be the error of the estimate of a constant theta. To first order the a-priori innovation is
-//! `eps^ = eps + h' X`, where X holds theta~ and the errors that past estimates have left in the filters of the predictor,
+//! Let `theta~ = theta - theta^` be the error of the estimate of a constant theta. To first order
+//! the a-priori innovation is `eps^ = eps + h' X`, where X holds theta~ and the errors that past
+//! estimates have left in the filters of the predictor,
 //!
 //! - `dw = w - w^ = b~' x - f~' w^ - (F^ - 1) dw`,
 //! - `dv = v^ - v = dw - a~' u`,
 //! - `de = eps^ - eps = D^ dv - d~' v^ + c~' eps^ - (C^ - 1) de`,
 //!
-//! (signals that stand with a `~` are past ones, x includes the present one; all follow from eq. 5.4 by subtraction). So `h` is the
-//! pseudo-linear regressor for theta~, `D^ - F^` for the past dw, `-(C^ - 1)` for the past de; and with the step `theta^ <- theta^ + g eps^`
+//! (signals that stand with a `~` are past ones, x includes the present one; all follow from eq.
+//! 5.4 by subtraction). So `h` is the pseudo-linear regressor for theta~, `D^ - F^` for the past
+//! dw, `-(C^ - 1)` for the past de; and with the step `theta^ <- theta^ + g eps^`
 //!
 //! `theta~ <- theta~ - g (eps + h' X)`,  `Sigma <- (I - g h') Sigma (I - g h')' + g g'`
 //!
-//! (the Joseph form, in units of sigma^2), after which the new dw, dv and de take their layout in X. With `z = Sigma h` and
-//! `k = z - (1 + h' z)/2 g` the update is `Sigma - g k' - k g'`, and for the row a of a new error, which differs from h in few layout,
-//! `Sigma a = z - Sigma (h - a)`: two thirds of the products are shared. No assumption is made about g: the
-//! error bars hold for a scalar factor, where they tend to `P/(1 + lambda)` for ARX (L. Ljung and T. Söderström, *Theory and Practice of
-//! Recursive Identification*, 1983, eq. 4.136), for a forgetting matrix, a shortened step, or a gradient. Without forgetting `Sigma`
-//! becomes P. The usual `h = psi` is the same for an estimate that does not move within the memory of the filters. Where the memory of
-//! the estimate is not much longer than that of 1/F, its variances are up to a third too small; a step costs half. K = 0 (no errors of filters)
-//! chooses it.
+//! (the Joseph form, in units of sigma^2), after which the new dw, dv and de take their layout in
+//! X. With `z = Sigma h` and `k = z - (1 + h' z)/2 g` the update is `Sigma - g k' - k g'`, and for
+//! the row a of a new error, which differs from h in few layout, `Sigma a = z - Sigma (h - a)`: two
+//! thirds of the products are shared. No assumption is made about g: the error bars hold for a
+//! scalar factor, where they tend to `P/(1 + lambda)` for ARX (L. Ljung and T. Söderström, *Theory
+//! and Practice of Recursive Identification*, 1983, eq. 4.136), for a forgetting matrix, a
+//! shortened step, or a gradient. Without forgetting `Sigma` becomes P. The usual `h = psi` is the
+//! same for an estimate that does not move within the memory of the filters. Where the memory of
+//! the estimate is not much longer than that of 1/F, its variances are up to a third too small; a
+//! step costs half. K = 0 (no errors of filters) chooses it.
 //!
-//! **Outliers.** An innovation beyond a few sigma moves the estimate as if it were at that limit (P. J. Huber, *Robust Statistics*, 1981,
-//! section 7.3; the gain in the equations above is then the smaller one that was used). The innovation variance takes it unclipped, so that a lasting
+//! **Outliers.** An innovation beyond a few sigma moves the estimate as if it were at that limit
+//! (P. J. Huber, *Robust Statistics*, 1981, section 7.3; the gain in the equations above is then
+//! the smaller one that was used). The innovation variance takes it unclipped, so that a lasting
 //! change of the noise is followed.
 //!
-//! The innovation variance sigma^2 is the mean of `eps^2/(1 + h' Sigma h)`, each term of which has the expectation sigma^2.
+//! The innovation variance sigma^2 is the mean of `eps^2/(1 + h' Sigma h)`, each term of which has
+//! the expectation sigma^2.
 
 use crate::{
     innovation_variance::InnovationVariance,
@@ -38,7 +44,8 @@ pub const LARGEST_GROWTH: f64 = 1e6;
 /// Samples between two checks of the variances.
 const CHECK_PERIOD: u32 = 64;
 
-/// Sigma over sigma^2, and sigma^2. N is the capacity for parameters, K that for the errors of the filters ([`ErrorLayout::filter_errors`]).
+/// Sigma over sigma^2, and sigma^2. N is the capacity for parameters, K that for the errors of the
+/// filters ([`ErrorLayout::filter_errors`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorBars<const N: usize, const K: usize> {
     /// Covariance of theta.
@@ -60,11 +67,13 @@ crate::state!([const N: usize, const K: usize] ErrorBars<N, K> {
     theta, cross, filters, initial_variances, innovation_variance, limit, until_check,
 });
 
-/// Follows the error of an estimate through its recursion: [`ErrorBars`], or [`NoErrorBars`] where they are not wanted.
+/// Follows the error of an estimate through its recursion: [`ErrorBars`], or [`NoErrorBars`] where
+/// they are not wanted.
 pub trait ErrorPropagation<const N: usize, const K: usize>: State {
     /// The innovation, clipped at the limit for outliers.
     fn clip(&self, eps: f64) -> f64;
-    /// The update by a step of the estimate: its gain, its innovation, and the errors that it leaves in the filters.
+    /// The update by a step of the estimate: its gain, its innovation, and the errors that it
+    /// leaves in the filters.
     fn update(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>, gain: &[f64; N], eps: f64);
     /// The errors that a sample leaves in the filters, when the estimate stays.
     fn propagate(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>);
@@ -74,7 +83,8 @@ pub trait ErrorPropagation<const N: usize, const K: usize>: State {
     fn variance(&self) -> Option<f64>;
 }
 
-/// No error bars, no innovation variance and no limit on outliers: the recursion is its estimate alone, without further cost.
+/// No error bars, no innovation variance and no limit on outliers: the recursion is its estimate
+/// alone, without further cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct NoErrorBars;
 
@@ -104,8 +114,9 @@ impl<const N: usize> ErrorPropagation<N, 0> for NoErrorBars {
 }
 
 impl<const N: usize, const K: usize> ErrorBars<N, K> {
-    /// From the covariance of theta at the start over the innovation variance, with filters whose past is right. Innovations move the
-    /// estimate as if they were no larger than `limit` times sigma; infinite for no limit.
+    /// From the covariance of theta at the start over the innovation variance, with filters whose
+    /// past is right. Innovations move the estimate as if they were no larger than `limit` times
+    /// sigma; infinite for no limit.
     pub fn new(start: &[[f64; N]; N], innovation_variance: InnovationVariance, limit: f64) -> Self {
         Self {
             theta: *start,
@@ -172,7 +183,8 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         }
     }
 
-    /// `Sigma a` for the rows a of the new dw, dv and de, from `Sigma h`: with theta, and with the past errors of the filters.
+    /// `Sigma a` for the rows a of the new dw, dv and de, from `Sigma h`: with theta, and with the
+    /// past errors of the filters.
     #[inline(always)]
     fn covariances_of_new(
         &self,
@@ -263,8 +275,9 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         }
     }
 
-    /// Keeps the variances below [`LARGEST_GROWTH`] times those at the start. The equations of first order can be unstable for large gains where the
-    /// recursion is not. After an overflow all start again from there.
+    /// Keeps the variances below [`LARGEST_GROWTH`] times those at the start. The equations of
+    /// first order can be unstable for large gains where the recursion is not. After an overflow
+    /// all start again from there.
     #[cold]
     fn bound_variances(&mut self) {
         if !self.is_valid() {

@@ -1,7 +1,8 @@
 //! Rational filters over slices.
 //!
-//! A monic polynomial `D(q^-1) = 1 + d_1 q^-1 + ... + d_n q^-n` is given by its coefficients `[d_1, ..., d_n]`; the leading
-//! one is never stored. All filters start at rest (zeros before the first sample).
+//! A monic polynomial `D(q^-1) = 1 + d_1 q^-1 + ... + d_n q^-n` is given by its coefficients
+//! `[d_1, ..., d_n]`; the leading one is never stored. All filters start at rest (zeros before the
+//! first sample).
 
 /// All-pole filter into another slice: `y = x / D(q^-1)`.
 ///
@@ -16,12 +17,14 @@ pub fn divide(d: &[f64], x: &[f64], y: &mut [f64]) {
     divide_in_place(d, y);
 }
 
-/// All-pole filter in place: `x <- x / D(q^-1)`, that is `y(t) = x(t) - d_1 y(t-1) - ... - d_n y(t-n)`.
+/// All-pole filter in place: `x <- x / D(q^-1)`, that is
+/// `y(t) = x(t) - d_1 y(t-1) - ... - d_n y(t-n)`.
 pub fn divide_in_place(d: &[f64], x: &mut [f64]) {
     divide_from(d, x, 0);
 }
 
-/// As [`divide_in_place`] from index `from` on; the values before it are the past output of the filter, with zeros before the first.
+/// As [`divide_in_place`] from index `from` on; the values before it are the past output of the
+/// filter, with zeros before the first.
 pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
     let before = |lag: usize, x: &[f64]| from.checked_sub(lag).map_or(0.0, |t| x[t]);
     match *d {
@@ -55,9 +58,9 @@ pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
 
 /// `y = x / (1 + d_1 q^-1 + d_2 q^-2)` from rest, four samples at a time.
 ///
-/// Sample by sample each value waits for the one before it. Written out over four samples with the impulse response h,
-/// `y(t+k) = sum_{i<=k} h_i x(t+k-i) + h_{k+1} y(t-1) - d_2 h_k y(t-2)`, all four wait for y(t-1) and y(t-2) alone, and only for a
-/// product and two sums.
+/// Sample by sample each value waits for the one before it. Written out over four samples with the
+/// impulse response h, `y(t+k) = sum_{i<=k} h_i x(t+k-i) + h_{k+1} y(t-1) - d_2 h_k y(t-2)`, all
+/// four wait for y(t-1) and y(t-2) alone, and only for a product and two sums.
 #[derive(Debug, Clone, Copy)]
 pub struct SecondOrder {
     /// h_1 to h_4; h_0 is one.

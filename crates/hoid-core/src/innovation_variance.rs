@@ -1,9 +1,10 @@
 //! The variance of the innovations, with an exponential memory.
 //!
-//! `sigma^2 = sum_k lambda^{t-k} s_k/sum_k lambda^{t-k}`. Here s_k is the square of an innovation over its variance in units of sigma^2, so that the
-//! expectation of each s_k is sigma^2.
+//! `sigma^2 = sum_k lambda^{t-k} s_k/sum_k lambda^{t-k}`. Here s_k is the square of an innovation
+//! over its variance in units of sigma^2, so that the expectation of each s_k is sigma^2.
 
-/// The weighted mean of the s_k; the sum of the weights is the number of residuals that it rests on.
+/// The weighted mean of the s_k; the sum of the weights is the number of residuals that it rests
+/// on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InnovationVariance {
     sum: f64,
@@ -14,7 +15,8 @@ pub struct InnovationVariance {
 crate::state!([] InnovationVariance { sum, residuals, lambda });
 
 impl InnovationVariance {
-    /// Starts from a variance that was estimated from this number of residuals; 0 starts from nothing. `lambda` is the factor of forgetting.
+    /// Starts from a variance that was estimated from this number of residuals; 0 starts from
+    /// nothing. `lambda` is the factor of forgetting.
     pub fn new(variance: f64, residuals: f64, lambda: f64) -> Self {
         Self {
             sum: variance * residuals,
@@ -46,14 +48,16 @@ impl InnovationVariance {
         self.residuals
     }
 
-    /// True when an innovation is beyond `limit` standard deviations. Before anything is known of sigma there is no limit.
+    /// True when an innovation is beyond `limit` standard deviations. Before anything is known of
+    /// sigma there is no limit.
     #[inline(always)]
     pub(crate) fn is_beyond(&self, eps: f64, limit: f64) -> bool {
         // Without a root, which few innovations need.
         self.sum > 0.0 && eps * eps * self.residuals > limit * limit * self.sum
     }
 
-    /// The same variance, as if from no more than this number of residuals: the next ones count the more.
+    /// The same variance, as if from no more than this number of residuals: the next ones count the
+    /// more.
     pub fn limit_residuals(&mut self, residuals: f64) {
         if self.residuals > residuals && residuals > 0.0 {
             self.sum *= residuals / self.residuals;

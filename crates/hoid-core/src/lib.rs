@@ -1,22 +1,28 @@
-//! Recursive identification of a human operator in real time: what runs once per sample, beside a control loop.
+//! Recursive identification of a human operator in real time: what runs once per sample, beside a
+//! control loop.
 //!
-//! A person steers a machine by the tracking error e and gives the control output u. Their dynamics change as they learn, tire or adapt to the
-//! machine. The recursions of this crate estimate a model of them from each new sample, with the uncertainty of the estimate.
+//! A person steers a machine by the tracking error e and gives the control output u. Their dynamics
+//! change as they learn, tire or adapt to the machine. The recursions of this crate estimate a
+//! model of them from each new sample, with the uncertainty of the estimate.
 //!
-//! **Mathematics.** For the model `A u = (B/F) q^-nk e + (C/D) eps` with the coefficients theta of its polynomials, the one-step prediction error and
-//! its negative gradient are `eps(t)` and `psi(t) = -d eps/d theta`. Each sample moves the estimate by the recursive prediction-error method
-//! (L. Ljung and T. Söderström, *Theory and Practice of Recursive Identification*, 1983):
+//! **Mathematics.** For the model `A u = (B/F) q^-nk e + (C/D) eps` with the coefficients theta of
+//! its polynomials, the one-step prediction error and its negative gradient are `eps(t)` and
+//! `psi(t) = -d eps/d theta`. Each sample moves the estimate by the recursive prediction-error
+//! method (L. Ljung and T. Söderström, *Theory and Practice of Recursive Identification*, 1983):
 //!
-//! - forget: `P <- Lambda P Lambda` with a factor for each parameter, or another rule of [`adaptation`];
+//! - forget: `P <- Lambda P Lambda` with a factor for each parameter, or another rule of
+//!   [`adaptation`];
 //! - gain: `g = P psi/(1 + psi' P psi)`;
 //! - update: `theta <- theta + g eps`, `P <- P - g psi' P`.
 //!
-//! P is kept in factors `U D U'`, which rounding cannot make indefinite. A step that would make the predictor unstable is halved until it does not.
-//! The error bars follow the error of the estimate through the recursion, whatever the gain, in units of the innovation variance sigma^2.
+//! P is kept in factors `U D U'`, which rounding cannot make indefinite. A step that would make the
+//! predictor unstable is halved until it does not. The error bars follow the error of the estimate
+//! through the recursion, whatever the gain, in units of the innovation variance sigma^2.
 //!
-//! **Real time.** `no_std`, no allocation, no dependency but elementary functions (`libm`). Every routine works in memory that the caller owns and has
-//! a bounded number of operations. The numbers of a recursion can be saved and restored ([`mod@state`]). Batch estimators and simulator of hoid stand on
-//! the same filters, so that a recursion and its batch counterpart cannot differ in them.
+//! **Real time.** `no_std`, no allocation, no dependency but elementary functions (`libm`). Every
+//! routine works in memory that the caller owns and has a bounded number of operations. The numbers
+//! of a recursion can be saved and restored ([`mod@state`]). Batch estimators and simulator of hoid
+//! stand on the same filters, so that a recursion and its batch counterpart cannot differ in them.
 //!
 //! ```
 //! use hoid_core::{

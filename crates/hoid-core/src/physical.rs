@@ -1,15 +1,19 @@
 //! The recursive prediction-error method in physical parameters.
 //!
-//! `eta = [K_e, K_e_dot, omega_nm, zeta_nm, c.., d..]`, or with the delay `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, c.., d..]`. The
-//! predictor is that of Box-Jenkins with the polynomials `theta(eta)` of the exact zero-order hold ([`crate::held_operator`]); its gradient is
-//! `psi_eta = (d theta/d eta)' psi_theta`. The step is that of [`crate::rpem`], but each factor of forgetting now belongs to a quantity of which the
-//! user knows how fast it changes: operators adapt their gains, and hardly their neuromuscular system.
+//! `eta = [K_e, K_e_dot, omega_nm, zeta_nm, c.., d..]`, or with the delay
+//! `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, c.., d..]`. The predictor is that of Box-Jenkins with
+//! the polynomials `theta(eta)` of the exact zero-order hold ([`crate::held_operator`]); its
+//! gradient is `psi_eta = (d theta/d eta)' psi_theta`. The step is that of [`crate::rpem`], but
+//! each factor of forgetting now belongs to a quantity of which the user knows how fast it changes:
+//! operators adapt their gains, and hardly their neuromuscular system.
 //!
-//! Each parameter stays within its bounds: a step is cut where it meets one. C (and D, with [`Stable::PredictorAndNoise`]) is kept stable by halving the step.
+//! Each parameter stays within its bounds: a step is cut where it meets one. C (and D, with
+//! [`Stable::PredictorAndNoise`]) is kept stable by halving the step.
 //!
-//! With the delay as a parameter `tau_e = l Ts + delta`, B has three coefficients behind `nk = l + 1` samples; as tau_e grows over a
-//! whole sample, B moves on along the past input that the predictor keeps, without a transient. The model is continuous there, its derivative
-//! has a kink (see [`crate::held_operator`]).
+//! With the delay as a parameter `tau_e = l Ts + delta`, B has three coefficients behind
+//! `nk = l + 1` samples; as tau_e grows over a whole sample, B moves on along the past input that
+//! the predictor keeps, without a transient. The model is continuous there, its derivative has a
+//! kink (see [`crate::held_operator`]).
 
 use crate::{
     adaptation::Adaptation,
@@ -33,7 +37,8 @@ const TAU: usize = 4;
 pub struct PhysicalModel<S, const N: usize> {
     /// Orders: nc and nd are free, na = 0, nf = 2 and nb = 2, or 3 when tau_e is a parameter.
     pub shape: S,
-    /// Smallest delay nk in samples, of which the recursion is given the input `x(t) = e(t - nk)`, when tau_e is a parameter.
+    /// Smallest delay nk in samples, of which the recursion is given the input `x(t) = e(t - nk)`,
+    /// when tau_e is a parameter.
     pub smallest_nk: Option<usize>,
     /// Sample time in s.
     pub sample_time: f64,
@@ -43,14 +48,16 @@ pub struct PhysicalModel<S, const N: usize> {
     pub stable: Stable,
 }
 
-/// The recursion. N is the capacity for parameters, K that for the errors of its filters ([`ErrorLayout::filter_errors`]; 0 for the usual error
-/// bars), L the number of past inputs that are kept: 2 without tau_e, 3 and the range of the delay with it; at least nc.
+/// The recursion. N is the capacity for parameters, K that for the errors of its filters
+/// ([`ErrorLayout::filter_errors`]; 0 for the usual error bars), L the number of past inputs that
+/// are kept: 2 without tau_e, 3 and the range of the delay with it; at least nc.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalRpem<S, const N: usize, const K: usize, const L: usize, A> {
     model: PhysicalModel<S, N>,
     predictor: Predictor<S, N, L>,
     eta: [f64; N],
-    /// Polynomials of eta, their Jacobian with respect to the first parameters, and the whole samples of the delay.
+    /// Polynomials of eta, their Jacobian with respect to the first parameters, and the whole
+    /// samples of the delay.
     polynomials: Polynomials<N>,
     psi: [f64; N],
     adaptation: A,
@@ -118,8 +125,9 @@ impl<S: Shape, const N: usize> PhysicalModel<S, N> {
 }
 
 impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>> PhysicalRpem<S, N, K, L, A> {
-    /// Starts from eta with filters at rest. `None` when the orders are not those of [`PhysicalModel::shape`], N, K or L is too small, eta lies outside
-    /// the bounds, the bounds let omega_nm or zeta_nm become zero, or the noise model is not stable.
+    /// Starts from eta with filters at rest. `None` when the orders are not those of
+    /// [`PhysicalModel::shape`], N, K or L is too small, eta lies outside the bounds, the bounds
+    /// let omega_nm or zeta_nm become zero, or the noise model is not stable.
     pub fn new(model: PhysicalModel<S, N>, eta: [f64; N], adaptation: A, bars: ErrorBars<N, K>) -> Option<Self> {
         let shape = model.shape;
         let predictor = Predictor::new(shape, Regressor::Gradient)?;
@@ -188,7 +196,8 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         row
     }
 
-    /// The step by a sample `x(t) = e(t - nk)`, `u(t)`; nk is [`PhysicalModel::smallest_nk`] when the delay is a parameter. Both must be finite.
+    /// The step by a sample `x(t) = e(t - nk)`, `u(t)`; nk is [`PhysicalModel::smallest_nk`] when
+    /// the delay is a parameter. Both must be finite.
     #[inline]
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         let innovation = self.predict(x, u);
@@ -200,7 +209,8 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
             .update(&self.psi, limited, &self.eta, self.bars.innovation_variance());
         let (operator, noise) = (self.model.operator(), self.model.shape.nc() + self.model.shape.nd());
         let (shape, stable) = (self.model.shape, self.model.stable);
-        // The operator's part of theta is stable by its bounds; only the noise model has to be tested.
+        // The operator's part of theta is stable by its bounds; only the noise model has to be
+        // tested.
         let (allowed, mut eta) = backtrack(&self.eta, &moved.step, |eta| {
             let mut theta = [0.0; N];
             theta[operator - 2..operator - 2 + noise].copy_from_slice(&eta[operator..operator + noise]);
@@ -223,8 +233,8 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         }
     }
 
-    /// Cuts the new estimate where it is outside the bounds. Returns the fraction of the step that is left of each parameter, `allowed` inside the bounds,
-    /// and whether one was cut.
+    /// Cuts the new estimate where it is outside the bounds. Returns the fraction of the step that
+    /// is left of each parameter, `allowed` inside the bounds, and whether one was cut.
     #[inline(always)]
     fn cut_at_bounds(&self, step: &[f64; N], allowed: f64, eta: &mut [f64; N]) -> ([f64; N], bool) {
         let (mut fraction, mut cut) = ([allowed; N], false);
@@ -256,7 +266,8 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         }
     }
 
-    /// As [`PhysicalRpem::step_without_update`] where the output is missing: the one-step prediction takes its place.
+    /// As [`PhysicalRpem::step_without_update`] where the output is missing: the one-step
+    /// prediction takes its place.
     pub fn bridge(&mut self, x: f64) {
         self.predict(x, 0.0);
         self.predictor.bridge(&self.polynomials.theta);

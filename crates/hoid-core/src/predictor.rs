@@ -14,13 +14,14 @@
 //! | `d_j` | `-(1/C) v(t-j)` |
 //! | `f_j` | `-(D/(C F)) w(t-j)` |
 //!
-//! Each filter works with the coefficients of its time; for a theta that stays, eps and psi are those of the batch criterion started at
-//! rest. After the estimate has moved, w, v and eps of the sample are computed again with it ([`Predictor::correct`]): the
-//! a-posteriori residuals, with which the recursion converges faster (L. Ljung and T. Söderström, *Theory and Practice of Recursive
-//! Identification*, 1983, section 3.7.3 and eq. 3.151).
+//! Each filter works with the coefficients of its time; for a theta that stays, eps and psi are
+//! those of the batch criterion started at rest. After the estimate has moved, w, v and eps of the
+//! sample are computed again with it ([`Predictor::correct`]): the a-posteriori residuals, with
+//! which the recursion converges faster (L. Ljung and T. Söderström, *Theory and Practice of
+//! Recursive Identification*, 1983, section 3.7.3 and eq. 3.151).
 //!
-//! The input is kept over L samples, so that B may begin at any `offset` within them: a delay can be changed without a transient.
-//! N is the capacity for parameters.
+//! The input is kept over L samples, so that B may begin at any `offset` within them: a delay can
+//! be changed without a transient. N is the capacity for parameters.
 
 use core::hint::black_box;
 
@@ -35,8 +36,9 @@ pub enum Regressor {
     /// The gradient: prediction-error method.
     #[default]
     Gradient,
-    /// The signals without their filters: pseudo-linear regression, also called extended least squares (Ljung and Söderström,
-    /// section 3.7.4). Fewer operations; it converges where 1/C (1/F ...) is positive real.
+    /// The signals without their filters: pseudo-linear regression, also called extended least
+    /// squares (Ljung and Söderström, section 3.7.4). Fewer operations; it converges where 1/C (1/F
+    /// ...) is positive real.
     PseudoLinear,
 }
 
@@ -98,7 +100,8 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         self.shape
     }
 
-    /// Lets B begin `offset` samples before the newest input, as far as the kept input reaches; B can shift where L is larger than N.
+    /// Lets B begin `offset` samples before the newest input, as far as the kept input reaches; B
+    /// can shift where L is larger than N.
     pub fn set_offset(&mut self, offset: usize) {
         self.offset = offset.min(L - self.shape.nb().min(L));
     }
@@ -156,7 +159,8 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         [w, v, v + dot(d, &self.v) - dot(c, &self.eps)]
     }
 
-    /// Moves the filters on by the predicted sample, with the estimate after it. Returns the a-posteriori residual.
+    /// Moves the filters on by the predicted sample, with the estimate after it. Returns the
+    /// a-posteriori residual.
     #[inline(always)]
     pub fn correct(&mut self, theta: &[f64; N]) -> f64 {
         let shape = self.shape;
@@ -208,7 +212,8 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         self.pending[0] = -self.residual(theta)[2];
     }
 
-    /// The sensitivities of dw, dv and de of the pending sample to the errors X of [`crate::error_bars`].
+    /// The sensitivities of dw, dv and de of the pending sample to the errors X of
+    /// [`crate::error_bars`].
     #[inline(always)]
     pub fn sensitivities<const K: usize>(&self, theta: &[f64; N], layout: &ErrorLayout) -> Sensitivities<N, K> {
         let shape = self.shape;
@@ -260,8 +265,9 @@ pub(crate) fn dot(coefficients: &[f64], history: &[f64]) -> f64 {
 
 /// The same, of a history that the sample before has pushed into number by number.
 ///
-/// Each number is read by itself: one wide load of what was stored narrowly just before would wait until all of it has reached the
-/// memory, so that no two samples could overlap. The compiler likes to make such loads.
+/// Each number is read by itself: one wide load of what was stored narrowly just before would wait
+/// until all of it has reached the memory, so that no two samples could overlap. The compiler likes
+/// to make such loads.
 #[inline(always)]
 fn dot_of_fresh(coefficients: &[f64], history: &[f64]) -> f64 {
     let mut pairs = coefficients.iter().zip(history);

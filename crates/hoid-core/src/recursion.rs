@@ -11,7 +11,8 @@ pub struct Step {
     pub shortened: bool,
 }
 
-/// Polynomials whose roots a recursion keeps inside the unit circle. Without C and F there the predictor and its gradient diverge.
+/// Polynomials whose roots a recursion keeps inside the unit circle. Without C and F there the
+/// predictor and its gradient diverge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Stable {
     /// C and F.
@@ -39,14 +40,16 @@ pub fn ratio(part: f64, whole: f64) -> f64 {
     if part == whole { 1.0 } else { part / whole }
 }
 
-/// True when every number is finite; in floating-point registers and without a branch for each number.
+/// True when every number is finite; in floating-point registers and without a branch for each
+/// number.
 #[inline(always)]
 pub(crate) fn all_finite<const N: usize>(values: &[f64; N]) -> bool {
     // Zero times infinity or NaN is NaN.
     values.iter().fold(0.0, |sum, v| sum + 0.0 * v) == 0.0
 }
 
-/// The largest of the fractions 1, 1/2, 1/4 ... of a step that is allowed, and theta after it; 0 and theta when none is.
+/// The largest of the fractions 1, 1/2, 1/4 ... of a step that is allowed, and theta after it; 0
+/// and theta when none is.
 #[inline]
 pub fn backtrack<const N: usize>(
     theta: &[f64; N],

@@ -1,7 +1,8 @@
 //! Recursive least squares for ARX and FIR.
 //!
-//! `eps = u - psi' theta`, `psi = [-u(t-1) .. -u(t-na), x(t) .. x(t-nb+1)]` with `x(t) = e(t - nk)`, and the step of an
-//! [`Adaptation`] (eq. 5.21, 5.25, 5.26; L. Ljung and T. Söderström, *Theory and Practice of Recursive Identification*, 1983, section 2.2).
+//! `eps = u - psi' theta`, `psi = [-u(t-1) .. -u(t-na), x(t) .. x(t-nb+1)]` with
+//! `x(t) = e(t - nk)`, and the step of an [`Adaptation`] (eq. 5.21, 5.25, 5.26; L. Ljung and T.
+//! Söderström, *Theory and Practice of Recursive Identification*, 1983, section 2.2).
 
 use crate::{
     adaptation::Adaptation,
@@ -12,7 +13,8 @@ use crate::{
     shape::Shape,
 };
 
-/// The recursion. N is the capacity for parameters, B the error bars or [`NoErrorBars`](crate::error_bars::NoErrorBars).
+/// The recursion. N is the capacity for parameters, B the error bars or
+/// [`NoErrorBars`](crate::error_bars::NoErrorBars).
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
 pub struct Rls<S, const N: usize, A, B = ErrorBars<N, 0>> {
@@ -27,8 +29,9 @@ pub struct Rls<S, const N: usize, A, B = ErrorBars<N, 0>> {
 crate::state!([S, const N: usize, A: crate::state::State, B: crate::state::State] Rls<S, N, A, B> { theta, psi, adaptation, bars, restarts });
 
 impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<S, N, A, B> {
-    /// Starts from theta `[a.., b..]` with zeros before the first sample. `None` when there is no parameter, more than N, or one of
-    /// C, D or F; or when the rule of forgetting needs the innovation variance and `bars` do not estimate it.
+    /// Starts from theta `[a.., b..]` with zeros before the first sample. `None` when there is no
+    /// parameter, more than N, or one of C, D or F; or when the rule of forgetting needs the
+    /// innovation variance and `bars` do not estimate it.
     pub fn new(shape: S, theta: [f64; N], adaptation: A, bars: B) -> Option<Self> {
         let linear = (shape.nc(), shape.nd(), shape.nf()) == (0, 0, 0);
         let known = bars.variance().is_some() || !adaptation.needs_innovation_variance();
@@ -86,7 +89,8 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         }
     }
 
-    /// As [`Rls::step_without_update`] where the output is missing: the one-step prediction takes its place.
+    /// As [`Rls::step_without_update`] where the output is missing: the one-step prediction takes
+    /// its place.
     pub fn bridge(&mut self, x: f64) {
         let (psi, innovation) = self.innovation(&self.theta, x, 0.0);
         self.shift(psi, -innovation);
@@ -96,7 +100,8 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
     #[inline(always)]
     fn innovation(&self, theta: &[f64; N], x: f64, u: f64) -> ([f64; N], f64) {
         let (na, nb) = (self.shape.na(), self.shape.nb());
-        // Each number is read by itself: a wide load right after the narrow stores of the sample before would wait for memory.
+        // Each number is read by itself: a wide load right after the narrow stores of the sample
+        // before would wait for memory.
         let mut psi = self.psi.map(core::hint::black_box);
         for j in (1..nb).rev() {
             psi[na + j] = psi[na + j - 1];

@@ -1,8 +1,11 @@
-//! The recursive prediction-error method for `A u = (B/F) q^-nk e + (C/D) eps`: ARX, ARMAX, OE, ARARX, Box-Jenkins and the general form.
+//! The recursive prediction-error method for `A u = (B/F) q^-nk e + (C/D) eps`: ARX, ARMAX, OE,
+//! ARARX, Box-Jenkins and the general form.
 //!
-//! `theta <- theta + g eps` with psi and eps of [`crate::predictor`] and the gain of an [`Adaptation`] (eq. 31, 5.54; L. Ljung and
-//! T. Söderström, *Theory and Practice of Recursive Identification*, 1983, section 3.7). A step that would take C or F out of the
-//! stable region is halved until it does not. Without C, D and F this is recursive least squares, [`crate::rls`], to the last bit.
+//! `theta <- theta + g eps` with psi and eps of [`crate::predictor`] and the gain of an
+//! [`Adaptation`] (eq. 31, 5.54; L. Ljung and T. Söderström, *Theory and Practice of Recursive
+//! Identification*, 1983, section 3.7). A step that would take C or F out of the stable region is
+//! halved until it does not. Without C, D and F this is recursive least squares, [`crate::rls`], to
+//! the last bit.
 
 use crate::{
     adaptation::Adaptation,
@@ -13,8 +16,9 @@ use crate::{
     shape::Shape,
 };
 
-/// The recursion. N is the capacity for parameters, K that for the errors of its filters ([`ErrorLayout::filter_errors`]): 0 for the usual error bars
-/// and for none, B = [`NoErrorBars`](crate::error_bars::NoErrorBars).
+/// The recursion. N is the capacity for parameters, K that for the errors of its filters
+/// ([`ErrorLayout::filter_errors`]): 0 for the usual error bars and for none, B =
+/// [`NoErrorBars`](crate::error_bars::NoErrorBars).
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
 pub struct Rpem<S, const N: usize, const K: usize, A, B = ErrorBars<N, K>> {
@@ -32,8 +36,9 @@ crate::state!([S, const N: usize, const K: usize, A: crate::state::State, B: cra
 });
 
 impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropagation<N, K>> Rpem<S, N, K, A, B> {
-    /// Starts from `theta = [a.. b.. c.. d.. f..]` with filters at rest. `None` when the shape does not fit in N and K, theta is not
-    /// stable, or the rule of forgetting needs the innovation variance and `bars` do not estimate it.
+    /// Starts from `theta = [a.. b.. c.. d.. f..]` with filters at rest. `None` when the shape does
+    /// not fit in N and K, theta is not stable, or the rule of forgetting needs the innovation
+    /// variance and `bars` do not estimate it.
     pub fn new(
         shape: S,
         regressor: Regressor,
@@ -96,7 +101,8 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         }
     }
 
-    /// As [`Rpem::step_without_update`] where the output is missing: the one-step prediction takes its place.
+    /// As [`Rpem::step_without_update`] where the output is missing: the one-step prediction takes
+    /// its place.
     pub fn bridge(&mut self, x: f64) {
         let theta = self.theta;
         (self.psi, _) = self.predictor.predict(&theta, x, 0.0);

@@ -1,11 +1,13 @@
 //! How the errors in the filters of the predictor follow from those of the parameters.
 //!
-//! An estimate that was wrong has left errors in what the filters of the [`crate::predictor`] remember. With theta~ and the past errors in a vector X,
-//! the new ones are linear functions of X; [`crate::error_bars`] has the equations.
+//! An estimate that was wrong has left errors in what the filters of the [`crate::predictor`]
+//! remember. With theta~ and the past errors in a vector X, the new ones are linear functions of X;
+//! [`crate::error_bars`] has the equations.
 
 use crate::shape::Shape;
 
-/// The layout of X: which parameters belong to A, which to C and D, and how many past errors of the filters are kept.
+/// The layout of X: which parameters belong to A, which to C and D, and how many past errors of the
+/// filters are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ErrorLayout {
     /// Number of coefficients of A, which come first.
@@ -82,7 +84,8 @@ pub struct Sensitivities<const N: usize, const K: usize> {
 }
 
 impl<const N: usize, const K: usize> Sensitivities<N, K> {
-    /// Those of an estimate that does not move within the memory of its filters: `h = psi`, and no errors in the filters.
+    /// Those of an estimate that does not move within the memory of its filters: `h = psi`, and no
+    /// errors in the filters.
     #[inline(always)]
     pub fn from_gradient(psi: &[f64; N]) -> Self {
         let form = LinearForm {

@@ -1,12 +1,13 @@
 //! Orders of the general model, as numbers or in the type.
 //!
-//! The parameters of `A u = (B/F) q^-nk e + (C/D) eps` stand in one vector, `theta = [a.. b.. c.. d.. f..]`. A [`Shape`] says how many there are of
-//! each kind, and so where each polynomial stands.
+//! The parameters of `A u = (B/F) q^-nk e + (C/D) eps` stand in one vector,
+//! `theta = [a.. b.. c.. d.. f..]`. A [`Shape`] says how many there are of each kind, and so where
+//! each polynomial stands.
 
 /// Numbers of coefficients of A, B, C, D and F.
 ///
-/// [`AnyShape`] holds them as numbers. [`FixedShape`] has them in its type, so that the compiler unrolls every loop over
-/// coefficients: the same operations in the same order, in half the time.
+/// [`AnyShape`] holds them as numbers. [`FixedShape`] has them in its type, so that the compiler
+/// unrolls every loop over coefficients: the same operations in the same order, in half the time.
 pub trait Shape: Copy {
     /// Coefficients `a_1 ...`.
     fn na(&self) -> usize;

@@ -1,22 +1,29 @@
 //! A covariance matrix in factors: `P = U D U'`, U unit upper triangular, D diagonal.
 //!
-//! P stays symmetric and positive whatever rounding does, as long as D does. The rules of forgetting need three operations:
+//! P stays symmetric and positive whatever rounding does, as long as D does. The rules of
+//! forgetting need three operations:
 //!
-//! - **measurement** with the regressor psi and the variance R: `g = P psi/(R + psi' P psi)`, `P <- P - g psi' P`. With
-//!   `f = U' psi`, `v = D f` and the partial sums `alpha_j = R + sum_{i<=j} f_i v_i`: `d_j <- d_j alpha_{j-1}/alpha_j`, and the columns of
-//!   U follow (G. J. Bierman, *Factorization Methods for Discrete Sequential Estimation*, 1977, section V.3). A negative R, with all
-//!   alpha negative, undoes a measurement by the same equations.
-//! - **scaling** `P <- S P S` with a diagonal S: `U_ij <- U_ij s_i/s_j`, `d_j <- d_j s_j^2`. Exact; this is the forgetting matrix.
-//! - **rank one** `P <- P + c a a'` with `c >= 0` (W. S. Agee and R. H. Turner, 1972; Bierman, section III.4).
+//! - **measurement** with the regressor psi and the variance R: `g = P psi/(R + psi' P psi)`,
+//!   `P <- P - g psi' P`. With `f = U' psi`, `v = D f` and the partial sums
+//!   `alpha_j = R + sum_{i<=j} f_i v_i`: `d_j <- d_j alpha_{j-1}/alpha_j`, and the columns of U
+//!   follow (G. J. Bierman, *Factorization Methods for Discrete Sequential Estimation*, 1977,
+//!   section V.3). A negative R, with all alpha negative, undoes a measurement by the same
+//!   equations.
+//! - **scaling** `P <- S P S` with a diagonal S: `U_ij <- U_ij s_i/s_j`, `d_j <- d_j s_j^2`. Exact;
+//!   this is the forgetting matrix.
+//! - **rank one** `P <- P + c a a'` with `c >= 0` (W. S. Agee and R. H. Turner, 1972; Bierman,
+//!   section III.4).
 //!
-//! N is the capacity for parameters. Where there are fewer, the d of the others are zero and stay so.
+//! N is the capacity for parameters. Where there are fewer, the d of the others are zero and stay
+//! so.
 
 /// `U D U'` of an N x N matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
 pub struct UdCovariance<const N: usize> {
-    /// Column j holds `U_ij`, i < j, and `d_j` in the place of the 1; the rest is not used. The d do not stand side by side, so that no
-    /// compiler makes a vector of them, whose first element would wait for the last.
+    /// Column j holds `U_ij`, i < j, and `d_j` in the place of the 1; the rest is not used. The d
+    /// do not stand side by side, so that no compiler makes a vector of them, whose first element
+    /// would wait for the last.
     u: [[f64; N]; N],
 }
 
@@ -32,8 +39,8 @@ impl<const N: usize> UdCovariance<N> {
         Self { u }
     }
 
-    /// The factors of a symmetric matrix; `None` unless it is positive semidefinite up to rounding. Rows and columns of zeros
-    /// are parameters that do not move.
+    /// The factors of a symmetric matrix; `None` unless it is positive semidefinite up to rounding.
+    /// Rows and columns of zeros are parameters that do not move.
     pub fn from_matrix(p: &[[f64; N]; N]) -> Option<Self> {
         let mut rest = *p;
         let mut factored = Self::diagonal([0.0; N]);

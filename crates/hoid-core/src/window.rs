@@ -1,25 +1,30 @@
 //! A rectangular window: the last W samples count, all the same.
 //!
-//! Each sample gives a linear equation for theta, `y = psi' theta + eps` with `y = eps(t) + psi(t)' theta(t-1)`; for ARX and FIR y is the
-//! output and psi the regressor, whatever theta was. The estimate is that of least squares over the window,
-//! `theta = R^{-1} sum psi y`, `R = sum psi psi'`, which for ARX and FIR is exact and for the others the recursive prediction-error method
-//! with that memory.
+//! Each sample gives a linear equation for theta, `y = psi' theta + eps` with
+//! `y = eps(t) + psi(t)' theta(t-1)`; for ARX and FIR y is the output and psi the regressor,
+//! whatever theta was. The estimate is that of least squares over the window,
+//! `theta = R^{-1} sum psi y`, `R = sum psi psi'`, which for ARX and FIR is exact and for the
+//! others the recursive prediction-error method with that memory.
 //!
-//! Sums from which the oldest term is subtracted would keep the rounding of all the past. Here the window is held as two sums: one grows from a
-//! boundary on; the other, a sum that grew until that boundary, loses its terms. When it has lost all of them the first takes its place. No rounding
+//! Sums from which the oldest term is subtracted would keep the rounding of all the past. Here the
+//! window is held as two sums: one grows from a boundary on; the other, a sum that grew until that
+//! boundary, loses its terms. When it has lost all of them the first takes its place. No rounding
 //! lives longer than two windows.
 //!
-//! The covariance of theta over sigma^2 is `R^{-1}`. Where the window does not determine theta (fewer samples than parameters, no
-//! excitation), theta stays and there is no covariance. The caller owns the memory of `W (N + 1)` numbers.
+//! The covariance of theta over sigma^2 is `R^{-1}`. Where the window does not determine theta
+//! (fewer samples than parameters, no excitation), theta stays and there is no covariance. The
+//! caller owns the memory of `W (N + 1)` numbers.
 
 use crate::adaptation::{Adaptation, ParameterStep};
 
-/// Smallest pivot of R, scaled to a unit diagonal, of a window that determines theta: some hundred units of rounding.
+/// Smallest pivot of R, scaled to a unit diagonal, of a window that determines theta: some hundred
+/// units of rounding.
 const SMALLEST_PIVOT: f64 = 1e-13;
 /// Power of a parameter's gradient, relative to the largest so far, below which it is not excited.
 const NO_EXCITATION: f64 = 1e-20;
 
-/// The sums of the normal equations over some samples: `sum psi psi'` (lower triangle) and `sum psi y`.
+/// The sums of the normal equations over some samples: `sum psi psi'` (lower triangle) and
+/// `sum psi y`.
 #[derive(Debug, Clone, PartialEq)]
 struct NormalEquations<const N: usize> {
     r: [[f64; N]; N],
@@ -28,7 +33,8 @@ struct NormalEquations<const N: usize> {
 
 crate::state!([const N: usize] NormalEquations<N> { r, psi_y });
 
-/// The adaptation by a rectangular window. N is the capacity for parameters, M the memory of the samples.
+/// The adaptation by a rectangular window. N is the capacity for parameters, M the memory of the
+/// samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Window<const N: usize, M> {
     memory: M,
@@ -87,8 +93,8 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
         samples * (N + 1)
     }
 
-    /// A window as long as the memory allows, for the first `parameters` of N. `None` when the memory is shorter than one sample or
-    /// there is no parameter.
+    /// A window as long as the memory allows, for the first `parameters` of N. `None` when the
+    /// memory is shorter than one sample or there is no parameter.
     pub fn new(memory: M, parameters: usize) -> Option<Self> {
         let length = memory.as_ref().len() / (N + 1);
         (length > 0 && (1..=N).contains(&parameters)).then_some(Self {

@@ -1,4 +1,5 @@
-//! The bank of hypotheses: its filters, one hypothesis against least squares, changes, signals that are not as they should be.
+//! The bank of hypotheses: its filters, one hypothesis against least squares, changes, signals that
+//! are not as they should be.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -46,7 +47,8 @@ fn level(deviation: f64) -> InnovationVariance {
     InnovationVariance::new(deviation * deviation, 2000.0, 1.0 - 1.0 / 2000.0)
 }
 
-/// Delayed error and control of an operator whose gains are those of `eta` at each sample, in its output, with AR(1) noise.
+/// Delayed error and control of an operator whose gains are those of `eta` at each sample, in its
+/// output, with AR(1) noise.
 fn operator(samples: usize, seed: u64, deviation: f64, eta: impl Fn(usize) -> [f64; 4]) -> Vec<(f64, f64)> {
     with_noise(samples, seed, |_| deviation, eta)
 }
@@ -114,7 +116,8 @@ fn responses_times_gains_are_the_held_operator_and_their_derivatives_are_differe
 
 #[test]
 fn a_point_that_moves_takes_the_past_with_it() {
-    // What the filters remember after a move differs in the second order from that of filters that always stood there.
+    // What the filters remember after a move differs in the second order from that of filters that
+    // always stood there.
     let error = |step: f64| {
         let mut noise = Noise(9);
         let (mut moved, mut there) = (

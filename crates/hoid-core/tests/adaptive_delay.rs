@@ -1,4 +1,5 @@
-//! The bank of hypotheses where the delay is not known: one delay against a delay line, delays that were wrong or that change, signals that overflow.
+//! The bank of hypotheses where the delay is not known: one delay against a delay line, delays that
+//! were wrong or that change, signals that overflow.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -51,7 +52,8 @@ fn bank(later: usize, delay: DelayPrior) -> Bank {
     .unwrap()
 }
 
-/// Error and control of an operator whose delay is given at each sample, in samples, with AR(1) noise.
+/// Error and control of an operator whose delay is given at each sample, in samples, with AR(1)
+/// noise.
 fn operator(samples: usize, seed: u64, delay: impl Fn(usize) -> usize) -> Vec<(f64, f64)> {
     let mut noise = Noise(seed);
     let mut response = Response::new([S1[2], S1[3]], TS);
@@ -71,8 +73,8 @@ fn operator(samples: usize, seed: u64, delay: impl Fn(usize) -> usize) -> Vec<(f
 
 #[test]
 fn a_delay_that_is_not_questioned_is_a_delay_line() {
-    // omega_nm and zeta_nm are known, so that the point of the filters stays: when it moves, signals that the delay line has not let through yet differ in
-    // the second order.
+    // omega_nm and zeta_nm are known, so that the point of the filters stays: when it moves,
+    // signals that the delay line has not let through yet differ in the second order.
     let prior_of = |delay| ChangePrior {
         neuromuscular_every: 0,
         ..prior_of(delay)

@@ -116,7 +116,8 @@ fn factors_are_the_plain_covariance_for_every_way_of_forgetting() {
             let gain = plain.update(&forgetting, recursion.psi(), limited, variance);
             if !step.shortened {
                 for i in 0..5 {
-                    // In units of the standard error, so that a parameter of any size counts the same.
+                    // In units of the standard error, so that a parameter of any size counts the
+                    // same.
                     let difference = recursion.theta()[i] - before[i] - gain[i] * limited;
                     worst_gain = worst_gain.max(difference.abs() / plain.p[i][i].sqrt());
                 }
@@ -307,7 +308,8 @@ fn a_window_is_least_squares_over_its_samples() {
         let theta = gram_schmidt(&rows);
         for i in 0..4 {
             let difference = (rls.theta()[i] - theta[i]).abs();
-            // Normal equations: the condition number of the regressors squared (1e4 squared) times rounding.
+            // Normal equations: the condition number of the regressors squared (1e4 squared) times
+            // rounding.
             assert!(
                 difference < 1e-8 * (1.0 + theta[i].abs()),
                 "{t}: {} and {}",
@@ -523,7 +525,8 @@ fn the_guard_holds_every_variance_within_its_bound() {
     const BOUND: f64 = 50.0;
     let mut noise = Noise(10);
     for forgetting in ways::<5>().into_iter().skip(1) {
-        // What is forgotten in one round of the guard: e^{1/4}, or five samples with the smallest variable factor.
+        // What is forgotten in one round of the guard: e^{1/4}, or five samples with the smallest
+        // variable factor.
         let slack = if matches!(forgetting, Forgetting::Variable { .. }) {
             0.9_f64.powi(-5)
         } else {

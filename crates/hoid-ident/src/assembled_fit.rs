@@ -1,8 +1,9 @@
-//! The fit that belongs to a minimum: loss, innovation variance and what else follows from the sum of squares.
+//! The fit that belongs to a minimum: loss, innovation variance and what else follows from the sum
+//! of squares.
 //!
 //! With n residuals, p free parameters and s initial states, `V = sum eps^2 / n` and
-//! `sigma^2 = sum eps^2 / (n - p - s)`. The covariance of theta is `sigma^2 (psi' psi)^-1` over the free parameters (L. Ljung,
-//! *System Identification*, 1999, eq. 9.19 and 9.42).
+//! `sigma^2 = sum eps^2 / (n - p - s)`. The covariance of theta is `sigma^2 (psi' psi)^-1` over the
+//! free parameters (L. Ljung, *System Identification*, 1999, eq. 9.19 and 9.42).
 
 use hoid_model::{PolynomialModel, SampleTime, Structure};
 

@@ -18,7 +18,8 @@ impl Constraint {
         }
     }
 
-    /// True for numbers that are in order: a finite value, or a lower bound that does not exceed the upper one.
+    /// True for numbers that are in order: a finite value, or a lower bound that does not exceed
+    /// the upper one.
     pub fn is_sound(self) -> bool {
         match self {
             Self::Fixed(value) => value.is_finite(),
@@ -29,8 +30,8 @@ impl Constraint {
 
 /// A guess theta* of one parameter: the loss grows by `weight (theta - theta*)^2`.
 ///
-/// A weight of `sigma^2 / (N s^2)` stands for knowledge of theta* with the standard deviation s (innovation variance sigma^2, N
-/// residuals).
+/// A weight of `sigma^2 / (N s^2)` stands for knowledge of theta* with the standard deviation s
+/// (innovation variance sigma^2, N residuals).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     /// The guess theta*.

@@ -1,15 +1,18 @@
 //! Poles, zeros, crossover and margins of a fit, with standard errors by the delta method.
 //!
-//! A simple root z of `p(z) = z^n + p_1 z^{n-1} + ... + p_n` moves with the coefficients as `dz/dp_j = -z^{n-j} / p'(z)`; the
-//! same holds for B with its leading coefficient b_0. At a multiple root the derivative does not exist, and near one it says
-//! little: the standard error grows without bound there, as the root itself is ill determined.
+//! A simple root z of `p(z) = z^n + p_1 z^{n-1} + ... + p_n` moves with the coefficients as
+//! `dz/dp_j = -z^{n-j} / p'(z)`; the same holds for B with its leading coefficient b_0. At a
+//! multiple root the derivative does not exist, and near one it says little: the standard error
+//! grows without bound there, as the root itself is ill determined.
 //!
-//! The open loop is `L(omega, theta) = H(omega, theta) Y_c(omega)` with the controlled element Y_c given. Where `|L| = 1`
-//! stays so while theta moves,
+//! The open loop is `L(omega, theta) = H(omega, theta) Y_c(omega)` with the controlled element Y_c
+//! given. Where `|L| = 1` stays so while theta moves,
 //!
-//! `d omega_c = -(d ln|L|/d theta) / (d ln|L|/d omega)`,  `d phi_m = d arg L/d theta + (d arg L/d omega) d omega_c`,
+//! `d omega_c = -(d ln|L|/d theta) / (d ln|L|/d omega)`,
+//! `d phi_m = d arg L/d theta + (d arg L/d omega) d omega_c`,
 //!
-//! and where `arg L = -180 deg` stays so, with the parts of phase and gain exchanged, for the gain margin.
+//! and where `arg L = -180 deg` stays so, with the parts of phase and gain exchanged, for the gain
+//! margin.
 
 use hoid_model::{
     Complex64, margins::Margins, margins::margins, polynomial, polynomial_model::monic, uncertainty::Estimate,
@@ -25,13 +28,14 @@ pub struct Root {
     pub polynomial: char,
     /// Its place.
     pub value: Complex64,
-    /// Standard errors of the real and the imaginary part; `None` without covariance or at a multiple root.
+    /// Standard errors of the real and the imaginary part; `None` without covariance or at a
+    /// multiple root.
     pub standard_error: Option<(f64, f64)>,
 }
 
 impl Root {
-    /// Natural frequency in rad/s and damping ratio of the continuous pole `ln(z)/Ts`; `None` on the closed negative real axis of
-    /// z, where there is none.
+    /// Natural frequency in rad/s and damping ratio of the continuous pole `ln(z)/Ts`; `None` on
+    /// the closed negative real axis of z, where there is none.
     pub fn frequency_and_damping(&self, sample_time_s: f64) -> Option<(f64, f64)> {
         if self.value.im == 0.0 && self.value.re <= 0.0 {
             return None;
@@ -42,7 +46,8 @@ impl Root {
     }
 }
 
-/// Crossover and margins of an open loop with their uncertainty; `None` where there is no crossover.
+/// Crossover and margins of an open loop with their uncertainty; `None` where there is no
+/// crossover.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MarginEstimates {
     /// Gain crossover frequency omega_c in rad/s.
@@ -68,8 +73,9 @@ impl From<Margins> for MarginEstimates {
 }
 
 impl Fit {
-    /// Roots of A, B, C, D and F with their uncertainty, in this order: poles of the system are those of A and F, its zeros
-    /// those of B (the delay's not counted); poles of the noise filter are those of A and D, its zeros those of C.
+    /// Roots of A, B, C, D and F with their uncertainty, in this order: poles of the system are
+    /// those of A and F, its zeros those of B (the delay's not counted); poles of the noise filter
+    /// are those of A and D, its zeros those of C.
     pub fn roots(&self) -> Vec<Root> {
         let m = self.model();
         let o = self.orders();
@@ -90,7 +96,8 @@ impl Fit {
         all
     }
 
-    /// Standard errors of a root of `p`, whose coefficients lie in theta from `at` on (all of them, or all but the leading one).
+    /// Standard errors of a root of `p`, whose coefficients lie in theta from `at` on (all of them,
+    /// or all but the leading one).
     fn root_error(&self, p: &[f64], z: Complex64, at: usize, leading: bool) -> Option<(f64, f64)> {
         let covariance = self.covariance()?;
         let n = p.len() - 1;
@@ -111,7 +118,8 @@ impl Fit {
         (re > 0.0 || im > 0.0).then_some((re, im))
     }
 
-    /// Crossover frequency and margins of the open loop with a controlled element of the given frequency response.
+    /// Crossover frequency and margins of the open loop with a controlled element of the given
+    /// frequency response.
     pub fn margins(&self, controlled_element: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> MarginEstimates {
         let open_loop = |omega: f64| self.model().response(omega) * controlled_element(omega);
         let found = margins(open_loop, range_rad_s);
@@ -119,7 +127,8 @@ impl Fit {
         let Some(covariance) = self.covariance() else {
             return estimates;
         };
-        // d ln L / d omega by a central difference: L is smooth, so that the step costs about 1e-10 of it.
+        // d ln L / d omega by a central difference: L is smooth, so that the step costs about 1e-10
+        // of it.
         let slope = |omega: f64| {
             let h = 1e-5 * omega;
             let ratio = open_loop(omega + h) / open_loop(omega - h);

@@ -3,7 +3,8 @@
 use hoid_model::ModelError;
 use thiserror::Error;
 
-/// Everything that stops a fit. How a search *ended* is data in the fit ([`crate::Termination`]), not an error.
+/// Everything that stops a fit. How a search *ended* is data in the fit ([`crate::Termination`]),
+/// not an error.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum IdentError {

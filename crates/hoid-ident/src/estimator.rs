@@ -15,11 +15,13 @@ use crate::{
 /// What the fitted model is to be good at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Focus {
-    /// One-step-ahead prediction: the prediction error method, efficient where the structure is right.
+    /// One-step-ahead prediction: the prediction error method, efficient where the structure is
+    /// right.
     #[default]
     Prediction,
-    /// Simulation from the input alone: the system from e to u minimises the simulation error, and the noise model is fitted to
-    /// what is left. In a closed loop the system is then biased by the feedback.
+    /// Simulation from the input alone: the system from e to u minimises the simulation error, and
+    /// the noise model is fitted to what is left. In a closed loop the system is then biased by the
+    /// feedback.
     Simulation,
 }
 
@@ -32,14 +34,16 @@ pub struct Estimator {
     pub structure: Structure,
     /// The orders.
     pub orders: Orders,
-    /// Initial states of each record. Default (`None`): automatic, which is estimated where there is an input and backcast for
-    /// an output alone, whose past is as stationary as its present.
+    /// Initial states of each record. Default (`None`): automatic, which is estimated where there
+    /// is an input and backcast for an output alone, whose past is as stationary as its present.
     pub initial_state: Option<InitialState>,
     /// Method and limits of the search.
     pub search: SearchOptions,
-    /// Number of own starts from which the search runs to its end; the best minimum wins. Default 2.
+    /// Number of own starts from which the search runs to its end; the best minimum wins. Default
+    /// 2.
     pub starts: usize,
-    /// Start of the search instead of the estimator's own; theta in the order of [`Orders::parameter_names`].
+    /// Start of the search instead of the estimator's own; theta in the order of
+    /// [`Orders::parameter_names`].
     pub start: Option<Vec<f64>>,
     /// Fixed and bounded coefficients, by name.
     pub constraints: BTreeMap<String, Constraint>,
@@ -49,7 +53,8 @@ pub struct Estimator {
     pub loss: Loss,
     /// What the model is to be good at. Default: prediction.
     pub focus: Focus,
-    /// True when A must be stable too, so that the model from e to u is. C and F always are. Default false.
+    /// True when A must be stable too, so that the model from e to u is. C and F always are.
+    /// Default false.
     pub stable: bool,
 }
 
@@ -157,8 +162,8 @@ impl Estimator {
         self.fit_from(records, 0)
     }
 
-    /// As [`Estimator::fit`], with residuals that count from sample `first` of each record at the earliest, so that models of
-    /// different orders are compared on the same samples.
+    /// As [`Estimator::fit`], with residuals that count from sample `first` of each record at the
+    /// earliest, so that models of different orders are compared on the same samples.
     ///
     /// # Errors
     /// As [`Estimator::fit`].
@@ -173,9 +178,9 @@ impl Estimator {
 
     /// Fits a model to each record alone.
     ///
-    /// Box-Jenkins models of records of one length are searched side by side, in about half of the time of one after the other.
-    /// What a fit finds does not depend on what it is searched beside; it differs from that of [`Estimator::fit`] by rounding,
-    /// less than 1e-7 of a standard error.
+    /// Box-Jenkins models of records of one length are searched side by side, in about half of the
+    /// time of one after the other. What a fit finds does not depend on what it is searched beside;
+    /// it differs from that of [`Estimator::fit`] by rounding, less than 1e-7 of a standard error.
     ///
     /// # Errors
     /// Those of [`Estimator::fit`], for each record by itself.

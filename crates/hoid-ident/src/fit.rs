@@ -77,14 +77,14 @@ impl Fit {
         self.model.orders()
     }
 
-    /// Covariance of theta by rows, `sigma^2 (psi' psi)^-1` with the initial states eliminated; `None` for an exact fit, whose
-    /// residuals carry no information about the noise.
+    /// Covariance of theta by rows, `sigma^2 (psi' psi)^-1` with the initial states eliminated;
+    /// `None` for an exact fit, whose residuals carry no information about the noise.
     pub fn covariance(&self) -> Option<&[f64]> {
         self.covariance.as_deref()
     }
 
-    /// Name, value and standard error of each parameter: the coefficients of theta, or the physical parameters that a grey box
-    /// fitted.
+    /// Name, value and standard error of each parameter: the coefficients of theta, or the physical
+    /// parameters that a grey box fitted.
     pub fn parameters(&self) -> Vec<(String, Estimate)> {
         if let Some(physical) = &self.physical {
             return physical.parameters.clone();
@@ -110,8 +110,8 @@ impl Fit {
         self.loss
     }
 
-    /// Unbiased innovation variance `sum eps^2 / (n - p - s)` with p parameters and s estimated initial states; with a robust
-    /// loss the square of the robust scale ([`Fit::is_robust`]).
+    /// Unbiased innovation variance `sum eps^2 / (n - p - s)` with p parameters and s estimated
+    /// initial states; with a robust loss the square of the robust scale ([`Fit::is_robust`]).
     pub fn innovation_variance(&self) -> f64 {
         self.innovation_variance
     }
@@ -131,7 +131,8 @@ impl Fit {
         self.initial_state
     }
 
-    /// For each coefficient, whether it was fixed or rests at a bound; it then has no standard error.
+    /// For each coefficient, whether it was fixed or rests at a bound; it then has no standard
+    /// error.
     pub fn held(&self) -> &[bool] {
         &self.held
     }
@@ -163,8 +164,9 @@ impl Fit {
         self.loss * (1.0 + ratio) / (1.0 - ratio)
     }
 
-    /// Akaike's criterion with the correction for short records, `AIC + 2 p (p + 1)/(n - p - 1)` (C. M. Hurvich and C.-L. Tsai,
-    /// *Biometrika* 76 (1989) 297-307); infinite where n does not exceed p + 1.
+    /// Akaike's criterion with the correction for short records, `AIC + 2 p (p + 1)/(n - p - 1)`
+    /// (C. M. Hurvich and C.-L. Tsai, *Biometrika* 76 (1989) 297-307); infinite where n does not
+    /// exceed p + 1.
     pub fn aicc(&self) -> f64 {
         let (n, p) = (self.residuals as f64, self.parameter_count());
         if n > p + 1.0 {
@@ -180,9 +182,10 @@ impl Fit {
         self.loss * (1.0 + p * n.ln() / n)
     }
 
-    /// Young's criterion `ln(V / var u) + ln( (1/p) sum_i var theta_i / theta_i^2 )` over the free coefficients of A, B and F
-    /// (P. C. Young, *Recursive Estimation and Time-Series Analysis*, 2011, section 6.7): the more negative, the better the
-    /// fit for well determined coefficients. `None` without standard errors or where a coefficient is zero.
+    /// Young's criterion `ln(V / var u) + ln( (1/p) sum_i var theta_i / theta_i^2 )` over the free
+    /// coefficients of A, B and F (P. C. Young, *Recursive Estimation and Time-Series Analysis*,
+    /// 2011, section 6.7): the more negative, the better the fit for well determined coefficients.
+    /// `None` without standard errors or where a coefficient is zero.
     pub fn yic(&self) -> Option<f64> {
         let relative: Option<Vec<f64>> = self
             .parameters()
@@ -242,8 +245,8 @@ impl Fit {
         }
     }
 
-    /// T_n and K_n of the remnant filter that the noise model stands for. A grey box has fitted them as they are held over each
-    /// sample, whatever `how`.
+    /// T_n and K_n of the remnant filter that the noise model stands for. A grey box has fitted
+    /// them as they are held over each sample, whatever `how`.
     ///
     /// # Errors
     /// [`NotConvertible`] with the reason.
@@ -280,9 +283,9 @@ impl Fit {
         Ok(output_less(record, self.residuals(record)?))
     }
 
-    /// Simulated output: the response of `B/(A F)` to the input alone, without noise model. Where the fit estimated initial
-    /// states, those of the simulation are estimated too (least squares of the simulation error). A model without an input
-    /// has nothing to simulate: zero.
+    /// Simulated output: the response of `B/(A F)` to the input alone, without noise model. Where
+    /// the fit estimated initial states, those of the simulation are estimated too (least squares
+    /// of the simulation error). A model without an input has nothing to simulate: zero.
     ///
     /// # Errors
     /// As [`Fit::residuals`].
@@ -333,8 +336,8 @@ impl Fit {
         })
     }
 
-    /// Frequency response with standard errors by the delta method: with `dH` the gradient, `d ln|H| = Re(dH/H)` and
-    /// `d arg H = Im(dH/H)`.
+    /// Frequency response with standard errors by the delta method: with `dH` the gradient,
+    /// `d ln|H| = Re(dH/H)` and `d arg H = Im(dH/H)`.
     pub fn frequency_response(&self, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
         let to_db = 20.0 / std::f64::consts::LN_10;
         omega_rad_s
@@ -365,8 +368,8 @@ fn output_less(record: &Record, mut errors: Series) -> Series {
     errors
 }
 
-/// Orders and theta of the output-error model `u = B/(A F) q^-nk e + eps` with the same system: its residual is the
-/// simulation error of the model.
+/// Orders and theta of the output-error model `u = B/(A F) q^-nk e + eps` with the same system: its
+/// residual is the simulation error of the model.
 fn output_error_form(model: &PolynomialModel) -> (Orders, Vec<f64>) {
     let orders = model.orders();
     let den = product(&monic(model.a()), &monic(model.f()));

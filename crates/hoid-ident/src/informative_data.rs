@@ -1,7 +1,8 @@
-//! Whether records are informative enough for a model: one sample time, an input that moves, more residuals than unknowns.
+//! Whether records are informative enough for a model: one sample time, an input that moves, more
+//! residuals than unknowns.
 //!
-//! This is what can be said before the fit; whether the regressors are independent, the fit itself finds out. Source: L. Ljung,
-//! *System Identification*, 1999, section 8.2 (informative data).
+//! This is what can be said before the fit; whether the regressors are independent, the fit itself
+//! finds out. Source: L. Ljung, *System Identification*, 1999, section 8.2 (informative data).
 
 use hoid_model::{Orders, Record, SampleTime, Structure};
 
@@ -26,7 +27,8 @@ pub(crate) fn common_sample_time(records: &[Record]) -> Result<SampleTime, Ident
 /// Refuses a record that cannot determine a model whose residuals start at sample `first`.
 ///
 /// # Errors
-/// [`IdentError::NoInput`], [`IdentError::NoExcitation`], [`IdentError::DelayTooLong`], [`IdentError::TooFewSamples`].
+/// [`IdentError::NoInput`], [`IdentError::NoExcitation`], [`IdentError::DelayTooLong`],
+/// [`IdentError::TooFewSamples`].
 pub(crate) fn check_record(
     structure: Structure,
     orders: &Orders,
@@ -70,7 +72,8 @@ pub(crate) fn check_record(
     Ok(())
 }
 
-/// Refuses records with fewer residuals than unknowns: `N > p + s` with p parameters and s initial states.
+/// Refuses records with fewer residuals than unknowns: `N > p + s` with p parameters and s initial
+/// states.
 ///
 /// # Errors
 /// [`IdentError::TooFewSamples`].

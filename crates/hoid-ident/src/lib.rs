@@ -1,25 +1,30 @@
 //! Identification of the human operator from records: batch estimators.
 //!
-//! **The problem.** A person tracks a target: they see the error e and move the control, u. Both are sampled with the period Ts.
-//! What dynamics lead from e to u, how well are they determined, and what of u do they leave unexplained, the remnant?
+//! **The problem.** A person tracks a target: they see the error e and move the control, u. Both
+//! are sampled with the period Ts. What dynamics lead from e to u, how well are they determined,
+//! and what of u do they leave unexplained, the remnant?
 //!
 //! **The model.** Everything here is a case of
 //!
 //! `A(q) u(t) = (B(q)/F(q)) q^-nk e(t) + (C(q)/D(q)) eps(t)`
 //!
-//! with polynomials in the backward shift `q^-1`, `A = 1 + a1 q^-1 + ..`, `B = b0 + b1 q^-1 + ..`, and white innovations eps
-//! with the variance sigma^2. B/F with nk is the operator with the delay, C/D shapes the remnant; structures set some of the
-//! polynomials to one (ARX: A and B; Box-Jenkins: B, C, D and F).
+//! with polynomials in the backward shift `q^-1`, `A = 1 + a1 q^-1 + ..`, `B = b0 + b1 q^-1 + ..`,
+//! and white innovations eps with the variance sigma^2. B/F with nk is the operator with the delay,
+//! C/D shapes the remnant; structures set some of the polynomials to one (ARX: A and B;
+//! Box-Jenkins: B, C, D and F).
 //!
-//! **The method.** For given coefficients theta the best prediction of u(t) from all that was before leaves
+//! **The method.** For given coefficients theta the best prediction of u(t) from all that was
+//! before leaves
 //!
 //! `eps(t, theta) = (D/C) (A u(t) - (B/F) q^-nk e(t))`
 //!
-//! and theta minimises `V = (1/N) sum eps(t, theta)^2`: the prediction error method (L. Ljung, *System Identification*, 1999,
-//! ch. 7). It is consistent where the structure holds the true dynamics, in a closed loop too if there is a delay in the loop, and
-//! it attains the Cramér-Rao bound for normal innovations. Its covariance is `sigma^2 (psi' psi)^-1` with `psi = -d eps/d theta`.
-//! What a record does not say about the time before it, the initial states, enters eps linearly and is eliminated exactly for
-//! each theta. ARX is linear in theta and solved in one step; the others by damped Gauss-Newton from several starts.
+//! and theta minimises `V = (1/N) sum eps(t, theta)^2`: the prediction error method (L. Ljung,
+//! *System Identification*, 1999, ch. 7). It is consistent where the structure holds the true
+//! dynamics, in a closed loop too if there is a delay in the loop, and it attains the Cramér-Rao
+//! bound for normal innovations. Its covariance is `sigma^2 (psi' psi)^-1` with
+//! `psi = -d eps/d theta`. What a record does not say about the time before it, the initial states,
+//! enters eps linearly and is eliminated exactly for each theta. ARX is linear in theta and solved
+//! in one step; the others by damped Gauss-Newton from several starts.
 //!
 //! ```
 //! use hoid_ident::Estimator;

@@ -1,8 +1,9 @@
 //! Choice of orders and delay.
 //!
-//! Every combination of the given ranges is fitted on the same samples (the residuals of all candidates start where the most
-//! demanding one can), and the criterion decides: the loss for the delay alone, BIC where the number of parameters differs.
-//! The chosen model is then fitted once more on all the samples that its own orders leave.
+//! Every combination of the given ranges is fitted on the same samples (the residuals of all
+//! candidates start where the most demanding one can), and the criterion decides: the loss for the
+//! delay alone, BIC where the number of parameters differs. The chosen model is then fitted once
+//! more on all the samples that its own orders leave.
 
 use std::{fmt, ops::RangeInclusive};
 
@@ -213,8 +214,9 @@ pub struct Choice {
     pub criterion: Criterion,
 }
 
-/// Identifies a person as `hoid identify` does without options: the operator by a Box-Jenkins model, the delay searched over 0.05 to 0.6 s and
-/// the order of the noise model over 1 to 4, chosen by BIC.
+/// Identifies a person as `hoid identify` does without options: the operator by a Box-Jenkins
+/// model, the delay searched over 0.05 to 0.6 s and the order of the noise model over 1 to 4,
+/// chosen by BIC.
 ///
 /// # Errors
 /// As [`choose_orders`]; [`IdentError::NoRecords`] without a record.
@@ -226,7 +228,8 @@ pub fn identify(records: &[Record]) -> Result<Choice, IdentError> {
     choose_orders(&template, &ranges, Criterion::Bic, records)
 }
 
-/// Fits every combination of orders and returns the best. `template` gives the options; its orders and start are not used.
+/// Fits every combination of orders and returns the best. `template` gives the options; its orders
+/// and start are not used.
 ///
 /// # Errors
 /// [`IdentError::EmptyRange`]; the error of the first candidate when none could be fitted.
@@ -239,7 +242,8 @@ pub fn choose_orders(
     choose_orders_with(template, ranges, criterion, records, &|| {})
 }
 
-/// As [`choose_orders`], calling `each` after every candidate, from any thread, so that a long search can show how far it is.
+/// As [`choose_orders`], calling `each` after every candidate, from any thread, so that a long
+/// search can show how far it is.
 ///
 /// # Errors
 /// As [`choose_orders`].
@@ -259,7 +263,8 @@ pub fn choose_orders_with(
         .map(|o| first_residual(o, template.initial_state_in_use()))
         .max()
         .unwrap_or(0);
-    // To rank candidates the loss need not be known to the last digit; the chosen one is fitted again with all care.
+    // To rank candidates the loss need not be known to the last digit; the chosen one is fitted
+    // again with all care.
     let quick = Estimator {
         search: SearchOptions {
             tolerance: template.search.tolerance.max(1e-8),
@@ -269,8 +274,9 @@ pub fn choose_orders_with(
         starts: 1,
         ..template.clone()
     };
-    // Delays in blocks: within one, each delay starts from its neighbour. The blocks are the same for any number of threads, and
-    // the results are collected by index, so that the table does not depend on them.
+    // Delays in blocks: within one, each delay starts from its neighbour. The blocks are the same
+    // for any number of threads, and the results are collected by index, so that the table does not
+    // depend on them.
     let delays = ranges.nk.clone().count();
     let blocks: Vec<&[Orders]> = combinations
         .chunks(delays)
@@ -333,11 +339,13 @@ fn fit_neighbours(
         .collect()
 }
 
-/// The fit of one model where the ranges leave nothing open, else that of the best of them with the table it was chosen from. `template` gives
-/// the options; its start belongs to the first case alone.
+/// The fit of one model where the ranges leave nothing open, else that of the best of them with the
+/// table it was chosen from. `template` gives the options; its start belongs to the first case
+/// alone.
 ///
 /// # Errors
-/// Those of [`Estimator::fit`] and [`choose_orders`]; [`IdentError::BadStart`] for a start where several models are tried.
+/// Those of [`Estimator::fit`] and [`choose_orders`]; [`IdentError::BadStart`] for a start where
+/// several models are tried.
 pub fn fit_or_choose(
     template: &Estimator,
     ranges: &OrderRanges,
@@ -364,10 +372,11 @@ pub fn fit_or_choose(
 }
 
 impl Choice {
-    /// Delays nk that the data do not tell from the best one, the other orders being those of the chosen model: the smallest
-    /// and the largest with `n ln(V/V_min) <= 3.84`, the 95 % point of chi-square with one degree of freedom (a profile
-    /// likelihood interval; nk moves in whole samples, so that it is coarse where one sample changes the loss much). `None`
-    /// when fewer than two delays were fitted.
+    /// Delays nk that the data do not tell from the best one, the other orders being those of the
+    /// chosen model: the smallest and the largest with `n ln(V/V_min) <= 3.84`, the 95 % point of
+    /// chi-square with one degree of freedom (a profile likelihood interval; nk moves in whole
+    /// samples, so that it is coarse where one sample changes the loss much). `None` when fewer
+    /// than two delays were fitted.
     pub fn delay_interval(&self) -> Option<(usize, usize)> {
         let chosen = self.fit.orders();
         let profile: Vec<(usize, f64, usize)> = self
@@ -402,7 +411,8 @@ pub fn default_delay_range(sample_time: hoid_model::SampleTime) -> RangeInclusiv
     samples(0.05)..=samples(0.6)
 }
 
-/// The operator's orders with the defaults of the command line: nk searched, and nd over 1 to 4 for Box-Jenkins.
+/// The operator's orders with the defaults of the command line: nk searched, and nd over 1 to 4 for
+/// Box-Jenkins.
 pub fn default_operator_ranges(structure: Structure, sample_time: hoid_model::SampleTime) -> OrderRanges {
     let mut ranges = OrderRanges::from(structure.operator_orders(1));
     if structure.has_input() {

@@ -1,7 +1,8 @@
 //! The registry of batch estimators: what each is called, what it is, and which options it takes.
 //!
-//! The command line takes names, help and placement of its flags from here, the book its page of options, Python what belongs to what. A new
-//! instrumental-variable method is in the list by being in [`IvMethod::ALL`].
+//! The command line takes names, help and placement of its flags from here, the book its page of
+//! options, Python what belongs to what. A new instrumental-variable method is in the list by being
+//! in [`IvMethod::ALL`].
 
 use hoid_model::{NamedChoice, Structure};
 

@@ -10,7 +10,8 @@ use crate::{Fit, Reason};
 const DIGITS: i32 = 5;
 
 impl fmt::Display for Fit {
-    /// Structure and orders, a row for each parameter with its standard error, loss and criteria, how the search ended.
+    /// Structure and orders, a row for each parameter with its standard error, loss and criteria,
+    /// how the search ended.
     ///
     /// ```
     /// # use hoid_ident::Estimator;

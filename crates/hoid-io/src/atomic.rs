@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 
 use crate::IoError;
 
-/// Writes a file through `write`. A file that exists is replaced only when everything is written and on the disk; on an error
-/// it stays as it was and nothing else is left behind. A pipe or a device is written into directly.
+/// Writes a file through `write`. A file that exists is replaced only when everything is written
+/// and on the disk; on an error it stays as it was and nothing else is left behind. A pipe or a
+/// device is written into directly.
 ///
 /// # Errors
 /// [`IoError::Directory`], [`IoError::Unwritable`] for what the system or `write` says.
@@ -165,7 +166,8 @@ fn part(place: PathBuf, permissions: Option<fs::Permissions>) -> io::Result<(fs:
     ))
 }
 
-/// A file of the usual permissions (those of the umask), where temporary files are otherwise closed to all others.
+/// A file of the usual permissions (those of the umask), where temporary files are otherwise closed
+/// to all others.
 fn beside() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".hoid-").suffix(".part");

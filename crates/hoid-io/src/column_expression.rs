@@ -1,8 +1,8 @@
 //! Which columns are the input and the output: `NAME`, `-NAME` or `NAME-NAME`.
 //!
-//! Laboratories often record the target r and the output y of the controlled element and leave the tracking error
-//! `e = r - y` to the reader, or count the control with the other sign. A column whose name is the whole text wins, so that a
-//! name may hold a hyphen.
+//! Laboratories often record the target r and the output y of the controlled element and leave the
+//! tracking error `e = r - y` to the reader, or count the control with the other sign. A column
+//! whose name is the whole text wins, so that a name may hold a hyphen.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,7 +10,8 @@ use std::str::FromStr;
 use crate::IoError;
 use crate::wording::list;
 
-/// A column, its negative, or the difference of two columns. It is text until the columns of a file are known.
+/// A column, its negative, or the difference of two columns. It is text until the columns of a file
+/// are known.
 ///
 /// ```
 /// let error: hoid_io::ColumnExpression = "r-y".parse()?;
@@ -86,7 +87,8 @@ impl ColumnExpression {
         match (meanings.as_slice(), splits.as_slice()) {
             ([one], _) => Ok(*one),
             ([], splits) => {
-                // With one hyphen it is clear which of the two names is wrong; otherwise the text is named as it stands.
+                // With one hyphen it is clear which of the two names is wrong; otherwise the text
+                // is named as it stands.
                 let parts = match splits {
                     [(left, right)] => vec![*left, *right],
                     _ => vec![self.text.strip_prefix('-').unwrap_or(&self.text)],

@@ -3,8 +3,9 @@
 use hoid_model::ModelError;
 use thiserror::Error;
 
-/// Why a file could not be read or written. Each message names the file, the place in it, what was found, what was expected
-/// and the remedy. A `place` is "line 12" where the format has lines, else "row 12".
+/// Why a file could not be read or written. Each message names the file, the place in it, what was
+/// found, what was expected and the remedy. A `place` is "line 12" where the format has lines, else
+/// "row 12".
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum IoError {

@@ -1,8 +1,8 @@
 //! Crates that read untrusted bytes, kept from ending a study.
 //!
-//! They answer most damage by an error, but some by a panic: an index or a sum out of range. This is the one place where a
-//! panic is caught. What it may leave half done is the crate's and is dropped here. With `panic = "abort"` nothing can be
-//! caught.
+//! They answer most damage by an error, but some by a panic: an index or a sum out of range. This
+//! is the one place where a panic is caught. What it may leave half done is the crate's and is
+//! dropped here. With `panic = "abort"` nothing can be caught.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
@@ -28,8 +28,8 @@ pub(crate) fn guarded<T>(file: &str, read: impl FnOnce() -> Result<T, IoError>) 
 
 /// The result, or the message of a panic.
 ///
-/// The hook is passed through, once for the process, and keeps silent on a thread that is reading; any other panic is reported
-/// as before.
+/// The hook is passed through, once for the process, and keeps silent on a thread that is reading;
+/// any other panic is reported as before.
 fn without_panic<T>(read: impl FnOnce() -> T) -> Result<T, String> {
     static HOOK: Once = Once::new();
     // A hook cannot be set while the thread is falling.

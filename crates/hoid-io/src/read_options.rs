@@ -1,12 +1,14 @@
-//! How to read a record: which columns are input and output, the sampling, and what may be repaired.
+//! How to read a record: which columns are input and output, the sampling, and what may be
+//! repaired.
 
 use crate::column_expression::ColumnExpression;
 
 /// What may be mended in a damaged record. By default nothing is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Repair {
-    /// Interpolate linearly from an uneven t, also over gaps, to an even grid. The grid starts at the first t; its sample time
-    /// is that of the typical step, or of [`ReadOptions::sampling_hz`].
+    /// Interpolate linearly from an uneven t, also over gaps, to an even grid. The grid starts at
+    /// the first t; its sample time is that of the typical step, or of
+    /// [`ReadOptions::sampling_hz`].
     pub resample: bool,
     /// Bridge missing values (empty, NaN, NA) linearly between the values before and behind.
     pub fill: bool,
@@ -15,12 +17,14 @@ pub struct Repair {
 /// How to read a record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadOptions {
-    /// Input of the person; `e` by default. `None` reads an output alone, for the structures without input.
+    /// Input of the person; `e` by default. `None` reads an output alone, for the structures
+    /// without input.
     pub input: Option<ColumnExpression>,
     /// Output of the person; `u` by default.
     pub output: ColumnExpression,
-    /// Sampling frequency in Hz. It wins over the column t, which then gives only the time of the first sample (0 when there
-    /// is none); with [`Repair::resample`] it is the frequency of the new grid. By default the sampling is that of t.
+    /// Sampling frequency in Hz. It wins over the column t, which then gives only the time of the
+    /// first sample (0 when there is none); with [`Repair::resample`] it is the frequency of the
+    /// new grid. By default the sampling is that of t.
     pub sampling_hz: Option<f64>,
     /// The samples with `from <= t < to`, s; what lies outside is not looked at. By default all.
     pub span_s: (Option<f64>, Option<f64>),

@@ -2,7 +2,8 @@
 
 use hoid_model::{Channel, Record};
 
-/// The channels in the order that a person reads in: the target first, then what the operator sees and does.
+/// The channels in the order that a person reads in: the target first, then what the operator sees
+/// and does.
 pub(crate) fn channels(record: &Record) -> Vec<&Channel> {
     let (target, others): (Vec<&Channel>, Vec<&Channel>) = record.channels().partition(|c| c.name == "f_t");
     target.into_iter().chain(others).collect()

@@ -1,8 +1,9 @@
 //! Records from files and into files.
 //!
-//! Reading takes the columns that are asked for, finds the sampling, checks every value in use and gives a [`Record`], or the
-//! error that names the place. Nothing is repaired unless [`Repair`](crate::Repair) asks for it, and what was repaired is said in the notes.
-//! The format follows from the extension.
+//! Reading takes the columns that are asked for, finds the sampling, checks every value in use and
+//! gives a [`Record`], or the error that names the place. Nothing is repaired unless
+//! [`Repair`](crate::Repair) asks for it, and what was repaired is said in the notes. The format
+//! follows from the extension.
 
 use std::io::Write;
 use std::path::Path;
@@ -19,7 +20,8 @@ use crate::record_columns::{channels, comments};
 use crate::record_from_table::{ReadRecord, record_of};
 use crate::table_writer::write_values;
 
-/// Reads a record with the defaults of the command line: columns e, u and t, and each other column of numbers as a channel of its own.
+/// Reads a record with the defaults of the command line: columns e, u and t, and each other column
+/// of numbers as a channel of its own.
 ///
 /// # Errors
 /// As [`read_record`].
@@ -27,7 +29,8 @@ pub fn read(path: impl AsRef<Path>) -> Result<Record, IoError> {
     Ok(read_record(path.as_ref(), &ReadOptions::default())?.record)
 }
 
-/// Reads a record from a file: input, output, and each other column of numbers as a channel of its own.
+/// Reads a record from a file: input, output, and each other column of numbers as a channel of its
+/// own.
 ///
 /// # Errors
 /// [`IoError`], naming the place in the file.
@@ -35,7 +38,8 @@ pub fn read_record(path: &Path, options: &ReadOptions) -> Result<ReadRecord, IoE
     read_prepared(path, options, &Preparation::default())
 }
 
-/// Reads a record and prepares it: the units, the alignment and the rate that the estimator is to see.
+/// Reads a record and prepares it: the units, the alignment and the rate that the estimator is to
+/// see.
 ///
 /// # Errors
 /// [`IoError`], naming the place in the file or the step of the preparation.
@@ -50,12 +54,13 @@ pub fn read_prepared(path: &Path, options: &ReadOptions, preparation: &Preparati
     Ok(ReadRecord { record, ..read })
 }
 
-/// Writes a record: t, then `f_t` where there is one, input, output, and the other channels in their order, all with the digits
-/// that give the same numbers back. Units and sample time are kept beside them as comments; the label is not written.
+/// Writes a record: t, then `f_t` where there is one, input, output, and the other channels in
+/// their order, all with the digits that give the same numbers back. Units and sample time are kept
+/// beside them as comments; the label is not written.
 ///
 /// # Errors
-/// [`IoError::UnknownFormat`], [`IoError::ChannelName`] for a channel that could not be read back, and those of
-/// [`write_atomically`].
+/// [`IoError::UnknownFormat`], [`IoError::ChannelName`] for a channel that could not be read back,
+/// and those of [`write_atomically`].
 pub fn write_record(path: &Path, record: &Record) -> Result<(), IoError> {
     let format = format_to_write(path)?;
     check_names(record, || path.display().to_string())?;
@@ -86,7 +91,8 @@ fn write_columns(path: &Path, record: &Record) -> Result<(), IoError> {
 /// Writes a record as CSV into something that is open already, such as standard output.
 ///
 /// # Errors
-/// [`IoError::ChannelName`]; [`IoError::Unwritable`] for what `out` says. `name` stands for it in both.
+/// [`IoError::ChannelName`]; [`IoError::Unwritable`] for what `out` says. `name` stands for it in
+/// both.
 pub fn write_record_csv(out: &mut dyn Write, name: &str, record: &Record) -> Result<(), IoError> {
     check_names(record, || name.to_owned())?;
     write_record_as_csv(out, record).map_err(|source| IoError::Unwritable {

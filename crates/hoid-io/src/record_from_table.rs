@@ -22,7 +22,8 @@ pub struct ReadRecord {
     pub notes: Vec<String>,
     /// What was done to the numbers of the file, in this order.
     pub steps: Vec<Step>,
-    /// What is wrong with the input, the output and their time in the file, before anything was done; within the span that is read.
+    /// What is wrong with the input, the output and their time in the file, before anything was
+    /// done; within the span that is read.
     pub quality_issues: Vec<QualityIssue>,
 }
 
@@ -141,8 +142,8 @@ fn nothing() -> Channel {
     Channel::new("", "", Vec::new())
 }
 
-/// The signal that an expression makes of columns; nothing where it is a column by itself. Its name is the expression; a difference has a unit
-/// where both terms share it.
+/// The signal that an expression makes of columns; nothing where it is a column by itself. Its name
+/// is the expression; a difference has a unit where both terms share it.
 fn combine(signal: Signal, expression: &ColumnExpression, columns: &[Option<Channel>]) -> Channel {
     let nothing = nothing();
     let column = |index: usize| columns[index].as_ref().unwrap_or(&nothing);

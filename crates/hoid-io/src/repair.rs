@@ -1,8 +1,9 @@
-//! The remedies for damaged records, applied only when they are asked for: rows that were written twice are dropped, straight
-//! lines are drawn over missing values, and from an uneven t to an even grid.
+//! The remedies for damaged records, applied only when they are asked for: rows that were written
+//! twice are dropped, straight lines are drawn over missing values, and from an uneven t to an even
+//! grid.
 //!
-//! The lines invent data. Over a gap of one or two samples that does little harm; a long straight line is seen by every
-//! estimator as a person who behaves like that.
+//! The lines invent data. Over a gap of one or two samples that does little harm; a long straight
+//! line is seen by every estimator as a person who behaves like that.
 
 use std::ops::Range;
 
@@ -25,7 +26,8 @@ pub(crate) struct Bridged {
     pub(crate) longest: usize,
 }
 
-/// Puts the straight line between its neighbours in place of each run of NaN, along `t` where it is known and else by rows.
+/// Puts the straight line between its neighbours in place of each run of NaN, along `t` where it is
+/// known and else by rows.
 pub(crate) fn fill(values: &mut [f64], t: Option<&[f64]>) -> Result<Bridged, OpenEnd> {
     let mut bridged = Bridged::default();
     let mut at = 0;

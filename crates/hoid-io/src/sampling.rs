@@ -1,9 +1,10 @@
 //! The sampling that a column t states, and whether it is even.
 //!
-//! `Ts = (t_last - t_first) / (N - 1)`, and each t must lie on the grid `t_first + k Ts` within the larger of `1e-3 Ts` and one
-//! unit of the last printed decimal of t: files print t rounded (0.0167 at 60 Hz), and a rounded t is no uneven one. When
-//! `1 / Ts` is a whole number of Hz within `1e-4`, or within the rounding of t, it is taken as that number, so that runs of
-//! one laboratory have one sample time.
+//! `Ts = (t_last - t_first) / (N - 1)`, and each t must lie on the grid `t_first + k Ts` within the
+//! larger of `1e-3 Ts` and one unit of the last printed decimal of t: files print t rounded (0.0167
+//! at 60 Hz), and a rounded t is no uneven one. When `1 / Ts` is a whole number of Hz within
+//! `1e-4`, or within the rounding of t, it is taken as that number, so that runs of one laboratory
+//! have one sample time.
 
 use crate::table::Precision;
 
@@ -40,7 +41,8 @@ pub(crate) struct Sampling {
     pub(crate) note: Option<String>,
 }
 
-/// The sample time of an even t. A sample time that the file states beside its columns counts when t agrees with it.
+/// The sample time of an even t. A sample time that the file states beside its columns counts when
+/// t agrees with it.
 pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Result<Sampling, Uneven> {
     let (&[first, .., last], steps) = (t, t.len().saturating_sub(1) as f64) else {
         return match stated_s {
@@ -132,13 +134,15 @@ impl Rounding {
         }
     }
 
-    /// One unit of the last digit of t, but no more than the median step: a t coarser than that would have stood still.
+    /// One unit of the last digit of t, but no more than the median step: a t coarser than that
+    /// would have stood still.
     fn unit(self, t: f64) -> f64 {
         self.precision.unit(t).min(self.median_step_s)
     }
 }
 
-/// The mean of the steps that are no gaps: of those below 1.5 times the median step, plus one unit for the rounding of t.
+/// The mean of the steps that are no gaps: of those below 1.5 times the median step, plus one unit
+/// for the rounding of t.
 fn typical_step(t: &[f64], rounding: Rounding) -> f64 {
     let median = rounding.median_step_s;
     let (sum, count) = t
@@ -149,8 +153,9 @@ fn typical_step(t: &[f64], rounding: Rounding) -> f64 {
     if count == 0 { median } else { sum / count as f64 }
 }
 
-/// Where samples are missing. Rounding makes steps of one unit more than the sample time, as in 0.00, 0.02, 0.03 at 60 Hz, but
-/// not of a whole unit more where the sample time is itself a multiple of the unit.
+/// Where samples are missing. Rounding makes steps of one unit more than the sample time, as in
+/// 0.00, 0.02, 0.03 at 60 Hz, but not of a whole unit more where the sample time is itself a
+/// multiple of the unit.
 fn gap(t: &[f64], rounding: Rounding, typical_s: f64) -> Result<(), Uneven> {
     let is_gap = |k: &usize| {
         let step = t[k + 1] - t[*k];
@@ -166,7 +171,8 @@ fn gap(t: &[f64], rounding: Rounding, typical_s: f64) -> Result<(), Uneven> {
     })
 }
 
-/// `ts`, or the sample time of the whole number of Hz near it; `slack_s` is the uncertainty of `ts` from the rounding of t.
+/// `ts`, or the sample time of the whole number of Hz near it; `slack_s` is the uncertainty of `ts`
+/// from the rounding of t.
 fn whole_hz(ts: f64, slack_s: f64) -> f64 {
     let frequency = (1.0 / ts).round();
     let near = (1.0 / ts - frequency).abs() <= WHOLE_HZ * frequency || (1.0 / frequency - ts).abs() <= slack_s;

@@ -1,8 +1,10 @@
-//! Records between faults of the recording: a file is cut where samples are missing, stand still or are clipped, and each segment is a record.
+//! Records between faults of the recording: a file is cut where samples are missing, stand still or
+//! are clipped, and each segment is a record.
 //!
-//! Nothing is invented, and each segment has initial states of its own in a fit. But what is left out is chosen by what was
-//! recorded: without the samples at a rail the largest answers are gone, which biases what is left (the lead of C1 clipped at 1.5
-//! standard deviations by 9 %, where the clipped record itself has its gain 12 % too small).
+//! Nothing is invented, and each segment has initial states of its own in a fit. But what is left
+//! out is chosen by what was recorded: without the samples at a rail the largest answers are gone,
+//! which biases what is left (the lead of C1 clipped at 1.5 standard deviations by 9 %, where the
+//! clipped record itself has its gain 12 % too small).
 
 use std::ops::Range;
 use std::path::Path;
@@ -16,12 +18,13 @@ use crate::record_file::read_prepared;
 use crate::record_from_table::ReadRecord;
 use crate::wording::decimal;
 
-/// Reads the segments of a file between faults of these kinds that last `shortest_s` or more, in their order; the whole record where no
-/// kind is named. The first carries what is wrong with the file as a whole.
+/// Reads the segments of a file between faults of these kinds that last `shortest_s` or more, in
+/// their order; the whole record where no kind is named. The first carries what is wrong with the
+/// file as a whole.
 ///
 /// # Errors
-/// As [`read_prepared`]; [`IoError::Preparation`] for kinds that are no places (a clock, a constant), for a run-in, and where no
-/// segment is left.
+/// As [`read_prepared`]; [`IoError::Preparation`] for kinds that are no places (a clock, a
+/// constant), for a run-in, and where no segment is left.
 pub fn read_segments(
     path: &Path,
     options: &ReadOptions,

@@ -1,7 +1,9 @@
-//! What is inside of a file, before anything is chosen: columns, their sampling and ranges, and what is suspicious in them.
+//! What is inside of a file, before anything is chosen: columns, their sampling and ranges, and
+//! what is suspicious in them.
 //!
-//! Nothing is judged finally here: a channel may rightly be constant. What is suspicious is found by `data_quality`, in columns that
-//! belong to one time together; a column that is constant is only marked, because many files carry such.
+//! Nothing is judged finally here: a channel may rightly be constant. What is suspicious is found
+//! by `data_quality`, in columns that belong to one time together; a column that is constant is
+//! only marked, because many files carry such.
 
 use std::path::Path;
 

@@ -1,8 +1,8 @@
 //! Columns of numbers as they stand in a file, before anything is chosen, checked or repaired.
 //!
-//! Each format fills a [`Table`]; everything behind it (choice of columns, sampling, repair) is the same for all formats. A
-//! value that is missing or no number is NaN here; the file is asked again what stood there only when an error has to say
-//! so, which keeps a million rows cheap.
+//! Each format fills a [`Table`]; everything behind it (choice of columns, sampling, repair) is the
+//! same for all formats. A value that is missing or no number is NaN here; the file is asked again
+//! what stood there only when an error has to say so, which keeps a million rows cheap.
 
 use std::ops::Range;
 
@@ -74,8 +74,8 @@ impl Precision {
         self.significant = self.significant.max(digits(mantissa) - leading_zeros);
     }
 
-    /// One unit of the last printed digit of a value of this size. Fixed decimals give the same unit everywhere; with a fixed
-    /// number of significant digits the unit grows with the value.
+    /// One unit of the last printed digit of a value of this size. Fixed decimals give the same
+    /// unit everywhere; with a fixed number of significant digits the unit grows with the value.
     pub(crate) fn unit(self, value: f64) -> f64 {
         let Some(decimals) = self.decimals else { return 0.0 };
         let fixed = 10_f64.powi(-decimals);
@@ -128,7 +128,8 @@ impl Table<'_> {
         self.columns.iter().map(|c| c.name.as_str()).collect()
     }
 
-    /// Why the value at `row` of a column, which is not finite, cannot be used. `rows` are the rows in use.
+    /// Why the value at `row` of a column, which is not finite, cannot be used. `rows` are the rows
+    /// in use.
     pub(crate) fn bad_value(&self, column: usize, row: usize, rows: Range<usize>) -> IoError {
         let Column {
             name, values, texts, ..
@@ -198,7 +199,8 @@ pub(crate) fn asides<'a>(comments: impl Iterator<Item = &'a str>, columns: &mut 
         let line = line.trim_start_matches('#').trim();
         if let Some(units) = line.strip_prefix("units:") {
             for part in units.split(',').map(str::trim) {
-                // A name or a unit may hold blanks: the column that fits with the longest name is the one.
+                // A name or a unit may hold blanks: the column that fits with the longest name is
+                // the one.
                 let unit_of = |column: &Column| {
                     let unit = part.strip_prefix(column.name.as_str())?;
                     unit.starts_with(char::is_whitespace).then(|| unit.trim().to_owned())

@@ -15,13 +15,13 @@ pub fn check_table_path(path: &Path) -> Result<(), IoError> {
     format_to_write(path).map(drop)
 }
 
-/// Writes a table, whole or not at all: as CSV (`.csv`, `.txt`, with tabs `.tsv`), Parquet (`.parquet`, `.pq`),
-/// NPZ (`.npz`) or for MATLAB (`.mat`). The same
-/// table gives the same bytes.
+/// Writes a table, whole or not at all: as CSV (`.csv`, `.txt`, with tabs `.tsv`), Parquet
+/// (`.parquet`, `.pq`), NPZ (`.npz`) or for MATLAB (`.mat`). The same table gives the same bytes.
 ///
 /// # Errors
-/// Those of [`check_table_path`]; [`IoError::ColumnLength`], [`IoError::NoColumns`], [`IoError::DuplicateColumn`] or
-/// [`IoError::ChannelName`] for what cannot be written; those of [`write_atomically`](crate::write_atomically).
+/// Those of [`check_table_path`]; [`IoError::ColumnLength`], [`IoError::NoColumns`],
+/// [`IoError::DuplicateColumn`] or [`IoError::ChannelName`] for what cannot be written; those of
+/// [`write_atomically`](crate::write_atomically).
 ///
 /// ```
 /// use hoid_io::{ColumnValues, OutputColumn, OutputTable, read_table, write_table};
@@ -44,8 +44,9 @@ pub fn write_table(path: &Path, table: &OutputTable) -> Result<(), IoError> {
     write_values(path, table.schema(), &table.values())
 }
 
-/// Reads a table back, with the kinds that it was written with; see the table of this module for those of CSV. A column of
-/// integers in a Parquet file of other origin is whole where no value is missing or negative, else real.
+/// Reads a table back, with the kinds that it was written with; see the table of this module for
+/// those of CSV. A column of integers in a Parquet file of other origin is whole where no value is
+/// missing or negative, else real.
 ///
 /// # Errors
 /// [`IoError`], naming the place in the file.

@@ -1,5 +1,5 @@
-//! Tables that are written while they grow: CSV and Parquet in bounded memory, the formats of whole arrays once all rows are
-//! there.
+//! Tables that are written while they grow: CSV and Parquet in bounded memory, the formats of whole
+//! arrays once all rows are there.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -81,9 +81,9 @@ pub(crate) fn write_values(path: &Path, schema: TableSchema, values: &[Values<'_
     })
 }
 
-/// A table that is written as it grows, for studies that are larger than memory; NPZ and .mat keep their rows in
-/// memory until the end. The file is in its place once
-/// [`finish`](Self::finish) is done; a writer that is dropped before leaves everything as it was. The bytes are those that
+/// A table that is written as it grows, for studies that are larger than memory; NPZ and .mat keep
+/// their rows in memory until the end. The file is in its place once [`finish`](Self::finish) is
+/// done; a writer that is dropped before leaves everything as it was. The bytes are those that
 /// [`write_table`](crate::write_table) gives for all rows at once.
 pub struct TableWriter {
     file: WholeFile,
@@ -107,8 +107,9 @@ impl TableWriter {
     /// Begins a file of a format by its extension, as in [`write_table`](crate::write_table).
     ///
     /// # Errors
-    /// [`IoError::UnknownFormat`]; [`IoError::NoColumns`], [`IoError::DuplicateColumn`] or [`IoError::ChannelName`] for a
-    /// schema that cannot be written; [`IoError::Unwritable`] for what the system says.
+    /// [`IoError::UnknownFormat`]; [`IoError::NoColumns`], [`IoError::DuplicateColumn`] or
+    /// [`IoError::ChannelName`] for a schema that cannot be written; [`IoError::Unwritable`] for
+    /// what the system says.
     pub fn create(path: &Path, schema: &TableSchema) -> Result<Self, IoError> {
         let format = format_to_write(path)?;
         let name = path.display().to_string();
@@ -128,8 +129,8 @@ impl TableWriter {
     /// Appends the rows of a table of the same columns; its comments are not looked at.
     ///
     /// # Errors
-    /// [`IoError::ColumnsDiffer`] and [`IoError::ColumnLength`], after which other rows may be appended;
-    /// [`IoError::Unwritable`], after which nothing can.
+    /// [`IoError::ColumnsDiffer`] and [`IoError::ColumnLength`], after which other rows may be
+    /// appended; [`IoError::Unwritable`], after which nothing can.
     pub fn append(&mut self, table: &OutputTable) -> Result<(), IoError> {
         let schema = table.schema();
         if schema.columns != self.columns {

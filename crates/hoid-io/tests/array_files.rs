@@ -1,4 +1,5 @@
-//! Files of named arrays: those of other programs, as the `make.py` of their folder in `fixtures` writes them, and our own.
+//! Files of named arrays: those of other programs, as the `make.py` of their folder in `fixtures`
+//! writes them, and our own.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 
@@ -254,7 +255,8 @@ fn streams_of_the_lab_streaming_layer() {
         found.notes
     );
     for (k, (e, u)) in record.input().iter().zip(record.output()).enumerate() {
-        // Jitter of 2 ms over 300 samples leaves 0.3 ms, the quantum is 1e-4, and a chord of the sine at 40 Hz adds 8e-5.
+        // Jitter of 2 ms over 300 samples leaves 0.3 ms, the quantum is 1e-4, and a chord of the
+        // sine at 40 Hz adds 8e-5.
         let t = u.acos();
         let expected = if record.time_s(k) < std::f64::consts::PI {
             1e4 * t.sin()
@@ -380,7 +382,8 @@ fn records_come_back_bit_for_bit() {
     }
 }
 
-/// Files with some bytes changed, or cut: an error that names the file, or values, but never a panic.
+/// Files with some bytes changed, or cut: an error that names the file, or values, but never a
+/// panic.
 #[test]
 fn damaged_files_never_panic() {
     let dir = tempfile::tempdir().unwrap();

@@ -377,7 +377,8 @@ fn resample_goes_over_gaps_and_jitter() {
         sampling_hz,
         ..defaults()
     };
-    // e = 10 t and u = 1 - t on an uneven t with two samples missing: straight lines come back exactly up to rounding.
+    // e = 10 t and u = 1 - t on an uneven t with two samples missing: straight lines come back
+    // exactly up to rounding.
     let times = [0.0, 0.101, 0.199, 0.3, 0.6, 0.7, 0.803, 0.9, 1.0];
     let mut text = String::from("t,e,u\n");
     times
@@ -453,7 +454,8 @@ fn what_lies_outside_the_span_is_not_looked_at() {
     }
 }
 
-/// Whatever stands in a file, the answer is a record of finite numbers or an error that names the file.
+/// Whatever stands in a file, the answer is a record of finite numbers or an error that names the
+/// file.
 #[test]
 fn damaged_files_never_panic() {
     let desk = Desk::new();

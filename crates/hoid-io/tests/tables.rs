@@ -481,7 +481,8 @@ fn what_is_no_parquet_says_so() {
     }
 }
 
-/// Bytes changed anywhere, and footers above all: a table, a record or an error, and neither a panic nor all memory.
+/// Bytes changed anywhere, and footers above all: a table, a record or an error, and neither a
+/// panic nor all memory.
 #[test]
 fn damaged_parquet_never_panics() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,8 +1,9 @@
 //! Four numbers in one register or two.
 //!
-//! A sum over a record is a recursion: each term waits for the sum of those before it. Four partial sums, each of every fourth
-//! term, do not wait for one another. They are four whatever the registers, since their number decides the last digits of the
-//! sum: with AVX2 they fill one register, elsewhere two. Products and sums are those of each number by itself, without
+//! A sum over a record is a recursion: each term waits for the sum of those before it. Four partial
+//! sums, each of every fourth term, do not wait for one another. They are four whatever the
+//! registers, since their number decides the last digits of the sum: with AVX2 they fill one
+//! register, elsewhere two. Products and sums are those of each number by itself, without
 //! contraction: the same bits in all registers.
 
 use std::ops::{Add, Mul, Sub};
@@ -128,8 +129,8 @@ pub fn with_four_lanes<T: FourLaneTask>(task: T) -> T::Output {
 impl InstructionSet {
     /// As [`with_four_lanes`] in these registers; `None` when this processor does not have them.
     ///
-    /// Four numbers fill half of a register of AVX-512, so that [`InstructionSet::Avx512`] stands for AVX2 here.
-    /// [`InstructionSet::Scalar`] gives the registers of a processor without either.
+    /// Four numbers fill half of a register of AVX-512, so that [`InstructionSet::Avx512`] stands
+    /// for AVX2 here. [`InstructionSet::Scalar`] gives the registers of a processor without either.
     pub fn with_four_lanes<T: FourLaneTask>(self, task: T) -> Option<T::Output> {
         match self {
             Self::Best => Some(with_four_lanes(task)),

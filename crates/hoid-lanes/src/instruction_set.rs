@@ -24,8 +24,8 @@ pub trait LaneTask {
     type Output;
     /// The computation, with numbers of the type of `zero`.
     ///
-    /// Mark it `#[inline(always)]`, and all that it calls at every sample: a function of its own is compiled for the
-    /// narrowest registers.
+    /// Mark it `#[inline(always)]`, and all that it calls at every sample: a function of its own is
+    /// compiled for the narrowest registers.
     fn run<R: Number>(self, zero: R) -> Self::Output;
 }
 
@@ -73,8 +73,9 @@ impl<T: LaneTask> NullaryFnOnce for OneLane<T> {
 
 /// Runs a task for one run, with numbers that are f64.
 ///
-/// It is compiled with the instructions of AVX2 where this processor has them. They name three registers, so that an operand need
-/// not be copied before it is overwritten. Products and sums are not contracted: the same bits.
+/// It is compiled with the instructions of AVX2 where this processor has them. They name three
+/// registers, so that an operand need not be copied before it is overwritten. Products and sums are
+/// not contracted: the same bits.
 pub fn with_one_lane<T: LaneTask>(task: T) -> T::Output {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     if let Some(simd) = pulp::x86::V3::try_new() {

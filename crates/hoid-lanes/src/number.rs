@@ -4,9 +4,9 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// An f64, or several in lanes.
 ///
-/// Code that is written over a `Number` runs for one record with f64 and for several at a time in vector registers. Every
-/// operation acts on each lane alone and in the order of the code, so that a lane has the bits of its run alone; products and
-/// sums are never contracted.
+/// Code that is written over a `Number` runs for one record with f64 and for several at a time in
+/// vector registers. Every operation acts on each lane alone and in the order of the code, so that
+/// a lane has the bits of its run alone; products and sums are never contracted.
 pub trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {

@@ -4,7 +4,8 @@
 
 use hoid_lanes::{FourLaneTask, FourLanes, InstructionSet, LaneTask, Number, with_four_lanes, with_one_lane};
 
-/// A sum, a difference and a product of each four; products that a contraction would round otherwise.
+/// A sum, a difference and a product of each four; products that a contraction would round
+/// otherwise.
 struct Horner<'a>(&'a [[f64; 4]]);
 
 impl FourLaneTask for Horner<'_> {
@@ -39,8 +40,9 @@ fn each_number_goes_alone_and_without_contraction() {
     }
 }
 
-/// A recursion of second order with a gain that is divided by what it has measured: all operations of a number, with products that a
-/// contraction would round otherwise. `x` holds a sample of all lanes, then the next.
+/// A recursion of second order with a gain that is divided by what it has measured: all operations
+/// of a number, with products that a contraction would round otherwise. `x` holds a sample of all
+/// lanes, then the next.
 struct Recursion<'a>(&'a [f64]);
 
 impl LaneTask for Recursion<'_> {

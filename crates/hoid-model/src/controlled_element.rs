@@ -1,6 +1,7 @@
 //! The controlled element: what the person steers.
 //!
-//! `H_CE(s) = K_c / (s (s + omega_b))`   (eq. 4), an integrator below the break frequency omega_b turns into a double one above.
+//! `H_CE(s) = K_c / (s (s + omega_b))` (eq. 4), an integrator below the break frequency omega_b
+//! turns into a double one above.
 
 use crate::{ModelError, transfer_function::ContinuousTransferFunction};
 
@@ -9,7 +10,8 @@ use crate::{ModelError, transfer_function::ContinuousTransferFunction};
 pub struct ControlledElement {
     /// Control gain K_c, deg/deg.
     pub k_c: f64,
-    /// Break frequency omega_b, rad/s; 0 is the double integrator, a negative one is an unstable element.
+    /// Break frequency omega_b, rad/s; 0 is the double integrator, a negative one is an unstable
+    /// element.
     pub omega_b_rad_s: f64,
 }
 
@@ -51,7 +53,8 @@ mod tests {
 
     #[test]
     fn single_integrator_below_and_double_above_the_break() {
-        // K_c/omega_b / s far below, K_c / s^2 far above; the other pole changes either by (1e-4)^2/2.
+        // K_c/omega_b / s far below, K_c / s^2 far above; the other pole changes either by
+        // (1e-4)^2/2.
         let low = response(90.0, 6.0, 6e-4);
         assert!((low.norm() * 6e-4 - 15.0).abs() < 1e-6);
         assert!((low.arg() + std::f64::consts::FRAC_PI_2).abs() < 2e-4);

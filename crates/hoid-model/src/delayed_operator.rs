@@ -1,17 +1,21 @@
 //! Exact zero-order hold of the operator with a real delay: any fraction of a sample.
 //!
-//! `H(s) = (K_e + K_e_dot s) omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}` with `tau = l Ts + delta`, `0 <= delta < Ts`, is
-//! `q^-nk (b0 + b1 q^-1 + b2 q^-2)/(1 + f1 q^-1 + f2 q^-2)` with `nk = l + 1` behind a zero-order hold, by the formulas of
-//! [`hoid_core::held_operator`]. delta = 0 gives b2 = 0 and the hold of [`crate::operator`].
+//! `H(s) = (K_e + K_e_dot s) omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}` with
+//! `tau = l Ts + delta`, `0 <= delta < Ts`, is
+//! `q^-nk (b0 + b1 q^-1 + b2 q^-2)/(1 + f1 q^-1 + f2 q^-2)` with `nk = l + 1` behind a zero-order
+//! hold, by the formulas of [`hoid_core::held_operator`]. delta = 0 gives b2 = 0 and the hold of
+//! [`crate::operator`].
 //!
-//! The model is linear in K_e and K_e_dot. Its response is continuous in tau and has a kink where tau is a whole number of
-//! samples: the step response starts with the slope `omega^2 K_e_dot`. Derivatives there are those for growing tau.
+//! The model is linear in K_e and K_e_dot. Its response is continuous in tau and has a kink where
+//! tau is a whole number of samples: the step response starts with the slope `omega^2 K_e_dot`.
+//! Derivatives there are those for growing tau.
 
 use hoid_core::held_operator::held_operator_delayed;
 
 use crate::{ModelError, OperatorParameters, SampleTime};
 
-/// `q^-nk (b0 + b1 q^-1 + b2 q^-2) / (1 + f1 q^-1 + f2 q^-2)`: the operator with any delay behind a zero-order hold.
+/// `q^-nk (b0 + b1 q^-1 + b2 q^-2) / (1 + f1 q^-1 + f2 q^-2)`: the operator with any delay behind a
+/// zero-order hold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DelayedOperator {
     /// Delay of b0 in samples: the whole samples of tau_e and the one of the hold.
@@ -25,7 +29,8 @@ pub struct DelayedOperator {
 /// Names of the parameters, in the order of every array here; units deg/deg, s, rad/s, 1, s.
 pub const DELAYED_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
-/// Distance from a whole number of samples, in samples, that counts as rounding: `0.29 / 0.01` is `28.999999999999996`.
+/// Distance from a whole number of samples, in samples, that counts as rounding: `0.29 / 0.01` is
+/// `28.999999999999996`.
 const ROUNDING: f64 = 1e-12;
 
 /// `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` of operator parameters.
@@ -39,18 +44,20 @@ pub fn delayed_parameters(operator: &OperatorParameters) -> [f64; 5] {
     ]
 }
 
-/// The exact discrete model of `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` for an error held over each sample.
+/// The exact discrete model of `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` for an error held over
+/// each sample.
 ///
 /// # Errors
-/// [`ModelError::OutOfRange`] when a parameter is not finite, omega_nm is not positive, the delay is negative, or a
-/// coefficient is not finite (a pole so fast that its exponential overflows).
+/// [`ModelError::OutOfRange`] when a parameter is not finite, omega_nm is not positive, the delay
+/// is negative, or a coefficient is not finite (a pole so fast that its exponential overflows).
 pub fn delayed_operator(parameters: [f64; 5], sample_time: SampleTime) -> Result<DelayedOperator, ModelError> {
     let whole_samples = whole_samples(parameters[4], sample_time)?;
     delayed_operator_within(whole_samples, parameters, sample_time)
 }
 
-/// As [`delayed_operator`], written with a given whole number l of samples in the delay: for `l Ts <= tau <= (l + 1) Ts`, both
-/// ends included, so that inside each sample the model and its derivatives are smooth functions up to the borders.
+/// As [`delayed_operator`], written with a given whole number l of samples in the delay: for
+/// `l Ts <= tau <= (l + 1) Ts`, both ends included, so that inside each sample the model and its
+/// derivatives are smooth functions up to the borders.
 ///
 /// # Errors
 /// As [`delayed_operator`]; also when tau_e does not lie within that sample.
@@ -62,7 +69,8 @@ pub fn delayed_operator_within(
     Ok(delayed_operator_and_jacobian_within(whole_samples, parameters, sample_time)?.0)
 }
 
-/// Jacobian of `[b0, b1, b2, f1, f2]` (rows) with respect to `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` (columns), nk held.
+/// Jacobian of `[b0, b1, b2, f1, f2]` (rows) with respect to
+/// `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` (columns), nk held.
 ///
 /// # Errors
 /// As [`delayed_operator`].
@@ -180,7 +188,8 @@ mod tests {
         SampleTime::new(0.01).unwrap()
     }
 
-    /// Complex, double, nearly double, real, fast and slow, lightly damped, unstable; signs of both gains.
+    /// Complex, double, nearly double, real, fast and slow, lightly damped, unstable; signs of both
+    /// gains.
     fn cases() -> Vec<[f64; 5]> {
         let poles = [
             (11.25, 0.35),
@@ -255,7 +264,8 @@ mod tests {
             let theirs = by_matrix_exponentials(p, 80);
             let size = theirs.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
             for (k, (a, b)) in ours.iter().zip(&theirs).enumerate() {
-                // The recursion of the difference equation loses digits by 1/|1 + f1 + f2| at most 2500 here.
+                // The recursion of the difference equation loses digits by 1/|1 + f1 + f2| at most
+                // 2500 here.
                 assert!((a - b).abs() < 2e-12 * size, "{p:?} sample {k}: {a} and {b}");
             }
         }
@@ -301,7 +311,8 @@ mod tests {
                 [d.b[0], d.b[1], d.b[2], d.f[0], d.f[1]]
             };
             for j in 0..5 {
-                // Inside the sample: the whole ones have derivatives on one side only, tested beside.
+                // Inside the sample: the whole ones have derivatives on one side only, tested
+                // beside.
                 if j == 4 && [0.0, 0.28, 0.29].contains(&p[4]) {
                     continue;
                 }
@@ -317,7 +328,8 @@ mod tests {
                 let scale = (0..5).map(|k| exact[k][j].abs()).fold(0.0, f64::max);
                 for i in 0..5 {
                     let difference = (up[i] - down[i]) / (2.0 * h);
-                    // Central differences: truncation h^2 and rounding eps/h against derivatives of 1e-3 and more.
+                    // Central differences: truncation h^2 and rounding eps/h against derivatives of
+                    // 1e-3 and more.
                     assert!(
                         (exact[i][j] - difference).abs() < 1e-7 * scale + 1e-10,
                         "{p:?} row {i} by {}: {} and {difference}",

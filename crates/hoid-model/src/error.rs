@@ -4,8 +4,8 @@ use thiserror::Error;
 
 use crate::UnknownName;
 
-/// Why a model, a record or a conversion could not be made. Each message names the quantity, what was found, what was
-/// expected, and where it helps, the remedy.
+/// Why a model, a record or a conversion could not be made. Each message names the quantity, what
+/// was found, what was expected, and where it helps, the remedy.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ModelError {

@@ -4,7 +4,8 @@ use std::fmt;
 
 use crate::numbers::{DASH, with_uncertainty};
 
-/// A number with its standard error; `None` where the data give none (a delay that was fixed, a singular information matrix).
+/// A number with its standard error; `None` where the data give none (a delay that was fixed, a
+/// singular information matrix).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// The estimate.
@@ -14,7 +15,8 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// An estimate with the variance of its error; a variance that is not finite or negative means no standard error.
+    /// An estimate with the variance of its error; a variance that is not finite or negative means
+    /// no standard error.
     pub fn with_variance(value: f64, variance: f64) -> Self {
         Self {
             value,
@@ -32,7 +34,8 @@ impl Estimate {
 }
 
 impl fmt::Display for Estimate {
-    /// `value ± standard error` with two digits of the error, the value alone where there is no error.
+    /// `value ± standard error` with two digits of the error, the value alone where there is no
+    /// error.
     ///
     /// ```
     /// # use hoid_model::uncertainty::Estimate;

@@ -1,6 +1,7 @@
 //! Estimates as a table of plain text: name, value ± standard error, unit.
 //!
-//! The standard error decides the digits ([`crate::numbers`]); values are aligned at their right, standard errors at their left.
+//! The standard error decides the digits ([`crate::numbers`]); values are aligned at their right,
+//! standard errors at their left.
 
 use std::fmt;
 
@@ -9,7 +10,8 @@ use crate::{
     numbers::{DASH, with_uncertainty},
 };
 
-/// Writes a row for each name, estimate and unit (empty for none), each with a line feed in front but for the first.
+/// Writes a row for each name, estimate and unit (empty for none), each with a line feed in front
+/// but for the first.
 ///
 /// # Errors
 /// Those of the formatter.

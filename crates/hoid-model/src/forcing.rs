@@ -1,12 +1,14 @@
 //! The forcing function: the target signal as a sum of sinusoids.
 //!
-//! `f_t(t) = sum A_k sin(omega_k t + phi_k)`   (eq. 42), with t = 0 at the start of the measurement.
+//! `f_t(t) = sum A_k sin(omega_k t + phi_k)` (eq. 42), with t = 0 at the start of the measurement.
 //!
-//! The sinusoids also run before t = 0, so that the run-in settles on them. The reference frequencies are whole multiples of
-//! `2 pi / 81.92 s`: each sinusoid fits the measurement a whole number of times and does not leak into others.
+//! The sinusoids also run before t = 0, so that the run-in settles on them. The reference
+//! frequencies are whole multiples of `2 pi / 81.92 s`: each sinusoid fits the measurement a whole
+//! number of times and does not leak into others.
 //!
-//! [`ForcingFunction::samples`] uses `sin(a + b) = sin a cos b + cos a sin b` with b from a table over one block: two products a
-//! sinusoid and sample instead of a sine, and no error that grows along the record as in a recurrence.
+//! [`ForcingFunction::samples`] uses `sin(a + b) = sin a cos b + cos a sin b` with b from a table
+//! over one block: two products a sinusoid and sample instead of a sine, and no error that grows
+//! along the record as in a recurrence.
 
 use std::f64::consts::TAU;
 
@@ -46,14 +48,16 @@ const TABLE_1: [(f64, f64, f64); 10] = [
     (229.0, 0.025, 0.604),
 ];
 
-/// Samples of one block of the table of angles: near the square root of a record, where both kinds of sine are fewest.
+/// Samples of one block of the table of angles: near the square root of a record, where both kinds
+/// of sine are fewest.
 const BLOCK: usize = 96;
 
 impl ForcingFunction {
     /// A forcing function of any number of sinusoids; none is a target at rest.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] when a number is not finite, a frequency is not positive, or two frequencies are the same.
+    /// [`ModelError::OutOfRange`] when a number is not finite, a frequency is not positive, or two
+    /// frequencies are the same.
     pub fn new(sinusoids: Vec<Sinusoid>) -> Result<Self, ModelError> {
         let refuse = |quantity, found, expected| {
             Err(ModelError::OutOfRange {
@@ -116,7 +120,8 @@ impl ForcingFunction {
         self.sinusoids.iter().map(term).sum()
     }
 
-    /// f_t in deg at `start_s + k Ts`, k from 0 to `n - 1`: [`ForcingFunction::value`] to rounding, without its sines.
+    /// f_t in deg at `start_s + k Ts`, k from 0 to `n - 1`: [`ForcingFunction::value`] to rounding,
+    /// without its sines.
     pub fn samples(&self, start_s: f64, sample_time: SampleTime, n: usize) -> Vec<f64> {
         let mut values = vec![0.0; n];
         for s in &self.sinusoids {
@@ -183,7 +188,8 @@ mod tests {
             assert_eq!(samples.len(), n);
             for (k, value) in samples.into_iter().enumerate() {
                 let t = start + k as f64 * 0.01;
-                // Angles up to 1500 rad are rounded to 1e-13; they belong to an amplitude of 0.025 deg.
+                // Angles up to 1500 rad are rounded to 1e-13; they belong to an amplitude of 0.025
+                // deg.
                 assert!((value - f.value(t)).abs() < 1e-13, "t = {t}");
             }
         }

@@ -1,10 +1,12 @@
-//! What hoid identifies, and the mathematics that needs no data: records, polynomial models, exact discretisation, the
-//! operator's parameters and the task in which an operator is measured.
+//! What hoid identifies, and the mathematics that needs no data: records, polynomial models, exact
+//! discretisation, the operator's parameters and the task in which an operator is measured.
 //!
-//! A person who tracks a target sees the error e and answers with the control u. The operator model is a gain, a lead, a delay and the
-//! neuromuscular dynamics, `K_e (1 + T_L s) omega^2 / (s^2 + 2 zeta omega s + omega^2) e^{-tau s}`, with a remnant of filtered white
-//! noise. What is estimated from samples is a polynomial model in `q^-1`. This crate takes one to the other, both ways and
-//! with derivatives, and describes the loop around the operator.
+//! A person who tracks a target sees the error e and answers with the control u. The operator model
+//! is a gain, a lead, a delay and the neuromuscular dynamics,
+//! `K_e (1 + T_L s) omega^2 / (s^2 + 2 zeta omega s + omega^2) e^{-tau s}`, with a remnant of
+//! filtered white noise. What is estimated from samples is a polynomial model in `q^-1`. This crate
+//! takes one to the other, both ways and with derivatives, and describes the loop around the
+//! operator.
 //!
 //! ```
 //! use hoid_model::{

@@ -46,8 +46,8 @@ pub struct UnknownName {
     pub expected: String,
 }
 
-/// Gives an enum without fields the names that users type: `ALL`, `name`, [`Display`](std::fmt::Display),
-/// [`FromStr`](std::str::FromStr) and [`NamedChoice`].
+/// Gives an enum without fields the names that users type: `ALL`, `name`,
+/// [`Display`](std::fmt::Display), [`FromStr`](std::str::FromStr) and [`NamedChoice`].
 ///
 /// ```
 /// #[derive(Debug, Clone, Copy, PartialEq)]

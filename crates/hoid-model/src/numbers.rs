@@ -1,7 +1,8 @@
 //! Numbers with as many digits as their standard error allows.
 //!
-//! A standard error is itself known to a few per cent at best, so that it is given with two significant digits and the value
-//! with the same decimals (ISO/IEC Guide 98-3, 7.2.6). Numbers without a standard error get five significant digits.
+//! A standard error is itself known to a few per cent at best, so that it is given with two
+//! significant digits and the value with the same decimals (ISO/IEC Guide 98-3, 7.2.6). Numbers
+//! without a standard error get five significant digits.
 
 /// Stands where there is no number.
 pub const DASH: &str = "\u{2013}";
@@ -12,8 +13,8 @@ pub const Z_95: f64 = 1.959_963_984_540_054;
 const DIGITS_OF_ERROR: i32 = 2;
 const DIGITS_ALONE: i32 = 5;
 
-/// Value and standard error as text, both with the decimals that two significant digits of the error need. A dash for what is
-/// not finite.
+/// Value and standard error as text, both with the decimals that two significant digits of the
+/// error need. A dash for what is not finite.
 pub fn with_uncertainty(value: f64, standard_error: Option<f64>) -> (String, String) {
     if !value.is_finite() {
         return (DASH.to_owned(), DASH.to_owned());
@@ -28,7 +29,8 @@ pub fn with_uncertainty(value: f64, standard_error: Option<f64>) -> (String, Str
     }
 }
 
-/// The interval `value +- factor * standard_error` with the same decimals; a dash without a standard error.
+/// The interval `value +- factor * standard_error` with the same decimals; a dash without a
+/// standard error.
 pub fn interval(value: f64, standard_error: Option<f64>, factor: f64) -> String {
     match standard_error.filter(|s| s.is_finite() && *s > 0.0 && value.is_finite()) {
         None => DASH.to_owned(),

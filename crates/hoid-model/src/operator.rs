@@ -1,9 +1,10 @@
 //! The linear part of the human operator, in continuous and in discrete time.
 //!
-//! `H(s) = K_e (T_L s + 1) e^{-s tau_e} omega_nm^2 / (s^2 + 2 zeta_nm omega_nm s + omega_nm^2)`   (eq. 2)
+//! `H(s) = K_e (T_L s + 1) e^{-s tau_e} omega_nm^2 / (s^2 + 2 zeta_nm omega_nm s + omega_nm^2)`
+//! (eq. 2)
 //!
-//! Behind a zero-order hold this is exactly `(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)` with `nk = tau_e/Ts + 1`
-//! (eq. 11), by the formulas of [`hoid_core::held_operator`].
+//! Behind a zero-order hold this is exactly `(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)` with
+//! `nk = tau_e/Ts + 1` (eq. 11), by the formulas of [`hoid_core::held_operator`].
 
 use hoid_core::held_operator::held_operator;
 use nalgebra::{Matrix4, Vector4};
@@ -39,17 +40,20 @@ pub struct DiscreteOperator {
     pub sample_time: SampleTime,
 }
 
-/// Size of `1 + f1 + f2` below which a pole counts as lying at the origin of s: four digits above rounding.
+/// Size of `1 + f1 + f2` below which a pole counts as lying at the origin of s: four digits above
+/// rounding.
 const AT_ORIGIN: f64 = 1e-12;
 
 /// Names of the physical parameters in the order of rows and columns of every Jacobian here.
 pub const PHYSICAL_NAMES: [&str; 4] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm"];
 
 impl OperatorParameters {
-    /// From the parameters by name: `K_e`, `T_L` or `K_e_dot`, `omega_nm`, `zeta_nm`, and `tau_e`, which is zero when it is not named.
+    /// From the parameters by name: `K_e`, `T_L` or `K_e_dot`, `omega_nm`, `zeta_nm`, and `tau_e`,
+    /// which is zero when it is not named.
     ///
     /// # Errors
-    /// [`ModelError::Operator`] for a name that is not there, is lacking, or stands beside one that says the same.
+    /// [`ModelError::Operator`] for a name that is not there, is lacking, or stands beside one that
+    /// says the same.
     pub fn of_names(pairs: &[(String, f64)]) -> Result<Self, ModelError> {
         const NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
         let wrong = |reason: String| ModelError::Operator { reason };
@@ -109,8 +113,8 @@ impl OperatorParameters {
     /// The exact discrete model for an error held over each sample.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] when omega_nm is not positive, a parameter is not finite, or the delay is no whole number
-    /// of samples.
+    /// [`ModelError::OutOfRange`] when omega_nm is not positive, a parameter is not finite, or the
+    /// delay is no whole number of samples.
     pub fn discretise(&self, sample_time: SampleTime) -> Result<DiscreteOperator, ModelError> {
         let checks = [
             ("error gain K_e", self.k_e, true),
@@ -157,7 +161,8 @@ impl DiscreteOperator {
             return Err(NotConvertible::NoDelay);
         }
         let c = self.held.unhold(self.sample_time)?;
-        // K_e and omega_nm hang on 1 + f1 + f2, a difference of numbers of size 1: below this nothing of it is left.
+        // K_e and omega_nm hang on 1 + f1 + f2, a difference of numbers of size 1: below this
+        // nothing of it is left.
         let at_one = (1.0 + self.held.f1 + self.held.f2).abs();
         if c.a2 <= 0.0 || at_one < AT_ORIGIN {
             return Err(NotConvertible::NoNaturalFrequency { a1: c.a1, a2: c.a2 });
@@ -177,13 +182,14 @@ impl DiscreteOperator {
     }
 }
 
-/// Jacobian of `[b0, b1, f1, f2]` (rows) with respect to `[K_e, K_e_dot, omega_nm, zeta_nm]` (columns).
+/// Jacobian of `[b0, b1, f1, f2]` (rows) with respect to `[K_e, K_e_dot, omega_nm, zeta_nm]`
+/// (columns).
 pub fn discretisation_jacobian(operator: &OperatorParameters, sample_time: SampleTime) -> [[f64; 4]; 4] {
     held_operator(operator.without_delay(), sample_time.s()).1
 }
 
-/// Jacobian of `[K_e, K_e_dot, omega_nm, zeta_nm]` (rows) with respect to `[b0, b1, f1, f2]` (columns): the inverse of
-/// [`discretisation_jacobian`]. `None` when that is singular.
+/// Jacobian of `[K_e, K_e_dot, omega_nm, zeta_nm]` (rows) with respect to `[b0, b1, f1, f2]`
+/// (columns): the inverse of [`discretisation_jacobian`]. `None` when that is singular.
 pub fn retrieval_jacobian(operator: &OperatorParameters, sample_time: SampleTime) -> Option<[[f64; 4]; 4]> {
     let forward = discretisation_jacobian(operator, sample_time);
     let matrix = Matrix4::from_fn(|i, j| forward[i][j]);
@@ -298,7 +304,8 @@ mod tests {
                 let (up, down) = (at(up), at(down));
                 for i in 0..4 {
                     let difference = (up[i] - down[i]) / (2.0 * h);
-                    // Central differences: truncation h^2 and rounding eps/h, both below 1e-8 of the column.
+                    // Central differences: truncation h^2 and rounding eps/h, both below 1e-8 of
+                    // the column.
                     let scale = (0..4).map(|k| exact[k][j].abs()).fold(0.0, f64::max);
                     assert!(
                         (exact[i][j] - difference).abs() < 2e-8 * scale,

@@ -1,8 +1,9 @@
 //! Polynomials and their roots.
 //!
-//! Coefficients are stored in one order, `p[0] + p[1] x + ... + p[n] x^n` with `x = q^-1` for discrete time; transfer
-//! functions in s store descending powers and say so. Roots come from the eigenvalues of the balanced companion matrix
-//! (Edelman and Murakami, 1995) and one Newton step each.
+//! Coefficients are stored in one order, `p[0] + p[1] x + ... + p[n] x^n` with `x = q^-1` for
+//! discrete time; transfer functions in s store descending powers and say so. Roots come from the
+//! eigenvalues of the balanced companion matrix (Edelman and Murakami, 1995) and one Newton step
+//! each.
 
 use hoid_core::stability::roots_inside;
 use nalgebra::DMatrix;
@@ -27,8 +28,8 @@ pub fn value(p: &[f64], x: Complex64) -> Complex64 {
     p.iter().rev().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * x + c)
 }
 
-/// Monic polynomial `z^n + p[1] z^{n-1} + ... + p[n]` with these roots, `p[0] = 1`. Complex roots must come in conjugate
-/// pairs; what is left of the imaginary parts by rounding is dropped.
+/// Monic polynomial `z^n + p[1] z^{n-1} + ... + p[n]` with these roots, `p[0] = 1`. Complex roots
+/// must come in conjugate pairs; what is left of the imaginary parts by rounding is dropped.
 pub fn from_roots(roots: &[Complex64]) -> Vec<f64> {
     let mut p = vec![Complex64::new(1.0, 0.0)];
     for root in roots {
@@ -41,10 +42,12 @@ pub fn from_roots(roots: &[Complex64]) -> Vec<f64> {
     p.into_iter().map(|c| c.re).collect()
 }
 
-/// Roots z of `p[0] z^n + p[1] z^{n-1} + ... + p[n]`, largest modulus first, conjugates next to each other.
+/// Roots z of `p[0] z^n + p[1] z^{n-1} + ... + p[n]`, largest modulus first, conjugates next to
+/// each other.
 ///
-/// For a polynomial in `q^-1` with `p[0] = 1` these are its zeros in z. Leading zero coefficients lower the degree; the zero
-/// polynomial and constants have no roots. `None` when a coefficient is not finite or the eigenvalue iteration fails.
+/// For a polynomial in `q^-1` with `p[0] = 1` these are its zeros in z. Leading zero coefficients
+/// lower the degree; the zero polynomial and constants have no roots. `None` when a coefficient is
+/// not finite or the eigenvalue iteration fails.
 pub fn roots(p: &[f64]) -> Option<Vec<Complex64>> {
     if p.iter().any(|c| !c.is_finite()) {
         return None;
@@ -122,8 +125,9 @@ fn newton_step(p: &[f64], z: Complex64) -> Complex64 {
     if horner(better).0.norm() < f.norm() { better } else { z }
 }
 
-/// Monic `[p_1, ..., p_n]` with each root outside the unit circle replaced by the inverse of its conjugate, which leaves the shape of the
-/// spectrum as it is. `None` where the roots cannot be found.
+/// Monic `[p_1, ..., p_n]` with each root outside the unit circle replaced by the inverse of its
+/// conjugate, which leaves the shape of the spectrum as it is. `None` where the roots cannot be
+/// found.
 pub fn reflected_inside(coefficients: &[f64]) -> Option<Vec<f64>> {
     if roots_inside(coefficients, 1.0) {
         return Some(coefficients.to_vec());

@@ -1,7 +1,7 @@
 //! The identified object: polynomials with numbers in them.
 //!
-//! `A u = (B/F) q^-nk e + (C/D) eps`, with theta = `[a1.. b0.. c1.. d1.. f1..]`. The system from e to u is
-//! `B q^-nk/(A F)`, the noise filter `C/(A D)`.
+//! `A u = (B/F) q^-nk e + (C/D) eps`, with theta = `[a1.. b0.. c1.. d1.. f1..]`. The system from e
+//! to u is `B q^-nk/(A F)`, the noise filter `C/(A D)`.
 
 use hoid_core::stability::roots_inside;
 use num_complex::Complex64;
@@ -24,8 +24,8 @@ impl PolynomialModel {
     /// A model from its parameter vector.
     ///
     /// # Errors
-    /// [`ModelError::Orders`] when orders and structure contradict each other or theta has another length;
-    /// [`ModelError::TransferFunction`] when a coefficient is not finite.
+    /// [`ModelError::Orders`] when orders and structure contradict each other or theta has another
+    /// length; [`ModelError::TransferFunction`] when a coefficient is not finite.
     pub fn new(
         structure: Structure,
         orders: Orders,
@@ -102,7 +102,8 @@ impl PolynomialModel {
         self.part(self.orders.parameters() - self.orders.nf, self.orders.nf)
     }
 
-    /// True when the predictor `D A/C u`, `B D/(F C) e` is stable: all roots of C and F inside the unit circle.
+    /// True when the predictor `D A/C u`, `B D/(F C) e` is stable: all roots of C and F inside the
+    /// unit circle.
     pub fn predictor_is_stable(&self) -> bool {
         roots_inside(self.c(), 1.0) && roots_inside(self.f(), 1.0)
     }
@@ -115,7 +116,8 @@ impl PolynomialModel {
     /// `B q^-nk / (A F)`.
     ///
     /// # Errors
-    /// None for a model that could be made; the signature follows the constructor of the transfer function.
+    /// None for a model that could be made; the signature follows the constructor of the transfer
+    /// function.
     pub fn system(&self) -> Result<DiscreteTransferFunction, ModelError> {
         let mut num = vec![0.0; self.orders.nk];
         num.extend_from_slice(self.b());
@@ -128,8 +130,8 @@ impl PolynomialModel {
         self.response_and_gradient(omega_rad_s).0
     }
 
-    /// Frequency response and its gradient with respect to theta: `dH/db_j = z^{-nk-j}/(A F)`, `dH/df_j = -H z^-j/F`,
-    /// `dH/da_j = -H z^-j/A`; zero for c and d.
+    /// Frequency response and its gradient with respect to theta: `dH/db_j = z^{-nk-j}/(A F)`,
+    /// `dH/df_j = -H z^-j/F`, `dH/da_j = -H z^-j/A`; zero for c and d.
     pub fn response_and_gradient(&self, omega_rad_s: f64) -> (Complex64, Vec<Complex64>) {
         let phase = omega_rad_s * self.sample_time.s();
         let backward = |lag: usize| Complex64::from_polar(1.0, -phase * lag as f64);
@@ -172,12 +174,14 @@ impl PolynomialModel {
         }
     }
 
-    /// The polynomial that holds the operator's poles: A where there is no F (ARX and its kin), else F.
+    /// The polynomial that holds the operator's poles: A where there is no F (ARX and its kin),
+    /// else F.
     fn operator_poles(&self) -> &[f64] {
         if self.orders.nf == 0 { self.a() } else { self.f() }
     }
 
-    /// Positions of `[b0, b1, f1, f2]` (or a1, a2) in theta, for models that [`PolynomialModel::discrete_operator`] takes.
+    /// Positions of `[b0, b1, f1, f2]` (or a1, a2) in theta, for models that
+    /// [`PolynomialModel::discrete_operator`] takes.
     pub fn operator_positions(&self) -> [usize; 4] {
         let b = self.orders.na;
         let f = if self.orders.nf == 0 {

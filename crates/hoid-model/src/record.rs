@@ -1,8 +1,9 @@
 //! An evenly sampled record of a person at work.
 //!
-//! A [`Record`] holds the input of the person (the tracking error e), the output (the control u) and any other channel that
-//! was measured or simulated with them. It is checked when it is made: all channels have the same length and every sample is
-//! finite, so that nothing behind it has to look again.
+//! A [`Record`] holds the input of the person (the tracking error e), the output (the control u)
+//! and any other channel that was measured or simulated with them. It is checked when it is made:
+//! all channels have the same length and every sample is finite, so that nothing behind it has to
+//! look again.
 
 use crate::{ModelError, SampleTime};
 
@@ -54,7 +55,8 @@ pub struct Record {
 }
 
 impl Record {
-    /// A record of the input (tracking error) and the output (control), both with one value a sample.
+    /// A record of the input (tracking error) and the output (control), both with one value a
+    /// sample.
     ///
     /// # Errors
     /// [`ModelError::EmptyRecord`], [`ModelError::LengthMismatch`], [`ModelError::NotFinite`],
@@ -224,12 +226,15 @@ impl Record {
         })
     }
 
-    /// This record and, from its next sample on, another: what happens at the seam is known to have happened there.
+    /// This record and, from its next sample on, another: what happens at the seam is known to have
+    /// happened there.
     ///
-    /// Channels that only one of them has are left out; label, names and units are those of the first.
+    /// Channels that only one of them has are left out; label, names and units are those of the
+    /// first.
     ///
     /// # Errors
-    /// [`ModelError::Joined`] when their sample times differ by more than one part in a million, or only one of them has an input.
+    /// [`ModelError::Joined`] when their sample times differ by more than one part in a million, or
+    /// only one of them has an input.
     pub fn joined(mut self, next: &Self) -> Result<Self, ModelError> {
         let (first, second) = (self.sample_time.s(), next.sample_time.s());
         let refuse = |found: String, expected: &'static str| ModelError::Joined {
@@ -265,7 +270,8 @@ impl Record {
         Ok(self)
     }
 
-    /// The same record with the mean or the line taken out of input and output; other channels stay as they are.
+    /// The same record with the mean or the line taken out of input and output; other channels stay
+    /// as they are.
     pub fn detrended(mut self, how: Detrend) -> Self {
         for channel in self.input.iter_mut().chain([&mut self.output]) {
             take_out(how, &mut channel.values);

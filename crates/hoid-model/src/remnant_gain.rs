@@ -1,20 +1,26 @@
 //! The remnant gain K_n that gives a demanded noise level P_n (appendix A of the reference text).
 //!
-//! With `S = 1/(1 + H_HO H_CE)`, unit white noise drawn once a sample (its power spreads evenly over 0 to pi/Ts), and
+//! With `S = 1/(1 + H_HO H_CE)`, unit white noise drawn once a sample (its power spreads evenly
+//! over 0 to pi/Ts), and
 //!
 //! - `V_f = 1/2 sum A_k^2 |S H_HO (j omega_k)|^2`, the variance of u due to the forcing function,
-//! - `V_u = Ts/pi  integral_0^{pi/Ts} |S|^2 / (1 + T_n^2 omega^2)^m d omega`, that due to the remnant with K_n = 1,
-//! - `V_n = Ts/pi  integral_0^{pi/Ts} 1 / (1 + T_n^2 omega^2)^m d omega`, that of the remnant itself,
+//! - `V_u = Ts/pi  integral_0^{pi/Ts} |S|^2 / (1 + T_n^2 omega^2)^m d omega`, that due to the
+//!   remnant with K_n = 1,
+//! - `V_n = Ts/pi  integral_0^{pi/Ts} 1 / (1 + T_n^2 omega^2)^m d omega`, that of the remnant
+//!   itself,
 //!
 //! the two definitions give
 //!
-//! - `P_n = var(u_n)/var(u)`: `K_n^2 = P_n/(1 - P_n) V_f/V_u` (eq. 43, A.14), for every P_n from 0 to below 1;
-//! - `P_n = var(n)/var(u)`: `K_n^2 = P_n V_f / (V_n - P_n V_u)` (A.17), for P_n from 0 to below `V_n/V_u`.
+//! - `P_n = var(u_n)/var(u)`: `K_n^2 = P_n/(1 - P_n) V_f/V_u` (eq. 43, A.14), for every P_n from 0
+//!   to below 1;
+//! - `P_n = var(n)/var(u)`: `K_n^2 = P_n V_f / (V_n - P_n V_u)` (A.17), for P_n from 0 to below
+//!   `V_n/V_u`.
 //!
-//! All quantities are those of the continuous loop, as in the text. V_n has a closed form. V_u is integrated by the adaptive
-//! Gauss-Kronrod rule of 7 and 15 points to 1e-10 relative, from a partition at the local maxima of the integrand: the peaks near
-//! crossover and at lightly damped closed-loop modes. S is evaluated from polynomials, `D / (D + N e^{-j omega tau})`, which is
-//! 0 at an integrator of the loop where `1/(1 + infinity)` would not be a number.
+//! All quantities are those of the continuous loop, as in the text. V_n has a closed form. V_u is
+//! integrated by the adaptive Gauss-Kronrod rule of 7 and 15 points to 1e-10 relative, from a
+//! partition at the local maxima of the integrand: the peaks near crossover and at lightly damped
+//! closed-loop modes. S is evaluated from polynomials, `D / (D + N e^{-j omega tau})`, which is 0
+//! at an integrator of the loop where `1/(1 + infinity)` would not be a number.
 
 use num_complex::Complex64;
 
@@ -25,7 +31,8 @@ use crate::{
 /// What the noise level P_n compares.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NoiseDefinition {
-    /// `var(u_n)/var(u)`: the part of the operator's output that is due to the remnant, fed back through the loop (eq. 43, A.14).
+    /// `var(u_n)/var(u)`: the part of the operator's output that is due to the remnant, fed back
+    /// through the loop (eq. 43, A.14).
     #[default]
     Response,
     /// `var(n)/var(u)`: the remnant itself (A.17).
@@ -48,14 +55,15 @@ const TOLERANCE: f64 = 1e-10;
 
 /// The remnant gain K_n for a noise level P_n.
 ///
-/// `order` and `time_constant_s` are those of the remnant filter, `lines` the forcing function, `sample_time` that of the noise
-/// draws. K_n is 0 for a level of 0.
+/// `order` and `time_constant_s` are those of the remnant filter, `lines` the forcing function,
+/// `sample_time` that of the noise draws. K_n is 0 for a level of 0.
 ///
 /// # Errors
-/// [`ModelError::OutOfRange`] for a level below 0 (or not below 1 for [`NoiseDefinition::Response`]), a remnant order other than 1
-/// to 4, a time constant or a line without meaning, or a forcing function that does not excite u;
-/// [`ModelError::UnstableLoop`] when operator and controlled element make no stable loop;
-/// [`ModelError::UnreachableNoiseLevel`] for a level that [`NoiseDefinition::Remnant`] cannot have.
+/// [`ModelError::OutOfRange`] for a level below 0 (or not below 1 for
+/// [`NoiseDefinition::Response`]), a remnant order other than 1 to 4, a time constant or a line
+/// without meaning, or a forcing function that does not excite u; [`ModelError::UnstableLoop`] when
+/// operator and controlled element make no stable loop; [`ModelError::UnreachableNoiseLevel`] for a
+/// level that [`NoiseDefinition::Remnant`] cannot have.
 #[allow(clippy::too_many_arguments)]
 pub fn remnant_gain(
     level: f64,
@@ -171,7 +179,8 @@ impl Loop<'_> {
         (num_operator * den_element / characteristic).norm()
     }
 
-    /// Numerator and denominator of the operator without delay, denominator of the element, characteristic function.
+    /// Numerator and denominator of the operator without delay, denominator of the element,
+    /// characteristic function.
     fn at(&self, omega: f64) -> [Complex64; 4] {
         let s = Complex64::new(0.0, omega);
         let horner = |p: &[f64]| p.iter().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * s + c);
@@ -193,7 +202,8 @@ fn remnant_integral(order: usize, x: f64) -> f64 {
     integral
 }
 
-/// Nodes of the 15-point Kronrod rule on [-1, 1], from the outermost to 0; every second one belongs to the Gauss rule.
+/// Nodes of the 15-point Kronrod rule on [-1, 1], from the outermost to 0; every second one belongs
+/// to the Gauss rule.
 const NODES: [f64; 8] = [
     0.991_455_371_120_812_6,
     0.949_107_912_342_758_5,
@@ -357,7 +367,8 @@ mod tests {
 
     #[test]
     fn integrals_agree_with_scipy() {
-        // scipy.integrate.quad at 1e-13: V_u of s1 and s2 for m = 1, 4, and V_n for m = 4; V_f is common to all levels.
+        // scipy.integrate.quad at 1e-13: V_u of s1 and s2 for m = 1, 4, and V_n for m = 4; V_f is
+        // common to all levels.
         let expected = [
             (0, 1, 0.10113885417079896_f64, 0.005307028936817029),
             (0, 4, 0.041602794077966486, 0.005307028936817029),
@@ -400,7 +411,8 @@ mod tests {
 
     #[test]
     fn without_feedback_both_definitions_follow_from_variances() {
-        // No controlled element: u = H_HO f_t + n, so that var(u_n) = var(n) and both definitions are one.
+        // No controlled element: u = H_HO f_t + n, so that var(u_n) = var(n) and both definitions
+        // are one.
         let [(operator, _), _] = states();
         let none = tf(&[0.0], &[1.0, 1.0]);
         let line = [SpectralLine {
@@ -417,8 +429,8 @@ mod tests {
 
     #[test]
     fn sharp_peaks_are_integrated() {
-        // Just below the gain that makes the loop unstable the integrand has a peak of relative width 1e-6: V_u is its
-        // residue, which grows as the inverse of the distance.
+        // Just below the gain that makes the loop unstable the integrand has a peak of relative
+        // width 1e-6: V_u is its residue, which grows as the inverse of the distance.
         let [(operator, element), _] = states();
         let margin = crate::margins::margins(|w| operator.series(&element).response(w), (0.1, 100.0));
         let limit = 10f64.powf(margin.gain_margin_db.unwrap() / 20.0);

@@ -1,9 +1,10 @@
 //! The noise model of the exactly held remnant as a function of T_n alone, with its derivatives.
 //!
-//! `K_n/(T_n s + 1)^m`, driven by one normal deviate of unit variance a sample, has the innovation form `C/D eps` with
-//! `D = (1 - p q^-1)^m`, `p = e^{-Ts/T_n}`, C the monic spectral factor of the numerator of the zero-order hold
-//! ([`crate::remnant`]), and `sigma = K_n g(T_n)`. The derivatives: `dp/dT_n = p Ts/T_n^2`; a zero zeta of the numerator N moves by
-//! `-N_a/N_zeta` with `a = Ts/T_n`, its mirror image `1/conj zeta` accordingly.
+//! `K_n/(T_n s + 1)^m`, driven by one normal deviate of unit variance a sample, has the innovation
+//! form `C/D eps` with `D = (1 - p q^-1)^m`, `p = e^{-Ts/T_n}`, C the monic spectral factor of the
+//! numerator of the zero-order hold ([`crate::remnant`]), and `sigma = K_n g(T_n)`. The
+//! derivatives: `dp/dT_n = p Ts/T_n^2`; a zero zeta of the numerator N moves by `-N_a/N_zeta` with
+//! `a = Ts/T_n`, its mirror image `1/conj zeta` accordingly.
 
 use crate::{
     ModelError, SampleTime,
@@ -27,10 +28,12 @@ pub struct RemnantNoise {
     pub log_gain_slope: f64,
 }
 
-/// The innovation form for the time constant T_n in s and the order m; m = 0 is white noise, with no coefficients and g = 1.
+/// The innovation form for the time constant T_n in s and the order m; m = 0 is white noise, with
+/// no coefficients and g = 1.
 ///
 /// # Errors
-/// [`ModelError::OutOfRange`] when m is above 4, or T_n (which m = 0 does not use) not between 1e-9 and 1e9 samples.
+/// [`ModelError::OutOfRange`] when m is above 4, or T_n (which m = 0 does not use) not between 1e-9
+/// and 1e9 samples.
 pub fn remnant_noise(time_constant_s: f64, order: usize, sample_time: SampleTime) -> Result<RemnantNoise, ModelError> {
     if order == 0 {
         return Ok(RemnantNoise {
@@ -94,7 +97,8 @@ mod tests {
 
     #[test]
     fn spectrum_of_second_order_in_closed_form() {
-        // n_1 = 1 - p - a p and n_2 = p (p - 1 + a) of the hold of 1/(T_n s + 1)^2: sigma^2 C C* has to be N N*.
+        // n_1 = 1 - p - a p and n_2 = p (p - 1 + a) of the hold of 1/(T_n s + 1)^2: sigma^2 C C*
+        // has to be N N*.
         let a: f64 = 1.0 / 6.0;
         let p = (-a).exp();
         let (n1, n2) = (1.0 - p - a * p, p * (p - 1.0 + a));
@@ -122,7 +126,8 @@ mod tests {
                 for (slope, up, down) in pairs {
                     for ((s, u), d) in slope.iter().zip(up).zip(down) {
                         let difference = (u - d) / (2.0 * h);
-                        // Rounding: coefficients up to 6 with 1e-16 (zeros of m = 4 with 1e-14) over h; truncation (h/T_n)^2.
+                        // Rounding: coefficients up to 6 with 1e-16 (zeros of m = 4 with 1e-14)
+                        // over h; truncation (h/T_n)^2.
                         let bound = 2e-8 * difference.abs() + 5e-14 / h;
                         assert!((s - difference).abs() < bound, "m {m} T_n {t_n}: {s} and {difference}");
                     }

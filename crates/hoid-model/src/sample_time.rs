@@ -38,14 +38,16 @@ impl SampleTime {
 
     /// A time in s as a whole number of samples, when it is one within `1e-6` of a sample.
     ///
-    /// The quotient is rounded, never cut off: `0.29 / 0.01` is `28.999999999999996` in floating point and means 29.
+    /// The quotient is rounded, never cut off: `0.29 / 0.01` is `28.999999999999996` in floating
+    /// point and means 29.
     pub fn whole_samples(self, time_s: f64) -> Option<usize> {
         let samples = time_s / self.0;
         let rounded = samples.round();
         ((samples - rounded).abs() <= 1e-6 && (0.0..1e15).contains(&rounded)).then_some(rounded as usize)
     }
 
-    /// True when two sample times are the same up to rounding (1e-6 relative): records with both can be fitted together.
+    /// True when two sample times are the same up to rounding (1e-6 relative): records with both
+    /// can be fitted together.
     pub fn matches(self, other: Self) -> bool {
         (self.0 - other.0).abs() <= 1e-6 * self.0
     }

@@ -1,6 +1,7 @@
 //! Scenarios: who controls what, with which noise, and how it changes.
 //!
-//! The reference text's two states of adaptation (Table 2) and its six conditions (Table 4.4) are here as data:
+//! The reference text's two states of adaptation (Table 2) and its six conditions (Table 4.4) are
+//! here as data:
 //!
 //! | condition | operator and controlled element | rate of change G |
 //! |---|---|---|
@@ -9,9 +10,11 @@
 //! | C3, C4 | s1 to s2 at 40.96 s | 0.5, 100 1/s |
 //! | C5, C6 | s2 to s1 at 40.96 s | 0.5, 100 1/s |
 //!
-//! The gains, time constants and frequencies of operator and controlled element and the remnant gain K_n follow one sigmoid
-//! (eq. 5); the remnant time constant is constant. The delay is that of the text's conditions throughout; where it changes it goes along the same
-//! sigmoid, in steps of a sample. The remnant gain of each state gives the demanded noise level in that state (eq. 43 or A.17).
+//! The gains, time constants and frequencies of operator and controlled element and the remnant
+//! gain K_n follow one sigmoid (eq. 5); the remnant time constant is constant. The delay is that of
+//! the text's conditions throughout; where it changes it goes along the same sigmoid, in steps of a
+//! sample. The remnant gain of each state gives the demanded noise level in that state (eq. 43 or
+//! A.17).
 
 use crate::{
     ModelError, OperatorParameters, SampleTime,
@@ -22,7 +25,8 @@ use crate::{
     schedule::Schedule,
 };
 
-/// Longest run, in samples: 11 days at 100 Hz. A slip in the exponent of a time is found before it asks for all the memory.
+/// Longest run, in samples: 11 days at 100 Hz. A slip in the exponent of a time is found before it
+/// asks for all the memory.
 const MOST_SAMPLES: usize = 100_000_000;
 
 /// A state of adaptation: the operator and what he controls.
@@ -110,7 +114,8 @@ pub enum RemnantStrength {
 }
 
 impl RemnantStrength {
-    /// With another level, another definition of it, or both. `None` for a definition without a level where the gain itself is given.
+    /// With another level, another definition of it, or both. `None` for a definition without a
+    /// level where the gain itself is given.
     pub fn changed(self, level: Option<f64>, definition: Option<NoiseDefinition>) -> Option<Self> {
         match (self, level, definition) {
             (same, None, None) => Some(same),
@@ -158,7 +163,8 @@ pub enum Realisation {
     /// In the input matrix: the output x is continuous when K_c jumps.
     #[default]
     Input,
-    /// In the output matrix, as the controllable canonical form of the reference text has it: x jumps when K_c jumps.
+    /// In the output matrix, as the controllable canonical form of the reference text has it: x
+    /// jumps when K_c jumps.
     Output,
 }
 

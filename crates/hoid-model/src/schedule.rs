@@ -31,7 +31,8 @@ pub enum Schedule {
     },
 }
 
-/// Transitions are as good as over after so many of their time constants 1/G: e^-40 is below half a last digit.
+/// Transitions are as good as over after so many of their time constants 1/G: e^-40 is below half a
+/// last digit.
 const OVER: f64 = 40.0;
 /// Least interval between two changes, in time constants 1/G.
 const SHORTEST: f64 = 1.0;
@@ -113,7 +114,8 @@ impl Schedule {
             Self::Constant => initial,
             Self::Sigmoid { rate_per_s, midpoint_s } => {
                 let x = rate_per_s * (t_s - midpoint_s);
-                // The exponential of the nearer end: it cannot overflow, and that end is met exactly.
+                // The exponential of the nearer end: it cannot overflow, and that end is met
+                // exactly.
                 let far = (-x.abs()).exp();
                 let part = (finally - initial) * (far / (1.0 + far));
                 if x < 0.0 { initial + part } else { finally - part }

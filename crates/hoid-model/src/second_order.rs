@@ -1,20 +1,24 @@
 //! Exact zero-order hold of second-order systems, both ways.
 //!
-//! The continuous system `(b0 s + b1) / (s^2 + a1 s + a2)` (eq. 12) driven by an input that is held over each sample Ts is,
-//! at the samples, `(b0 + b1 q^-1) q^-1 / (1 + f1 q^-1 + f2 q^-2)` exactly. With the poles `p1, p2` of the continuous system,
-//! `z_i = p_i Ts`, `s = z1 + z2 = -a1 Ts` and `q = z1 z2 = a2 Ts^2`:
+//! The continuous system `(b0 s + b1) / (s^2 + a1 s + a2)` (eq. 12) driven by an input that is held
+//! over each sample Ts is, at the samples, `(b0 + b1 q^-1) q^-1 / (1 + f1 q^-1 + f2 q^-2)` exactly.
+//! With the poles `p1, p2` of the continuous system, `z_i = p_i Ts`, `s = z1 + z2 = -a1 Ts` and
+//! `q = z1 z2 = a2 Ts^2`:
 //!
 //! - `f1 = -(e^z1 + e^z2)`, `f2 = e^s`;
-//! - the impulse response of `1/(s^2 + a1 s + a2)` at Ts is `Ts phi1`, its step response `Ts^2 phi2`, with the divided
-//!   differences of the exponential `phi1 = exp[z1, z2]` and `phi2 = exp[0, z1, z2]`;
-//! - `b0_d = b0 Ts phi1 + b1 Ts^2 phi2` is the step response after one sample, and the gain at zero frequency gives
-//!   `b0_d + b1_d = b1 Ts^2 chi`, `chi = (1 + f1 + f2) / q = exp[0, z1] exp[0, z2]`.
+//! - the impulse response of `1/(s^2 + a1 s + a2)` at Ts is `Ts phi1`, its step response
+//!   `Ts^2 phi2`, with the divided differences of the exponential `phi1 = exp[z1, z2]` and
+//!   `phi2 = exp[0, z1, z2]`;
+//! - `b0_d = b0 Ts phi1 + b1 Ts^2 phi2` is the step response after one sample, and the gain at zero
+//!   frequency gives `b0_d + b1_d = b1 Ts^2 chi`,
+//!   `chi = (1 + f1 + f2) / q = exp[0, z1] exp[0, z2]`.
 //!
-//! All of these are symmetric in the poles and entire in (s, q): complex, real, double poles and poles at the origin of s are
-//! the same formulas ([`hoid_core::divided_differences`]). This replaces the matrix exponential and
-//! logarithm of the extended matrix (eq. B.7); it gives the same numbers.
-//! The inverse exists when no pole in z lies on the closed negative real axis (then the logarithm is the principal one).
-//! Source: N. J. Higham, *Functions of Matrices*, 2008, sections 2.4 and B.16 (divided differences); eq. B.3-B.10 of the reference text.
+//! All of these are symmetric in the poles and entire in (s, q): complex, real, double poles and
+//! poles at the origin of s are the same formulas ([`hoid_core::divided_differences`]). This
+//! replaces the matrix exponential and logarithm of the extended matrix (eq. B.7); it gives the
+//! same numbers. The inverse exists when no pole in z lies on the closed negative real axis (then
+//! the logarithm is the principal one). Source: N. J. Higham, *Functions of Matrices*, 2008,
+//! sections 2.4 and B.16 (divided differences); eq. B.3-B.10 of the reference text.
 
 use hoid_core::divided_differences::DividedDifferences;
 
@@ -50,8 +54,8 @@ impl SecondOrder {
     /// The exact discrete model for an input held over each sample.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] when the result is not finite (an unstable pole so fast that its exponential overflows, or
-    /// a coefficient that is not a finite number).
+    /// [`ModelError::OutOfRange`] when the result is not finite (an unstable pole so fast that its
+    /// exponential overflows, or a coefficient that is not a finite number).
     pub fn hold(self, sample_time: SampleTime) -> Result<HeldSecondOrder, ModelError> {
         let ts = sample_time.s();
         let poles = DividedDifferences::at(-self.a1 * ts, self.a2 * ts * ts);
@@ -108,8 +112,8 @@ impl HeldSecondOrder {
     }
 }
 
-/// The state space of `1/(s^2 + a1 s + a2)` in controllable canonical form (output and its rate) over one sample of held input:
-/// `x(t + Ts) = transition x(t) + input u(t)`.
+/// The state space of `1/(s^2 + a1 s + a2)` in controllable canonical form (output and its rate)
+/// over one sample of held input: `x(t + Ts) = transition x(t) + input u(t)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeldStates {
     /// `e^{A Ts}` by rows.
@@ -119,7 +123,8 @@ pub struct HeldStates {
 }
 
 impl HeldStates {
-    /// With `h = Ts phi1` and `g = Ts^2 phi2`: transition `[[1 - a2 g, h], [-a2 h, 1 - a2 g - a1 h]]`, input `[g, h]`.
+    /// With `h = Ts phi1` and `g = Ts^2 phi2`: transition
+    /// `[[1 - a2 g, h], [-a2 h, 1 - a2 g - a1 h]]`, input `[g, h]`.
     pub fn new(a1: f64, a2: f64, sample_time: SampleTime) -> Self {
         let ts = sample_time.s();
         let poles = DividedDifferences::at(-a1 * ts, a2 * ts * ts);
@@ -142,13 +147,14 @@ impl HeldStates {
     }
 }
 
-/// Direct feedthrough beside the strictly proper part: `d + (b0 s + b1)/(s^2 + a1 s + a2)`, numerator and denominator by
-/// descending powers.
+/// Direct feedthrough beside the strictly proper part: `d + (b0 s + b1)/(s^2 + a1 s + a2)`,
+/// numerator and denominator by descending powers.
 ///
 /// The held system has the numerator `d + (d f1 + b0_d) q^-1 + (d f2 + b1_d) q^-2`.
 ///
 /// # Errors
-/// As [`SecondOrder::hold`]; [`ModelError::TransferFunction`] when the leading coefficient of `den` is zero.
+/// As [`SecondOrder::hold`]; [`ModelError::TransferFunction`] when the leading coefficient of `den`
+/// is zero.
 pub fn hold_biproper(
     num: [f64; 3],
     den: [f64; 3],
@@ -195,7 +201,8 @@ pub fn unhold_biproper(
     ))
 }
 
-/// Sum and product of the poles times Ts that `1 + f1 q^-1 + f2 q^-2` has in s, by the principal logarithm.
+/// Sum and product of the poles times Ts that `1 + f1 q^-1 + f2 q^-2` has in s, by the principal
+/// logarithm.
 fn continuous_poles(f1: f64, f2: f64) -> Result<(f64, f64), NotConvertible> {
     let half = -f1 / 2.0;
     let x = half * half - f2;
@@ -210,8 +217,9 @@ fn continuous_poles(f1: f64, f2: f64) -> Result<(f64, f64), NotConvertible> {
     if lowest <= 0.0 {
         return Err(NotConvertible::NegativeRealPole { pole: lowest });
     }
-    // A pole near z = 1 is a pole near the origin of s: its distance from 1 follows from the value of the polynomial at 1, which
-    // the coefficients give more accurately than the difference of the roots.
+    // A pole near z = 1 is a pole near the origin of s: its distance from 1 follows from the value
+    // of the polynomial at 1, which the coefficients give more accurately than the difference of
+    // the roots.
     let at_one = 1.0 + f1 + f2;
     let (far_z, near_z) = if (outer - 1.0).abs() > (inner - 1.0).abs() {
         (outer, inner)
@@ -301,7 +309,8 @@ mod tests {
         for case in cases() {
             let exact = case.hold(ts()).unwrap();
             let matrix = by_matrix_exponential(case, 0.01);
-            // The matrix way loses digits in b1 and f2 by cancellation: 1e-13 of the largest coefficient.
+            // The matrix way loses digits in b1 and f2 by cancellation: 1e-13 of the largest
+            // coefficient.
             for (name, a, b) in [
                 ("b0", exact.b0, matrix.b0),
                 ("b1", exact.b1, matrix.b1),
@@ -320,8 +329,9 @@ mod tests {
     fn unhold_inverts_hold_for_all_pole_cases() {
         for case in cases() {
             let back = case.hold(ts()).unwrap().unhold(ts()).unwrap();
-            // A held system knows its poles to eps/(Ts |p1 - p2|) and, at a double pole, to sqrt(eps)/Ts; the coefficients
-            // a1, a2, which are symmetric, keep more. Fast poles leave e^{p Ts} small and keep fewer digits.
+            // A held system knows its poles to eps/(Ts |p1 - p2|) and, at a double pole, to
+            // sqrt(eps)/Ts; the coefficients a1, a2, which are symmetric, keep more. Fast poles
+            // leave e^{p Ts} small and keep fewer digits.
             for (name, a, b) in [
                 ("b0", back.b0, case.b0),
                 ("b1", back.b1, case.b1),

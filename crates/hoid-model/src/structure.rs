@@ -1,8 +1,9 @@
 //! Model structures and their orders (Table 5.1).
 //!
-//! The general family is `A(q^-1) u(t) = B(q^-1)/F(q^-1) e(t-nk) + C(q^-1)/D(q^-1) eps(t)` (eq. 5.1 times A). A structure says
-//! which polynomials are there. Orders follow the field's software: nb counts the coefficients `b0 ... b_{nb-1}` of B, the
-//! others count the coefficients behind the leading one, nk is the delay of b0 in samples.
+//! The general family is `A(q^-1) u(t) = B(q^-1)/F(q^-1) e(t-nk) + C(q^-1)/D(q^-1) eps(t)` (eq. 5.1
+//! times A). A structure says which polynomials are there. Orders follow the field's software: nb
+//! counts the coefficients `b0 ... b_{nb-1}` of B, the others count the coefficients behind the
+//! leading one, nk is the delay of b0 in samples.
 //!
 //! This is the one list of structures: the command line, plans and Python take their names from it.
 //!
@@ -68,19 +69,21 @@ impl Structure {
         }
     }
 
-    /// True when the structure describes how the output follows an input; AR, MA and ARMA describe the output alone.
+    /// True when the structure describes how the output follows an input; AR, MA and ARMA describe
+    /// the output alone.
     pub fn has_input(self) -> bool {
         self.polynomials().contains('b')
     }
 
-    /// True when the residual is linear in theta, so that least squares gives the fit in one step: FIR, AR, ARX.
+    /// True when the residual is linear in theta, so that least squares gives the fit in one step:
+    /// FIR, AR, ARX.
     pub fn is_linear(self) -> bool {
         matches!(self, Self::Fir | Self::Ar | Self::Arx)
     }
 
-    /// The orders with which the structure comes nearest to the human operator (two poles, b0 and b1) with a remnant of
-    /// first order: `ARX(na=2, nb=2)`, `BJ(nb=2, nc=0, nd=1, nf=2)`. A structure without poles or input takes orders that
-    /// are usual for it.
+    /// The orders with which the structure comes nearest to the human operator (two poles, b0 and
+    /// b1) with a remnant of first order: `ARX(na=2, nb=2)`, `BJ(nb=2, nc=0, nd=1, nf=2)`. A
+    /// structure without poles or input takes orders that are usual for it.
     pub fn operator_orders(self, nk: usize) -> Orders {
         let base = Orders {
             nb: 2,
@@ -175,8 +178,8 @@ impl Orders {
             .collect()
     }
 
-    /// First sample at which the undisturbed part can be computed without any input or output from before the record:
-    /// `max(na, nk + nb - 1)`.
+    /// First sample at which the undisturbed part can be computed without any input or output from
+    /// before the record: `max(na, nk + nb - 1)`.
     pub fn first_regressed_sample(&self) -> usize {
         self.na.max(self.nk + self.nb.saturating_sub(1))
     }

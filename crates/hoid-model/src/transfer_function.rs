@@ -16,8 +16,8 @@ impl ContinuousTransferFunction {
     /// A proper transfer function; the denominator is made monic.
     ///
     /// # Errors
-    /// [`ModelError::TransferFunction`] when a coefficient is not finite, the denominator is zero, or the degree of the
-    /// numerator exceeds that of the denominator.
+    /// [`ModelError::TransferFunction`] when a coefficient is not finite, the denominator is zero,
+    /// or the degree of the numerator exceeds that of the denominator.
     pub fn new(num: &[f64], den: &[f64]) -> Result<Self, ModelError> {
         let refuse = |expected: &str| ModelError::TransferFunction {
             found: format!("{num:?} / {den:?}"),
@@ -96,8 +96,8 @@ fn without_leading_zeros(p: &[f64]) -> &[f64] {
     &p[p.iter().position(|&c| c != 0.0).unwrap_or(p.len())..]
 }
 
-/// `H(z) = num(z^-1) / den(z^-1)`, coefficients by ascending powers of `z^-1`, `den[0] = 1`. A pure delay of n samples is n
-/// leading zeros in `num`.
+/// `H(z) = num(z^-1) / den(z^-1)`, coefficients by ascending powers of `z^-1`, `den[0] = 1`. A pure
+/// delay of n samples is n leading zeros in `num`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiscreteTransferFunction {
     num: Vec<f64>,

@@ -1,9 +1,10 @@
 //! Standard errors of derived quantities by the delta method.
 //!
-//! For `y = g(theta)` and an estimate with covariance P, `var y ~ G P G'` with `G = dg/dtheta` at the estimate. For the
-//! operator, G is the inverse of the Jacobian of the exact zero-order hold ([`crate::operator::retrieval_jacobian`]); the
-//! lead time is the ratio `T_L = K_e_dot / K_e`, whose first-order error is good as long as K_e stands several standard errors
-//! away from zero. Source: A. W. van der Vaart, *Asymptotic Statistics*, 1998, section 3.1.
+//! For `y = g(theta)` and an estimate with covariance P, `var y ~ G P G'` with `G = dg/dtheta` at
+//! the estimate. For the operator, G is the inverse of the Jacobian of the exact zero-order hold
+//! ([`crate::operator::retrieval_jacobian`]); the lead time is the ratio `T_L = K_e_dot / K_e`,
+//! whose first-order error is good as long as K_e stands several standard errors away from zero.
+//! Source: A. W. van der Vaart, *Asymptotic Statistics*, 1998, section 3.1.
 
 use std::fmt;
 
@@ -29,7 +30,8 @@ pub struct OperatorEstimate {
     pub omega_nm_rad_s: Estimate,
     /// Neuromuscular damping zeta_nm.
     pub zeta_nm: Estimate,
-    /// Delay tau_e = (nk - 1) Ts, s: a whole number of samples that was given or searched, without a standard error.
+    /// Delay tau_e = (nk - 1) Ts, s: a whole number of samples that was given or searched, without
+    /// a standard error.
     pub tau_e_s: Estimate,
 }
 
@@ -153,8 +155,9 @@ pub fn operator_estimate(model: &PolynomialModel, covariance: &[f64]) -> Result<
     })
 }
 
-/// T_n and K_n of a model's noise polynomial D, with the covariance of its theta (by rows) and the standard deviation of the
-/// innovation, itself known to `innovation_sd_variance` and uncorrelated with theta (Gaussian innovations).
+/// T_n and K_n of a model's noise polynomial D, with the covariance of its theta (by rows) and the
+/// standard deviation of the innovation, itself known to `innovation_sd_variance` and uncorrelated
+/// with theta (Gaussian innovations).
 ///
 /// # Errors
 /// [`NotConvertible`] with the reason.
@@ -199,7 +202,8 @@ mod tests {
     use super::*;
     use crate::{Orders, SampleTime, Structure};
 
-    /// Normal deviates by Box and Muller on a linear congruential generator: enough for a check to a few per cent.
+    /// Normal deviates by Box and Muller on a linear congruential generator: enough for a check to
+    /// a few per cent.
     fn normals(seed: u64) -> impl FnMut() -> f64 {
         let mut state = seed;
         let mut uniform = move || {
@@ -227,8 +231,8 @@ mod tests {
         vec![0.0442765923, -0.0431823806, -0.8464817249, -1.9121130548, 0.9242709633]
     }
 
-    /// Lower factor (by rows) of a covariance like that of a fit, b0 and b1, f1 and f2 nearly opposite, scaled down so that
-    /// the map is linear over it.
+    /// Lower factor (by rows) of a covariance like that of a fit, b0 and b1, f1 and f2 nearly
+    /// opposite, scaled down so that the map is linear over it.
     fn factor() -> Vec<f64> {
         let rows = [
             [2e-3, 0.0, 0.0, 0.0, 0.0],

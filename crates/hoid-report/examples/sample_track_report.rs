@@ -1,4 +1,5 @@
-//! Simulates a run of condition C4, tracks it by RLS, RPEM and the recursion in physical parameters, and writes the report:
+//! Simulates a run of condition C4, tracks it by RLS, RPEM and the recursion in physical
+//! parameters, and writes the report:
 //! `cargo run -p hoid-report --example sample_track_report -- report.html`.
 
 use std::error::Error;

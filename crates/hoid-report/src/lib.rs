@@ -1,7 +1,8 @@
 //! Figures and HTML pages about identified models.
 //!
-//! A fit is a list of numbers; whether to believe it shows in pictures: the frequency response with its bands, the residual tests, the
-//! simulated output over the measured one. A [`Report`] puts them on one page, with styles and figures inside the file:
+//! A fit is a list of numbers; whether to believe it shows in pictures: the frequency response with
+//! its bands, the residual tests, the simulated output over the measured one. A [`Report`] puts
+//! them on one page, with styles and figures inside the file:
 //!
 //! ```
 //! use hoid_ident::Estimator;

@@ -41,7 +41,8 @@ impl ModelSection<'_> {
     }
 }
 
-/// The operator of records that carry the truth, when it is the same throughout (a simulated run without a change).
+/// The operator of records that carry the truth, when it is the same throughout (a simulated run
+/// without a change).
 pub fn known_operator(records: &[Record]) -> Option<OperatorParameters> {
     let constant = |name: &str| {
         let first = *records.first()?.channel(name)?.first()?;

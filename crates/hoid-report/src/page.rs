@@ -23,8 +23,8 @@ pub(crate) fn render(name: &str, values: Value) -> Result<String, ReportError> {
     render_with(&[], name, values)
 }
 
-/// The page of a template, which may be one of `own`: name and text of templates beside those of this crate, whose parts and style they
-/// can use.
+/// The page of a template, which may be one of `own`: name and text of templates beside those of
+/// this crate, whose parts and style they can use.
 ///
 /// # Errors
 /// [`ReportError::Template`] where the template cannot be filled.

@@ -53,7 +53,8 @@ impl<'a> Report<'a> {
 }
 
 impl Report<'_> {
-    /// The page as HTML text, with all styles and figures inside it. The same data give the same bytes.
+    /// The page as HTML text, with all styles and figures inside it. The same data give the same
+    /// bytes.
     ///
     /// # Errors
     /// [`ReportError::NoModels`]; [`ReportError::Template`] for a defect of this crate.

@@ -70,7 +70,8 @@ fn section_of<'a>(html: &'a str, name: &str) -> &'a str {
     &html[start..start + end]
 }
 
-/// What every page must keep: nothing from outside, no NaN, no two equal ids, references that exist.
+/// What every page must keep: nothing from outside, no NaN, no two equal ids, references that
+/// exist.
 fn check_page(html: &str) {
     let without_namespace = html.replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
     for outside in ["http", "src=", "<link", "<script", "@import", "url(\"", "//cdn"] {
@@ -217,7 +218,8 @@ fn a_series_shorter_than_the_lags_has_its_figures() {
     check_page(&html);
     assert!(html.contains(&format!(" of {lags} lags outside")));
 
-    // A record that the model cannot be compared with gives the reason, one without a name its number.
+    // A record that the model cannot be compared with gives the reason, one without a name its
+    // number.
     let other = [cut(12), cut(1)];
     let html = page(vec![section("ARX", &fit, &other)]);
     check_page(&html);

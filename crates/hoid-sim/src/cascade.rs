@@ -1,8 +1,11 @@
-//! Exact zero-order hold of the cascade `1/(T_n s + 1)^m` driven by noise that is held over each sample.
+//! Exact zero-order hold of the cascade `1/(T_n s + 1)^m` driven by noise that is held over each
+//! sample.
 //!
-//! The states are the outputs of the m first-order sections, `T_n z_1' = eps - z_1`, `T_n z_i' = z_{i-1} - z_i`. With
-//! `h = Ts/T_n` the transition matrix is lower triangular Toeplitz with `e^-h h^k/k!` on diagonal k, and the input enters
-//! section k (from 0) with `1 - e^-h sum_{j<=k} h^j/j!`, summed from its tail `e^-h sum_{j>k} h^j/j!` so that nothing cancels.
+//! The states are the outputs of the m first-order sections, `T_n z_1' = eps - z_1`,
+//! `T_n z_i' = z_{i-1} - z_i`. With `h = Ts/T_n` the transition matrix is lower triangular Toeplitz
+//! with `e^-h h^k/k!` on diagonal k, and the input enters section k (from 0) with
+//! `1 - e^-h sum_{j<=k} h^j/j!`, summed from its tail `e^-h sum_{j>k} h^j/j!` so that nothing
+//! cancels.
 
 use hoid_lanes::Number;
 

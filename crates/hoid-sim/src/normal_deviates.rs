@@ -1,9 +1,11 @@
 //! Standard normal deviates from a generator of random bits.
 //!
-//! Normal deviates are those of `rand_distr`, by the ziggurat: the surface below the density is cut into 256 layers of one area; a random
-//! layer i and a random place in it give a deviate at once where it lies below the edge of the next layer, 99 times in a hundred (G. Marsaglia and W. W. Tsang,
-//! *J. Statistical Software* 5 (2000) 8; J. A. Doornik, *An Improved Ziggurat Method to Generate Normal Random Samples*, 2005).
-//! These are made here, many in a row, and the others by the crate, from the same numbers: the same deviates in less time.
+//! Normal deviates are those of `rand_distr`, by the ziggurat: the surface below the density is cut
+//! into 256 layers of one area; a random layer i and a random place in it give a deviate at once
+//! where it lies below the edge of the next layer, 99 times in a hundred (G. Marsaglia and W. W.
+//! Tsang, *J. Statistical Software* 5 (2000) 8; J. A. Doornik, *An Improved Ziggurat Method to
+//! Generate Normal Random Samples*, 2005). These are made here, many in a row, and the others by
+//! the crate, from the same numbers: the same deviates in less time.
 
 use std::{convert::Infallible, sync::OnceLock};
 
@@ -40,7 +42,8 @@ pub(crate) fn normal_deviates(generator: ChaCha8Rng, deviates: &mut [f64]) {
 static EDGES: OnceLock<[f64; LAYERS + 1]> = OnceLock::new();
 const LAYERS: usize = 256;
 
-/// The deviate of a random number where it is decided at once: layer and place are its lowest and highest bits.
+/// The deviate of a random number where it is decided at once: layer and place are its lowest and
+/// highest bits.
 #[inline(always)]
 fn quick(edges: &[f64; LAYERS + 1], bits: u64) -> Option<f64> {
     let layer = bits as usize % LAYERS;

@@ -1,7 +1,8 @@
 //! Random streams that belong to a run, not to a thread.
 //!
-//! A run is named by (seed, cell, replication). These three numbers are the key of a ChaCha8 generator, so that any run can be
-//! repeated alone, in any order and on any number of threads, and no two runs share a stream.
+//! A run is named by (seed, cell, replication). These three numbers are the key of a ChaCha8
+//! generator, so that any run can be repeated alone, in any order and on any number of threads, and
+//! no two runs share a stream.
 
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 
@@ -18,7 +19,8 @@ pub struct RunSeed {
     pub replication: u64,
 }
 
-/// Last eight bytes of each key: other uses of (seed, cell, replication) get another tag and so another stream.
+/// Last eight bytes of each key: other uses of (seed, cell, replication) get another tag and so
+/// another stream.
 const REMNANT: u64 = u64::from_le_bytes(*b"remnant\0");
 
 impl RunSeed {
@@ -89,7 +91,8 @@ mod tests {
 
     #[test]
     fn the_noise_of_this_version_is_pinned() {
-        // A change of generator or transform would change every published figure: it must be noticed.
+        // A change of generator or transform would change every published figure: it must be
+        // noticed.
         let first: Vec<String> = RunSeed::default()
             .white_noise(3)
             .iter()

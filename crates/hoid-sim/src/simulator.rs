@@ -4,15 +4,18 @@
 //!
 //! `e = f_t - x`, `u = y(k - tau_e/Ts) + n`, `n = K_n z`,
 //!
-//! where y is the operator's response without delay, x the output of the controlled element and z that of the unit remnant
-//! cascade. Each block is then taken over one sample exactly, for an input that is held: the operator driven by e, the
-//! controlled element by u, the cascade by one normal deviate. The hold delays the response by one sample more, so that
-//! `nk = tau_e/Ts + 1`. The remnant is not delayed. A delay that changes is that of the sample at which the response arrives: when it grows, parts
-//! of the response are heard twice, when it shrinks some are not heard.
+//! where y is the operator's response without delay, x the output of the controlled element and z
+//! that of the unit remnant cascade. Each block is then taken over one sample exactly, for an input
+//! that is held: the operator driven by e, the controlled element by u, the cascade by one normal
+//! deviate. The hold delays the response by one sample more, so that `nk = tau_e/Ts + 1`. The
+//! remnant is not delayed. A delay that changes is that of the sample at which the response
+//! arrives: when it grows, parts of the response are heard twice, when it shrinks some are not
+//! heard.
 //!
-//! Operator and controlled element are in controllable canonical form (states: output and rate of `1/den`). The operator's
-//! gains stand in its output matrix; those of the controlled element where [`Realisation`] says. When parameters change,
-//! the matrices of each sample are those of the continuous model with the values at that sample.
+//! Operator and controlled element are in controllable canonical form (states: output and rate of
+//! `1/den`). The operator's gains stand in its output matrix; those of the controlled element where
+//! [`Realisation`] says. When parameters change, the matrices of each sample are those of the
+//! continuous model with the values at that sample.
 
 use std::ops::Range;
 
@@ -52,8 +55,9 @@ struct Matrices {
     delay: usize,
 }
 
-/// A held system by rows, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`: the bits of [`HeldStates::step`]. Were both rows sums, the compiler would
-/// pack the states into one register, and each sample would wait for the shuffles besides.
+/// A held system by rows, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`: the bits of
+/// [`HeldStates::step`]. Were both rows sums, the compiler would pack the states into one register,
+/// and each sample would wait for the shuffles besides.
 #[derive(Debug, Clone, Copy)]
 struct Rows {
     plus: [f64; 3],
@@ -132,7 +136,8 @@ impl Simulator {
         self.forcing_deg.len()
     }
 
-    /// One run as a record of the measurement (or from the start of the run-in): e, u, f_t, x, n and the true parameters.
+    /// One run as a record of the measurement (or from the start of the run-in): e, u, f_t, x, n
+    /// and the true parameters.
     ///
     /// # Errors
     /// [`SimError::Diverged`].
@@ -151,7 +156,8 @@ impl Simulator {
         Ok(signals)
     }
 
-    /// As [`Simulator::signals`], into memory that was used before: new memory costs half as much as the run.
+    /// As [`Simulator::signals`], into memory that was used before: new memory costs half as much
+    /// as the run.
     ///
     /// # Errors
     /// As [`Simulator::signals`]; the signals are then of no use.
@@ -170,18 +176,21 @@ impl Simulator {
         }
     }
 
-    /// The signals of several runs, each driven by its own white noise, side by side in the lanes of vector registers: the bits of
-    /// [`Simulator::signals`] for each alone, with every instruction set.
+    /// The signals of several runs, each driven by its own white noise, side by side in the lanes
+    /// of vector registers: the bits of [`Simulator::signals`] for each alone, with every
+    /// instruction set.
     ///
     /// # Errors
-    /// As [`Simulator::signals`], for the first run that has one; [`SimError::NoSuchInstructionSet`].
+    /// As [`Simulator::signals`], for the first run that has one;
+    /// [`SimError::NoSuchInstructionSet`].
     pub fn batched_signals(&self, noises: &[Vec<f64>], instructions: InstructionSet) -> Result<Vec<Signals>, SimError> {
         let mut all = Vec::new();
         self.batched_signals_into(noises, instructions, &mut all)?;
         Ok(all)
     }
 
-    /// As [`Simulator::batched_signals`], into memory that was used before: new memory costs more than the runs.
+    /// As [`Simulator::batched_signals`], into memory that was used before: new memory costs more
+    /// than the runs.
     ///
     /// # Errors
     /// As [`Simulator::batched_signals`].
@@ -225,7 +234,8 @@ impl Simulator {
         })
     }
 
-    /// The samples of `range`, from noise into e, u, x and n that hold the lanes of each sample beside each other.
+    /// The samples of `range`, from noise into e, u, x and n that hold the lanes of each sample
+    /// beside each other.
     #[inline(always)]
     fn pass<R: Number>(&self, state: &mut LoopState<R>, range: Range<usize>, noise: &[f64], out: [&mut [f64]; 4]) {
         match self.cascade.order() {
@@ -383,8 +393,8 @@ impl<R: Number> LoopState<R> {
         }
     }
 
-    /// True when all that a lane has gone through was finite. A number that is not stays in the states for ever: zero times it is not finite
-    /// either.
+    /// True when all that a lane has gone through was finite. A number that is not stays in the
+    /// states for ever: zero times it is not finite either.
     fn is_finite(&self, lane: usize) -> bool {
         let states = self.operator.iter().chain(&self.element).chain(&self.remnant);
         states.chain(&self.memory).all(|state| state.lane(lane).is_finite())

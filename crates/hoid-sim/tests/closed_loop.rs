@@ -38,8 +38,9 @@ fn noises(simulator: &Simulator, runs: u64) -> Vec<Vec<f64>> {
     (0..runs).map(of).collect()
 }
 
-/// The loop in continuous time, without any hold: fourth-order Runge-Kutta, `steps` to a sample, the delay by a buffer (its
-/// value at half steps by the mean of its neighbours). Returns u and e at the samples.
+/// The loop in continuous time, without any hold: fourth-order Runge-Kutta, `steps` to a sample,
+/// the delay by a buffer (its value at half steps by the mean of its neighbours). Returns u and e
+/// at the samples.
 fn continuous_loop(scenario: &Scenario, steps: usize) -> (Vec<f64>, Vec<f64>) {
     let (o, c) = (scenario.initial.operator, scenario.initial.controlled_element);
     let ts = scenario.sample_time.s();
@@ -89,8 +90,8 @@ fn relative_error(ours: &[f64], theirs: &[f64]) -> f64 {
     (distance / size).sqrt()
 }
 
-/// Relative errors of u and e in a noise-free run at Ts = 0.02, 0.01, 0.005 s against the continuous loop with `extra` samples more
-/// delay.
+/// Relative errors of u and e in a noise-free run at Ts = 0.02, 0.01, 0.005 s against the
+/// continuous loop with `extra` samples more delay.
 fn errors_against_continuous(condition: Condition, extra: f64) -> Vec<[f64; 2]> {
     [0.02, 0.01, 0.005]
         .into_iter()
@@ -111,7 +112,8 @@ fn errors_against_continuous(condition: Condition, extra: f64) -> Vec<[f64; 2]> 
 
 #[test]
 fn the_noise_free_loop_tends_to_the_continuous_one() {
-    // Bounds at Ts = 0.01 s: measured 0.036 and 0.088. The phase margin of s2 is 23 deg, so that it feels the holds more.
+    // Bounds at Ts = 0.01 s: measured 0.036 and 0.088. The phase margin of s2 is 23 deg, so that it
+    // feels the holds more.
     for (condition, bound) in [(Condition::C1, 0.04), (Condition::C2, 0.1)] {
         let errors = errors_against_continuous(condition, 0.0);
         println!("{condition}: relative error of u and e at Ts = 0.02, 0.01, 0.005 s: {errors:.5?}");
@@ -123,7 +125,8 @@ fn the_noise_free_loop_tends_to_the_continuous_one() {
                 "{condition}: {errors:?}"
             );
         }
-        // With that sample of delay in the continuous loop as well, the error of e falls with the square of Ts.
+        // With that sample of delay in the continuous loop as well, the error of e falls with the
+        // square of Ts.
         let errors = errors_against_continuous(condition, 1.0);
         println!("{condition}: with one sample more delay in the continuous loop: {errors:.6?}");
         for pair in errors.windows(2) {
@@ -170,7 +173,8 @@ fn realisations_agree_while_nothing_changes_and_differ_at_the_jump() {
     );
     let before = 1000 + 4000;
     assert!(relative_error(&input.x[..before], &output.x[..before]) < 1e-9);
-    // K_c falls to a third within 0.1 s: with the gain at the output x falls with it, with the gain at the input it cannot.
+    // K_c falls to a third within 0.1 s: with the gain at the output x falls with it, with the gain
+    // at the input it cannot.
     let largest_step = |x: &[f64]| {
         x[5000..5200]
             .windows(2)
@@ -180,7 +184,8 @@ fn realisations_agree_while_nothing_changes_and_differ_at_the_jump() {
     assert!(largest_step(&output.x) > 5.0 * largest_step(&input.x));
 }
 
-/// With a controlled element that does nothing the error is the target, and the response at each sample is that of the delay of this sample.
+/// With a controlled element that does nothing the error is the target, and the response at each
+/// sample is that of the delay of this sample.
 #[test]
 fn a_delay_that_changes_is_that_of_the_sample_at_which_the_response_arrives() {
     let with = |before: f64, after: f64| {
@@ -261,8 +266,8 @@ fn the_obtained_noise_level_is_the_demanded_one() {
                 let n = f64::from(runs as u32);
                 let mean = levels.iter().sum::<f64>() / n;
                 let spread = (levels.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-                // The mean of a ratio lies a little below the ratio of the means: 0.003 as in the expected values, and four
-                // standard errors.
+                // The mean of a ratio lies a little below the ratio of the means: 0.003 as in the
+                // expected values, and four standard errors.
                 let allowed = 0.003 + 4.0 * spread / n.sqrt();
                 assert!(
                     (mean - demanded).abs() < allowed,

@@ -1,6 +1,8 @@
-//! The tables of the page "A person who changes, compared" of the book, from the results of the study, as they stand there:
+//! The tables of the page "A person who changes, compared" of the book, from the results of the
+//! study, as they stand there:
 //!
-//! `hoid study run adaptation --out adaptation` and `cargo run --release -p hoid-study --example adaptation_tables -- adaptation`
+//! `hoid study run adaptation --out adaptation` and
+//! `cargo run --release -p hoid-study --example adaptation_tables -- adaptation`
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::path::Path;
@@ -124,7 +126,8 @@ impl Tables {
                     let rows = self.rows(&format!("{what}_{p}"), "all", &CHANGING, name);
                     let bias: Vec<f64> = rows.iter().map(|row| row.statistics.median.abs()).collect();
                     let spread = |row: &&SummaryRow| {
-                        // Of a normal sample the standard deviation; a few that diverged do not count.
+                        // Of a normal sample the standard deviation; a few that diverged do not
+                        // count.
                         (row.statistics.upper_quartile - row.statistics.lower_quartile) / 1.349
                     };
                     let spread: Vec<f64> = rows.iter().map(spread).collect();

@@ -1,7 +1,8 @@
 //! The batch fits that the estimators of a cell need, each made once for all runs of a block.
 //!
-//! A recursion that starts from a fit of a span and an estimator that makes the same fit share it, and the fits of the runs are searched
-//! in one batch ([`Estimator::fit_each`]). The results do not depend on who shares a fit.
+//! A recursion that starts from a fit of a span and an estimator that makes the same fit share it,
+//! and the fits of the runs are searched in one batch ([`Estimator::fit_each`]). The results do not
+//! depend on who shares a fit.
 
 use std::borrow::Cow;
 
@@ -25,7 +26,8 @@ pub(crate) struct BatchFits {
 }
 
 impl BatchFits {
-    /// All fits that these estimators need of these runs. None when `go_on` says no before one of them.
+    /// All fits that these estimators need of these runs. None when `go_on` says no before one of
+    /// them.
     pub fn of(
         estimators: &[(&EstimatorCell, Task)],
         runs: &[&Record],

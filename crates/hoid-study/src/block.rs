@@ -108,7 +108,8 @@ struct CellRun<'a> {
 }
 
 impl<'a> CellRun<'a> {
-    /// Estimates of these runs. None when `go_on` says no; it is called before each estimator, some of which take a tenth of a second.
+    /// Estimates of these runs. None when `go_on` says no; it is called before each estimator, some
+    /// of which take a tenth of a second.
     fn estimate_all(
         &mut self,
         simulator: &Simulator,

@@ -6,7 +6,8 @@
 //! | traces | one kept point of a recursion | cell, replication, estimator, t; theta and operator |
 //! | cells | one scenario of the grid | its settings and its true parameters |
 //!
-//! A number that does not exist (the operator of a model that does not convert, nk of an output model) is an empty cell.
+//! A number that does not exist (the operator of a model that does not convert, nk of an output
+//! model) is an empty cell.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +17,8 @@ use crate::plan::{Plan, Task};
 
 /// The operator's parameters, in the order of all tables.
 pub const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
-/// What is looked at in a trace: these and the delay, in the order of [`hoid_model::uncertainty::OperatorEstimate::rows`].
+/// What is looked at in a trace: these and the delay, in the order of
+/// [`hoid_model::uncertainty::OperatorEstimate::rows`].
 pub(crate) const TRACED: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
 /// Rows under known columns.
@@ -61,7 +63,8 @@ impl Rows {
         }
     }
 
-    /// Sets a number of the row; a column that the table does not have is not looked for twice: plans decide which there are.
+    /// Sets a number of the row; a column that the table does not have is not looked for twice:
+    /// plans decide which there are.
     pub fn real(&mut self, name: &str, value: f64) {
         if let Some(ColumnValues::Real(values)) = self.column(name)
             && let Some(last) = values.last_mut()

@@ -3,7 +3,8 @@
 use hoid_io::IoError;
 use thiserror::Error;
 
-/// What can go wrong with a study as a whole. A fit that fails is a row of the results with its reason, not an error.
+/// What can go wrong with a study as a whole. A fit that fails is a row of the results with its
+/// reason, not an error.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StudyError {

@@ -2,18 +2,24 @@
 //!
 //! - `vaf`, %: `100 (1 - sum (u - u_s)^2 / sum u^2)` of the simulated output u_s, no mean removed.
 //! - `delta_vaf`, %: `vaf` less that of another estimator with the same nk on the same run.
-//! - `response_error`, %: root of the mean over the lines of the forcing function of `|H - H0|^2 / |H0|^2`, where H0 is the simulated operator
-//!   as it is held at the sample time of the simulation. It needs no conversion, so that models of any order can be compared.
-//! - `rms_<p>`, %: root mean square of the relative error of a trace from 10 s after the start on, over what converts.
-//! - `settle50_<p>`, `settle90_<p>`, s: time after t_M at which the trace has first covered 50 or 90 % of the step of a parameter.
-//! - `before_<p>`, `after_<p>`, %: mean relative error of a trace from 10 s after the start to t_M, and over the last 10 s: their spread over the replications is that of
-//!   the summary. `covered_<p>`, `covered_through_<p>`, %: points of a trace, after its start fit and within 5 s after a change, in which 1.96 standard errors
-//!   cover the truth.
-//! - `false_alarms`: changes declared more than 5 s after a true one, or before the first; `hours`: the time in which they could be.
-//!   `found`, %: true changes after the start fit that were declared within 5 s; `lag`, s: mean time to the declaration of those.
+//! - `response_error`, %: root of the mean over the lines of the forcing function of
+//!   `|H - H0|^2 / |H0|^2`, where H0 is the simulated operator as it is held at the sample time of
+//!   the simulation. It needs no conversion, so that models of any order can be compared.
+//! - `rms_<p>`, %: root mean square of the relative error of a trace from 10 s after the start on,
+//!   over what converts.
+//! - `settle50_<p>`, `settle90_<p>`, s: time after t_M at which the trace has first covered 50 or
+//!   90 % of the step of a parameter.
+//! - `before_<p>`, `after_<p>`, %: mean relative error of a trace from 10 s after the start to t_M,
+//!   and over the last 10 s: their spread over the replications is that of the summary.
+//!   `covered_<p>`, `covered_through_<p>`, %: points of a trace, after its start fit and within 5 s
+//!   after a change, in which 1.96 standard errors cover the truth.
+//! - `false_alarms`: changes declared more than 5 s after a true one, or before the first; `hours`:
+//!   the time in which they could be. `found`, %: true changes after the start fit that were
+//!   declared within 5 s; `lag`, s: mean time to the declaration of those.
 //! - `diverged`: a coefficient is no number, or its magnitude is beyond 10.
-//! - `noise_level_obtained`: `(var u - var u0) / var u` with u0 of the run without remnant, `noise_level_response`:
-//!   `var(u - u0) / var u`, which lacks the chance correlation of the two, and `noise_level_remnant`: `var n / var u`.
+//! - `noise_level_obtained`: `(var u - var u0) / var u` with u0 of the run without remnant,
+//!   `noise_level_response`: `var(u - u0) / var u`, which lacks the chance correlation of the two,
+//!   and `noise_level_remnant`: `var n / var u`.
 
 use hoid_ident::Fit;
 use hoid_model::{Complex64, Orders, PolynomialModel, Record, Structure, uncertainty::OperatorEstimate};

@@ -1,8 +1,9 @@
 //! Running a study: blocks over threads, parts on disk, resume.
 //!
-//! A block is written as one file a table when it is finished, traces first, beside its place and then renamed. A study that was
-//! killed therefore has whole blocks and nothing else, and goes on with the blocks that have no file of fits. When all blocks are
-//! there, the parts are joined in the order of the plan; which thread or machine made a part does not show.
+//! A block is written as one file a table when it is finished, traces first, beside its place and
+//! then renamed. A study that was killed therefore has whole blocks and nothing else, and goes on
+//! with the blocks that have no file of fits. When all blocks are there, the parts are joined in
+//! the order of the plan; which thread or machine made a part does not show.
 
 use std::{
     path::{Path, PathBuf},
@@ -56,12 +57,13 @@ pub struct Outcome {
     pub tables: Vec<PathBuf>,
 }
 
-/// Runs a study into a directory. `progress` is called from any thread after each estimate; `go_on` is called before each
-/// estimate, and what it stops can be resumed.
+/// Runs a study into a directory. `progress` is called from any thread after each estimate; `go_on`
+/// is called before each estimate, and what it stops can be resumed.
 ///
 /// # Errors
-/// [`StudyError::Occupied`] when the directory holds a study without `resume`, [`StudyError::OtherStudy`] when it is
-/// another one, [`StudyError::Io`] when a file cannot be written.
+/// [`StudyError::Occupied`] when the directory holds a study without `resume`,
+/// [`StudyError::OtherStudy`] when it is another one, [`StudyError::Io`] when a file cannot be
+/// written.
 pub fn run(
     plan: &Plan,
     directory: &Path,

@@ -1,7 +1,8 @@
 //! What stands beside the results: `study.json`.
 //!
-//! It says which plan and which program made the parts of a directory, and which shard of the study they are. Two directories belong
-//! together when plan, replications, seed and version are the same.
+//! It says which plan and which program made the parts of a directory, and which shard of the study
+//! they are. Two directories belong together when plan, replications, seed and version are the
+//! same.
 
 use std::path::Path;
 
@@ -64,7 +65,8 @@ impl RunRecord {
 
     /// What keeps two parts from belonging to one study; none when they do.
     pub fn differs(&self, other: &Self) -> Option<String> {
-        // What a user may have changed on purpose first: each of these also changes the hash of the plan, which says less.
+        // What a user may have changed on purpose first: each of these also changes the hash of the
+        // plan, which says less.
         let pairs = [
             ("hoid version", self.hoid.clone(), other.hoid.clone()),
             ("study", self.study.clone(), other.study.clone()),

@@ -33,7 +33,8 @@ impl std::fmt::Display for Shard {
 }
 
 impl Shard {
-    /// Whether a block belongs to it: blocks are dealt out in turn, so that shards take about the same time.
+    /// Whether a block belongs to it: blocks are dealt out in turn, so that shards take about the
+    /// same time.
     pub(crate) fn has(self, block: u64) -> bool {
         block % self.of == self.index - 1
     }

@@ -1,11 +1,14 @@
 //! Statistics of the replications of a cell.
 //!
-//! - Quantiles interpolate linearly between order statistics (type 7 of Hyndman and Fan, *The American Statistician* 50, 1996; the default of NumPy
-//!   and R).
-//! - Whiskers reach to the last value within 1.5 interquartile ranges of the box; what lies beyond is an outlier (Tukey, 1977).
-//! - Monte Carlo errors: `s / sqrt(n)` of the mean; `sqrt((m4 - s^4 (n-3)/(n-1)) / n) / (2 s)` of the standard deviation, with the
-//!   fourth central moment m4 (Rao, *Linear Statistical Inference*, 1973); of the median half the distance between the order statistics one
-//!   binomial standard deviation to each side of the middle, whatever the distribution; of a rate `sqrt(p (1 - p) / n)`.
+//! - Quantiles interpolate linearly between order statistics (type 7 of Hyndman and Fan, *The
+//!   American Statistician* 50, 1996; the default of NumPy and R).
+//! - Whiskers reach to the last value within 1.5 interquartile ranges of the box; what lies beyond
+//!   is an outlier (Tukey, 1977).
+//! - Monte Carlo errors: `s / sqrt(n)` of the mean; `sqrt((m4 - s^4 (n-3)/(n-1)) / n) / (2 s)` of
+//!   the standard deviation, with the fourth central moment m4 (Rao, *Linear Statistical
+//!   Inference*, 1973); of the median half the distance between the order statistics one binomial
+//!   standard deviation to each side of the middle, whatever the distribution; of a rate
+//!   `sqrt(p (1 - p) / n)`.
 
 /// What a box plot and a table say of some values.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -169,7 +172,8 @@ mod tests {
 
     #[test]
     fn a_box_by_hand() {
-        // NumPy: quantile([1..9, 100], [.25, .5, .75]) = 3.25, 5.5, 7.75; whiskers within 3.25 - 6.75 and 7.75 + 6.75.
+        // NumPy: quantile([1..9, 100], [.25, .5, .75]) = 3.25, 5.5, 7.75; whiskers within 3.25 -
+        // 6.75 and 7.75 + 6.75.
         let values = [5.0, 1.0, 9.0, 100.0, 2.0, 8.0, 3.0, 7.0, 4.0, 6.0];
         let s = Statistics::of(&values);
         assert_eq!((s.lower_quartile, s.median, s.upper_quartile), (3.25, 5.5, 7.75));
@@ -193,11 +197,13 @@ mod tests {
         assert_eq!(rate(1, 4), (0.25, (0.1875_f64 / 4.0).sqrt()));
     }
 
-    /// Errors of mean, standard deviation and median over many samples of 100 normal and of 100 uniform numbers.
+    /// Errors of mean, standard deviation and median over many samples of 100 normal and of 100
+    /// uniform numbers.
     #[test]
     fn monte_carlo_errors_are_the_spread_that_they_claim() {
-        // 4000 samples: a standard deviation is known to 1.1 %, the mean of the claimed errors far better; the order statistics are 6 %
-        // below at n = 100 for the median of a uniform (a small-sample effect of the interpolation).
+        // 4000 samples: a standard deviation is known to 1.1 %, the mean of the claimed errors far
+        // better; the order statistics are 6 % below at n = 100 for the median of a uniform (a
+        // small-sample effect of the interpolation).
         let mut state = 12345u64;
         let mut uniform = || {
             state = state

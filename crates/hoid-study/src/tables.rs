@@ -19,7 +19,8 @@ pub(crate) fn table_path(directory: &Path, table: &str) -> PathBuf {
     }
 }
 
-/// A table by its columns. A CSV column of whole numbers or of nothing does not show of which kind it was.
+/// A table by its columns. A CSV column of whole numbers or of nothing does not show of which kind
+/// it was.
 pub(crate) struct Columns {
     file: String,
     table: OutputTable,

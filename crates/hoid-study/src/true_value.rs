@@ -7,7 +7,8 @@ use crate::{
     plan::{Cell, EstimatorCell, Task},
 };
 
-/// True value of a column of the table of fits, where it is known and does not change within the span.
+/// True value of a column of the table of fits, where it is known and does not change within the
+/// span.
 pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
     let scenario = cell.resolved.scenario();
     let (from, to) = match estimator.task {

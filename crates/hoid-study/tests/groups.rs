@@ -104,7 +104,8 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
     }
     assert!(content(&whole) == content(&pieces));
 
-    // Delay and gain of each person: nk = 29, K_e = 0.09 and 0.108 in C1 within four standard errors of the mean of two runs.
+    // Delay and gain of each person: nk = 29, K_e = 0.09 and 0.108 in C1 within four standard
+    // errors of the mean of two runs.
     let delays = read_table(&whole.join("delays.parquet")).unwrap();
     for nk in reals(&delays, "BJ_nk") {
         assert!((nk - 29.0).abs() <= 1.0, "{nk}");
@@ -222,7 +223,8 @@ fn a_virtual_experiment_has_its_truth_beside_it() {
     assert!(content(&plain) == content(&again), "the same seed, the same bytes");
     assert_eq!(Manifest::read(&plain.join("group.toml")).unwrap(), manifest);
 
-    // Estimates lie around the truth of each run: all of sixteen within five standard errors, in mean within 4/sqrt(16).
+    // Estimates lie around the truth of each run: all of sixteen within five standard errors, in
+    // mean within 4/sqrt(16).
     manifest.analysis.methods.clear();
     manifest.analysis.delay_s = (0.2, 0.36);
     let out = directory.path().join("out");
@@ -293,7 +295,8 @@ fn a_virtual_experiment_has_its_truth_beside_it() {
     }
 }
 
-/// Runs of two people who change at the seam are joined, and what is found in the frequency domain is what was simulated.
+/// Runs of two people who change at the seam are joined, and what is found in the frequency domain
+/// is what was simulated.
 #[test]
 fn joined_runs_settle_and_fits_agree_with_the_describing_function() {
     let data = recorded();
@@ -362,13 +365,15 @@ run = "2"
         of("settle90_s")
     );
 
-    // Without a bias to speak of, Box-Jenkins is within two errors of the describing function and has the margins of C1.
+    // Without a bias to speak of, Box-Jenkins is within two errors of the describing function and
+    // has the margins of C1.
     let agreement = read_table(&out.join("agreement.parquet")).unwrap();
     let row = texts(&agreement, "estimator").iter().position(|e| e == "BJ").unwrap();
     assert_eq!(texts(&agreement, "agrees")[row], "yes");
     let of = |name: &str| reals(&agreement, name)[row];
     assert!(of("distance_in_errors") < 2.0, "{}", of("distance_in_errors"));
-    // Crossover 1.5635 rad/s and phase margin 76.67 deg (expected-values, Table 2), the latter with the half sample of the hold.
+    // Crossover 1.5635 rad/s and phase margin 76.67 deg (expected-values, Table 2), the latter with
+    // the half sample of the hold.
     assert!(
         (of("crossover_rad_s") / 1.5635 - 1.0).abs() < 0.05,
         "{}",
@@ -389,7 +394,8 @@ run = "2"
     assert!(refused.contains("seam"), "{refused}");
 }
 
-/// The numbers of the guide: with the delay as a parameter of its own the error bars hold for all six parameters, ARX takes longer delays than Box-Jenkins.
+/// The numbers of the guide: with the delay as a parameter of its own the error bars hold for all
+/// six parameters, ARX takes longer delays than Box-Jenkins.
 #[test]
 fn grey_box_error_bars_hold_in_a_virtual_experiment() {
     let experiment = VirtualExperiment {

@@ -1,5 +1,5 @@
-//! Studies as their users run them: the same bytes for any division of the work, resumed after any end, refused when parts do not
-//! belong together.
+//! Studies as their users run them: the same bytes for any division of the work, resumed after any
+//! end, refused when parts do not belong together.
 #![allow(clippy::unwrap_used)]
 
 use std::{
@@ -135,7 +135,8 @@ fn a_stopped_study_goes_on_and_repeats_nothing() {
     let (mut made, mut sessions) = (0, 0);
     loop {
         sessions += 1;
-        // Three replications at a time, each asked for by every estimator: blocks that are not finished are lost.
+        // Three replications at a time, each asked for by every estimator: blocks that are not
+        // finished are lost.
         let left = AtomicU64::new(3 * plan.estimators.len() as u64);
         let go_on = || {
             left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1))

@@ -1,4 +1,5 @@
-//! The studies of the reference text, as named plans, beside those that come with the program anyway.
+//! The studies of the reference text, as named plans, beside those that come with the program
+//! anyway.
 
 use hoid_study::{NamedPlan, PLANS};
 

@@ -1,7 +1,8 @@
 //! The numbers of the page "A person who changes" of the book that take too long for a test.
 //!
-//! `cargo run --release -p hoid-track --example adaptive_evidence -- detection|tune|set|cost [RUNS]` or `-- joined FIRST.csv SECOND.csv ..`, pairs of
-//! recordings with the columns t, r, u and y that are joined in the middle
+//! `cargo run --release -p hoid-track --example adaptive_evidence -- detection|tune|set|cost [RUNS]`
+//! or `-- joined FIRST.csv SECOND.csv ..`, pairs of recordings with the columns t, r, u and y that
+//! are joined in the middle
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod evidence;
@@ -68,7 +69,8 @@ fn of_the_text(method: Method) -> TrackOptions {
 struct Found {
     /// RMS of the relative error over t in [10, 81.92] s, per cent.
     errors: [f64; 5],
-    /// Share of samples after the start fit, and within 5 s after the change, in which 1.96 standard errors cover the truth.
+    /// Share of samples after the start fit, and within 5 s after the change, in which 1.96
+    /// standard errors cover the truth.
     covered: [f64; 5],
     covered_through: [f64; 5],
     /// Changes declared before and after t_M, and whether one was within 5 s after it.
@@ -254,7 +256,8 @@ fn detection(runs: usize) {
     }
 }
 
-/// Errors over the better of RLS and RPEM on the cells on which methods are set: C3 and C5, m0 = 2 and 3, seed 9000.
+/// Errors over the better of RLS and RPEM on the cells on which methods are set: C3 and C5, m0 = 2
+/// and 3, seed 9000.
 fn tune(runs: usize) {
     let methods = [
         of_the_text(Method::rls()),
@@ -302,8 +305,8 @@ fn tune(runs: usize) {
     }
 }
 
-/// Cells on which `adaptive` is set: C3 and C5, C1 and C2, and changes of the neuromuscular system that are not those of the plan.
-/// Errors: geometric mean over the cells of the median run.
+/// Cells on which `adaptive` is set: C3 and C5, C1 and C2, and changes of the neuromuscular system
+/// that are not those of the plan. Errors: geometric mean over the cells of the median run.
 fn set(runs: usize) {
     let options = options(Method::adaptive());
     let neuromuscular = |omega: f64, zeta: f64| {
@@ -423,7 +426,8 @@ fn recording(path: &str) -> [Vec<f64>; 2] {
     [e, control]
 }
 
-/// What is declared around the joint of two recordings of a person: the first 30 s start it, up to 40 s nothing changes.
+/// What is declared around the joint of two recordings of a person: the first 30 s start it, up to
+/// 40 s nothing changes.
 fn joined(files: &[String]) {
     let (start_s, seam_s) = (30.0, 40.0);
     let sample_time = SampleTime::new(1.0 / 60.0).unwrap();

@@ -1,8 +1,10 @@
-//! When a person changed: by the odds of the hypotheses of [`crate::Method::Adaptive`], and the published baseline.
+//! When a person changed: by the odds of the hypotheses of [`crate::Method::Adaptive`], and the
+//! published baseline.
 //!
-//! The baseline looks at the loop from outside: an adaptation is taken to be needed while the tracking error or its rate is larger than k of its
-//! standard deviations before the change (R. A. Hess, *Journal of Guidance, Control, and Dynamics* 32 (2009): three; here either
-//! signal raises the alarm, the rate by the difference of neighbouring samples).
+//! The baseline looks at the loop from outside: an adaptation is taken to be needed while the
+//! tracking error or its rate is larger than k of its standard deviations before the change (R. A.
+//! Hess, *Journal of Guidance, Control, and Dynamics* 32 (2009): three; here either signal raises
+//! the alarm, the rate by the difference of neighbouring samples).
 
 use hoid_core::adaptive::{change as kernel_change, hypothesis as kernel};
 use hoid_model::{SampleTime, uncertainty::Estimate};
@@ -28,7 +30,8 @@ pub struct Change {
     pub t_l_s: [f64; 2],
     /// Innovation variance before and after.
     pub innovation_variance: [f64; 2],
-    /// Change of K_e, K_e_dot, omega_nm, zeta_nm, the logarithm of the innovation variance and tau_e, each over its standard error.
+    /// Change of K_e, K_e_dot, omega_nm, zeta_nm, the logarithm of the innovation variance and
+    /// tau_e, each over its standard error.
     pub z: [f64; 6],
 }
 
@@ -72,14 +75,16 @@ impl Change {
         1.0 / (1.0 + (-self.odds).exp())
     }
 
-    /// Names of what changed by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`, `zeta_nm`, `remnant`, `tau_e`.
+    /// Names of what changed by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`,
+    /// `zeta_nm`, `remnant`, `tau_e`.
     pub fn changed(&self) -> Vec<&'static str> {
         let each = QUANTITIES.into_iter().zip(self.z);
         each.filter(|(_, z)| z.abs() > CHANGED).map(|(name, _)| name).collect()
     }
 }
 
-/// The published baseline: k standard deviations of the tracking error and of its rate before the change.
+/// The published baseline: k standard deviations of the tracking error and of its rate before the
+/// change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorThreshold {
     /// Mean and standard deviation of the error, and of its rate in 1/s.
@@ -89,7 +94,8 @@ pub struct ErrorThreshold {
 }
 
 impl ErrorThreshold {
-    /// From the error of a span without a change; `None` with fewer than three samples, or values that are not finite.
+    /// From the error of a span without a change; `None` with fewer than three samples, or values
+    /// that are not finite.
     pub fn new(error: &[f64], sample_time: SampleTime) -> Option<Self> {
         let ts = sample_time.s();
         let rate: Vec<f64> = error.windows(2).map(|w| (w[1] - w[0]) / ts).collect();
@@ -109,8 +115,8 @@ impl ErrorThreshold {
         })
     }
 
-    /// The larger distance of error and error rate from their means, in standard deviations: an alarm where it is above k. The rate counts from the second
-    /// sample on.
+    /// The larger distance of error and error rate from their means, in standard deviations: an
+    /// alarm where it is above k. The rate counts from the second sample on.
     pub fn step(&mut self, error: f64) -> f64 {
         let distance = |[mean, deviation]: [f64; 2], v: f64| ((v - mean) / deviation).abs();
         let by_error = distance(self.levels[0], error);
@@ -134,7 +140,8 @@ mod tests {
         let mut baseline = ErrorThreshold::new(&error, ts).unwrap();
         let deviation = (8.0_f64 / 7.0).sqrt();
         assert!((baseline.step(3.0) - 3.0 / deviation).abs() < 1e-12);
-        // The rate of 1 in 0.01 s: its mean is -200/7, its deviation sqrt(6/7 * ... ) by definition.
+        // The rate of 1 in 0.01 s: its mean is -200/7, its deviation sqrt(6/7 * ... ) by
+        // definition.
         let rates = [-200.0, 200.0, -200.0, 200.0, -200.0, 200.0, -200.0];
         let mean = rates.iter().sum::<f64>() / 7.0;
         let spread = (rates.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>() / 6.0).sqrt();

@@ -25,8 +25,9 @@ impl Trace {
         names
     }
 
-    /// `t`, each coefficient and each parameter of the operator, with their standard errors behind each (`_se`). NaN stands where a row has
-    /// no operator, or a value no standard error. `operators` are those of [`Trace::operators`].
+    /// `t`, each coefficient and each parameter of the operator, with their standard errors behind
+    /// each (`_se`). NaN stands where a row has no operator, or a value no standard error.
+    /// `operators` are those of [`Trace::operators`].
     pub fn estimate_columns(&self, operators: &[Result<OperatorEstimate, NotConvertible>]) -> Columns {
         let mut columns: Columns = vec![("t".to_owned(), self.times_s().to_vec())];
         let mut add = |name: &str, estimates: &[Option<Estimate>]| {

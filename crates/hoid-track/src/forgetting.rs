@@ -26,8 +26,8 @@ pub enum ForgettingRule {
     /// A factor for each parameter; with equal memories the scalar factor.
     #[default]
     Exponential,
-    /// Random walk: the standard deviation by which each parameter drifts in one second, in its unit. Parameters that are not named do not
-    /// drift.
+    /// Random walk: the standard deviation by which each parameter drifts in one second, in its
+    /// unit. Parameters that are not named do not drift.
     RandomWalk(BTreeMap<String, f64>),
     /// Sliding rectangular window as long as the shortest memory.
     Window,

@@ -15,12 +15,14 @@ use hoid_ident::IdentError;
 
 use crate::{forgetting::ForgettingRule, setup::Setup, start::StartState};
 
-/// Where nothing excites a parameter, its variance in P may grow to this multiple of the level that it has with the excitation of
-/// the start fit: the gain after a silence is that of three times the usual standard error.
+/// Where nothing excites a parameter, its variance in P may grow to this multiple of the level that
+/// it has with the excitation of the start fit: the gain after a silence is that of three times the
+/// usual standard error.
 const ROOM_TO_GROW: f64 = 10.0;
 /// The same for a start covariance that comes from no fit, as a multiple of it.
 pub(crate) const ROOM_WITHOUT_FIT: f64 = 1e4;
-/// Growing memory of a start without a fit: what the first sample forgets, and the share of it that the next one forgets still.
+/// Growing memory of a start without a fit: what the first sample forgets, and the share of it that
+/// the next one forgets still.
 const EARLY_FORGETTING: f64 = 0.01;
 const EARLY_SHARE: f64 = 0.9993;
 /// Smallest factor of variable forgetting: a memory of ten samples.
@@ -44,11 +46,13 @@ impl<const N: usize> State for Gain<N> {
 }
 
 impl<const N: usize> Gain<N> {
-    /// The adaptation with room for N parameters. With `growing` a start without a fit has a growing memory: gradients on the way from a
-    /// start that no data speak for must not be remembered for ever; least squares has none.
+    /// The adaptation with room for N parameters. With `growing` a start without a fit has a
+    /// growing memory: gradients on the way from a start that no data speak for must not be
+    /// remembered for ever; least squares has none.
     ///
     /// # Errors
-    /// [`IdentError`] for options that contradict each other, or a start covariance that is not positive.
+    /// [`IdentError`] for options that contradict each other, or a start covariance that is not
+    /// positive.
     pub(crate) fn new(
         setup: &Setup,
         from: &StartState,
@@ -62,7 +66,8 @@ impl<const N: usize> Gain<N> {
             .map(|(_, memory)| memory.lambda(sample_time))
             .collect::<Result<Vec<f64>, _>>()?;
         let shortest = lambda.iter().copied().fold(1.0, f64::min);
-        // Where no fit says what the innovation variance is, P and drift are in the units of the parameters.
+        // Where no fit says what the innovation variance is, P and drift are in the units of the
+        // parameters.
         let unit = if from.variance > 0.0 { from.variance } else { 1.0 };
         let padded =
             |values: &[f64], fill: f64| -> [f64; N] { std::array::from_fn(|i| values.get(i).copied().unwrap_or(fill)) };
@@ -121,7 +126,8 @@ impl<const N: usize> Gain<N> {
         };
         let bound = std::array::from_fn(|i| {
             let room = match setup.covariance {
-                // N samples of the start leave 1/N of the information of a sample, a memory 1 - lambda of it.
+                // N samples of the start leave 1/N of the information of a sample, a memory 1 -
+                // lambda of it.
                 None if from.from_fit && i < p => ROOM_TO_GROW * (from.residuals * (1.0 - lambda[i])).max(1.0),
                 _ => ROOM_WITHOUT_FIT,
             };

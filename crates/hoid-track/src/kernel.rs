@@ -1,5 +1,5 @@
-//! The recursions of the real-time kernel behind one face: room for the parameters, the delay line, the covariance in units of the
-//! parameters.
+//! The recursions of the real-time kernel behind one face: room for the parameters, the delay line,
+//! the covariance in units of the parameters.
 
 use hoid_core::{
     adaptation::Adaptation,
@@ -62,11 +62,12 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Builds a recursion of the kernel: the smallest room that holds its parameters, and the orders in its type where they are those of the
-    /// operator.
+    /// Builds a recursion of the kernel: the smallest room that holds its parameters, and the
+    /// orders in its type where they are those of the operator.
     ///
     /// # Errors
-    /// [`IdentError`] for options that contradict each other or a start that the recursion cannot take.
+    /// [`IdentError`] for options that contradict each other or a start that the recursion cannot
+    /// take.
     pub fn build(&self, kernel: Kernel) -> Result<Box<dyn Recursion>, IdentError> {
         let o = self.setup.polynomial_orders();
         let p = self.from.values.len();

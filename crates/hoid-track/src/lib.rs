@@ -17,13 +17,15 @@
 //! | `saved` | a tracker as numbers, to go on elsewhere |
 //! | `trace`, `columns` | the estimate at every sample |
 //!
-//! **A recursion starts with what is known.** By default it is the batch fit of the first third of a record, with the covariance of that
-//! fit; until the end of that span the filters follow and the estimate stays, so that no sample counts twice and the error bars hold. With
-//! the text's own start, `P_0 = 0.1 I` (eq. 38, 5.41, 5.55), the estimate moves from the first sample on.
+//! **A recursion starts with what is known.** By default it is the batch fit of the first third of
+//! a record, with the covariance of that fit; until the end of that span the filters follow and the
+//! estimate stays, so that no sample counts twice and the error bars hold. With the text's own
+//! start, `P_0 = 0.1 I` (eq. 38, 5.41, 5.55), the estimate moves from the first sample on.
 //!
-//! **Samples that are not as they should be** never reach the filters. A value is a fault when it is not a finite number or larger than
-//! [`TrackOptions::largest`]. An error e is then replaced by the last good one, an output u by the one-step prediction, and the estimate
-//! stays at that sample. Each is counted.
+//! **Samples that are not as they should be** never reach the filters. A value is a fault when it
+//! is not a finite number or larger than [`TrackOptions::largest`]. An error e is then replaced by
+//! the last good one, an output u by the one-step prediction, and the estimate stays at that
+//! sample. Each is counted.
 
 mod change;
 mod columns;

@@ -37,7 +37,8 @@ pub struct LiveOutcome {
 }
 
 impl Live {
-    /// A recursion that begins at once where its start is given, else with a warm-up of so many samples.
+    /// A recursion that begins at once where its start is given, else with a warm-up of so many
+    /// samples.
     ///
     /// # Errors
     /// [`IdentError`] for a start that cannot be used.
@@ -48,8 +49,8 @@ impl Live {
         })
     }
 
-    /// Takes a sample; NaN stands for what is faulty or missing. The fit of the warm-up is made when its last sample comes, with the options
-    /// that `choose` gives for it.
+    /// Takes a sample; NaN stands for what is faulty or missing. The fit of the warm-up is made
+    /// when its last sample comes, with the options that `choose` gives for it.
     pub fn take(&mut self, sample: Sample, choose: Choose<'_>) -> LiveOutcome {
         let warm_up = match self {
             Self::Tracking(tracker) => {
@@ -127,7 +128,8 @@ impl State for WarmUp {
 }
 
 impl WarmUp {
-    /// The warm-up as numbers, for [`WarmUp::restored`]; the trouble of the last fit is not among them.
+    /// The warm-up as numbers, for [`WarmUp::restored`]; the trouble of the last fit is not among
+    /// them.
     pub fn saved(&mut self) -> Vec<f64> {
         let mut numbers = Vec::new();
         self.visit(&mut |number| numbers.push(*number));

@@ -1,7 +1,8 @@
 //! What a recursive method says of itself.
 //!
-//! A method is a file or folder in `methods`: its options (a struct made by `settings!`), this trait for them, and the recursion that it
-//! builds. One line in `methods/mod.rs` makes it a variant of [`Method`](crate::Method); the command line, plans, Python and the book follow.
+//! A method is a file or folder in `methods`: its options (a struct made by `settings!`), this
+//! trait for them, and the recursion that it builds. One line in `methods/mod.rs` makes it a
+//! variant of [`Method`](crate::Method); the command line, plans, Python and the book follow.
 
 use std::collections::BTreeMap;
 
@@ -28,7 +29,8 @@ pub(crate) struct About {
     pub help: &'static str,
     /// Where it comes from.
     pub source: &'static str,
-    /// The structures that it serves; the first is that of the method when none is named, but for Box-Jenkins where it is among them.
+    /// The structures that it serves; the first is that of the method when none is named, but for
+    /// Box-Jenkins where it is among them.
     pub structures: &'static [Structure],
     /// Defaults, in words, of options that it shares with others.
     pub defaults: &'static [(&'static str, &'static str)],
@@ -75,8 +77,8 @@ pub(crate) trait RecursiveMethod {
         false
     }
 
-    /// True for a method that has a model of how the person changes, and no memory: physical parameters behind the noise model of a batch fit,
-    /// which stays.
+    /// True for a method that has a model of how the person changes, and no memory: physical
+    /// parameters behind the noise model of a batch fit, which stays.
     fn is_model_of_change(&self) -> bool {
         false
     }
@@ -106,7 +108,8 @@ pub(crate) trait RecursiveMethod {
         None
     }
 
-    /// Multiple of the innovation's standard deviation beyond which an innovation moves the estimate no further.
+    /// Multiple of the innovation's standard deviation beyond which an innovation moves the
+    /// estimate no further.
     fn limit(&self) -> f64 {
         f64::INFINITY
     }

@@ -21,8 +21,8 @@ pub struct TrackOptions {
     pub orders: Orders,
     /// Where to start. Default: a batch fit of the first third.
     pub start: StartAt,
-    /// Time from which the estimate moves, s; before that only the filters follow. Default: the end of the start span when P is that of its fit,
-    /// else the beginning of the record.
+    /// Time from which the estimate moves, s; before that only the filters follow. Default: the end
+    /// of the start span when P is that of its fit, else the beginning of the record.
     pub update_from_s: Option<f64>,
     /// Limits of the search of start fits and windows.
     pub search: SearchOptions,
@@ -44,13 +44,15 @@ impl TrackOptions {
         }
     }
 
-    /// Default options with the structure and the orders that the method takes when none are named, for a delay of nk samples.
+    /// Default options with the structure and the orders that the method takes when none are named,
+    /// for a delay of nk samples.
     pub fn usual(method: Method, nk: usize) -> Self {
         let (structure, orders) = (method.usual_structure(), method.usual_orders(nk));
         Self::new(method, structure, orders)
     }
 
-    /// With options of the method set from their texts, as `[("memory", "256"), ("covariance", "0.1")]`.
+    /// With options of the method set from their texts, as
+    /// `[("memory", "256"), ("covariance", "0.1")]`.
     ///
     /// # Errors
     /// As [`Method::set`].

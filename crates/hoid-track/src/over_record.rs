@@ -20,8 +20,8 @@ pub fn track(record: &Record, options: &TrackOptions, every: usize) -> Result<Tr
     track_from(record, options, every, None)
 }
 
-/// As [`track`], from a fit that is known: that of [`TrackOptions::start_estimator`] to the start span. Several methods that start from the
-/// same fit need it only once.
+/// As [`track`], from a fit that is known: that of [`TrackOptions::start_estimator`] to the start
+/// span. Several methods that start from the same fit need it only once.
 ///
 /// # Errors
 /// As [`track`].

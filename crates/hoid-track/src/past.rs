@@ -2,15 +2,18 @@
 
 use hoid_core::state::{State, visit_all};
 
-/// Largest size of a value in a recursion. Its fourth power is still a number, so that covariances of filtered signals are.
+/// Largest size of a value in a recursion. Its fourth power is still a number, so that covariances
+/// of filtered signals are.
 const LARGEST: f64 = 1e60;
 
-/// The value as a recursion takes it: within [`LARGEST`], and zero where a product of large numbers has no value.
+/// The value as a recursion takes it: within [`LARGEST`], and zero where a product of large numbers
+/// has no value.
 pub(crate) fn bounded(x: f64) -> f64 {
     if x.is_nan() { 0.0 } else { x.clamp(-LARGEST, LARGEST) }
 }
 
-/// The last n values in one slice. Each is written twice, n places apart, so that nothing is ever moved.
+/// The last n values in one slice. Each is written twice, n places apart, so that nothing is ever
+/// moved.
 #[derive(Debug, Clone)]
 pub(crate) struct Past {
     values: Vec<f64>,

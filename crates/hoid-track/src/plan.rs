@@ -1,4 +1,5 @@
-//! What is to be tracked while some orders may still be open: they are searched on the start span or the warm-up.
+//! What is to be tracked while some orders may still be open: they are searched on the start span
+//! or the warm-up.
 
 use std::collections::BTreeMap;
 
@@ -19,10 +20,12 @@ pub struct TrackPlan {
 }
 
 impl TrackPlan {
-    /// A plan; the orders of the options are replaced by the largest of the ranges. Everything is checked that can be before there are data.
+    /// A plan; the orders of the options are replaced by the largest of the ranges. Everything is
+    /// checked that can be before there are data.
     ///
     /// # Errors
-    /// [`IdentError`] for options that contradict each other, name what is not there, or give a start for one of several models.
+    /// [`IdentError`] for options that contradict each other, name what is not there, or give a
+    /// start for one of several models.
     pub fn new(
         options: TrackOptions,
         ranges: OrderRanges,
@@ -64,7 +67,8 @@ impl TrackPlan {
         &self.ranges
     }
 
-    /// Searches what is left open on a record, nothing when all is settled; `each` is called after every candidate.
+    /// Searches what is left open on a record, nothing when all is settled; `each` is called after
+    /// every candidate.
     ///
     /// # Errors
     /// Those of the search.
@@ -82,7 +86,8 @@ impl TrackPlan {
         Ok((self.with_orders(choice.fit.orders()), Some(choice)))
     }
 
-    /// The options for orders within the ranges; what was said of coefficients that these orders do not have is left out.
+    /// The options for orders within the ranges; what was said of coefficients that these orders do
+    /// not have is left out.
     pub fn with_orders(&self, orders: Orders) -> TrackOptions {
         let mut options = TrackOptions {
             orders,
@@ -94,8 +99,9 @@ impl TrackPlan {
     }
 }
 
-/// Narrows ranges to what is known besides: the delay lies within the range that is tracked (unless nk was given), and orders that are still
-/// open are those of the coefficients of a start, named as f1 or b0.
+/// Narrows ranges to what is known besides: the delay lies within the range that is tracked (unless
+/// nk was given), and orders that are still open are those of the coefficients of a start, named as
+/// f1 or b0.
 pub fn narrowed(
     mut ranges: OrderRanges,
     track_delay_s: Option<(f64, f64)>,

@@ -1,7 +1,8 @@
-//! One-step prediction, sample by sample: the predictor of the kernel behind a delay line, for methods that need no gradient of it.
+//! One-step prediction, sample by sample: the predictor of the kernel behind a delay line, for
+//! methods that need no gradient of it.
 //!
-//! The coefficients may change from sample to sample; the histories of w, v and eps keep the values that were right when they were
-//! taken. A signal that overflows brings the filters to rest.
+//! The coefficients may change from sample to sample; the histories of w, v and eps keep the values
+//! that were right when they were taken. A signal that overflows brings the filters to rest.
 
 use hoid_core::state::{State, visit_all};
 use hoid_core::{
@@ -47,7 +48,8 @@ impl Predictor {
         })
     }
 
-    /// Takes a sample and returns its prediction error eps under theta, in the order of [`Orders::parameter_names`].
+    /// Takes a sample and returns its prediction error eps under theta, in the order of
+    /// [`Orders::parameter_names`].
     pub fn step(&mut self, theta: &[f64], e: f64, u: f64) -> f64 {
         let theta = padded(theta);
         let eps = self.predict(&theta, e, u);

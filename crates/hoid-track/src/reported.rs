@@ -1,4 +1,5 @@
-//! What a trace reports of a recursion in physical parameters whose noise model stays: the polynomials of the exact hold and the operator.
+//! What a trace reports of a recursion in physical parameters whose noise model stays: the
+//! polynomials of the exact hold and the operator.
 
 use hoid_core::{
     adaptive::prior::OPERATOR,
@@ -12,7 +13,8 @@ use hoid_model::{
 
 use crate::start::StartState;
 
-/// `[b0, b1, d.., f1, f2]` with the Jacobian of the operator's part, and the covariance of d, which stays that of the start fit.
+/// `[b0, b1, d.., f1, f2]` with the Jacobian of the operator's part, and the covariance of d, which
+/// stays that of the start fit.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Reported {
     sample_time_s: f64,

@@ -1,7 +1,8 @@
 //! A tracker as numbers, to go on elsewhere: in another process, or after a restart.
 //!
-//! The numbers are those of the start, of which gains and bounds are made, and then all that changes ([`hoid_core::state`]). A tracker that
-//! was restored goes on with the same digits. It does not have the start fit any more.
+//! The numbers are those of the start, of which gains and bounds are made, and then all that
+//! changes ([`hoid_core::state`]). A tracker that was restored goes on with the same digits. It
+//! does not have the start fit any more.
 
 use hoid_core::state::{State, visit_all};
 use hoid_model::SampleTime;

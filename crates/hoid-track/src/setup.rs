@@ -1,4 +1,5 @@
-//! What a recursion is built of, beside its start: structure, orders, and the options that all methods read alike.
+//! What a recursion is built of, beside its start: structure, orders, and the options that all
+//! methods read alike.
 
 use std::collections::BTreeMap;
 
@@ -39,7 +40,8 @@ pub struct Setup {
     pub forgetting: ForgettingRule,
     /// P at the start as a multiple of the unit matrix; none for that of the start fit.
     pub covariance: Option<f64>,
-    /// Multiple of the innovation's standard deviation beyond which an innovation moves the estimate no further.
+    /// Multiple of the innovation's standard deviation beyond which an innovation moves the
+    /// estimate no further.
     pub limit: f64,
     /// Polynomials that are kept stable.
     pub stable: Stable,
@@ -67,7 +69,8 @@ impl Setup {
         }
     }
 
-    /// Orders of the polynomials that the method reports: a delay between two samples takes one coefficient of B more.
+    /// Orders of the polynomials that the method reports: a delay between two samples takes one
+    /// coefficient of B more.
     pub fn polynomial_orders(&self) -> Orders {
         match self.delay_parameter_s {
             Some(_) => Orders { nb: 3, ..self.orders },

@@ -10,7 +10,8 @@ use crate::{forgetting::ForgettingRule, memory::MemoryOptions};
 settings! {
     /// The gain of a recursion of the kernel.
     pub struct GainOptions {
-        /// Covariance P at the start: X times the unit matrix, in units of the innovation variance (the reference text: 0.1)
+        /// Covariance P at the start: X times the unit matrix, in units of the innovation variance
+        /// (the reference text: 0.1)
         #[setting(bounds(Bounds::PositiveFinite), default("that of the start fit; 1e6 where there is none"))]
         pub covariance: Option<f64> = None,
         /// Standard deviations beyond which an innovation moves the estimate no further
@@ -62,7 +63,8 @@ settings! {
 settings! {
     /// A delay that is followed.
     pub struct DelayOptions {
-        /// Follow the delay tau_e too, within this range: as a parameter by physical, in whole samples by adaptive
+        /// Follow the delay tau_e too, within this range: as a parameter by physical, in whole
+        /// samples by adaptive
         #[setting(name("track_delay"), unit("s"), bounds(Bounds::NonNegative), default("nk stays"))]
         pub track_delay_s: Option<(f64, f64)> = None,
     }

@@ -1,21 +1,27 @@
-//! The two-sided estimate of a recorded run: what all of its samples say of the operator at each of them.
+//! The two-sided estimate of a recorded run: what all of its samples say of the operator at each of
+//! them.
 //!
-//! Behind the whitening filter the model of [`hoid_core::adaptive`] has no dynamics: `y(t) = K_e psi_1 + K_e_dot psi_2 + eps`, with signals that the record
-//! gives once for all. The bank of hypotheses may therefore be run over it from either end. At t the run from the front says
-//! `p(eta_t | y_1..y_t) = sum_f P(f) N(m_f, P_f)`, where f says when the person changed last, and the run from the back
-//! `p(y_{t+1}..y_N | eta_t)`, in proportion to `sum_b P(b) N(m_b, P_b)`, where b says when the person will change next. The product is the two-filter smoother
-//! (D. C. Fraser and J. E. Potter, *IEEE Transactions on Automatic Control* 14 (1969) 387-390), here of two mixtures
-//! (G. Kitagawa, *Annals of the Institute of Statistical Mathematics* 46 (1994) 605-623): with `S = P_f + P_b`,
+//! Behind the whitening filter the model of [`hoid_core::adaptive`] has no dynamics:
+//! `y(t) = K_e psi_1 + K_e_dot psi_2 + eps`, with signals that the record gives once for all. The
+//! bank of hypotheses may therefore be run over it from either end. At t the run from the front
+//! says `p(eta_t | y_1..y_t) = sum_f P(f) N(m_f, P_f)`, where f says when the person changed last,
+//! and the run from the back `p(y_{t+1}..y_N | eta_t)`, in proportion to `sum_b P(b) N(m_b, P_b)`,
+//! where b says when the person will change next. The product is the two-filter smoother (D. C.
+//! Fraser and J. E. Potter, *IEEE Transactions on Automatic Control* 14 (1969) 387-390), here of
+//! two mixtures (G. Kitagawa, *Annals of the Institute of Statistical Mathematics* 46 (1994)
+//! 605-623): with `S = P_f + P_b`,
 //!
 //! - `m = m_f + P_f S^-1 (m_b - m_f)`, `P = P_f - P_f S^-1 P_f`;
-//! - `P(f, b) ~ P(f) P(b) N(m_b - m_f; 0, S)`: a past and a future that contradict each other are not joined.
+//! - `P(f, b) ~ P(f) P(b) N(m_b - m_f; 0, S)`: a past and a future that contradict each other are
+//!   not joined.
 //!
-//! Each hypothesis has an innovation variance s2 that rests on n residuals; the same holds for `ln s2`, of variance 2/n.
-//! What is printed is mean and covariance of the mixture of pairs.
+//! Each hypothesis has an innovation variance s2 that rests on n residuals; the same holds for
+//! `ln s2`, of variance 2/n. What is printed is mean and covariance of the mixture of pairs.
 //!
-//! The run from the back needs a start about which it is linear: it is the end of the run from the front, with [`KNOWN_LITTLE`] times the covariance of
-//! the start fit, and so is that of the run from the front. What counts twice is one part in so many. omega_nm and zeta_nm, about which the filters stand, are those at
-//! the end of the causal estimate.
+//! The run from the back needs a start about which it is linear: it is the end of the run from the
+//! front, with [`KNOWN_LITTLE`] times the covariance of the start fit, and so is that of the run
+//! from the front. What counts twice is one part in so many. omega_nm and zeta_nm, about which the
+//! filters stand, are those at the end of the causal estimate.
 //!
 //! There is time for more hypotheses here: one is born every 0.08 s, and there is room for 64.
 
@@ -43,7 +49,8 @@ const HYPOTHESES: usize = 64;
 const SPACING_S: f64 = 0.08;
 /// Multiple of the covariance of the start fit from which both runs begin.
 const KNOWN_LITTLE: f64 = 100.0;
-/// Time constants of the neuromuscular system after which the filters have forgotten that they began at rest.
+/// Time constants of the neuromuscular system after which the filters have forgotten that they
+/// began at rest.
 const SETTLED: f64 = 6.0;
 /// Least probability of a hypothesis that is joined, and least share of a pair in the largest.
 const LEAST: f64 = 1e-3;
@@ -298,8 +305,9 @@ fn dot(a: &[f64; OPERATOR], b: &[f64; OPERATOR]) -> f64 {
 }
 
 impl<'a> Pair<'a> {
-    /// What the difference takes from the logarithm of the weight, at least: `z'z` is no less than the square of one difference over its variance.
-    /// As S is larger than either covariance, neither of these bounds is crossed but for rounding.
+    /// What the difference takes from the logarithm of the weight, at least: `z'z` is no less than
+    /// the square of one difference over its variance. As S is larger than either covariance,
+    /// neither of these bounds is crossed but for rounding.
     fn half_square(f: &Side, b: &Side) -> f64 {
         let apart = b.level[0] - f.level[0];
         let mut square = 0.0_f64;

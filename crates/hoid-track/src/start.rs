@@ -1,8 +1,9 @@
 //! Where a recursion starts: values, covariance and innovation variance.
 //!
-//! From a batch fit, P is its covariance over sigma^2, which is the inverse of the information matrix; in physical parameters
-//! `P_eta = T^{-1} P_theta T^{-T}` with the Jacobian T of theta(eta). A multiple of the unit matrix instead (the text's `0.1 I`) is the
-//! gain that the user wants; the error bars then still begin with the covariance of the fit.
+//! From a batch fit, P is its covariance over sigma^2, which is the inverse of the information
+//! matrix; in physical parameters `P_eta = T^{-1} P_theta T^{-T}` with the Jacobian T of
+//! theta(eta). A multiple of the unit matrix instead (the text's `0.1 I`) is the gain that the user
+//! wants; the error bars then still begin with the covariance of the fit.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +16,8 @@ use crate::setup::{PHYSICAL_NAMES, Setup, StartAt};
 
 /// Variance of P for a start from nothing, in units of the innovation variance.
 const UNKNOWN: f64 = 1e6;
-/// Operator of a start from nothing: K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm, tau_e (s), those of the reference text's order.
+/// Operator of a start from nothing: K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm, tau_e (s), those
+/// of the reference text's order.
 const TYPICAL_OPERATOR: [f64; 5] = [0.1, 0.05, 10.0, 0.4, 0.25];
 /// First noise pole of a start from nothing.
 const TYPICAL_NOISE_POLE: f64 = -0.8;
@@ -46,7 +48,8 @@ pub(crate) struct StartState {
 }
 
 impl StartState {
-    /// The start that the options ask for, from a record of the start span where a fit is wanted, and that fit where it is known.
+    /// The start that the options ask for, from a record of the start span where a fit is wanted,
+    /// and that fit where it is known.
     ///
     /// # Errors
     /// Those of the batch fit; [`IdentError::BadStart`].
@@ -257,7 +260,8 @@ fn polynomial_fit(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result
     }
 }
 
-/// The Box-Jenkins fit where it has physical parameters within the bounds, else the grey box, which always has.
+/// The Box-Jenkins fit where it has physical parameters within the bounds, else the grey box, which
+/// always has.
 fn fit_physical(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<PhysicalStart, IdentError> {
     if setup.delay_parameter_s.is_none()
         && let Some(start) = from_box_jenkins(setup, record, known)?
@@ -370,7 +374,8 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<PhysicalStart, IdentE
     let mut covariance = found.covariance().map(|c| congruence(&rows, c, width));
     if let Some(covariance) = &mut covariance {
         for i in 0..p {
-            // What the grey box did not have, or held, is not known: coefficients are of the size of 1, gains may change as they are.
+            // What the grey box did not have, or held, is not known: coefficients are of the size
+            // of 1, gains may change as they are.
             if covariance[i * p + i] == 0.0 {
                 let size = if i < operator { eta[i] * eta[i] } else { 1.0 };
                 covariance[i * p + i] = size.max(variance);

@@ -6,7 +6,8 @@ use hoid_model::numbers::plain;
 
 use crate::trace::Trace;
 
-/// The method, what it remembers, where it started, the operator at the end, and the changes that were declared.
+/// The method, what it remembers, where it started, the operator at the end, and the changes that
+/// were declared.
 impl fmt::Display for Trace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let options = self.options();

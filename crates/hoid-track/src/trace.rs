@@ -69,7 +69,8 @@ impl Trace {
         &self.times_s
     }
 
-    /// Names of the coefficients. With the delay as a parameter B has three, from the smallest delay that is tracked on.
+    /// Names of the coefficients. With the delay as a parameter B has three, from the smallest
+    /// delay that is tracked on.
     pub fn parameter_names(&self) -> Vec<String> {
         self.options.polynomial_orders().parameter_names()
     }
@@ -132,7 +133,8 @@ impl Trace {
         )
     }
 
-    /// The operator of a row without standard errors, which take most of the time of [`Trace::operator`].
+    /// The operator of a row without standard errors, which take most of the time of
+    /// [`Trace::operator`].
     ///
     /// # Errors
     /// [`NotConvertible`] with the reason.
@@ -165,12 +167,14 @@ impl Trace {
         &self.shortened
     }
 
-    /// Logarithm of the odds that the person changed within the last four seconds, in each row; empty for methods without hypotheses.
+    /// Logarithm of the odds that the person changed within the last four seconds, in each row;
+    /// empty for methods without hypotheses.
     pub fn change_odds(&self) -> &[f64] {
         &self.change_odds
     }
 
-    /// The changes that were declared, each with the time in s at which it was; rows that are not kept included.
+    /// The changes that were declared, each with the time in s at which it was; rows that are not
+    /// kept included.
     pub fn changes(&self) -> &[(f64, Change)] {
         &self.changes
     }
@@ -210,10 +214,12 @@ impl Trace {
         (self.averaged - 1) as f64 / 2.0 * self.every as f64 * self.sample_time.s()
     }
 
-    /// The mean of the last `rows` rows in place of each: theta, the operator of a physical recursion, and their covariance.
+    /// The mean of the last `rows` rows in place of each: theta, the operator of a physical
+    /// recursion, and their covariance.
     ///
-    /// The mean lags by `(rows - 1)/2`. Estimates of neighbouring samples have nearly the same error, so that the mean of the covariances is
-    /// close to, and never below, the covariance of the mean.
+    /// The mean lags by `(rows - 1)/2`. Estimates of neighbouring samples have nearly the same
+    /// error, so that the mean of the covariances is close to, and never below, the covariance of
+    /// the mean.
     #[must_use]
     pub fn moving_average(mut self, rows: usize) -> Self {
         let p = self.width();
@@ -294,7 +300,8 @@ fn unpack(packed: &[f64], p: usize) -> Vec<f64> {
     whole
 }
 
-/// Mean of each column over the last `rows` rows, over those that there are in the beginning. NaN stays within its reach.
+/// Mean of each column over the last `rows` rows, over those that there are in the beginning. NaN
+/// stays within its reach.
 fn causal_mean(values: &[f64], width: usize, rows: usize) -> Vec<f64> {
     if width == 0 {
         return Vec::new();

@@ -36,8 +36,8 @@ impl std::fmt::Debug for Tracker {
 }
 
 impl Tracker {
-    /// A tracker with filters at rest. `span` is the record of the start fit; without it the tracker starts from theta or from
-    /// nothing, as the options say.
+    /// A tracker with filters at rest. `span` is the record of the start fit; without it the
+    /// tracker starts from theta or from nothing, as the options say.
     ///
     /// # Errors
     /// [`IdentError`] when options contradict each other, or the start fit fails.
@@ -70,7 +70,8 @@ impl Tracker {
         self.take(Sample { e, u, reference: None }, true)
     }
 
-    /// Takes a sample, with the external signal where it is known. With `update` false only the filters follow.
+    /// Takes a sample, with the external signal where it is known. With `update` false only the
+    /// filters follow.
     pub fn take(&mut self, sample: Sample, update: bool) -> Outcome {
         self.counts.samples += 1;
         let sound = |v: f64| v.abs() <= self.options.largest;
@@ -151,7 +152,8 @@ impl Tracker {
         }
     }
 
-    /// Logarithm of the odds that the person changed within the last four seconds, by [`crate::Method::Adaptive`].
+    /// Logarithm of the odds that the person changed within the last four seconds, by
+    /// [`crate::Method::Adaptive`].
     pub fn change_odds(&self) -> Option<f64> {
         self.recursion.change_odds()
     }

@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release -p hoid --example evidence -- coverage|efficiency|starts|delay [RUNS]`
 //!
-//! `cargo run --release -p hoid --example evidence -- speed [RUNS] [PYTHON]` times the Box-Jenkins fit beside SciPy; PYTHON is an
-//! interpreter that has numpy and scipy, `python3` by default.
+//! `cargo run --release -p hoid --example evidence -- speed [RUNS] [PYTHON]` times the Box-Jenkins
+//! fit beside SciPy; PYTHON is an interpreter that has numpy and scipy, `python3` by default.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../tests/common/textbook.rs"]
@@ -72,7 +72,8 @@ struct Tally {
 struct Tallies(Vec<Tally>);
 
 impl Tallies {
-    /// Adds an estimate, and the variance that the Cramer-Rao bound allows it (not a number where that is not asked).
+    /// Adds an estimate, and the variance that the Cramer-Rao bound allows it (not a number where
+    /// that is not asked).
     fn add(&mut self, name: &str, estimate: Estimate, truth: f64, bound: f64) {
         let at = match self.0.iter().position(|t| t.name == name) {
             Some(at) => at,
@@ -275,7 +276,8 @@ fn delay(runs: u64) {
     }
 }
 
-/// The Box-Jenkins fit from no start beside the same in SciPy, in one sitting on one thread; the smallest of the times of each.
+/// The Box-Jenkins fit from no start beside the same in SciPy, in one sitting on one thread; the
+/// smallest of the times of each.
 fn speed(runs: u64, python: &str) {
     let record = [run(&simulator(Condition::C1, 1, 0.1), 0, 0)];
     let estimator = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(NK));

@@ -1,6 +1,8 @@
-//! Identifies a person from a file and writes a report: `cargo run --example identify_file -- run1.csv report`.
+//! Identifies a person from a file and writes a report:
+//! `cargo run --example identify_file -- run1.csv report`.
 //!
 //! The file has the columns t (s), e and u. Without arguments a simulated run stands for it.
+#![allow(clippy::print_stdout)]
 
 use std::{error::Error, path::PathBuf};
 

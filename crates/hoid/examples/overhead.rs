@@ -1,5 +1,5 @@
-//! Times of a fit and of a step in Rust, to compare with those from Python (`python/benchmarks/overhead.py`): run one after the other on a
-//! machine at rest.
+//! Times of a fit and of a step in Rust, to compare with those from Python
+//! (`python/benchmarks/overhead.py`): run one after the other on a machine at rest.
 //!
 //! ```sh
 //! cargo run --release -p hoid --example overhead

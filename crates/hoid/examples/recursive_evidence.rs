@@ -1,4 +1,5 @@
-//! The numbers of recursive identification on the page "Evidence" of the book that take too long for a test.
+//! The numbers of recursive identification on the page "Evidence" of the book that take too long
+//! for a test.
 //!
 //! `cargo run --release -p hoid --example recursive_evidence -- table|divergence [RUNS]`
 //!
@@ -98,7 +99,8 @@ fn median(values: &mut [f64]) -> f64 {
     values[values.len() / 2]
 }
 
-/// Standard error of the median of sorted values, from the order statistics one binomial standard deviation to each side.
+/// Standard error of the median of sorted values, from the order statistics one binomial standard
+/// deviation to each side.
 fn error_of_median(sorted: &[f64]) -> f64 {
     let n = sorted.len();
     let away = (0.5 * (n as f64).sqrt()).round() as usize;
@@ -106,7 +108,8 @@ fn error_of_median(sorted: &[f64]) -> f64 {
     (sorted[(middle + away).min(n - 1)] - sorted[middle.saturating_sub(away)]) / 2.0
 }
 
-/// Time after the change at 40.96 s at which the median trace has covered 90 % of the step from .036 to .084 s.
+/// Time after the change at 40.96 s at which the median trace has covered 90 % of the step from
+/// .036 to .084 s.
 fn settling_time_s(traces: &[&[f64]]) -> f64 {
     for k in 4096..traces[0].len() {
         let mut values: Vec<f64> = traces.iter().map(|t| t[k]).filter(|v| v.is_finite()).collect();

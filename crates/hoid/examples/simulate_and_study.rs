@@ -1,4 +1,6 @@
-//! A small Monte Carlo study: ARX against Box-Jenkins on simulated runs. `cargo run --example simulate_and_study`.
+//! A small Monte Carlo study: ARX against Box-Jenkins on simulated runs.
+//! `cargo run --example simulate_and_study`.
+#![allow(clippy::print_stdout)]
 
 use std::error::Error;
 

@@ -1,6 +1,9 @@
-//! Tracks a person while they act: one sample in, one estimate out. `cargo run --example track_live`.
+//! Tracks a person while they act: one sample in, one estimate out.
+//! `cargo run --example track_live`.
 //!
-//! The samples come from a simulated run whose task changes at 40.96 s; the first 20 s give the start fit.
+//! The samples come from a simulated run whose task changes at 40.96 s; the first 20 s give the
+//! start fit.
+#![allow(clippy::print_stdout)]
 
 use std::error::Error;
 

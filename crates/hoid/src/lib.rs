@@ -1,13 +1,17 @@
-//! Human-operator identification: how a person controls a machine, from the tracking error e and the control output u.
+//! Human-operator identification: how a person controls a machine, from the tracking error e and
+//! the control output u.
 //!
-//! A pilot, driver or surgeon closes a control loop. Near the task they behave like a linear operator with a remnant,
+//! A pilot, driver or surgeon closes a control loop. Near the task they behave like a linear
+//! operator with a remnant,
 //!
 //! `u = K_e (T_L s + 1) e^(-tau_e s) omega_nm^2/(s^2 + 2 zeta_nm omega_nm s + omega_nm^2) e + n`,
 //!
-//! and hoid estimates these parameters with standard errors: in batch by the prediction error method on a Box-Jenkins model
-//! `u = (B/F) q^-nk e + (1/D) eps`, sample by sample by recursions, on recorded and on simulated runs.
+//! and hoid estimates these parameters with standard errors: in batch by the prediction error
+//! method on a Box-Jenkins model `u = (B/F) q^-nk e + (1/D) eps`, sample by sample by recursions,
+//! on recorded and on simulated runs.
 //!
-//! This crate has no code of its own. The prelude has what most programs use, from the file to the report:
+//! This crate has no code of its own. The prelude has what most programs use, from the file to the
+//! report:
 //!
 //! ```no_run
 //! use hoid::prelude::*;

@@ -1,5 +1,5 @@
-//! Batch fits on simulated runs against independently computed values: medians of the relative error of ARX and Box-Jenkins
-//! fits in C1, 100 runs a cell, nk = 29.
+//! Batch fits on simulated runs against independently computed values: medians of the relative
+//! error of ARX and Box-Jenkins fits in C1, 100 runs a cell, nk = 29.
 #![allow(clippy::unwrap_used)]
 
 use hoid::{model::remnant_gain::NoiseDefinition, model::scenario::RemnantStrength, prelude::*};
@@ -56,7 +56,8 @@ fn quantile(values: &[f64], q: f64) -> f64 {
     sorted[low] + part * (sorted[(low + 1).min(sorted.len() - 1)] - sorted[low])
 }
 
-/// Median with its standard error: 1.253 times the standard deviation (here from the quartiles) over the square root of n.
+/// Median with its standard error: 1.253 times the standard deviation (here from the quartiles)
+/// over the square root of n.
 fn median(values: &[f64]) -> (f64, f64) {
     let spread = (quantile(values, 0.75) - quantile(values, 0.25)) / 1.349;
     (quantile(values, 0.5), 1.253 * spread / (values.len() as f64).sqrt())
@@ -106,7 +107,8 @@ fn fit_all(structure: Structure, records: &[Record], condition: Condition) -> Ce
     cell
 }
 
-/// m0, P_n, ARX: a1, b0, omega_nm, zeta (None: not convertible in most runs), Box-Jenkins: bounds of b0, omega_nm, zeta.
+/// m0, P_n, ARX: a1, b0, omega_nm, zeta (None: not convertible in most runs), Box-Jenkins: bounds
+/// of b0, omega_nm, zeta.
 type Row = (usize, f64, (f64, f64, Option<(f64, f64)>), [f64; 3]);
 
 const EXPECTED: [Row; 8] = [

@@ -1,4 +1,5 @@
-//! A person who changes: the two-sided estimate against the causal one, and the methods that stand beside for comparison.
+//! A person who changes: the two-sided estimate against the causal one, and the methods that stand
+//! beside for comparison.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -33,7 +34,8 @@ fn options(method: Method) -> TrackOptions {
     }
 }
 
-/// RMS relative error of K_e, T_L ... after the start fit, and the share of samples that 1.96 standard errors cover.
+/// RMS relative error of K_e, T_L ... after the start fit, and the share of samples that 1.96
+/// standard errors cover.
 fn errors(record: &Record, options: &TrackOptions) -> [[f64; 5]; 2] {
     let trace = track(record, options, 8).unwrap();
     let (mut squares, mut covered, mut count) = ([0.0; 5], [0.0; 5], 0.0);

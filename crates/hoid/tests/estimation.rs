@@ -1,5 +1,5 @@
-//! Properties of the estimators that need simulated records: coverage of the error bars, several records, other orders, and
-//! what is refused.
+//! Properties of the estimators that need simulated records: coverage of the error bars, several
+//! records, other orders, and what is refused.
 #![allow(clippy::unwrap_used)]
 
 use hoid::{
@@ -175,7 +175,8 @@ fn other_orders_find_the_truth_from_own_starts() {
             let truth: Vec<f64> = [b, c, d, f].concat();
             for ((name, e), truth) in fit.parameters().into_iter().zip(truth) {
                 let distance = (e.value - truth) / e.standard_error.unwrap();
-                // Some 50 numbers are checked: 4.5 standard errors have probability 3e-4 among them.
+                // Some 50 numbers are checked: 4.5 standard errors have probability 3e-4 among
+                // them.
                 assert!(distance.abs() < 4.5, "{orders} {initial_state:?} {name}: {distance}");
             }
             assert!(
@@ -219,7 +220,8 @@ fn one_sample_too_few_is_told() {
         bj().fit(&[short]),
         Err(IdentError::TooFewSamples { samples: 38, .. })
     ));
-    // One residual more than unknowns: whatever the search finds is a fit or a reasoned refusal, never a panic.
+    // One residual more than unknowns: whatever the search finds is a fit or a reasoned refusal,
+    // never a panic.
     match bj().fit(&[enough]) {
         Ok(fit) => assert!(fit.loss().is_finite()),
         Err(error) => assert!(matches!(

@@ -1,5 +1,5 @@
-//! The grey box on simulated runs: bias, spread against the Cramér-Rao bound, coverage, choice of m, delays between samples,
-//! constraints, several records, and what is refused.
+//! The grey box on simulated runs: bias, spread against the Cramér-Rao bound, coverage, choice of
+//! m, delays between samples, constraints, several records, and what is refused.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid::{
@@ -60,7 +60,8 @@ fn median(values: &[f64]) -> f64 {
     (sorted[(n - 1) / 2] + sorted[n / 2]) / 2.0
 }
 
-/// Fits of known m in both conditions: medians within 5 %, spread as the information says, intervals that cover.
+/// Fits of known m in both conditions: medians within 5 %, spread as the information says,
+/// intervals that cover.
 fn unbiased_and_efficient(m0: usize) {
     let n = 100;
     let mut inside = [0; 8];
@@ -75,7 +76,8 @@ fn unbiased_and_efficient(m0: usize) {
                 let se = e.standard_error.unwrap();
                 relative[i].push(e.value / truth - 1.0);
                 variance[i] += (e.value - truth).powi(2) / n as f64;
-                // sigma^2 times the inverse of the information, averaged: the Cramér-Rao bound of these runs.
+                // sigma^2 times the inverse of the information, averaged: the Cramér-Rao bound of
+                // these runs.
                 expected[i] += se * se / n as f64;
                 inside[i] += u64::from((e.value - truth).abs() < 1.96 * se);
             }
@@ -146,8 +148,9 @@ fn white_remnant_is_told_from_a_coloured_one() {
     assert!((fit.innovation_variance().sqrt() / 0.004 - 1.0).abs() < 0.05);
 }
 
-/// The operator with a delay of `tau` in open loop: the held input is integrated exactly over the parts of each sample before
-/// and after it reaches the system, so that nothing of the discrete model under test is used.
+/// The operator with a delay of `tau` in open loop: the held input is integrated exactly over the
+/// parts of each sample before and after it reaches the system, so that nothing of the discrete
+/// model under test is used.
 fn delayed(tau: f64, n: usize, noise: f64) -> Record {
     respond([0.09, 0.036, 11.25, 0.35, tau], n, noise, 0)
 }
@@ -264,7 +267,8 @@ fn every_person_is_found_from_the_own_starts() {
             ));
         }
     }
-    // An overdamped operator whose zero nearly cancels a pole may fit best in the limit of one pole, and is refused.
+    // An overdamped operator whose zero nearly cancels a pole may fit best in the limit of one
+    // pole, and is refused.
     assert!(singular <= 2, "{singular}");
     assert!(lost.is_empty(), "{} of 200: {lost:#?}", lost.len());
 }
@@ -324,7 +328,8 @@ fn records_share_what_is_common() {
     let gain = |fit: &GreyBoxFit| fit.operator(0).unwrap().omega_nm_rad_s.standard_error.unwrap();
     // Twice the data; the estimates of the error scatter by some per cent.
     assert!((1.2..1.65).contains(&(gain(&one) / gain(&two))));
-    // The third record has other gains; the neuromuscular system, the delay and the remnant are the same.
+    // The third record has other gains; the neuromuscular system, the delay and the remnant are the
+    // same.
     let mut mixed = grey_box(1);
     mixed.individual = vec!["K_e".to_owned(), "K_e_dot".to_owned()];
     let fit = mixed.fit(&records).unwrap();
@@ -391,7 +396,8 @@ fn what_cannot_be_fitted_is_told() {
         refused(|g| g.individual = vec!["mass".to_owned()], &record),
         IdentError::UnknownParameter { .. }
     ));
-    // 62 samples before the first residual that the longest delay leaves, 6 parameters and 2 states.
+    // 62 samples before the first residual that the longest delay leaves, 6 parameters and 2
+    // states.
     for samples in [1, 5, 61, 65, 69] {
         let short = [record[0].span(0.0, 0.01 * f64::from(samples)).unwrap()];
         let error = refused(|_| (), &short);

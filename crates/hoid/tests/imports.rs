@@ -1,8 +1,9 @@
 //! No circle of imports between the files of a crate.
 //!
-//! An arrow goes from a file to another file of which it names an item, by `use` or by a path. `mod` lines and re-exports
-//! (`pub use`) are the doors of a room and draw no arrow, and tests may look at everything. Names are resolved as the compiler does:
-//! through modules, imports and re-exports, to the file that defines the item.
+//! An arrow goes from a file to another file of which it names an item, by `use` or by a path.
+//! `mod` lines and re-exports (`pub use`) are the doors of a room and draw no arrow, and tests may
+//! look at everything. Names are resolved as the compiler does: through modules, imports and
+//! re-exports, to the file that defines the item.
 #![allow(clippy::unwrap_used)]
 
 use std::{
@@ -198,7 +199,8 @@ impl Crate {
         at
     }
 
-    /// The module that defines the item at the end of a path; none for paths that lead out of the crate, or to a module.
+    /// The module that defines the item at the end of a path; none for paths that lead out of the
+    /// crate, or to a module.
     fn resolve(&self, from: usize, path: &[String], depth: usize) -> Option<usize> {
         let (first, rest) = path.split_first()?;
         // Circles of re-exports, and names that lead nowhere.

@@ -1,5 +1,6 @@
-//! Instrumental variables: open loop against the truth and the prediction error method, the closed loops of the reference task and a
-//! faster one in which the input is strongly correlated with the noise, and what is refused.
+//! Instrumental variables: open loop against the truth and the prediction error method, the closed
+//! loops of the reference task and a faster one in which the input is strongly correlated with the
+//! noise, and what is refused.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid::{
@@ -183,7 +184,8 @@ fn refined_method_agrees_with_the_prediction_error_method_for_c_and_d_too() {
     for ((name, a), (_, b)) in riv.parameters().into_iter().zip(pem.parameters()) {
         let (sa, sb) = (a.standard_error.unwrap(), b.standard_error.unwrap());
         println!("{name}: {:.5} +- {sa:.5}, PEM {:.5} +- {sb:.5}", a.value, b.value);
-        // The same information: estimates differ by a small part of their errors, and the errors agree.
+        // The same information: estimates differ by a small part of their errors, and the errors
+        // agree.
         assert!((a.value - b.value).abs() < 0.3 * sb, "{name}");
         assert!((sa / sb - 1.0).abs() < 0.1, "{name}");
     }
@@ -274,7 +276,8 @@ fn assert_unbiased(label: &str, samples: &[Sample], errors: f64, share: f64) {
     }
 }
 
-/// Delay 0.05 s and a remnant of time constant 0.3 s: what the operator sees still holds the noise that acts now.
+/// Delay 0.05 s and a remnant of time constant 0.3 s: what the operator sees still holds the noise
+/// that acts now.
 #[test]
 fn fast_loop_biases_simulated_instruments_but_not_external_ones() {
     let nk = 6;
@@ -291,7 +294,8 @@ fn fast_loop_biases_simulated_instruments_but_not_external_ones() {
     for method in IvMethod::ALL {
         let label = format!("{method} from f_t");
         let samples = fit_all(&label, &records, |r| operator_iv(method, external(), nk).fit(one(r)));
-        // The estimate is not linear in the data: a second-order bias of some per cent, where a spread is 13 %, is no surprise.
+        // The estimate is not linear in the data: a second-order bias of some per cent, where a
+        // spread is 13 %, is no surprise.
         assert_unbiased(&label, &samples, 3.5, 0.02);
         for (i, (ours, theirs)) in samples.iter().zip(&by_pem).enumerate() {
             let ratio = (ours.spread() / theirs.spread()).powi(2);

@@ -1,7 +1,8 @@
-//! Recorded people in a manual tracking task: the open-loop crossover of the identified model against the describing function.
+//! Recorded people in a manual tracking task: the open-loop crossover of the identified model
+//! against the describing function.
 //!
-//! The recordings are not part of the project. The directory is that of the environment variable `HOID_HUMAN_DATA`; without it
-//! the test says so and passes.
+//! The recordings are not part of the project. The directory is that of the environment variable
+//! `HOID_HUMAN_DATA`; without it the test says so and passes.
 #![allow(clippy::unwrap_used)]
 
 use std::{env, path::PathBuf};
@@ -16,8 +17,8 @@ use hoid::{
     prelude::*,
 };
 
-/// Person, plant, crossover in rad/s by Fourier coefficients at the disturbance lines, averaged over ten trials (published with
-/// the recordings; computed independently).
+/// Person, plant, crossover in rad/s by Fourier coefficients at the disturbance lines, averaged
+/// over ten trials (published with the recordings; computed independently).
 const CROSSOVER: [(&str, &str, f64); 6] = [
     ("P03", "fo", 1.99),
     ("P03", "so", 1.21),
@@ -63,7 +64,8 @@ fn crossover_agrees_with_the_describing_function() {
         assert_eq!(records.len(), 10, "{person} {plant}");
         assert!(records.iter().all(|r| r.len() == 2400));
         let structure = Structure::BoxJenkins;
-        // A subset of the delays and orders that `hoid identify` would search: people need a rich noise model.
+        // A subset of the delays and orders that `hoid identify` would search: people need a rich
+        // noise model.
         let mut ranges = OrderRanges::from(structure.operator_orders(1));
         ranges.nk = 9..=21;
         ranges.nd = 7..=8;

@@ -1,7 +1,8 @@
-//! Recorded people in a manual tracking task: describing functions against the table that was published with the recordings.
+//! Recorded people in a manual tracking task: describing functions against the table that was
+//! published with the recordings.
 //!
-//! The recordings are not part of the project. The directory is that of the environment variable `HOID_HUMAN_DATA`; without it
-//! the test says so and passes.
+//! The recordings are not part of the project. The directory is that of the environment variable
+//! `HOID_HUMAN_DATA`; without it the test says so and passes.
 #![allow(clippy::unwrap_used)]
 
 use std::{env, path::Path};
@@ -83,7 +84,8 @@ fn describing_functions_are_those_of_the_table() {
         let first_order = row.plant == "fo";
         let harmonics = if first_order { &PRIMES[..] } else { &PRIMES[..7] };
         let excitation = Excitation::of_harmonics(harmonics, 20.0).unwrap();
-        // Two periods of the disturbance after the ramp; the u of a row was read one row before its error was shown.
+        // Two periods of the disturbance after the ramp; the u of a row was read one row before its
+        // error was shown.
         let options = DescribingOptions {
             averaging: Averaging::Reference {
                 channel: "d".to_owned(),

@@ -1,4 +1,5 @@
-//! Recursive identification against its batch twin, by Monte Carlo, and with samples that are not as they should be.
+//! Recursive identification against its batch twin, by Monte Carlo, and with samples that are not
+//! as they should be.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -80,8 +81,8 @@ fn with_memory(method: Method, memory: &str) -> TrackOptions {
 #[test]
 fn error_bars_hold_with_an_infinite_memory() {
     for method in [Method::rpem(), Method::physical()] {
-        // From half of the record, whose own errors are nearly normal. The standard error of a standard deviation from 6000 runs is
-        // 1/sqrt(12000) = .009.
+        // From half of the record, whose own errors are nearly normal. The standard error of a
+        // standard deviation from 6000 runs is 1/sqrt(12000) = .009.
         let half = TrackOptions {
             start: StartAt::Span(Some((0.0, 40.96))),
             ..with_memory(method.clone(), "inf")
@@ -131,7 +132,8 @@ fn with_an_infinite_memory_it_comes_to_the_batch_fit_from_several_starts() {
         ..with_memory(Method::rpem(), "inf")
     };
     let span = |to: f64| from(StartAt::Span(Some((0.0, to))), None);
-    // With filters that are warm. The memory grows at the start, so that the way from there is forgotten.
+    // With filters that are warm. The memory grows at the start, so that the way from there is
+    // forgotten.
     let theta = |theta: Vec<f64>| {
         let from = from(StartAt::Theta(theta), Some(4.0));
         from.with(&[("covariance", "10")]).unwrap()
@@ -238,8 +240,8 @@ fn a_million_samples_in_all_weathers_leave_numbers_and_a_bounded_covariance() {
                 );
                 assert!(tracker.innovation_variance().is_finite(), "{name} at {k}");
                 let covariance = tracker.covariance().unwrap_or_default();
-                // A silent window has no covariance, and one with little excitation a large one. The others: a thousand times the standard
-                // error of the start, in squares.
+                // A silent window has no covariance, and one with little excitation a large one.
+                // The others: a thousand times the standard error of the start, in squares.
                 let window = options.method.settings().get("forgetting").as_deref() == Some("window");
                 let bound = if window { f64::MAX } else { 1e12 };
                 assert!(
@@ -279,7 +281,8 @@ fn after_silence_the_estimate_recovers_as_fast_as_at_the_start() {
                 }
             }
         }
-        // RMS over 8192 samples from 10 s on. A start from the batch fit has the smaller covariance: it is better by up to a half.
+        // RMS over 8192 samples from 10 s on. A start from the batch fit has the smaller
+        // covariance: it is better by up to a half.
         println!("{method:?} fresh and after silence: {errors:?}");
         if method != Method::rpem() {
             for (fresh, silent) in errors[0].iter().zip(errors[1]) {
@@ -316,7 +319,8 @@ fn hostile_samples_are_skipped_counted_and_forgotten() {
         }
         assert_eq!(tracker.counts().skipped, faults);
         assert_eq!(tracker.counts().samples, record.len() as u64);
-        // Two per cent of the samples are missing: the estimate is another one, but none that its error bars exclude.
+        // Two per cent of the samples are missing: the estimate is another one, but none that its
+        // error bars exclude.
         for (a, b) in clean.parameters().iter().zip(tracker.parameters()) {
             let distance = (a.value - b.value).abs() / a.standard_error.unwrap();
             assert!(distance < 3.0, "{method:?}: {distance}");

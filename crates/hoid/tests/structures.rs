@@ -1,4 +1,5 @@
-//! All structures of Table 5.1 find the truth from their own starts, and each option does what it says.
+//! All structures of Table 5.1 find the truth from their own starts, and each option does what it
+//! says.
 #![allow(clippy::unwrap_used)]
 
 #[path = "common/textbook.rs"]
@@ -156,7 +157,8 @@ fn a_prior_draws_by_its_weight() {
     assert!((f2(&strong) - 0.5).abs() < 1e-3);
     // The loss is that of the residuals, without the penalty.
     assert!(strong.loss() > plain.loss() && strong.loss() < 100.0 * plain.loss());
-    // Three parameters of equal weight at the truth: the posterior mean of a linear problem, by hand.
+    // Three parameters of equal weight at the truth: the posterior mean of a linear problem, by
+    // hand.
     let record = Truth::of(Structure::Fir).record(300, 0.5, 8);
     let mut fir = estimator(Structure::Fir);
     for name in ["b0", "b1"] {
@@ -234,7 +236,8 @@ fn a_robust_loss_shrugs_at_outliers() {
 
 #[test]
 fn the_focus_on_simulation_minimises_the_simulation_error_and_its_bars_cover() {
-    // An ARX model of an output-error system: the equation error is biased, the simulation error is not.
+    // An ARX model of an output-error system: the equation error is biased, the simulation error is
+    // not.
     let truth = Truth::of(Structure::OutputError);
     let record = truth.record(2000, 2.0, 11);
     let arx = Orders {
@@ -276,7 +279,8 @@ fn the_focus_on_simulation_minimises_the_simulation_error_and_its_bars_cover() {
 
 #[test]
 fn a_stable_model_can_be_asked_for() {
-    // The output grows: least squares says unstable, and with `stable` the best stable model is given.
+    // The output grows: least squares says unstable, and with `stable` the best stable model is
+    // given.
     let ts = SampleTime::HUNDREDTH;
     let mut draw = Draw(5);
     let e: Vec<f64> = (0..120).map(|_| draw.normal()).collect();
@@ -363,6 +367,7 @@ fn roots_of_c_near_the_circle_do_not_stop_the_search() {
             (all_higher, all_stuck) = (all_higher + higher, all_stuck + stuck);
         }
     }
-    // Before the search followed the border, 180 of these 360 fits stopped on it. Some minima on it are minima of their own.
+    // Before the search followed the border, 180 of these 360 fits stopped on it. Some minima on it
+    // are minima of their own.
     assert!(all_higher <= 12 && all_stuck <= 12, "{all_higher} {all_stuck}");
 }

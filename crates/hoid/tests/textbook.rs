@@ -1,5 +1,5 @@
-//! Every structure on records of textbook systems, against independent implementations: fixtures/textbook, made by make.py there,
-//! which says what each library assumes.
+//! Every structure on records of textbook systems, against independent implementations:
+//! fixtures/textbook, made by make.py there, which says what each library assumes.
 #![allow(clippy::unwrap_used)]
 
 use std::{fs, path::PathBuf};
@@ -10,9 +10,11 @@ use hoid::{
 };
 use serde_json::Value;
 
-/// Half a unit in the fifth digit of a number that begins with 9, so tighter than five digits for all others.
+/// Half a unit in the fifth digit of a number that begins with 9, so tighter than five digits for
+/// all others.
 const FIVE_DIGITS: f64 = 5e-6;
-/// The reference is exact to rounding; the search of hoid then has to go on to the end, `TO_THE_END`.
+/// The reference is exact to rounding; the search of hoid then has to go on to the end,
+/// `TO_THE_END`.
 const REFERENCE: f64 = 1e-6;
 /// Tolerance of the search at which `sqrt(tolerance n)` = 2e-7 standard errors are left.
 const TO_THE_END: f64 = 1e-16;
@@ -124,8 +126,9 @@ fn estimates(case: &Value) -> impl Iterator<Item = (&str, InitialState, &Value)>
         .filter_map(|e| Some((e["by"].as_str()?, rule(e["rule"].as_str()?)?, e)))
 }
 
-/// J of the rule backcast depends on which square root of Sigma^-1 makes the residuals. Another one turns them, which adds to J'J
-/// the contribution of about 1/(1 - r^2) samples, r being the largest root of the noise model; twice that is allowed.
+/// J of the rule backcast depends on which square root of Sigma^-1 makes the residuals. Another one
+/// turns them, which adds to J'J the contribution of about 1/(1 - r^2) samples, r being the largest
+/// root of the noise model; twice that is allowed.
 fn square_root_matters(fit: &Fit) -> f64 {
     let model = fit.model();
     let d = polynomial::product(&monic(model.a()), &monic(model.d()));
@@ -227,7 +230,8 @@ fn standard_errors_agree_with_independent_implementations() {
     }
 }
 
-/// The grid of starts is one of neuromuscular frequencies in rad/s: it must not matter that these systems have none.
+/// The grid of starts is one of neuromuscular frequencies in rad/s: it must not matter that these
+/// systems have none.
 #[test]
 fn the_sample_time_does_not_matter() {
     for case in cases() {
@@ -239,8 +243,8 @@ fn the_sample_time_does_not_matter() {
     }
 }
 
-/// Series E of Box and Jenkins, 100 yearly sunspot numbers: c1 of ARMA(2, 1) under each rule, in standard errors from exact
-/// maximum likelihood (statsmodels), which treats the past as it is.
+/// Series E of Box and Jenkins, 100 yearly sunspot numbers: c1 of ARMA(2, 1) under each rule, in
+/// standard errors from exact maximum likelihood (statsmodels), which treats the past as it is.
 #[test]
 fn on_a_short_series_the_rule_decides() {
     let cases = cases();
@@ -263,7 +267,8 @@ fn on_a_short_series_the_rule_decides() {
     assert!(away(InitialState::Zero) > 1.0);
 }
 
-/// A search that starts from the truth ends in one minimum; a better one may exist (`general`: A and D with their roots exchanged).
+/// A search that starts from the truth ends in one minimum; a better one may exist (`general`: A
+/// and D with their roots exchanged).
 #[test]
 fn own_starts_end_no_higher_than_the_truth_does() {
     for case in cases() {
@@ -288,8 +293,8 @@ fn own_starts_end_no_higher_than_the_truth_does() {
     }
 }
 
-/// ARARX with strong noise whose pole least squares puts into A: from there the search ends up to 40 % too high. 40 records of
-/// 500 samples; the noise has the power of the response.
+/// ARARX with strong noise whose pole least squares puts into A: from there the search ends up to
+/// 40 % too high. 40 records of 500 samples; the noise has the power of the response.
 #[test]
 fn the_pole_of_the_noise_stays_in_d() {
     let mut state = 9_u64;

@@ -1,5 +1,5 @@
-//! The fit of an operator who changes once: recovery without noise, bias, spread and coverage over simulated runs, and what is
-//! said when nothing changes.
+//! The fit of an operator who changes once: recovery without noise, bias, spread and coverage over
+//! simulated runs, and what is said when nothing changes.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::collections::BTreeMap;
@@ -104,7 +104,8 @@ fn a_change_without_noise_is_recovered() {
     }
 }
 
-/// Runs of one condition, every parameter printed; what must hold is asserted with the Monte Carlo error in mind.
+/// Runs of one condition, every parameter printed; what must hold is asserted with the Monte Carlo
+/// error in mind.
 fn study(condition: Condition, n: u64) {
     let truth = truth(condition);
     let mut errors = vec![Vec::new(); truth.len()];
@@ -162,14 +163,16 @@ fn study(condition: Condition, n: u64) {
         if !["t_M", "G"].contains(name) {
             regular += with;
             covered += inside[i];
-            // d1 is drawn to zero by what the operator's parameters take from the slow noise: 0.0019, a third of its error.
+            // d1 is drawn to zero by what the operator's parameters take from the slow noise:
+            // 0.0019, a third of its error.
             let allowed = 4.0 / (n as f64).sqrt() + if *name == "d1" { 0.4 } else { 0.0 };
             assert!(mean.abs() < allowed * spread, "{name}");
         }
     }
     let share = covered as f64 / regular as f64;
     println!("  all but t_M and G: {:.1} % covered", 100.0 * share);
-    // 8 n intervals, of which gains and lead times come in pairs: a standard error of 2.2 % for n = 25, four of that.
+    // 8 n intervals, of which gains and lead times come in pairs: a standard error of 2.2 % for n =
+    // 25, four of that.
     assert!(share > 0.86);
     // One of 25 has a standard error of 4.4 %: four of that below 95 %.
     assert!(midpoints as f64 > 0.77 * n as f64 && rates as f64 > 0.77 * n as f64);
@@ -249,7 +252,8 @@ fn a_record_without_a_change_agrees_with_box_jenkins() {
         .unwrap();
     for ((name, _, a), (_, _, b)) in ours.rows().into_iter().zip(theirs.rows()) {
         let Some(s) = b.standard_error else { continue };
-        // Box-Jenkins starts its residuals one sample earlier or later: a 1/8000 of the information.
+        // Box-Jenkins starts its residuals one sample earlier or later: a 1/8000 of the
+        // information.
         assert!(
             (a.value - b.value).abs() < 0.05 * s,
             "{name}: {} and {}",
@@ -269,7 +273,8 @@ fn several_records_sharpen_the_change() {
     assert_eq!((single.state_count(), all.state_count()), (2, 8));
     for name in ["K_e1", "K_e2", "T_L1", "T_L2", "t_M", "omega_nm", "tau_e"] {
         let ratio = value(&single, name).standard_error.unwrap() / value(&all, name).standard_error.unwrap();
-        // Four times the data halve the error; that of t_M hangs on the error signal around the change.
+        // Four times the data halve the error; that of t_M hangs on the error signal around the
+        // change.
         assert!((1.3..3.2).contains(&ratio), "{name}: {ratio}");
     }
 }
@@ -335,7 +340,8 @@ fn residuals_and_simulation_of_a_fit() {
         .map(|((u, w), n)| (u - w - n).powi(2))
         .sum();
     let noise: f64 = n.iter().map(|n| n * n).sum();
-    // 9 parameters, several of them of the slow part of the noise, of some hundred independent values of it.
+    // 9 parameters, several of them of the slow part of the noise, of some hundred independent
+    // values of it.
     assert!(left < 0.1 * noise, "{left} {noise}");
     let levels = quick().fit(one(record)).unwrap().noise_levels().unwrap();
     let k_n = record.channel("K_n").unwrap();

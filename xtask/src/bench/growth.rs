@@ -1,7 +1,8 @@
 //! How time and memory grow with samples, parameters, replications and threads.
 //!
-//! Each point is a process of its own. Our example says itself what its peak was; of the command line the largest resident memory is read from
-//! `/proc` while it runs (Linux; elsewhere the column is empty). The slope is that of `log time` over `log N` by least squares, from the third
+//! Each point is a process of its own. Our example says itself what its peak was; of the command
+//! line the largest resident memory is read from `/proc` while it runs (Linux; elsewhere the column
+//! is empty). The slope is that of `log time` over `log N` by least squares, from the third
 //! smallest N on, where what a run costs without data no longer counts: 1 is a straight line.
 
 use std::{

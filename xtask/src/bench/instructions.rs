@@ -1,8 +1,10 @@
 //! A gate on the instructions that a task takes.
 //!
-//! Times of a shared machine say little; the number of instructions of a program is the same to a few in a thousand whatever else runs. Callgrind
-//! (Valgrind) counts those of one run of the example `tasks` and of three: half of the difference belongs to one run of the task. The numbers that are
-//! kept stand in [`KEPT`] with the compiler that gave them. More than [`ALLOWED`] above them fails; with another compiler it is only said.
+//! Times of a shared machine say little; the number of instructions of a program is the same to a
+//! few in a thousand whatever else runs. Callgrind (Valgrind) counts those of one run of the
+//! example `tasks` and of three: half of the difference belongs to one run of the task. The numbers
+//! that are kept stand in [`KEPT`] with the compiler that gave them. More than [`ALLOWED`] above
+//! them fails; with another compiler it is only said.
 
 use std::{
     collections::BTreeMap,
@@ -16,8 +18,9 @@ use serde_json::{Value, json};
 const KEPT: &str = "crates/hoid/benches/instructions.json";
 /// Share above the kept number that is allowed.
 const ALLOWED: f64 = 0.05;
-/// Tasks on one thread and one record. Valgrind has AVX2 where the processor has it and no AVX-512: the sums of `arx` and `bj` take the same registers on
-/// all but old processors, which need more instructions.
+/// Tasks on one thread and one record. Valgrind has AVX2 where the processor has it and no AVX-512:
+/// the sums of `arx` and `bj` take the same registers on all but old processors, which need more
+/// instructions.
 const TASKS: [&str; 6] = ["arx", "bj", "rls", "rpem", "loop", "loop with noise"];
 
 /// Counts, compares, and with `keep` writes the numbers down.

@@ -1,8 +1,9 @@
 //! `cargo xtask bench`: our tasks and those of the peers in one sitting, and how cost grows.
 //!
-//! Ours are the example `tasks` of the crate `hoid`, the peers the scripts in `crates/hoid/benches/peers`. Both print one line of JSON a task
-//! ([`lines`]). They take turns, and of the medians of the rounds the smallest counts, so that what else the machine does falls on both. The
-//! tables go between the markers of a page of the book ([`page`]).
+//! Ours are the example `tasks` of the crate `hoid`, the peers the scripts in
+//! `crates/hoid/benches/peers`. Both print one line of JSON a task ([`lines`]). They take turns,
+//! and of the medians of the rounds the smallest counts, so that what else the machine does falls
+//! on both. The tables go between the markers of a page of the book ([`page`]).
 
 mod growth;
 mod instructions;

@@ -26,7 +26,8 @@ const WORK: &str = "target/bench";
 pub fn bench(arguments: &[String]) -> Result<(), String> {
     let options = Options::read(arguments)?;
     if options.instructions {
-        // Of the whole workspace, as the tests: with other features the same crates would be built twice.
+        // Of the whole workspace, as the tests: with other features the same crates would be built
+        // twice.
         let ours = build(&["--workspace", "--example", "tasks"], "examples/tasks", Profile::Tests)?;
         return instructions::gate(&ours, &data(), options.keep);
     }
@@ -153,7 +154,8 @@ fn scripts() -> Result<Vec<PathBuf>, String> {
     Ok(found)
 }
 
-/// The interpreter for the peers: that of the environment in `target/bench`, which `--peers install` makes, else `python3`.
+/// The interpreter for the peers: that of the environment in `target/bench`, which
+/// `--peers install` makes, else `python3`.
 fn interpreter(peers: Peers) -> Result<String, String> {
     let environment = Path::new(WORK).join("venv");
     let folder = if cfg!(windows) { "Scripts" } else { "bin" };

@@ -13,8 +13,8 @@ use super::{
 
 /// Human-operator identification: finds out how a person controls a machine.
 ///
-/// From the tracking error e and the control output u it identifies gain, lead, delay and neuromuscular dynamics, with ARX and
-/// Box-Jenkins models and standard errors.
+/// From the tracking error e and the control output u it identifies gain, lead, delay and
+/// neuromuscular dynamics, with ARX and Box-Jenkins models and standard errors.
 #[derive(Debug, Parser)]
 #[command(name = "hoid", version, max_term_width = 110)]
 pub struct Cli {
@@ -34,7 +34,8 @@ pub enum Command {
     Track(Box<TrackArgs>),
     /// Track live: samples as lines on standard input, one JSON line a sample on standard output
     Stream(Box<StreamArgs>),
-    /// Show what is inside of a file: columns, sampling, ranges, what is suspicious, and a sketch of each
+    /// Show what is inside of a file: columns, sampling, ranges, what is suspicious, and a sketch
+    /// of each
     Info(InfoArgs),
     /// Take discrete coefficients to operator parameters or back, or discretise a transfer function
     Convert(ConvertArgs),
@@ -42,7 +43,8 @@ pub enum Command {
     Margins(MarginsArgs),
     /// Analyse many recorded runs by subject and condition
     Group(GroupArgs),
-    /// Simulate a virtual experiment for `hoid group`: subjects, conditions and runs, with the truth beside them
+    /// Simulate a virtual experiment for `hoid group`: subjects, conditions and runs, with the
+    /// truth beside them
     SimulateGroup(SimulateGroupArgs),
     /// Monte Carlo studies: run a plan, join shards, list plans
     #[command(subcommand)]

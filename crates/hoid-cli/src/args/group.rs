@@ -48,7 +48,8 @@ pub struct GroupInitArgs {
     /// Directory with one file a run
     #[arg(value_name = "DIR")]
     pub directory: PathBuf,
-    /// Names of the files: {subject}, {condition} and {run} stand for what is taken from them, * for anything
+    /// Names of the files: {subject}, {condition} and {run} stand for what is taken from them, *
+    /// for anything
     #[arg(long, value_name = "PATTERN", default_value = "{subject}_{condition}_{run}.csv")]
     pub pattern: String,
     /// The manifest; standard output where it is -. Default: group.toml in the directory
@@ -90,7 +91,8 @@ pub struct SimulateGroupArgs {
     /// Seed of the random streams
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// What is wrong with the sampling: jitter, missing, repeated, slow-clock, saturated, quantised, stalled
+    /// What is wrong with the sampling: jitter, missing, repeated, slow-clock, saturated,
+    /// quantised, stalled
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_trouble)]
     pub trouble: Vec<SamplingDefect>,
 }

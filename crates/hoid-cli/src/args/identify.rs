@@ -19,18 +19,21 @@ use crate::orders::parse_range;
 
 #[derive(Debug, Args)]
 pub struct IdentifyArgs {
-    /// Record files (CSV, Parquet, NPZ, MATLAB .mat, XDF); several share one model and have initial states of their own
+    /// Record files (CSV, Parquet, NPZ, MATLAB .mat, XDF); several share one model and have initial
+    /// states of their own
     #[arg(required = true, value_name = "RECORD")]
     pub records: Vec<PathBuf>,
     #[command(flatten)]
     pub read: ReadArgs,
     #[command(flatten)]
     pub mask: MaskArgs,
-    /// What is fitted: a polynomial structure, grey-box (operator and remnant in physical parameters, with a real delay), or
-    /// time-varying (the operator's gains change once, by a sigmoid) [default: bj, or that of --method]
+    /// What is fitted: a polynomial structure, grey-box (operator and remnant in physical
+    /// parameters, with a real delay), or time-varying (the operator's gains change once, by a
+    /// sigmoid) [default: bj, or that of --method]
     #[arg(long, value_name = "NAME", value_parser = by_name(ModelKind::named()))]
     pub structure: Option<ModelKind>,
-    /// How: pem the prediction error method; iv4 (for arx), sriv (for oe), rivbj (for bj) instrumental variables
+    /// How: pem the prediction error method; iv4 (for arx), sriv (for oe), rivbj (for bj)
+    /// instrumental variables
     #[arg(long, value_name = "NAME", default_value = "pem", value_parser = by_name(fit_methods()))]
     pub method: std::option::Option<IvMethod>,
     #[arg(long, help = about("instruments"), value_name = "CHANNEL|simulated")]
@@ -41,7 +44,8 @@ pub struct IdentifyArgs {
     pub delay: Option<(f64, f64)>,
     #[arg(long, help = about("individual"), value_name = "NAMES", value_delimiter = ',')]
     pub individual: Vec<String>,
-    /// Write K_e, T_L and K_e_dot over time into this file (CSV, Parquet, NPZ or .mat), for time-varying
+    /// Write K_e, T_L and K_e_dot over time into this file (CSV, Parquet, NPZ or .mat), for
+    /// time-varying
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
     #[arg(long, help = about("orders"), value_name = "LIST")]
@@ -76,7 +80,8 @@ pub struct IdentifyArgs {
     /// Discretisation that is inverted to get T_n and K_n from the noise model
     #[arg(long, value_name = "NAME", default_value = "zoh", value_parser = choice_of(&RemnantDiscretisation::ALL))]
     pub remnant_discretisation: RemnantDiscretisation,
-    /// Controlled element NUM/DEN by descending powers of s, as 90/1,6,0: adds crossover frequency and margins
+    /// Controlled element NUM/DEN by descending powers of s, as 90/1,6,0: adds crossover frequency
+    /// and margins
     #[arg(long, value_name = "NUM/DEN", value_parser = parse_transfer_function, allow_hyphen_values = true)]
     pub controlled_element: Option<ContinuousTransferFunction>,
     /// Also judge the prediction K samples ahead
@@ -125,7 +130,8 @@ fn initial_states() -> impl Iterator<Item = (&'static str, Option<InitialState>)
     [("auto", None)].into_iter().chain(rules)
 }
 
-/// Help of an option, from the registry of estimators: what it does, what it belongs to where that is not all, its default.
+/// Help of an option, from the registry of estimators: what it does, what it belongs to where that
+/// is not all, its default.
 fn about(name: &str) -> String {
     let all = estimators();
     let Some(setting) = estimator_setting(name) else {

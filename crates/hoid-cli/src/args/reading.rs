@@ -43,18 +43,20 @@ pub struct PrepareArgs {
     /// Drop rows that are there twice, time included
     #[arg(long)]
     pub drop_repeated: bool,
-    /// Multiply a channel: by a factor (u=12.5), into a unit (u=12.5:deg), or from unit to unit (e=rad:deg). A channel is a
-    /// column, or e and u for input and output. May be repeated
+    /// Multiply a channel: by a factor (u=12.5), into a unit (u=12.5:deg), or from unit to unit
+    /// (e=rad:deg). A channel is a column, or e and u for input and output. May be repeated
     #[arg(long, value_name = "CHANNEL=FACTOR", value_parser = parse_scale, allow_hyphen_values = true)]
     pub scale: Vec<(String, Scaling)>,
-    /// A channel that was recorded late, by samples (u=1) or seconds (u=0.0167s); parts of a sample by band-limited
-    /// interpolation. May be repeated
+    /// A channel that was recorded late, by samples (u=1) or seconds (u=0.0167s); parts of a sample
+    /// by band-limited interpolation. May be repeated
     #[arg(long, value_name = "CHANNEL=N|Ss", value_parser = parse_offset, allow_hyphen_values = true)]
     pub offset: Vec<(String, Offset)>,
-    /// Take every M-th sample, behind a low-pass filter on all channels alike (0.8 of the new Nyquist frequency pass)
+    /// Take every M-th sample, behind a low-pass filter on all channels alike (0.8 of the new
+    /// Nyquist frequency pass)
     #[arg(long, value_name = "M", conflicts_with = "new_fs")]
     pub decimate: Option<usize>,
-    /// Bring evenly sampled data to another sampling frequency in Hz, behind a low-pass filter on all channels alike
+    /// Bring evenly sampled data to another sampling frequency in Hz, behind a low-pass filter on
+    /// all channels alike
     #[arg(long, value_name = "HZ")]
     pub new_fs: Option<f64>,
     /// Drop the first seconds of what is read
@@ -65,8 +67,8 @@ pub struct PrepareArgs {
 /// What is left out of a record.
 #[derive(Debug, Args)]
 pub struct MaskArgs {
-    /// Leave out what is wrong with the sampling (see `hoid info`): the record is cut there, and each segment has initial states of its
-    /// own
+    /// Leave out what is wrong with the sampling (see `hoid info`): the record is cut there, and
+    /// each segment has initial states of its own
     #[arg(long, value_name = "KINDS", value_delimiter = ',', value_parser = choice_of(&QualityIssueKind::MASKABLE))]
     pub mask: Vec<QualityIssueKind>,
     /// Shortest segment between masked samples that is used, s

@@ -27,7 +27,8 @@ pub struct RecursionArgs {
     /// [default: the operator's: bj nb=2,nd=1..4,nf=2, for adaptive nd=6; arx na=2,nb=2]
     #[arg(long, value_name = "LIST")]
     pub orders: Option<String>,
-    /// Delay of b0 in samples, a number or a range to search on the start span [default: 0.05 to 0.6 s]
+    /// Delay of b0 in samples, a number or a range to search on the start span
+    /// [default: 0.05 to 0.6 s]
     #[arg(long, value_name = "N|LO..HI", value_parser = parse_range)]
     pub nk: Option<RangeInclusive<usize>>,
     /// What decides between candidates when something is searched
@@ -67,10 +68,12 @@ pub struct TrackArgs {
     /// Keep every N-th sample of the trace
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_count)]
     pub every: usize,
-    /// File for the trace (CSV, Parquet, NPZ or .mat): the estimate at each sample with its standard errors
+    /// File for the trace (CSV, Parquet, NPZ or .mat): the estimate at each sample with its
+    /// standard errors
     #[arg(long, value_name = "TRACE")]
     pub out: PathBuf,
-    /// Write a report (HTML) into this directory: parameters over time with bands, innovations, standard errors
+    /// Write a report (HTML) into this directory: parameters over time with bands, innovations,
+    /// standard errors
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
     /// Spans in s whose batch fits the report draws as dashed lines, as 0..30.72,51.2..81.92

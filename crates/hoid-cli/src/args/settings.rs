@@ -1,4 +1,5 @@
-//! The options of the recursive methods as flags, made from the registry of the library: nothing is listed here.
+//! The options of the recursive methods as flags, made from the registry of the library: nothing is
+//! listed here.
 
 use std::collections::BTreeSet;
 
@@ -59,7 +60,8 @@ fn argument(setting: &Setting, methods: &[MethodSpec]) -> Arg {
     }
 }
 
-/// Help, the methods that it is for where they are not all, and the default, which methods may have for themselves.
+/// Help, the methods that it is for where they are not all, and the default, which methods may have
+/// for themselves.
 fn help(setting: &Setting, methods: &[MethodSpec]) -> String {
     let mut text = setting.help.clone();
     if !setting.unit.is_empty() {

@@ -43,7 +43,8 @@ pub struct SimulateArgs {
     /// Noise level P_n; 0 is a run without remnant [default: 0.1, or the scenario's]
     #[arg(long, value_name = "P_N")]
     pub noise_level: Option<f64>,
-    /// What the noise level is a share of: var(u_n)/var(u) or var(n)/var(u) [default: response, or the scenario's]
+    /// What the noise level is a share of: var(u_n)/var(u) or var(n)/var(u)
+    /// [default: response, or the scenario's]
     #[arg(long, value_name = "WHICH", value_parser = choice_of(&NoiseDefinition::ALL))]
     pub noise_definition: Option<NoiseDefinition>,
     /// Remnant time constant T_n in s [default: 0.06, or the scenario's]
@@ -52,14 +53,15 @@ pub struct SimulateArgs {
     /// Sample time Ts in s [default: 0.01, or the scenario's]
     #[arg(long, value_name = "S")]
     pub sample_time: Option<f64>,
-    /// Where K_c stands when it changes: in the input matrix (x stays continuous) or in the output matrix (as in the reference
-    /// text) [default: input, or the scenario's]
+    /// Where K_c stands when it changes: in the input matrix (x stays continuous) or in the output
+    /// matrix (as in the reference text) [default: input, or the scenario's]
     #[arg(long, value_name = "WHERE", value_parser = choice_of(&Realisation::ALL))]
     pub realisation: Option<Realisation>,
     /// Seed of the random streams
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Cell of a study, to repeat one of its runs: seed, cell and replication name the random stream
+    /// Cell of a study, to repeat one of its runs: seed, cell and replication name the random
+    /// stream
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub cell: u64,
     /// Replication: runs with the same seed and another replication are independent

@@ -79,13 +79,15 @@ pub struct StudyPlansArgs {
 
 #[derive(Debug, Args)]
 pub struct ReproduceArgs {
-    /// Tables, figures, appendices, studies or the claims, separated by commas, as fig-5,table-2,H,recursive,claims. Default: all
+    /// Tables, figures, appendices, studies or the claims, separated by commas, as
+    /// fig-5,table-2,H,recursive,claims. Default: all
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub only: Vec<String>,
     /// Replications of each cell; 10 for a quick look
     #[arg(long, value_name = "M", default_value_t = 100)]
     pub replications: u64,
-    /// Directory for tables, figures, their data and the index page; studies that are there already are not run again
+    /// Directory for tables, figures, their data and the index page; studies that are there already
+    /// are not run again
     #[arg(long, value_name = "DIR", default_value = "hoid-reproduction")]
     pub out: PathBuf,
     /// Threads. Default: one a core

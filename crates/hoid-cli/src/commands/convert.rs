@@ -1,4 +1,5 @@
-//! `hoid convert`: discrete coefficients to operator parameters, back, and any transfer function to discrete time.
+//! `hoid convert`: discrete coefficients to operator parameters, back, and any transfer function to
+//! discrete time.
 
 use hoid_model::{
     ContinuousTransferFunction, DiscreteOperator, OperatorParameters, SampleTime, discretise::discretise,

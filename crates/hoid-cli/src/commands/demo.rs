@@ -1,5 +1,5 @@
-//! `hoid demo`: the whole path on a simulated run of condition C4, in which the controlled element changes at 40.96 s and the
-//! operator with it.
+//! `hoid demo`: the whole path on a simulated run of condition C4, in which the controlled element
+//! changes at 40.96 s and the operator with it.
 
 use std::path::PathBuf;
 
@@ -61,7 +61,8 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Traces of the whole run, from the batch fit before the change on: the two methods of the text, and the one in physical parameters.
+/// Traces of the whole run, from the batch fit before the change on: the two methods of the text,
+/// and the one in physical parameters.
 fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, CliError> {
     let (_, from, to) = SPANS[0];
     let nk = stages[0].choice.fit.orders().nk;
@@ -154,7 +155,8 @@ fn report_of_traces(
     Ok(write_report(&args.out.join("tracking"), &report.to_html()?)?)
 }
 
-/// Box-Jenkins with nk and nd searched as `hoid identify` does by default, and ARX with the same delay.
+/// Box-Jenkins with nk and nd searched as `hoid identify` does by default, and ARX with the same
+/// delay.
 fn identify(name: &'static str, record: Record) -> Result<Stage, CliError> {
     let structure = Structure::BoxJenkins;
     let ranges = order_selection::default_operator_ranges(structure, record.sample_time());

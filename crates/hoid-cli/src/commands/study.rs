@@ -100,11 +100,13 @@ pub fn run_with_progress(plan: &Plan, directory: &Path, options: &RunOptions) ->
     }
 }
 
-/// A flag that an interrupt sets; a second interrupt ends the program at once, with nothing lost but the blocks on their way.
+/// A flag that an interrupt sets; a second interrupt ends the program at once, with nothing lost
+/// but the blocks on their way.
 pub fn stop_at_interrupt() -> Arc<AtomicBool> {
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);
-    // Studies run one after the other set it anew; without a handler an interrupt ends the program, which can be resumed as well.
+    // Studies run one after the other set it anew; without a handler an interrupt ends the program,
+    // which can be resumed as well.
     let _ = ctrlc::set_handler(move || {
         if flag.swap(true, Ordering::Relaxed) {
             std::process::exit(130);

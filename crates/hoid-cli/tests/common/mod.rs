@@ -32,7 +32,8 @@ pub fn json(directory: &Path, arguments: &[&str]) -> Value {
     serde_json::from_str(&good(directory, arguments)).unwrap()
 }
 
-/// Exit code and message of a command that fails, which must print nothing on standard output and leave no file behind.
+/// Exit code and message of a command that fails, which must print nothing on standard output and
+/// leave no file behind.
 pub fn bad(directory: &Path, arguments: &[&str]) -> (i32, String) {
     let files = |d: &Path| fs::read_dir(d).unwrap().count();
     let before = files(directory);

@@ -1,7 +1,8 @@
 //! The recursion: the filters of the signals, and behind them the bank of hypotheses.
 //!
-//! A sample passes the [`Response`] to the held error, the whitening filter D and the ring of delayed signals to the [`Bank`]. Now and then the
-//! linearisation point of the response follows the estimate.
+//! A sample passes the [`Response`] to the held error, the whitening filter D and the ring of
+//! delayed signals to the [`Bank`]. Now and then the linearisation point of the response follows
+//! the estimate.
 
 use super::{
     bank::Bank,
@@ -17,7 +18,8 @@ const RELINEARISE_EVERY: u64 = 64;
 /// Largest relative move of the point: the states of the filters move along their first derivative.
 const LARGEST_MOVE: f64 = 0.1;
 
-/// The recursion. M is the largest number of hypotheses, D the largest order of the noise model, B the memory for the signals of every delay.
+/// The recursion. M is the largest number of hypotheses, D the largest order of the noise model, B
+/// the memory for the signals of every delay.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdaptiveFilter<const M: usize, const D: usize, B = [Signals; 1]> {
     bank: Bank<M>,
@@ -37,15 +39,16 @@ crate::state!([const M: usize, const D: usize, B: AsMut<[Signals]>] AdaptiveFilt
 });
 
 impl<const M: usize, const D: usize> AdaptiveFilter<M, D> {
-    /// Starts from one hypothesis with filters at rest, for a delay that is known. `None` when the order of the noise model is above D, and as
-    /// [`Bank::new`].
+    /// Starts from one hypothesis with filters at rest, for a delay that is known. `None` when the
+    /// order of the noise model is above D, and as [`Bank::new`].
     pub fn new(first: Hypothesis, d: &[f64], prior: ChangePrior) -> Option<Self> {
         Self::with_delays(first, d, prior, [[0.0; 6]; 1])
     }
 }
 
 impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> AdaptiveFilter<M, D, B> {
-    /// As [`AdaptiveFilter::new`] with several candidate delays. `None` too when the memory is not of [`DelayPrior::count`](super::prior::DelayPrior::count) signals.
+    /// As [`AdaptiveFilter::new`] with several candidate delays. `None` too when the memory is not
+    /// of [`DelayPrior::count`](super::prior::DelayPrior::count) signals.
     pub fn with_delays(first: Hypothesis, d: &[f64], prior: ChangePrior, memory: B) -> Option<Self> {
         let ring = SignalRing::new(memory);
         if d.len() > D || ring.count() != prior.delay.count {
@@ -66,7 +69,8 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Ada
         })
     }
 
-    /// The step by a sample `x(t) = e(t - nk)`, `u(t)`, with nk of the shortest delay. Both must be finite.
+    /// The step by a sample `x(t) = e(t - nk)`, `u(t)`, with nk of the shortest delay. Both must be
+    /// finite.
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         let signals = self.response.step(x);
         let (y, r) = self.whitened(u, &signals);
@@ -95,7 +99,8 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Ada
         }
     }
 
-    /// As [`AdaptiveFilter::step_without_update`] where the output is missing: the one-step prediction takes its place.
+    /// As [`AdaptiveFilter::step_without_update`] where the output is missing: the one-step
+    /// prediction takes its place.
     pub fn bridge(&mut self, x: f64) {
         self.bank.skip();
         let signals = self.response.step(x);
@@ -127,7 +132,8 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Ada
         eta[0] * psi[0] + eta[1] * psi[1]
     }
 
-    /// Puts a sample into the histories, and moves the linearisation point toward the estimate when it is time.
+    /// Puts a sample into the histories, and moves the linearisation point toward the estimate when
+    /// it is time.
     fn remember(&mut self, u: f64, signals: Signals) {
         if !(u.abs() < LARGEST && signals.iter().all(|s| s.abs() < LARGEST)) {
             self.response.reset();

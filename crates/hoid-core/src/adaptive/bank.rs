@@ -1,14 +1,17 @@
 //! The hypotheses with their probabilities, for output and signals behind the whitening filter.
 //!
-//! At each sample the probability of a hypothesis is multiplied by the density that it gave to the innovation, and all are normalised. At every birth
-//! the likeliest is the parent of new ones:
+//! At each sample the probability of a hypothesis is multiplied by the density that it gave to the
+//! innovation, and all are normalised. At every birth the likeliest is the parent of new ones:
 //!
-//! - **a change of the gains**, and at every few births one of omega_nm and zeta_nm too, with the prior probability of such a change since the last birth;
-//! - **a neighbouring delay**, as what may have held all the time: as old as its parent, each parameter opened by the error that the difference of the
-//!   delays makes in it; the first of them when the bank begins;
-//! - **a change of the delay**: delays spread over all candidates, with gains that are opened as in any change, and probabilities in proportion to the
-//!   normal density of the step. The proposed delays move on by one each time, so that each candidate has its turn, and the number of hypotheses is
-//!   bounded however many delays there are.
+//! - **a change of the gains**, and at every few births one of omega_nm and zeta_nm too, with the
+//!   prior probability of such a change since the last birth;
+//! - **a neighbouring delay**, as what may have held all the time: as old as its parent, each
+//!   parameter opened by the error that the difference of the delays makes in it; the first of them
+//!   when the bank begins;
+//! - **a change of the delay**: delays spread over all candidates, with gains that are opened as in
+//!   any change, and probabilities in proportion to the normal density of the step. The proposed
+//!   delays move on by one each time, so that each candidate has its turn, and the number of
+//!   hypotheses is bounded however many delays there are.
 //!
 //! A newborn takes the slot of the least likely hypothesis that is old enough to be judged.
 
@@ -50,8 +53,9 @@ const NEIGHBOURS: usize = 3;
 const LEAST_PROBABILITY: f64 = 1e-12;
 
 impl<const M: usize> Bank<M> {
-    /// Starts from one hypothesis. `None` when M is below two, the start is not finite or not within the bounds, the bounds let omega_nm or zeta_nm
-    /// become zero, or a number of the prior is outside its range.
+    /// Starts from one hypothesis. `None` when M is below two, the start is not finite or not
+    /// within the bounds, the bounds let omega_nm or zeta_nm become zero, or a number of the prior
+    /// is outside its range.
     pub fn new(first: Hypothesis, prior: ChangePrior) -> Option<Self> {
         let within_bounds = first
             .eta
@@ -77,7 +81,8 @@ impl<const M: usize> Bank<M> {
         Some(bank)
     }
 
-    /// The update by a sample: output and signals behind the whitening filter, `None` where they are not known. Returns the innovation.
+    /// The update by a sample: output and signals behind the whitening filter, `None` where they
+    /// are not known. Returns the innovation.
     pub fn update(&mut self, sample: Option<(f64, DelayedSignals<'_>)>, point: [f64; 2]) -> f64 {
         let innovation = self.update_hypotheses(sample, point);
         if self.detector.update(&self.hypotheses, self.samples, &self.prior) {
@@ -86,10 +91,12 @@ impl<const M: usize> Bank<M> {
         innovation
     }
 
-    /// Drops the young hypotheses of a change of omega_nm and zeta_nm, and lets new ones be born only after the settling time.
+    /// Drops the young hypotheses of a change of omega_nm and zeta_nm, and lets new ones be born
+    /// only after the settling time.
     ///
-    /// The change of the gains itself passes through the neuromuscular system, and until it has settled the response is that of neither set of gains:
-    /// it would be taken for a change of omega_nm and zeta_nm.
+    /// The change of the gains itself passes through the neuromuscular system, and until it has
+    /// settled the response is that of neither set of gains: it would be taken for a change of
+    /// omega_nm and zeta_nm.
     fn suspend_neuromuscular(&mut self) {
         self.neuromuscular_from = self.samples + self.prior.settling_time;
         let mut rest = 0.0;
@@ -157,7 +164,8 @@ impl<const M: usize> Bank<M> {
         self.samples += 1;
     }
 
-    /// Brings the sum of the probabilities to one. Those that are too small, or not finite, become [`LEAST_PROBABILITY`].
+    /// Brings the sum of the probabilities to one. Those that are too small, or not finite, become
+    /// [`LEAST_PROBABILITY`].
     fn normalise(&mut self) {
         let mut most = 0.0;
         for h in self.hypotheses.iter().flatten() {
@@ -239,8 +247,8 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// The likeliest hypothesis, and its slot. One of a recent change of omega_nm and zeta_nm has no children: what a change of the gains seems to do
-    /// to them in passing is not handed on.
+    /// The likeliest hypothesis, and its slot. One of a recent change of omega_nm and zeta_nm has
+    /// no children: what a change of the gains seems to do to them in passing is not handed on.
     fn parent(&self) -> Option<(usize, Hypothesis)> {
         let (mut likeliest, mut highest) = (None, 0.0);
         for (slot, h) in self.hypotheses.iter().enumerate() {
@@ -261,7 +269,8 @@ impl<const M: usize> Bank<M> {
         child
     }
 
-    /// Puts a child into the slot of the least likely that is old enough to be pruned; there is no child when that is its parent.
+    /// Puts a child into the slot of the least likely that is old enough to be pruned; there is no
+    /// child when that is its parent.
     fn spawn(&mut self, mut child: Hypothesis, probability: f64, parent: usize) {
         let (mut slot, mut lowest) = (None, f64::INFINITY);
         for (i, h) in self.hypotheses.iter().enumerate() {
@@ -317,7 +326,8 @@ impl<const M: usize> Bank<M> {
         covariance
     }
 
-    /// T_L in s and its variance, `E[K_e K_e_dot]/E[K_e^2]`: the T for which `E (K_e_dot - T K_e)^2` is least.
+    /// T_L in s and its variance, `E[K_e K_e_dot]/E[K_e^2]`: the T for which
+    /// `E (K_e_dot - T K_e)^2` is least.
     pub fn lead_time(&self, covariance: &[[f64; OPERATOR]; OPERATOR]) -> [f64; 2] {
         let [k_e, k_e_dot, ..] = self.mixture().eta;
         let square = k_e * k_e + covariance[0][0];

@@ -1,15 +1,19 @@
 //! When the operator changed, and in what.
 //!
-//! `Lambda = ln(sum of P(h) over those born within the last T)/(sum of P(h) over those that are older))`: the logarithm of the posterior odds of a
-//! change. It is the likelihood ratio of Willsky and Jones (A. S. Willsky and H. L. Jones, *IEEE Transactions on Automatic Control* 21 (1976) 108-112),
-//! with the size of the change and its time averaged out instead of maximised, so that its expectation does not grow with the number of
-//! times that are tried. A change is declared when Lambda is over the threshold and the likeliest of the recent hypotheses is old enough to
-//! say what changed. The next is declared only after Lambda has been below zero, when
-//! the new values have become the established ones, or when more turns out to have changed: the neuromuscular system, by the same odds of such
-//! hypotheses against all others, or the delay, by three standard errors.
+//! `Lambda = ln(sum of P(h) over those born within the last T)/(sum of P(h) over those that are older))`:
+//! the logarithm of the posterior odds of a change. It is the likelihood ratio of Willsky and Jones
+//! (A. S. Willsky and H. L. Jones, *IEEE Transactions on Automatic Control* 21 (1976) 108-112),
+//! with the size of the change and its time averaged out instead of maximised, so that its
+//! expectation does not grow with the number of times that are tried. A change is declared when
+//! Lambda is over the threshold and the likeliest of the recent hypotheses is old enough to say
+//! what changed. The next is declared only after Lambda has been below zero, when the new values
+//! have become the established ones, or when more turns out to have changed: the neuromuscular
+//! system, by the same odds of such hypotheses against all others, or the delay, by three standard
+//! errors.
 //!
-//! The likeliest of the recent hypotheses says since when, and what held before: the change of each quantity over its standard
-//! error tells in what the operator changed. For the innovation variance that is `ln(s2/s1)/sqrt(2/n)` with the n samples since.
+//! The likeliest of the recent hypotheses says since when, and what held before: the change of each
+//! quantity over its standard error tells in what the operator changed. For the innovation variance
+//! that is `ln(s2/s1)/sqrt(2/n)` with the n samples since.
 
 use super::{
     hypothesis::{Hypothesis, Snapshot},
@@ -28,7 +32,8 @@ pub struct Change {
     pub before: Snapshot,
     /// What holds now.
     pub after: Snapshot,
-    /// Change of K_e, K_e_dot, omega_nm, zeta_nm, of the innovation variance and of the delay, each over its standard error.
+    /// Change of K_e, K_e_dot, omega_nm, zeta_nm, of the innovation variance and of the delay, each
+    /// over its standard error.
     pub z: [f64; OPERATOR + 2],
 }
 
@@ -83,7 +88,8 @@ const DELAY_THRESHOLD: f64 = 3.0;
 const REGULARISATION: f64 = 1e-12;
 
 impl ChangeDetector {
-    /// The update by the hypotheses after a sample. True where Lambda rises above zero: a change begins.
+    /// The update by the hypotheses after a sample. True where Lambda rises above zero: a change
+    /// begins.
     pub fn update(&mut self, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) -> bool {
         let sums = Sums::over(hypotheses, now, prior);
         let before = self.log_odds;
@@ -97,7 +103,8 @@ impl ChangeDetector {
         self.log_odds > 0.0 && before <= 0.0
     }
 
-    /// Declares the change that the likeliest of the recent hypotheses stands for, once it has settled and if there is something new in it.
+    /// Declares the change that the likeliest of the recent hypotheses stands for, once it has
+    /// settled and if there is something new in it.
     fn declare(&mut self, sums: &Sums<'_>, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) {
         let Some(h) = sums.likeliest.filter(|h| now - h.born >= prior.settling_time) else {
             return;
@@ -170,12 +177,14 @@ fn log_odds(probability: f64, of_others: f64) -> f64 {
     libm::log((probability + REGULARISATION) / (of_others + REGULARISATION))
 }
 
-/// True for a hypothesis within the change window. The first, born at sample 0, stands for no change.
+/// True for a hypothesis within the change window. The first, born at sample 0, stands for no
+/// change.
 fn is_recent(h: &Hypothesis, now: u64, prior: &ChangePrior) -> bool {
     h.born > 0 && now - h.born < prior.change_window
 }
 
-/// Mean and variance of the delay over hypotheses, in samples beyond the shortest. The variance includes that of rounding to whole samples, 1/12.
+/// Mean and variance of the delay over hypotheses, in samples beyond the shortest. The variance
+/// includes that of rounding to whole samples, 1/12.
 pub(super) fn delay_of<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> [f64; 2] {
     let (mut sum, mut first, mut second) = (0.0, 0.0, 0.0);
     for h in hypotheses {

@@ -1,7 +1,7 @@
 //! `ln(1 + x)` and `e^x` without a call, for the density of every hypothesis at every sample.
 
-/// `ln(1 + x)` for x that is not negative, in a third of the time where x is small: with `z = x/(2 + x)`, `2 (z + z^3/3 + z^5/5 + ...)`, whose next term is
-/// below 1e-16 of the first.
+/// `ln(1 + x)` for x that is not negative, in a third of the time where x is small: with
+/// `z = x/(2 + x)`, `2 (z + z^3/3 + z^5/5 + ...)`, whose next term is below 1e-16 of the first.
 #[inline(always)]
 pub(super) fn log1p(x: f64) -> f64 {
     if x > 0.25 {
@@ -16,7 +16,8 @@ pub(super) fn log1p(x: f64) -> f64 {
     2.0 * z * sum
 }
 
-/// `e^x` without a call, to 4e-16 between -700 and 700 and libm's beyond: `2^k e^r` with `|r| <= ln(2)/2`, by Taylor's series.
+/// `e^x` without a call, to 4e-16 between -700 and 700 and libm's beyond: `2^k e^r` with
+/// `|r| <= ln(2)/2`, by Taylor's series.
 #[inline(always)]
 pub(super) fn exp(x: f64) -> f64 {
     if x.abs() >= 700.0 || x.is_nan() {

@@ -1,16 +1,21 @@
-//! One hypothesis: a Kalman filter of the operator's parameters, given that they last changed at its birth.
+//! One hypothesis: a Kalman filter of the operator's parameters, given that they last changed at
+//! its birth.
 //!
 //! With `y = D u` and `r` the whitened signals, the innovation and its negative gradient at eta are
 //!
-//! `eps = y - K_e psi_1 - K_e_dot psi_2`, `psi_1 = r_1 + d_omega r_3 + d_zeta r_5`, `psi_2 = r_2 + d_omega r_4 + d_zeta r_6`,
-//! `psi_3 = K_e r_3 + K_e_dot r_4`, `psi_4 = K_e r_5 + K_e_dot r_6`,
+//! `eps = y - K_e psi_1 - K_e_dot psi_2`, `psi_1 = r_1 + d_omega r_3 + d_zeta r_5`,
+//! `psi_2 = r_2 + d_omega r_4 + d_zeta r_6`, `psi_3 = K_e r_3 + K_e_dot r_4`,
+//! `psi_4 = K_e r_5 + K_e_dot r_6`,
 //!
-//! with `d_omega`, `d_zeta` the distances from the linearisation point of the filters. The predictive distribution of eps is that of Student with the
-//! variance `v = sigma^2 + psi' P psi` and n degrees of freedom, the residuals that sigma^2 rests on; its density is
-//! `v^{-1/2} exp(-(n + 1)/2 ln(1 + eps^2/(n v)) - 1/(4 n))` up to a factor (the Gamma functions give `-1/(4 n) + O(n^{-3})`).
+//! with `d_omega`, `d_zeta` the distances from the linearisation point of the filters. The
+//! predictive distribution of eps is that of Student with the variance `v = sigma^2 + psi' P psi`
+//! and n degrees of freedom, the residuals that sigma^2 rests on; its density is
+//! `v^{-1/2} exp(-(n + 1)/2 ln(1 + eps^2/(n v)) - 1/(4 n))` up to a factor (the Gamma functions
+//! give `-1/(4 n) + O(n^{-3})`).
 //!
-//! An innovation beyond the limit counts as one at the limit, in the density and in sigma^2, and as a measurement of so large
-//! a variance that it lies there (P. J. Huber, *Robust Statistics*, 1981, section 7.3): an outlier says nothing about which hypothesis predicts better.
+//! An innovation beyond the limit counts as one at the limit, in the density and in sigma^2, and as
+//! a measurement of so large a variance that it lies there (P. J. Huber, *Robust Statistics*, 1981,
+//! section 7.3): an outlier says nothing about which hypothesis predicts better.
 
 use super::{
     elementary::{exp, log1p},
@@ -23,7 +28,8 @@ use crate::{innovation_variance::InnovationVariance, state::State, ud_covariance
 pub(super) const LARGEST: f64 = 1e60;
 /// Largest square of an innovation over its variance that enters sigma^2.
 const LARGEST_SQUARE: f64 = 9.0;
-/// Largest relative distance of omega_nm and zeta_nm from the linearisation point: the first derivatives hold no further.
+/// Largest relative distance of omega_nm and zeta_nm from the linearisation point: the first
+/// derivatives hold no further.
 const LARGEST_DISTANCE: f64 = 0.5;
 /// Least innovation variance relative to that at the start, for a span without any signal.
 const LEAST_VARIANCE: f64 = 1e-9;
@@ -81,7 +87,8 @@ impl State for Option<Hypothesis> {
     }
 }
 
-/// psi at eta, from the whitened signals of filters that are linearised about a point `[omega_nm, zeta_nm]`.
+/// psi at eta, from the whitened signals of filters that are linearised about a point
+/// `[omega_nm, zeta_nm]`.
 #[inline(always)]
 pub fn gradient(eta: &[f64; OPERATOR], r: &Signals, point: [f64; 2]) -> [f64; OPERATOR] {
     let (omega, zeta) = (eta[2] - point[0], eta[3] - point[1]);
@@ -93,7 +100,8 @@ pub fn gradient(eta: &[f64; OPERATOR], r: &Signals, point: [f64; 2]) -> [f64; OP
     ]
 }
 
-/// The value within `low` and `high`. Not `f64::clamp`, which panics where the bounds are not ordered numbers.
+/// The value within `low` and `high`. Not `f64::clamp`, which panics where the bounds are not
+/// ordered numbers.
 #[inline(always)]
 fn bounded(value: f64, low: f64, high: f64) -> f64 {
     if value < low {
@@ -120,7 +128,8 @@ impl Hypothesis {
         }
     }
 
-    /// From the estimate at the start, its covariance and the innovation variance. `None` unless the covariance is positive.
+    /// From the estimate at the start, its covariance and the innovation variance. `None` unless
+    /// the covariance is positive.
     pub fn new(
         eta: [f64; OPERATOR],
         covariance: &[[f64; OPERATOR]; OPERATOR],
@@ -184,7 +193,8 @@ impl Hypothesis {
         [g, g / square]
     }
 
-    /// Adds the drift of the parameters between two births, faster just after a change. It ends where they are known no better than after a change.
+    /// Adds the drift of the parameters between two births, faster just after a change. It ends
+    /// where they are known no better than after a change.
     pub fn drift(&mut self, now: u64, prior: &ChangePrior) {
         let scales = self.gain_scales(prior);
         // The first, born at sample 0, stands for no change.

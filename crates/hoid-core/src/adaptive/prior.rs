@@ -1,8 +1,10 @@
-//! What is expected of an operator before the data: how often they change, by how much, and in what.
+//! What is expected of an operator before the data: how often they change, by how much, and in
+//! what.
 //!
-//! Times are in samples. Changes of the gains are given relative to `g = sqrt(K_e^2 + omega_c^2 K_e_dot^2)`, the gain of the operator's lead term at the
-//! crossover frequency omega_c: those of K_e in units of g, those of K_e_dot in units of `g/omega_c`. So the same numbers hold for an operator of
-//! any gain, also where K_e or K_e_dot is zero.
+//! Times are in samples. Changes of the gains are given relative to
+//! `g = sqrt(K_e^2 + omega_c^2 K_e_dot^2)`, the gain of the operator's lead term at the crossover
+//! frequency omega_c: those of K_e in units of g, those of K_e_dot in units of `g/omega_c`. So the
+//! same numbers hold for an operator of any gain, also where K_e or K_e_dot is zero.
 
 /// Number of the operator's parameters: K_e, K_e_dot, omega_nm, zeta_nm.
 pub const OPERATOR: usize = 4;
@@ -24,14 +26,16 @@ pub struct ChangePrior {
     pub gain_jump: [f64; 2],
     /// Standard deviation of the drift of both gains in one sample, relative to g.
     pub gain_drift: f64,
-    /// Standard deviations of the drift in one sample just after a change: of K_e and K_e_dot relative to g; of omega_nm and zeta_nm, where they
-    /// changed, in units of [`ChangePrior::neuromuscular_jump`].
+    /// Standard deviations of the drift in one sample just after a change: of K_e and K_e_dot
+    /// relative to g; of omega_nm and zeta_nm, where they changed, in units of
+    /// [`ChangePrior::neuromuscular_jump`].
     pub transient_drift: [f64; OPERATOR],
     /// Time constant with which this drift decays, samples.
     pub transient_time_constant: f64,
     /// Standard deviation of a change of omega_nm and of zeta_nm, relative to their values.
     pub neuromuscular_jump: [f64; 2],
-    /// Every how many births a hypothesis is born that omega_nm and zeta_nm changed too; zero: never.
+    /// Every how many births a hypothesis is born that omega_nm and zeta_nm changed too; zero:
+    /// never.
     pub neuromuscular_every: u32,
     /// Odds of a change of all four parameters against one of the gains alone.
     pub neuromuscular_odds: f64,
@@ -43,7 +47,8 @@ pub struct ChangePrior {
     pub pruning_age: u64,
     /// Samples within which a birth counts as a recent change.
     pub change_window: u64,
-    /// Samples that the estimates take to settle after a change; before, a hypothesis cannot say what changed.
+    /// Samples that the estimates take to settle after a change; before, a hypothesis cannot say
+    /// what changed.
     pub settling_time: u64,
     /// Logarithm of the posterior odds from which a change is declared.
     pub log_odds_threshold: f64,
@@ -52,7 +57,8 @@ pub struct ChangePrior {
 }
 
 impl ChangePrior {
-    /// True when omega_nm and zeta_nm cannot become zero and every probability, time and interval is in its range.
+    /// True when omega_nm and zeta_nm cannot become zero and every probability, time and interval
+    /// is in its range.
     pub(super) fn is_valid(&self) -> bool {
         self.bounds[2][0] > 0.0
             && self.bounds[3][0] > 0.0
@@ -78,8 +84,8 @@ pub struct DelayPrior {
     pub jump: f64,
     /// Prior probability of a delay one sample beside the likeliest.
     pub neighbour_probability: f64,
-    /// Errors of the parameters that an error of one sample in the delay brings about (standard deviations): K_e and K_e_dot relative to g,
-    /// omega_nm and zeta_nm relative to their values.
+    /// Errors of the parameters that an error of one sample in the delay brings about (standard
+    /// deviations): K_e and K_e_dot relative to g, omega_nm and zeta_nm relative to their values.
     pub error_per_sample: [f64; OPERATOR],
 }
 

@@ -1,12 +1,14 @@
-//! Response of the neuromuscular system to a held error and to its rate, with derivatives by omega_nm and zeta_nm.
+//! Response of the neuromuscular system to a held error and to its rate, with derivatives by
+//! omega_nm and zeta_nm.
 //!
 //! With the exact hold of [`crate::held_operator`] for the gains `[1, 0]` and `[0, 1]`,
 //!
 //! `x(t) = b0 e(t) + b1 e(t-1) - f1 x(t-1) - f2 x(t-2)`,
 //! `x'(t) = b0' e(t) + b1' e(t-1) - f1' x(t-1) - f2' x(t-2) - f1 x'(t-1) - f2 x'(t-2)`,
 //!
-//! where `'` is the derivative by omega_nm or zeta_nm. The filters are linearised about a point `[omega, zeta]`. When it moves, their states move
-//! along its derivative: a filter whose past belongs to another point would have a kink there, which the whitening filter, a difference of
+//! where `'` is the derivative by omega_nm or zeta_nm. The filters are linearised about a point
+//! `[omega, zeta]`. When it moves, their states move along its derivative: a filter whose past
+//! belongs to another point would have a kink there, which the whitening filter, a difference of
 //! high order, makes larger than the noise.
 
 use crate::held_operator::held_operator;

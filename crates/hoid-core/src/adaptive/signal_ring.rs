@@ -1,7 +1,8 @@
 //! The signals of the last samples, from which those for every delay are read.
 //!
-//! The response to an error that arrives k samples later is the response k samples ago. So one filter gives the signals for all delays between the
-//! shortest and the longest, and a ring buffer keeps those of the last samples, behind the whitening filter.
+//! The response to an error that arrives k samples later is the response k samples ago. So one
+//! filter gives the signals for all delays between the shortest and the longest, and a ring buffer
+//! keeps those of the last samples, behind the whitening filter.
 
 use super::response::Signals;
 

@@ -1,4 +1,5 @@
-//! The hold of the operator against 60 digits, against itself where its cases meet, and on degenerate input.
+//! The hold of the operator against 60 digits, against itself where its cases meet, and on
+//! degenerate input.
 
 use super::*;
 use std::vec::Vec;
@@ -75,8 +76,8 @@ fn coefficients_agree_with_sixty_digits() {
         let (found, _) = held_operator_delayed(p, case.delta, case.ts);
         let scales = scales(&case.coefficients);
         for i in 0..5 {
-            // An ulp each from the divided differences, the products of gain and time and the two sums in b1. The largest are
-            // 3.92 for b, 0.64 for f.
+            // An ulp each from the divided differences, the products of gain and time and the two
+            // sums in b1. The largest are 3.92 for b, 0.64 for f.
             let what = format_args!("{p:?} {} {}: {}", case.delta, case.ts, ROWS[i]);
             assert_within(found[i], case.coefficients[i], 4.0 * scales[i], what);
         }
@@ -93,8 +94,9 @@ fn the_sum_keeps_its_relative_precision() {
         let found = [poles.sum, poles.sum_omega, poles.sum_zeta];
         let expected = [case.sum, case.sum_slopes[0], case.sum_slopes[1]];
         for (i, name) in ["sum", "by omega", "by zeta"].into_iter().enumerate() {
-            // Relative: 1 + f1 + f2 of the rounded coefficients would lose 1/(omega Ts)^2, up to 1e12 here. Four products on top
-            // of the divided differences; the largest are 1.94, 3.13 and 2.77.
+            // Relative: 1 + f1 + f2 of the rounded coefficients would lose 1/(omega Ts)^2, up to
+            // 1e12 here. Four products on top of the divided differences; the largest are 1.94,
+            // 3.13 and 2.77.
             let what = format_args!("omega {omega} zeta {zeta} Ts {ts}: {name}");
             assert_within(found[i], expected[i], 8.0 * expected[i].abs(), what);
         }
@@ -164,7 +166,8 @@ fn a_fraction_of_one_sample_is_a_whole_sample() {
 #[test]
 fn jacobian_agrees_with_finite_differences() {
     for case in cases() {
-        // Slower ones change by less than the rounding of the differences; the 60 digits hold those.
+        // Slower ones change by less than the rounding of the differences; the 60 digits hold
+        // those.
         if case.parameters[2] * case.ts < 0.01 {
             continue;
         }
@@ -182,7 +185,8 @@ fn jacobian_agrees_with_finite_differences() {
             let scale = largest(&column(&exact, j));
             for i in 0..5 {
                 let difference = (up[i] - down[i]) / (2.0 * h);
-                // Truncation h^2/6 of a third derivative: 1e-8 times the size of poles cubed, and rounding 1e-16/1e-4.
+                // Truncation h^2/6 of a third derivative: 1e-8 times the size of poles cubed, and
+                // rounding 1e-16/1e-4.
                 assert!(
                     (exact[i][j] - difference).abs() < 1e-7 * scale,
                     "{p:?} Ts {}: {} by {}: {} and {difference}",
@@ -211,8 +215,8 @@ fn continuous_in_the_fraction() {
         let p = [0.09, 0.036, omega, zeta];
         let at = |k: usize| held_operator_delayed(p, TS * k as f64 / STEPS as f64, TS);
         let step = TS / STEPS as f64;
-        // The third derivative of R is omega^2 times the divided difference of z^3 e^{zt}, at most (3 + |z| t) |z|^2 |e^{zt}|; that
-        // of A is smaller by |z|.
+        // The third derivative of R is omega^2 times the divided difference of z^3 e^{zt}, at most
+        // (3 + |z| t) |z|^2 |e^{zt}|; that of A is smaller by |z|.
         let fastest = size_of_poles(omega, zeta, TS) / TS;
         let growth = (-2.0 * zeta * omega * TS).exp().max(1.0);
         let third = omega * omega * (3.0 + fastest * TS) * fastest * (p[0] + p[1] * fastest) * growth;
@@ -220,7 +224,8 @@ fn continuous_in_the_fraction() {
         for k in 1..=STEPS {
             let (now, slopes) = at(k);
             for i in 0..3 {
-                // Trapezoidal rule: step^3/12 of the third derivative, of two responses in b1, and the coefficients' 4 eps each.
+                // Trapezoidal rule: step^3/12 of the third derivative, of two responses in b1, and
+                // the coefficients' 4 eps each.
                 let change = step * (slopes[i][4] + slopes_before[i][4]) / 2.0;
                 let bound = step.powi(3) / 12.0 * 2.0 * third + 8.0 * f64::EPSILON * largest(&now[..3]);
                 assert!(

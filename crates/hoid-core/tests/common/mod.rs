@@ -18,7 +18,8 @@ impl Noise {
     }
 }
 
-/// Input and output of `u = (B/F) x + (C/D) eps` with two poles of an operator at 100 Hz; x in the units of a tracking error.
+/// Input and output of `u = (B/F) x + (C/D) eps` with two poles of an operator at 100 Hz; x in the
+/// units of a tracking error.
 pub fn box_jenkins(samples: usize, seed: u64, level: f64) -> Vec<(f64, f64)> {
     let mut noise = Noise(seed);
     let (mut w, mut x1, mut n, mut eps1, mut slow) = ([0.0; 2], 0.0, 0.0, 0.0, 0.0);
@@ -37,7 +38,8 @@ pub fn box_jenkins(samples: usize, seed: u64, level: f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// P by rows, updated as the text prints it, made symmetric at each sample: the oracle of the factors.
+/// P by rows, updated as the text prints it, made symmetric at each sample: the oracle of the
+/// factors.
 pub struct Plain<const N: usize> {
     pub p: [[f64; N]; N],
     pub power: f64,
@@ -68,7 +70,8 @@ impl<const N: usize> Plain<N> {
         }
     }
 
-    /// One sample, without the guard against windup; `variance` is the innovation variance that variable forgetting expects.
+    /// One sample, without the guard against windup; `variance` is the innovation variance that
+    /// variable forgetting expects.
     pub fn update(&mut self, forgetting: &Forgetting<N>, psi: &[f64; N], eps: f64, variance: f64) -> [f64; N] {
         match forgetting {
             Forgetting::Exponential { lambda } => {

@@ -10,8 +10,8 @@ pub enum InitialState {
     /// Nothing is assumed: the initial states of each record are estimated with the parameters.
     #[default]
     Estimate,
-    /// The noise was stationary before the record as well (Box and Jenkins's unconditional sum of squares); of the response
-    /// to the input nothing is assumed.
+    /// The noise was stationary before the record as well (Box and Jenkins's unconditional sum of
+    /// squares); of the response to the input nothing is assumed.
     Backcast,
 }
 

@@ -1,13 +1,15 @@
 //! Initial states of a record, eliminated exactly.
 //!
-//! What a record does not say about its own past enters the residuals linearly: the nf past values of w through the free
-//! responses of `1/F` (as `-(D/C) h`, h the impulse response of `1/F`), the nc past innovations through those of `1/C`. With G the
-//! matrix of these responses and `G = Q R`, the states of least squares are `x = -R^-1 Q' eps_0` and the residuals
-//! `eps = (I - Q Q') eps_0`. The responses die away, so that Q is short beside the record.
-//! Source: G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432.
+//! What a record does not say about its own past enters the residuals linearly: the nf past values
+//! of w through the free responses of `1/F` (as `-(D/C) h`, h the impulse response of `1/F`), the
+//! nc past innovations through those of `1/C`. With G the matrix of these responses and `G = Q R`,
+//! the states of least squares are `x = -R^-1 Q' eps_0` and the residuals `eps = (I - Q Q') eps_0`.
+//! The responses die away, so that Q is short beside the record. Source: G. H. Golub and V.
+//! Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432.
 //!
-//! With a stationary past ([`crate::criterion::stationary_noise`]) the states of the noise model have a known covariance `sigma^2 L L'`:
-//! they are `L z` with z of variance sigma^2, and z counts as further residuals. G then has the rows `[I; G L]` for them.
+//! With a stationary past ([`crate::criterion::stationary_noise`]) the states of the noise model
+//! have a known covariance `sigma^2 L L'`: they are `L z` with z of variance sigma^2, and z counts
+//! as further residuals. G then has the rows `[I; G L]` for them.
 
 use hoid_core::filter::{SecondOrder, divide_in_place};
 
@@ -16,11 +18,12 @@ use crate::{
     linalg::least_squares::{add_scaled, dot},
 };
 
-/// Orthonormal basis of the responses to the initial states of a record, and the map back to the states.
+/// Orthonormal basis of the responses to the initial states of a record, and the map back to the
+/// states.
 #[derive(Debug, Default)]
 pub(crate) struct InitialStateResponses {
-    /// Basis vectors: first [`InitialStateResponses::prior_rows`] of z, then from the first residual on; what follows their end is
-    /// zero.
+    /// Basis vectors: first [`InitialStateResponses::prior_rows`] of z, then from the first
+    /// residual on; what follows their end is zero.
     q: Vec<Vec<f64>>,
     /// `G[:, kept[k]] = sum over l <= k of Q_l r[k][l]`.
     r: Vec<Vec<f64>>,
@@ -42,15 +45,17 @@ pub(crate) struct Past<'a> {
     pub lead: usize,
     /// The past of the noise when it was stationary; else nothing is known of it.
     pub noise: Option<&'a StationaryNoise>,
-    /// Square roots of the weights of the residuals, from the first residual on; none where all count the same.
+    /// Square roots of the weights of the residuals, from the first residual on; none where all
+    /// count the same.
     pub weights: Option<&'a [f64]>,
 }
 
 impl InitialStateResponses {
-    /// Responses of `rows` residuals, from the first one on, to the nf initial values of w and the states of the noise model.
+    /// Responses of `rows` residuals, from the first one on, to the nf initial values of w and the
+    /// states of the noise model.
     ///
-    /// Any free response of 1/F is a combination of its impulse response `h` started at the first nf samples (that basis stays
-    /// independent even where f_nf = 0).
+    /// Any free response of 1/F is a combination of its impulse response `h` started at the first
+    /// nf samples (that basis stays independent even where f_nf = 0).
     pub fn of(past: &Past<'_>, rows: usize) -> Self {
         let Past { c, d, f, lead, .. } = *past;
         let mut columns: Vec<Vec<f64>> = Vec::new();
@@ -105,7 +110,8 @@ impl InitialStateResponses {
         free
     }
 
-    /// Modified Gram-Schmidt, twice for orthogonality to rounding; a column without a part of its own is dropped.
+    /// Modified Gram-Schmidt, twice for orthogonality to rounding; a column without a part of its
+    /// own is dropped.
     fn orthonormalise(&mut self, index: usize, mut column: Vec<f64>) {
         let size = dot(&column, &column).sqrt();
         let mut r = vec![0.0; self.q.len()];
@@ -131,8 +137,9 @@ impl InitialStateResponses {
         self.kept.push(index);
     }
 
-    /// Takes the best initial states into the signals: w and v from the first regressed sample on, eps (weighted, if there are
-    /// weights) from the first residual. Returns z, empty where the past is not random.
+    /// Takes the best initial states into the signals: w and v from the first regressed sample on,
+    /// eps (weighted, if there are weights) from the first residual. Returns z, empty where the
+    /// past is not random.
     pub fn eliminate(&self, w: &mut [f64], v: &mut [f64], eps: &mut [f64]) -> Vec<f64> {
         let components: Vec<f64> = self.basis().map(|q| dot(q, &eps[..q.len()])).collect();
         for (q, &component) in self.basis().zip(&components) {
@@ -175,8 +182,8 @@ impl InitialStateResponses {
         self.h.len() < rows && self.basis().all(dead)
     }
 
-    /// The orthonormal basis in the rows of the residuals; a vector starts at the first residual, and what follows its end is
-    /// zero.
+    /// The orthonormal basis in the rows of the residuals; a vector starts at the first residual,
+    /// and what follows its end is zero.
     pub fn basis(&self) -> impl Iterator<Item = &[f64]> {
         self.q.iter().map(|q| &q[self.prior_rows..])
     }
@@ -191,7 +198,8 @@ fn shifted(response: &[f64], delay: usize, lead: usize, rows: usize) -> Vec<f64>
     column
 }
 
-/// Impulse response of `1/D`, until it has died away (1e-16 of its largest value) or `longest` is reached.
+/// Impulse response of `1/D`, until it has died away (1e-16 of its largest value) or `longest` is
+/// reached.
 fn impulse_response(d: &[f64], longest: usize) -> Vec<f64> {
     const BLOCK: usize = 128;
     let order = d.len();

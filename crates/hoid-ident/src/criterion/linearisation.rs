@@ -1,5 +1,5 @@
-//! What a search and a fit need of the criterion: feasible theta, sum of squares, descent `psi' eps` and `psi' psi`, also for some
-//! polynomials alone, and the residuals themselves.
+//! What a search and a fit need of the criterion: feasible theta, sum of squares, descent
+//! `psi' eps` and `psi' psi`, also for some polynomials alone, and the residuals themselves.
 
 use std::ops::Range;
 
@@ -24,8 +24,9 @@ impl Criterion<'_> {
         self.linearise(theta, workspace).sum_of_squares
     }
 
-    /// A and B of least squares for the other coefficients of theta, in one step because the residual is affine in them, and
-    /// the sum of squares there. `None` when the regressors are singular or the loss is not finite.
+    /// A and B of least squares for the other coefficients of theta, in one step because the
+    /// residual is affine in them, and the sum of squares there. `None` when the regressors are
+    /// singular or the loss is not finite.
     pub fn best_linear_part(&self, theta: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, f64)> {
         let linear = self.orders.na + self.orders.nb;
         let mut theta = theta.to_vec();
@@ -44,7 +45,8 @@ impl Criterion<'_> {
         value.is_finite().then_some((best, value))
     }
 
-    /// As [`Objective::linearise`], with the derivatives to the coefficients of one polynomial alone; those to others are zero.
+    /// As [`Objective::linearise`], with the derivatives to the coefficients of one polynomial
+    /// alone; those to others are zero.
     pub fn linearise_block(&self, theta: &[f64], block: Block, workspace: &mut Workspace) -> Linearisation {
         let (p, place) = (theta.len(), block.place(&self.orders));
         let count = place.len();
@@ -79,7 +81,8 @@ impl Criterion<'_> {
         residuals
     }
 
-    /// Columns of psi in one record, from the first residual on, with the initial states projected out.
+    /// Columns of psi in one record, from the first residual on, with the initial states projected
+    /// out.
     pub fn jacobian(&self, theta: &[f64], record: usize, workspace: &mut Workspace) -> Vec<Vec<f64>> {
         let data = self.data[record];
         let states = self.residual_pass(theta, record, data, workspace);
@@ -104,7 +107,8 @@ impl Criterion<'_> {
 impl Objective for Criterion<'_> {
     type Workspace = Workspace;
 
-    /// Roots of C and F inside the unit circle; a stationary past needs those of the noise poles there too.
+    /// Roots of C and F inside the unit circle; a stationary past needs those of the noise poles
+    /// there too.
     fn is_feasible(&self, theta: &[f64]) -> bool {
         let parts = Polynomials::split(&self.orders, theta);
         theta.iter().all(|v| v.is_finite())

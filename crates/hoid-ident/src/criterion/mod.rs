@@ -2,10 +2,10 @@
 //!
 //! For `A u = (B/F) q^-nk e + (C/D) eps` and given theta
 //!
-//! `w = (B/F) q^-nk e`,  `v = A u - w`,  `eps = (D/C) v`                                            (eq. 5.4)
+//! `w = (B/F) q^-nk e`, `v = A u - w`, `eps = (D/C) v` (eq. 5.4)
 //!
-//! and the negative gradient `psi = -d eps/d theta` is made of shifts of one filtered signal each (Ljung, *System
-//! Identification*, 1999, eq. 10.53; with the signs of this notation):
+//! and the negative gradient `psi = -d eps/d theta` is made of shifts of one filtered signal each
+//! (Ljung, *System Identification*, 1999, eq. 10.53; with the signs of this notation):
 //!
 //! | parameter | psi(t) |
 //! |---|---|
@@ -15,23 +15,27 @@
 //! | `d_j` | `-(1/C) v(t-j)` |
 //! | `f_j` | `-(D/(C F)) w(t-j)` |
 //!
-//! **Initial states.** With [`InitialState::Zero`] everything before the record is zero and all residuals count. With
-//! [`InitialState::Estimate`] nothing is assumed: residuals are used from the first sample at which every input and output
-//! in the regression lies inside the record, and what then remains unknown, the nf past values of w and the nc past values of
-//! eps, is estimated in each record. eps is affine in these states, so that they are eliminated exactly for each theta
-//! (variable projection; G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432): with the orthonormal basis Q of
-//! their responses, `eps = (I - Q Q') eps_0`. The loss is then a function of theta alone, its gradient is `-psi' eps` exactly
-//! (the states are optimal), and the Gauss-Newton matrix is `psi' (I - Q Q') psi` (the approximation of L. Kaufman, *BIT* 15
-//! (1975) 49-57). A shifted signal differs from the true derivative only by a free response of 1/F or 1/C, which lies in the
-//! span of Q: shifting stays exact.
+//! **Initial states.** With [`InitialState::Zero`] everything before the record is zero and all
+//! residuals count. With [`InitialState::Estimate`] nothing is assumed: residuals are used from the
+//! first sample at which every input and output in the regression lies inside the record, and what
+//! then remains unknown, the nf past values of w and the nc past values of eps, is estimated in
+//! each record. eps is affine in these states, so that they are eliminated exactly for each theta
+//! (variable projection; G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432):
+//! with the orthonormal basis Q of their responses, `eps = (I - Q Q') eps_0`. The loss is then a
+//! function of theta alone, its gradient is `-psi' eps` exactly (the states are optimal), and the
+//! Gauss-Newton matrix is `psi' (I - Q Q') psi` (the approximation of L. Kaufman, *BIT* 15 (1975)
+//! 49-57). A shifted signal differs from the true derivative only by a free response of 1/F or 1/C,
+//! which lies in the span of Q: shifting stays exact.
 //!
-//! With [`InitialState::Backcast`] the past of w is unknown as before, but that of the noise is stationary
-//! ([`stationary_noise`]): the residuals start nd samples earlier, and the state of the noise model counts as r further
-//! residuals z. Where there is no input, A plays the part of D and the residuals start with the record.
+//! With [`InitialState::Backcast`] the past of w is unknown as before, but that of the noise is
+//! stationary ([`stationary_noise`]): the residuals start nd samples earlier, and the state of the
+//! noise model counts as r further residuals z. Where there is no input, A plays the part of D and
+//! the residuals start with the record.
 //!
 //! **Weights** multiply the squared residuals; they serve the robust loss.
 //!
-//! **A long record** passes span by span behind its first part ([`pass`]), so that a fit needs no memory beside the record.
+//! **A long record** passes span by span behind its first part ([`pass`]), so that a fit needs no
+//! memory beside the record.
 //!
 //! | module | what it holds |
 //! |---|---|

@@ -1,4 +1,5 @@
-//! The normal equations of a record: products of the residuals and the columns of psi, with the initial states projected out.
+//! The normal equations of a record: products of the residuals and the columns of psi, with the
+//! initial states projected out.
 
 use std::{borrow::Cow, ops::Range};
 

@@ -1,12 +1,17 @@
 //! A pass over a record at one theta; a long record is passed span by span.
 //!
-//! What the normal equations need of a record are sums over time, and every signal in them is the output of a filter that goes forward: the
-//! first part of the record (32 768 samples) is passed as any record, the rest in spans that stay in the memory near the processor, each with
-//! the last samples of the span before in front of it. Nothing then grows with the record, and a sample costs the same in a long one.
+//! What the normal equations need of a record are sums over time, and every signal in them is the
+//! output of a filter that goes forward: the first part of the record (32 768 samples) is passed as
+//! any record, the rest in spans that stay in the memory near the processor, each with the last
+//! samples of the span before in front of it. Nothing then grows with the record, and a sample
+//! costs the same in a long one.
 //!
-//! The initial states act on the beginning alone. Their responses must have died away within the head ([`InitialStateResponses::have_died`](crate::criterion::initial_state_responses::InitialStateResponses::have_died)); where a pole is so
-//! near the circle that they have not, the record is passed whole. So it is with weights, of which there is one a sample, and with a stationary
-//! past, whose columns are whitened one by one. The sums differ from those over the whole by rounding alone.
+//! The initial states act on the beginning alone. Their responses must have died away within the
+//! head
+//! ([`InitialStateResponses::have_died`](crate::criterion::initial_state_responses::InitialStateResponses::have_died));
+//! where a pole is so near the circle that they have not, the record is passed whole. So it is with
+//! weights, of which there is one a sample, and with a stationary past, whose columns are whitened
+//! one by one. The sums differ from those over the whole by rounding alone.
 
 use std::ops::Range;
 
@@ -25,12 +30,14 @@ use super::{
 /// Samples of a span: its signals fill a quarter of the second cache.
 const SPAN: usize = 1 << 11;
 
-/// Samples of the first part. A record twice as long counts as long: others, all of some minutes, pass whole.
+/// Samples of the first part. A record twice as long counts as long: others, all of some minutes,
+/// pass whole.
 const HEAD: usize = 1 << 15;
 
 impl Criterion<'_> {
-    /// Passes a record and calls `show` with the eliminated initial states, the places in the workspace of the residuals that
-    /// count, and the workspace; for a long record, span by span, once for each span. Returns the eliminated initial states.
+    /// Passes a record and calls `show` with the eliminated initial states, the places in the
+    /// workspace of the residuals that count, and the workspace; for a long record, span by span,
+    /// once for each span. Returns the eliminated initial states.
     pub(super) fn pass(
         &self,
         theta: &[f64],
@@ -49,8 +56,8 @@ impl Criterion<'_> {
         states
     }
 
-    /// Passes a record span after span, with what the pass over the head has found (for the other spans nothing); `None`, and nothing shown,
-    /// where the record has to pass whole.
+    /// Passes a record span after span, with what the pass over the head has found (for the other
+    /// spans nothing); `None`, and nothing shown, where the record has to pass whole.
     pub(super) fn pass_in_spans(
         &self,
         theta: &[f64],

@@ -29,10 +29,11 @@ pub(crate) struct Criterion<'a> {
     pub orders: Orders,
     pub data: Vec<Data<'a>>,
     pub initial: InitialState,
-    /// First sample whose residual counts, in each record; at least [`first_residual`](super::first_residual).
+    /// First sample whose residual counts, in each record; at least
+    /// [`first_residual`](super::first_residual).
     pub first: usize,
-    /// Square roots of the weights of the residuals of each record, from the first residual on; none where all count the
-    /// same.
+    /// Square roots of the weights of the residuals of each record, from the first residual on;
+    /// none where all count the same.
     pub weights: Option<&'a [Vec<f64>]>,
 }
 

@@ -1,4 +1,5 @@
-//! The signals of a record: w, v and eps with the best initial states in them, and those whose shifts are the columns of psi.
+//! The signals of a record: w, v and eps with the best initial states in them, and those whose
+//! shifts are the columns of psi.
 
 use std::ops::Range;
 
@@ -79,7 +80,8 @@ impl Criterion<'_> {
         states
     }
 
-    /// `w = B s` and `v = A u - w` of these samples, the first of which stands at `from` in the workspace.
+    /// `w = B s` and `v = A u - w` of these samples, the first of which stands at `from` in the
+    /// workspace.
     pub(super) fn response(
         &self,
         parts: &Polynomials<'_>,
@@ -158,7 +160,8 @@ impl Criterion<'_> {
         }
     }
 
-    /// `(D/C) u`; with a stationary past u, because each shift is cut at the first residual before it is whitened.
+    /// `(D/C) u`; with a stationary past u, because each shift is cut at the first residual before
+    /// it is whitened.
     fn filter_output(&self, parts: &Polynomials<'_>, data: Data<'_>, ws: &mut Workspace) {
         if self.orders.na == 0 {
             return;
@@ -174,8 +177,8 @@ impl Criterion<'_> {
         }
     }
 
-    /// `s = (1/F) e(t-nk)`, of which w is a moving sum: `w = B s`. Where the initial states are estimated, w may differ from the
-    /// response that starts at rest by a free response of 1/F.
+    /// `s = (1/F) e(t-nk)`, of which w is a moving sum: `w = B s`. Where the initial states are
+    /// estimated, w may differ from the response that starts at rest by a free response of 1/F.
     fn filter_input(&self, parts: &Polynomials<'_>, data: Data<'_>, ws: &mut Workspace) {
         let (pad, n) = (ws.pad, data.u.len());
         if self.orders.nb == 0 {

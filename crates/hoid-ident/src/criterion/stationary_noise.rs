@@ -1,25 +1,30 @@
-//! The past of stationary noise, for the rule that MATLAB's toolbox and Box and Jenkins call backcasting.
+//! The past of stationary noise, for the rule that MATLAB's toolbox and Box and Jenkins call
+//! backcasting.
 //!
 //! `v = (C/D) eps` has the state of the innovations form with r = max(nc, nd)
 //!
-//! `x_i(t+1) = x_{i+1}(t) + c_i eps(t) - d_i v(t)`,  `v = eps + x_1`:  `x(t+1) = Phi x + K eps`, `K_i = c_i - d_i`,
+//! `x_i(t+1) = x_{i+1}(t) + c_i eps(t) - d_i v(t)`, `v = eps + x_1`: `x(t+1) = Phi x + K eps`,
+//! `K_i = c_i - d_i`,
 //!
-//! and for a record that starts at t = 0 the predictor reads `C eps = D v + g`, `g_i = -x_{i+1}(0)`, with zeros before. Where v
-//! is stationary, x(0) is random with the covariance `sigma^2 P`, `P = Phi P Phi' + K K'`, and
+//! and for a record that starts at t = 0 the predictor reads `C eps = D v + g`,
+//! `g_i = -x_{i+1}(0)`, with zeros before. Where v is stationary, x(0) is random with the
+//! covariance `sigma^2 P`, `P = Phi P Phi' + K K'`, and
 //!
 //! `S(theta) = min over g of  sum eps^2 + g' P^-1 g  =  v' Sigma_v^-1 v`,
 //!
-//! the *unconditional sum of squares* of G. E. P. Box and G. M. Jenkins (*Time Series Analysis*, 1976, section 7.1.4), which they
-//! reach by running the model backwards. With `P = L L'` and `g = L z` the penalty is `z' z`, so that z joins the residuals.
+//! the *unconditional sum of squares* of G. E. P. Box and G. M. Jenkins (*Time Series Analysis*,
+//! 1976, section 7.1.4), which they reach by running the model backwards. With `P = L L'` and
+//! `g = L z` the penalty is `z' z`, so that z joins the residuals.
 //!
-//! The gradient of the penalty follows from the adjoint equation `Z = Phi' Z Phi + y y'`, `y = P^-1 g`:
-//! `y' (dP/dc_i) y = 2 (Z K)_i` and `y' (dP/dd_i) y = -2 (Z K)_i - 2 (Z Phi P)_{i1}`.
+//! The gradient of the penalty follows from the adjoint equation `Z = Phi' Z Phi + y y'`,
+//! `y = P^-1 g`: `y' (dP/dc_i) y = 2 (Z K)_i` and `y' (dP/dd_i) y = -2 (Z K)_i - 2 (Z Phi P)_{i1}`.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::linalg::least_squares::add_scaled;
 
-/// Doublings of the Lyapunov sum: 2^60 terms are more than any pole that differs from one in double precision needs.
+/// Doublings of the Lyapunov sum: 2^60 terms are more than any pole that differs from one in double
+/// precision needs.
 const DOUBLINGS: usize = 60;
 
 /// Covariance of the initial state of a noise model.
@@ -32,7 +37,8 @@ pub(crate) struct StationaryNoise {
 }
 
 impl StationaryNoise {
-    /// The past of `(C/D) eps` with unit variance of eps. `None` when D has a root on or outside the unit circle.
+    /// The past of `(C/D) eps` with unit variance of eps. `None` when D has a root on or outside
+    /// the unit circle.
     pub fn of(c: &[f64], d: &[f64]) -> Option<Self> {
         let r = c.len().max(d.len());
         let coefficient = |p: &[f64], i: usize| p.get(i).copied().unwrap_or(0.0);
@@ -65,7 +71,8 @@ impl StationaryNoise {
         column
     }
 
-    /// `(1/2) y' dP y` for the coefficients of C and of D, at the best z: what the penalty adds to the descent `psi' eps`.
+    /// `(1/2) y' dP y` for the coefficients of C and of D, at the best z: what the penalty adds to
+    /// the descent `psi' eps`.
     pub fn descent(&self, z: &[f64], nc: usize, nd: usize) -> (Vec<f64>, Vec<f64>) {
         // No state, or none with a variance.
         if self.states() == 0 {
@@ -97,8 +104,8 @@ impl StationaryNoise {
     }
 }
 
-/// `P = Phi P Phi' + k k'` by doubling: `P <- P + A P A'`, `A <- A^2` (B. D. O. Anderson and J. B. Moore, *Optimal Filtering*,
-/// 1979, section 6.7). `None` when the sum does not settle.
+/// `P = Phi P Phi' + k k'` by doubling: `P <- P + A P A'`, `A <- A^2` (B. D. O. Anderson and J. B.
+/// Moore, *Optimal Filtering*, 1979, section 6.7). `None` when the sum does not settle.
 fn lyapunov(transition: &DMatrix<f64>, gain: &DVector<f64>) -> Option<DMatrix<f64>> {
     let mut sum = gain * gain.transpose();
     let mut power = transition.clone();

@@ -172,7 +172,8 @@ fn residuals_obey_the_model_equation() {
 
 #[test]
 fn estimated_states_leave_nothing_to_gain() {
-    // Shifting w by any free response must not lower the loss: the residual is orthogonal to the basis.
+    // Shifting w by any free response must not lower the loss: the residual is orthogonal to the
+    // basis.
     let (e, u) = record(300);
     for (orders, theta) in cases() {
         let c = criterion(orders, vec![Data { e: &e, u: &u }], InitialState::Estimate);
@@ -239,7 +240,8 @@ fn the_unconditional_sum_of_squares_is_that_of_the_covariance_matrix() {
     let theta = vec![-1.5, 0.7, 0.4];
     let c = criterion(orders, vec![Data { e: &[], u: &u }], InitialState::Backcast);
     let ours = c.linearise(&theta, &mut Workspace::default()).sum_of_squares;
-    // Autocovariance of C/A eps from its impulse response; the poles have the modulus 0.84, 0.84^400 = 1e-30.
+    // Autocovariance of C/A eps from its impulse response; the poles have the modulus 0.84,
+    // 0.84^400 = 1e-30.
     let mut h = vec![1.0, 0.4 + 1.5];
     for t in 2..800 {
         h.push(1.5 * h[t - 1] - 0.7 * h[t - 2]);

@@ -7,7 +7,8 @@ use std::{
 
 use hoid_model::Orders;
 
-/// Signals of one record at one theta. Each has `pad` zeros in front, so that a shift needs no case distinction.
+/// Signals of one record at one theta. Each has `pad` zeros in front, so that a shift needs no case
+/// distinction.
 #[derive(Debug, Default)]
 pub(crate) struct Workspace {
     pub(super) pad: usize,
@@ -24,8 +25,8 @@ thread_local! {
     static LEFT: Cell<Option<Workspace>> = const { Cell::new(None) };
 }
 
-/// A workspace for one fit, kept for the next on the same thread: getting fresh pages for each fit costs a quarter of a study's time. What is in
-/// it is written before it is read.
+/// A workspace for one fit, kept for the next on the same thread: getting fresh pages for each fit
+/// costs a quarter of a study's time. What is in it is written before it is read.
 #[derive(Debug, Default)]
 pub(crate) struct Borrowed(Workspace);
 
@@ -58,12 +59,13 @@ impl Drop for Borrowed {
     }
 }
 
-/// Longest signals that are kept between fits, samples: a record of an hour at 100 Hz would occupy the thread for ever.
+/// Longest signals that are kept between fits, samples: a record of an hour at 100 Hz would occupy
+/// the thread for ever.
 const KEPT: usize = 1 << 17;
 
 impl Workspace {
-    /// Makes room for a record, for the signals that these orders have; every pass writes all of a signal before it reads it, zeros in
-    /// front included.
+    /// Makes room for a record, for the signals that these orders have; every pass writes all of a
+    /// signal before it reads it, zeros in front included.
     pub(super) fn make_room(&mut self, o: &Orders, n: usize) {
         let pad = o.na.max(o.nb).max(o.nd).max(o.nc + o.nf);
         self.pad = pad;
@@ -85,7 +87,8 @@ impl Workspace {
     }
 }
 
-/// True for the poles of the operator with a noise model of first order or none, whose signal of F comes from one pass.
+/// True for the poles of the operator with a noise model of first order or none, whose signal of F
+/// comes from one pass.
 pub(super) fn passes_once(o: &Orders) -> bool {
     (o.nc, o.nf) == (0, 2) && o.nd <= 1
 }

@@ -1,4 +1,5 @@
-//! From records to a describing function: coefficients at the lines of every run, their averages and errors.
+//! From records to a describing function: coefficients at the lines of every run, their averages
+//! and errors.
 
 use hoid_model::{Channel, Complex64, Record, uncertainty::Estimate};
 
@@ -25,7 +26,8 @@ pub struct Line {
     pub response: Complex64,
     /// sigma, the root of the mean square of `|dH|`; `None` for one run.
     pub standard_error: Option<f64>,
-    /// Standard deviation of the ratios of single runs, as the root of the mean square modulus; `None` for one run.
+    /// Standard deviation of the ratios of single runs, as the root of the mean square modulus;
+    /// `None` for one run.
     pub spread: Option<f64>,
     /// Squared coherence, 0 to 1; `None` for one run, where it is always 1.
     pub coherence: Option<f64>,
@@ -60,8 +62,9 @@ impl Line {
             .map(|s| s / (std::f64::consts::SQRT_2 * self.response.norm()))
     }
 
-    /// Centre and radius of the circle in the complex plane that holds the true H with this probability, exact for a circular normal
-    /// remnant however small e is against it; `None` for one run, or where e does not differ from zero at this level.
+    /// Centre and radius of the circle in the complex plane that holds the true H with this
+    /// probability, exact for a circular normal remnant however small e is against it; `None` for
+    /// one run, or where e does not differ from zero at this level.
     pub fn confidence_circle(&self, probability: f64) -> Option<(Complex64, f64)> {
         self.ratio.confidence_disc(probability)
     }
@@ -118,9 +121,10 @@ struct Run {
 /// The describing function from e to u of one or several records at the lines of their excitation.
 ///
 /// # Errors
-/// [`IdentError::NoRecords`], [`IdentError::MixedSampling`], [`IdentError::NotWholePeriods`], [`IdentError::LineBeyondNyquist`],
-/// [`IdentError::NoExcitation`] for e or u that does not move, [`IdentError::NoLinePower`] for a line without power,
-/// [`IdentError::BadOption`] for a channel that is not there.
+/// [`IdentError::NoRecords`], [`IdentError::MixedSampling`], [`IdentError::NotWholePeriods`],
+/// [`IdentError::LineBeyondNyquist`], [`IdentError::NoExcitation`] for e or u that does not move,
+/// [`IdentError::NoLinePower`] for a line without power, [`IdentError::BadOption`] for a channel
+/// that is not there.
 pub fn describe(
     records: &[Record],
     excitation: &Excitation,

@@ -1,9 +1,11 @@
 //! The lines of a periodic excitation.
 //!
-//! A sum of sinusoids at harmonics `omega_k = n_k 2 pi/T` of one period T has all its power at these lines, and over a whole
-//! number of periods each of them is one bin of the discrete Fourier transform. Source: D. T. McRuer and H. R. Jex, *A Review
-//! of Quasi-Linear Pilot Models*, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249; H. J. Damveld et al., *Design of
-//! Forcing Functions for the Identification of Human Control Behavior*, J. Guidance, Control, and Dynamics 33 (2010) 1064-1081.
+//! A sum of sinusoids at harmonics `omega_k = n_k 2 pi/T` of one period T has all its power at
+//! these lines, and over a whole number of periods each of them is one bin of the discrete Fourier
+//! transform. Source: D. T. McRuer and H. R. Jex, *A Review of Quasi-Linear Pilot Models*, IEEE
+//! Trans. Human Factors in Electronics 8 (1967) 231-249; H. J. Damveld et al., *Design of Forcing
+//! Functions for the Identification of Human Control Behavior*, J. Guidance, Control, and Dynamics
+//! 33 (2010) 1064-1081.
 
 use std::f64::consts::TAU;
 
@@ -49,8 +51,8 @@ impl Excitation {
     /// The harmonics n_k of the period T in s.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] without harmonics, with a harmonic 0 or one that stands twice, or for a period that is not
-    /// positive.
+    /// [`IdentError::BadOption`] without harmonics, with a harmonic 0 or one that stands twice, or
+    /// for a period that is not positive.
     pub fn of_harmonics(harmonics: &[usize], period_s: f64) -> Result<Self, IdentError> {
         if !(period_s.is_finite() && period_s > 0.0) {
             return refuse(
@@ -116,12 +118,14 @@ impl Excitation {
         Self::new(&omega, period_s)
     }
 
-    /// The lines of a channel of a record that spans whole periods: the bins with at least the amplitude of `search`. A span that
-    /// is wrong by a sample or so leaks too little to be seen; with the period given it is refused.
+    /// The lines of a channel of a record that spans whole periods: the bins with at least the
+    /// amplitude of `search`. A span that is wrong by a sample or so leaks too little to be seen;
+    /// with the period given it is refused.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a channel that is not there, or whose power is not in such lines: noise, or a span of no
-    /// whole periods; [`IdentError::NoExcitation`] for a constant channel; [`IdentError::NotWholePeriods`].
+    /// [`IdentError::BadOption`] for a channel that is not there, or whose power is not in such
+    /// lines: noise, or a span of no whole periods; [`IdentError::NoExcitation`] for a constant
+    /// channel; [`IdentError::NotWholePeriods`].
     pub fn found_in(record: &Record, channel: &str, search: &LineSearch) -> Result<Self, IdentError> {
         let values = channel_of(record, channel, "the channel to find lines in")?;
         if !(search.least_amplitude > 0.0 && search.least_amplitude <= 1.0) {
@@ -272,7 +276,8 @@ mod tests {
             let refused = Excitation::found_in(&reference(samples, 0.0), "e", &search);
             assert!(matches!(refused, Err(IdentError::NotWholePeriods { .. })));
         }
-        // The lines of two periods taken for those of one of twice the length would be harmonics too; the other way round not.
+        // The lines of two periods taken for those of one of twice the length would be harmonics
+        // too; the other way round not.
         let wrong = LineSearch {
             period_s: Some(40.96),
             ..LineSearch::default()

@@ -1,10 +1,12 @@
 //! Gain, lead and delay of `M = K (T_L s + 1) e^{-s tau}` from a describing function.
 //!
-//! The criterion is `sum_k w_k |M(j omega_k)/H_k - 1|^2`: errors relative to the describing function, which would else count most
-//! where it is largest. For a given tau the model is linear in K and K T_L, so that the criterion is a function of tau alone
-//! (G. H. Golub and V. Pereyra, SIAM J. Numerical Analysis 10 (1973) 413-432); it is scanned over the range of delays, and its
-//! lowest point refined. Without lead this is the crossover model of McRuer and Jex (1967) for a single integrator. The delay holds
-//! all of the phase lag that the model has no other term for, that of the neuromuscular system too.
+//! The criterion is `sum_k w_k |M(j omega_k)/H_k - 1|^2`: errors relative to the describing
+//! function, which would else count most where it is largest. For a given tau the model is linear
+//! in K and K T_L, so that the criterion is a function of tau alone (G. H. Golub and V. Pereyra,
+//! SIAM J. Numerical Analysis 10 (1973) 413-432); it is scanned over the range of delays, and its
+//! lowest point refined. Without lead this is the crossover model of McRuer and Jex (1967) for a
+//! single integrator. The delay holds all of the phase lag that the model has no other term for,
+//! that of the neuromuscular system too.
 //!
 //! Standard errors are those of the jackknife over runs, with the weights kept (`ratio.rs`).
 
@@ -88,8 +90,8 @@ impl DescribingFunction {
     /// Gain, lead and delay by weighted least squares.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a range of delays that is none, for variance weights of one run, or for fewer lines than
-    /// parameters need.
+    /// [`IdentError::BadOption`] for a range of delays that is none, for variance weights of one
+    /// run, or for fewer lines than parameters need.
     pub fn fit_gain_lead_delay(&self, options: &GainLeadDelayOptions) -> Result<GainLeadDelay, IdentError> {
         let (shortest, longest) = options.delay_range_s;
         let omega: Vec<f64> = self.lines.iter().map(|l| l.omega_rad_s).collect();
@@ -174,8 +176,9 @@ struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// The best K and K T_L at a delay: normal equations of two unknowns with the columns `c` and `j omega c`, where
-    /// `c = e^{-j omega tau}/H`. As their product is imaginary, they are orthogonal.
+    /// The best K and K T_L at a delay: normal equations of two unknowns with the columns `c` and
+    /// `j omega c`, where `c = e^{-j omega tau}/H`. As their product is imaginary, they are
+    /// orthogonal.
     fn at(&self, delay_s: f64) -> Solution {
         let lines = || self.omega.iter().zip(self.response).zip(self.weights);
         let column = |w: f64, h: Complex64| Complex64::from_polar(1.0, -w * delay_s) / h;

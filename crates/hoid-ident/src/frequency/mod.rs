@@ -1,26 +1,31 @@
-//! Describing functions: how a human operator responds at the lines of a periodic excitation, without a model.
+//! Describing functions: how a human operator responds at the lines of a periodic excitation,
+//! without a model.
 //!
-//! With `E_i, U_i` the Fourier coefficients of e and u at a line in run i, `H_i = U_i/E_i` is the describing function of that
-//! run. The remnant n, `U = H E + N`, goes round the loop, so that the mean of the ratios is biased, by more the smaller E is.
-//! With D_i the coefficient of the forcing function or the disturbance, to which the remnant is not related,
+//! With `E_i, U_i` the Fourier coefficients of e and u at a line in run i, `H_i = U_i/E_i` is the
+//! describing function of that run. The remnant n, `U = H E + N`, goes round the loop, so that the
+//! mean of the ratios is biased, by more the smaller E is. With D_i the coefficient of the forcing
+//! function or the disturbance, to which the remnant is not related,
 //!
 //! `H = sum_i U_i D_i* / sum_i E_i D_i*`
 //!
-//! has the bias only in the second order of the error of its denominator. [`Averaging`] offers both, and `D_i = 1` for runs that
-//! all had the same excitation.
+//! has the bias only in the second order of the error of its denominator. [`Averaging`] offers
+//! both, and `D_i = 1` for runs that all had the same excitation.
 //!
-//! - **Standard error**: with `N_i = U_i - H E_i`, `sigma^2 = n/(n-1) sum |N_i D_i*|^2 / |sum E_i D_i*|^2` is the expectation of
-//!   `|dH|^2`. The coefficients of a stationary remnant are circular, real and imaginary part with half of it each, so that
-//!   `20 log10 |H|` has the standard error `(20/ln 10) sigma/(sqrt(2) |H|)` and the phase `sigma/(sqrt(2) |H|)` rad.
-//!   It holds where the remnant in e is small against e; [`Line::confidence_circle`] holds where it is not.
-//! - **Coherence** between excitation and u over runs: `|sum U_i D_i*|^2 / (sum |U_i|^2 sum |D_i|^2)`. Of n unrelated runs it is
-//!   1/n in the mean.
+//! - **Standard error**: with `N_i = U_i - H E_i`,
+//!   `sigma^2 = n/(n-1) sum |N_i D_i*|^2 / |sum E_i D_i*|^2` is the expectation of `|dH|^2`. The
+//!   coefficients of a stationary remnant are circular, real and imaginary part with half of it
+//!   each, so that `20 log10 |H|` has the standard error `(20/ln 10) sigma/(sqrt(2) |H|)` and the
+//!   phase `sigma/(sqrt(2) |H|)` rad. It holds where the remnant in e is small against e;
+//!   [`Line::confidence_circle`] holds where it is not.
+//! - **Coherence** between excitation and u over runs:
+//!   `|sum U_i D_i*|^2 / (sum |U_i|^2 sum |D_i|^2)`. Of n unrelated runs it is 1/n in the mean.
 //! - **Remnant**: what u has off the lines, as the remnant shows in u behind the loop, `N/(1 + L)`.
 //!
-//! Sources: D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249; M. M. van Paassen and
-//! M. Mulder, *Identification of Human Operator Control Behaviour in Multiple-Loop Tracking Tasks*, IFAC MMS 1998; R. Pintelon and
-//! J. Schoukens, *System Identification: A Frequency Domain Approach*, 2012, sections 2.4 to 2.7; J. S. Bendat and A. G. Piersol,
-//! *Random Data*, 2010, chapters 9 and 11.
+//! Sources: D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249;
+//! M. M. van Paassen and M. Mulder, *Identification of Human Operator Control Behaviour in
+//! Multiple-Loop Tracking Tasks*, IFAC MMS 1998; R. Pintelon and J. Schoukens, *System
+//! Identification: A Frequency Domain Approach*, 2012, sections 2.4 to 2.7; J. S. Bendat and A. G.
+//! Piersol, *Random Data*, 2010, chapters 9 and 11.
 //!
 //! | module | what it holds |
 //! |---|---|

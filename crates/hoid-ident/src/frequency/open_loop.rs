@@ -1,11 +1,13 @@
 //! Crossover frequency and phase margin of `L = H H_CE` between the lines.
 //!
-//! Magnitude in dB and phase are taken as straight lines over log omega between neighbouring lines. The crossover is where the
-//! magnitude passes 0 dB; the phase margin is 180 deg plus the phase there. Where there are several, the lowest at which the
-//! magnitude falls is given: the describing function of one run scatters above the crossover, where coherence is low, and may pass
-//! 0 dB there again. The phase is followed from one line to the next along the shorter way. A delay bends the phase over log omega,
-//! so that between lines half an octave apart the straight line is a degree or so too low; with the delay taken out before and put
-//! back after, it is not. Standard errors are those of the jackknife over runs (`ratio.rs`); the spread is that of single runs.
+//! Magnitude in dB and phase are taken as straight lines over log omega between neighbouring lines.
+//! The crossover is where the magnitude passes 0 dB; the phase margin is 180 deg plus the phase
+//! there. Where there are several, the lowest at which the magnitude falls is given: the describing
+//! function of one run scatters above the crossover, where coherence is low, and may pass 0 dB
+//! there again. The phase is followed from one line to the next along the shorter way. A delay
+//! bends the phase over log omega, so that between lines half an octave apart the straight line is
+//! a degree or so too low; with the delay taken out before and put back after, it is not. Standard
+//! errors are those of the jackknife over runs (`ratio.rs`); the spread is that of single runs.
 
 use hoid_model::{Complex64, ContinuousTransferFunction, uncertainty::Estimate};
 
@@ -38,7 +40,8 @@ pub struct Crossover {
     pub phase_margin_deg: f64,
 }
 
-/// Crossover and phase margin with their uncertainty; `None` where no crossover lies between the lines.
+/// Crossover and phase margin with their uncertainty; `None` where no crossover lies between the
+/// lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescribingMargins {
     /// Crossover frequency omega_c, rad/s.
@@ -59,7 +62,8 @@ impl DescribingFunction {
         self.open_loop_with(|omega| element.response(omega))
     }
 
-    /// The open loop with any frequency response over rad/s, such as that of the controlled element behind its hold.
+    /// The open loop with any frequency response over rad/s, such as that of the controlled element
+    /// behind its hold.
     pub fn open_loop_with(&self, element: impl Fn(f64) -> Complex64) -> OpenLoop {
         let known: Vec<Complex64> = self.lines.iter().map(|l| element(l.omega_rad_s)).collect();
         self.loop_of(|k, _| known[k], |k, _| known[k])
@@ -68,7 +72,8 @@ impl DescribingFunction {
     /// The open loop with the controlled element that is estimated from the records.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] when [`super::DescribingOptions::element`] did not name its channels.
+    /// [`IdentError::BadOption`] when [`super::DescribingOptions::element`] did not name its
+    /// channels.
     pub fn measured_open_loop(&self) -> Result<OpenLoop, IdentError> {
         let ratios: Vec<_> = self.lines.iter().filter_map(|l| l.element_ratio.as_ref()).collect();
         if ratios.len() < self.lines.len() {
@@ -140,8 +145,9 @@ impl OpenLoop {
 }
 
 impl Crossover {
-    /// The lowest crossover where the magnitude of an open loop falls, between ascending frequencies in rad/s at which its response is known; none
-    /// where it does not. The phase of the delay in s is interpolated apart.
+    /// The lowest crossover where the magnitude of an open loop falls, between ascending
+    /// frequencies in rad/s at which its response is known; none where it does not. The phase of
+    /// the delay in s is interpolated apart.
     pub fn of(omega_rad_s: &[f64], response: &[Complex64], delay_s: f64) -> Option<Self> {
         let mut pairs = omega_rad_s.windows(2).zip(response.windows(2));
         pairs.find_map(|(w, l)| {

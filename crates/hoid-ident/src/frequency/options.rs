@@ -1,4 +1,5 @@
-//! What a describing function is made of: averaging, spans, offsets, and the channels of the controlled element.
+//! What a describing function is made of: averaging, spans, offsets, and the channels of the
+//! controlled element.
 
 use hoid_model::Detrend;
 
@@ -8,13 +9,14 @@ pub enum Averaging {
     /// The mean of the ratios `U_i/E_i`. Coherence is that between e and u.
     #[default]
     Ratios,
-    /// `sum U_i D_i* / sum E_i D_i*` with D_i of this channel, the forcing function or the disturbance. Phases may differ between
-    /// runs. Coherence is that between this channel and u.
+    /// `sum U_i D_i* / sum E_i D_i*` with D_i of this channel, the forcing function or the
+    /// disturbance. Phases may differ between runs. Coherence is that between this channel and u.
     Reference {
         /// Name of the channel.
         channel: String,
     },
-    /// The same with D_i = 1: every run (and period) begins at the same phase of the same excitation.
+    /// The same with D_i = 1: every run (and period) begins at the same phase of the same
+    /// excitation.
     SameExcitation,
 }
 
@@ -24,8 +26,8 @@ pub enum Realisation {
     /// Each record is one realisation, however many periods it has.
     #[default]
     Record,
-    /// Each period of each record is one, which gives one record a spread. The remnant of neighbouring periods is taken as
-    /// independent.
+    /// Each period of each record is one, which gives one record a spread. The remnant of
+    /// neighbouring periods is taken as independent.
     Period,
 }
 
@@ -34,8 +36,8 @@ pub enum Realisation {
 pub struct MeasuredElement {
     /// Name of the channel of its output y.
     pub output: String,
-    /// Name of the channel of a disturbance that is added to u, row by row and with the offset of u, if there is one: without it,
-    /// `Y/U` would be minus the inverse of H.
+    /// Name of the channel of a disturbance that is added to u, row by row and with the offset of
+    /// u, if there is one: without it, `Y/U` would be minus the inverse of H.
     pub disturbance: Option<String>,
 }
 
@@ -52,10 +54,11 @@ pub struct DescribingOptions {
     pub to_s: Option<f64>,
     /// `e[k]` belongs to `u[k + offset_samples]`, a whole number or not. Default 0.
     pub offset_samples: f64,
-    /// What is taken out of e and u of each run beforehand. The lines do not see a mean, the rms does; a straight line has power at
-    /// all lines. Default nothing.
+    /// What is taken out of e and u of each run beforehand. The lines do not see a mean, the rms
+    /// does; a straight line has power at all lines. Default nothing.
     pub detrend: Detrend,
-    /// Bins of the shortest run that are averaged into one value of the remnant spectrum. Default 8.
+    /// Bins of the shortest run that are averaged into one value of the remnant spectrum. Default
+    /// 8.
     pub smoothing_bins: usize,
     /// Channels to estimate the controlled element from, if any.
     pub element: Option<MeasuredElement>,

@@ -1,12 +1,14 @@
 //! A ratio of sums over runs, `H = sum a_i / sum b_i`, and its error.
 //!
-//! `dH = sum (a_i - H b_i) / sum b_i` to the first order, with independent terms: `sigma^2 = n/(n-1) sum |a_i - H b_i|^2 /
+//! `dH = sum (a_i - H b_i) / sum b_i` to the first order, with independent terms: `sigma^2 =
+//! n/(n-1) sum |a_i - H b_i|^2 /
 //! |sum b_i|^2`. Without linearisation: the mean of `a_i - H b_i` is zero at the true H alone, and n times its square over their
-//! sample variance there has the F distribution with 2 and 2(n - 1) degrees of freedom for circular normal errors. The values of H that a
-//! level of F does not exclude are a disc, as long as the denominator differs from zero at this level (E. C. Fieller, J. Royal
-//! Statistical Society B 16 (1954) 175-185, for complex ratios). What is computed from several ratios has its standard error by the jackknife over runs, `sigma^2 = (n-1)/n
-//! sum (y_(i) - mean)^2`, y_(i) without run i (B. Efron, *The Jackknife, the Bootstrap and Other Resampling Plans*, 1982,
-//! chapter 3).
+//! sample variance there has the F distribution with 2 and 2(n - 1) degrees of freedom for circular
+//! normal errors. The values of H that a level of F does not exclude are a disc, as long as the
+//! denominator differs from zero at this level (E. C. Fieller, J. Royal Statistical Society B 16
+//! (1954) 175-185, for complex ratios). What is computed from several ratios has its standard error
+//! by the jackknife over runs, `sigma^2 = (n-1)/n sum (y_(i) - mean)^2`, y_(i) without run i (B.
+//! Efron, *The Jackknife, the Bootstrap and Other Resampling Plans*, 1982, chapter 3).
 
 use hoid_model::{Complex64, uncertainty::Estimate};
 
@@ -41,7 +43,8 @@ impl Ratio {
         (n > 1.0).then(|| (n / (n - 1.0) * squares).sqrt() / b.norm())
     }
 
-    /// Centre and radius of the disc that holds the true ratio with this probability; `None` for one run, or where there is no bound.
+    /// Centre and radius of the disc that holds the true ratio with this probability; `None` for
+    /// one run, or where there is no bound.
     pub fn confidence_disc(&self, probability: f64) -> Option<(Complex64, f64)> {
         let n = self.0.len() as f64;
         let (a, b) = self.sums(None);
@@ -64,8 +67,8 @@ impl Ratio {
     }
 }
 
-/// A value with the standard error of the jackknife; none where one of the values without a run does not exist, or there is
-/// only one run.
+/// A value with the standard error of the jackknife; none where one of the values without a run
+/// does not exist, or there is only one run.
 pub(super) fn jackknife(value: f64, without: &[Option<f64>]) -> Estimate {
     let known: Vec<f64> = without.iter().copied().flatten().collect();
     let n = without.len();

@@ -1,12 +1,14 @@
 //! The remnant in u: its power off the lines.
 //!
-//! Over whole periods the response to the excitation has no power between its lines, so that all of it there is remnant. Bin k
-//! of a window of N samples gives the one-sided density `|U_k|^2/2 / (2 pi/(N Ts))` per rad/s, with a relative standard error of
-//! 1 (chi-square with two degrees of freedom); the mean over n runs and neighbouring bins, m values, has one of `1/sqrt(m)`
-//! (J. S. Bendat and A. G. Piersol, *Random Data*, 2010, section 8.5.4).
+//! Over whole periods the response to the excitation has no power between its lines, so that all of
+//! it there is remnant. Bin k of a window of N samples gives the one-sided density
+//! `|U_k|^2/2 / (2 pi/(N Ts))` per rad/s, with a relative standard error of 1 (chi-square with two
+//! degrees of freedom); the mean over n runs and neighbouring bins, m values, has one of
+//! `1/sqrt(m)` (J. S. Bendat and A. G. Piersol, *Random Data*, 2010, section 8.5.4).
 //!
-//! At the lines the remnant stands too. With the density of the neighbourhood there, `noise ratio = power of the remnant /
-//! var(u)` estimates P_n of eq. 43, where the share off the lines leaves the lines out.
+//! At the lines the remnant stands too. With the density of the neighbourhood there,
+//! `noise ratio = power of the remnant / var(u)` estimates P_n of eq. 43, where the share off the
+//! lines leaves the lines out.
 
 use std::f64::consts::TAU;
 
@@ -19,7 +21,8 @@ use super::{spectrum::power, window::Window};
 pub struct RemnantBand {
     /// Mean frequency of its bins, rad/s.
     pub omega_rad_s: f64,
-    /// One-sided power density of u off the lines, square of the unit of u per rad/s: its integral is a variance.
+    /// One-sided power density of u off the lines, square of the unit of u per rad/s: its integral
+    /// is a variance.
     pub density: f64,
     /// Values that the mean is over: bins of all runs.
     pub values: usize,
@@ -63,7 +66,8 @@ impl Control<'_> {
     }
 }
 
-/// Bands of `neighbours` bins of the shortest window, each the mean over the bins off the lines of all runs.
+/// Bands of `neighbours` bins of the shortest window, each the mean over the bins off the lines of
+/// all runs.
 pub(super) fn spectrum(runs: &[Control<'_>], harmonics: &[usize], ts_s: f64, neighbours: usize) -> Vec<RemnantBand> {
     let widest = runs.iter().map(|r| r.width_rad_s(ts_s)).fold(0.0, f64::max);
     let band_rad_s = widest * neighbours.max(1) as f64;
@@ -73,7 +77,8 @@ pub(super) fn spectrum(runs: &[Control<'_>], harmonics: &[usize], ts_s: f64, nei
         let width = run.width_rad_s(ts_s);
         for k in (1..run.coefficients.len()).filter(|k| !run.is_line(*k, harmonics)) {
             let omega = k as f64 * width;
-            // Half a bin up: a frequency at an edge belongs to the band below, whatever its rounding.
+            // Half a bin up: a frequency at an edge belongs to the band below, whatever its
+            // rounding.
             let band = ((omega - 0.5 * width) / band_rad_s).max(0.0) as usize;
             if bands.len() <= band {
                 bands.resize(band + 1, (0.0, 0.0, 0));
@@ -107,7 +112,8 @@ pub(super) fn share_and_ratio(
     (off / all, (off + at_lines) / all)
 }
 
-/// Density between the centres of two bands by linear interpolation; that of the first or the last band outside.
+/// Density between the centres of two bands by linear interpolation; that of the first or the last
+/// band outside.
 fn density_at(spectrum: &[RemnantBand], omega: f64) -> f64 {
     let above = spectrum.partition_point(|b| b.omega_rad_s <= omega);
     match (above.checked_sub(1).map(|i| &spectrum[i]), spectrum.get(above)) {

@@ -1,4 +1,5 @@
-//! Whole results on simulated runs: the exact operator without remnant, error bars and remnant with it.
+//! Whole results on simulated runs: the exact operator without remnant, error bars and remnant with
+//! it.
 
 use hoid_model::{
     Complex64, DiscreteTransferFunction, PolynomialModel, Record, Structure,
@@ -47,7 +48,8 @@ fn operator(scenario: &Scenario) -> PolynomialModel {
     PolynomialModel::new(Structure::BoxJenkins, orders, scenario.sample_time, theta).unwrap()
 }
 
-/// `K_c/(s (s + omega_b))` behind its hold, in closed form: the residues of `K_c/(s^2 (s + omega_b))`.
+/// `K_c/(s (s + omega_b))` behind its hold, in closed form: the residues of
+/// `K_c/(s^2 (s + omega_b))`.
 fn element(scenario: &Scenario) -> DiscreteTransferFunction {
     let (c, ts) = (scenario.initial.controlled_element, scenario.sample_time.s());
     let (b, p) = (c.omega_b_rad_s, (-c.omega_b_rad_s * ts).exp());
@@ -94,13 +96,14 @@ fn without_remnant_the_lines_are_those_of_the_held_operator() {
 
 #[test]
 fn margins_between_the_lines_are_near_those_of_the_loop() {
-    // The lines around the crossover of s1 are 1.00 and 1.69 rad/s, those around that of s2 2.61 and 4.07: far apart, and what is
-    // straight between them is not the loop.
+    // The lines around the crossover of s1 are 1.00 and 1.69 rad/s, those around that of s2 2.61
+    // and 4.07: far apart, and what is straight between them is not the loop.
     for (condition, crossover, margin) in [(Condition::C1, 1.5635, 76.67), (Condition::C2, 2.7480, 22.90)] {
         let scenario = scenario(condition, false);
         let found = describe(&runs(&scenario, 0, 1), &lines(), &DescribingOptions::default()).unwrap();
         let continuous = scenario.initial.controlled_element.transfer_function().unwrap();
-        // The hold of the operator delays by half a sample, to 1e-5 of the magnitude at these frequencies.
+        // The hold of the operator delays by half a sample, to 1e-5 of the magnitude at these
+        // frequencies.
         let half_s = 0.5 * scenario.sample_time.s();
         let open_loop = found.open_loop_with(|w| continuous.response(w) * Complex64::from_polar(1.0, half_s * w));
         let delay_s = scenario.initial.operator.tau_e_s;
@@ -154,10 +157,12 @@ fn error_bars_hold_what_they_say() {
     // A region without bound is the outside of a circle far from H: the truth is in it.
     let coverage = (inside + unbounded) as f64 / checks as f64;
     println!("coverage {coverage} of {checks} circles, without bound {without_bound:?}");
-    // Nearly independent: a standard error of 0.0077. Only where the remnant in e is as large as e there may be no bound.
+    // Nearly independent: a standard error of 0.0077. Only where the remnant in e is as large as e
+    // there may be no bound.
     assert!((coverage - 0.95).abs() < 0.023 && without_bound[2..].iter().all(|n| *n == 0));
-    // At the two lowest lines the remnant in e is no small part of it, and sigma holds to the first order only. At each of the
-    // others 80 squares with two degrees of freedom, and their estimates with eight: a standard error of 0.044 for the mean.
+    // At the two lowest lines the remnant in e is no small part of it, and sigma holds to the first
+    // order only. At each of the others 80 squares with two degrees of freedom, and their estimates
+    // with eight: a standard error of 0.044 for the mean.
     let ratios: Vec<f64> = squares[2..]
         .iter()
         .map(|(square, variance)| square / variance)
@@ -169,7 +174,8 @@ fn error_bars_hold_what_they_say() {
     let mean = crossovers.iter().sum::<f64>() / n;
     let variance = crossovers.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (n - 1.0);
     let ratio = (variance / (errors.iter().sum::<f64>() / n)).sqrt();
-    // 80 experiments: a standard error of 0.08 for the deviation, and of 0.04 for the jackknife of five runs.
+    // 80 experiments: a standard error of 0.08 for the deviation, and of 0.04 for the jackknife of
+    // five runs.
     println!("crossover {mean}, deviation/standard error {ratio}");
     assert!((ratio - 1.0).abs() < 0.27);
 }
@@ -182,7 +188,8 @@ fn the_remnant_is_found_off_the_lines() {
         let found = describe(&records, &lines(), &DescribingOptions::default()).unwrap();
         let ratio = found.noise_ratio;
         println!("{condition}: {ratio:?}, off the lines {:?}", found.off_line_share);
-        // Of the demanded level 0.1, of which 1000 runs are within 0.003; the mean of ratios has a bias of some of their variance.
+        // Of the demanded level 0.1, of which 1000 runs are within 0.003; the mean of ratios has a
+        // bias of some of their variance.
         assert!((ratio.value - 0.1).abs() < 3.0 * ratio.standard_error.unwrap() + 0.003);
         assert!(found.off_line_share.value < ratio.value);
 
@@ -205,7 +212,8 @@ fn the_remnant_is_found_off_the_lines() {
         }
         let normalised = chi_square / f64::from(bands);
         println!("{bands} bands: {normalised}");
-        // About 470 values of unit variance: a standard error of sqrt(2/470) = 0.065. The leak of a window without taper adds.
+        // About 470 values of unit variance: a standard error of sqrt(2/470) = 0.065. The leak of a
+        // window without taper adds.
         assert!((normalised - 1.0).abs() < 0.25);
     }
 }

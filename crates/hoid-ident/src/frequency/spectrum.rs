@@ -1,9 +1,10 @@
 //! Fourier coefficients of a record over whole periods.
 //!
-//! For N samples, `X_k = (2/N) sum_i x_i e^{-j 2 pi k i/N}`, k = 0 .. N/2: a sinusoid `A sin(omega_k t + phi)` with
-//! `omega_k = 2 pi k/(N Ts)` has `|X_k| = A`, and no part of it in any other bin. With the bins 0 and N/2 counted once,
-//! `var(x) = sum_{k = 1}^{N/2} |X_k|^2/2` (Parseval; J. S. Bendat and A. G. Piersol, *Random Data*, 2010, section 11.2;
-//! R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach*, 2012, section 2.2).
+//! For N samples, `X_k = (2/N) sum_i x_i e^{-j 2 pi k i/N}`, k = 0 .. N/2: a sinusoid
+//! `A sin(omega_k t + phi)` with `omega_k = 2 pi k/(N Ts)` has `|X_k| = A`, and no part of it in
+//! any other bin. With the bins 0 and N/2 counted once, `var(x) = sum_{k = 1}^{N/2} |X_k|^2/2`
+//! (Parseval; J. S. Bendat and A. G. Piersol, *Random Data*, 2010, section 11.2; R. Pintelon and J.
+//! Schoukens, *System Identification: A Frequency Domain Approach*, 2012, section 2.2).
 
 use hoid_model::Complex64;
 use realfft::RealFftPlanner;

@@ -12,7 +12,8 @@ fn record(e: Vec<f64>, u: Vec<f64>) -> Result<Record, hoid_model::ModelError> {
 
 #[test]
 fn the_controlled_element_is_found_behind_a_disturbance_and_an_offset() {
-    // y[k + 1] = 0.8 y[k] + 0.5 (u[k] + d[k]), with u and d recorded a sample late, over two periods after a long run-in.
+    // y[k + 1] = 0.8 y[k] + 0.5 (u[k] + d[k]), with u and d recorded a sample late, over two
+    // periods after a long run-in.
     let at = |k: i32, n: f64, phase: f64| (std::f64::consts::TAU * n * f64::from(k) / 100.0 + phase).sin();
     let u = |k: i32| at(k, 3.0, 0.2) - 0.7 * at(k, 7.0, 1.0);
     let d = |k: i32| 0.4 * at(k, 3.0, 2.0) + at(k, 7.0, 0.4);

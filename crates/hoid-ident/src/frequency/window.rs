@@ -1,8 +1,9 @@
-//! Spans of whole periods, and the Fourier coefficients of two channels that are recorded at an offset.
+//! Spans of whole periods, and the Fourier coefficients of two channels that are recorded at an
+//! offset.
 //!
-//! With `e[k]` belonging to `u[k + s]`, s of any size, `U(omega) e^{j omega s Ts}` is the coefficient of u at the time of e: exact
-//! for what is periodic. The whole samples of s are taken from the record where it reaches so far, which is exact for the rest
-//! as well.
+//! With `e[k]` belonging to `u[k + s]`, s of any size, `U(omega) e^{j omega s Ts}` is the
+//! coefficient of u at the time of e: exact for what is periodic. The whole samples of s are taken
+//! from the record where it reaches so far, which is exact for the rest as well.
 
 use std::f64::consts::TAU;
 
@@ -20,7 +21,8 @@ pub(super) struct Window {
     pub periods: usize,
 }
 
-/// The number of periods in `samples` samples of a record, when it is a whole one within half a sample.
+/// The number of periods in `samples` samples of a record, when it is a whole one within half a
+/// sample.
 pub(super) fn whole_periods(record: &Record, samples: usize, period_s: f64) -> Result<usize, IdentError> {
     let ts = record.sample_time().s();
     let of_period = period_s / ts;
@@ -74,7 +76,8 @@ impl Window {
         (0..self.periods).map(one).collect()
     }
 
-    /// Its samples of a channel that is `offset` samples late, and the part of the offset that is left.
+    /// Its samples of a channel that is `offset` samples late, and the part of the offset that is
+    /// left.
     pub fn samples_of(self, values: &[f64], offset: f64) -> (&[f64], f64) {
         let whole = offset.floor();
         let begin = self.first as f64 + whole;

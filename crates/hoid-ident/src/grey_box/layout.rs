@@ -1,8 +1,10 @@
-//! Where the physical parameters of each record stand in eta, and what they mean for its polynomials.
+//! Where the physical parameters of each record stand in eta, and what they mean for its
+//! polynomials.
 //!
-//! Slots of one record: `[K_e, K_e_dot (or T_L), omega_nm, zeta_nm, tau_e, T_n]`, the last only for m > 0. A parameter that the
-//! records share has one place in eta, one that is individual has as many as there are records. K_e_dot is the coordinate of
-//! the lead unless the user constrains T_L itself: `K_e_dot = K_e T_L` is well determined also where K_e is small.
+//! Slots of one record: `[K_e, K_e_dot (or T_L), omega_nm, zeta_nm, tau_e, T_n]`, the last only for
+//! m > 0. A parameter that the records share has one place in eta, one that is individual has as
+//! many as there are records. K_e_dot is the coordinate of the lead unless the user constrains T_L
+//! itself: `K_e_dot = K_e T_L` is well determined also where K_e is small.
 
 use std::collections::BTreeMap;
 
@@ -59,7 +61,8 @@ pub(crate) struct Layout {
     pub slots: Vec<usize>,
 }
 
-/// Orders and theta of one record at one eta; the Jacobian has a row for each coefficient and a column for each slot.
+/// Orders and theta of one record at one eta; the Jacobian has a row for each coefficient and a
+/// column for each slot.
 #[derive(Debug, Clone)]
 pub(crate) struct Polynomials {
     pub orders: Orders,
@@ -231,7 +234,8 @@ impl Layout {
         [k_e, k_e_dot, omega, zeta, tau]
     }
 
-    /// The polynomials of one record; `sample` is the sample in which tau_e lies, where the caller has chosen one.
+    /// The polynomials of one record; `sample` is the sample in which tau_e lies, where the caller
+    /// has chosen one.
     pub fn polynomials(&self, eta: &[f64], record: usize, sample: Option<usize>) -> Result<Polynomials, ModelError> {
         let slots = self.of_record(eta, record);
         let operator = self.operator(&slots);

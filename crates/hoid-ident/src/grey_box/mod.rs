@@ -1,16 +1,19 @@
 //! Grey box: the prediction-error fit in physical parameters.
 //!
-//! `eta = [K_e, K_e_dot, omega_nm, zeta_nm, tau_e, T_n]` with a real delay ([`mod@hoid_model::delayed_operator`]) and the remnant as the
-//! exact zero-order hold of `K_n/(T_n s + 1)^m` with its zeros ([`hoid_model::remnant_noise`]). The predictor is the one of
-//! `u = (B/F) q^-nk e + (C/D) eps` with the polynomials `theta(eta)`; the criterion is that of the general model, so that initial
-//! states are eliminated exactly, and `psi_eta = psi d theta/d eta`. Where Box-Jenkins with nc = 0 has a free D of order m, this
-//! has T_n alone, and neither D nor nk has to stand in for what the structure leaves out: T_n, K_n and tau_e are consistent.
-//! K_n follows from the innovation: `K_n = sigma/g(T_n)`.
+//! `eta = [K_e, K_e_dot, omega_nm, zeta_nm, tau_e, T_n]` with a real delay
+//! ([`mod@hoid_model::delayed_operator`]) and the remnant as the exact zero-order hold of
+//! `K_n/(T_n s + 1)^m` with its zeros ([`hoid_model::remnant_noise`]). The predictor is the one of
+//! `u = (B/F) q^-nk e + (C/D) eps` with the polynomials `theta(eta)`; the criterion is that of the
+//! general model, so that initial states are eliminated exactly, and `psi_eta = psi d theta/d eta`.
+//! Where Box-Jenkins with nc = 0 has a free D of order m, this has T_n alone, and neither D nor nk
+//! has to stand in for what the structure leaves out: T_n, K_n and tau_e are consistent. K_n
+//! follows from the innovation: `K_n = sigma/g(T_n)`.
 //!
-//! The order m is given or chosen by BIC over a range; m from 1 on has the same number of parameters, so that the loss decides.
+//! The order m is given or chosen by BIC over a range; m from 1 on has the same number of
+//! parameters, so that the loss decides.
 //!
-//! Source: L. Ljung, *System Identification*, 1999, sections 4.3 (grey boxes) and 7.2; T. Bohlin, *Practical Grey-box Process
-//! Identification*, 2006.
+//! Source: L. Ljung, *System Identification*, 1999, sections 4.3 (grey boxes) and 7.2; T. Bohlin,
+//! *Practical Grey-box Process Identification*, 2006.
 
 mod layout;
 mod objective;
@@ -37,7 +40,8 @@ use layout::{Layout, SLOTS, TIME_CONSTANT};
 use objective::PhysicalCriterion;
 use starts::Start;
 
-/// Relative decrease of the loss, and steps, at which the search of an order ends while orders are compared.
+/// Relative decrease of the loss, and steps, at which the search of an order ends while orders are
+/// compared.
 const QUICK_TOLERANCE: f64 = 1e-7;
 const QUICK_ITERATIONS: usize = 30;
 
@@ -50,7 +54,8 @@ pub struct GreyBox {
     pub delay_range_s: (f64, f64),
     /// Fixed and bounded parameters by name ([`GREY_BOX_NAMES`]). T_L or K_e_dot, not both.
     pub constraints: BTreeMap<String, Constraint>,
-    /// Names of the parameters that each record has for itself; all others are common to the records.
+    /// Names of the parameters that each record has for itself; all others are common to the
+    /// records.
     pub individual: Vec<String>,
     /// Initial states of each record. Default: estimated.
     pub initial_state: InitialState,
@@ -77,7 +82,8 @@ impl GreyBox {
     /// Fits one model to all records, initial states of each.
     ///
     /// # Errors
-    /// [`IdentError`]; how a search ended is part of the fit. With several orders an error means that none could be fitted.
+    /// [`IdentError`]; how a search ended is part of the fit. With several orders an error means
+    /// that none could be fitted.
     pub fn fit(&self, records: &[Record]) -> Result<GreyBoxFit, IdentError> {
         let sample_time = informative_data::common_sample_time(records)?;
         self.check_orders()?;
@@ -114,7 +120,8 @@ impl GreyBox {
             let candidates = vec![candidate(criterion, Ok(&fit))];
             return Ok(GreyBoxFit { candidates, ..fit });
         }
-        // To compare orders the loss need not be known to the last digit; a wrong order converges slowly.
+        // To compare orders the loss need not be known to the last digit; a wrong order converges
+        // slowly.
         let quick = SearchOptions {
             tolerance: self.search.tolerance.max(QUICK_TOLERANCE),
             max_iterations: self.search.max_iterations.min(QUICK_ITERATIONS),
@@ -195,7 +202,8 @@ impl GreyBox {
         workspace: &mut Workspace,
     ) -> Result<GreyBoxFit, IdentError> {
         let mut etas: Vec<(String, Vec<f64>)> = Vec::new();
-        // The minimum of another order is near, whatever the layout of the records; m = 0 has no T_n to go on with.
+        // The minimum of another order is near, whatever the layout of the records; m = 0 has no
+        // T_n to go on with.
         if let Some(before) = before.filter(|b| b.len() == criterion.layout.names.len()) {
             etas.push((format!("order {}", criterion.layout.order - 1), before.to_vec()));
         }

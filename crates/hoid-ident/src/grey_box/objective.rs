@@ -1,8 +1,9 @@
 //! The prediction-error criterion as a function of the physical parameters.
 //!
-//! For each record the polynomials follow from eta, `theta = theta(eta)` with `J = d theta/d eta`; then `psi_eta = psi J`, so that
-//! `psi_eta' eps = J' psi' eps` and `psi_eta' psi_eta = J' psi' psi J`, both summed over the records. nk moves with tau_e, the
-//! first residual that counts does not: the loss is a function of eta alone.
+//! For each record the polynomials follow from eta, `theta = theta(eta)` with `J = d theta/d eta`;
+//! then `psi_eta = psi J`, so that `psi_eta' eps = J' psi' eps` and
+//! `psi_eta' psi_eta = J' psi' psi J`, both summed over the records. nk moves with tau_e, the first
+//! residual that counts does not: the loss is a function of eta alone.
 
 use crate::{
     IdentError, InitialState,
@@ -21,7 +22,8 @@ pub(crate) struct PhysicalCriterion<'a> {
     pub data: Vec<Data<'a>>,
     pub initial: InitialState,
     pub first: usize,
-    /// Sample in which each delay of [`Layout::delays`] is held; by the delay itself where there is none.
+    /// Sample in which each delay of [`Layout::delays`] is held; by the delay itself where there is
+    /// none.
     pub samples: Option<Vec<usize>>,
     pub limits: Vec<(f64, f64)>,
 }
@@ -71,8 +73,9 @@ impl<'a> PhysicalCriterion<'a> {
         self.layout.polynomials(eta, record, sample).ok()
     }
 
-    /// The gains that are best for the other parameters, and the sum of squares there: the residual is affine in K_e and
-    /// K_e_dot. Only for one set of parameters common to all records, with K_e_dot as coordinate.
+    /// The gains that are best for the other parameters, and the sum of squares there: the residual
+    /// is affine in K_e and K_e_dot. Only for one set of parameters common to all records, with
+    /// K_e_dot as coordinate.
     pub fn best_gains(&self, eta: &mut [f64], workspace: &mut Workspace) -> Option<f64> {
         eta[..2].fill(0.0);
         if !self.is_feasible(eta) {
@@ -92,8 +95,8 @@ impl<'a> PhysicalCriterion<'a> {
         (value.is_finite() && eta.iter().all(|v| v.is_finite())).then_some(value)
     }
 
-    /// Searches from eta. The loss has kinks where a delay is a whole number of samples, and a search may end in
-    /// one; then it is finished inside each of the samples that meet there.
+    /// Searches from eta. The loss has kinks where a delay is a whole number of samples, and a
+    /// search may end in one; then it is finished inside each of the samples that meet there.
     pub fn search(
         &self,
         eta: Vec<f64>,
@@ -163,7 +166,8 @@ impl<'a> PhysicalCriterion<'a> {
         best
     }
 
-    /// Elements of eta with a variance: not fixed, and not held at a bound of the user. A kink of the loss is no bound.
+    /// Elements of eta with a variance: not fixed, and not held at a bound of the user. A kink of
+    /// the loss is no bound.
     pub fn free(&self, eta: &[f64], descent: &[f64]) -> Vec<usize> {
         crate::optimize::free_parameters(self, eta, descent)
     }

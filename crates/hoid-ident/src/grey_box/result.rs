@@ -59,9 +59,9 @@ impl GreyBoxFit {
         &self.candidates
     }
 
-    /// Name, value and standard error of each parameter that was fitted, in the coordinates of the fit: K_e (deg/deg), K_e_dot
-    /// (s) or T_L (s) where that is constrained, omega_nm (rad/s), zeta_nm, tau_e (s), T_n (s). Individual parameters carry the
-    /// number of their record.
+    /// Name, value and standard error of each parameter that was fitted, in the coordinates of the
+    /// fit: K_e (deg/deg), K_e_dot (s) or T_L (s) where that is constrained, omega_nm (rad/s),
+    /// zeta_nm, tau_e (s), T_n (s). Individual parameters carry the number of their record.
     pub fn parameters(&self) -> Vec<(String, Estimate)> {
         self.layout
             .names
@@ -71,7 +71,8 @@ impl GreyBoxFit {
             .collect()
     }
 
-    /// Covariance of [`GreyBoxFit::parameters`] by rows, zero for what was fixed or rests at a bound; `None` for an exact fit.
+    /// Covariance of [`GreyBoxFit::parameters`] by rows, zero for what was fixed or rests at a
+    /// bound; `None` for an exact fit.
     pub fn covariance(&self) -> Option<&[f64]> {
         self.covariance.as_deref()
     }
@@ -84,7 +85,8 @@ impl GreyBoxFit {
         }
     }
 
-    /// An estimate of `value` whose gradient is `by_gain` for K_e and `by_lead` for the second coordinate.
+    /// An estimate of `value` whose gradient is `by_gain` for K_e and `by_lead` for the second
+    /// coordinate.
     fn of_gains(&self, record: usize, value: f64, by_gain: f64, by_lead: f64) -> Estimate {
         let places = &self.layout.positions[record];
         let used = |place: usize, by: f64| by != 0.0 && self.free.contains(&place);
@@ -99,8 +101,8 @@ impl GreyBoxFit {
         }
     }
 
-    /// The operator of a record, with standard errors. `record` counts the records of the fit from 0, here and below; a number
-    /// beyond them means the last.
+    /// The operator of a record, with standard errors. `record` counts the records of the fit from
+    /// 0, here and below; a number beyond them means the last.
     ///
     /// # Errors
     /// [`NotConvertible::ZeroGain`] when K_e is zero, so that there is no T_L.
@@ -138,10 +140,11 @@ impl GreyBoxFit {
         Ok(self.operator(record)?.parameters())
     }
 
-    /// T_n and K_n of a record, the remnant held over each sample; `None` for m = 0, where the remnant is white with the standard
-    /// deviation of the innovation.
+    /// T_n and K_n of a record, the remnant held over each sample; `None` for m = 0, where the
+    /// remnant is white with the standard deviation of the innovation.
     ///
-    /// `K_n = sigma/g(T_n)`; sigma is known to `sigma^2/(2 n)` and uncorrelated with T_n (Gaussian innovations).
+    /// `K_n = sigma/g(T_n)`; sigma is known to `sigma^2/(2 n)` and uncorrelated with T_n (Gaussian
+    /// innovations).
     pub fn remnant(&self, record: usize) -> Option<RemnantEstimate> {
         if self.layout.order == 0 {
             return None;
@@ -165,9 +168,10 @@ impl GreyBoxFit {
         })
     }
 
-    /// The same model as polynomials, for prediction, simulation and the frequency response with its bands: Box-Jenkins with
-    /// three coefficients in B. Its covariance is `J P J'` and singular, as theta has more elements than eta; parameters, criteria,
-    /// operator and remnant are those of this fit.
+    /// The same model as polynomials, for prediction, simulation and the frequency response with
+    /// its bands: Box-Jenkins with three coefficients in B. Its covariance is `J P J'` and
+    /// singular, as theta has more elements than eta; parameters, criteria, operator and remnant
+    /// are those of this fit.
     pub fn polynomial_fit(&self, record: usize) -> &Fit {
         &self.fits[self.known(record)]
     }
@@ -186,7 +190,8 @@ impl GreyBoxFit {
         self.whole().loss()
     }
 
-    /// Unbiased innovation variance `sum eps^2 / (n - p - s)` with p parameters and s estimated initial states.
+    /// Unbiased innovation variance `sum eps^2 / (n - p - s)` with p parameters and s estimated
+    /// initial states.
     pub fn innovation_variance(&self) -> f64 {
         self.whole().innovation_variance()
     }

@@ -1,9 +1,11 @@
 //! Where the search in physical parameters starts.
 //!
-//! 1. `grid`: delays every 0.04 s over their range with a usual neuromuscular system, then at the best of them frequencies and
-//!    dampings in the range of human operators. The residual is affine in K_e and K_e_dot, so that both are eliminated at each point; the
-//!    noise model is that of one T_n. The best points by loss are starts.
-//! 2. `box-jenkins`: the operator that a Box-Jenkins fit at the delay of the best point converts to, where it does.
+//! 1. `grid`: delays every 0.04 s over their range with a usual neuromuscular system, then at the
+//!    best of them frequencies and dampings in the range of human operators. The residual is affine
+//!    in K_e and K_e_dot, so that both are eliminated at each point; the noise model is that of one
+//!    T_n. The best points by loss are starts.
+//! 2. `box-jenkins`: the operator that a Box-Jenkins fit at the delay of the best point converts
+//!    to, where it does.
 //! 3. `order m - 1`: the minimum of the order before, when several orders are tried.
 //!
 //! For each order the T_n of a start is the best of a few.
@@ -17,7 +19,8 @@ use super::{
     objective::PhysicalCriterion,
 };
 
-/// Spacing of the delays, s: a fraction of the period of the highest frequencies that people respond to.
+/// Spacing of the delays, s: a fraction of the period of the highest frequencies that people
+/// respond to.
 const GRID_DELAY_S: f64 = 0.04;
 /// Neuromuscular frequency with which the delays are ranked, rad/s.
 const USUAL_OMEGA: f64 = 11.0;
@@ -35,7 +38,8 @@ pub(crate) const GRID_TIME_CONSTANT_S: [f64; 6] = [0.1, 0.004, 0.012, 0.03, 0.06
 /// Fewest delays over a range that is not a point.
 const FEWEST_DELAYS: usize = 3;
 
-/// A start with its name: `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, T_n]`, the same for all records.
+/// A start with its name: `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, T_n]`, the same for all
+/// records.
 #[derive(Debug, Clone)]
 pub(crate) struct Start {
     pub label: String,
@@ -74,8 +78,8 @@ pub(crate) fn scout<'a>(criterion: &PhysicalCriterion<'a>, order: usize) -> Phys
     PhysicalCriterion::new(layout, criterion.data.clone(), criterion.initial, criterion.first)
 }
 
-/// The best points of the grid, with the gains that are best for them: so many with a lead, and the best without one where it is
-/// better.
+/// The best points of the grid, with the gains that are best for them: so many with a lead, and the
+/// best without one where it is better.
 pub(crate) fn grid(criterion: &PhysicalCriterion<'_>, starts: usize, workspace: &mut Workspace) -> Vec<Start> {
     let scout = scout(criterion, criterion.layout.order.min(1));
     let bounded = |slot: usize, value: f64| value.clamp(scout.limits[slot].0, scout.limits[slot].1);
@@ -116,8 +120,8 @@ pub(crate) fn grid(criterion: &PhysicalCriterion<'_>, starts: usize, workspace: 
     leading(&points, starts)
 }
 
-/// The first few with a lead, and the first of all: a lag in the place of the lead, with a shorter delay, imitates the phase of
-/// an operator and makes a local minimum of its own.
+/// The first few with a lead, and the first of all: a lag in the place of the lead, with a shorter
+/// delay, imitates the phase of an operator and makes a local minimum of its own.
 fn leading(points: &[(Start, f64)], n: usize) -> Vec<Start> {
     let has_lead = |s: &Start| s.slots[0] * s.slots[LEAD] >= 0.0;
     let mut chosen: Vec<Start> = points

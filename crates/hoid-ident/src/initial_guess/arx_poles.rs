@@ -1,4 +1,5 @@
-//! Poles by linear least squares: of an ARX model, of one of high order, and by the iteration of Steiglitz and McBride.
+//! Poles by linear least squares: of an ARX model, of one of high order, and by the iteration of
+//! Steiglitz and McBride.
 
 use hoid_core::{
     filter::{divide_in_place, fir},

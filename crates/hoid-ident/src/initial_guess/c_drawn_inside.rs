@@ -1,9 +1,10 @@
-//! Starts for a search that ended with a root of C on the unit circle: the loss often has a lower minimum inside.
+//! Starts for a search that ended with a root of C on the unit circle: the loss often has a lower
+//! minimum inside.
 
 use hoid_model::{Complex64, Orders, polynomial};
 
-/// Theta with the roots of C drawn towards the origin, `c_i rho^i`, and with pairs of them turned off the real axis: starts for a
-/// search that ended on the unit circle.
+/// Theta with the roots of C drawn towards the origin, `c_i rho^i`, and with pairs of them turned
+/// off the real axis: starts for a search that ended on the unit circle.
 pub(crate) fn with_c_drawn_inside(o: &Orders, theta: &[f64]) -> Vec<Vec<f64>> {
     let block = o.na + o.nb..o.na + o.nb + o.nc;
     let c = &theta[block.clone()];

@@ -1,11 +1,13 @@
 //! A start from the low-passed record: few samples, and a loss with few minima.
 //!
-//! Input and output pass the same moving average over K samples and are taken every K samples; the system between them is, at
-//! low frequencies, the same with its poles raised to the power K. There the search runs to its end from each of a few poles
-//! of the grid for about 1/K of the cost, and the poles of the minimum that it finds, taken back by the K-th root, start the
-//! search on the record itself. The delay becomes a fraction of a sample, so that B gets one coefficient more.
+//! Input and output pass the same moving average over K samples and are taken every K samples; the
+//! system between them is, at low frequencies, the same with its poles raised to the power K. There
+//! the search runs to its end from each of a few poles of the grid for about 1/K of the cost, and
+//! the poles of the minimum that it finds, taken back by the K-th root, start the search on the
+//! record itself. The delay becomes a fraction of a sample, so that B gets one coefficient more.
 //!
-//! Only a start: where the system is fast beside K samples it is a bad one, and others are tried as well.
+//! Only a start: where the system is fast beside K samples it is a bad one, and others are tried as
+//! well.
 
 use hoid_model::{Complex64, Orders, SampleTime, polynomial, polynomial_model::monic};
 
@@ -32,16 +34,18 @@ const SEARCH: SearchOptions = SearchOptions {
     tolerance: 1e-6,
 };
 
-/// `|ln z|` of a pole of the averaged record below which it lies well inside what the average leaves (its Nyquist frequency
-/// is pi).
+/// `|ln z|` of a pole of the averaged record below which it lies well inside what the average
+/// leaves (its Nyquist frequency is pi).
 const SLOW: f64 = 1.3;
 
 /// The poles that the averaged record gives.
 #[derive(Debug, Default)]
 pub(crate) struct SlowPoles {
-    /// Polynomials F, best first; none where the records are short or the model has no poles in F alone.
+    /// Polynomials F, best first; none where the records are short or the model has no poles in F
+    /// alone.
     pub f: Vec<Vec<f64>>,
-    /// True when all poles of the best one are slow beside the average, so that it determines nearly all that the record does.
+    /// True when all poles of the best one are slow beside the average, so that it determines
+    /// nearly all that the record does.
     pub complete: bool,
 }
 
@@ -110,8 +114,8 @@ impl AveragedRecords {
     }
 }
 
-/// The search on the averaged records: the places of the pole grid are ranked with one noise model, that of the first of them, and the best
-/// are searched from.
+/// The search on the averaged records: the places of the pole grid are ranked with one noise model,
+/// that of the first of them, and the best are searched from.
 pub(crate) struct Continuation<'c> {
     low: &'c Criterion<'c>,
     factor: usize,
@@ -238,8 +242,8 @@ fn averaged(x: &[f64], factor: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The polynomial whose roots are the principal K-th roots; `None` where a root has none that is real with it (on the closed
-/// negative axis).
+/// The polynomial whose roots are the principal K-th roots; `None` where a root has none that is
+/// real with it (on the closed negative axis).
 fn root_of_poles(f: &[f64], factor: usize) -> Option<Vec<f64>> {
     let k = factor as f64;
     let roots: Option<Vec<Complex64>> = polynomial::roots(&monic(f))?

@@ -1,21 +1,27 @@
 //! Starts of the Box-Jenkins search, so that the user need not guess.
 //!
-//! The poles decide: given F, the model is linear in B, and given B and F the noise model is a linear
-//! autoregression. So each start is a proposal for F that is completed by linear least squares:
+//! The poles decide: given F, the model is linear in B, and given B and F the noise model is a
+//! linear autoregression. So each start is a proposal for F that is completed by linear least
+//! squares:
 //!
-//! 1. `low-pass continuation`: the minimum on the averaged record ([`crate::initial_guess::continuation`]), searched from the pole grid.
-//! 2. `pole grid`, where the record is too short for that: for two poles and more, neuromuscular frequencies from 3 to 24 rad/s
-//!    with damping 0.25 and 0.7, the range of human operators, through the exact zero-order hold.
-//! 3. `steiglitz-mcbride`: ARX, and again on input and output filtered by 1/F of the step before, a few times (K. Steiglitz and
-//!    L. E. McBride, *IEEE Trans. Automatic Control* 10 (1965) 461-464). The `arx` poles themselves, badly biased where the
-//!    noise poles are not those of the system (m0 = 1: a2 near 0), only where that fails.
-//! 4. `high-order arx`: an ARX model with so many poles that the noise has some of its own, and the poles of its noise-free response
-//!    by Steiglitz and McBride (B. Wahlberg, *Automatica* 25 (1989) 829-841, in its simplest form).
-//! 5. `instruments`: ARX, instrumental variables twice, the residual, C and D from it ([`crate::iv`]).
+//! 1. `low-pass continuation`: the minimum on the averaged record
+//!    ([`crate::initial_guess::continuation`]), searched from the pole grid.
+//! 2. `pole grid`, where the record is too short for that: for two poles and more, neuromuscular
+//!    frequencies from 3 to 24 rad/s with damping 0.25 and 0.7, the range of human operators,
+//!    through the exact zero-order hold.
+//! 3. `steiglitz-mcbride`: ARX, and again on input and output filtered by 1/F of the step before, a
+//!    few times (K. Steiglitz and L. E. McBride, *IEEE Trans. Automatic Control* 10 (1965)
+//!    461-464). The `arx` poles themselves, badly biased where the noise poles are not those of the
+//!    system (m0 = 1: a2 near 0), only where that fails.
+//! 4. `high-order arx`: an ARX model with so many poles that the noise has some of its own, and the
+//!    poles of its noise-free response by Steiglitz and McBride (B. Wahlberg, *Automatica* 25
+//!    (1989) 829-841, in its simplest form).
+//! 5. `instruments`: ARX, instrumental variables twice, the residual, C and D from it
+//!    ([`crate::iv`]).
 //!
-//! The last three only where the poles of the first are not all slow beside its average: there it determines nearly all that the record
-//! does. The proposals are ranked by their loss with the initial states eliminated; the search runs from the best of them, and the
-//! best minimum wins.
+//! The last three only where the poles of the first are not all slow beside its average: there it
+//! determines nearly all that the record does. The proposals are ranked by their loss with the
+//! initial states eliminated; the search runs from the best of them, and the best minimum wins.
 
 use hoid_model::{Orders, SampleTime, polynomial::reflected_inside};
 
@@ -103,7 +109,8 @@ fn from_poles(
     starts
 }
 
-/// Proposals for F with A, B and a noise model of their own: to be found, or found where A or C takes part.
+/// Proposals for F with A, B and a noise model of their own: to be found, or found where A or C
+/// takes part.
 fn completed(criterion: &Criterion<'_>, proposals: Vec<(String, Vec<f64>)>, workspace: &mut Workspace) -> Vec<Start> {
     let o = &criterion.orders;
     let in_steps = o.na + o.nc == 0 && criterion.initial != InitialState::Backcast;
@@ -119,7 +126,8 @@ fn completed(criterion: &Criterion<'_>, proposals: Vec<(String, Vec<f64>)>, work
         .collect()
 }
 
-/// The pole grid, best first: all are ranked with the noise model of the first one, which costs one pass each.
+/// The pole grid, best first: all are ranked with the noise model of the first one, which costs one
+/// pass each.
 fn ranked_grid(
     criterion: &Criterion<'_>,
     sample_time: SampleTime,
@@ -144,9 +152,10 @@ fn ranked_grid(
     ranked.into_iter().take(count).map(|(label, f, _)| (label, f)).collect()
 }
 
-/// Theta and sum of squares for a given F: A and B by least squares, the noise model by autoregression of what is left, and A
-/// and B once more with that noise model. With A in the model that is repeated: A and the noise model depend on each other
-/// (generalised least squares; D. W. Clarke, *IFAC Symposium on Identification*, Prague 1967).
+/// Theta and sum of squares for a given F: A and B by least squares, the noise model by
+/// autoregression of what is left, and A and B once more with that noise model. With A in the model
+/// that is repeated: A and the noise model depend on each other (generalised least squares; D. W.
+/// Clarke, *IFAC Symposium on Identification*, Prague 1967).
 fn complete(criterion: &Criterion<'_>, f: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, f64)> {
     let o = criterion.orders;
     let linear = o.na + o.nb;
@@ -182,9 +191,9 @@ fn complete(criterion: &Criterion<'_>, f: &[f64], workspace: &mut Workspace) -> 
     Some((theta, value))
 }
 
-/// Starts of a model of the output alone, `u = (C/A) eps`: A and C by Hannan and Rissanen, which cancel each other in part where
-/// the roots of C are near the unit circle and the long autoregression is too short; and A by its own autoregression, with the
-/// same C and with C = 1.
+/// Starts of a model of the output alone, `u = (C/A) eps`: A and C by Hannan and Rissanen, which
+/// cancel each other in part where the roots of C are near the unit circle and the long
+/// autoregression is too short; and A by its own autoregression, with the same C and with C = 1.
 fn time_series(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Start> {
     let o = criterion.orders;
     let outputs: Vec<Vec<f64>> = criterion.data.iter().map(|d| d.u.to_vec()).collect();
@@ -251,8 +260,8 @@ mod tests {
         let refined = steiglitz_mcbride(&criterion, arx.clone(), &mut workspace).unwrap();
         let reduced = reduced_arx(&criterion, &mut workspace).unwrap();
         let off = |f: &[f64]| (f[0] + 1.5).abs().max((f[1] - 0.7).abs());
-        // The equation error and Steiglitz and McBride, who take the noise for 1/A and for white, pay for its colour; a model that
-        // has room for its poles does not.
+        // The equation error and Steiglitz and McBride, who take the noise for 1/A and for white,
+        // pay for its colour; a model that has room for its poles does not.
         assert!(off(&arx) > 0.05 && off(&refined) > 0.05, "{arx:?} {refined:?}");
         assert!(off(&reduced) < 0.02, "{reduced:?}");
         let starts = initial_guesses(&criterion, SampleTime::HUNDREDTH, &mut workspace);

@@ -1,9 +1,11 @@
-//! A start for the prediction error method by a chain of instrumental variables (L. Ljung, *System Identification*, 1999, section
-//! 10.6): ARX by least squares, instruments simulated with it, the IV estimate, instruments and estimate once more, the residual of
-//! that system, a long autoregression of it, and C and D by regression on past residuals and past innovations.
+//! A start for the prediction error method by a chain of instrumental variables (L. Ljung, *System
+//! Identification*, 1999, section 10.6): ARX by least squares, instruments simulated with it, the
+//! IV estimate, instruments and estimate once more, the residual of that system, a long
+//! autoregression of it, and C and D by regression on past residuals and past innovations.
 //!
-//! Consistent in an open loop for any noise; in a closed loop biased by as much as the input follows the noise, which is little where
-//! the loop has a delay longer than the memory of the noise. About ten passes over the data.
+//! Consistent in an open loop for any noise; in a closed loop biased by as much as the input
+//! follows the noise, which is little where the loop has a delay longer than the memory of the
+//! noise. About ten passes over the data.
 
 use hoid_model::Orders;
 
@@ -15,8 +17,8 @@ use crate::{
     optimize::Objective,
 };
 
-/// Theta for the orders of the criterion; `None` where A and F are both there (the chain does not tell their poles apart), where
-/// there is no input, and where the data do not carry it.
+/// Theta for the orders of the criterion; `None` where A and F are both there (the chain does not
+/// tell their poles apart), where there is no input, and where the data do not carry it.
 pub(crate) fn instrument_chain(criterion: &Criterion<'_>) -> Option<Vec<f64>> {
     let o = criterion.orders;
     if o.nb == 0 || (o.na > 0 && o.nf > 0) {
@@ -114,7 +116,8 @@ mod tests {
         for (orders, u, truth) in cases {
             let theta = chain(orders, Data { e: &e, u: &u }).unwrap();
             for (found, truth) in theta.iter().zip(truth) {
-                // 20 000 samples leave 2 % on these coefficients by instruments that are not the best.
+                // 20 000 samples leave 2 % on these coefficients by instruments that are not the
+                // best.
                 assert!((found - truth).abs() < 0.08, "{orders}: {found} {truth}");
             }
         }

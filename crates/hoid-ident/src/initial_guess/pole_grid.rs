@@ -1,5 +1,5 @@
-//! Poles in the range of human operators: F of an operator's neuromuscular system at a few frequencies and dampings, through the exact
-//! zero-order hold.
+//! Poles in the range of human operators: F of an operator's neuromuscular system at a few
+//! frequencies and dampings, through the exact zero-order hold.
 
 use hoid_model::{Complex64, SampleTime, polynomial};
 

@@ -1,13 +1,16 @@
 //! Starts for models whose A stands beside a noise model or beside F: which poles belong to A?
 //!
-//! A belongs to the system and to the noise, F to the system and D to the noise alone, and the loss has a minimum at many a
-//! confusion of them: ARARX with a1 = -0.65, a2 = 0.11, d1 = -0.93 ends 40 % too high from least squares, the pole of D in A.
-//! So the poles come from fits that know nothing of the division, and every way to deal them out is a start:
+//! A belongs to the system and to the noise, F to the system and D to the noise alone, and the loss
+//! has a minimum at many a confusion of them: ARARX with a1 = -0.65, a2 = 0.11, d1 = -0.93 ends 40
+//! % too high from least squares, the pole of D in A. So the poles come from fits that know nothing
+//! of the division, and every way to deal them out is a start:
 //!
 //! - the poles of the system, A F, from instruments, which no coloured noise biases in an open loop
-//!   ([`crate::iv`]): any na of them are A, the rest F, and the noise model follows from what is left;
-//! - all poles, A D F, from an ARX model with nd more coefficients in A and in B, which is ARARX without its common factor: any nd
-//!   of them are D, any nf of the rest F, and A and B follow by least squares.
+//!   ([`crate::iv`]): any na of them are A, the rest F, and the noise model follows from what is
+//!   left;
+//! - all poles, A D F, from an ARX model with nd more coefficients in A and in B, which is ARARX
+//!   without its common factor: any nd of them are D, any nf of the rest F, and A and B follow by
+//!   least squares.
 //!
 //! A few steps of the search from each tell which of them lead down.
 
@@ -33,7 +36,8 @@ pub(crate) fn concerns(o: &Orders) -> bool {
     o.na > 0 && o.nb > 0 && o.nc + o.nd + o.nf > 0
 }
 
-/// The best starts of both kinds and of `others`, after a few steps of the search, with their sums of squares.
+/// The best starts of both kinds and of `others`, after a few steps of the search, with their sums
+/// of squares.
 pub(crate) fn initial_guesses(criterion: &Criterion<'_>, others: Vec<Start>, workspace: &mut Workspace) -> Vec<Start> {
     let mut starts = others;
     starts.extend(from_instruments(criterion, workspace));
@@ -111,7 +115,8 @@ fn from_long_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<St
     starts
 }
 
-/// A start with given A, B and F: the noise model from the residual, and A and B once more with that noise model.
+/// A start with given A, B and F: the noise model from the residual, and A and B once more with
+/// that noise model.
 fn start(
     label: &str,
     criterion: &Criterion<'_>,

@@ -5,14 +5,14 @@ use crate::linalg::least_squares::{add_scaled, dot};
 /// Columns over the rows of all records, one after the other.
 pub(crate) type Columns = Vec<Vec<f64>>;
 
-/// Part of a column that must be its own, in amplitude, for it not to count as a combination of those before it. Twice
-/// orthogonalised columns keep 1e-15.
+/// Part of a column that must be its own, in amplitude, for it not to count as a combination of
+/// those before it. Twice orthogonalised columns keep 1e-15.
 const OWN_PART: f64 = 1e-10;
 /// Longest invented past in samples.
 const PAST: usize = 256;
 
-/// The signal behind an invented past, and the length of that past: reflected at the first sample and faded in, so that what is
-/// simulated from it starts without a jump.
+/// The signal behind an invented past, and the length of that past: reflected at the first sample
+/// and faded in, so that what is simulated from it starts without a jump.
 pub(super) fn with_past(x: &[f64]) -> (Vec<f64>, usize) {
     let length = PAST.min(x.len().saturating_sub(1));
     let fade = |k: usize| 0.5 + 0.5 * (std::f64::consts::PI * k as f64 / (length + 1) as f64).cos();
@@ -21,7 +21,8 @@ pub(super) fn with_past(x: &[f64]) -> (Vec<f64>, usize) {
     (extended, length)
 }
 
-/// Orthonormal basis of the columns by Gram-Schmidt, twice, and the indices of the columns that have a part of their own.
+/// Orthonormal basis of the columns by Gram-Schmidt, twice, and the indices of the columns that
+/// have a part of their own.
 pub(super) fn orthonormal(columns: &[Vec<f64>]) -> (Columns, Vec<usize>) {
     let mut q: Columns = Vec::new();
     let mut kept = Vec::new();

@@ -1,9 +1,10 @@
 //! The covariance of an estimate by instrumental variables, for a residual of any colour.
 //!
-//! For a residual with the covariance matrix R, independent of Z,
-//! `(Z' Phi)^-1 Z' R Z (Phi' Z)^-1` (T. Söderström and P. Stoica, *Instrumental Variable Methods for System Identification*, 1983,
-//! ch. 5). R is that of a long autoregression `D r = eps` of the residual: `Z' R Z = lambda (H'Z)' (H'Z)`, with H' the filter 1/D run
-//! backwards in time. Where the filter has made the residual white it is Ljung's (15.29), `lambda (Z'Z)^-1` for Z = Phi.
+//! For a residual with the covariance matrix R, independent of Z, `(Z' Phi)^-1 Z' R Z (Phi' Z)^-1`
+//! (T. Söderström and P. Stoica, *Instrumental Variable Methods for System Identification*, 1983,
+//! ch. 5). R is that of a long autoregression `D r = eps` of the residual:
+//! `Z' R Z = lambda (H'Z)' (H'Z)`, with H' the filter 1/D run backwards in time. Where the filter
+//! has made the residual white it is Ljung's (15.29), `lambda (Z'Z)^-1` for Z = Phi.
 
 use hoid_core::filter::{divide_in_place, multiply};
 use hoid_model::polynomial::reflected_inside;
@@ -36,8 +37,8 @@ fn coloured_noise(residual: &[Vec<f64>], parameters: usize) -> (Vec<f64>, f64) {
     (d, total / rows.max(1) as f64 * freedom)
 }
 
-/// `(Z' Phi)^-1 lambda K' K (Phi' Z)^-1` by rows, where K is Z with the spectrum of the residual applied to those columns that do
-/// not depend on it. `None` where `Z' Phi` has no inverse.
+/// `(Z' Phi)^-1 lambda K' K (Phi' Z)^-1` by rows, where K is Z with the spectrum of the residual
+/// applied to those columns that do not depend on it. `None` where `Z' Phi` has no inverse.
 pub(super) fn covariance(
     z: &[Vec<f64>],
     phi: &[Vec<f64>],
@@ -109,7 +110,8 @@ mod tests {
         let gram = DMatrix::from_fn(2, 2, |i, j| dot(&z[i], &z[j]));
         let expected = gram.try_inverse().unwrap() / 12.0;
         for i in 0..2 {
-            // The spectrum of 5000 samples at one frequency, by an autoregression of order 30: 1 standard error is 11 %.
+            // The spectrum of 5000 samples at one frequency, by an autoregression of order 30: 1
+            // standard error is 11 %.
             let ratio = found[3 * i] / expected[(i, i)];
             assert!((0.6..1.6).contains(&ratio), "{ratio}");
         }

@@ -1,11 +1,13 @@
 //! The filtered equation, its instruments and its solution.
 //!
-//! With poles `f_1 .. f_n` (of A or F) the equation reads `u(t) = -f_1 u(t-1) - .. + b_0 e(t-nk) + .. + r(t)`; a filter L is applied to
-//! each of its columns, at rest at the first row. The instruments are the same columns made of the noise-free input x and of
-//! `(B/F) q^-nk x`, under the same filter.
+//! With poles `f_1 .. f_n` (of A or F) the equation reads
+//! `u(t) = -f_1 u(t-1) - .. + b_0 e(t-nk) + .. + r(t)`; a filter L is applied to each of its
+//! columns, at rest at the first row. The instruments are the same columns made of the noise-free
+//! input x and of `(B/F) q^-nk x`, under the same filter.
 //!
-//! **Solution.** `Z = Q T` with orthonormal Q (Gram-Schmidt, twice), then `Q' Phi theta = Q' y` by QR with column pivoting: the
-//! condition of Z does not enter twice, and the rank is decided as for least squares.
+//! **Solution.** `Z = Q T` with orthonormal Q (Gram-Schmidt, twice), then `Q' Phi theta = Q' y` by
+//! QR with column pivoting: the condition of Z does not enter twice, and the rank is decided as for
+//! least squares.
 
 use std::{borrow::Cow, ops::Range};
 
@@ -33,7 +35,8 @@ pub(crate) struct Prefilter<'p> {
 }
 
 impl Prefilter<'_> {
-    /// The filtered signal from the first sample at which D has all its samples; 1/(C F) is at rest there.
+    /// The filtered signal from the first sample at which D has all its samples; 1/(C F) is at rest
+    /// there.
     fn apply(&self, x: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; x.len()];
         multiply(self.d, x, &mut y);
@@ -63,7 +66,8 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Data, noise-free inputs and orders. The system is a vector `[f_1 .. f_n, b_0 .. ]`, with A in place of F for ARX.
+/// Data, noise-free inputs and orders. The system is a vector `[f_1 .. f_n, b_0 .. ]`, with A in
+/// place of F for ARX.
 pub(crate) struct IvProblem<'a> {
     pub poles: usize,
     pub nb: usize,
@@ -154,7 +158,8 @@ impl<'a> IvProblem<'a> {
         output
     }
 
-    /// The filtered equation with instruments from the noise-free inputs and what this system (with stable F) makes of them.
+    /// The filtered equation with instruments from the noise-free inputs and what this system (with
+    /// stable F) makes of them.
     pub fn equation(&self, filter: Prefilter<'_>, system: &[f64]) -> Equation {
         let measured: Vec<(&[f64], &[f64])> = self.data.iter().map(|d| (d.u, d.e)).collect();
         let mut equation = Equation {

@@ -31,8 +31,8 @@ pub struct InstrumentalVariable {
     pub instruments: Instruments,
     /// Largest number of iterations of the refined methods. Default 100.
     pub max_iterations: usize,
-    /// The refined methods have settled when an iteration moves theta by less than this share of its standard errors. Default
-    /// 1e-4.
+    /// The refined methods have settled when an iteration moves theta by less than this share of
+    /// its standard errors. Default 1e-4.
     pub tolerance: f64,
 }
 
@@ -120,7 +120,8 @@ impl InstrumentalVariable {
         })
     }
 
-    /// Refuses fewer rows of the filtered equation than parameters and initial states of the filter.
+    /// Refuses fewer rows of the filtered equation than parameters and initial states of the
+    /// filter.
     fn check_rows(&self, problem: &IvProblem<'_>, records: &[Record]) -> Result<(), IdentError> {
         let o = &self.orders;
         let states = o.nf + o.nc;

@@ -1,20 +1,25 @@
 //! The part of the input that follows an external signal.
 //!
-//! In a closed loop `e = S f_t + (a response to the noise)`. The response to f_t is estimated as an expansion in Laguerre filters
+//! In a closed loop `e = S f_t + (a response to the noise)`. The response to f_t is estimated as an
+//! expansion in Laguerre filters
 //!
 //! `L_0 = sqrt(1 - p^2) / (1 - p q^-1)`,  `L_k = L_{k-1} (q^-1 - p) / (1 - p q^-1)`
 //!
-//! whose weights are found by least squares (B. Wahlberg, *IEEE Trans. Automatic Control* 36 (1991) 551-562). A few dozen of them
-//! span the seconds that a loop remembers, where a finite impulse response would need hundreds of lags; the expansion is always
-//! stable; and for a sum of sinusoids it is the projection on their lines.
+//! whose weights are found by least squares (B. Wahlberg, *IEEE Trans. Automatic Control* 36 (1991)
+//! 551-562). A few dozen of them span the seconds that a loop remembers, where a finite impulse
+//! response would need hundreds of lags; the expansion is always stable; and for a sum of sinusoids
+//! it is the projection on their lines.
 //!
-//! The sum is made of f_t alone, so that the noise can reach it only through the weights: the noise of the record at the very
-//! lines of f_t, which is a good part of it where noise and f_t are both slow. So the record is cut into blocks, and the instruments
-//! of a block are made with weights from the other blocks (split-sample instruments, J. D. Angrist and A. B. Krueger, *J. Business
-//! Econ. Stat.* 13 (1995) 225-235), whose noise is independent of that in the block. Poor weights then cost variance, not bias.
+//! The sum is made of f_t alone, so that the noise can reach it only through the weights: the noise
+//! of the record at the very lines of f_t, which is a good part of it where noise and f_t are both
+//! slow. So the record is cut into blocks, and the instruments of a block are made with weights
+//! from the other blocks (split-sample instruments, J. D. Angrist and A. B. Krueger, *J. Business
+//! Econ. Stat.* 13 (1995) 225-235), whose noise is independent of that in the block. Poor weights
+//! then cost variance, not bias.
 //!
-//! The construction of instruments from an external signal is that of M. Gilson, H. Garnier, P. C. Young and P. Van den Hof, *IET
-//! Control Theory Appl.* 5 (2011) 1147-1154; they use the known controller, which is unknown for a human operator.
+//! The construction of instruments from an external signal is that of M. Gilson, H. Garnier, P. C.
+//! Young and P. Van den Hof, *IET Control Theory Appl.* 5 (2011) 1147-1154; they use the known
+//! controller, which is unknown for a human operator.
 
 use std::{borrow::Cow, ops::Range};
 
@@ -40,7 +45,8 @@ const FILTERS: usize = 24;
 const SAMPLES_EACH: usize = 10;
 /// Blocks whose input is made with weights from the others.
 const BLOCKS: usize = 4;
-/// Pull of the weights to zero, against filters whose output lies in one block alone. The scale of an instrument does not matter.
+/// Pull of the weights to zero, against filters whose output lies in one block alone. The scale of
+/// an instrument does not matter.
 const RIDGE: f64 = 0.02;
 
 /// The external signal of each record.
@@ -82,7 +88,8 @@ pub(super) fn signals<'a>(records: &'a [Record], name: &str) -> Result<Vec<&'a [
     Ok(found)
 }
 
-/// The part of each input that follows the external signals, once for each block of samples with weights from the others.
+/// The part of each input that follows the external signals, once for each block of samples with
+/// weights from the others.
 pub(super) fn noise_free<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Source<'a>> {
     let inputs: Vec<&[f64]> = data.iter().map(|d| d.e).collect();
     let lengths: Vec<usize> = inputs.iter().map(|e| e.len()).collect();
@@ -136,7 +143,8 @@ fn combination(basis: &[Vec<f64>], weights: &[f64], samples: usize) -> Vec<f64> 
     sum
 }
 
-/// Orthonormal basis of the filters' outputs, over all records, with the time constant that explains most of the targets.
+/// Orthonormal basis of the filters' outputs, over all records, with the time constant that
+/// explains most of the targets.
 fn best_basis(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
     let target = targets.concat();
     let filters = FILTERS.min(target.len() / SAMPLES_EACH).max(1);

@@ -10,18 +10,18 @@ pub const FORCING_CHANNEL: &str = "f_t";
 /// What the instruments are made of.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Instruments {
-    /// The input itself and the output that the model simulates from it. For an open loop: in a closed one the input carries the
-    /// noise, and the estimate is biased.
+    /// The input itself and the output that the model simulates from it. For an open loop: in a
+    /// closed one the input carries the noise, and the estimate is biased.
     #[default]
     Simulated,
-    /// The part of the input that follows this channel, which the noise does not reach: the forcing function f_t or a known
-    /// disturbance. For a closed loop.
+    /// The part of the input that follows this channel, which the noise does not reach: the forcing
+    /// function f_t or a known disturbance. For a closed loop.
     External(String),
 }
 
 impl Instruments {
-    /// The forcing function f_t where all records have it: in a closed loop it is the signal that the noise does not reach. Else those that
-    /// are simulated.
+    /// The forcing function f_t where all records have it: in a closed loop it is the signal that
+    /// the noise does not reach. Else those that are simulated.
     pub fn usual(records: &[Record]) -> Self {
         if records.iter().all(|r| r.channel(FORCING_CHANNEL).is_some()) {
             Self::External(FORCING_CHANNEL.to_owned())

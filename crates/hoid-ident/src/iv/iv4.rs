@@ -1,13 +1,16 @@
-//! The four-step instrumental variable method (L. Ljung, *System Identification*, 1999, section 15.3, eq. 15.21-15.26).
+//! The four-step instrumental variable method (L. Ljung, *System Identification*, 1999, section
+//! 15.3, eq. 15.21-15.26).
 //!
 //! 1. Least squares of `A u = B q^-nk e + v`.
 //! 2. Instruments simulated with that A and B; first IV estimate.
 //! 3. Autoregression `L v = eps` of what is left.
 //! 4. Instruments simulated with the second A and B; IV estimate of the equation filtered with L.
 //!
-//! Consistent whatever v is; of the smallest variance where L makes v white. In the closed-loop form the simulations start from the
-//! noise-free input. The book takes L of the order na + nb, as an example; here it is four times that, because v of a process that
-//! is sampled fast (`A = F`, `v = F n` with noise n) has zeros near the unit circle, which an autoregression needs many terms for.
+//! Consistent whatever v is; of the smallest variance where L makes v white. In the closed-loop
+//! form the simulations start from the noise-free input. The book takes L of the order na + nb, as
+//! an example; here it is four times that, because v of a process that is sampled fast (`A = F`,
+//! `v = F n` with noise n) has zeros near the unit circle, which an autoregression needs many terms
+//! for.
 
 use hoid_model::Structure;
 

@@ -1,4 +1,5 @@
-//! The methods of instrumental variables. A new one is a file with its [`Algorithm`] and a line in the list below.
+//! The methods of instrumental variables. A new one is a file with its [`Algorithm`] and a line in
+//! the list below.
 
 use std::fmt;
 

@@ -1,12 +1,14 @@
 //! Instrumental variables.
 //!
-//! The equation `y = Phi theta + r` of a model that is linear in theta (A or F of the denominator, and B) gives a biased least
-//! squares estimate where r is correlated with the regressors, as past outputs always are and, in a closed loop, inputs too.
-//! With instruments Z that follow the regressors but not the noise,
+//! The equation `y = Phi theta + r` of a model that is linear in theta (A or F of the denominator,
+//! and B) gives a biased least squares estimate where r is correlated with the regressors, as past
+//! outputs always are and, in a closed loop, inputs too. With instruments Z that follow the
+//! regressors but not the noise,
 //!
-//! `Z' Phi theta = Z' y`                                                        (L. Ljung, *System Identification*, 1999, eq. 7.118)
+//! `Z' Phi theta = Z' y` (L. Ljung, *System Identification*, 1999, eq. 7.118)
 //!
-//! is consistent whatever the noise. The methods differ in their instruments and in the filter that is applied to the equation:
+//! is consistent whatever the noise. The methods differ in their instruments and in the filter that
+//! is applied to the equation:
 //!
 //! | method | model | filter |
 //! |---|---|---|
@@ -14,14 +16,17 @@
 //! | [`IvMethod::Sriv`] | `u = (B/F) q^-nk e + eps` | 1/F, repeated |
 //! | [`IvMethod::RivBj`] | `u = (B/F) q^-nk e + (C/D) eps` | D/(C F), repeated |
 //!
-//! and instruments are made of an input that holds no noise: e itself in an open loop, and the part of e that follows an external
-//! signal such as the forcing function f_t in a closed one ([`Instruments`]).
+//! and instruments are made of an input that holds no noise: e itself in an open loop, and the part
+//! of e that follows an external signal such as the forcing function f_t in a closed one
+//! ([`Instruments`]).
 //!
-//! **Pre-history.** Rows of the filtered equation are used from the first sample at which all of `D (F u - B q^-nk e)` lies inside the
-//! record. What is then unknown, the free response of 1/(C F), is projected out of every column, record by record. Signals that are
-//! simulated for the instruments get an invented past (the record reflected at its first sample, faded in); it does not matter for
-//! consistency, only for how well the instruments follow the regressors: a jump at the start, raised by D, would outweigh all
-//! that follows. Several records add up, row by row, with a common theta.
+//! **Pre-history.** Rows of the filtered equation are used from the first sample at which all of
+//! `D (F u - B q^-nk e)` lies inside the record. What is then unknown, the free response of 1/(C
+//! F), is projected out of every column, record by record. Signals that are simulated for the
+//! instruments get an invented past (the record reflected at its first sample, faded in); it does
+//! not matter for consistency, only for how well the instruments follow the regressors: a jump at
+//! the start, raised by D, would outweigh all that follows. Several records add up, row by row,
+//! with a common theta.
 
 //!
 //! | module | what it holds |

@@ -1,12 +1,14 @@
 //! The iteration that the refined methods share.
 //!
-//! Given a system, its noise-free output is simulated, the filter `D/(C F)` is built, and the filtered equation gives the next
-//! system, until an iteration moves it by less than the tolerance: with `delta` the step and sigma the standard deviation of the
-//! filtered residual, `|Z delta| <= tolerance sigma`, which is a distance in standard errors.
+//! Given a system, its noise-free output is simulated, the filter `D/(C F)` is built, and the
+//! filtered equation gives the next system, until an iteration moves it by less than the tolerance:
+//! with `delta` the step and sigma the standard deviation of the filtered residual,
+//! `|Z delta| <= tolerance sigma`, which is a distance in standard errors.
 //!
-//! **Start.** Input and output are replaced by the parts of them that follow the noise-free input (Laguerre expansion), and a few
-//! iterations of K. Steiglitz and L. E. McBride (*IEEE Trans. Automatic Control* 10 (1965) 461-464) on these give a system that is
-//! close in open and closed loop alike. Least squares on the data themselves serves where that fails.
+//! **Start.** Input and output are replaced by the parts of them that follow the noise-free input
+//! (Laguerre expansion), and a few iterations of K. Steiglitz and L. E. McBride (*IEEE Trans.
+//! Automatic Control* 10 (1965) 461-464) on these give a system that is close in open and closed
+//! loop alike. Least squares on the data themselves serves where that fails.
 
 use crate::{
     IdentError, Reason, Termination,

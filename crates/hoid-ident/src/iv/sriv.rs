@@ -1,8 +1,10 @@
-//! Simplified refined instrumental variable for `u = (B/F) q^-nk e + eps` (P. C. Young and A. J. Jakeman, *Int. J. Control* 29 (1979)
-//! 1-30; P. C. Young, *Recursive Estimation and Time-Series Analysis*, 2nd ed. 2011, ch. 6).
+//! Simplified refined instrumental variable for `u = (B/F) q^-nk e + eps` (P. C. Young and A. J.
+//! Jakeman, *Int. J. Control* 29 (1979) 1-30; P. C. Young, *Recursive Estimation and Time-Series
+//! Analysis*, 2nd ed. 2011, ch. 6).
 //!
-//! The equation `F u = B q^-nk e + F eps` is filtered with 1/F of the iteration before, which makes its noise eps again. Consistent
-//! for coloured eps as well, of the smallest variance for white eps; the covariance is that of the colour found.
+//! The equation `F u = B q^-nk e + F eps` is filtered with 1/F of the iteration before, which makes
+//! its noise eps again. Consistent for coloured eps as well, of the smallest variance for white
+//! eps; the covariance is that of the colour found.
 
 use hoid_model::Structure;
 

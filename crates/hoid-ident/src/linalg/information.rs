@@ -1,14 +1,16 @@
 //! The inverse of an information matrix, and which parameters it leaves open.
 //!
-//! `psi' psi` is scaled to a unit diagonal, so that units do not matter, and inverted by its eigenvalues: one that is zero up to
-//! rounding belongs to a combination of parameters that the data do not determine, and its eigenvector names them.
+//! `psi' psi` is scaled to a unit diagonal, so that units do not matter, and inverted by its
+//! eigenvalues: one that is zero up to rounding belongs to a combination of parameters that the
+//! data do not determine, and its eigenvector names them.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use crate::IdentError;
 
-/// Eigenvalue of the information matrix (scaled to a unit diagonal) below which a combination of parameters counts as not
-/// determined by the data. Rounding leaves about 1e-15 times the number of parameters.
+/// Eigenvalue of the information matrix (scaled to a unit diagonal) below which a combination of
+/// parameters counts as not determined by the data. Rounding leaves about 1e-15 times the number of
+/// parameters.
 const SINGULAR: f64 = 1e-13;
 
 /// Inverse of the information matrix (by rows) of the named parameters.
@@ -52,7 +54,8 @@ pub(crate) fn inverse_information(gram: &[f64], names: &[String]) -> Result<Vec<
     Ok(inverse)
 }
 
-/// The inverse for the free parameters alone; rows and columns of the others are zero, as those parameters have no variance.
+/// The inverse for the free parameters alone; rows and columns of the others are zero, as those
+/// parameters have no variance.
 ///
 /// # Errors
 /// As [`inverse_information`].

@@ -1,13 +1,15 @@
 //! Linear least squares by Householder QR with column pivoting.
 //!
-//! `min |y - X theta|^2` for a tall X stored by columns. Columns are scaled to unit length first, so that the decision about
-//! the rank does not depend on units; at each step the column with the largest rest is taken. The rank is the number of
-//! diagonal elements of R above `tolerance |R_11|`. Source: P. Businger and G. H. Golub, *Numer. Math.* 7 (1965) 269-276.
+//! `min |y - X theta|^2` for a tall X stored by columns. Columns are scaled to unit length first,
+//! so that the decision about the rank does not depend on units; at each step the column with the
+//! largest rest is taken. The rank is the number of diagonal elements of R above
+//! `tolerance |R_11|`. Source: P. Businger and G. H. Golub, *Numer. Math.* 7 (1965) 269-276.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Relative size of a diagonal element of R below which a column counts as dependent on those before it. Rounding alone
-/// leaves about 1e-15; regressors that determine their coefficients to a few digits lie above 1e-10.
+/// Relative size of a diagonal element of R below which a column counts as dependent on those
+/// before it. Rounding alone leaves about 1e-15; regressors that determine their coefficients to a
+/// few digits lie above 1e-10.
 pub(crate) const RANK_TOLERANCE: f64 = 1e-12;
 
 /// `X P = Q R` and `Q' y`, all that is needed of the data afterwards.
@@ -25,7 +27,8 @@ pub(crate) struct LeastSquares {
 }
 
 impl LeastSquares {
-    /// Factors the columns (each `rows` long, one after the other) together with the right-hand side. Both are overwritten.
+    /// Factors the columns (each `rows` long, one after the other) together with the right-hand
+    /// side. Both are overwritten.
     pub fn factor(columns: &mut [f64], y: &mut [f64]) -> Self {
         let rows = y.len();
         let p = columns.len().checked_div(rows).unwrap_or(0);
@@ -42,7 +45,8 @@ impl LeastSquares {
         let mut rank = 0;
         let steps = p.min(rows);
         for k in 0..steps {
-            // Rest of each column computed afresh: downdating the norms loses digits exactly where the rank is decided.
+            // Rest of each column computed afresh: downdating the norms loses digits exactly where
+            // the rank is decided.
             let rest = |j: usize, columns: &[f64]| {
                 let tail = &columns[j * rows + k..(j + 1) * rows];
                 dot(tail, tail)
@@ -181,8 +185,8 @@ impl LeastSquares {
     }
 }
 
-/// Solution of the positive definite system `gram x = rhs` (gram by rows) by Cholesky, scaled to a unit diagonal. `None` when
-/// it is not positive definite.
+/// Solution of the positive definite system `gram x = rhs` (gram by rows) by Cholesky, scaled to a
+/// unit diagonal. `None` when it is not positive definite.
 pub(crate) fn solve_symmetric(gram: &[f64], rhs: &[f64]) -> Option<Vec<f64>> {
     let p = rhs.len();
     let scale: Vec<f64> = (0..p).map(|i| gram[i * p + i].sqrt()).collect();
@@ -268,7 +272,8 @@ mod tests {
         for i in 0..3 {
             for j in 0..3 {
                 let product: f64 = (0..3).map(|k| dot(columns[i], columns[k]) * inverse[k * 3 + j]).sum();
-                // Units of the columns differ by 1e6; relative to that the identity holds to rounding.
+                // Units of the columns differ by 1e6; relative to that the identity holds to
+                // rounding.
                 let scale = (dot(columns[i], columns[i]) / dot(columns[j], columns[j])).sqrt();
                 assert!((product / scale - f64::from(u8::from(i == j))).abs() < 1e-12);
             }

@@ -1,11 +1,13 @@
 //! Sums of products of many columns, in one pass over each.
 //!
-//! A normal matrix needs the product of each pair of its columns. One column against four others at a time reads five numbers for
-//! four products, where single products read eight; and a column that is the one before it, a sample later, needs no pass:
-//! `sum x(t-1) y(t-1)` over a span is `sum x(t) y(t)` but for the samples at both ends.
+//! A normal matrix needs the product of each pair of its columns. One column against four others at
+//! a time reads five numbers for four products, where single products read eight; and a column that
+//! is the one before it, a sample later, needs no pass: `sum x(t-1) y(t-1)` over a span is
+//! `sum x(t) y(t)` but for the samples at both ends.
 //!
-//! Each product has partial sums of a fixed number and order, in registers that are chosen when the program runs ([`hoid_lanes::with_four_lanes`]): the bits
-//! are the same whatever the registers, whatever is summed beside, and in whatever stretches the record is read.
+//! Each product has partial sums of a fixed number and order, in registers that are chosen when the
+//! program runs ([`hoid_lanes::with_four_lanes`]): the bits are the same whatever the registers,
+//! whatever is summed beside, and in whatever stretches the record is read.
 
 use std::ops::Range;
 
@@ -13,8 +15,9 @@ use hoid_lanes::{FourLaneTask, FourLanes, with_four_lanes};
 
 use crate::linalg::least_squares::add_scaled;
 
-/// Samples that are read at a time: those of all columns stay in the nearest memory. A multiple of eight, the most partial sums of a product. For
-/// residuals the number is part of the last digits, since their sums are closed behind each stretch.
+/// Samples that are read at a time: those of all columns stay in the nearest memory. A multiple of
+/// eight, the most partial sums of a product. For residuals the number is part of the last digits,
+/// since their sums are closed behind each stretch.
 const STRETCH: usize = 512;
 
 /// Products of one column with four, two or one other.
@@ -49,7 +52,8 @@ impl<F: FourLanes> Tile<F> {
         }
     }
 
-    /// Adds the products over the whole blocks of a stretch. Named sums, because those of an array are kept in memory.
+    /// Adds the products over the whole blocks of a stretch. Named sums, because those of an array
+    /// are kept in memory.
     #[inline(always)]
     fn add<'a>(&mut self, column: impl Fn(usize) -> &'a [f64]) {
         let x = column(self.x);
@@ -84,7 +88,8 @@ impl<F: FourLanes> Tile<F> {
         self.sums = [s0, s1, s2, s3];
     }
 
-    /// The product of x with the k-th of ys over whole columns: the sums, and what lies behind the last whole block.
+    /// The product of x with the k-th of ys over whole columns: the sums, and what lies behind the
+    /// last whole block.
     #[inline(always)]
     fn total<'a>(&self, k: usize, column: impl Fn(usize) -> &'a [f64]) -> f64 {
         let (x, y) = (column(self.x), column(self.ys[k]));
@@ -183,8 +188,8 @@ pub(crate) struct Lagged<'a> {
 
 /// The symmetric matrix of the products of all columns, by rows.
 ///
-/// A column that follows none leads: it is multiplied with all columns at once. What is left are pairs of columns that both follow, which come
-/// from the pair before them.
+/// A column that follows none leads: it is multiplied with all columns at once. What is left are
+/// pairs of columns that both follow, which come from the pair before them.
 pub(crate) fn gram(columns: &[Lagged<'_>]) -> Vec<f64> {
     with_four_lanes(Gram(columns))
 }
@@ -241,10 +246,12 @@ fn ends(columns: &[Lagged<'_>], i: usize, j: usize) -> f64 {
     columns[i].values[0] * columns[j].values[0] - x[last] * y[last]
 }
 
-/// Which columns follow in the regression that is made most often: an output with two lags, an input with two.
+/// Which columns follow in the regression that is made most often: an output with two lags, an
+/// input with two.
 const TWO_OF_EACH: [bool; 5] = [false, true, true, false, true];
 
-/// The tiles of such a regression in one pass, which reads five numbers for nine products; tile by tile it would read twelve.
+/// The tiles of such a regression in one pass, which reads five numbers for nine products; tile by
+/// tile it would read twelve.
 #[inline(always)]
 fn add_two_of_each<F: FourLanes>(tiles: &mut [Tile<F>], columns: [&[f64]; 5]) {
     // u with the first four columns, u with the last, e with the last four.
@@ -269,7 +276,8 @@ fn add_two_of_each<F: FourLanes>(tiles: &mut [Tile<F>], columns: [&[f64]; 5]) {
         eu2 = eu2 + e * u2;
         let e1 = kind.load(e1);
         ee1 = ee1 + e * e1;
-        // The product alone has eight partial sums, in turn: with two blocks written out the sums would not fit in sixteen registers.
+        // The product alone has eight partial sums, in turn: with two blocks written out the sums
+        // would not fit in sixteen registers.
         (ue1, ue1_later) = (ue1_later, ue1 + u * e1);
     }
     by_u.sums = [uu, uu1, uu2, ue];
@@ -296,7 +304,8 @@ impl ResidualProducts {
         }
     }
 
-    /// Adds those of `y - sum_k factors_k x_k`, of which a stretch at a time is in memory. The first column is y.
+    /// Adds those of `y - sum_k factors_k x_k`, of which a stretch at a time is in memory. The
+    /// first column is y.
     pub fn add(&mut self, columns: &[Lagged<'_>], factors: &[f64]) {
         with_four_lanes(Residuals {
             columns,
@@ -352,7 +361,8 @@ impl FourLaneTask for Residuals<'_, '_> {
     }
 }
 
-/// Power and products of the residuals of four inputs over a whole stretch, which never leave the registers.
+/// Power and products of the residuals of four inputs over a whole stretch, which never leave the
+/// registers.
 #[inline(always)]
 fn of_four_inputs<F: FourLanes>(columns: [&[f64]; 5], factors: [f64; 4], zero: F) -> (f64, [f64; 4]) {
     let [y, a, b, c, d] = columns;

@@ -1,5 +1,6 @@
-//! A search by reverse communication: it names the theta at which it needs the linearisation of the criterion, and is updated
-//! with it. Whoever drives it decides how to linearise: alone, or for several records side by side.
+//! A search by reverse communication: it names the theta at which it needs the linearisation of the
+//! criterion, and is updated with it. Whoever drives it decides how to linearise: alone, or for
+//! several records side by side.
 
 use crate::{
     criterion::{Block, Criterion, Workspace},

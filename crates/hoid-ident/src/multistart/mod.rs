@@ -1,5 +1,5 @@
-//! Searches from several starts, driven from outside: what they need of the criterion is given to them, so that the searches of
-//! several records can run side by side.
+//! Searches from several starts, driven from outside: what they need of the criterion is given to
+//! them, so that the searches of several records can run side by side.
 //!
 //! | module | what it holds |
 //! |---|---|

@@ -1,11 +1,12 @@
 //! Searches from several starts of one criterion, one linearisation after the other.
 //!
-//! First what is left to find of each start, then the search from the best of them, and from the next ones. A start that turns out to lie in the
-//! basin of a minimum that is known is left out, and a search that comes close to one without a promise to end lower is stopped.
+//! First what is left to find of each start, then the search from the best of them, and from the
+//! next ones. A start that turns out to lie in the basin of a minimum that is known is left out,
+//! and a search that comes close to one without a promise to end lower is stopped.
 //!
-//! The searches do not evaluate the criterion themselves: they name the theta at which they need its linearisation and are
-//! updated with it (reverse communication), so that those of several records can run side by side
-//! ([`crate::pem::batched`]).
+//! The searches do not evaluate the criterion themselves: they name the theta at which they need
+//! its linearisation and are updated with it (reverse communication), so that those of several
+//! records can run side by side ([`crate::pem::batched`]).
 
 use hoid_model::Orders;
 
@@ -27,7 +28,8 @@ pub(crate) struct MultiStart<'s, O> {
     options: &'s SearchOptions,
     /// Starts from which there is a search at most.
     most: usize,
-    /// The starts; once nothing is left to find of them, those whose turn is still to come, the best last.
+    /// The starts; once nothing is left to find of them, those whose turn is still to come, the
+    /// best last.
     starts: Vec<Start>,
     /// The present search, with the label of its start.
     searching: Option<(String, GaussNewton<'s, O>)>,

@@ -13,7 +13,8 @@ use crate::{
 pub(crate) struct Start {
     pub label: String,
     pub theta: Vec<f64>,
-    /// The sum of squares there, once nothing is left to find; not finite where a regression was singular.
+    /// The sum of squares there, once nothing is left to find; not finite where a regression was
+    /// singular.
     pub value: f64,
     /// Polynomials that are still to be found, the next one last.
     left: Vec<Block>,
@@ -30,8 +31,8 @@ impl Start {
         }
     }
 
-    /// With B and the noise model still to be found for its F, without A and C: B with white noise, D of what is left, and B once more with
-    /// that noise model.
+    /// With B and the noise model still to be found for its F, without A and C: B with white noise,
+    /// D of what is left, and B once more with that noise model.
     pub fn of_poles(label: &str, o: &Orders, f: &[f64]) -> Self {
         let left = if o.nd > 0 {
             vec![Block::B, Block::D, Block::B]
@@ -64,7 +65,8 @@ impl Start {
         self.left.last().copied()
     }
 
-    /// Takes the criterion at theta. The residual is affine in B, and in D: one step of least squares finds either with the rest as it is.
+    /// Takes the criterion at theta. The residual is affine in B, and in D: one step of least
+    /// squares finds either with the rest as it is.
     pub fn update(&mut self, o: &Orders, there: &Linearisation) {
         let Some(block) = self.left.pop() else { return };
         let (p, place) = (self.theta.len(), block.place(o));

@@ -8,8 +8,9 @@ use super::{
     termination::{Reason, Termination},
 };
 
-/// Searches from `theta`. `None` when the start is unstable or its loss is not finite, or when the search comes close to
-/// `rival`, the sum of squares of a minimum that is known already, and is predicted to end no lower.
+/// Searches from `theta`. `None` when the start is unstable or its loss is not finite, or when the
+/// search comes close to `rival`, the sum of squares of a minimum that is known already, and is
+/// predicted to end no lower.
 pub(crate) fn minimise<O: Objective>(
     objective: &O,
     theta: Vec<f64>,
@@ -23,7 +24,8 @@ pub(crate) fn minimise<O: Objective>(
 }
 
 impl<O: Objective> GaussNewton<'_, O> {
-    /// The minimum, once the search has ended for this reason; the automatic search may continue along the border of stability.
+    /// The minimum, once the search has ended for this reason; the automatic search may continue
+    /// along the border of stability.
     pub fn finish(mut self, reason: Reason, workspace: &mut O::Workspace) -> Option<Minimum> {
         let reason = if self.options.method == SearchMethod::Automatic && reason == Reason::NoDescent {
             self.follow_the_border(workspace)?
@@ -40,8 +42,8 @@ impl<O: Objective> GaussNewton<'_, O> {
         })
     }
 
-    /// Goes on in coordinates in which the border of stability is a bound. `None` where the loss is not finite or the rival will
-    /// not be beaten.
+    /// Goes on in coordinates in which the border of stability is a bound. `None` where the loss is
+    /// not finite or the rival will not be beaten.
     fn follow_the_border(&mut self, workspace: &mut O::Workspace) -> Option<Reason> {
         let Some((coordinates, kappa)) = StableCoordinates::of(self.objective, &self.theta) else {
             return Some(Reason::NoDescent);

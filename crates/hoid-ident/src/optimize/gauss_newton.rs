@@ -1,5 +1,5 @@
-//! A damped Gauss-Newton search by reverse communication: it names the theta at which it needs the derivatives and is updated
-//! with them.
+//! A damped Gauss-Newton search by reverse communication: it names the theta at which it needs the
+//! derivatives and is updated with them.
 
 use super::{
     objective::{Linearisation, Objective},
@@ -8,11 +8,12 @@ use super::{
 };
 use crate::linalg::least_squares::{dot, solve_symmetric};
 
-/// Relative decrease of the loss that a step predicts from which on the second derivative is learnt from the gradients.
+/// Relative decrease of the loss that a step predicts from which on the second derivative is learnt
+/// from the gradients.
 const NEAR: f64 = 1e-2;
 
-/// Relative decrease of the loss that its rounding may hide: filters with poles near the unit circle lose five of the sixteen
-/// digits.
+/// Relative decrease of the loss that its rounding may hide: filters with poles near the unit
+/// circle lose five of the sixteen digits.
 const ROUNDING: f64 = 1e-10;
 
 /// A search that is driven from outside, so that several can run side by side.
@@ -28,8 +29,8 @@ pub(crate) struct GaussNewton<'s, O> {
     growth: f64,
     /// Decrease that the quadratic model predicts for the undamped step of this iteration.
     predicted_decrease: f64,
-    /// What the Gauss-Newton matrix lacks of half the second derivative, from the gradients of the last steps; empty where that is not
-    /// used.
+    /// What the Gauss-Newton matrix lacks of half the second derivative, from the gradients of the
+    /// last steps; empty where that is not used.
     secant: Vec<f64>,
     trial: Trial,
     /// Where the derivatives are needed next.
@@ -40,7 +41,8 @@ pub(crate) struct GaussNewton<'s, O> {
 enum Trial {
     /// Whether the start is any good.
     Start,
-    /// A step of Levenberg and Marquardt, and the decrease that the quadratic model predicts for it.
+    /// A step of Levenberg and Marquardt, and the decrease that the quadratic model predicts for
+    /// it.
     Damped { predicted: f64 },
     /// A share of a step that is halved until the loss falls.
     Share { delta: Vec<f64>, factor: f64 },
@@ -58,7 +60,8 @@ pub(crate) enum Progress {
 }
 
 impl<'s, O: Objective> GaussNewton<'s, O> {
-    /// A search from `theta`, drawn inside the limits; `None` when the predictor does not exist there.
+    /// A search from `theta`, drawn inside the limits; `None` when the predictor does not exist
+    /// there.
     pub fn new(objective: &'s O, mut theta: Vec<f64>, options: &'s SearchOptions, rival: Option<f64>) -> Option<Self> {
         if let Some(limits) = objective.limits() {
             for (t, (low, high)) in theta.iter_mut().zip(limits) {
@@ -134,7 +137,8 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
                 }
             }
             Trial::Last => {
-                // The predicted decrease is less than the rounding of the loss may hide, which must not decide about it.
+                // The predicted decrease is less than the rounding of the loss may hide, which must
+                // not decide about it.
                 if finite && there.sum_of_squares <= self.at.sum_of_squares * (1.0 + ROUNDING) {
                     self.move_to(there);
                 }
@@ -153,7 +157,8 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
         self.at = there;
     }
 
-    /// Symmetric rank-one correction of the secant, so that `(H + S) s = g - g'` for the step s just made.
+    /// Symmetric rank-one correction of the secant, so that `(H + S) s = g - g'` for the step s
+    /// just made.
     fn learn(&mut self, there: &Linearisation) {
         let p = self.theta.len();
         self.secant.resize(p * p, 0.0);
@@ -287,8 +292,9 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
         self.objective.is_feasible(&self.evaluation_point)
     }
 
-    /// `(H + S + mu diag H)^-1 g` of the free parameters, cut where it meets a bound, and the decrease of the sum of squares that
-    /// the quadratic model predicts for it. `None` when the matrix is not positive definite.
+    /// `(H + S + mu diag H)^-1 g` of the free parameters, cut where it meets a bound, and the
+    /// decrease of the sum of squares that the quadratic model predicts for it. `None` when the
+    /// matrix is not positive definite.
     fn damped_step(&self, mu: f64, secant: &[f64]) -> Option<Step> {
         let p = self.theta.len();
         let mut free = self.free();

@@ -1,6 +1,7 @@
 //! Minimisation of a sum of squares over theta.
 //!
-//! With `g = psi' eps` and the Gauss-Newton matrix `H = psi' psi` at theta, the methods differ in their step:
+//! With `g = psi' eps` and the Gauss-Newton matrix `H = psi' psi` at theta, the methods differ in
+//! their step:
 //!
 //! | method | step |
 //! |---|---|
@@ -9,22 +10,26 @@
 //! | steepest descent | `alpha (diag H)^-1 g`, alpha best for the quadratic model, halved until the loss falls |
 //! | automatic | Levenberg-Marquardt, near the minimum with a secant; where it finds no lower loss although the gradient is not zero, it goes on in coordinates in which the border of stability is a bound ([`reflection_coefficients`]) |
 //!
-//! **The secant.** Gauss and Newton leave the part of the second derivative out that vanishes with white residuals of the right model. Where
-//! the model is not right (a delay that is off by a few samples) they converge by a constant factor a step only. Near the minimum a
-//! matrix S takes the place of what is left out, `(H + S) s = g(theta) - g(theta + s)` for each step s, by symmetric corrections of rank one (J. E. Dennis, D. M. Gay
-//! and R. E. Welsch, *ACM Trans. Mathematical Software* 7 (1981) 348-368, with the correction of C. G. Broyden, *Math. Computation* 21 (1967) 368-381). It decides about
-//! steps alone; a step with it that does not lower the loss is made without it.
+//! **The secant.** Gauss and Newton leave the part of the second derivative out that vanishes with
+//! white residuals of the right model. Where the model is not right (a delay that is off by a few
+//! samples) they converge by a constant factor a step only. Near the minimum a matrix S takes the
+//! place of what is left out, `(H + S) s = g(theta) - g(theta + s)` for each step s, by symmetric
+//! corrections of rank one (J. E. Dennis, D. M. Gay and R. E. Welsch, *ACM Trans. Mathematical
+//! Software* 7 (1981) 348-368, with the correction of C. G. Broyden, *Math. Computation* 21 (1967)
+//! 368-381). It decides about steps alone; a step with it that does not lower the loss is made
+//! without it.
 //!
 //! A step that makes the predictor unstable counts as one that does not lower the loss.
 //!
-//! **Limits.** A parameter with equal bounds is fixed. Else a step is cut where it meets a bound, and a parameter that rests at
-//! a bound while the loss falls outwards takes no part in it (an active set; J. Nocedal and S. J. Wright, *Numerical
-//! Optimization*, 2006, section 16.5).
+//! **Limits.** A parameter with equal bounds is fixed. Else a step is cut where it meets a bound,
+//! and a parameter that rests at a bound while the loss falls outwards takes no part in it (an
+//! active set; J. Nocedal and S. J. Wright, *Numerical Optimization*, 2006, section 16.5).
 //!
-//! The search has converged when the undamped Gauss-Newton step of the free parameters predicts less than `tolerance` of
-//! relative decrease of the loss: `g' H^-1 g <= tolerance V`. In units of standard errors the distance left is about
-//! `sqrt(tolerance N)`, 1e-4 for the default and 8192 samples; that last step is still taken. Where no step lowers the loss any
-//! more and the predicted decrease is as small as the rounding of the loss, it has converged as well.
+//! The search has converged when the undamped Gauss-Newton step of the free parameters predicts
+//! less than `tolerance` of relative decrease of the loss: `g' H^-1 g <= tolerance V`. In units of
+//! standard errors the distance left is about `sqrt(tolerance N)`, 1e-4 for the default and 8192
+//! samples; that last step is still taken. Where no step lowers the loss any more and the predicted
+//! decrease is as small as the rounding of the loss, it has converged as well.
 
 pub mod basin;
 mod border;

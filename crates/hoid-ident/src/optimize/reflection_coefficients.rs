@@ -1,14 +1,14 @@
 //! Coordinates in which the region of stable polynomials is a box.
 //!
-//! A monic polynomial of order n has its roots inside the unit circle exactly when its reflection coefficients obey
-//! `|k_m| < 1`, m = 1 .. n, with the recursion of Levinson and Durbin
+//! A monic polynomial of order n has its roots inside the unit circle exactly when its reflection
+//! coefficients obey `|k_m| < 1`, m = 1 .. n, with the recursion of Levinson and Durbin
 //!
 //! `p^(m)_i = p^(m-1)_i + k_m p^(m-1)_{m-i}` for i < m,  `p^(m)_m = k_m`
 //!
-//! (O. Barndorff-Nielsen and G. Schou, *J. Multivariate Analysis* 3 (1973) 408-419; J. F. Monahan, *Biometrika* 71 (1984)
-//! 403-404). In theta the border of stability is curved, and a search that meets it stops although the loss falls along it;
-//! in k it is a bound, which the search knows how to follow. With `J = dp/dk` the derivatives are `J' psi' eps` and
-//! `J' psi' psi J`.
+//! (O. Barndorff-Nielsen and G. Schou, *J. Multivariate Analysis* 3 (1973) 408-419; J. F. Monahan,
+//! *Biometrika* 71 (1984) 403-404). In theta the border of stability is curved, and a search that
+//! meets it stops although the loss falls along it; in k it is a bound, which the search knows how
+//! to follow. With `J = dp/dk` the derivatives are `J' psi' eps` and `J' psi' psi J`.
 
 use std::ops::Range;
 

@@ -16,11 +16,13 @@ pub enum Reason {
     ExactFit,
     /// The limit of iterations was reached first.
     IterationLimit,
-    /// No step lowers the loss although the gradient is not zero; often the loss falls only across the border of stability.
+    /// No step lowers the loss although the gradient is not zero; often the loss falls only across
+    /// the border of stability.
     NoDescent,
     /// An iteration of instrumental variables that moves the parameters no more.
     Settled,
-    /// Instrumental variables ended with a pole outside the unit circle, which was then reflected into it.
+    /// Instrumental variables ended with a pole outside the unit circle, which was then reflected
+    /// into it.
     UnstableEstimate,
 }
 

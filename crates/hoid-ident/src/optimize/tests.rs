@@ -233,7 +233,8 @@ fn the_secant_saves_steps_where_the_model_is_wrong_and_ends_in_the_same_place() 
     assert!(with.termination.converged() && without.termination.converged());
     let (few, many) = (with.termination.iterations, without.termination.iterations);
     assert!(3 * few <= 2 * many, "{few} steps with the secant, {many} without");
-    // A relative decrease of 1e-12 that is left is 1e-6 of the length of theta in units of the residuals.
+    // A relative decrease of 1e-12 that is left is 1e-6 of the length of theta in units of the
+    // residuals.
     for i in 0..3 {
         let error = (without.at.sum_of_squares / (3000.0 * without.at.gram[4 * i])).sqrt();
         assert!((with.theta[i] - without.theta[i]).abs() < 1e-4 * error);

@@ -1,13 +1,16 @@
 //! ARX by linear least squares.
 //!
-//! `u(t) = phi(t)' theta + eps(t)` with `phi = [-u(t-1) .. -u(t-na), e(t-nk) .. e(t-nk-nb+1)]` (eq. 5.31), from the first sample
-//! at which phi lies inside the record (eq. 5.33) in each record, or with zeros for what lies before it.
+//! `u(t) = phi(t)' theta + eps(t)` with `phi = [-u(t-1) .. -u(t-na), e(t-nk) .. e(t-nk-nb+1)]` (eq.
+//! 5.31), from the first sample at which phi lies inside the record (eq. 5.33) in each record, or
+//! with zeros for what lies before it.
 //!
-//! **How it is solved.** The columns are shifts of two signals, so that `Phi' Phi` costs a few passes over the record, a tenth of an
-//! orthogonal factorisation. A solution of the normal equations has an error of `cond(Phi' Phi) eps`; one step of refinement from
-//! the residuals themselves, `theta + (Phi' Phi)^-1 Phi' (y - Phi theta)`, squares that factor (A. Bjorck, *Numerical Methods for Least Squares
-//! Problems*, 1996, sec. 2.9.3). Where the regressors are too close to dependence for it, where the fit is exact, and where
-//! zeros stand before the record, QR with column pivoting decides and solves.
+//! **How it is solved.** The columns are shifts of two signals, so that `Phi' Phi` costs a few
+//! passes over the record, a tenth of an orthogonal factorisation. A solution of the normal
+//! equations has an error of `cond(Phi' Phi) eps`; one step of refinement from the residuals
+//! themselves, `theta + (Phi' Phi)^-1 Phi' (y - Phi theta)`, squares that factor (A. Bjorck,
+//! *Numerical Methods for Least Squares Problems*, 1996, sec. 2.9.3). Where the regressors are too
+//! close to dependence for it, where the fit is exact, and where zeros stand before the record, QR
+//! with column pivoting decides and solves.
 
 use hoid_model::{Orders, SampleTime, Structure};
 use nalgebra::{DMatrix, DVector};
@@ -20,8 +23,8 @@ use crate::{
     linalg::products::{Lagged, ResidualProducts, gram},
 };
 
-/// Condition of the scaled normal matrix (an upper bound, `p tr(G^-1)`) up to which it is used: refined, the solution keeps all digits but three, the
-/// covariance nine.
+/// Condition of the scaled normal matrix (an upper bound, `p tr(G^-1)`) up to which it is used:
+/// refined, the solution keeps all digits but three, the covariance nine.
 const WELL_CONDITIONED: f64 = 1e7;
 
 /// Share of the residuals in the power of the output below which the fit counts as exact here.

@@ -1,7 +1,8 @@
 //! The prediction-error criterion with constraints and priors.
 //!
-//! `N V(theta) = sum eps^2 + N sum_i w_i (theta_i - theta*_i)^2` (the regularised criterion of L. Ljung, *System
-//! Identification*, 1999, eq. 7.107), with bounds on each parameter, and on request only models that are stable from e to u.
+//! `N V(theta) = sum eps^2 + N sum_i w_i (theta_i - theta*_i)^2` (the regularised criterion of L.
+//! Ljung, *System Identification*, 1999, eq. 7.107), with bounds on each parameter, and on request
+//! only models that are stable from e to u.
 
 use std::ops::Range;
 

@@ -51,7 +51,8 @@ impl<'q, 'a> FitProblem<'q, 'a> {
     /// The fit at the lowest minimum, once all searches have ended.
     ///
     /// # Errors
-    /// [`IdentError::NoFiniteLoss`] where no search came anywhere, [`IdentError::SingularInformation`].
+    /// [`IdentError::NoFiniteLoss`] where no search came anywhere,
+    /// [`IdentError::SingularInformation`].
     pub fn fit(self, workspace: &mut Workspace) -> Result<Fit, IdentError> {
         let Self {
             settings, constrained, ..

@@ -30,7 +30,8 @@ pub(crate) struct FitSettings {
 }
 
 impl FitSettings {
-    /// The criterion over these records, with residuals from sample `first` on at the earliest, and their sample time.
+    /// The criterion over these records, with residuals from sample `first` on at the earliest, and
+    /// their sample time.
     ///
     /// # Errors
     /// [`IdentError`] where the records are not informative enough.

@@ -1,4 +1,5 @@
-//! The fit by the prediction error method: what it minimises is [`crate::criterion`], how is [`crate::optimize`].
+//! The fit by the prediction error method: what it minimises is [`crate::criterion`], how is
+//! [`crate::optimize`].
 //!
 //! | module | what it holds |
 //! |---|---|

@@ -1,4 +1,5 @@
-//! Fits by the prediction error: in one step where the residual is linear in theta, else by searches.
+//! Fits by the prediction error: in one step where the residual is linear in theta, else by
+//! searches.
 
 use hoid_model::Record;
 

@@ -1,10 +1,11 @@
 //! A loss that outliers cannot dominate.
 //!
-//! Huber's loss ([`Loss`](crate::Loss)) with the threshold k is minimised by iteratively reweighted least squares (P. J. Huber,
-//! *Robust Statistics*, 1981, section 7.8): the weights `w = min(1, k/|r|)` of one search are those of the residuals that the
-//! search before left, in units of the scale s. Each round lowers the loss. The
-//! scale is the median absolute residual over 0.6745, from the residuals of the round before; it is held after [`SCALES`] rounds,
-//! so that the rounds settle.
+//! Huber's loss ([`Loss`](crate::Loss)) with the threshold k is minimised by iteratively reweighted
+//! least squares (P. J. Huber, *Robust Statistics*, 1981, section 7.8): the weights
+//! `w = min(1, k/|r|)` of one search are those of the residuals that the search before left, in
+//! units of the scale s. Each round lowers the loss. The scale is the median absolute residual over
+//! 0.6745, from the residuals of the round before; it is held after [`SCALES`] rounds, so that the
+//! rounds settle.
 //!
 //! Covariance (Huber, eq. 7.6.8, for residuals that are independent of the gradient):
 //! `s^2 kappa (psi' psi)^-1`, `kappa = mean(rho'^2) / mean(rho'')^2`, with the unweighted psi.
@@ -47,8 +48,8 @@ impl Reweighting {
         }
     }
 
-    /// Square roots of the weights for the next round, by the residuals of each record. `None` when the residuals have no
-    /// scale (half of them are zero).
+    /// Square roots of the weights for the next round, by the residuals of each record. `None` when
+    /// the residuals have no scale (half of them are zero).
     pub fn next(&mut self, residuals: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
         if self.round < SCALES {
             self.scale = median_absolute(residuals) / 0.674_489_750_196_081_7;

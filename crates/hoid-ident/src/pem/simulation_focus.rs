@@ -1,13 +1,14 @@
 //! Fits whose system is to simulate well.
 //!
-//! First the system `B/(A F)`, by the output-error criterion: the simulation error is all that counts. Then C and D, by the
-//! prediction error with that system held.
+//! First the system `B/(A F)`, by the output-error criterion: the simulation error is all that
+//! counts. Then C and D, by the prediction error with that system held.
 //!
-//! **Covariance.** The simulation error is `v = H eps` with `H = C/(A D)`, not white. With psi the gradient of the simulation
-//! error (initial states projected out) the estimate of the system has, to first order,
-//! `(psi' psi)^-1 psi' (sigma^2 H H') psi (psi' psi)^-1` (L. Ljung, *System Identification*, 1999, section 9.4), with
-//! `H' psi` the filter H run backwards in time. It holds in an open loop; in a closed loop the input is correlated with the
-//! noise and the system is biased besides. C and D have the covariance of their own search, and no correlation with the
+//! **Covariance.** The simulation error is `v = H eps` with `H = C/(A D)`, not white. With psi the
+//! gradient of the simulation error (initial states projected out) the estimate of the system has,
+//! to first order, `(psi' psi)^-1 psi' (sigma^2 H H') psi (psi' psi)^-1` (L. Ljung, *System
+//! Identification*, 1999, section 9.4), with `H' psi` the filter H run backwards in time. It holds
+//! in an open loop; in a closed loop the input is correlated with the noise and the system is
+//! biased besides. C and D have the covariance of their own search, and no correlation with the
 //! system is taken into account.
 
 use std::collections::BTreeMap;

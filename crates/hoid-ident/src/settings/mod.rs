@@ -1,7 +1,9 @@
 //! Options that describe themselves.
 //!
-//! An estimator or a recursive method declares its options once, by [`settings!`](crate::settings!): name, type, unit, default, bounds and a
-//! line of help. The command line, plans of studies, Python and the pages of the book read that declaration and have no list of their own.
+//! An estimator or a recursive method declares its options once, by
+//! [`settings!`](crate::settings!): name, type, unit, default, bounds and a line of help. The
+//! command line, plans of studies, Python and the pages of the book read that declaration and have
+//! no list of their own.
 //!
 //! ```
 //! use hoid_ident::{settings, settings::{Bounds, Settings}};
@@ -25,8 +27,9 @@
 //! # Ok::<(), hoid_ident::IdentError>(())
 //! ```
 //!
-//! A value is written as on the command line: `256`, `true`, `0.2..0.4`, `b0=256,f=inf`. What a plan or Python has in its own types is brought
-//! into that form first, so that there is one reader of each type ([`Value`]).
+//! A value is written as on the command line: `256`, `true`, `0.2..0.4`, `b0=256,f=inf`. What a
+//! plan or Python has in its own types is brought into that form first, so that there is one reader
+//! of each type ([`Value`]).
 
 mod declare;
 mod kind;

@@ -19,7 +19,8 @@ use crate::{
     optimize::Minimum,
 };
 
-/// Lower minima that the walks along t_M and G may come upon before the fit is left at the last one.
+/// Lower minima that the walks along t_M and G may come upon before the fit is left at the last
+/// one.
 const MOST_LOWER: usize = 10;
 
 /// What is to be estimated, and how.
@@ -29,22 +30,26 @@ pub struct SigmoidChange {
     pub nd: usize,
     /// Shortest and longest delay tau_e, s; any fraction of a sample. Equal ends fix it.
     pub delay_range_s: (f64, f64),
-    /// Fixed and bounded parameters by name ([`SIGMOID_NAMES`], d1 ...). By default t_M lies in the middle nine tenths of
-    /// the span that the records have in common, and G between 5/span and 2/Ts.
+    /// Fixed and bounded parameters by name ([`SIGMOID_NAMES`], d1 ...). By default t_M lies in the
+    /// middle nine tenths of the span that the records have in common, and G between 5/span and
+    /// 2/Ts.
     pub constraints: BTreeMap<String, Constraint>,
     /// Size of the innovations over the record.
     pub noise_level: NoiseLevel,
-    /// Start instead of the own ones: the parameters of [`SIGMOID_NAMES`] in their units, then d1 ... d_nd.
+    /// Start instead of the own ones: the parameters of [`SIGMOID_NAMES`] in their units, then d1
+    /// ... d_nd.
     pub start: Option<Vec<f64>>,
     /// Method and limits of each search.
     pub search: SearchOptions,
-    /// Whether t_M and G get likelihood intervals; they take about as long as the fit. Default true.
+    /// Whether t_M and G get likelihood intervals; they take about as long as the fit. Default
+    /// true.
     pub likelihood_intervals: bool,
 }
 
 impl Default for SigmoidChange {
-    /// First-order noise, delay between 0.05 and 0.6 s, noise level that changes, own starts; searches of up to 200 steps
-    /// to a relative decrease of 1e-10 (a thousandth of a standard error): a small change fills its loss with ripples in t_M.
+    /// First-order noise, delay between 0.05 and 0.6 s, noise level that changes, own starts;
+    /// searches of up to 200 steps to a relative decrease of 1e-10 (a thousandth of a standard
+    /// error): a small change fills its loss with ripples in t_M.
     fn default() -> Self {
         Self {
             nd: 1,
@@ -63,11 +68,12 @@ impl Default for SigmoidChange {
 }
 
 impl SigmoidChange {
-    /// Fits one change to all records: parameters and t_M in common (t_M on the time axis of each record), initial states of
-    /// each.
+    /// Fits one change to all records: parameters and t_M in common (t_M on the time axis of each
+    /// record), initial states of each.
     ///
     /// # Errors
-    /// [`IdentError`]; how the search ended, and what the data do not determine, is part of the fit.
+    /// [`IdentError`]; how the search ended, and what the data do not determine, is part of the
+    /// fit.
     pub fn fit(&self, records: &[Record]) -> Result<SigmoidFit, IdentError> {
         let sample_time = common_sample_time(records)?;
         let mut criterion = self.criterion(records, sample_time)?;
@@ -83,7 +89,8 @@ impl SigmoidChange {
             let Some(theta) = walk.flatten() else {
                 return Ok(found);
             };
-            // With the weights of the other minimum this one may be the lower: the likelihood decides, weights and all.
+            // With the weights of the other minimum this one may be the lower: the likelihood
+            // decides, weights and all.
             let weights = criterion.weights.clone();
             let other = search(&criterion, theta, &self.search, None).ok_or(IdentError::NoFiniteLoss)?;
             let (mut other, other_levels) = self.with_levels(&mut criterion, other)?;

@@ -125,8 +125,8 @@ impl SigmoidFit {
         }
     }
 
-    /// Covariance of the parameters in the order and the units of [`SigmoidFit::parameters`], by rows; zero for what was
-    /// held, `None` for an exact fit.
+    /// Covariance of the parameters in the order and the units of [`SigmoidFit::parameters`], by
+    /// rows; zero for what was held, `None` for an exact fit.
     pub fn covariance(&self) -> Option<Vec<f64>> {
         let p = self.theta.len();
         let rate = self.theta[LOG_RATE].exp();
@@ -135,8 +135,9 @@ impl SigmoidFit {
         Some((0..p * p).map(|k| c[k] * scale(k / p) * scale(k % p)).collect())
     }
 
-    /// Likelihood intervals of t_M and G, if there was a change and noise. Returns theta where the loss is lower than at
-    /// the minimum, if the walk along t_M or G comes upon such a place and is not to stay.
+    /// Likelihood intervals of t_M and G, if there was a change and noise. Returns theta where the
+    /// loss is lower than at the minimum, if the walk along t_M or G comes upon such a place and is
+    /// not to stay.
     pub(super) fn add_intervals(
         &mut self,
         criterion: &ChangeCriterion<'_>,
@@ -175,18 +176,20 @@ impl SigmoidFit {
         None
     }
 
-    /// 95 % likelihood interval of t_M in s; `None` without noise, without a change, or if it was not asked for.
+    /// 95 % likelihood interval of t_M in s; `None` without noise, without a change, or if it was
+    /// not asked for.
     pub fn midpoint_interval(&self) -> Option<(f64, f64)> {
         self.midpoint_interval.map(|i| (i.low, i.high))
     }
 
-    /// 95 % likelihood interval of G in 1/s, open to infinity where the change may have been abrupt; else as
-    /// [`SigmoidFit::midpoint_interval`].
+    /// 95 % likelihood interval of G in 1/s, open to infinity where the change may have been
+    /// abrupt; else as [`SigmoidFit::midpoint_interval`].
     pub fn rate_interval(&self) -> Option<(f64, f64)> {
         self.rate_interval.map(|i| (i.low, i.high))
     }
 
-    /// True where the change is too fast for t_M to have an error that is normally distributed: a change point.
+    /// True where the change is too fast for t_M to have an error that is normally distributed: a
+    /// change point.
     pub fn is_change_point(&self) -> bool {
         self.change_point
     }
@@ -217,11 +220,12 @@ impl SigmoidFit {
         self.comparison.bic_difference > 0.0
     }
 
-    /// Gains in force at a time on the axis of the record, with standard errors: those of the sigmoid where the records show a
-    /// change, else those of the fit without one.
+    /// Gains in force at a time on the axis of the record, with standard errors: those of the
+    /// sigmoid where the records show a change, else those of the fit without one.
     ///
-    /// The errors are those of the delta method, t_M and G included. Around a change point, where the sigmoid is no line over
-    /// the interval of t_M, `step^2 p (1 - p)` stands for the latter, with p the probability that the change has happened.
+    /// The errors are those of the delta method, t_M and G included. Around a change point, where
+    /// the sigmoid is no line over the interval of t_M, `step^2 p (1 - p)` stands for the latter,
+    /// with p the probability that the change has happened.
     pub fn gains_at(&self, time_s: f64) -> GainsAt {
         if !self.change_found() {
             return GainsAt {
@@ -271,7 +275,8 @@ impl SigmoidFit {
         &self.theta[NOISE..]
     }
 
-    /// Loss: mean of the squared residuals, weighted where the noise level changes (weights with the geometric mean 1).
+    /// Loss: mean of the squared residuals, weighted where the noise level changes (weights with
+    /// the geometric mean 1).
     pub fn loss(&self) -> f64 {
         self.loss
     }
@@ -281,8 +286,8 @@ impl SigmoidFit {
         self.innovation_variance
     }
 
-    /// Standard deviation of the innovations before and after the change; `None` where the same throughout was asked for, or
-    /// the residuals have no size.
+    /// Standard deviation of the innovations before and after the change; `None` where the same
+    /// throughout was asked for, or the residuals have no size.
     pub fn noise_levels(&self) -> Option<[f64; 2]> {
         self.levels
     }
@@ -315,7 +320,8 @@ impl SigmoidFit {
         self.errors_of(&self.theta, self.nd, record)
     }
 
-    /// Output of the operator alone, without noise model; the initial state is that of the least simulation error.
+    /// Output of the operator alone, without noise model; the initial state is that of the least
+    /// simulation error.
     ///
     /// # Errors
     /// As [`SigmoidFit::residuals`].

@@ -1,8 +1,9 @@
-//! What the two minima, with a change and without, say: covariance, which parameters have a standard error, and whether there was
-//! a change.
+//! What the two minima, with a change and without, say: covariance, which parameters have a
+//! standard error, and whether there was a change.
 //!
-//! The covariance is `sigma^2 (psi' psi)^-1` of the parameters that were free, with the initial states eliminated and the weights
-//! taken as known. The comparison is by the likelihood ratio `n ln(V_0/V_1)` and the BIC.
+//! The covariance is `sigma^2 (psi' psi)^-1` of the parameters that were free, with the initial
+//! states eliminated and the weights taken as known. The comparison is by the likelihood ratio
+//! `n ln(V_0/V_1)` and the BIC.
 
 use std::fmt;
 
@@ -27,9 +28,11 @@ pub enum Remark {
     Fixed,
     /// It rests at a bound.
     AtBound,
-    /// G rests at its upper bound: the change takes no longer than two samples, and how fast it was cannot be told.
+    /// G rests at its upper bound: the change takes no longer than two samples, and how fast it was
+    /// cannot be told.
     Abrupt,
-    /// The records show no change (BIC): t_M and G mean nothing, and gains on either side of it are chosen by chance.
+    /// The records show no change (BIC): t_M and G mean nothing, and gains on either side of it are
+    /// chosen by chance.
     NoChange,
     /// The change is too fast for a normal error: the likelihood interval holds.
     ChangePoint,
@@ -150,7 +153,8 @@ fn fastest(criterion: &ChangeCriterion<'_>) -> f64 {
     (FASTEST / criterion.sample_time.s()).ln() - 1e-9
 }
 
-/// Inverse of the information of the free parameters. Time and rate of a change that leaves no trace are taken out.
+/// Inverse of the information of the free parameters. Time and rate of a change that leaves no
+/// trace are taken out.
 fn invert(
     at: &Linearisation,
     free: &mut Vec<usize>,

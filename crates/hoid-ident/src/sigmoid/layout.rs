@@ -1,7 +1,8 @@
 //! Order and meaning of the parameters.
 //!
-//! `theta = [K_e1, K_e2, T_L1, T_L2, t_M, ln G, omega_nm, zeta_nm, tau_e, d1 .. d_nd]`. The rate enters by its logarithm: it is
-//! positive, and its likelihood is far more nearly a parabola in ln G than in G.
+//! `theta = [K_e1, K_e2, T_L1, T_L2, t_M, ln G, omega_nm, zeta_nm, tau_e, d1 .. d_nd]`. The rate
+//! enters by its logarithm: it is positive, and its likelihood is far more nearly a parabola in ln
+//! G than in G.
 
 use std::collections::BTreeMap;
 
@@ -36,15 +37,18 @@ pub const SIGMOID_NAMES: [(&str, &str); NOISE] = [
 const ZETA_LIMITS: (f64, f64) = (1e-4, 100.0);
 /// Largest omega_nm as a share of pi/Ts.
 const HIGHEST_FREQUENCY: f64 = 0.999;
-/// Share of the span at either end in which t_M is not sought by default: less of a record does not determine two gains.
+/// Share of the span at either end in which t_M is not sought by default: less of a record does not
+/// determine two gains.
 const ENDS: f64 = 0.05;
-/// Largest rate times the sample time: four fifths of the change take two samples (2 ln 9 = 4.4). A faster one looks the same,
-/// and its likelihood would be a staircase in t_M, with a step for each sample (here its slope varies by 2 % with the place of
-/// t_M between two samples, for twice the rate by 50 %).
+/// Largest rate times the sample time: four fifths of the change take two samples (2 ln 9 = 4.4). A
+/// faster one looks the same, and its likelihood would be a staircase in t_M, with a step for each
+/// sample (here its slope varies by 2 % with the place of t_M between two samples, for twice the
+/// rate by 50 %).
 pub(crate) const FASTEST: f64 = 2.0;
 /// Largest rate times the sample time that can be given.
 const FASTEST_GIVEN: f64 = 10.0;
-/// Smallest rate times the span: nine tenths of the change fill it (2 ln 19 = 5.9), and its ends are hardly told from a line.
+/// Smallest rate times the span: nine tenths of the change fill it (2 ln 19 = 5.9), and its ends
+/// are hardly told from a line.
 const SLOWEST: f64 = 5.0;
 
 /// Argument from which `e^-x` is zero in double precision.

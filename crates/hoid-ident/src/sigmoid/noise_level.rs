@@ -1,9 +1,11 @@
 //! Noise that grows or fades with the change.
 //!
-//! A remnant with another gain after the change gives innovations of another size: `sigma(t) = sigma_1 + (sigma_2 - sigma_1) s(t)`
-//! with the sigmoid s of the gains, without their delay. Given the residuals, sigma_1 and sigma_2 minimise
-//! `sum of ln sigma(t) + eps(t)^2/(2 sigma(t)^2)` (Fisher scoring); the residuals are then weighted by 1/sigma(t), and the fit and
-//! the levels are found in turn. Source: R. J. Carroll and D. Ruppert, *Transformation and Weighting in Regression*, 1988, ch. 3.
+//! A remnant with another gain after the change gives innovations of another size:
+//! `sigma(t) = sigma_1 + (sigma_2 - sigma_1) s(t)` with the sigmoid s of the gains, without their
+//! delay. Given the residuals, sigma_1 and sigma_2 minimise
+//! `sum of ln sigma(t) + eps(t)^2/(2 sigma(t)^2)` (Fisher scoring); the residuals are then weighted
+//! by 1/sigma(t), and the fit and the levels are found in turn. Source: R. J. Carroll and D.
+//! Ruppert, *Transformation and Weighting in Regression*, 1988, ch. 3.
 
 use crate::linalg::least_squares::dot;
 
@@ -20,7 +22,8 @@ pub enum NoiseLevel {
 /// Smallest ratio of the two levels: what lies below is a record without noise on one side.
 const SMALLEST_RATIO: f64 = 1e-3;
 
-/// `[sigma_1, sigma_2]` for the residuals and the share of the change at each; `None` where they have no size.
+/// `[sigma_1, sigma_2]` for the residuals and the share of the change at each; `None` where they
+/// have no size.
 pub(crate) fn levels(residuals: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<[f64; 2]> {
     let pairs = || residuals.iter().flatten().zip(shares.iter().flatten());
     // From the weighted mean squares on either side.
@@ -71,8 +74,8 @@ pub(crate) fn levels(residuals: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<[f64
     (ratio >= SMALLEST_RATIO).then_some(sigma)
 }
 
-/// Weights `1/sigma(t)`, scaled to the geometric mean 1 over all residuals: the sum of weighted squares then takes the place
-/// of the sum of squares in the likelihood.
+/// Weights `1/sigma(t)`, scaled to the geometric mean 1 over all residuals: the sum of weighted
+/// squares then takes the place of the sum of squares in the likelihood.
 pub(crate) fn weights(sigma: [f64; 2], shares: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let level = |share: f64| sigma[0] + (sigma[1] - sigma[0]) * share;
     let count: usize = shares.iter().map(Vec::len).sum();
@@ -87,7 +90,8 @@ pub(crate) fn weights(sigma: [f64; 2], shares: &[Vec<f64>]) -> Vec<Vec<f64>> {
 mod tests {
     use super::*;
 
-    /// Numbers with the moments of a normal distribution: equal shares at +-1 have the mean square 1.
+    /// Numbers with the moments of a normal distribution: equal shares at +-1 have the mean square
+    /// 1.
     fn record(sigma: [f64; 2]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
         let shares: Vec<f64> = (0..400).map(|t| f64::from(t / 2) / 199.0).collect();
         let eps = shares

@@ -1,18 +1,21 @@
 //! The prediction-error criterion of an operator that changes.
 //!
-//! With y1 and y2 the responses of `omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}` and of s times that to the held error,
+//! With y1 and y2 the responses of `omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}` and of s
+//! times that to the held error,
 //!
 //! `w(t) = K_e(t - tau) y1(t) + K_e_dot(t - tau) y2(t)`,  `v = u - w`,  `eps = D v`,
 //!
-//! because the delay stands behind the gains. y1 and y2 have one F and one state in common, which the gains do not touch, so
-//! that y_i = (B_i/F) q^-nk e holds throughout ([`hoid_model::delayed_operator`], linear in the gains), and
+//! because the delay stands behind the gains. y1 and y2 have one F and one state in common, which
+//! the gains do not touch, so that y_i = (B_i/F) q^-nk e holds throughout
+//! ([`hoid_model::delayed_operator`], linear in the gains), and
 //! `F dy_i/dp = (dB_i/dp) q^-nk e - (dF/dp) y_i`.
 //!
-//! **Initial states.** The state of the operator where a record begins is unknown, two numbers. Any state is reached from rest
-//! by two held errors before the record; those are the unknowns, so that the same filters give the responses to them and
-//! all derivatives. They enter eps linearly and are eliminated exactly for each theta, as in [`crate::criterion::initial_state_responses`]:
-//! `eps = (I - Q Q') eps_0`, psi with the best states, `psi' (I - Q Q') psi` (G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10
-//! (1973) 413-432; L. Kaufman, *BIT* 15 (1975) 49-57).
+//! **Initial states.** The state of the operator where a record begins is unknown, two numbers. Any
+//! state is reached from rest by two held errors before the record; those are the unknowns, so that
+//! the same filters give the responses to them and all derivatives. They enter eps linearly and are
+//! eliminated exactly for each theta, as in [`crate::criterion::initial_state_responses`]:
+//! `eps = (I - Q Q') eps_0`, psi with the best states, `psi' (I - Q Q') psi` (G. H. Golub and V.
+//! Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432; L. Kaufman, *BIT* 15 (1975) 49-57).
 
 use hoid_core::filter::{divide_in_place, fir};
 use hoid_model::{
@@ -52,7 +55,8 @@ pub(crate) struct ChangeCriterion<'a> {
     pub sample: Option<usize>,
     /// False for the model whose first state holds throughout.
     pub changes: bool,
-    /// Weights of the residuals of each record, from the first residual on; none where all count the same.
+    /// Weights of the residuals of each record, from the first residual on; none where all count
+    /// the same.
     pub weights: Option<Vec<Vec<f64>>>,
 }
 
@@ -288,7 +292,8 @@ impl ChangeCriterion<'_> {
     }
 }
 
-/// Takes the best combination of the columns out of eps; returns their orthonormal basis and how much of each was taken in.
+/// Takes the best combination of the columns out of eps; returns their orthonormal basis and how
+/// much of each was taken in.
 fn eliminate(columns: Vec<Vec<f64>>, eps: &mut [f64]) -> (Vec<Vec<f64>>, Vec<f64>) {
     let count = columns.len();
     let mut basis: Vec<Vec<f64>> = Vec::with_capacity(count);
@@ -378,7 +383,8 @@ impl Objective for ChangeCriterion<'_> {
             }
         }
         for i in 0..p {
-            // A parameter without any effect here would make the matrix singular; with a diagonal of one it rests.
+            // A parameter without any effect here would make the matrix singular; with a diagonal
+            // of one it rests.
             if total.gram[i * p + i] <= 0.0 {
                 total.descent[i] = 0.0;
                 for j in 0..p {

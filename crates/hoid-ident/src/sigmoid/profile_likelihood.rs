@@ -1,10 +1,12 @@
 //! Profile likelihood intervals of t_M and G.
 //!
-//! An interval holds the values at which the other parameters, searched anew, lose little: `n ln(V(x)/V) <= q`. It needs no
-//! parabola. For G, and for t_M where the change is resolved (two standard errors are less than the width 1/G of the change), the
-//! loss is chi-square with one degree of freedom: q = 3.84 for 95 %. An abrupt change is a change point instead: the loss at the
-//! true t_M is distributed as the larger of two exponential variables, `P(loss <= q) = (1 - e^{-q/2})^2`, q = 7.35 for 95 %
-//! (B. E. Hansen, *Econometrica* 68 (2000) 575-603, theorem 2).
+//! An interval holds the values at which the other parameters, searched anew, lose little:
+//! `n ln(V(x)/V) <= q`. It needs no parabola. For G, and for t_M where the change is resolved (two
+//! standard errors are less than the width 1/G of the change), the loss is chi-square with one
+//! degree of freedom: q = 3.84 for 95 %. An abrupt change is a change point instead: the loss at
+//! the true t_M is distributed as the larger of two exponential variables,
+//! `P(loss <= q) = (1 - e^{-q/2})^2`, q = 7.35 for 95 % (B. E. Hansen, *Econometrica* 68 (2000)
+//! 575-603, theorem 2).
 
 use super::{
     layout::{LOG_RATE, MIDPOINT},
@@ -46,12 +48,13 @@ pub(crate) enum Profile {
 
 /// Whether t_M, with this standard error of a regular parameter, is a change point.
 pub(crate) fn is_change_point(theta: &[f64], standard_error: f64) -> bool {
-    // Derivatives at one t_M do not tell about another one a width of the change away: the ends of a 95 % interval.
+    // Derivatives at one t_M do not tell about another one a width of the change away: the ends of
+    // a 95 % interval.
     2.0 * standard_error >= (-theta[LOG_RATE]).exp()
 }
 
-/// 95 % interval of t_M or ln G around a minimum, `standard_error` its own where it has one; with `stay` a lower loss on the
-/// way only counts as inside.
+/// 95 % interval of t_M or ln G around a minimum, `standard_error` its own where it has one; with
+/// `stay` a lower loss on the way only counts as inside.
 pub(crate) fn profile_likelihood_interval(
     criterion: &ChangeCriterion<'_>,
     minimum: &Minimum,
@@ -99,7 +102,8 @@ pub(crate) fn profile_likelihood_interval(
             let value = (from[place] + sign * step).clamp(low, high);
             step *= GROWTH;
             let Some((loss, theta)) = at(value, &from) else { break };
-            // A lower minimum than the one that was found, by a tenth of what matters: the walk goes on to the lowest.
+            // A lower minimum than the one that was found, by a tenth of what matters: the walk
+            // goes on to the lowest.
             if loss < lowest && !stay {
                 lowest = loss;
                 lower = Some(theta.clone());

@@ -1,5 +1,6 @@
-//! The fit with a noise level before the change and another after it: fit and levels in turn, until the ratio of the levels
-//! settles. The squared residuals are weighted with the inverse of the level in force ([`super::noise_level`]).
+//! The fit with a noise level before the change and another after it: fit and levels in turn, until
+//! the ratio of the levels settles. The squared residuals are weighted with the inverse of the
+//! level in force ([`super::noise_level`]).
 
 use super::{
     layout::Instant,
@@ -15,12 +16,15 @@ use crate::{
 
 /// Rounds of fit and noise levels in turn.
 const ROUNDS: usize = 20;
-/// Rounds end when the ratio of the levels moves by less than this share; its own standard error is `1/sqrt n`, about 1 %.
+/// Rounds end when the ratio of the levels moves by less than this share; its own standard error is
+/// `1/sqrt n`, about 1 %.
 const SETTLED: f64 = 1e-6;
-/// Relative change of the loss that does not matter: of the log-likelihood of 10000 residuals, a two-hundredth.
+/// Relative change of the loss that does not matter: of the log-likelihood of 10000 residuals, a
+/// two-hundredth.
 const NO_MATTER: f64 = 1e-6;
 
-/// The minimum with the noise levels found in turn with the fit, and the levels; `None` where the residuals are rounding.
+/// The minimum with the noise levels found in turn with the fit, and the levels; `None` where the
+/// residuals are rounding.
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`].
@@ -46,7 +50,8 @@ pub(super) fn with_levels(
         iterations += next.termination.iterations;
         let change = next.at.sum_of_squares / minimum.at.sum_of_squares - 1.0;
         if round > 0 && change > NO_MATTER {
-            // Two changes that each look worse with the noise levels of the other: the likelier one stays.
+            // Two changes that each look worse with the noise levels of the other: the likelier one
+            // stays.
             (criterion.weights, levels) = (kept, before);
             break;
         }

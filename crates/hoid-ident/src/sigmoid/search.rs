@@ -1,4 +1,5 @@
-//! Searches for the minimum of the loss, which has kinks where the delay is a whole number of samples.
+//! Searches for the minimum of the loss, which has kinks where the delay is a whole number of
+//! samples.
 
 use super::{
     layout::{DELAY, OF_THE_CHANGE},
@@ -16,7 +17,8 @@ const LOOK: usize = 30;
 /// Distance to the border of a sample, in samples, below which the next sample is tried.
 const NEAR_BORDER: f64 = 1e-6;
 
-/// The lowest of the minima from these starts, with the name of its start: a look at each, then the best to its end.
+/// The lowest of the minima from these starts, with the name of its start: a look at each, then the
+/// best to its end.
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`].
@@ -68,8 +70,8 @@ pub(super) fn without_change(
     search(&constant, start, options, None).ok_or(IdentError::NoFiniteLoss)
 }
 
-/// Searches from theta. The loss has kinks where tau_e is a whole number of samples, and a search may end in one;
-/// it is then finished inside each of the samples that meet there.
+/// Searches from theta. The loss has kinks where tau_e is a whole number of samples, and a search
+/// may end in one; it is then finished inside each of the samples that meet there.
 pub(super) fn search(
     criterion: &ChangeCriterion<'_>,
     theta: Vec<f64>,

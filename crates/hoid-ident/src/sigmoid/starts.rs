@@ -1,9 +1,10 @@
 //! The starts of the search where none is given.
 //!
-//! Poles, delay and noise model come from Box-Jenkins fits to the first and the last third of the records; where those give no
-//! operator, from a small grid of poles. With these and t_M and G given the residual is linear in the gains at both ends
-//! (K_e_dot following the sigmoid, which it does at both ends), so that pairs of t_M and G are ranked by least squares: a grid
-//! of t_M for a slow, a middling and an abrupt change, then halved steps of t_M around the best of each.
+//! Poles, delay and noise model come from Box-Jenkins fits to the first and the last third of the
+//! records; where those give no operator, from a small grid of poles. With these and t_M and G
+//! given the residual is linear in the gains at both ends (K_e_dot following the sigmoid, which it
+//! does at both ends), so that pairs of t_M and G are ranked by least squares: a grid of t_M for a
+//! slow, a middling and an abrupt change, then halved steps of t_M around the best of each.
 
 use hoid_model::{OperatorParameters, Orders, Record, Structure};
 
@@ -20,7 +21,8 @@ use crate::{
 const RATES: [f64; 3] = [0.5, 5.0, 100.0];
 /// Times of the change in the grid.
 const MIDPOINTS: usize = 12;
-/// Time between the delays that are tried, s: the search finds its way from a distance of a tenth of the period of the poles.
+/// Time between the delays that are tried, s: the search finds its way from a distance of a tenth
+/// of the period of the poles.
 const DELAY_STEP_S: f64 = 0.06;
 /// Searches in the windows: a start need not be exact.
 const COARSE: SearchOptions = SearchOptions {
@@ -75,7 +77,8 @@ pub(crate) fn initial_guesses(criterion: &ChangeCriterion<'_>, records: &[Record
     starts
 }
 
-/// The start of the model without a change, from the poles, the delay and the noise model of the other.
+/// The start of the model without a change, from the poles, the delay and the noise model of the
+/// other.
 pub(crate) fn without_change(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> Vec<f64> {
     let mut theta = theta.to_vec();
     if let Some(ranking) = Ranking::new(criterion, &theta)
@@ -255,7 +258,8 @@ fn set_gains(theta: &mut [f64], [k_e1, k_e2, k_e_dot1, k_e_dot2]: [f64; 4]) {
     theta[..4].copy_from_slice(&[k_e1, k_e2, lead(k_e_dot1, k_e1), lead(k_e_dot2, k_e2)]);
 }
 
-/// Responses for given poles, delay and noise model, from which the best gains follow for any change.
+/// Responses for given poles, delay and noise model, from which the best gains follow for any
+/// change.
 struct Ranking<'c, 'a> {
     criterion: &'c ChangeCriterion<'a>,
     theta: Vec<f64>,
@@ -286,8 +290,8 @@ impl<'c, 'a> Ranking<'c, 'a> {
         })
     }
 
-    /// Sum of squares and `[K_e1, K_e2, K_e_dot1, K_e_dot2]` of least squares for the change of `theta`; without one, the gains
-    /// of either end are the same.
+    /// Sum of squares and `[K_e1, K_e2, K_e_dot1, K_e_dot2]` of least squares for the change of
+    /// `theta`; without one, the gains of either end are the same.
     fn best_gains(&self, change: Option<&[f64]>) -> Option<(f64, [f64; 4])> {
         let columns_count = if change.is_some() { 4 } else { 2 };
         let mut gram = vec![0.0; columns_count * columns_count];

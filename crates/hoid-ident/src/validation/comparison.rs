@@ -11,15 +11,17 @@ use super::{
 };
 use crate::{Fit, IdentError, Series};
 
-/// What the residual tests say. A lag outside its 99 % bound is expected once in a hundred; more than [`OUTSIDE_ALLOWED`] of
-/// them is a sign.
+/// What the residual tests say. A lag outside its 99 % bound is expected once in a hundred; more
+/// than [`OUTSIDE_ALLOWED`] of them is a sign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ResidualDiagnostics {
     /// The residuals are not white at the 1 % level: the noise model is too small.
     pub coloured_residuals: bool,
-    /// The residuals follow the input at positive lags: the model misses dynamics, or has the wrong delay.
+    /// The residuals follow the input at positive lags: the model misses dynamics, or has the wrong
+    /// delay.
     pub under_modelled: bool,
-    /// The input follows the residuals at negative lags: the output is fed back to the input, as in every closed loop.
+    /// The input follows the residuals at negative lags: the output is fed back to the input, as in
+    /// every closed loop.
     pub feedback: bool,
 }
 
@@ -39,9 +41,11 @@ pub struct Validation {
     pub quality: GoodnessOfFit,
     /// Residual autocorrelation, lags 1 to [`LARGEST_LAG`].
     pub autocorrelation: Correlation,
-    /// Cross-correlation of residuals and input, lags from minus to plus [`LARGEST_LAG`]; no lags without an input.
+    /// Cross-correlation of residuals and input, lags from minus to plus [`LARGEST_LAG`]; no lags
+    /// without an input.
     pub cross_correlation: Correlation,
-    /// Whiteness of the residuals; `None` when there are fewer lags than coefficients of the noise model.
+    /// Whiteness of the residuals; `None` when there are fewer lags than coefficients of the noise
+    /// model.
     pub ljung_box: Option<LjungBox>,
 }
 
@@ -154,7 +158,8 @@ impl Fit {
         })
     }
 
-    /// The first sample that both cover, and from there on the simulated output and the prediction one step ahead.
+    /// The first sample that both cover, and from there on the simulated output and the prediction
+    /// one step ahead.
     fn model_outputs(&self, record: &Record) -> Result<(usize, Vec<f64>, Vec<f64>), IdentError> {
         let (simulated, predicted) = (self.simulate(record)?, self.predict(record)?);
         let first = simulated.first.max(predicted.first);
@@ -165,9 +170,10 @@ impl Fit {
         Ok((first, from_there(simulated), from_there(predicted)))
     }
 
-    /// Prediction of the output k samples ahead, the input being known: `u - sum_{j<k} h_j eps(t-j)` with h the impulse response
-    /// of the noise filter C/(A D) (L. Ljung, *System Identification*, 1999, eq. 3.31). k = 1 is [`Fit::predict`]; for large k,
-    /// and a stable noise filter, it goes over into [`Fit::simulate`].
+    /// Prediction of the output k samples ahead, the input being known:
+    /// `u - sum_{j<k} h_j eps(t-j)` with h the impulse response of the noise filter C/(A D) (L.
+    /// Ljung, *System Identification*, 1999, eq. 3.31). k = 1 is [`Fit::predict`]; for large k, and
+    /// a stable noise filter, it goes over into [`Fit::simulate`].
     ///
     /// # Errors
     /// As [`Fit::residuals`]; [`IdentError::BadOption`] for k = 0.
@@ -197,8 +203,8 @@ impl Fit {
         })
     }
 
-    /// VAF and NRMSE over several records together: the squared errors of all of them against the power (for NRMSE, the
-    /// spread around the mean of each record) of all of them.
+    /// VAF and NRMSE over several records together: the squared errors of all of them against the
+    /// power (for NRMSE, the spread around the mean of each record) of all of them.
     ///
     /// # Errors
     /// As [`Fit::residuals`].

@@ -16,7 +16,8 @@ pub struct Correlation {
     pub bound_99: f64,
 }
 
-/// Samples that are multiplied with all lags before the next ones: they stay in the memory near the processor.
+/// Samples that are multiplied with all lags before the next ones: they stay in the memory near the
+/// processor.
 const BLOCK: usize = 8192;
 
 /// `sum_t x(t) y(t - k)` over the overlap, for each lag k; both have the same length.
@@ -62,11 +63,13 @@ pub(super) fn autocorrelation(x: &[f64], largest: usize) -> Correlation {
     }
 }
 
-/// Cross-correlation of residuals and an input, both with mean zero, lags from minus to plus `largest`.
+/// Cross-correlation of residuals and an input, both with mean zero, lags from minus to plus
+/// `largest`.
 pub(super) fn cross_correlation(x: &[f64], y: &[f64], largest: usize) -> Correlation {
     let largest = largest.min(x.len().saturating_sub(1)) as i64;
     let lags: Vec<i64> = (-largest..=largest).collect();
-    // The residuals are nearly white, so that few lags carry the sum, which has each of them on both sides of zero.
+    // The residuals are nearly white, so that few lags carry the sum, which has each of them on
+    // both sides of zero.
     let reach: Vec<i64> = (0..=(4 * largest).min(x.len() as i64 - 1)).collect();
     let (of_x, of_y) = (covariances_at(x, x, &reach), covariances_at(y, y, &reach));
     let zero = of_x.first().zip(of_y.first()).map_or(0.0, |(x, y)| x * y);

@@ -1,4 +1,5 @@
-//! How much of the measured output a model explains: VAF and NRMSE, of one record or of several together.
+//! How much of the measured output a model explains: VAF and NRMSE, of one record or of several
+//! together.
 
 use crate::linalg::{least_squares::dot, products::variance};
 
@@ -93,7 +94,8 @@ mod tests {
         let u = [1.0, 3.0, 1.0, 3.0];
         assert_eq!(vaf(&u, &u), 100.0);
         assert_eq!(nrmse_fit(&u, &u), 100.0);
-        // Error of 1 in each sample: sum of squares 4 of 20, and as large as the spread around the mean.
+        // Error of 1 in each sample: sum of squares 4 of 20, and as large as the spread around the
+        // mean.
         let off = [2.0, 2.0, 2.0, 2.0];
         assert!((vaf(&u, &off) - 80.0).abs() < 1e-12);
         assert!(nrmse_fit(&u, &off).abs() < 1e-12);

@@ -18,7 +18,8 @@ pub struct LjungBox {
     pub p_value: f64,
 }
 
-/// Test of Ljung and Box on residuals whose noise model has `free` coefficients; `None` when there are fewer lags than those.
+/// Test of Ljung and Box on residuals whose noise model has `free` coefficients; `None` when there
+/// are fewer lags than those.
 pub fn whiteness(residuals: &[f64], free: usize) -> Option<LjungBox> {
     let residuals = centred(residuals.to_vec());
     ljung_box(&autocorrelation(&residuals, LARGEST_LAG), residuals.len(), free)
@@ -45,7 +46,8 @@ mod tests {
 
     #[test]
     fn ljung_and_box_as_published() {
-        // r = 0.1, -0.2, n = 100: Q = 100 * 102 * (0.01/99 + 0.04/98) = 5.1936; chi-square with 2 degrees: exp(-Q/2).
+        // r = 0.1, -0.2, n = 100: Q = 100 * 102 * (0.01/99 + 0.04/98) = 5.1936; chi-square with 2
+        // degrees: exp(-Q/2).
         let correlation = Correlation {
             lags: vec![1, 2],
             values: vec![0.1, -0.2],

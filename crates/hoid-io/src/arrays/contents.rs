@@ -68,8 +68,8 @@ pub(crate) struct Contents {
     pub(crate) notes: Vec<String>,
     /// How the lines of a matrix are named.
     pub(crate) indexing: Indexing,
-    /// Whether each structure holds times of its own on one common clock, so that its columns can be put beside those of
-    /// another.
+    /// Whether each structure holds times of its own on one common clock, so that its columns can
+    /// be put beside those of another.
     pub(crate) own_clocks: bool,
 }
 

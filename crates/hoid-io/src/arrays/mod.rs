@@ -1,5 +1,6 @@
-//! Files of named arrays: NPZ, MATLAB, XDF. What they hold is a list of paths, each with an array, a text or something that is
-//! not read; records and tables are made of it here, the same way for all of them.
+//! Files of named arrays: NPZ, MATLAB, XDF. What they hold is a list of paths, each with an array,
+//! a text or something that is not read; records and tables are made of it here, the same way for
+//! all of them.
 //!
 //! | module | what it holds |
 //! |---|---|

@@ -1,4 +1,5 @@
-//! Numbers as they stand in a file: bytes, a type, and where each begins. They become `f64` when they are asked for.
+//! Numbers as they stand in a file: bytes, a type, and where each begins. They become `f64` when
+//! they are asked for.
 
 use std::rc::Rc;
 
@@ -110,7 +111,8 @@ impl Numbers {
         self.kind
     }
 
-    /// Each `stride`-th number from `first` on, `len` of them; those that are not there are left away.
+    /// Each `stride`-th number from `first` on, `len` of them; those that are not there are left
+    /// away.
     pub(crate) fn line(&self, first: usize, stride: usize, len: usize) -> Self {
         let there = if first >= self.len {
             0

@@ -1,8 +1,9 @@
 //! The columns of a record among all arrays of a file.
 //!
-//! A name is a path (`data.run(3).e`), or its end where only one path ends so (`run(3).e`, or `e`); a path that is the name
-//! wins. `run(1).e` also finds the only element `run.e`. The time is `t`, or `time`, beside the output or in the next structure
-//! around it. The other arrays beside the output become channels where they are as long.
+//! A name is a path (`data.run(3).e`), or its end where only one path ends so (`run(3).e`, or `e`);
+//! a path that is the name wins. `run(1).e` also finds the only element `run.e`. The time is `t`,
+//! or `time`, beside the output or in the next structure around it. The other arrays beside the
+//! output become channels where they are as long.
 
 use std::ops::Range;
 

@@ -1,11 +1,13 @@
 //! The even grid behind a recorded time, and how the time differs from it.
 //!
-//! Row i stands at `t_i = t_0 + k_i Ts + jitter`, with whole k that grow by one from row to row, and by more where rows are missing. The
-//! k are found by a phase that follows the times, `k_i - k_{i-1} = round((t_i - g) / Ts)` with `g` pulled a small share of the way to each
-//! time: jitter of nearly half a sample is then no gap. A row taken too far is given back when the next seems to stand. Ts is the
-//! slope of least squares, found twice.
+//! Row i stands at `t_i = t_0 + k_i Ts + jitter`, with whole k that grow by one from row to row,
+//! and by more where rows are missing. The k are found by a phase that follows the times,
+//! `k_i - k_{i-1} = round((t_i - g) / Ts)` with `g` pulled a small share of the way to each time:
+//! jitter of nearly half a sample is then no gap. A row taken too far is given back when the next
+//! seems to stand. Ts is the slope of least squares, found twice.
 //!
-//! The jitter is the deviation from straight lines over parts of 256 rows without a gap, so that a slow drift is none.
+//! The jitter is the deviation from straight lines over parts of 256 rows without a gap, so that a
+//! slow drift is none.
 
 /// Rows of a part, and the fewest that make one.
 const PART: usize = 256;
@@ -46,7 +48,8 @@ impl Grid {
             }
         }
         let times: Vec<f64> = rows.iter().map(|row| t[*row]).collect();
-        // The median of single steps is exact without jitter; that of sixteen at once sees through it, where few rows are missing.
+        // The median of single steps is exact without jitter; that of sixteen at once sees through
+        // it, where few rows are missing.
         let median = |length: usize| {
             let mut spans: Vec<f64> = times
                 .windows(length + 1)
@@ -87,7 +90,8 @@ impl Grid {
             .map(|i| (i - 1, self.steps[i] - 1.0))
     }
 
-    /// Deviation from lines over parts without a gap: RMS, and the largest with its row; none where no part is long enough.
+    /// Deviation from lines over parts without a gap: RMS, and the largest with its row; none where
+    /// no part is long enough.
     pub(crate) fn jitter(&self, t: &[f64]) -> Option<(f64, f64, usize)> {
         let (mut squares, mut freedom) = (0.0, 0);
         let mut worst = (0.0, 0);
@@ -124,7 +128,8 @@ impl Grid {
 fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
     steps.fill(1.0);
     let mut owed: Option<usize> = None;
-    // Where a grid begins, the first times together say where it lies: one alone is off by its jitter.
+    // Where a grid begins, the first times together say where it lies: one alone is off by its
+    // jitter.
     let begin = |i: usize| {
         let ahead = times[i..]
             .iter()
@@ -147,7 +152,8 @@ fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
         }
         known += 1.0;
         steps[i] = step.max(1.0);
-        // What seems to stand gives back what an early time took, or is owed what the next one takes.
+        // What seems to stand gives back what an early time took, or is owed what the next one
+        // takes.
         if step < 1.0 {
             match (i.saturating_sub(NEAR)..i).rev().find(|j| steps[*j] > 1.5) {
                 Some(taken) => steps[taken] -= 1.0,

@@ -1,9 +1,13 @@
-//! Rows that are there twice, and stalls: channels that all hold their values while the time goes on.
+//! Rows that are there twice, and stalls: channels that all hold their values while the time goes
+//! on.
 //!
-//! One channel may hold because a hand rests, and two in coarse steps may do so together. A stall is told by the channel that
-//! naturally holds shortest: all hold for longer than `min_c L_c`. For a channel in steps L is ten times the length that nine of ten of its
-//! holds do not exceed; for one in full precision twice its longest hold while another channel moves, which is 0 unless it is printed
-//! with few decimals: then each hold of all channels is told, unless one of them is in steps and the hold is of one row. A channel that stands alone must be in full precision to be judged.
+//! One channel may hold because a hand rests, and two in coarse steps may do so together. A stall
+//! is told by the channel that naturally holds shortest: all hold for longer than `min_c L_c`. For
+//! a channel in steps L is ten times the length that nine of ten of its holds do not exceed; for
+//! one in full precision twice its longest hold while another channel moves, which is 0 unless it
+//! is printed with few decimals: then each hold of all channels is told, unless one of them is in
+//! steps and the hold is of one row. A channel that stands alone must be in full precision to be
+//! judged.
 
 use std::ops::Range;
 
@@ -106,7 +110,8 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
                 2 * alone.iter().map(Range::len).max().unwrap_or(0)
             }
         };
-        // Beside a channel in steps, which holds often, one printed with few digits meets it at a peak by chance.
+        // Beside a channel in steps, which holds often, one printed with few digits meets it at a
+        // peak by chance.
         let by_chance = usize::from(moving.iter().any(|(_, levels)| levels.is_coarse()));
         moving.iter().zip(&holds).map(natural).min().unwrap_or(0).max(by_chance)
     };

@@ -98,8 +98,9 @@ pub struct QualityIssue {
     pub rows: usize,
     /// Their share of the rows looked at.
     pub share: f64,
-    /// How much, in `unit`: jitter RMS in s; a gap, a stall or a saturation its longest time in s; a clock and a drift the relative
-    /// deviation; the step of what is quantised; else the number of rows.
+    /// How much, in `unit`: jitter RMS in s; a gap, a stall or a saturation its longest time in s;
+    /// a clock and a drift the relative deviation; the step of what is quantised; else the number
+    /// of rows.
     pub size: f64,
     /// Unit of the size.
     pub unit: String,

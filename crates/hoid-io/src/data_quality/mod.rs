@@ -1,4 +1,5 @@
-//! The quality of recorded data: what is wrong with the sampling and the values, where and how much; nothing is mended unasked.
+//! The quality of recorded data: what is wrong with the sampling and the values, where and how
+//! much; nothing is mended unasked.
 //!
 //! | module | what it holds |
 //! |---|---|
@@ -11,8 +12,9 @@
 //! | `search` | all of these, for columns that belong together |
 //! | `in_table` | the same for the columns that a record is made of |
 //!
-//! An operator's channel may be smooth, quiet or constant for good reasons: the rules are made so that simulated operators without
-//! faults give no finding (tested), and say of what they find what it is and not what it means.
+//! An operator's channel may be smooth, quiet or constant for good reasons: the rules are made so
+//! that simulated operators without faults give no finding (tested), and say of what they find what
+//! it is and not what it means.
 
 mod grid;
 mod holds;

@@ -7,7 +7,8 @@ use super::{ALL, csv};
 use crate::IoError;
 use crate::format::{Format, Writing};
 
-/// The endings of the files that can be read, for help texts and messages: `.csv (also as .txt), .tsv, ... or .xdf`.
+/// The endings of the files that can be read, for help texts and messages:
+/// `.csv (also as .txt), .tsv, ... or .xdf`.
 #[must_use]
 pub fn readable_endings() -> String {
     endings(ALL)
@@ -52,7 +53,8 @@ fn format_of(path: &Path) -> Result<&'static Format, IoError> {
         })
 }
 
-/// The format of a file to write, which is no directory. A pipe or a device takes CSV under any other name.
+/// The format of a file to write, which is no directory. A pipe or a device takes CSV under any
+/// other name.
 pub(crate) fn format_to_write(path: &Path) -> Result<&'static Format, IoError> {
     let known = fs::metadata(path).ok();
     let format = match known {

@@ -4,14 +4,16 @@
 //! x(t) ~ sum_n x_n h(t - n),    h(s) = c sinc(c s) w(s / L),    w(r) = I0(beta sqrt(1 - r^2)) / I0(beta),  |r| <= 1
 //! ```
 //!
-//! with s in samples, `sinc x = sin(pi x) / (pi x)` and the cut-off c as a share of the Nyquist frequency. By Kaiser's formulas
-//! (J. F. Kaiser, "Nonrecursive digital filter design using the I0-sinh window function", Proc. IEEE Int. Symp. Circuits and
-//! Systems, 1974) the ripple is A dB below 1 in the pass band and the stop band alike for `beta = 0.1102 (A - 8.7)` and a
-//! length `2 L = (A - 7.95) / (2.285 d)`, d the width in rad of the transition around c.
+//! with s in samples, `sinc x = sin(pi x) / (pi x)` and the cut-off c as a share of the Nyquist
+//! frequency. By Kaiser's formulas (J. F. Kaiser, "Nonrecursive digital filter design using the
+//! I0-sinh window function", Proc. IEEE Int. Symp. Circuits and Systems, 1974) the ripple is A dB
+//! below 1 in the pass band and the stop band alike for `beta = 0.1102 (A - 8.7)` and a length
+//! `2 L = (A - 7.95) / (2.285 d)`, d the width in rad of the transition around c.
 //!
-//! At whole t this is a linear-phase FIR filter whose delay is compensated; at other t it interpolates, and both have the same
-//! frequency response. The weights of each t are divided by their sum, so that a constant stays what it is. A is [`DESIGN_DB`],
-//! by which the stated [`STOP_DB`] hold with room to spare.
+//! At whole t this is a linear-phase FIR filter whose delay is compensated; at other t it
+//! interpolates, and both have the same frequency response. The weights of each t are divided by
+//! their sum, so that a constant stays what it is. A is [`DESIGN_DB`], by which the stated
+//! [`STOP_DB`] hold with room to spare.
 
 use std::f64::consts::PI;
 
@@ -36,8 +38,8 @@ pub(super) struct Kernel {
 }
 
 impl Kernel {
-    /// Passes up to 0.8 of the Nyquist frequency of the record and stops from 1.2: moves a band-limited signal by parts of a
-    /// sample.
+    /// Passes up to 0.8 of the Nyquist frequency of the record and stops from 1.2: moves a
+    /// band-limited signal by parts of a sample.
     pub(super) fn interpolating() -> Self {
         Self {
             cutoff: 1.0,
@@ -45,8 +47,8 @@ impl Kernel {
         }
     }
 
-    /// Passes up to 0.8 `ratio` and stops from `ratio`, the new Nyquist frequency as a share of the old one; none where the
-    /// filter would be longer than `longest` to each side.
+    /// Passes up to 0.8 `ratio` and stops from `ratio`, the new Nyquist frequency as a share of the
+    /// old one; none where the filter would be longer than `longest` to each side.
     pub(super) fn limiting(ratio: f64, longest: usize) -> Option<Self> {
         let half = half_length(2.0 * HALF_TRANSITION * ratio);
         // Written so that NaN is none.
@@ -61,8 +63,9 @@ impl Kernel {
         self.half
     }
 
-    /// Weights of the samples `floor(t) - half + 1 ..= floor(t) + half` for `t = floor(t) + fraction`; for a whole t the first
-    /// is `floor(t) - half`, so that they are symmetric.
+    /// Weights of the samples `floor(t) - half + 1 ..= floor(t) + half` for
+    /// `t = floor(t) + fraction`; for a whole t the first is `floor(t) - half`, so that they are
+    /// symmetric.
     fn weights(self, fraction: f64) -> (isize, Vec<f64>) {
         let half = self.half as isize;
         let first = if fraction == 0.0 { -half } else { 1 - half };
@@ -79,7 +82,8 @@ impl Kernel {
         self.cutoff * sinc(self.cutoff * s) * bessel_i0(beta * root) / bessel_i0(beta)
     }
 
-    /// Values at `t_k = first + k step` for k = 0 .. n, in samples; every t lies [`Kernel::half`] samples inside.
+    /// Values at `t_k = first + k step` for k = 0 .. n, in samples; every t lies [`Kernel::half`]
+    /// samples inside.
     pub(super) fn values(self, samples: &[f64], first: f64, step: f64, n: usize) -> Vec<f64> {
         // Of a whole step all fractions are one, and the weights are made once.
         let (mut known, mut offset, mut weights) = (f64::NAN, 0, Vec::new());
@@ -113,7 +117,8 @@ fn sinc(x: f64) -> f64 {
     if angle.abs() < 1e-8 { 1.0 } else { angle.sin() / angle }
 }
 
-/// Modified Bessel function of the first kind and order 0, by its power series; the terms fall once k > x / 2.
+/// Modified Bessel function of the first kind and order 0, by its power series; the terms fall once
+/// k > x / 2.
 fn bessel_i0(x: f64) -> f64 {
     let square = 0.25 * x * x;
     let (mut term, mut sum) = (1.0, 1.0);
@@ -144,7 +149,8 @@ mod tests {
         }
     }
 
-    /// Amplitude and delay in samples of a wave of so many cycles a sample, taken at this fraction between two samples.
+    /// Amplitude and delay in samples of a wave of so many cycles a sample, taken at this fraction
+    /// between two samples.
     fn response((offset, weights): &(isize, Vec<f64>), frequency: f64, fraction: f64) -> (f64, f64) {
         let omega = 2.0 * PI * frequency;
         let (mut re, mut im) = (0.0, 0.0);

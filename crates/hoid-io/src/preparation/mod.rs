@@ -10,8 +10,10 @@
 //! | run-in | `run_in` | the first seconds are dropped |
 //! | detrend | [`Record::detrended`](hoid_model::Record::detrended) | mean or straight line out of input and output |
 //!
-//! [`Preparation`] in `pipeline` takes them, on the channels of a record that `record_parts` has taken apart. `kernel` is the filter of the two steps that need one. Samples whose filter would reach beyond the record are cut, never
-//! invented. Each step that was taken is a [`Step`], with its numbers; reading adds those of its repairs before.
+//! [`Preparation`] in `pipeline` takes them, on the channels of a record that `record_parts` has
+//! taken apart. `kernel` is the filter of the two steps that need one. Samples whose filter would
+//! reach beyond the record are cut, never invented. Each step that was taken is a [`Step`], with
+//! its numbers; reading adds those of its repairs before.
 
 mod kernel;
 mod offset;

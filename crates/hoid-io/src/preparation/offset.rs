@@ -1,10 +1,11 @@
 //! Channels that were recorded late are put beside the others.
 //!
-//! A channel with the offset d was recorded d samples later than it happened: its sample k + d goes beside sample k of the
-//! others, `x'(k) = x(k + d)`. An offset of whole samples moves rows and changes no number. Between samples the band-limited
-//! signal is taken by the windowed sinc of `kernel`: up to 0.8 of the Nyquist frequency its error is below 1e-4 of the amplitude
-//! (80 dB); above, the channel is not what it was. Rows for which a channel has no sample, or not all that the filter needs,
-//! are cut.
+//! A channel with the offset d was recorded d samples later than it happened: its sample k + d goes
+//! beside sample k of the others, `x'(k) = x(k + d)`. An offset of whole samples moves rows and
+//! changes no number. Between samples the band-limited signal is taken by the windowed sinc of
+//! `kernel`: up to 0.8 of the Nyquist frequency its error is below 1e-4 of the amplitude (80 dB);
+//! above, the channel is not what it was. Rows for which a channel has no sample, or not all that
+//! the filter needs, are cut.
 
 use std::str::FromStr;
 
@@ -79,7 +80,8 @@ impl RecordParts {
         let kernel = Kernel::interpolating();
         let half = |shift: Shift| if shift.interpolated { kernel.half() as f64 } else { 0.0 };
         let last = self.len() as f64 - 1.0;
-        // The rows for which every channel has what it needs; in floating point, since an offset may be of any size.
+        // The rows for which every channel has what it needs; in floating point, since an offset
+        // may be of any size.
         let (mut from, mut to) = (0.0_f64, last);
         for (_, shift) in &shifts {
             from = from.max((half(*shift) - shift.samples).ceil());

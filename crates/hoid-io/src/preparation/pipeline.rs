@@ -13,7 +13,8 @@ use crate::IoError;
 
 /// What is to be done to a record. By default nothing is.
 ///
-/// A channel is meant by its name; `e` and `u` are the input and the output, whatever their columns are called.
+/// A channel is meant by its name; `e` and `u` are the input and the output, whatever their columns
+/// are called.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Preparation {
     /// Factors and units by channel.
@@ -31,12 +32,12 @@ pub struct Preparation {
 }
 
 impl Preparation {
-    /// The record as it goes to the estimator, and what was done. [`Preparation::drop_repeated`] belongs to reading and is not
-    /// looked at.
+    /// The record as it goes to the estimator, and what was done. [`Preparation::drop_repeated`]
+    /// belongs to reading and is not looked at.
     ///
     /// # Errors
-    /// [`IoError::Preparation`] naming the step, what was found, and what was expected; [`IoError::Model`] where the numbers
-    /// leave the range of floating point.
+    /// [`IoError::Preparation`] naming the step, what was found, and what was expected;
+    /// [`IoError::Model`] where the numbers leave the range of floating point.
     pub fn apply(&self, record: Record) -> Result<(Record, Vec<Step>), IoError> {
         let begin_s = record.time_s(0);
         let mut parts = RecordParts::new(record);

@@ -171,7 +171,8 @@ fn decimation_keeps_the_pass_band_and_lets_nothing_fold_down() {
         let begin = found.time_s(0) - 3.0;
         let ts = found.sample_time().s();
         assert!((ts - factor as f64 * TS).abs() < 1e-15);
-        // 0.001 dB of ripple is 1.2e-4 of an amplitude of 1; the delay is compensated, else the error would be of order 1.
+        // 0.001 dB of ripple is 1.2e-4 of an amplitude of 1; the delay is compensated, else the
+        // error would be of order 1.
         assert!(largest(found.input(), |k| low(begin + k as f64 * ts)) < 1.2e-4);
         // The same on both channels: what is between them stays, to rounding.
         let both = largest(found.output(), |k| found.input()[k] + 1.0);

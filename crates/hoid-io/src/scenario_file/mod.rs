@@ -1,7 +1,8 @@
 //! Scenarios in TOML.
 //!
-//! A file starts from a condition C1-C6 and changes what it names, or describes everything itself. Units are part of the keys,
-//! times count from the start of the measurement, an unknown key is an error.
+//! A file starts from a condition C1-C6 and changes what it names, or describes everything itself.
+//! Units are part of the keys, times count from the start of the measurement, an unknown key is an
+//! error.
 //!
 //! ```toml
 //! condition = "C4"          # without it, tau_e_s and all keys of [initial] are required
@@ -28,8 +29,8 @@
 //! | `[remnant]` | `order`, `T_n_s`; `noise_level` and `noise_definition` ("response", "remnant"), or `K_n_initial_deg` and `K_n_last_deg` |
 //! | `[[forcing]]` | `amplitude_deg`, `phase_rad`, and `omega_rad_s` or `cycles` (within `measurement_s`); `forcing = []` is a target at rest |
 //!
-//! What the file leaves out is that of the condition; without one, the parameters of `[last]` are those of `[initial]`, and
-//! all else is as in C1.
+//! What the file leaves out is that of the condition; without one, the parameters of `[last]` are
+//! those of `[initial]`, and all else is as in C1.
 
 mod error;
 mod keys;

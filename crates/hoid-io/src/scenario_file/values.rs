@@ -21,8 +21,8 @@ pub(super) struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// A time that is `least` to ten million samples, a whole number of them. One that the file does not give can fail as well,
-    /// when the file gives the sample time.
+    /// A time that is `least` to ten million samples, a whole number of them. One that the file
+    /// does not give can fail as well, when the file gives the sample time.
     pub(super) fn whole(
         &self,
         key: &str,

@@ -4,8 +4,9 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::ContinuousTransferFunction;
 
-/// The system behind a hold with a delay of a `fraction` of a sample, by ascending powers of `z^-1`; a fraction other than zero
-/// makes the numerator one longer. `None` when the matrix exponential is not finite.
+/// The system behind a hold with a delay of a `fraction` of a sample, by ascending powers of
+/// `z^-1`; a fraction other than zero makes the numerator one longer. `None` when the matrix
+/// exponential is not finite.
 pub(super) fn hold(
     h: &ContinuousTransferFunction,
     ts: f64,
@@ -75,7 +76,8 @@ pub(super) fn hold(
         num[i + 1] += b;
     }
     if fraction != 0.0 {
-        // What is read within the sample was driven by the input at its start; `ahead` belongs to the input at its end.
+        // What is read within the sample was driven by the input at its start; `ahead` belongs to
+        // the input at its end.
         num.insert(0, 0.0);
         for (n, d) in num.iter_mut().zip(&den) {
             *n += ahead * d;
@@ -110,8 +112,8 @@ impl Propagation {
     }
 }
 
-/// Numerator (degree n - 1) and denominator (degree n) of `row (delta I - m)^-1 column` by descending powers of delta, by the
-/// Faddeev-LeVerrier recursion.
+/// Numerator (degree n - 1) and denominator (degree n) of `row (delta I - m)^-1 column` by
+/// descending powers of delta, by the Faddeev-LeVerrier recursion.
 fn transfer_function_in_delta(row: &DVector<f64>, m: &DMatrix<f64>, column: &DVector<f64>) -> (Vec<f64>, Vec<f64>) {
     let n = m.nrows();
     let (mut num, mut den) = (Vec::with_capacity(n), vec![1.0]);

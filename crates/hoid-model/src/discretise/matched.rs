@@ -4,7 +4,8 @@ use num_complex::Complex64;
 
 use crate::{ContinuousTransferFunction, polynomial};
 
-/// Poles and zeros by `z = e^{s Ts}`, by descending powers of z. `None` when the roots are not found.
+/// Poles and zeros by `z = e^{s Ts}`, by descending powers of z. `None` when the roots are not
+/// found.
 pub(super) fn matched(h: &ContinuousTransferFunction, ts: f64) -> Option<(Vec<f64>, Vec<f64>)> {
     let poles = polynomial::roots(h.den())?;
     let leading = h.num()[0];

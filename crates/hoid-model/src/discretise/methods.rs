@@ -29,13 +29,14 @@ pub enum Method {
 /// Longest delay that is written out as leading zeros of a numerator.
 const LONGEST_DELAY_SAMPLES: f64 = 1e6;
 
-/// The discrete transfer function of `h` by one of the methods of Table 5.2. The numerator starts with as many zeros as there
-/// are samples of delay.
+/// The discrete transfer function of `h` by one of the methods of Table 5.2. The numerator starts
+/// with as many zeros as there are samples of delay.
 ///
 /// # Errors
-/// [`ModelError::OutOfRange`] when the delay is no whole number of samples (the two holds take any delay) or the prewarping
-/// frequency does not lie between 0 and pi/Ts; [`ModelError::TransferFunction`] when the method sends a pole to infinity or the
-/// result is not finite.
+/// [`ModelError::OutOfRange`] when the delay is no whole number of samples (the two holds take any
+/// delay) or the prewarping frequency does not lie between 0 and pi/Ts;
+/// [`ModelError::TransferFunction`] when the method sends a pole to infinity or the result is not
+/// finite.
 pub fn discretise(
     h: &ContinuousTransferFunction,
     sample_time: SampleTime,
@@ -102,7 +103,8 @@ fn substitute(h: &ContinuousTransferFunction, c: f64, q: [f64; 2]) -> Result<(Ve
     let den = substitute_in_polynomial(h.den(), order, c, q);
     let powers = (0..=order).rev().map(|k| c.powi(k as i32));
     let size: f64 = h.den().iter().zip(powers).map(|(a, c)| (a * c).abs()).sum();
-    // The leading coefficient is the denominator at s = c (backward Euler, Tustin): zero when a pole lies there.
+    // The leading coefficient is the denominator at s = c (backward Euler, Tustin): zero when a
+    // pole lies there.
     if q[0] != 0.0 && den[0].abs() <= 1e-13 * size {
         return Err(ModelError::TransferFunction {
             found: format!("{:?} / {:?}", h.num(), h.den()),

@@ -22,7 +22,8 @@ struct Case {
     scipy_den: Vec<f64>,
 }
 
-/// From fixtures/discretise/make.py: exact values in 60 digits (mpmath), and those of scipy.signal.cont2discrete.
+/// From fixtures/discretise/make.py: exact values in 60 digits (mpmath), and those of
+/// scipy.signal.cont2discrete.
 fn cases() -> Vec<Case> {
     let numbers = |text: &str| -> Vec<f64> { text.split_whitespace().map(|v| v.parse().unwrap()).collect() };
     include_str!("../../../../fixtures/discretise/discretise.csv")
@@ -72,7 +73,8 @@ fn agrees_with_exact_values() {
     assert!(cases.len() >= 40);
     for case in &cases {
         let d = discretise(&case.h, case.sample_time, case.method).unwrap();
-        // Orders 1 to 6 at Ts = 0.01 s: a few roundings; the numerators of order 6 are of size 1e-8 to 1e-12.
+        // Orders 1 to 6 at Ts = 0.01 s: a few roundings; the numerators of order 6 are of size 1e-8
+        // to 1e-12.
         assert_close(&case.name, d.num(), &case.num, 1e-14);
         assert_close(&case.name, d.den(), &case.den, 2e-15);
     }
@@ -82,7 +84,8 @@ fn agrees_with_exact_values() {
 fn agrees_with_scipy() {
     for case in cases() {
         let d = discretise(&case.h, case.sample_time, case.method).unwrap();
-        // ss2tf takes a numerator as the difference of two denominators: absolute errors of 1e-15 times binomials.
+        // ss2tf takes a numerator as the difference of two denominators: absolute errors of 1e-15
+        // times binomials.
         let size = largest(&case.scipy_den) + largest(&case.scipy_num);
         for (ours, theirs) in [(d.num(), &case.scipy_num), (d.den(), &case.scipy_den)] {
             assert_eq!(ours.len(), theirs.len());
@@ -142,7 +145,8 @@ fn response_to(h: &DiscreteTransferFunction, input: impl Fn(usize) -> f64, sampl
 
 #[test]
 fn holds_with_a_fraction_of_a_sample_of_delay() {
-    // 0.7 + 2/(s + 3) with a delay of 2.3 samples, by hand: step and ramp start at t = 0, so that nothing is approximated.
+    // 0.7 + 2/(s + 3) with a delay of 2.3 samples, by hand: step and ramp start at t = 0, so that
+    // nothing is approximated.
     let sample_time = ts(0.1);
     let delay = 0.23;
     let h = tf(&[0.7, 4.1], &[1.0, 3.0]).with_delay(delay).unwrap();

@@ -23,10 +23,11 @@ const POINTS_PER_DECADE: f64 = 100.0;
 pub(super) const LARGEST_TURN_RAD: f64 = 0.5;
 /// Bounds the work: 4096 points for a step of the grid follow a delay of 90 s at 1000 rad/s.
 const DEEPEST_HALVING: u32 = 12;
-/// Margins of any frequency response: continuous with delay, or discrete with a range that ends at pi/Ts (a response there on the
-/// negative real axis counts as a phase crossover).
+/// Margins of any frequency response: continuous with delay, or discrete with a range that ends at
+/// pi/Ts (a response there on the negative real axis counts as a phase crossover).
 ///
-/// A range that is not `0 < low < high`, both finite, has no margins; where the response is not finite it is left out.
+/// A range that is not `0 < low < high`, both finite, has no margins; where the response is not
+/// finite it is left out.
 pub fn margins(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Margins {
     let points = scan(&open_loop, range_rad_s);
     let (mut phase, mut gain) = (Nearest::default(), Nearest::default());
@@ -43,7 +44,8 @@ pub fn margins(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) ->
             let omega = bisect(low, high, |w| above(open_loop(w)) == above(l_low));
             phase.offer(omega, phase_margin_deg(open_loop(omega)));
         }
-        // The turn between neighbours is small, so that a change of sign in the left half plane is a crossing of its axis.
+        // The turn between neighbours is small, so that a change of sign in the left half plane is
+        // a crossing of its axis.
         let upper = |l: Complex64| l.im >= 0.0;
         if upper(l_low) != upper(l_high) && l_low.re < 0.0 && l_high.re < 0.0 {
             let omega = bisect(low, high, |w| upper(open_loop(w)) == upper(l_low));

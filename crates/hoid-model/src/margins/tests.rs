@@ -50,7 +50,8 @@ fn assert_margins(found: Margins, expected: [(f64, f64); 4]) {
 
 #[test]
 fn both_states_of_the_reference() {
-    // scipy.optimize.brentq on |L| - 1 and on Im L; expected-values gives the same, shorter (its 5.52 rad/s is 5.525 cut off).
+    // scipy.optimize.brentq on |L| - 1 and on Im L; expected-values gives the same, shorter (its
+    // 5.52 rad/s is 5.525 cut off).
     let tolerance = 1e-9;
     let expected = |values: [f64; 4]| values.map(|v| (v, tolerance));
     let first = [
@@ -89,9 +90,10 @@ fn crossover_model_in_closed_form() {
 
 #[test]
 fn the_margins_nearest_to_zero_govern() {
-    // e^{-0.1 s}/s with a lightly damped mode at 9 rad/s crosses gain one at 1.013, 8.482 and 9.428 rad/s with phase margins of
-    // 83.94, 22.75 and -120.7 deg, and the negative real axis at 8.786 and 47.2 rad/s with -5.392 and 61.95 dB. By numpy on two
-    // million frequencies; python-control 0.10.2 `stability_margins` chooses the same two.
+    // e^{-0.1 s}/s with a lightly damped mode at 9 rad/s crosses gain one at 1.013, 8.482 and 9.428
+    // rad/s with phase margins of 83.94, 22.75 and -120.7 deg, and the negative real axis at 8.786
+    // and 47.2 rad/s with -5.392 and 61.95 dB. By numpy on two million frequencies; python-control
+    // 0.10.2 `stability_margins` chooses the same two.
     let h = delayed(&[1.0], &[1.0, 0.0], 0.1).series(&tf(&[81.0], &[1.0, 0.36, 81.0]));
     assert_margins(
         continuous(&h),
@@ -103,7 +105,8 @@ fn the_margins_nearest_to_zero_govern() {
 #[test]
 fn fast_turning_phase_is_followed() {
     // |L| rises towards 0.9, so that the phase crossover next to the end of the range governs. The delay turns four whole
-    // rounds over the last step of the grid, from 977.2 to 1000 rad/s: seen from its ends it does not turn.
+    // rounds over the last step of the grid, from 977.2 to 1000 rad/s: seen from its ends it does
+    // not turn.
     let tau = 4.0 * 2.0 * PI / (1000.0 * -(-0.01 * 10f64.ln()).exp_m1());
     let h = delayed(&[0.9, 0.0], &[1.0, 500.0], tau);
     let found = continuous(&h);
@@ -143,7 +146,8 @@ fn no_range_no_margins() {
         assert_eq!(margins(|w| h.response(w), range), none);
     }
     assert_eq!(margins(|_| Complex64::new(f64::NAN, 0.0), (0.1, 10.0)), none);
-    // A double integrator lies on the negative real axis: it crosses nothing, and its phase margin is zero.
+    // A double integrator lies on the negative real axis: it crosses nothing, and its phase margin
+    // is zero.
     let double = continuous(&tf(&[4.0], &[1.0, 0.0, 0.0]));
     assert_eq!(double.phase_crossover_rad_s, None);
     assert!((double.crossover_rad_s.unwrap() - 2.0).abs() < 1e-12 && double.phase_margin_deg.unwrap().abs() < 1e-9);
@@ -178,14 +182,16 @@ fn stability_with_delay_in_closed_form() {
             );
         }
     }
-    // A pair of zeros enters at K tau = pi/2 + 2 pi k; for 5000 each step of the grid hides many rounds.
+    // A pair of zeros enters at K tau = pi/2 + 2 pi k; for 5000 each step of the grid hides many
+    // rounds.
     for product in [1.5, 1.6, 60.0, 5000.0] {
         let h = delayed(&[product / 0.28], &[1.0, 0.0], 0.28);
         let pairs = ((product - PI / 2.0) / (2.0 * PI)).ceil().max(0.0) as usize;
         let found = Characteristic::new(&h).unwrap().zeros_in_right_half_plane();
         assert_eq!(found, Some(2 * pairs), "{product}");
     }
-    // k e^{-s tau}/(s - 1), tau = 0.5: stable for 1 < k < sqrt(1 + w^2) with atan w = w/2 (w = 2.331122370414423).
+    // k e^{-s tau}/(s - 1), tau = 0.5: stable for 1 < k < sqrt(1 + w^2) with atan w = w/2 (w =
+    // 2.331122370414423).
     let limit = (1.0 + 2.331122370414423f64.powi(2)).sqrt();
     for (k, stable) in [(0.9, false), (1.001, true), (limit - 1e-3, true), (limit + 1e-3, false)] {
         assert_eq!(closed_loop_is_stable(&delayed(&[k], &[1.0, -1.0], 0.5)), stable, "{k}");
@@ -242,7 +248,8 @@ fn marginal_and_hidden_modes_are_not_stable() {
     assert!(!closed_loop_is_stable(&tf(&[0.0], &[1.0, 0.0])));
     assert!(closed_loop_is_stable(&tf(&[0.0], &[1.0, 2.0])));
     assert!(!closed_loop_is_stable(&tf(&[-1.0], &[1.0])));
-    // (s - 1)/((s - 1)(s + 2)): the unstable mode is in the loop though not in its transfer function.
+    // (s - 1)/((s - 1)(s + 2)): the unstable mode is in the loop though not in its transfer
+    // function.
     assert!(!closed_loop_is_stable(&tf(&[1.0, -1.0], &[1.0, 1.0, -2.0])));
     // Two modes within one step of the grid, which together turn the phase by whole rounds.
     for (damping, stable) in [(1e-6, true), (-1e-6, false)] {

@@ -40,7 +40,8 @@ impl RemnantDiscretisation {
         }
     }
 
-    /// sigma' of the filter with K_n = 1, and its logarithmic derivative with respect to `a = Ts/T_n`.
+    /// sigma' of the filter with K_n = 1, and its logarithmic derivative with respect to
+    /// `a = Ts/T_n`.
     pub(super) fn innovation_sd(self, order: usize, a: f64) -> (f64, f64) {
         match self {
             Self::ZeroOrderHold => {

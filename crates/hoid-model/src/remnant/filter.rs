@@ -30,7 +30,8 @@ impl RemnantFilter {
     /// A remnant filter with parameters that have a meaning.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] unless the gain is zero or more, the time constant positive, both finite, and the order 1 to 4.
+    /// [`ModelError::OutOfRange`] unless the gain is zero or more, the time constant positive, both
+    /// finite, and the order 1 to 4.
     pub fn new(gain: f64, time_constant_s: f64, order: usize) -> Result<Self, ModelError> {
         let filter = Self {
             gain,
@@ -79,7 +80,8 @@ impl RemnantFilter {
     /// The discrete filter from the noise, one draw a sample, to the remnant n.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] as for [`RemnantFilter::new`], and when T_n is not between 1e-9 and 1e9 samples.
+    /// [`ModelError::OutOfRange`] as for [`RemnantFilter::new`], and when T_n is not between 1e-9
+    /// and 1e9 samples.
     pub fn discrete(
         &self,
         sample_time: SampleTime,
@@ -101,7 +103,8 @@ impl RemnantFilter {
     /// The monic noise model of the same spectrum.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] as for [`RemnantFilter::new`], and when T_n is not between 1e-9 and 1e9 samples.
+    /// [`ModelError::OutOfRange`] as for [`RemnantFilter::new`], and when T_n is not between 1e-9
+    /// and 1e9 samples.
     pub fn noise_model(&self, sample_time: SampleTime, how: RemnantDiscretisation) -> Result<NoiseModel, ModelError> {
         let a = self.ratio(sample_time)?;
         let (c, unit) = match how {

@@ -1,4 +1,5 @@
-//! The numerator of the filter behind a zero-order hold, and its factors with all zeros inside the unit circle.
+//! The numerator of the filter behind a zero-order hold, and its factors with all zeros inside the
+//! unit circle.
 
 use num_complex::Complex64;
 
@@ -25,7 +26,8 @@ fn moments(a: f64) -> [f64; 5] {
     let decay = (-a).exp();
     let mut m = [0.0; 5];
     if a < 8.0 {
-        // The highest by its series of positive terms, e^-a sum of a^i k!/(k + 1 + i)!; the others follow downwards by parts.
+        // The highest by its series of positive terms, e^-a sum of a^i k!/(k + 1 + i)!; the others
+        // follow downwards by parts.
         let (mut term, mut sum) = (0.2, 0.0);
         for i in 0..80 {
             sum += term;
@@ -92,7 +94,8 @@ impl Factored {
             .collect();
         let at = |p: &[f64], z: Complex64| p.iter().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * z + c);
         let (mut inside, mut moves) = (Vec::with_capacity(degree), Vec::with_capacity(degree));
-        // At most three roots of positive coefficients: found unless a is so large that all but n_1 vanish.
+        // At most three roots of positive coefficients: found unless a is so large that all but n_1
+        // vanish.
         for zero in polynomial::roots(&numerator).unwrap_or_default() {
             // N(zeta, a) = 0 moves the zero by -N_a/N_zeta.
             let moved = -at(&derivative, zero) / at(&slope, zero);

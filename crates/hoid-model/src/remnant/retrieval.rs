@@ -13,11 +13,13 @@ pub struct RetrievedRemnant {
     pub k_n: f64,
 }
 
-/// T_n and K_n from the noise polynomial `1 + d[0] q^-1 + ... + d[m-1] q^-m` and the standard deviation of the innovation.
+/// T_n and K_n from the noise polynomial `1 + d[0] q^-1 + ... + d[m-1] q^-m` and the standard
+/// deviation of the innovation.
 ///
 /// # Errors
-/// [`NotConvertible::NotFinite`] for coefficients that are no numbers; [`NotConvertible::NotARemnantFilter`] when m is not 1 to 4, a
-/// coefficient has the wrong sign, it implies a pole outside (0, 1), or T_n is nothing beside a sample.
+/// [`NotConvertible::NotFinite`] for coefficients that are no numbers;
+/// [`NotConvertible::NotARemnantFilter`] when m is not 1 to 4, a coefficient has the wrong sign, it
+/// implies a pole outside (0, 1), or T_n is nothing beside a sample.
 pub fn retrieve(
     d: &[f64],
     innovation_sd: f64,
@@ -33,7 +35,8 @@ pub fn retrieve(
     })
 }
 
-/// Jacobian of `[T_n in s, K_n]` (rows) with respect to `[d_1, ..., d_m, sigma']` (columns) at what [`retrieve`] finds.
+/// Jacobian of `[T_n in s, K_n]` (rows) with respect to `[d_1, ..., d_m, sigma']` (columns) at what
+/// [`retrieve`] finds.
 ///
 /// # Errors
 /// As [`retrieve`].

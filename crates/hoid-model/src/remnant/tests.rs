@@ -22,7 +22,8 @@ fn filters() -> Vec<RemnantFilter> {
         .collect()
 }
 
-/// Variance of the output for white noise of unit variance: the sum of the squared impulse response.
+/// Variance of the output for white noise of unit variance: the sum of the squared impulse
+/// response.
 fn variance(h: &DiscreteTransferFunction, samples: usize) -> f64 {
     let mut y: Vec<f64> = Vec::with_capacity(samples);
     for k in 0..samples {
@@ -191,7 +192,8 @@ fn jacobian_agrees_with_finite_differences() {
                     let (up, down) = (at(1.0), at(-1.0));
                     for i in 0..2 {
                         let difference = (up[i] - down[i]) / (2.0 * h);
-                        // Truncation (h/(1 - alpha))^2 with 1 - alpha of 0.03 or more, and rounding eps/h.
+                        // Truncation (h/(1 - alpha))^2 with 1 - alpha of 0.03 or more, and rounding
+                        // eps/h.
                         assert!(
                             (exact[i][j] - difference).abs() <= 2e-6 * difference.abs(),
                             "{how:?} m {m} T_n {t} row {i} column {j}: {} and {difference}",

@@ -6,7 +6,8 @@ use kuva::prelude::{Layout, TickFormat};
 
 use super::style;
 
-/// Height between the ticks of an ordinate at the least, and of a decade that has labels at 2 and 5 as well.
+/// Height between the ticks of an ordinate at the least, and of a decade that has labels at 2 and 5
+/// as well.
 const TICK_HEIGHT: f64 = 16.0;
 const HIGH_DECADE: f64 = 48.0;
 /// Parts of a circle, deg.
@@ -44,7 +45,8 @@ pub fn tick(value: f64, step: f64) -> String {
     format!("{value:.digits$e}")
 }
 
-/// A layout with the ticks of an ordinate of this height in `unit`; their numbers stand there where `labelled`.
+/// A layout with the ticks of an ordinate of this height in `unit`; their numbers stand there where
+/// `labelled`.
 pub fn with_ordinate(
     layout: Layout,
     (low, high): (f64, f64),
@@ -96,7 +98,8 @@ pub fn with_abscissa(layout: Layout, (low, high): (f64, f64), logarithmic: bool,
         .with_x_tick_format(TickFormat::Custom(Arc::new(format)))
 }
 
-/// Range of a logarithmic axis that holds these values, at 1, 2 or 5 times a power of ten; from 0.1 to 1 where none is positive.
+/// Range of a logarithmic axis that holds these values, at 1, 2 or 5 times a power of ten; from 0.1
+/// to 1 where none is positive.
 pub fn log_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let drawable = values.into_iter().filter(|v| style::is_drawable(*v) && *v >= LEAST);
     let start = (f64::INFINITY, 0.0_f64);

@@ -1,8 +1,10 @@
-//! Bode pair: magnitude and phase of models with their 95 % bands, and of the true operator where it is known.
+//! Bode pair: magnitude and phase of models with their 95 % bands, and of the true operator where
+//! it is known.
 //!
-//! The estimators see the operator behind the zero-order hold of their sampling, `B q^-nk/(A F)`; the truth is drawn behind the
-//! same hold, so that both curves lie on each other when the parameters agree. The phase is unwrapped with the delay
-//! `nk Ts omega` taken out, which turns fastest, and put back.
+//! The estimators see the operator behind the zero-order hold of their sampling, `B q^-nk/(A F)`;
+//! the truth is drawn behind the same hold, so that both curves lie on each other when the
+//! parameters agree. The phase is unwrapped with the delay `nk Ts omega` taken out, which turns
+//! fastest, and put back.
 
 use std::f64::consts::TAU;
 
@@ -29,7 +31,8 @@ const PHASE_STEPS: [f64; 6] = [15.0, 30.0, 45.0, 90.0, 180.0, 360.0];
 
 /// Frequencies of a curve.
 const POINTS: usize = 240;
-/// Range in which a person controls, rad/s; from a tenth to fifty the axis has ticks at 1, 2 and 5 of each decade.
+/// Range in which a person controls, rad/s; from a tenth to fifty the axis has ticks at 1, 2 and 5
+/// of each decade.
 const LOWEST_RAD_S: f64 = 0.1;
 const HIGHEST_RAD_S: f64 = 50.0;
 /// A model in the figure.
@@ -52,17 +55,19 @@ pub struct TrueResponse {
     pub sample_time: SampleTime,
 }
 
-/// Magnitude in dB and phase in deg over frequency in rad/s, from 0.1 rad/s, or the lowest frequency that the longest
-/// record resolves, to 50 rad/s or half the sampling frequency.
+/// Magnitude in dB and phase in deg over frequency in rad/s, from 0.1 rad/s, or the lowest
+/// frequency that the longest record resolves, to 50 rad/s or half the sampling frequency.
 ///
-/// Bands are 1.96 standard errors to either side; a model without standard errors has none. A truth that no discrete model
-/// stands for (a delay of no whole number of samples) is drawn without the hold.
+/// Bands are 1.96 standard errors to either side; a model without standard errors has none. A truth
+/// that no discrete model stands for (a delay of no whole number of samples) is drawn without the
+/// hold.
 pub fn bode(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse]) -> String {
     bode_with_points(id, models, truths, &[])
 }
 
-/// The same with points over it, such as a describing function of the same records, with error bars of 1.96 standard errors. The axes
-/// reach to all points below 50 rad/s. The first set is black, further ones have the colours that no model has.
+/// The same with points over it, such as a describing function of the same records, with error bars
+/// of 1.96 standard errors. The axes reach to all points below 50 rad/s. The first set is black,
+/// further ones have the colours that no model has.
 pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse], points: &[BodePoints]) -> String {
     let points: Vec<BodePoints> = points.iter().map(BodePoints::drawable).collect();
     let omega = frequencies(models, &points);

@@ -1,6 +1,8 @@
-//! Bode pairs side by side: magnitude in dB over phase in deg, several curves and the true response in each column.
+//! Bode pairs side by side: magnitude in dB over phase in deg, several curves and the true response
+//! in each column.
 //!
-//! The phase is unwrapped with the delay taken out, which turns fastest, and put back, as in [`super::bode`].
+//! The phase is unwrapped with the delay taken out, which turns fastest, and put back, as in
+//! [`super::bode`].
 
 use hoid_model::{Complex64, uncertainty::Estimate};
 
@@ -29,11 +31,13 @@ pub struct BodeCurve {
     pub phase_deg: Vec<f64>,
     /// Lower and upper edge of the band of the magnitude, dB; empty for none.
     pub magnitude_band: Vec<(f64, f64)>,
-    /// Lower and upper edge of the band of the phase, deg, on the branch of the phase; empty for none.
+    /// Lower and upper edge of the band of the phase, deg, on the branch of the phase; empty for
+    /// none.
     pub phase_band: Vec<(f64, f64)>,
     /// Lower and upper end of the error bar of the magnitude, dB; empty for none.
     pub magnitude_bars: Vec<(f64, f64)>,
-    /// Lower and upper end of the error bar of the phase, deg, on the branch of the phase; empty for none.
+    /// Lower and upper end of the error bar of the phase, deg, on the branch of the phase; empty
+    /// for none.
     pub phase_bars: Vec<(f64, f64)>,
     /// Delay that is taken out while the phase is unwrapped, s; that of the model, or zero.
     pub delay_s: f64,
@@ -139,7 +143,8 @@ pub struct BodeGrid {
     pub columns: Vec<BodeColumn>,
 }
 
-/// Magnitude over phase as one figure, with logarithmic frequency in rad/s. `title` is what a screen reader says.
+/// Magnitude over phase as one figure, with logarithmic frequency in rad/s. `title` is what a
+/// screen reader says.
 pub fn bode_grid(id: &str, title: &str, grid: &BodeGrid) -> String {
     let row = |name: &str, unit: &str, of: fn(&BodeCurve) -> Curve| -> Vec<CurvePanel> {
         let panel = |column: &BodeColumn| CurvePanel {

@@ -1,7 +1,9 @@
-//! Points with error bars over a Bode pair: describing functions beside the models that were fitted to the same records.
+//! Points with error bars over a Bode pair: describing functions beside the models that were fitted
+//! to the same records.
 //!
-//! The phase of a point is known but for whole turns. It is drawn on the branch that is nearest to the first curve, and without a
-//! curve unwrapped from point to point with the delay of the points taken out.
+//! The phase of a point is known but for whole turns. It is drawn on the branch that is nearest to
+//! the first curve, and without a curve unwrapped from point to point with the delay of the points
+//! taken out.
 
 use hoid_ident::frequency::DescribingFunction;
 use hoid_model::uncertainty::Estimate;
@@ -21,7 +23,8 @@ pub struct BodePoints {
     pub name: String,
     /// Frequencies, rad/s, ascending.
     pub omega_rad_s: Vec<f64>,
-    /// Magnitude in dB at each, with its standard error if there is one. What is not finite is left out.
+    /// Magnitude in dB at each, with its standard error if there is one. What is not finite is left
+    /// out.
     pub magnitude_db: Vec<Estimate>,
     /// Phase in deg at each, on any branch, with its standard error if there is one.
     pub phase_deg: Vec<Estimate>,

@@ -1,5 +1,5 @@
-//! Box plots of the results of many runs: groups on the abscissa, in each group one box for each series.
-//! [`BoxStatistics`] says what a box shows.
+//! Box plots of the results of many runs: groups on the abscissa, in each group one box for each
+//! series. [`BoxStatistics`] says what a box shows.
 
 use kuva::{
     prelude::Plot,
@@ -36,7 +36,8 @@ pub enum BoxRange {
     /// All boxes, whiskers and outliers.
     #[default]
     Full,
-    /// Boxes and whiskers; outliers beyond are counted above the panel, and a triangle at its edge marks their group.
+    /// Boxes and whiskers; outliers beyond are counted above the panel, and a triangle at its edge
+    /// marks their group.
     Whiskers,
 }
 
@@ -52,11 +53,13 @@ pub struct BoxSeries {
 /// One panel of box plots.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BoxPanel {
-    /// Name of the quantity, such as `B_r(b_0)`; after `_` or `^` stands one sign, or several in braces.
+    /// Name of the quantity, such as `B_r(b_0)`; after `_` or `^` stands one sign, or several in
+    /// braces.
     pub name: String,
     /// Its unit; empty for none.
     pub unit: String,
-    /// The boxes by group and, in each, by series; a place that is not there is one without a value.
+    /// The boxes by group and, in each, by series; a place that is not there is one without a
+    /// value.
     pub boxes: Vec<Vec<BoxStatistics>>,
 }
 
@@ -65,7 +68,8 @@ pub struct BoxPanel {
 pub struct BoxGrid {
     /// The panels by rows.
     pub panels: Vec<BoxPanel>,
-    /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as a page.
+    /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as
+    /// a page.
     pub columns: usize,
     /// Text above each column; empty for none.
     pub titles: Vec<String>,
@@ -81,7 +85,8 @@ pub struct BoxGrid {
     pub shared_ordinates: bool,
     /// True when zero is in every range, with a line.
     pub with_zero: bool,
-    /// What every range reaches to both sides of its middle at least, so that rounding is not drawn as a spread; zero for none.
+    /// What every range reaches to both sides of its middle at least, so that rounding is not drawn
+    /// as a spread; zero for none.
     pub least_reach: f64,
 }
 

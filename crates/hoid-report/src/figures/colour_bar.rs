@@ -1,7 +1,8 @@
 //! Colours of values, and the bar that explains them.
 //!
-//! They are viridis (Smith and van der Walt, 2015), evenly spaced in lightness, or for differences those from red over white at zero to
-//! blue of Harrower and Brewer (2003), of which both ends are equally dark.
+//! They are viridis (Smith and van der Walt, 2015), evenly spaced in lightness, or for differences
+//! those from red over white at zero to blue of Harrower and Brewer (2003), of which both ends are
+//! equally dark.
 
 use kuva::{
     prelude::ColorMap,

@@ -11,7 +11,8 @@ use super::{
 
 const HEIGHT: f64 = 220.0;
 
-/// Autocorrelation of the residuals over positive lags with its 99 % bounds. Values outside are vermillion.
+/// Autocorrelation of the residuals over positive lags with its 99 % bounds. Values outside are
+/// vermillion.
 pub fn autocorrelation(id: &str, correlation: &Correlation, sample_time: SampleTime) -> String {
     stems(
         id,
@@ -22,7 +23,8 @@ pub fn autocorrelation(id: &str, correlation: &Correlation, sample_time: SampleT
     )
 }
 
-/// Cross-correlation of residuals and input over negative and positive lags with its 99 % bounds. Values outside are vermillion.
+/// Cross-correlation of residuals and input over negative and positive lags with its 99 % bounds.
+/// Values outside are vermillion.
 pub fn cross_correlation(id: &str, correlation: &Correlation, sample_time: SampleTime) -> String {
     stems(
         id,

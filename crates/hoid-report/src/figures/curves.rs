@@ -1,4 +1,5 @@
-//! Curves over a number in a grid of panels: with bands, markers, error bars and stems, on linear and logarithmic axes.
+//! Curves over a number in a grid of panels: with bands, markers, error bars and stems, on linear
+//! and logarithmic axes.
 
 use kuva::{
     prelude::{BandPlot, Plot},
@@ -56,7 +57,8 @@ pub struct Curve {
     pub shade: Shade,
     /// Abscissas, ascending.
     pub x: Vec<f64>,
-    /// One value for each. What is not finite, or has no logarithm where the axis needs it, is a gap.
+    /// One value for each. What is not finite, or has no logarithm where the axis needs it, is a
+    /// gap.
     pub y: Vec<f64>,
     /// Lower and upper edge of the band at each abscissa; empty for none.
     pub band: Vec<(f64, f64)>,
@@ -84,7 +86,8 @@ pub struct CurvePanel {
 pub struct CurveGrid {
     /// The panels by rows.
     pub panels: Vec<CurvePanel>,
-    /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as a page.
+    /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as
+    /// a page.
     pub columns: usize,
     /// Text above each column; empty for none.
     pub titles: Vec<String>,
@@ -271,7 +274,8 @@ impl Curve {
         runs(n, known).into_iter().filter(|r| r.len() > 1).map(line).collect()
     }
 
-    /// Stems, error bars and markers, and the values that stand alone between gaps; none outside the axes.
+    /// Stems, error bars and markers, and the values that stand alone between gaps; none outside
+    /// the axes.
     fn draw_marks(&self, scene: &mut Scene, scale: &Scale) {
         let colour = self.colour();
         let n = self.y.len().min(self.x.len());

@@ -139,7 +139,8 @@ pub fn text_width(text: &str, size: u32) -> f64 {
 pub mod tests {
     use super::*;
 
-    /// True when the figure has an element with these numbers, to the hundredth that it is written with.
+    /// True when the figure has an element with these numbers, to the hundredth that it is written
+    /// with.
     pub fn has(svg: &str, element: &str, numbers: &[(&str, f64)]) -> bool {
         let number = |tag: &str, name: &str| -> Option<f64> {
             let (_, rest) = tag.split_once(&format!(" {name}=\""))?;

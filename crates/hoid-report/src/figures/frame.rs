@@ -1,7 +1,8 @@
-//! The grid that figures of several panels stand in: widths, heights and margins of its cells, labels of rows and titles of columns.
+//! The grid that figures of several panels stand in: widths, heights and margins of its cells,
+//! labels of rows and titles of columns.
 //!
-//! One column is as wide as a column of text, several as a page. Axes are equally wide in all columns. Only the lowest panel of a
-//! column has the ticks and the name of the abscissa.
+//! One column is as wide as a column of text, several as a page. Axes are equally wide in all
+//! columns. Only the lowest panel of a column has the ticks and the name of the abscissa.
 
 use std::sync::Arc;
 
@@ -22,7 +23,8 @@ const SPACE: f64 = 8.0;
 const GAP: f64 = 16.0;
 /// Before a panel with ticks of its own, but no label.
 const TICKS: f64 = 50.0;
-/// After such a panel, but for the last: less than the half of a tick's label, which reaches into the space of the next.
+/// After such a panel, but for the last: less than the half of a tick's label, which reaches into
+/// the space of the next.
 const NARROW: f64 = 5.0;
 const TITLE: f64 = 18.0;
 /// Centre of the label of the ordinate.
@@ -42,7 +44,8 @@ pub enum Ordinates {
 }
 
 impl Ordinates {
-    /// For panels with these names and units by rows: one label is enough for a row of one quantity.
+    /// For panels with these names and units by rows: one label is enough for a row of one
+    /// quantity.
     pub fn of<'a>(labels: impl Iterator<Item = (&'a str, &'a str)>, columns: usize, shared: bool) -> Self {
         let labels: Vec<(&str, &str)> = labels.collect();
         let one = |row: &[(&str, &str)]| row.iter().all(|l| *l == row[0]);
@@ -183,7 +186,8 @@ impl Frame {
         }
     }
 
-    /// A layout with the size and margins of a panel, and no ticks at the abscissa where it is not the lowest.
+    /// A layout with the size and margins of a panel, and no ticks at the abscissa where it is not
+    /// the lowest.
     pub fn fitted(&self, i: usize, layout: Layout) -> Layout {
         let (row, column) = (i / self.columns, i % self.columns);
         let layout = layout
@@ -197,7 +201,8 @@ impl Frame {
         layout.with_x_tick_format(TickFormat::Custom(Arc::new(|_| String::new())))
     }
 
-    /// The panels with the name of the abscissa, the labels of their ordinates and the titles of the columns.
+    /// The panels with the name of the abscissa, the labels of their ordinates and the titles of
+    /// the columns.
     pub fn drawn(
         &self,
         cells: Vec<(Vec<Plot>, Layout)>,

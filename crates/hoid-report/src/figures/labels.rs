@@ -1,9 +1,10 @@
 //! Text of labels: names of parameters as symbols, subscripts and superscripts.
 //!
-//! The library that draws knows no subscripts. They are marked by characters of the private use area of Unicode, which become tags in
-//! the finished SVG ([`tagged`]).
+//! The library that draws knows no subscripts. They are marked by characters of the private use
+//! area of Unicode, which become tags in the finished SVG ([`tagged`]).
 
-/// Stand in the text of labels for the begin and end of a subscript and of a superscript, and the end of the label; they become tags.
+/// Stand in the text of labels for the begin and end of a subscript and of a superscript, and the
+/// end of the label; they become tags.
 const SUB: char = '\u{e000}';
 const BACK: char = '\u{e001}';
 const END: char = '\u{e002}';
@@ -22,7 +23,8 @@ pub fn axis_label(name: &str, unit: &str) -> String {
     literal(&plain(&format!("{name} ({unit})")))
 }
 
-/// Name and unit of a panel; several names are separated by commas. [`tagged`] completes it in the finished figure.
+/// Name and unit of a panel; several names are separated by commas. [`tagged`] completes it in the
+/// finished figure.
 pub fn panel_label(name: &str, unit: &str) -> String {
     let names: Vec<String> = name.split(", ").map(symbol).collect();
     let unit = match unit {
@@ -32,8 +34,9 @@ pub fn panel_label(name: &str, unit: &str) -> String {
     literal(&closed(&format!("{}{unit}", names.join(", "))))
 }
 
-/// Text of a label with its subscripts and superscripts: `n_k^*`, `B_r(b_0^{d,0})`. After `_` or `^` stands one sign or several in
-/// braces; words such as `my_model` and `run_2` stay as they are. [`tagged`] completes it in the finished figure.
+/// Text of a label with its subscripts and superscripts: `n_k^*`, `B_r(b_0^{d,0})`. After `_` or
+/// `^` stands one sign or several in braces; words such as `my_model` and `run_2` stay as they are.
+/// [`tagged`] completes it in the finished figure.
 pub fn marked(text: &str) -> String {
     literal(&closed(&marks(text)))
 }

@@ -54,13 +54,14 @@ impl Entry {
     }
 }
 
-/// Adds the legend below the figure, which grows by it: in one row where that is wide enough, else in columns, else, with long names,
-/// in rows of as many entries as fit.
+/// Adds the legend below the figure, which grows by it: in one row where that is wide enough, else
+/// in columns, else, with long names, in rows of as many entries as fit.
 pub fn add_legend(scene: &mut Scene, entries: &[Entry]) {
     add_legend_by(scene, entries, 1);
 }
 
-/// The same with a whole multiple of `multiple` columns where there are several rows, so that entries of one kind stay together.
+/// The same with a whole multiple of `multiple` columns where there are several rows, so that
+/// entries of one kind stay together.
 pub fn add_legend_by(scene: &mut Scene, entries: &[Entry], multiple: usize) {
     if entries.is_empty() {
         return;

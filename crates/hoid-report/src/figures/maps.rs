@@ -29,7 +29,8 @@ const APART: f64 = 5.0;
 pub struct MapPanel {
     /// What the rows of panels differ in, such as `P_n = 0.1`; that of the first of a row is shown.
     pub name: String,
-    /// Values by ordinate, the lowest first, and in each by abscissa. What is not finite or not there is hatched.
+    /// Values by ordinate, the lowest first, and in each by abscissa. What is not finite or not
+    /// there is hatched.
     pub values: Vec<Vec<f64>>,
     /// Abscissa and ordinate, counted from zero, of the cell with the cross.
     pub marked: Option<(usize, usize)>,
@@ -40,11 +41,13 @@ pub struct MapPanel {
 pub struct MapGrid {
     /// The panels by rows.
     pub panels: Vec<MapPanel>,
-    /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as a page.
+    /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as
+    /// a page.
     pub columns: usize,
     /// Text above each column; empty for none.
     pub titles: Vec<String>,
-    /// Name of the abscissa, such as `n_k^*`; after `_` or `^` stands one sign, or several in braces.
+    /// Name of the abscissa, such as `n_k^*`; after `_` or `^` stands one sign, or several in
+    /// braces.
     pub abscissa: String,
     /// Names of its places.
     pub x_places: Vec<String>,
@@ -56,7 +59,8 @@ pub struct MapGrid {
     pub value: String,
     /// Colours of the cells.
     pub colours: MapColours,
-    /// Values at the ends of the colours, beyond which they do not change; those of the data where it is `None`.
+    /// Values at the ends of the colours, beyond which they do not change; those of the data where
+    /// it is `None`.
     pub limits: Option<(f64, f64)>,
     /// True when each row has colours and a bar of its own.
     pub bar_per_row: bool,
@@ -238,7 +242,8 @@ impl MapGrid {
         missing
     }
 
-    /// The decimals, at most two, with which the longest number fits into a cell: no more than three digits need.
+    /// The decimals, at most two, with which the longest number fits into a cell: no more than
+    /// three digits need.
     fn decimals(&self, width: f64) -> Option<usize> {
         let values = || self.panels.iter().flat_map(|p| p.values.iter().flatten());
         let finite = || values().copied().filter(|v| style::is_drawable(*v));

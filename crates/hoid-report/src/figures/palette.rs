@@ -1,7 +1,9 @@
-//! The colours of all figures: the hue is the method, the shade of the hue the level (noise, sample time, memory), black the truth.
+//! The colours of all figures: the hue is the method, the shade of the hue the level (noise, sample
+//! time, memory), black the truth.
 //!
-//! Hues are those of Okabe and Ito (*Color Universal Design*, 2008). Shades of one hue are spaced evenly in lightness `L*` (CIE 1976),
-//! light for the lowest level and dark for the highest, so that their order is kept in grey print as well.
+//! Hues are those of Okabe and Ito (*Color Universal Design*, 2008). Shades of one hue are spaced
+//! evenly in lightness `L*` (CIE 1976), light for the lowest level and dark for the highest, so
+//! that their order is kept in grey print as well.
 
 use super::style::MODEL_COLOURS;
 
@@ -62,7 +64,8 @@ pub fn shade(method: usize, level: usize, levels: usize) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
 }
 
-/// True when white stands out better than black on a colour `#rrggbb`: by contrast of luminance, below `L*` of 50.
+/// True when white stands out better than black on a colour `#rrggbb`: by contrast of luminance,
+/// below `L*` of 50.
 pub fn is_dark(colour: &str) -> bool {
     lightness(channels(colour)) < 50.0
 }

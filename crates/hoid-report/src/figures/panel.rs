@@ -1,11 +1,13 @@
 //! One quantity over time, and the range of its ordinate.
 //!
-//! An estimate that leaves its usual range for a moment (T_L where K_e nearly vanishes) must not flatten all the rest. The ordinate
-//! therefore covers the truth, the batch fits and the estimates between their 10 and 90 % quantiles, and beyond that the quantiles of
-//! 1 and 99 % and the middle of the bands, as far as one and a half such ranges to either side. Where a truth is known and at least one
-//! method is near it, one that is far off does not flatten the others either: the ordinate ends at most two spans from the truth, a span
-//! being the range of the truth or a quarter of its size, and methods and batch fits beyond do not count. What lies outside is cut off at
-//! the axes, and [`TracePanel::beyond`] counts it.
+//! An estimate that leaves its usual range for a moment (T_L where K_e nearly vanishes) must not
+//! flatten all the rest. The ordinate therefore covers the truth, the batch fits and the estimates
+//! between their 10 and 90 % quantiles, and beyond that the quantiles of 1 and 99 % and the middle
+//! of the bands, as far as one and a half such ranges to either side. Where a truth is known and at
+//! least one method is near it, one that is far off does not flatten the others either: the
+//! ordinate ends at most two spans from the truth, a span being the range of the truth or a quarter
+//! of its size, and methods and batch fits beyond do not count. What lies outside is cut off at the
+//! axes, and [`TracePanel::beyond`] counts it.
 
 use super::{
     axes::one_two_five,
@@ -38,7 +40,8 @@ pub struct TraceCurve {
     pub kind: CurveKind,
     /// Number of its method, which gives the colour.
     pub method: usize,
-    /// Number of its level among those of the grid, which gives the shade; of no matter where the grid has none.
+    /// Number of its level among those of the grid, which gives the shade; of no matter where the
+    /// grid has none.
     pub level: usize,
     /// Times in s, ascending.
     pub times_s: Vec<f64>,
@@ -73,7 +76,8 @@ pub struct Beyond {
 /// One quantity over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TracePanel {
-    /// Name: `K_e` and the other parameters of the operator, `b0` and other coefficients are written with subscripts, the rest as it is.
+    /// Name: `K_e` and the other parameters of the operator, `b0` and other coefficients are
+    /// written with subscripts, the rest as it is.
     pub name: String,
     /// Unit, empty for none.
     pub unit: String,

@@ -8,12 +8,14 @@ pub const COLUMNS: usize = 340;
 /// More runs than this are joined where the gap between them is narrower than a column.
 const MOST_RUNS: usize = 200;
 
-/// Indices of the smallest and the largest value of each column, in order; all indices of a short series.
+/// Indices of the smallest and the largest value of each column, in order; all indices of a short
+/// series.
 pub fn thinned(values: &[f64]) -> Vec<usize> {
     thinned_run(values, 0..values.len(), COLUMNS)
 }
 
-/// As [`thinned`], for a part of a series; the whole has `parts` columns. Values that are not finite are passed over.
+/// As [`thinned`], for a part of a series; the whole has `parts` columns. Values that are not
+/// finite are passed over.
 pub fn thinned_run(values: &[f64], run: Range<usize>, parts: usize) -> Vec<usize> {
     let finite = |k: &usize| values[*k].is_finite();
     if values.len() <= 2 * parts {
@@ -34,7 +36,8 @@ pub fn thinned_run(values: &[f64], run: Range<usize>, parts: usize) -> Vec<usize
     kept
 }
 
-/// Indices of a run with the smallest lower and the largest upper edge of a band around each: first, middle of each column, last.
+/// Indices of a run with the smallest lower and the largest upper edge of a band around each:
+/// first, middle of each column, last.
 pub fn thinned_band(lower: &[f64], upper: &[f64], run: Range<usize>, parts: usize) -> Vec<(usize, f64, f64)> {
     let point = |k: usize| (k, lower[k], upper[k]);
     if lower.len() <= 2 * parts {
@@ -73,7 +76,8 @@ pub fn without_level<T: PartialEq>(kept: &[usize], value: impl Fn(usize) -> T) -
     needed.map(|(_, &k)| k).collect()
 }
 
-/// Runs of indices that are all known. Of very many, those closer to each other than a column are one.
+/// Runs of indices that are all known. Of very many, those closer to each other than a column are
+/// one.
 pub fn runs(n: usize, known: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let mut found: Vec<Range<usize>> = Vec::new();
     for k in (0..n).filter(|k| known(*k)) {

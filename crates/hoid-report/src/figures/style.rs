@@ -11,7 +11,8 @@ use super::labels::{plain, tagged};
 
 /// Width of every figure in units of the SVG.
 pub const WIDTH: f64 = 420.0;
-/// Space for tick labels and the label of the ordinate, the same in all figures so that panels align.
+/// Space for tick labels and the label of the ordinate, the same in all figures so that panels
+/// align.
 pub const LEFT: f64 = 68.0;
 pub const RIGHT: f64 = 14.0;
 /// Space above the axes.
@@ -126,7 +127,8 @@ pub fn in_grid(panels: Vec<(Vec<Plot>, Layout)>, widths: &[f64], heights: &[f64]
     figure.with_plots(plots).with_layouts(layouts).render()
 }
 
-/// SVG text with a view box (it scales with the page), a title for screen readers, and ids that begin with that of the figure.
+/// SVG text with a view box (it scales with the page), a title for screen readers, and ids that
+/// begin with that of the figure.
 pub fn finish(id: &str, title: &str, scene: &Scene) -> String {
     let raw = SvgBackend::new().render_scene(scene);
     let Some((_, body)) = raw.split_once('>') else {
@@ -147,8 +149,9 @@ pub fn finish(id: &str, title: &str, scene: &Scene) -> String {
     )
 }
 
-/// Ids `from` + number as `to` + number, counted from 1 in the order in which they come. The library counts them over the whole
-/// life of the process: the same figure drawn twice would differ.
+/// Ids `from` + number as `to` + number, counted from 1 in the order in which they come. The
+/// library counts them over the whole life of the process: the same figure drawn twice would
+/// differ.
 fn renumbered(text: &str, from: &str, to: &str) -> String {
     let mut known: Vec<&str> = Vec::new();
     let mut parts = text.split(from);

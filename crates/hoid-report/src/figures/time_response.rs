@@ -18,11 +18,12 @@ const SMALLEST_CLOSE_UP: usize = 50;
 const UPPER: f64 = 150.0;
 const LOWER: f64 = 190.0;
 
-/// Measured (grey), predicted (vermillion) and simulated (blue) output over time: the whole record above, its middle eighth
-/// below, where the prediction can be told from the measurement.
+/// Measured (grey), predicted (vermillion) and simulated (blue) output over time: the whole record
+/// above, its middle eighth below, where the prediction can be told from the measurement.
 ///
-/// The ordinate covers the measured output with half its range to either side; what leaves that (an unstable model) is cut off.
-/// Long records are drawn by the smallest and largest sample of each column, so that no peak is lost.
+/// The ordinate covers the measured output with half its range to either side; what leaves that (an
+/// unstable model) is cut off. Long records are drawn by the smallest and largest sample of each
+/// column, so that no peak is lost.
 pub fn time_response(id: &str, record: &Record, validation: &Validation) -> String {
     let measured = record.output();
     let (low, high) = style::padded_range(measured.iter().copied());

@@ -1,4 +1,5 @@
-//! Quantities over time in a grid of panels with one time axis: recursive estimates, their bands and errors, innovations.
+//! Quantities over time in a grid of panels with one time axis: recursive estimates, their bands
+//! and errors, innovations.
 
 use std::ops::Range;
 
@@ -29,14 +30,15 @@ const DASHES: &str = "#444444";
 pub struct TraceGrid {
     /// The panels by rows.
     pub panels: Vec<TracePanel>,
-    /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as a page.
+    /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as
+    /// a page.
     pub columns: usize,
     /// Text above each column; empty for none.
     pub titles: Vec<String>,
     /// Names of the methods, for the legend; empty for none.
     pub methods: Vec<String>,
-    /// Names of the levels of each method, such as those of the noise, from the lowest; empty for none. They are shades of the
-    /// colour of the method.
+    /// Names of the levels of each method, such as those of the noise, from the lowest; empty for
+    /// none. They are shades of the colour of the method.
     pub levels: Vec<String>,
     /// Spans that are shaded, s.
     pub shaded_s: Vec<(f64, f64)>,
@@ -178,7 +180,8 @@ impl TraceCurve {
         shade(self.method, self.level, levels)
     }
 
-    /// The rows of a run that are drawn: none on the level of both neighbours. One row alone is as long as its sample.
+    /// The rows of a run that are drawn: none on the level of both neighbours. One row alone is as
+    /// long as its sample.
     fn points(&self, run: Range<usize>, parts: usize, bounded: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
         let at = |k: usize| (self.times_s[k], bounded(self.values[k]));
         if run.len() == 1 {

@@ -25,7 +25,8 @@ pub(super) fn headings() -> Vec<&'static str> {
 }
 
 impl GroupReport<'_> {
-    /// A row for each subject, condition and estimator: the median over runs of each parameter of the whole run.
+    /// A row for each subject, condition and estimator: the median over runs of each parameter of
+    /// the whole run.
     pub(super) fn averages(&self) -> Vec<Value> {
         let table = self.tables.averages;
         let [subject, condition, window, estimator, parameter] =

@@ -16,7 +16,8 @@ use crate::{
 const FITS: [(&str, usize); 4] = [("ARX", 0), ("BJ", 1), ("grey box", 3), ("BJ, all runs", 4)];
 
 impl GroupReport<'_> {
-    /// What the describing functions say, with standard errors, a row for each subject and condition.
+    /// What the describing functions say, with standard errors, a row for each subject and
+    /// condition.
     pub(super) fn margins(&self) -> Vec<Value> {
         let Some(table) = self.tables.frequencies.map(|f| f.margins) else {
             return Vec::new();
@@ -55,7 +56,8 @@ impl GroupReport<'_> {
             .collect()
     }
 
-    /// Bode points of the describing functions, a figure for each condition with a column for each subject.
+    /// Bode points of the describing functions, a figure for each condition with a column for each
+    /// subject.
     pub(super) fn describing_functions(&self) -> Vec<Value> {
         let Some((lines, margins)) = self.tables.frequencies.map(|f| (f.lines, f.margins)) else {
             return Vec::new();
@@ -128,7 +130,8 @@ impl GroupReport<'_> {
             .collect()
     }
 
-    /// Median responses of the fits over the runs between two frequencies, with the quartiles as bands.
+    /// Median responses of the fits over the runs between two frequencies, with the quartiles as
+    /// bands.
     fn fits(&self, subject: &str, condition: &str, (low, high): (f64, f64)) -> Vec<BodeCurve> {
         let table = self.tables.responses;
         let (estimators, omega) = (texts(table, "estimator"), reals(table, "omega_rad_s"));

@@ -6,7 +6,8 @@ use super::{estimates, over_time, report::GroupReport};
 use crate::{ReportError, page};
 
 impl GroupReport<'_> {
-    /// The page as HTML text, with all styles and figures inside it. The same data give the same bytes.
+    /// The page as HTML text, with all styles and figures inside it. The same data give the same
+    /// bytes.
     ///
     /// # Errors
     /// [`ReportError::Template`] for a defect of this crate.

@@ -137,7 +137,8 @@ impl GroupReport<'_> {
         columns.map(row).collect()
     }
 
-    /// How fast the recursions follow a change and how noisy they are: a row for each subject, condition and parameter, three cells a recursion.
+    /// How fast the recursions follow a change and how noisy they are: a row for each subject,
+    /// condition and parameter, three cells a recursion.
     pub(super) fn settling(&self) -> Vec<Value> {
         let table = self.tables.settling;
         let [subject, condition, estimator, parameter] =
@@ -185,7 +186,8 @@ impl GroupReport<'_> {
         rows
     }
 
-    /// When the task of a condition changes, s: as the manifest says, or at the seam of joined runs.
+    /// When the task of a condition changes, s: as the manifest says, or at the seam of joined
+    /// runs.
     fn change_s(&self, condition: &str) -> Option<f64> {
         let known = self.manifest.conditions.get(condition).and_then(|facts| facts.change_s);
         let table = self.tables.settling;

@@ -14,10 +14,12 @@ use crate::{ReportError, page};
 /// Runs whose preparation and trouble the pages list.
 const MOST_LISTED: usize = 24;
 
-/// Writes the page of the group and one for each subject into the directory of its tables; `path` is where the manifest was read.
+/// Writes the page of the group and one for each subject into the directory of its tables; `path`
+/// is where the manifest was read.
 ///
 /// # Errors
-/// [`ReportError::Io`] for tables that are not there and pages that cannot be written; [`ReportError::Template`] for a defect of this crate.
+/// [`ReportError::Io`] for tables that are not there and pages that cannot be written;
+/// [`ReportError::Template`] for a defect of this crate.
 pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let read = |name: &str| read_table(&out.join(format!("{name}.parquet")));
     let (estimates, averages, delays) = (read("estimates")?, read("averages")?, read("delays")?);

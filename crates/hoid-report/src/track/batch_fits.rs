@@ -7,7 +7,8 @@ use hoid_track::{StartAt, Trace};
 /// A batch fit and its span, s.
 pub type BatchFit = ((f64, f64), Fit);
 
-/// The orders of a trace; where it tracks the delay, with the median of what it says of the delay in a span, s.
+/// The orders of a trace; where it tracks the delay, with the median of what it says of the delay
+/// in a span, s.
 fn orders_within(trace: &Trace, (from, to): (f64, f64)) -> Orders {
     let orders = trace.options().orders;
     if trace.options().method.track_delay_s().is_none() {
@@ -31,7 +32,8 @@ fn orders_within(trace: &Trace, (from, to): (f64, f64)) -> Orders {
     }
 }
 
-/// A fit of a span of a record with the structure and the orders of a trace; where the trace tracks the delay, with what it says of it there.
+/// A fit of a span of a record with the structure and the orders of a trace; where the trace tracks
+/// the delay, with what it says of it there.
 ///
 /// # Errors
 /// Those of the fit.
@@ -44,8 +46,8 @@ pub fn batch_fit(trace: &Trace, record: &Record, (from, to): (f64, f64)) -> Resu
     Ok(((from, to), estimator.fit(&[record.span(from, to)?])?))
 }
 
-/// The batch fits that a page compares a trace with, where none are named: that of the start, and one of the last third of the record; with the
-/// reason where the last third cannot be fitted.
+/// The batch fits that a page compares a trace with, where none are named: that of the start, and
+/// one of the last third of the record; with the reason where the last third cannot be fitted.
 pub fn default_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Option<IdentError>) {
     let mut all = Vec::new();
     if let (Some(start), StartAt::Span(Some((from, to)))) = (trace.start(), &trace.options().start)

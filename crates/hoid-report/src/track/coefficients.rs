@@ -1,4 +1,5 @@
-//! Coefficients by name, across structures: the poles of the operator stand in A of an ARX model and in F of a Box-Jenkins model.
+//! Coefficients by name, across structures: the poles of the operator stand in A of an ARX model
+//! and in F of a Box-Jenkins model.
 
 use hoid_ident::Fit;
 use hoid_track::Trace;
@@ -48,7 +49,8 @@ pub fn of_trace(trace: &Trace) -> Vec<Coefficient> {
         .collect()
 }
 
-/// Those of a fit, in the order of theta; none for a grey box, whose parameters are no coefficients.
+/// Those of a fit, in the order of theta; none for a grey box, whose parameters are no
+/// coefficients.
 pub fn of_fit(fit: &Fit) -> Vec<Coefficient> {
     if fit.is_grey_box() {
         return Vec::new();

@@ -1,5 +1,6 @@
-//! One self-contained HTML page about recursive estimates over a record: parameters over time with 95 % bands, batch fits and, where
-//! the record says it, the truth; innovations; standard errors; steps that were shortened.
+//! One self-contained HTML page about recursive estimates over a record: parameters over time with
+//! 95 % bands, batch fits and, where the record says it, the truth; innovations; standard errors;
+//! steps that were shortened.
 
 mod batch_fits;
 mod coefficients;

@@ -140,12 +140,14 @@ fn ordinate(shown: Shown) -> Ordinate {
     }
 }
 
-/// The coefficients, one panel each; where some methods have the poles in A and others in F, they share a panel.
+/// The coefficients, one panel each; where some methods have the poles in A and others in F, they
+/// share a panel.
 pub fn coefficient_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
     grid(traces, record, coefficient_panels(traces, record, Shown::Value))
 }
 
-/// Standard errors over time, of the operator's parameters when they are what all methods move, else of the coefficients.
+/// Standard errors over time, of the operator's parameters when they are what all methods move,
+/// else of the coefficients.
 pub fn error_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
     let panels = if of_operator(traces) {
         operator_panels(traces, record, Shown::Error)

@@ -20,8 +20,8 @@ pub struct TrackReport<'a> {
     pub title: String,
     /// What was done and with what, as name and value: command, versions, record, seed.
     pub settings: Vec<(String, String)>,
-    /// The record that was tracked. Columns with the names of the operator's parameters (`K_e`, `T_L`, `K_e_dot`, `omega_nm`, `zeta_nm`,
-    /// `tau_e`) are the truth, as in every simulation.
+    /// The record that was tracked. Columns with the names of the operator's parameters (`K_e`,
+    /// `T_L`, `K_e_dot`, `omega_nm`, `zeta_nm`, `tau_e`) are the truth, as in every simulation.
     pub record: &'a Record,
     /// One to four estimates of that record, drawn over each other.
     pub traces: Vec<TraceSection<'a>>,
@@ -30,11 +30,12 @@ pub struct TrackReport<'a> {
 }
 
 impl TrackReport<'_> {
-    /// The page as HTML text, with all styles and figures inside it. The same data give the same bytes.
+    /// The page as HTML text, with all styles and figures inside it. The same data give the same
+    /// bytes.
     ///
     /// # Errors
-    /// [`ReportError::NoTraces`], [`ReportError::TooManyTraces`], [`ReportError::EmptyTrace`]; [`ReportError::Template`] for a defect of
-    /// this crate.
+    /// [`ReportError::NoTraces`], [`ReportError::TooManyTraces`], [`ReportError::EmptyTrace`];
+    /// [`ReportError::Template`] for a defect of this crate.
     pub fn to_html(&self) -> Result<String, ReportError> {
         self.check()?;
         let traces: Vec<Evaluated<'_>> = self.traces.iter().map(Evaluated::new).collect();
@@ -70,7 +71,8 @@ impl TrackReport<'_> {
         page::render("track.html", values)
     }
 
-    /// The parameters of the operator over time, one panel each, for figures of one's own with [`figures::trace_panels`].
+    /// The parameters of the operator over time, one panel each, for figures of one's own with
+    /// [`figures::trace_panels`].
     ///
     /// # Errors
     /// [`ReportError::NoTraces`], [`ReportError::TooManyTraces`], [`ReportError::EmptyTrace`].

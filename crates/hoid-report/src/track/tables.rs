@@ -49,7 +49,8 @@ pub fn methods(traces: &[Evaluated<'_>], record: &Record) -> Vec<Value> {
     traces.iter().map(row).collect()
 }
 
-/// One row a method: how many samples were taken, left out, shortened, and which rows do not convert.
+/// One row a method: how many samples were taken, left out, shortened, and which rows do not
+/// convert.
 pub fn counts(traces: &[Evaluated<'_>]) -> Vec<Value> {
     let row = |t: &Evaluated<'_>| {
         let trace = t.section.trace;
@@ -95,7 +96,8 @@ struct Reason {
     text: String,
 }
 
-/// The reasons, the most frequent first. Those that differ in their numbers alone are one, in the words of the first.
+/// The reasons, the most frequent first. Those that differ in their numbers alone are one, in the
+/// words of the first.
 fn reasons(trace: &Evaluated<'_>) -> Vec<Reason> {
     let mut found: Vec<(&NotConvertible, Reason)> = Vec::new();
     let rows = trace.section.trace.times_s().iter().zip(&trace.operators);
@@ -121,7 +123,8 @@ fn reasons(trace: &Evaluated<'_>) -> Vec<Reason> {
     reasons
 }
 
-/// Share of innovations larger than twice their standard deviation, from the time on at which the estimate moves.
+/// Share of innovations larger than twice their standard deviation, from the time on at which the
+/// estimate moves.
 fn outside(trace: &Evaluated<'_>) -> Option<f64> {
     let trace = trace.section.trace;
     let rows = trace
@@ -136,7 +139,8 @@ fn outside(trace: &Evaluated<'_>) -> Option<f64> {
     (!moving.is_empty()).then(|| moving.iter().filter(|m| **m).count() as f64 / moving.len() as f64)
 }
 
-/// One row a parameter of the operator, one column a method: root of the mean squared relative error in %. `None` without a truth.
+/// One row a parameter of the operator, one column a method: root of the mean squared relative
+/// error in %. `None` without a truth.
 pub fn errors(traces: &[Evaluated<'_>], record: &Record) -> Option<Value> {
     let last_s = record.time_s(record.len() - 1);
     let from_s = if last_s > ERRORS_FROM_S {
@@ -192,7 +196,8 @@ fn percent(share: f64) -> String {
     }
 }
 
-/// The batch fits of one method: at the end of each span the recursive estimate, the fit and the truth.
+/// The batch fits of one method: at the end of each span the recursive estimate, the fit and the
+/// truth.
 pub fn batch(trace: &Evaluated<'_>, record: &Record) -> Vec<Value> {
     trace
         .section

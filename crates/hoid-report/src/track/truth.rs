@@ -29,8 +29,9 @@ pub fn parameter(record: &Record, name: &str, time_s: f64) -> Option<f64> {
     sample(record, time_s).map(|k| values[k])
 }
 
-/// The true coefficients of B and of the poles at every sample, by the exact hold with the parameters of that sample. Empty without a
-/// truth, and for a model that is not that of the operator; B alone is left out when the delay is another one.
+/// The true coefficients of B and of the poles at every sample, by the exact hold with the
+/// parameters of that sample. Empty without a truth, and for a model that is not that of the
+/// operator; B alone is left out when the delay is another one.
 pub fn coefficients(record: &Record, trace: &Trace) -> Vec<(Coefficient, Vec<f64>)> {
     let orders = trace.options().orders;
     let is_operator = orders.nb == 2 && (orders.na, orders.nf) != (2, 2) && (orders.na == 2 || orders.nf == 2);

@@ -1,12 +1,15 @@
 //! What is done with one run.
 //!
-//! nk, and for Box-Jenkins nd and T_n, are chosen beforehand: on each of two sub-batches every delay in the range is fitted, and nk is the
-//! average of the two best, rounded. With these, ARX and Box-Jenkins models are fitted to the sub-batches and to the whole run, and the recursions
-//! start from the fit of the first sub-batch. A row says what was estimated in which window; what fails is a row with its reason.
+//! nk, and for Box-Jenkins nd and T_n, are chosen beforehand: on each of two sub-batches every
+//! delay in the range is fitted, and nk is the average of the two best, rounded. With these, ARX
+//! and Box-Jenkins models are fitted to the sub-batches and to the whole run, and the recursions
+//! start from the fit of the first sub-batch. A row says what was estimated in which window; what
+//! fails is a row with its reason.
 //!
-//! Beside the fits of single runs stands one of all runs of a person in a condition that does not change: a Box-Jenkins model with initial states of each run,
-//! the delay that fits best, and the greatest order of the noise model that the manifest allows. In a closed loop a noise model that is too small biases the
-//! operator, and one run is too short for a great one.
+//! Beside the fits of single runs stands one of all runs of a person in a condition that does not
+//! change: a Box-Jenkins model with initial states of each run, the delay that fits best, and the
+//! greatest order of the noise model that the manifest allows. In a closed loop a noise model that
+//! is too small biases the operator, and one run is too short for a great one.
 
 use std::path::Path;
 

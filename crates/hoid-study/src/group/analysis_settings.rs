@@ -8,10 +8,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AnalysisSettings {
-    /// The two sub-batches, s; the first and the last three eighths of each record where they are left out.
+    /// The two sub-batches, s; the first and the last three eighths of each record where they are
+    /// left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub windows_s: Option<[(f64, f64); 2]>,
-    /// Least and greatest order of the noise model; BIC chooses on each sub-batch, the greater one is taken.
+    /// Least and greatest order of the noise model; BIC chooses on each sub-batch, the greater one
+    /// is taken.
     pub nd: (usize, usize),
     /// Range of the delay, s.
     pub delay_s: (f64, f64),

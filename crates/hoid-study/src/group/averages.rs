@@ -1,4 +1,5 @@
-//! Over the runs of a subject and condition: means with their errors, the chosen delays, mean traces.
+//! Over the runs of a subject and condition: means with their errors, the chosen delays, mean
+//! traces.
 
 use std::collections::BTreeMap;
 
@@ -64,7 +65,8 @@ impl Averages {
     }
 }
 
-/// Delays and T_n that were chosen beforehand (Table 3): a row for each run, by subject, condition and place in the manifest.
+/// Delays and T_n that were chosen beforehand (Table 3): a row for each run, by subject, condition
+/// and place in the manifest.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Delays(BTreeMap<(String, String, usize), DelaysOfRun>);
 
@@ -176,7 +178,8 @@ impl TraceAverages {
             .unzip()
     }
 
-    /// Median, quartiles, mean and standard deviation over the runs at each time; of a standard error the median variance.
+    /// Median, quartiles, mean and standard deviation over the runs at each time; of a standard
+    /// error the median variance.
     pub fn table(&self) -> OutputTable {
         let mut rows = Rows::new(&Self::schema(&self.names));
         for (key, times) in &self.values {

@@ -15,17 +15,20 @@ pub struct ConditionSettings {
     /// Channel whose lines excite the loop: f_t or a disturbance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub excitation: Option<String>,
-    /// Period of the excitation, s; the longest that all its lines are harmonics of where it is left out.
+    /// Period of the excitation, s; the longest that all its lines are harmonics of where it is
+    /// left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
-    /// Samples by which u is recorded later than the e that it answers: `e[k]` belongs to `u[k + offset]`.
+    /// Samples by which u is recorded later than the e that it answers: `e[k]` belongs to
+    /// `u[k + offset]`.
     pub offset_samples: f64,
     /// Whether the describing function is fitted with a lead.
     pub lead: bool,
     /// Time at which the task changes, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub change_s: Option<f64>,
-    /// What is done to its runs before they are analysed; what it names wins over that of the group.
+    /// What is done to its runs before they are analysed; what it names wins over that of the
+    /// group.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prepare: Option<PreparationSettings>,
 }

@@ -1,16 +1,23 @@
-//! Describing functions of a group, by Fourier coefficients at the lines of the excitation (see [`hoid_ident::frequency`]).
+//! Describing functions of a group, by Fourier coefficients at the lines of the excitation (see
+//! [`hoid_ident::frequency`]).
 //!
-//! For each subject and each condition whose excitation the manifest names: the describing function over the runs that can be read, crossover and
-//! phase margin with the controlled element, and gain, lead and delay. They stand beside the parametric fits and assume nothing of their structure.
+//! For each subject and each condition whose excitation the manifest names: the describing function
+//! over the runs that can be read, crossover and phase margin with the controlled element, and
+//! gain, lead and delay. They stand beside the parametric fits and assume nothing of their
+//! structure.
 //!
-//! How far a fit is from it: with `H_j` the describing function at line j, `s_j` its standard error and `F_j` the median response of the fits over the
-//! runs, the distance is `sqrt(sum |F_j - H_j|^2/s_j^2 / sum |H_j|^2/s_j^2)`, the deviation relative to H with the lines weighted as they are known, and in
-//! errors `sqrt(mean |F_j - H_j|^2/s_j^2)`. The errors of a line are known from its few runs alone; each is drawn towards the median of all lines,
-//! `r_j^2 <- (nu r_j^2 + 4 r~^2)/(nu + 4)` with `r = s/|H|` and `nu = 2 (runs - 1)` (moderated variances, Smyth 2004), else the one that is small by chance
-//! would decide. Both come from the same runs, so that a fit without bias is nearer than one error. Where the controlled element is
-//! known, a fit agrees when its crossover is within 10 % and its phase margin within 5 deg of those of the describing function: about what two experiments with the same
-//! person differ by; else when its distance is below 10 %. Where the task changes within the run, both are averages over what changes, in different ways, and
-//! nothing is said.
+//! How far a fit is from it: with `H_j` the describing function at line j, `s_j` its standard error
+//! and `F_j` the median response of the fits over the runs, the distance is
+//! `sqrt(sum |F_j - H_j|^2/s_j^2 / sum |H_j|^2/s_j^2)`, the deviation relative to H with the lines
+//! weighted as they are known, and in errors `sqrt(mean |F_j - H_j|^2/s_j^2)`. The errors of a line
+//! are known from its few runs alone; each is drawn towards the median of all lines,
+//! `r_j^2 <- (nu r_j^2 + 4 r~^2)/(nu + 4)` with `r = s/|H|` and `nu = 2 (runs - 1)` (moderated
+//! variances, Smyth 2004), else the one that is small by chance would decide. Both come from the
+//! same runs, so that a fit without bias is nearer than one error. Where the controlled element is
+//! known, a fit agrees when its crossover is within 10 % and its phase margin within 5 deg of those
+//! of the describing function: about what two experiments with the same person differ by; else when
+//! its distance is below 10 %. Where the task changes within the run, both are averages over what
+//! changes, in different ways, and nothing is said.
 
 use std::path::Path;
 
@@ -68,7 +75,8 @@ const AGREEMENT: [&str; 6] = [
     "distance_in_errors",
 ];
 
-/// Largest difference of a crossover, of a phase margin, and of a response where there is no crossover, for agreement.
+/// Largest difference of a crossover, of a phase margin, and of a response where there is no
+/// crossover, for agreement.
 const AGREES: (f64, f64, f64) = (10.0, 5.0, 10.0);
 
 /// The tables while they are filled.
@@ -78,7 +86,8 @@ struct Tables {
     agreement: Rows,
 }
 
-/// Describing functions of all subjects and conditions with an excitation, and how far the fits are from them; none where the manifest names none.
+/// Describing functions of all subjects and conditions with an excitation, and how far the fits are
+/// from them; none where the manifest names none.
 pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAverages) -> Option<Frequencies> {
     manifest.conditions.values().find(|facts| facts.excitation.is_some())?;
     let with_errors: Vec<String> = MARGINS
@@ -242,7 +251,8 @@ fn of_records(
     Ok(())
 }
 
-/// Distance between a describing function and a fit in percent and in errors; of one run, which has no errors, with equal weights in percent alone.
+/// Distance between a describing function and a fit in percent and in errors; of one run, which has
+/// no errors, with equal weights in percent alone.
 fn distance(found: &DescribingFunction, response: &MedianResponse) -> (f64, f64) {
     const PRIOR: f64 = 4.0;
     let relative = |line: &Line| line.standard_error.map(|s| s * s / line.response.norm_sqr());

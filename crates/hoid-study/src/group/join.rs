@@ -1,6 +1,7 @@
 //! The tables of a group from those of its runs.
 //!
-//! The traces of 1000 runs do not belong in memory: they are averaged for one person in one condition after the other.
+//! The traces of 1000 runs do not belong in memory: they are averaged for one person in one
+//! condition after the other.
 
 use std::{collections::BTreeMap, path::Path};
 

@@ -1,4 +1,5 @@
-//! The manifest of a group, in TOML: which file is which run of which subject, and what is done with it.
+//! The manifest of a group, in TOML: which file is which run of which subject, and what is done
+//! with it.
 //!
 //! ```toml
 //! name = "tracking"
@@ -76,7 +77,8 @@ pub struct Manifest {
 pub struct RunEntry {
     /// Its file, from the directory of the manifest.
     pub file: PathBuf,
-    /// A second file that is joined behind the first, from the next sample on: what the person controls changes at the seam.
+    /// A second file that is joined behind the first, from the next sample on: what the person
+    /// controls changes at the seam.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub then: Option<PathBuf>,
     /// Who it is.
@@ -104,7 +106,8 @@ impl Manifest {
     /// Reads and checks a manifest.
     ///
     /// # Errors
-    /// [`StudyError::Plan`] with the file, the line where there is one, and the remedy; [`StudyError::Io`].
+    /// [`StudyError::Plan`] with the file, the line where there is one, and the remedy;
+    /// [`StudyError::Io`].
     pub fn read(path: &Path) -> Result<Self, StudyError> {
         Self::parse(&hoid_io::read_text(path)?, &path.display().to_string())
     }
@@ -177,10 +180,12 @@ impl Manifest {
         self.analysis.check()
     }
 
-    /// A manifest of the files in a directory that match a pattern, in the order of their names; and the names of those that do not.
+    /// A manifest of the files in a directory that match a pattern, in the order of their names;
+    /// and the names of those that do not.
     ///
     /// # Errors
-    /// [`StudyError::Io`] when the directory cannot be read, [`StudyError::NoRuns`] when nothing matches.
+    /// [`StudyError::Io`] when the directory cannot be read, [`StudyError::NoRuns`] when nothing
+    /// matches.
     pub fn of_directory(directory: &Path, pattern: &Pattern) -> Result<(Self, Vec<String>), StudyError> {
         let mut names = hoid_io::file_names(directory)?;
         names.sort();

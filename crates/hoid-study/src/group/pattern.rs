@@ -1,6 +1,7 @@
 //! Names of files as patterns: `{subject}_{condition}_{run}*.csv`.
 //!
-//! A name in braces stands for one or more characters, as few as possible, `*` for any number of them; everything else stands for itself.
+//! A name in braces stands for one or more characters, as few as possible, `*` for any number of
+//! them; everything else stands for itself.
 
 use crate::StudyError;
 
@@ -33,8 +34,8 @@ impl Pattern {
     /// Reads a pattern.
     ///
     /// # Errors
-    /// [`StudyError::Pattern`] for braces that are not closed, other names, one that is there twice, two names without a text between them, or a
-    /// pattern without `{run}`.
+    /// [`StudyError::Pattern`] for braces that are not closed, other names, one that is there
+    /// twice, two names without a text between them, or a pattern without `{run}`.
     pub fn new(text: &str) -> Result<Self, StudyError> {
         let bad = |reason: String| StudyError::Pattern {
             pattern: text.to_owned(),

@@ -1,4 +1,5 @@
-//! How the runs of a group are prepared: the keys of `[prepare]` and of `[conditions.NAME.prepare]`, which win one by one.
+//! How the runs of a group are prepared: the keys of `[prepare]` and of
+//! `[conditions.NAME.prepare]`, which win one by one.
 //!
 //! ```toml
 //! [prepare]
@@ -18,7 +19,8 @@ use hoid_io::{IoError, NewRate, Offset, Preparation, Scaling};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is done to the runs before they are analysed. What is left out is not done, or as the group says.
+/// What is done to the runs before they are analysed. What is left out is not done, or as the group
+/// says.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PreparationSettings {
@@ -67,7 +69,8 @@ impl PreparationSettings {
         *self == Self::default()
     }
 
-    /// What is done to the runs of a condition: what the condition says, and what the group says of the rest.
+    /// What is done to the runs of a condition: what the condition says, and what the group says of
+    /// the rest.
     ///
     /// # Errors
     /// The key that has no meaning, and why.

@@ -38,7 +38,8 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path) -> Result<ReadRe
     read_prepared(path, &options, &preparation).map_err(text)
 }
 
-/// The tables of the account: what was done to the runs, one step a row, and what is wrong with their sampling, one finding a row.
+/// The tables of the account: what was done to the runs, one step a row, and what is wrong with
+/// their sampling, one finding a row.
 pub(super) fn schemas() -> [(&'static str, TableSchema); 2] {
     let schema = |names: &[&str]| {
         let column = |name: &&str| ColumnSchema {
@@ -116,7 +117,8 @@ pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
     run.ok_or_else(|| "no file is named".to_owned())
 }
 
-/// What was done to the files of a run and what is wrong with them; nothing for one that cannot be read, which its estimates say.
+/// What was done to the files of a run and what is wrong with them; nothing for one that cannot be
+/// read, which its estimates say.
 pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static str, OutputTable); 2] {
     let [(steps_name, steps), (trouble_name, trouble)] = schemas();
     let (mut steps, mut trouble) = (Rows::new(&steps), Rows::new(&trouble));

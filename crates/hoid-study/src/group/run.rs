@@ -1,4 +1,5 @@
-//! The analysis of a group in a directory: blocks over threads, parts on disk, the tables of the group at the end.
+//! The analysis of a group in a directory: blocks over threads, parts on disk, the tables of the
+//! group at the end.
 
 use std::{
     path::{Path, PathBuf},

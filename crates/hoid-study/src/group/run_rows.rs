@@ -1,4 +1,5 @@
-//! The estimates of one run as rows: coefficients, operator, responses, and what failed with its reason.
+//! The estimates of one run as rows: coefficients, operator, responses, and what failed with its
+//! reason.
 
 use hoid_ident::{Fit, frequency::Crossover};
 use hoid_io::{OutputTable, TableSchema};
@@ -24,7 +25,8 @@ pub(super) struct RunTables {
     pub estimates: OutputTable,
     pub responses: OutputTable,
     pub traces: OutputTable,
-    /// What was done to its files and what is wrong with their sampling, by the name of the table; none of all runs at once.
+    /// What was done to its files and what is wrong with their sampling, by the name of the table;
+    /// none of all runs at once.
     pub account: Vec<(&'static str, OutputTable)>,
 }
 
@@ -111,7 +113,8 @@ impl<'a> RunRows<'a> {
         }
     }
 
-    /// Frequency response of the fit of the whole run, and crossover and phase margin with the controlled element, where that is known.
+    /// Frequency response of the fit of the whole run, and crossover and phase margin with the
+    /// controlled element, where that is known.
     pub fn response_rows(&mut self, window: Window, label: &str, fit: &Fit, sample_time_s: f64) {
         if window.name != WHOLE {
             return;

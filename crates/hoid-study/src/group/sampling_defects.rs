@@ -48,7 +48,8 @@ impl SamplingDefect {
     }
 }
 
-/// The columns of a run as a recorder with these defects would have written them. `noise` are normal deviates, one a sample.
+/// The columns of a run as a recorder with these defects would have written them. `noise` are
+/// normal deviates, one a sample.
 pub(super) fn recorded(record: &Record, defects: &[SamplingDefect], noise: &[f64]) -> OutputTable {
     let has = |defect: SamplingDefect| defects.contains(&defect);
     let n = record.len();

@@ -1,10 +1,14 @@
-//! How fast the recursions follow a change at a known instant, and how noisy they are, by subject, condition and parameter.
+//! How fast the recursions follow a change at a known instant, and how noisy they are, by subject,
+//! condition and parameter.
 //!
-//! Of a recorded person the truth is not known: the levels before and after the change are those of the recursion itself, the medians over the second
-//! half of its rows before, and of those after the change, of the median over the runs. The settling times are those when the median has first covered 50 and
-//! 90 % of the step, as in the studies; the noise is the deviation of one run around its own level after the change, `1.4826` times the median
-//! absolute deviation, and its median over the runs. There is no time where the step is smaller than the noise, so that there is nothing to settle to, and none
-//! where the share was covered when the change came: then it was not the change that moved the estimate.
+//! Of a recorded person the truth is not known: the levels before and after the change are those of
+//! the recursion itself, the medians over the second half of its rows before, and of those after
+//! the change, of the median over the runs. The settling times are those when the median has first
+//! covered 50 and 90 % of the step, as in the studies; the noise is the deviation of one run around
+//! its own level after the change, `1.4826` times the median absolute deviation, and its median
+//! over the runs. There is no time where the step is smaller than the noise, so that there is
+//! nothing to settle to, and none where the share was covered when the change came: then it was not
+//! the change that moved the estimate.
 
 use std::collections::BTreeMap;
 

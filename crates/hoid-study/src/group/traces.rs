@@ -1,8 +1,9 @@
-//! Recursive estimates of one run as rows: coefficients and operator with their standard errors, correlations of the coefficients, and the frequency
-//! response at the frequencies of the manifest.
+//! Recursive estimates of one run as rows: coefficients and operator with their standard errors,
+//! correlations of the coefficients, and the frequency response at the frequencies of the manifest.
 //!
-//! The covariance of the errors of two coefficients is their correlation times both standard errors; pages show it
-//! for RPEM. The response at a frequency between the lines of the excitation is determined where single parameters are not.
+//! The covariance of the errors of two coefficients is their correlation times both standard
+//! errors; pages show it for RPEM. The response at a frequency between the lines of the excitation
+//! is determined where single parameters are not.
 
 use hoid_io::TableSchema;
 use hoid_model::PolynomialModel;
@@ -24,7 +25,8 @@ const CORRELATED: [&str; 4] = ["f1", "f2", "b0", "b1"];
 /// Which columns the traces have.
 #[derive(Debug, Clone)]
 pub(super) struct TraceColumns {
-    /// Those with a standard error: coefficients of RLS and of Box-Jenkins models, and the operator.
+    /// Those with a standard error: coefficients of RLS and of Box-Jenkins models, and the
+    /// operator.
     pub parameters: Vec<String>,
     /// Correlations, and the response at the frequencies of the manifest.
     pub others: Vec<String>,

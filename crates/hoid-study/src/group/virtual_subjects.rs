@@ -1,9 +1,12 @@
-//! A virtual experiment: subjects, conditions and runs of simulated subjects, with the truth beside the files.
+//! A virtual experiment: subjects, conditions and runs of simulated subjects, with the truth beside
+//! the files.
 //!
-//! The gain K_e, the lead T_L, omega_nm, zeta_nm and the noise level of subject s are those of the condition times `exp(a z)`, z a normal deviate of the subject, a the
-//! spread between subjects (0.15 is 15 %); in each run each of them is multiplied by `exp(b z)` again, b the spread between runs. The delay differs by whole
-//! samples. A loop that would be unstable is drawn again, from the next deviates. Deviates come from the random stream (seed, subject, run),
-//! remnants from the streams that `hoid simulate` uses.
+//! The gain K_e, the lead T_L, omega_nm, zeta_nm and the noise level of subject s are those of the
+//! condition times `exp(a z)`, z a normal deviate of the subject, a the spread between subjects
+//! (0.15 is 15 %); in each run each of them is multiplied by `exp(b z)` again, b the spread between
+//! runs. The delay differs by whole samples. A loop that would be unstable is drawn again, from the
+//! next deviates. Deviates come from the random stream (seed, subject, run), remnants from the
+//! streams that `hoid simulate` uses.
 
 use std::path::Path;
 
@@ -60,7 +63,8 @@ const MOST_DRAWS: usize = 100;
 /// Simulates the experiment into a directory: a file a run, `truth.csv`, `group.toml`.
 ///
 /// # Errors
-/// [`StudyError::Virtual`] for an experiment without meaning, [`StudyError::ExperimentThere`], [`StudyError::Io`].
+/// [`StudyError::Virtual`] for an experiment without meaning, [`StudyError::ExperimentThere`],
+/// [`StudyError::Io`].
 pub fn simulate_group(
     experiment: &VirtualExperiment,
     directory: &Path,
@@ -175,7 +179,8 @@ impl VirtualExperiment {
         let of_run = deviates(1 + cell * 1_000_000 + run);
         let mut reason = String::new();
         for draw in 0..MOST_DRAWS {
-            // The subject is drawn again when none of their runs can be stable, the run before that.
+            // The subject is drawn again when none of their runs can be stable, the run before
+            // that.
             let (s, r) = (&of_subject[6 * (draw / 10)..], &of_run[6 * draw..]);
             let factor = |i: usize| (self.between_subjects * s[i] + self.between_runs * r[i]).exp();
             let mut scenario = Scenario::condition(condition);

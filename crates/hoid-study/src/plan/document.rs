@@ -84,7 +84,8 @@ impl Plan {
     /// Reads and checks a plan.
     ///
     /// # Errors
-    /// [`StudyError::Plan`] with the file, the line and the remedy; [`StudyError::Io`] for a file that cannot be read.
+    /// [`StudyError::Plan`] with the file, the line and the remedy; [`StudyError::Io`] for a file
+    /// that cannot be read.
     pub fn read(path: &Path) -> Result<Self, StudyError> {
         let text = hoid_io::read_text(path)?;
         Self::parse(&text, &path.display().to_string())

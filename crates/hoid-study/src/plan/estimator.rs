@@ -8,8 +8,9 @@
 //! orders = { nd = [1, 2], nk = "true" }
 //! ```
 //!
-//! The keys are those of the command line, with units where it has none. `"true"` as an order takes what the scenario has: nk of its
-//! delay, nd of its remnant; `nk = "ramp"` is one less. Orders that are left out are those of the operator's structure, `nk = "true"`.
+//! The keys are those of the command line, with units where it has none. `"true"` as an order takes
+//! what the scenario has: nk of its delay, nd of its remnant; `nk = "ramp"` is one less. Orders
+//! that are left out are those of the operator's structure, `nk = "true"`.
 
 use std::collections::BTreeMap;
 
@@ -174,7 +175,8 @@ impl EstimatorCell {
             return Orders::default();
         };
         let (ts, table) = (scenario.scenario().sample_time.s() * self.decimate as f64, &self.orders);
-        // The delay in whole samples, but for the rounding of the quotient: what is left over is for b0 and those after it.
+        // The delay in whole samples, but for the rounding of the quotient: what is left over is
+        // for b0 and those after it.
         let delay = (scenario.scenario().initial.operator.tau_e_s / ts + 1e-9).floor() as usize;
         let of = |order: Option<Order>, usual: usize, simulated: usize| match order {
             None => usual,
@@ -202,7 +204,8 @@ impl EstimatorCell {
         self.start_values.get(name).copied()
     }
 
-    /// Start of theta for these orders, where the plan gives one; coefficients that it leaves out are zero.
+    /// Start of theta for these orders, where the plan gives one; coefficients that it leaves out
+    /// are zero.
     pub(crate) fn theta(&self, orders: &Orders) -> Option<Vec<f64>> {
         if self.start.is_empty() {
             return None;

@@ -41,7 +41,8 @@ pub(crate) enum Order {
 pub(crate) enum OfScenario {
     /// nk of the delay and sample time; nd of the order of the remnant.
     True,
-    /// nk for an input that is a ramp between two samples, one less: a decimated signal is not held.
+    /// nk for an input that is a ramp between two samples, one less: a decimated signal is not
+    /// held.
     Ramp,
 }
 
@@ -55,11 +56,13 @@ pub(crate) struct OrdersTable {
     /// Order of D, or "true" for the order of the simulated remnant.
     pub nd: Option<Order>,
     pub nf: Option<usize>,
-    /// Delay in samples, or "true" for that of the simulated operator (its default), or "ramp" for one less.
+    /// Delay in samples, or "true" for that of the simulated operator (its default), or "ramp" for
+    /// one less.
     pub nk: Option<Order>,
 }
 
-/// What is estimated from each record, and how. Each value may be a list, which makes it an axis of the grid.
+/// What is estimated from each record, and how. Each value may be a list, which makes it an axis of
+/// the grid.
 #[derive(Debug, Deserialize, JsonSchema)]
 pub(crate) struct EstimatorTable {
     /// Name in the results.
@@ -69,7 +72,8 @@ pub(crate) struct EstimatorTable {
     /// What is done.
     #[schemars(extend("enum" = what_is_done()))]
     pub(super) method: String,
-    /// Name of an estimator above, from whose VAF with the same nk on the same run that of this one is counted: delta_vaf.
+    /// Name of an estimator above, from whose VAF with the same nk on the same run that of this one
+    /// is counted: delta_vaf.
     pub(super) versus: Option<String>,
     /// Structure of the polynomial model. Default: arx for rls, else bj.
     #[schemars(extend("enum" = structure_names()))]
@@ -89,7 +93,8 @@ pub(crate) struct EstimatorTable {
     #[serde(default, deserialize_with = "choice_or_auto")]
     #[schemars(with = "Option<String>", extend("enum" = names::<InitialState>(&["auto"])))]
     pub(super) initial_state: Option<InitialState>,
-    /// Start of a search or a recursion: coefficients by name, those left out are zero; `name` labels it.
+    /// Start of a search or a recursion: coefficients by name, those left out are zero; `name`
+    /// labels it.
     pub(super) start: Option<BTreeMap<String, StartValue>>,
     /// Own starts from which a search runs to its end. Default 2.
     pub(super) starts: Option<usize>,

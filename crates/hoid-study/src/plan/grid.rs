@@ -1,9 +1,10 @@
 //! Grids in TOML: where a list stands for a value, each of its entries is taken.
 //!
-//! A table of a plan is taken apart into its leaves, `remnant.order = [1, 2]` and so on. A leaf with a list is an axis, unless a list
-//! is what the key wants. All combinations are formed, the first axis of the file slowest. Each is written down as a table without
-//! lists, one key a line, and the line of the plan from which each of its lines came is kept, so that who reads the table can
-//! name the line that the user wrote.
+//! A table of a plan is taken apart into its leaves, `remnant.order = [1, 2]` and so on. A leaf
+//! with a list is an axis, unless a list is what the key wants. All combinations are formed, the
+//! first axis of the file slowest. Each is written down as a table without lists, one key a line,
+//! and the line of the plan from which each of its lines came is kept, so that who reads the table
+//! can name the line that the user wrote.
 
 use toml::{
     Spanned,
@@ -80,7 +81,8 @@ pub fn line_at(text: &str, byte: usize) -> usize {
         .count()
 }
 
-/// All combinations of the lists of a table. Keys in `whole`, joined by dots, want a list or a table as it stands.
+/// All combinations of the lists of a table. Keys in `whole`, joined by dots, want a list or a
+/// table as it stands.
 pub fn variants(table: &Spanned<DeTable<'_>>, source: &str, whole: &[&str]) -> Result<Vec<Variant>, PlanProblem> {
     let mut leaves = Vec::new();
     collect(table.get_ref(), source, whole, &mut Vec::new(), &mut leaves)?;
@@ -123,7 +125,8 @@ fn combination(index: usize, count: usize, leaves: &[Leaf], source: &str, first_
         let key: Vec<String> = leaf.path.iter().map(|part| quoted(part)).collect();
         let line = format!("{} = {written}\n", key.join("."));
         let at = line_at(source, leaf.start);
-        // An entry over several lines is short of some where the list began later; the first line is what a reader looks for.
+        // An entry over several lines is short of some where the list began later; the first line
+        // is what a reader looks for.
         variant.lines.extend(line.lines().map(|_| at));
         variant.text.push_str(&line);
     }
@@ -190,7 +193,8 @@ fn entry_of(entry: &Spanned<DeValue<'_>>, source: &str) -> (String, String) {
     (written, shown)
 }
 
-/// A value on one line. Tables under headings of their own have no text in one piece and are put together.
+/// A value on one line. Tables under headings of their own have no text in one piece and are put
+/// together.
 fn written(value: &Spanned<DeValue<'_>>, source: &str) -> String {
     match value.get_ref() {
         DeValue::Table(table) => {

@@ -20,7 +20,8 @@ pub(crate) struct Head {
     pub seed: u64,
     /// Replications of each cell.
     pub replications: u64,
-    /// Replications that are run and stored together, which a stopped study loses at most. Default 50.
+    /// Replications that are run and stored together, which a stopped study loses at most. Default
+    /// 50.
     #[serde(default = "usual_block")]
     pub block: u64,
     /// What is kept.
@@ -33,11 +34,13 @@ pub(crate) struct Head {
 pub(crate) struct Keep {
     /// Samples from one kept point of a trace to the next. Default: no traces are kept.
     pub trace_every: Option<usize>,
-    /// Whether the points of each trace are kept, or only the summary over replications. Default true.
+    /// Whether the points of each trace are kept, or only the summary over replications. Default
+    /// true.
     pub trace_points: bool,
     /// Whether standard errors are kept. Default true.
     pub standard_errors: bool,
-    /// Whether bias before and after a change, coverage of the bands and declared changes of recursions are measured. Default false.
+    /// Whether bias before and after a change, coverage of the bands and declared changes of
+    /// recursions are measured. Default false.
     pub changes: bool,
 }
 

@@ -1,6 +1,7 @@
 //! JSON schema of a plan: what editors complete and check.
 //!
-//! It is made of the types that read plans and of the schema of a scenario file, in which each single value may also be a list.
+//! It is made of the types that read plans and of the schema of a scenario file, in which each
+//! single value may also be a list.
 
 use hoid_ident::settings::{Kind, MethodSpec};
 use hoid_track::Method;

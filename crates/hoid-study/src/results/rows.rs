@@ -35,7 +35,8 @@ pub struct SummaryRow {
     pub start: String,
     /// It took every `decimate`-th sample.
     pub decimate: usize,
-    /// The quantity: a column of the table of fits, `bias_<column>`, a rate or a settling time of median traces.
+    /// The quantity: a column of the table of fits, `bias_<column>`, a rate or a settling time of
+    /// median traces.
     pub quantity: String,
     /// Statistics over the replications; the outliers themselves are not kept.
     pub statistics: Statistics,
@@ -72,7 +73,8 @@ pub struct TraceStatistics {
 }
 
 impl TraceStatistics {
-    /// Monte Carlo error of the median of a point, taken as that of a normal sample of the same interquartile range.
+    /// Monte Carlo error of the median of a point, taken as that of a normal sample of the same
+    /// interquartile range.
     pub fn error_of_median(&self, point: usize, replications: u64) -> f64 {
         match replications {
             0 | 1 => 0.0,

@@ -58,7 +58,8 @@ impl Results {
         }
     }
 
-    /// The rows of the summary that a query describes, in the order of the table. A query without quantity takes all of them.
+    /// The rows of the summary that a query describes, in the order of the table. A query without
+    /// quantity takes all of them.
     pub fn find(&self, query: &Query) -> Vec<&SummaryRow> {
         let mut found = Vec::new();
         for pair in self.pairs.iter().filter(|pair| query.matches(&pair.key)) {
@@ -82,9 +83,10 @@ impl Results {
         }
     }
 
-    /// The values of a quantity replication by replication, cells and estimators in the order of the table; what does not exist is no
-    /// number. `bias_<column>` is computed from the column and its true value; `failed`, `not_convertible`, `converged`
-    /// and `diverged` are 0 or 1. Empty when the query names no quantity, or one that the table of fits does not have.
+    /// The values of a quantity replication by replication, cells and estimators in the order of
+    /// the table; what does not exist is no number. `bias_<column>` is computed from the column and
+    /// its true value; `failed`, `not_convertible`, `converged` and `diverged` are 0 or 1. Empty
+    /// when the query names no quantity, or one that the table of fits does not have.
     pub fn values(&self, query: &Query) -> Vec<f64> {
         let Some(quantity) = query.quantity() else {
             return Vec::new();

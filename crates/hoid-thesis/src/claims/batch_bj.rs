@@ -1,4 +1,5 @@
-//! Claims on batch fits of Box-Jenkins models with m* = m0: bias by remnant order, delay and noise level.
+//! Claims on batch fits of Box-Jenkins models with m* = m0: bias by remnant order, delay and noise
+//! level.
 
 use super::{
     batch_arx::conditions,
@@ -215,7 +216,8 @@ fn second_order_worst(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![part])
 }
 
-/// Biases of a remnant parameter as the text retrieves it, with the exact retrieval shown beside it.
+/// Biases of a remnant parameter as the text retrieves it, with the exact retrieval shown beside
+/// it.
 fn remnant(
     evidence: &Evidence<'_>,
     name: &str,

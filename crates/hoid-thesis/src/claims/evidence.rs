@@ -1,13 +1,16 @@
 //! The results of studies as evidence: figures of a cell with their Monte Carlo errors.
 //!
-//! - *Bias of a median trace*: mean over a span of the relative error of the median over replications. Were all times of a run in error alike, its
-//!   error would be the mean over the span of that of a median, 0.93 IQR / sqrt(M) (of a normal sample 1.253 s / sqrt(M), IQR = 1.349 s).
-//!   A bootstrap over runs gave for the span of 30.72 s: 0.3 to 0.57 of it where all parameters forget in 2.56 s (RLS and RPEM), and
-//!   0.33 to 0.45 for K_e, T_L and K_e_dot where b alone does (RLS); 0.46 to 1.5 for the others there. So half of it is
-//!   taken in the first two cases, all of it in the last.
-//! - *Settling of a median trace*: time after t_M at which it has covered 90 % of its own step, from its mean over the 10.24 s before t_M to its
-//!   mean over the last 15.36 s: an estimate with a bias settles at its own value. Its error is half of what lies between the settling of
-//!   the median plus and minus its own error, and at least half the step of the kept times.
+//! - *Bias of a median trace*: mean over a span of the relative error of the median over
+//!   replications. Were all times of a run in error alike, its error would be the mean over the
+//!   span of that of a median, 0.93 IQR / sqrt(M) (of a normal sample 1.253 s / sqrt(M), IQR =
+//!   1.349 s). A bootstrap over runs gave for the span of 30.72 s: 0.3 to 0.57 of it where all
+//!   parameters forget in 2.56 s (RLS and RPEM), and 0.33 to 0.45 for K_e, T_L and K_e_dot where b
+//!   alone does (RLS); 0.46 to 1.5 for the others there. So half of it is taken in the first two
+//!   cases, all of it in the last.
+//! - *Settling of a median trace*: time after t_M at which it has covered 90 % of its own step,
+//!   from its mean over the 10.24 s before t_M to its mean over the last 15.36 s: an estimate with
+//!   a bias settles at its own value. Its error is half of what lies between the settling of the
+//!   median plus and minus its own error, and at least half the step of the kept times.
 
 use std::collections::BTreeMap;
 
@@ -112,8 +115,8 @@ impl<'a> Study<'a> {
         Ok(median_of(&a.iter().zip(&b).map(|(a, b)| a - b).collect::<Vec<_>>()))
     }
 
-    /// Share of hits of a quantity of 0 and 1 over all replications of all that a query describes. None or all of n hits has an error of 1.5 / n:
-    /// its limit of 95 % is 3 / n.
+    /// Share of hits of a quantity of 0 and 1 over all replications of all that a query describes.
+    /// None or all of n hits has an error of 1.5 / n: its limit of 95 % is 3 / n.
     pub fn share(&self, query: &Query) -> Result<Value, String> {
         if self.results.count(query) == 0 || !self.results.has_quantity(query) {
             return Err(format!(
@@ -124,7 +127,8 @@ impl<'a> Study<'a> {
         Ok(share_of(&self.results.values(query)))
     }
 
-    /// Bias of the median trace of a parameter, % of the true value of the last state, over the span from 51.2 s on.
+    /// Bias of the median trace of a parameter, % of the true value of the last state, over the
+    /// span from 51.2 s on.
     pub fn trace_bias(&self, query: &Query, parameter: &str) -> Result<Value, String> {
         let (traces, truth) = self.trace(query, parameter)?;
         let Some(bands) = traces.parameters.get(parameter) else {
@@ -156,7 +160,8 @@ impl<'a> Study<'a> {
         })
     }
 
-    /// Settling time of the median trace of a parameter, s. A trace that does not settle has the time to its end.
+    /// Settling time of the median trace of a parameter, s. A trace that does not settle has the
+    /// time to its end.
     pub fn settling(&self, query: &Query, parameter: &str) -> Result<Value, String> {
         let (traces, _) = self.trace(query, parameter)?;
         let cell = self.results.cells(query);
@@ -191,7 +196,8 @@ impl<'a> Study<'a> {
         })
     }
 
-    /// The traces of one estimator in one cell, and the true value of a parameter before and after the change.
+    /// The traces of one estimator in one cell, and the true value of a parameter before and after
+    /// the change.
     fn trace(&self, query: &Query, parameter: &str) -> Result<(&'a TraceSummary, [f64; 2]), String> {
         let missing = || {
             format!(
@@ -227,7 +233,8 @@ impl<'a> Study<'a> {
     }
 }
 
-/// Whether the estimate of a parameter forgets within a small part of the span: gains do so with b, others when all parameters do.
+/// Whether the estimate of a parameter forgets within a small part of the span: gains do so with b,
+/// others when all parameters do.
 fn forgets(estimator: &EstimatorCell, parameter: &str) -> bool {
     const LONGEST_S: f64 = 5.0;
     const TEXT_SAMPLE_TIME_S: f64 = 0.01;

@@ -1,8 +1,9 @@
 //! Statements of the reference text, tested by the data of studies.
 //!
-//! A claim names what the text says and where, which plans measure it and how. Its verdict comes from the data by the rules of the
-//! module [`rules`], the same for all claims. A claim whose plan was not run, or which needs something that the results do not have, cannot
-//! be tested and says why; so does one on experiments with people, for which there are no data here.
+//! A claim names what the text says and where, which plans measure it and how. Its verdict comes
+//! from the data by the rules of the module [`rules`], the same for all claims. A claim whose plan
+//! was not run, or which needs something that the results do not have, cannot be tested and says
+//! why; so does one on experiments with people, for which there are no data here.
 //!
 //! | module | theme |
 //! |---|---|

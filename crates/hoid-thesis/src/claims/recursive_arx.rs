@@ -1,4 +1,5 @@
-//! Claims on recursive least squares of ARX models, with a factor (V.B) and with a matrix (6.2.1) of forgetting.
+//! Claims on recursive least squares of ARX models, with a factor (V.B) and with a matrix (6.2.1)
+//! of forgetting.
 
 use super::{
     claim::{Claim, Source, Theme},

@@ -1,4 +1,5 @@
-//! Claims on the recursive prediction-error method of BJ(m* = 1), and against recursive least squares.
+//! Claims on the recursive prediction-error method of BJ(m* = 1), and against recursive least
+//! squares.
 
 use super::{
     claim::{Claim, Source, Theme},

@@ -1,16 +1,20 @@
 //! From numbers with Monte Carlo errors to a verdict.
 //!
-//! 1. **A cell.** A claim is tested in each cell (a scenario, an estimator, a parameter) of which it speaks, with the measured value x, its
-//!    Monte Carlo error s and a margin of 2 s.
-//!    - *Comparison* (larger, smaller, no larger than): the cell passes when x is beyond the limit by more than the margin, fails when it is on the
-//!      other side by more, and is undecided within the margin.
-//!    - *Number* (around 50 %, 10 times): the cell passes when x lies within the range of the wording, widened by the margin, and fails
-//!      otherwise. It is undecided where it would pass with a margin of more than half the range: such an x says nothing of the number.
-//!    - Where less than half of the replications give a value (models that do not convert) the cell is undecided.
-//! 2. **A part** of a claim (same figure of merit, same test) holds when 90 % of its decided cells pass, holds in part when 50 % do, and does not
-//!    hold otherwise. When less than half of its cells are decided, the replications do not decide it.
-//! 3. **A claim** holds when all its parts hold, does not hold when none of them does even in part, and holds in part otherwise. When no part is
-//!    decided, it cannot be tested.
+//! 1. **A cell.** A claim is tested in each cell (a scenario, an estimator, a parameter) of which
+//!    it speaks, with the measured value x, its Monte Carlo error s and a margin of 2 s.
+//!    - *Comparison* (larger, smaller, no larger than): the cell passes when x is beyond the limit
+//!      by more than the margin, fails when it is on the other side by more, and is undecided
+//!      within the margin.
+//!    - *Number* (around 50 %, 10 times): the cell passes when x lies within the range of the
+//!      wording, widened by the margin, and fails otherwise. It is undecided where it would pass
+//!      with a margin of more than half the range: such an x says nothing of the number.
+//!    - Where less than half of the replications give a value (models that do not convert) the cell
+//!      is undecided.
+//! 2. **A part** of a claim (same figure of merit, same test) holds when 90 % of its decided cells
+//!    pass, holds in part when 50 % do, and does not hold otherwise. When less than half of its
+//!    cells are decided, the replications do not decide it.
+//! 3. **A claim** holds when all its parts hold, does not hold when none of them does even in part,
+//!    and holds in part otherwise. When no part is decided, it cannot be tested.
 //!
 //! What words mean, the same for all claims:
 //!

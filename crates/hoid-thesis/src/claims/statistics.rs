@@ -1,8 +1,10 @@
-//! Statistics of the replications with Monte Carlo errors: medians, shares, jackknifed functions of paired values.
+//! Statistics of the replications with Monte Carlo errors: medians, shares, jackknifed functions of
+//! paired values.
 //!
 //! - The error of a median is that of the module [`hoid_study::statistics`].
-//! - Anything else that is made of the values of replications gets the error of the delete-a-group jackknife (Kott, *Journal of Official Statistics*
-//!   17, 2001): with the g-th tenth of the replications left out of all samples at once, `s^2 = (G - 1)/G sum (x_g - mean x_g)^2`.
+//! - Anything else that is made of the values of replications gets the error of the delete-a-group
+//!   jackknife (Kott, *Journal of Official Statistics* 17, 2001): with the g-th tenth of the
+//!   replications left out of all samples at once, `s^2 = (G - 1)/G sum (x_g - mean x_g)^2`.
 //!   Estimators that saw the same records stay paired.
 
 use hoid_study::{Statistics, statistics::median};
@@ -160,8 +162,9 @@ mod tests {
 
     #[test]
     fn the_jackknife_of_a_mean_is_its_error() {
-        // The expectation of s^2 is exact for a mean; with 9 degrees of freedom s scatters by 24 % and 400 samples bring that to 1.2 %, the root of
-        // a chi-square of 9 degrees is 2.7 % below.
+        // The expectation of s^2 is exact for a mean; with 9 degrees of freedom s scatters by 24 %
+        // and 400 samples bring that to 1.2 %, the root of a chi-square of 9 degrees is 2.7 %
+        // below.
         let errors: f64 = (0..400)
             .map(|seed| jackknife(&[normals(100, seed)], &|s| s[0].iter().sum::<f64>() / s[0].len() as f64).error)
             .sum();

@@ -8,7 +8,8 @@ use hoid_study::{
     run,
 };
 
-/// What a replication of an estimator gives for a column: the relative error of what has a truth, else the value.
+/// What a replication of an estimator gives for a column: the relative error of what has a truth,
+/// else the value.
 type Data = dyn Fn(&Cell, &EstimatorCell, &str, u64) -> f64;
 
 const REPLICATIONS: u64 = 20;

@@ -1,4 +1,5 @@
-//! Box plots of relative biases (eq. 41) by delay, noise level and remnant order: Figs. 5, 6, 9 and C.1 to C.16.
+//! Box plots of relative biases (eq. 41) by delay, noise level and remnant order: Figs. 5, 6, 9 and
+//! C.1 to C.16.
 
 use hoid_study::{Query, Results};
 

@@ -1,4 +1,5 @@
-//! The page that shows the reproduction: tables, figures with their data, claims, studies with their plans.
+//! The page that shows the reproduction: tables, figures with their data, claims, studies with
+//! their plans.
 
 use crate::claims::{Claim, Finding, Measured, Verdict};
 use hoid_io::{ColumnValues, OutputTable};

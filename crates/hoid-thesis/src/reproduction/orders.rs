@@ -1,4 +1,5 @@
-//! Maps over the delay nk* and the order m* of the noise model: VAF, its difference to ARX, absolute biases. Figs. 7, 8, E.1 to E.16.
+//! Maps over the delay nk* and the order m* of the noise model: VAF, its difference to ARX,
+//! absolute biases. Figs. 7, 8, E.1 to E.16.
 
 use hoid_study::{Query, Results};
 
@@ -132,7 +133,8 @@ fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: Shown
         });
     }
     let grid = |panels: Vec<MapPanel>, titles: Vec<String>| MapGrid {
-        // Biases of b, a and the noise differ by an order of magnitude: a row and a colour bar for each pair.
+        // Biases of b, a and the noise differ by an order of magnitude: a row and a colour bar for
+        // each pair.
         columns: if shown == Shown::Bias { 2 } else { panels.len() },
         panels,
         titles,

@@ -1,4 +1,5 @@
-//! Bode plots of models whose coefficients are the averages over the runs: Figs. 10 and D.1 to D.18.
+//! Bode plots of models whose coefficients are the averages over the runs: Figs. 10 and D.1 to
+//! D.18.
 
 use hoid_model::{Complex64, Orders, PolynomialModel, Structure};
 use hoid_study::{Query, Results};

@@ -1,7 +1,8 @@
-//! The whole reproduction in a directory: runs the plans that are needed, draws tables and figures, tests the claims, writes the index page.
+//! The whole reproduction in a directory: runs the plans that are needed, draws tables and figures,
+//! tests the claims, writes the index page.
 //!
-//! Studies stand in `studies/NAME`, pictures and numbers in `figures` and `tables`. A study that is there already is taken as it is, so that
-//! a reproduction that was stopped goes on.
+//! Studies stand in `studies/NAME`, pictures and numbers in `figures` and `tables`. A study that is
+//! there already is taken as it is, so that a reproduction that was stopped goes on.
 
 use std::{
     collections::BTreeSet,
@@ -63,7 +64,8 @@ pub struct ReproductionSummary {
     pub index: PathBuf,
     /// Tables and figures.
     pub items: usize,
-    /// Claims that hold, hold in part, do not hold, cannot be tested; none where they were not chosen.
+    /// Claims that hold, hold in part, do not hold, cannot be tested; none where they were not
+    /// chosen.
     pub tally: Option<[usize; 4]>,
     /// Time that the studies took, s.
     pub simulated_s: f64,
@@ -71,10 +73,12 @@ pub struct ReproductionSummary {
     pub drawn_s: f64,
 }
 
-/// Reproduces into a directory; none when `goes_on` has stopped it, and then it can be called again to go on.
+/// Reproduces into a directory; none when `goes_on` has stopped it, and then it can be called again
+/// to go on.
 ///
 /// # Errors
-/// [`ThesisError::UnknownItem`]; [`ThesisError::Study`] and [`ThesisError::Io`] for what cannot be run, read or written.
+/// [`ThesisError::UnknownItem`]; [`ThesisError::Study`] and [`ThesisError::Io`] for what cannot be
+/// run, read or written.
 pub fn reproduce(
     wanted: &Reproduction,
     directory: &Path,
@@ -136,7 +140,8 @@ pub fn reproduce(
     }))
 }
 
-/// The chosen items, by their name, their plan or the letter of an appendix, and whether the claims were.
+/// The chosen items, by their name, their plan or the letter of an appendix, and whether the claims
+/// were.
 fn chosen(all: Vec<Item>, only: &[String]) -> Result<(Vec<Item>, bool), ThesisError> {
     if only.is_empty() {
         return Ok((all, true));

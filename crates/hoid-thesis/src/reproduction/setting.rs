@@ -1,4 +1,5 @@
-//! The setting of the text: forcing function, states, conditions, starts, remnant gain. Tables 1, 2 (4.2, 4.3), 4.4, 6.1; Figs. 3, 4, A.1.
+//! The setting of the text: forcing function, states, conditions, starts, remnant gain. Tables 1, 2
+//! (4.2, 4.3), 4.4, 6.1; Figs. 3, 4, A.1.
 
 use hoid_model::{
     forcing::{ForcingFunction, REFERENCE_PERIOD_S},

@@ -218,7 +218,8 @@ fn make(
     }
 }
 
-/// Every curve but for its highest and lowest three per cent: no estimator is missing because another is better.
+/// Every curve but for its highest and lowest three per cent: no estimator is missing because
+/// another is better.
 fn ordinate(curves: &[TraceCurve]) -> Ordinate {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for curve in curves {

@@ -1,9 +1,10 @@
-//! The bank of hypotheses of the real-time kernel ([`hoid_core::adaptive`]) behind the face of a recursion: what it supposes of a person, in
-//! seconds.
+//! The bank of hypotheses of the real-time kernel ([`hoid_core::adaptive`]) behind the face of a
+//! recursion: what it supposes of a person, in seconds.
 //!
 //! Where the delay is tracked, other delays are proposed every 1.28 s.
 //!
-//! The numbers were set on conditions C3 and C5 with remnants of order 2 and 3; the errors change by a tenth or less when any of them is halved or doubled.
+//! The numbers were set on conditions C3 and C5 with remnants of order 2 and 3; the errors change
+//! by a tenth or less when any of them is halved or doubled.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -39,7 +40,8 @@ use crate::{
     start::{self, StartState},
 };
 
-/// Room for hypotheses where the delay is known, where it is not, and the largest order of the noise model.
+/// Room for hypotheses where the delay is known, where it is not, and the largest order of the
+/// noise model.
 const HYPOTHESES: usize = 16;
 const WITH_DELAYS: usize = 48;
 pub(crate) const LARGEST_ND: usize = 8;
@@ -53,10 +55,12 @@ const BETWEEN_CHANGES_S: f64 = 60.0;
 const JUMP: [f64; 2] = [0.15, 0.5];
 /// Drift of the gains in one second, in the same units.
 const DRIFT: f64 = 0.005;
-/// The drift just after a change, for K_e and K_e_dot in the same units, for omega_nm and zeta_nm in those of a change of them; and how long it lasts, s.
+/// The drift just after a change, for K_e and K_e_dot in the same units, for omega_nm and zeta_nm
+/// in those of a change of them; and how long it lasts, s.
 const UNREST: [f64; OPERATOR] = [0.05, 0.25, 0.2, 0.2];
 const UNREST_FOR_S: f64 = 3.0;
-/// Relative change of omega_nm and of zeta_nm to be expected, how many births there are for one of this kind, and its odds against the other.
+/// Relative change of omega_nm and of zeta_nm to be expected, how many births there are for one of
+/// this kind, and its odds against the other.
 const NEUROMUSCULAR: [f64; 2] = [0.25, 0.4];
 const WHOLE_EVERY: u32 = 4;
 const WHOLE_ODDS: f64 = 0.3;
@@ -72,14 +76,16 @@ const SETTLED_S: f64 = 0.5;
 /// A hypothesis of up to this age stands for a change, s.
 const RECENT_S: f64 = 4.0;
 
-/// Births for one time at which other delays are proposed, how many of them, the odds of a change of the delay against one of the gains alone, its
-/// standard deviation in s, and the probability of a delay next to the likeliest.
+/// Births for one time at which other delays are proposed, how many of them, the odds of a change
+/// of the delay against one of the gains alone, its standard deviation in s, and the probability of
+/// a delay next to the likeliest.
 const DELAYS_EVERY: u32 = 4;
 const DELAYS_PROPOSED: usize = 8;
 const DELAY_ODDS: f64 = 1.0;
 const DELAY_JUMP_S: f64 = 0.05;
 const NEIGHBOUR: f64 = 0.15;
-/// What 0.01 s of delay is worth in K_e, K_e_dot, omega_nm and zeta_nm, in the units of [`DelayPrior::error_per_sample`].
+/// What 0.01 s of delay is worth in K_e, K_e_dot, omega_nm and zeta_nm, in the units of
+/// [`DelayPrior::error_per_sample`].
 const WORTH: [f64; OPERATOR] = [0.01, 0.03, 0.04, 0.08];
 
 /// Order of the noise model when none is named: the odds need innovations that are white.
@@ -93,7 +99,8 @@ settings! {
         /// Standard deviations beyond which an innovation moves the estimate no further
         #[setting(bounds(Bounds::Positive), default("3.5"))]
         pub limit: Option<f64> = None,
-        /// At each sample what all of a recorded run says of it, by hypotheses run from both ends, in place of what the past alone says
+        /// At each sample what all of a recorded run says of it, by hypotheses run from both ends,
+        /// in place of what the past alone says
         pub smooth: bool = false,
     }
     groups {
@@ -353,7 +360,8 @@ impl<const M: usize> AdaptiveRecursion<M> {
         })
     }
 
-    /// tau_e in s from a mean and a variance of the delay in samples beyond the shortest; no variance where it is known.
+    /// tau_e in s from a mean and a variance of the delay in samples beyond the shortest; no
+    /// variance where it is known.
     fn delay_s(&self, [later, variance]: [f64; 2]) -> Estimate {
         let ts = self.sample_time.s();
         let tau_e_s = (self.shortest as f64 - 1.0 + later) * ts;

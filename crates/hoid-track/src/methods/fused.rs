@@ -1,12 +1,14 @@
-//! Two methods in one, as the reference text proposes it (section VII): recursive least squares for the gains, with the neuromuscular coefficients
-//! "adjusted based on recursive Box-Jenkins calculations".
+//! Two methods in one, as the reference text proposes it (section VII): recursive least squares for
+//! the gains, with the neuromuscular coefficients "adjusted based on recursive Box-Jenkins
+//! calculations".
 //!
-//! The prediction-error method with a forgetting matrix gives F and D; least squares has only B left to find,
+//! The prediction-error method with a forgetting matrix gives F and D; least squares has only B
+//! left to find,
 //!
 //! `F u = B q^-nk e + eps`,
 //!
-//! with the F of the sample, and forgets by the memory of b. The bias that coloured noise gives to the poles is gone, that of B is not: the
-//! equation error `F n` is as coloured as in an ARX model.
+//! with the F of the sample, and forgets by the memory of b. The bias that coloured noise gives to
+//! the poles is gone, that of B is not: the equation error `F n` is as coloured as in an ARX model.
 
 use hoid_core::{
     delay::DelayLine,
@@ -41,7 +43,8 @@ const B: usize = 2;
 settings! {
     /// Options of least squares with the poles of the prediction-error method.
     pub struct FusedOptions {
-        /// Covariance P at the start: X times the unit matrix, in units of the innovation variance (the reference text: 0.1)
+        /// Covariance P at the start: X times the unit matrix, in units of the innovation variance
+        /// (the reference text: 0.1)
         #[setting(bounds(Bounds::PositiveFinite), default("that of the start fit; 1e6 where there is none"))]
         pub covariance: Option<f64> = None,
         /// Standard deviations beyond which an innovation moves the estimate no further

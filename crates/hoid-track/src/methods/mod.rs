@@ -86,9 +86,11 @@ methods! {
     Window(WindowOptions) = window,
     /// Recursive refined instrumental variable: Box-Jenkins with nc = 0.
     Rriv(RrivOptions) = rriv,
-    /// A bank of hypotheses of when the person changed, in physical parameters: Box-Jenkins with nc = 0.
+    /// A bank of hypotheses of when the person changed, in physical parameters: Box-Jenkins with nc
+    /// = 0.
     Adaptive(AdaptiveOptions) = adaptive,
-    /// Recursive least squares for B with the poles of the recursive prediction-error method: Box-Jenkins.
+    /// Recursive least squares for B with the poles of the recursive prediction-error method:
+    /// Box-Jenkins.
     Fused(FusedOptions) = fused,
     /// Extended Kalman filter of state and physical parameters: Box-Jenkins with nc = 0.
     Ekf(EkfOptions) = ekf,
@@ -97,7 +99,8 @@ methods! {
 }
 
 impl Method {
-    /// What is known of each method: the registry that command line, plans, Python and the book read.
+    /// What is known of each method: the registry that command line, plans, Python and the book
+    /// read.
     pub fn registry() -> Vec<MethodSpec> {
         Self::all().iter().map(Self::spec).collect()
     }
@@ -120,7 +123,8 @@ impl Method {
     /// Sets an option from its text.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for an option that the method does not have, or a text that is no value of it.
+    /// [`IdentError::BadOption`] for an option that the method does not have, or a text that is no
+    /// value of it.
     pub fn set(&mut self, name: &str, text: &str) -> Result<(), IdentError> {
         if self.inner_mut().settings_mut().set(name, text)? {
             return Ok(());
@@ -159,8 +163,8 @@ impl Method {
         self.inner().is_physical()
     }
 
-    /// True for a method that has a model of how the person changes, and no memory: physical parameters behind the noise model of a batch fit,
-    /// which stays.
+    /// True for a method that has a model of how the person changes, and no memory: physical
+    /// parameters behind the noise model of a batch fit, which stays.
     pub fn is_model_of_change(&self) -> bool {
         self.inner().is_model_of_change()
     }
@@ -190,8 +194,8 @@ impl Method {
         self.inner().limit()
     }
 
-    /// The operator's orders with the noise model that the method takes when none is named: of order 1, for adaptive of order 6, for its
-    /// odds need innovations that are white.
+    /// The operator's orders with the noise model that the method takes when none is named: of
+    /// order 1, for adaptive of order 6, for its odds need innovations that are white.
     pub fn usual_orders(&self, nk: usize) -> Orders {
         let orders = self.usual_structure().operator_orders(nk);
         match self.usual_nd() {
@@ -200,12 +204,14 @@ impl Method {
         }
     }
 
-    /// Order of the noise model when none is named and the method does not leave it to the structure.
+    /// Order of the noise model when none is named and the method does not leave it to the
+    /// structure.
     pub fn usual_nd(&self) -> Option<usize> {
         self.inner().usual_nd()
     }
 
-    /// The structure that the method takes when none is named: Box-Jenkins, or the first that it serves.
+    /// The structure that the method takes when none is named: Box-Jenkins, or the first that it
+    /// serves.
     pub fn usual_structure(&self) -> Structure {
         let served = self.inner().about().structures;
         match served.first() {

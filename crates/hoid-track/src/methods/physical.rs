@@ -1,4 +1,5 @@
-//! The recursive prediction-error method in the operator's parameters: its gradient is that of the polynomials times the Jacobian of theta.
+//! The recursive prediction-error method in the operator's parameters: its gradient is that of the
+//! polynomials times the Jacobian of theta.
 
 use std::collections::BTreeMap;
 

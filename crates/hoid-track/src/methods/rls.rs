@@ -1,4 +1,5 @@
-//! Recursive least squares for structures that are linear in theta (L. Ljung, *System Identification*, 1999, section 11.2).
+//! Recursive least squares for structures that are linear in theta (L. Ljung, *System
+//! Identification*, 1999, section 11.2).
 
 use hoid_ident::{IdentError, settings, settings::Settings};
 use hoid_model::{SampleTime, Structure};

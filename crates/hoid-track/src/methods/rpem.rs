@@ -1,4 +1,5 @@
-//! The recursive prediction-error method for every structure (L. Ljung, *System Identification*, 1999, section 11.5).
+//! The recursive prediction-error method for every structure (L. Ljung, *System Identification*,
+//! 1999, section 11.5).
 
 use hoid_core::{predictor::Regressor, recursion::Stable};
 use hoid_ident::{IdentError, settings, settings::Settings};

@@ -1,14 +1,17 @@
 //! The batch fit over a sliding window.
 //!
-//! The last W samples are kept, and every k samples they are fitted by the batch estimator, from the last theta; between the fits
-//! theta stays. So the estimate has the rectangular memory of W samples, initial states, bounds and all else that the estimator
-//! has, and the covariance is that of the fit.
+//! The last W samples are kept, and every k samples they are fitted by the batch estimator, from
+//! the last theta; between the fits theta stays. So the estimate has the rectangular memory of W
+//! samples, initial states, bounds and all else that the estimator has, and the covariance is that
+//! of the fit.
 //!
-//! **Wrong minima.** A search from the last theta stays in the valley it is in. The estimator's own starts are searched as well
-//! where there is no last theta or that search does not converge, where the loss has risen by [`SUSPICIOUS`] since the last
-//! comparison, and at every [`COMPARE`]-th fit at the latest; the lower of the two minima is taken.
+//! **Wrong minima.** A search from the last theta stays in the valley it is in. The estimator's own
+//! starts are searched as well where there is no last theta or that search does not converge, where
+//! the loss has risen by [`SUSPICIOUS`] since the last comparison, and at every [`COMPARE`]-th fit
+//! at the latest; the lower of the two minima is taken.
 //!
-//! **Failures.** Where a fit fails, as for a window without excitation, theta and covariance stay as they were.
+//! **Failures.** Where a fit fails, as for a window without excitation, theta and covariance stay
+//! as they were.
 
 use hoid_core::state::{State, visit_all};
 use std::collections::VecDeque;
@@ -167,7 +170,8 @@ impl State for WindowRecursion {
 }
 
 impl WindowRecursion {
-    /// Windows of `window` samples, fitted every `every` samples, from theta and its covariance where they are known.
+    /// Windows of `window` samples, fitted every `every` samples, from theta and its covariance
+    /// where they are known.
     ///
     /// # Errors
     /// [`IdentError`] for options, orders, a start or a window that cannot be used.
@@ -281,7 +285,8 @@ impl WindowRecursion {
                 self.theta.copy_from_slice(fit.model().theta());
                 self.covariance = fit.covariance().map(<[f64]>::to_vec);
                 self.variance = fit.innovation_variance();
-                // Innovations of the samples to come shall not hold what the theta before has left in the filters.
+                // Innovations of the samples to come shall not hold what the theta before has left
+                // in the filters.
                 self.predictor.reset();
                 for (e, u) in self.e.iter().zip(&self.u) {
                     self.predictor.step(&self.theta, *e, *u);
@@ -348,7 +353,8 @@ impl WindowRecursion {
     }
 }
 
-/// A fit whose search came to rest; one that did not says more about the limit of iterations than about the window.
+/// A fit whose search came to rest; one that did not says more about the limit of iterations than
+/// about the window.
 fn settled(fit: Fit) -> Result<Fit, IdentError> {
     if fit.termination().converged() {
         Ok(fit)

@@ -6,8 +6,9 @@
 //! | `arx parameters`, `rls parameters` | parameters, half of them of A, 8192 samples |
 //! | `bj parameters` | parameters, all but four of them of D, 8192 samples |
 //!
-//! Prints `{"seconds", "data_bytes", "before_bytes", "peak_bytes"}`: the time of one run after one to warm up (where that is short), e and u,
-//! and the largest resident memory before and after (Linux).
+//! Prints `{"seconds", "data_bytes", "before_bytes", "peak_bytes"}`: the time of one run after one
+//! to warm up (where that is short), e and u, and the largest resident memory before and after
+//! (Linux).
 
 use std::{hint::black_box, time::Instant};
 
@@ -99,8 +100,9 @@ fn work(name: &str, parameters: Option<usize>) -> Box<dyn Fn(&Record)> {
     }
 }
 
-/// A record of the operator in an open loop: slow noise through the held operator, and autoregressive noise on the output. Made without
-/// further memory, for the memory of the estimators is in question.
+/// A record of the operator in an open loop: slow noise through the held operator, and
+/// autoregressive noise on the output. Made without further memory, for the memory of the
+/// estimators is in question.
 fn record(samples: usize) -> Record {
     let mut state = 1_u64;
     let mut uniform = move || {

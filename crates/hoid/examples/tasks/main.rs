@@ -1,10 +1,12 @@
-//! The tasks by which hoid is compared with what people would use instead: our side. `cargo xtask bench` runs it beside the peers in
-//! `crates/hoid/benches/peers` and makes the table of the book.
+//! The tasks by which hoid is compared with what people would use instead: our side.
+//! `cargo xtask bench` runs it beside the peers in `crates/hoid/benches/peers` and makes the table
+//! of the book.
 //!
 //! `cargo run --release -p hoid --example tasks -- DIRECTORY [--task NAME,...] [--seconds S | --times K] [--reproduce M]`
 //!
-//! DIRECTORY receives the data that all share ([`data`]). One line of JSON a task: `{"task", "peer", "seconds", "answer"}`, the median of as
-//! many runs as S seconds hold (at least five), or of K runs. All but `reproduce` run on one thread (`RAYON_NUM_THREADS=1`).
+//! DIRECTORY receives the data that all share ([`data`]). One line of JSON a task:
+//! `{"task", "peer", "seconds", "answer"}`, the median of as many runs as S seconds hold (at least
+//! five), or of K runs. All but `reproduce` run on one thread (`RAYON_NUM_THREADS=1`).
 //!
 //! | task | what |
 //! |---|---|

@@ -51,7 +51,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let mut settings = chosen;
     settings.extend(common_settings(args, with_input));
     let operator = fit.operator();
-    let remnant = (fit.orders().nd > 0).then(|| fit.remnant(args.remnant_discretisation.into()));
+    let remnant = (fit.orders().nd > 0).then(|| fit.remnant(args.remnant_discretisation));
     let margins = args
         .controlled_element
         .as_ref()

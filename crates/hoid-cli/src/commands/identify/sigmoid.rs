@@ -19,7 +19,7 @@ use crate::{
 };
 
 pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: &[Account]) -> Result<(), CliError> {
-    if Option::<InitialState>::from(args.initial_state).is_some_and(|rule| rule != InitialState::Estimate) {
+    if args.initial_state.is_some_and(|rule| rule != InitialState::Estimate) {
         return Err(CliError::Usage(
             "--initial-state: the time-varying fit estimates the initial states; give auto or estimate".to_owned(),
         ));

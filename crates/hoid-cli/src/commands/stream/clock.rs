@@ -1,13 +1,16 @@
-//! The times of the lines against an even grid: which samples are missing, which lines come too late.
+//! The times of the lines against an even grid: which samples are missing, which lines come too
+//! late.
 //!
-//! Live times jitter, and the clock that made them is not quite that of `--fs`. The grid therefore follows the times with a small gain; a
-//! line is late by whole samples when it lies beyond half a sample of the place where the next one is expected.
+//! Live times jitter, and the clock that made them is not quite that of `--fs`. The grid therefore
+//! follows the times with a small gain; a line is late by whole samples when it lies beyond half a
+//! sample of the place where the next one is expected.
 
 /// Share of the difference by which the grid follows the times.
 const GAIN: f64 = 0.1;
 /// Longest gap that is bridged, s.
 pub const LONGEST_GAP_S: f64 = 10.0;
-/// Lines in a row, each later than the one before, after which a clock is believed to have been set back.
+/// Lines in a row, each later than the one before, after which a clock is believed to have been set
+/// back.
 const SET_BACK: usize = 10;
 /// Samples by which the grid may run ahead of the times before that is said.
 const AHEAD: f64 = 2.0;
@@ -15,7 +18,8 @@ const AHEAD: f64 = 2.0;
 /// What the time of a line says.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Arrival {
-    /// The next sample, after a number of missing ones that are to be bridged; `left_out` when the gap was longer than that.
+    /// The next sample, after a number of missing ones that are to be bridged; `left_out` when the
+    /// gap was longer than that.
     Sample { missing: usize, left_out: bool },
     /// Not later than the last line.
     Behind { last_s: f64 },

@@ -43,7 +43,8 @@ struct Line<'a> {
     warm_up: Option<WarmUp<'a>>,
 }
 
-/// What is known of a change: the odds at every line, the rest at the first line after one was declared.
+/// What is known of a change: the odds at every line, the rest at the first line after one was
+/// declared.
 #[derive(Serialize)]
 struct ChangeLine {
     log_odds: Option<f64>,

@@ -1,11 +1,12 @@
-//! Lines of a stream, as hostile as they come: what they mean, or why they mean nothing. Nothing here ends a stream but a header that lacks
-//! a column.
+//! Lines of a stream, as hostile as they come: what they mean, or why they mean nothing. Nothing
+//! here ends a stream but a header that lacks a column.
 
 use std::io::{self, BufRead, ErrorKind};
 
 use crate::error::CliError;
 
-/// Longest line that is looked at, bytes; of a longer one the rest is left out, so that memory stays bounded.
+/// Longest line that is looked at, bytes; of a longer one the rest is left out, so that memory
+/// stays bounded.
 const LONGEST: usize = 1 << 16;
 /// Characters of a faulty cell that are shown.
 const SHOWN: usize = 24;
@@ -91,7 +92,8 @@ struct Places {
     reference: Option<usize>,
 }
 
-/// The columns of a stream: found by the header, or by the number of cells in the first line of numbers.
+/// The columns of a stream: found by the header, or by the number of cells in the first line of
+/// numbers.
 pub struct Columns {
     input: String,
     output: String,

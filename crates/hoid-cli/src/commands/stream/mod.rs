@@ -1,5 +1,5 @@
-//! `hoid stream`: a recursive estimate, live. Each line of standard input that is no comment gives one line of JSON on standard output,
-//! flushed, whatever the line holds.
+//! `hoid stream`: a recursive estimate, live. Each line of standard input that is no comment gives
+//! one line of JSON on standard output, flushed, whatever the line holds.
 
 mod clock;
 mod line;
@@ -291,7 +291,8 @@ fn lock(session: &Mutex<Session>) -> MutexGuard<'_, Session> {
     session.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Ends with a summary and exit code 0 at an interrupt; a line that is being written is finished before.
+/// Ends with a summary and exit code 0 at an interrupt; a line that is being written is finished
+/// before.
 fn end_on_interrupt(session: &Arc<Mutex<Session>>) -> Result<(), CliError> {
     let session = Arc::clone(session);
     ctrlc::set_handler(move || {
@@ -301,7 +302,8 @@ fn end_on_interrupt(session: &Arc<Mutex<Session>>) -> Result<(), CliError> {
                 output::message(&session.summary());
                 process::exit(0);
             }
-            // A start fit, or a reader that takes nothing: lines are written whole, so that none is cut.
+            // A start fit, or a reader that takes nothing: lines are written whole, so that none is
+            // cut.
             if asked.elapsed() > PATIENCE {
                 process::exit(0);
             }

@@ -3,8 +3,8 @@
 use hoid_model::{NotConvertible, Record, uncertainty::OperatorEstimate};
 use hoid_track::{Trace, value_of};
 
-/// Root of the mean square of the relative error, of the rows from `first` on that converted, for each parameter whose truth the record
-/// holds.
+/// Root of the mean square of the relative error, of the rows from `first` on that converted, for
+/// each parameter whose truth the record holds.
 pub fn relative_errors(
     record: &Record,
     trace: &Trace,

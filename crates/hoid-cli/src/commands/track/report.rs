@@ -38,8 +38,9 @@ pub fn write(args: &TrackArgs, tracked: &Tracked<'_>, batch: &[BatchFit]) -> Res
     Ok(Some(write_report(directory, &report.to_html()?)?))
 }
 
-/// The batch fits that the page compares with: of the spans as typed, else the start fit and that of the last third. A span of the
-/// program's own choice that cannot be fitted is left out with a note.
+/// The batch fits that the page compares with: of the spans as typed, else the start fit and that
+/// of the last third. A span of the program's own choice that cannot be fitted is left out with a
+/// note.
 pub fn batch_fits(args: &TrackArgs, tracked: &Tracked<'_>) -> Result<Vec<BatchFit>, CliError> {
     if args.report.is_none() {
         return Ok(Vec::new());

@@ -92,7 +92,8 @@ fn instruments_change_with_the_source_at_its_rows_alone() {
         ..Prefilter::default()
     };
     let (a, b) = (split.equation(filter, &SYSTEM), plain.equation(filter, &SYSTEM));
-    // 350 samples in the first record; sample 400 is number 50 of the second. 4 samples and one of D come before the rows.
+    // 350 samples in the first record; sample 400 is number 50 of the second. 4 samples and one of
+    // D come before the rows.
     let change = (350 - 5) + (50 - 5);
     for (x, y) in a.z.iter().zip(&b.z) {
         assert_eq!(x[..change], y[..change]);

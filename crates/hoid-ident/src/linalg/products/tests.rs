@@ -20,7 +20,8 @@ fn leading(columns: &[Vec<f64>]) -> Vec<Lagged<'_>> {
         .collect()
 }
 
-/// The product as it is defined: partial sums in turn, added in this order, then what lies behind the last whole block.
+/// The product as it is defined: partial sums in turn, added in this order, then what lies behind
+/// the last whole block.
 fn in_partial_sums(x: &[f64], y: &[f64], count: usize) -> f64 {
     let mut sums = [0.0; 8];
     let whole = x.len() - x.len() % count;

@@ -18,7 +18,8 @@ fn orders(na: usize, nb: usize, nk: usize) -> Orders {
     }
 }
 
-/// By QR alone, which zeros before the record ask for: the same rows as data of their own, without their past.
+/// By QR alone, which zeros before the record ask for: the same rows as data of their own, without
+/// their past.
 fn by_qr(orders: &Orders, data: &[Data<'_>], first: usize) -> (Vec<f64>, f64, Vec<f64>) {
     let p = orders.na + orders.nb;
     let mut columns: Vec<f64> = Vec::new();
@@ -63,7 +64,8 @@ fn normal_equations_give_what_qr_gives() {
         );
         let found = regress(&orders, &data, 50).unwrap();
         let (theta, squares, inverse) = by_qr(&orders, &data, 50);
-        // Two ways of rounding, of regressors whose scaled normal matrix has a condition of up to 1e7.
+        // Two ways of rounding, of regressors whose scaled normal matrix has a condition of up to
+        // 1e7.
         for (a, b) in found.theta.iter().zip(&theta) {
             assert!((a - b).abs() < 1e-11 * b.abs(), "{condition}: {a} and {b}");
         }

@@ -1,7 +1,8 @@
 //! Products of eps and the columns of psi, for a record in each lane.
 //!
-//! A column that is the one before it, a sample later, needs no pass of its own: `sum x(t-1) y(t-1)` over a span is `sum x(t) y(t)` but for the
-//! samples at both ends, as in [`crate::linalg::products`].
+//! A column that is the one before it, a sample later, needs no pass of its own:
+//! `sum x(t-1) y(t-1)` over a span is `sum x(t) y(t)` but for the samples at both ends, as in
+//! [`crate::linalg::products`].
 
 use hoid_lanes::Number;
 
@@ -49,7 +50,8 @@ impl Columns {
         &signal[(from - lag) * width..(to - lag) * width]
     }
 
-    /// Adds the products over these rows for which a pass is needed: those of a column that follows none with all others.
+    /// Adds the products over these rows for which a pass is needed: those of a column that follows
+    /// none with all others.
     #[inline(always)]
     pub fn add_products<R: Number>(
         &self,
@@ -98,8 +100,8 @@ impl Columns {
         }
     }
 
-    /// The products of the columns that both follow others: those of the columns before them over the same rows, `sign` times their
-    /// products in one row more.
+    /// The products of the columns that both follow others: those of the columns before them over
+    /// the same rows, `sign` times their products in one row more.
     #[inline(always)]
     pub fn add_row<R: Number>(&self, zero: R, signals: &SignalBuffers, row: usize, sign: f64, products: &mut [f64]) {
         let (p1, width) = (self.count(), zero.lanes());
@@ -126,7 +128,8 @@ impl Columns {
                 let value = if self.follows(i) && self.follows(j) {
                     zero.load(&products[at..]) + zero.load(&products[((i - 1) * p1 + j - 1) * width..])
                 } else if self.follows(i) || !self.follows(j) {
-                    // The one that follows none was multiplied with all others, the earlier one of two such.
+                    // The one that follows none was multiplied with all others, the earlier one of
+                    // two such.
                     zero.load(&products[(j * p1 + i) * width..])
                 } else {
                     zero.load(&products[at..])

@@ -4,8 +4,9 @@ use hoid_lanes::Number;
 
 use super::{lane_products::add_scaled, signal_buffers::SignalBuffers};
 
-/// All signals of a span whose past is known, in one pass, where the poles are two, and B and D short: s and r wait for their own last values
-/// side by side, and what is not multiplied later is not kept. The same operations as one after the other. False for other orders.
+/// All signals of a span whose past is known, in one pass, where the poles are two, and B and D
+/// short: s and r wait for their own last values side by side, and what is not multiplied later is
+/// not kept. The same operations as one after the other. False for other orders.
 #[inline(always)]
 pub(super) fn all_at_once<R: Number>(
     zero: R,

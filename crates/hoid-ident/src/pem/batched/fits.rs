@@ -14,9 +14,9 @@ use crate::{
     pem::fit_settings::FitSettings,
 };
 
-/// A fit to each record; `None` for what is not searched side by side: anything but Box-Jenkins models without C, with their
-/// initial states estimated, without constraints, priors or a robust loss; records of different lengths; registers that this
-/// processor has not.
+/// A fit to each record; `None` for what is not searched side by side: anything but Box-Jenkins
+/// models without C, with their initial states estimated, without constraints, priors or a robust
+/// loss; records of different lengths; registers that this processor has not.
 pub(crate) fn fit_each(
     settings: &FitSettings,
     records: &[&Record],

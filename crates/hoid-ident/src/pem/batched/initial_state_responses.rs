@@ -1,10 +1,14 @@
-//! The responses to the initial states of 1/F, of a record in each lane, and what is best said of the states.
+//! The responses to the initial states of 1/F, of a record in each lane, and what is best said of
+//! the states.
 //!
-//! With h the impulse response of 1/F and g that of D/F, a state that enters w k samples after its first value adds `x_k h(t-k)` to w and takes
-//! `x_k g(t-k)` from the residuals. The columns `g(t-k)` over the residuals are made orthogonal by the factor of Cholesky of their products, twice, as
-//! once leaves what rounding makes of columns that are nearly parallel (Y. Yamamoto et al., *Electronic Trans. Numerical Analysis* 44 (2015) 306-326). As
-//! they are shifts of one, the first matrix takes nf products. The criterion alone has an orthonormal basis by Gram and Schmidt
-//! ([`crate::criterion::initial_state_responses`]), the same but for rounding; a lane whose columns depend on each other is left to it.
+//! With h the impulse response of 1/F and g that of D/F, a state that enters w k samples after its
+//! first value adds `x_k h(t-k)` to w and takes `x_k g(t-k)` from the residuals. The columns
+//! `g(t-k)` over the residuals are made orthogonal by the factor of Cholesky of their products,
+//! twice, as once leaves what rounding makes of columns that are nearly parallel (Y. Yamamoto et
+//! al., *Electronic Trans. Numerical Analysis* 44 (2015) 306-326). As they are shifts of one, the
+//! first matrix takes nf products. The criterion alone has an orthonormal basis by Gram and Schmidt
+//! ([`crate::criterion::initial_state_responses`]), the same but for rounding; a lane whose columns
+//! depend on each other is left to it.
 
 use hoid_lanes::Number;
 
@@ -21,7 +25,8 @@ const NOTHING: f64 = 1e-17;
 /// Share of a column's square that must not lie in the space of those before it.
 const OWN: f64 = 1e-12;
 
-/// The responses: h and g stand in [`SignalBuffers::h`] and [`SignalBuffers::g`] with nf zeros before and behind, the orthogonal columns q in [`SignalBuffers::q`].
+/// The responses: h and g stand in [`SignalBuffers::h`] and [`SignalBuffers::g`] with nf zeros
+/// before and behind, the orthogonal columns q in [`SignalBuffers::q`].
 pub(super) struct InitialStateResponses<R> {
     /// Rows of a column, from the first residual on.
     pub rows: usize,
@@ -29,7 +34,8 @@ pub(super) struct InitialStateResponses<R> {
     nf: usize,
     /// Samples of h.
     length: usize,
-    /// Factors by rows: that of the columns, each row over the diagonal element of its column, and that of q.
+    /// Factors by rows: that of the columns, each row over the diagonal element of its column, and
+    /// that of q.
     first: Vec<R>,
     second: Vec<R>,
 }
@@ -84,7 +90,8 @@ impl<R: Number> InitialStateResponses<R> {
         }
         for k in 1..nf {
             for i in k..nf {
-                // The row that enters in front, and the last that leaves, of the columns before these.
+                // The row that enters in front, and the last that leaves, of the columns before
+                // these.
                 let entering = self.at(zero, signals, k - 1, -1) * self.at(zero, signals, i - 1, -1);
                 let last = rows as isize - 1;
                 let leaving = self.at(zero, signals, k - 1, last) * self.at(zero, signals, i - 1, last);
@@ -141,8 +148,8 @@ impl<R: Number> InitialStateResponses<R> {
         &signals.q[k * self.rows * width..(k + 1) * self.rows * width]
     }
 
-    /// Takes the best initial states into w (in the place of r), v and eps: w begins in row `regressed` of the span, the residuals in row
-    /// `counted`.
+    /// Takes the best initial states into w (in the place of r), v and eps: w begins in row
+    /// `regressed` of the span, the residuals in row `counted`.
     #[inline(always)]
     pub fn eliminate(&self, zero: R, signals: &mut SignalBuffers, regressed: usize, counted: usize) {
         let (width, nf) = (zero.lanes(), self.nf);
@@ -181,7 +188,8 @@ impl<R: Number> InitialStateResponses<R> {
         add_shifts(zero, &minus, &signals.h, nf, &mut signals.v[from..to]);
     }
 
-    /// Components of each column of psi in the space of the responses, a row for each column. eps, the first, has none left.
+    /// Components of each column of psi in the space of the responses, a row for each column. eps,
+    /// the first, has none left.
     #[inline(always)]
     pub fn components(&self, zero: R, columns: &Columns, signals: &SignalBuffers, counted: usize) -> Vec<R> {
         let (width, nf, count) = (zero.lanes(), self.nf, columns.count());
@@ -263,8 +271,8 @@ fn add_shifts<R: Number>(zero: R, x: &[R], s: &[f64], at: usize, y: &mut [f64]) 
     }
 }
 
-/// Impulse response of 1/F until it has died away in all lanes or `longest` is reached, with nf zeros before and behind; zero in a lane in which it
-/// has died away before. Returns its length.
+/// Impulse response of 1/F until it has died away in all lanes or `longest` is reached, with nf
+/// zeros before and behind; zero in a lane in which it has died away before. Returns its length.
 #[inline(always)]
 fn impulse_response<R: Number>(zero: R, f: &[f64], longest: usize, h: &mut [f64]) -> usize {
     let (width, nf) = (zero.lanes(), f.len() / zero.lanes());

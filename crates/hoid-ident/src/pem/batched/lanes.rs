@@ -1,4 +1,5 @@
-//! The searches in the lanes: each record has a lane until its search has ended, then the next takes its place.
+//! The searches in the lanes: each record has a lane until its search has ended, then the next
+//! takes its place.
 
 use std::cell::Cell;
 
@@ -12,7 +13,8 @@ use crate::{
     optimize::{Linearisation, Objective},
 };
 
-/// Runs all searches to their end, side by side; the records are of one length and the orders the same.
+/// Runs all searches to their end, side by side; the records are of one length and the orders the
+/// same.
 pub(super) fn search(open: Vec<&mut impl LinearisationClient>, path: InstructionSet, workspace: &mut Workspace) {
     let first = open.first().map(|client| client.criterion());
     let lanes = first.and_then(|c| Some(Lanes::new(c.orders, c.first, c.data.first()?.u.len(), path.lanes()?)));

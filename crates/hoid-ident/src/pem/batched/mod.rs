@@ -1,10 +1,11 @@
 //! Fits of one model to each of many records, side by side.
 //!
-//! A search is a chain of passes over its record, each a chain of filters that wait for their own last value
-//! ([`crate::criterion`]). Searches of different records wait for nothing of each other: each has a lane of the registers,
-//! and when it has ended the next record takes its place; the search on the averaged records
-//! ([`crate::initial_guess::continuation`]) goes first in the same way. What needs more than the criterion (the border of
-//! stability, starts where the averages do not suffice, dependent responses to the initial states) is done alone.
+//! A search is a chain of passes over its record, each a chain of filters that wait for their own
+//! last value ([`crate::criterion`]). Searches of different records wait for nothing of each other:
+//! each has a lane of the registers, and when it has ended the next record takes its place; the
+//! search on the averaged records ([`crate::initial_guess::continuation`]) goes first in the same
+//! way. What needs more than the criterion (the border of stability, starts where the averages do
+//! not suffice, dependent responses to the initial states) is done alone.
 //!
 //! | module | what it holds |
 //! |---|---|

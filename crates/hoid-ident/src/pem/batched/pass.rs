@@ -1,17 +1,19 @@
 //! The criterion and its derivatives for several records at once, each with a theta of its own.
 //!
-//! The criterion ([`crate::criterion`]) of one Box-Jenkins model without C, with its initial states eliminated, for a record in each lane:
+//! The criterion ([`crate::criterion`]) of one Box-Jenkins model without C, with its initial states
+//! eliminated, for a record in each lane:
 //!
 //! `s = e(t-nk)/F`,  `w = B s`,  `v = u - w`,  `eps = D v`,  `x_b = D s`,  `r = w/F`,  `x_f = D r`
 //!
-//! The columns of psi are shifts of `x_b`, `-v` and `-x_f`. A recursion over t waits for its own last value, and eight records fill the
-//! waiting time. All signals of some samples are made and multiplied before the next samples are begun, so that they stay in the
-//! nearest memory; only the record itself is read from further away. The first of these spans reaches as far as the free responses
-//! do, because the initial states must be known before w is filtered again.
+//! The columns of psi are shifts of `x_b`, `-v` and `-x_f`. A recursion over t waits for its own
+//! last value, and eight records fill the waiting time. All signals of some samples are made and
+//! multiplied before the next samples are begun, so that they stay in the nearest memory; only the
+//! record itself is read from further away. The first of these spans reaches as far as the free
+//! responses do, because the initial states must be known before w is filtered again.
 //!
-//! Every operation acts on each lane alone, and what one lane needs longer than another is zero there: the bits of a lane depend
-//! neither on the registers nor on its neighbours. The sums run over time in another order than those of the criterion alone: they
-//! differ from it by rounding.
+//! Every operation acts on each lane alone, and what one lane needs longer than another is zero
+//! there: the bits of a lane depend neither on the registers nor on its neighbours. The sums run
+//! over time in another order than those of the criterion alone: they differ from it by rounding.
 
 use hoid_lanes::LaneTask;
 use hoid_lanes::Number;
@@ -107,7 +109,8 @@ impl LaneTask for Pass<'_> {
                 inside = states.components(zero, &columns, signals, counted);
                 columns.add_row(zero, signals, counted, 1.0, products);
             }
-            // In spans of the same samples however long the first is: its length is that of the slowest lane.
+            // In spans of the same samples however long the first is: its length is that of the
+            // slowest lane.
             let mut done = counted;
             while done < history + count {
                 let next = if done == counted && from == begin {
@@ -120,7 +123,8 @@ impl LaneTask for Pass<'_> {
                 done = next;
             }
             if to == n {
-                // One row later than the last, a column that follows is the one before it in the last.
+                // One row later than the last, a column that follows is the one before it in the
+                // last.
                 columns.add_row(zero, signals, history + count, -1.0, products);
                 break;
             }

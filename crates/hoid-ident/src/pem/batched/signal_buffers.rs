@@ -2,7 +2,8 @@
 
 use super::rows::Rows;
 
-/// Signals of a span, a row for each sample and in it a number for each lane. The rows before the first hold the end of the span before.
+/// Signals of a span, a row for each sample and in it a number for each lane. The rows before the
+/// first hold the end of the span before.
 #[derive(Debug, Default)]
 pub(super) struct SignalBuffers {
     pub s: Rows,

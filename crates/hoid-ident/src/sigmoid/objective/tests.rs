@@ -92,12 +92,14 @@ fn columns_are_the_derivatives_of_the_residuals_up_to_the_initial_states() {
         let (up, down) = (at(1.0), at(-1.0));
         let mut difference: Vec<f64> = up.iter().zip(&down).map(|(a, b)| (b - a) / (2.0 * h)).collect();
         let mut column = column;
-        // What moves with the basis of the initial states lies within that basis, up to the residual at its start.
+        // What moves with the basis of the initial states lies within that basis, up to the
+        // residual at its start.
         project(&mut difference);
         project(&mut column);
         let apart: Vec<f64> = difference.iter().zip(&column).map(|(a, b)| a - b).collect();
         let (size, error) = (dot(&column, &column).sqrt(), dot(&apart, &apart).sqrt());
-        // Kaufman's approximation leaves out a term of the size of the residual's share in the moved basis.
+        // Kaufman's approximation leaves out a term of the size of the residual's share in the
+        // moved basis.
         assert!(error < 0.05 * size, "parameter {i}: {error} of {size}");
         // Behind the initial transient nothing is left out.
         let late = |x: &[f64]| dot(&x[800..], &x[800..]).sqrt();

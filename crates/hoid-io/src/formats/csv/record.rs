@@ -42,7 +42,8 @@ fn write(file: &mut dyn Write, record: &Record, separator: u8) -> io::Result<()>
     csv.flush()
 }
 
-/// The fewest digits that give the same number back, with an exponent where that is shorter to read.
+/// The fewest digits that give the same number back, with an exponent where that is shorter to
+/// read.
 fn shortest(text: &mut String, value: f64) {
     let size = value.abs();
     let written = if size == 0.0 || (1e-5..1e16).contains(&size) {

@@ -7,8 +7,8 @@
 //! 0,0.125,-0.5                        one line a sample, decimal points
 //! ```
 //!
-//! Blank lines are skipped; a byte order mark and CRLF are tolerated. The stated sample time says without rounding what t
-//! can only say up to its last digit; it counts where t agrees with it.
+//! Blank lines are skipped; a byte order mark and CRLF are tolerated. The stated sample time says
+//! without rounding what t can only say up to its last digit; it counts where t agrees with it.
 
 use super::text::{comments, is_aside, place, reader, row_start, separator, text};
 use crate::IoError;
@@ -84,7 +84,8 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
         let row = starts.len();
         starts.push(start);
         for (column, cell) in columns.iter_mut().zip(&record) {
-            // The text is UTF-8 as a whole and the separators are ASCII, so that each cell is as well.
+            // The text is UTF-8 as a whole and the separators are ASCII, so that each cell is as
+            // well.
             let cell = std::str::from_utf8(cell).unwrap_or("\u{fffd}");
             column.values.push(match Cell::parse(cell) {
                 Cell::Number(value) => {

@@ -10,8 +10,8 @@
 //! | `names` | names of columns and names of variables |
 //! | `write` | version 7, one variable a column |
 //!
-//! Structures and cells become paths: `data.run(3).e`, `c{2}`; the index of an array of structures counts along its columns, as
-//! MATLAB's linear index does.
+//! Structures and cells become paths: `data.run(3).e`, `c{2}`; the index of an array of structures
+//! counts along its columns, as MATLAB's linear index does.
 
 mod elements;
 mod names;

@@ -1,10 +1,12 @@
 //! Names of columns and names of variables.
 //!
-//! A name that MATLAB does not take, such as `K e` or `f-y`, is written as the nearest that it does, and kept beside.
+//! A name that MATLAB does not take, such as `K e` or `f-y`, is written as the nearest that it
+//! does, and kept beside.
 
 use crate::arrays::{COMMENTS, Entry, Value};
 
-/// The variable that keeps the names that are no names of variables, each line a variable and the name it stands for.
+/// The variable that keeps the names that are no names of variables, each line a variable and the
+/// name it stands for.
 pub(super) const NAMES: &str = "hoid_names";
 /// MATLAB cuts what is longer.
 const LONGEST_NAME: usize = 63;

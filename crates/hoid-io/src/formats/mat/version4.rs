@@ -1,4 +1,5 @@
-//! Version 4 (MathWorks, "MAT-File Format", 2019, chapter 2): matrices behind a header of five numbers each.
+//! Version 4 (MathWorks, "MAT-File Format", 2019, chapter 2): matrices behind a header of five
+//! numbers each.
 
 use crate::IoError;
 use crate::arrays::{Array, Budget, Entry, Kind, Numbers, Value};
@@ -35,7 +36,8 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
             u32::from_le_bytes(bytes)
         }
     };
-    // Thousands: the order of bytes and other machines; hundreds: nothing; tens: the type; ones: what it is.
+    // Thousands: the order of bytes and other machines; hundreds: nothing; tens: the type; ones:
+    // what it is.
     let big_endian = number(0, false) > 4999;
     let kinds = number(0, big_endian);
     if kinds > 1999 || !kinds.is_multiple_of(1000) && kinds % 1000 / 100 != 0 {

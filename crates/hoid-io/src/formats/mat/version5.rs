@@ -1,4 +1,5 @@
-//! Versions 5 to 7 (MathWorks, "MAT-File Format", 2019, chapter 1): since 7 each variable may be deflated.
+//! Versions 5 to 7 (MathWorks, "MAT-File Format", 2019, chapter 1): since 7 each variable may be
+//! deflated.
 
 use std::io::Read;
 
@@ -101,8 +102,8 @@ impl Reader<'_> {
         }
     }
 
-    /// The data of the matrix in deflated bytes. Its tag says how long it is at most: Octave counts the data that stand in a tag
-    /// twice.
+    /// The data of the matrix in deflated bytes. Its tag says how long it is at most: Octave counts
+    /// the data that stand in a tag twice.
     fn inflated(&mut self, bytes: &[u8], big_endian: bool) -> Result<Vec<u8>, Stop> {
         let failed = |error: std::io::Error| Stop::Damaged(told(&error.to_string()));
         let mut decoder = ZlibDecoder::new(bytes);

@@ -1,6 +1,7 @@
-//! Version 7.3: HDF5 in MATLAB's manner. Structures are groups, arrays of structures and cells are references to what stands
-//! under `/#refs#`, sizes stand in the order of C and so read backwards, and `MATLAB_class` says what a dataset is. Datasets
-//! without it, as other programs write them, are numbers.
+//! Version 7.3: HDF5 in MATLAB's manner. Structures are groups, arrays of structures and cells are
+//! references to what stands under `/#refs#`, sizes stand in the order of C and so read backwards,
+//! and `MATLAB_class` says what a dataset is. Datasets without it, as other programs write them,
+//! are numbers.
 
 use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group, H5Element, Object};
 
@@ -82,7 +83,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// A dataset. The parent of one in an array of structures is the element, and its path begins with it.
+    /// A dataset. The parent of one in an array of structures is the element, and its path begins
+    /// with it.
     fn dataset(&mut self, dataset: &Dataset, parent: &str, path: &str, depth: usize) -> Result<(), IoError> {
         self.budget.take(VISIT, self.file)?;
         let error = |reader: &Self, error: Error| reader.damaged(path, &error);

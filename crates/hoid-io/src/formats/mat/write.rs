@@ -1,4 +1,5 @@
-//! Version 7, each variable deflated: a column of numbers is a variable of one column, of texts a cell of them.
+//! Version 7, each variable deflated: a column of numbers is a variable of one column, of texts a
+//! cell of them.
 
 use std::io::{self, Write};
 

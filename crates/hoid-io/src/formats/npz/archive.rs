@@ -1,7 +1,8 @@
 //! The zip around the arrays: each member `name.npy` is the array `name`.
 //!
-//! Reading takes stored and deflated members. Writing stores them, as `numpy.savez` does, without times, so that the same
-//! columns give the same bytes; texts keep no zeros at their end, which numpy's type of text cannot hold.
+//! Reading takes stored and deflated members. Writing stores them, as `numpy.savez` does, without
+//! times, so that the same columns give the same bytes; texts keep no zeros at their end, which
+//! numpy's type of text cannot hold.
 
 use std::io::{self, Cursor, Read, Write};
 

@@ -1,7 +1,8 @@
-//! The header of NPY: a Python dictionary of `descr`, `fortran_order` and `shape` (NEP 1, versions 1 to 3).
+//! The header of NPY: a Python dictionary of `descr`, `fortran_order` and `shape` (NEP 1, versions
+//! 1 to 3).
 //!
-//! The literal is read here because it is small, and because a general reader of Python literals recurses as deep as a hostile
-//! header says.
+//! The literal is read here because it is small, and because a general reader of Python literals
+//! recurses as deep as a hostile header says.
 
 /// What a header says.
 #[derive(Debug, Clone, PartialEq)]

@@ -83,7 +83,8 @@ impl Item {
     }
 }
 
-/// What stands in an array: one entry, or one for each field, at the top level where there is no other array.
+/// What stands in an array: one entry, or one for each field, at the top level where there is no
+/// other array.
 pub(super) fn entries(bytes: Vec<u8>, name: &str, alone: bool) -> Result<Vec<Entry>, NpyError> {
     let (header, at) = header_of(&bytes)?;
     let data = || bytes[at..].to_vec();

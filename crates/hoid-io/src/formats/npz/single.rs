@@ -4,8 +4,8 @@ use super::npy::{NpyError, entries};
 use crate::IoError;
 use crate::arrays::{Contents, Indexing};
 
-/// The one array in an NPY file; it is named as `numpy.savez` names an array without a name. The fields of a structured array
-/// are columns of their own.
+/// The one array in an NPY file; it is named as `numpy.savez` names an array without a name. The
+/// fields of a structured array are columns of their own.
 pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Contents, IoError> {
     let entries = entries(bytes, "arr_0", true).map_err(|error| match error {
         NpyError::NoMagic(found) => IoError::WrongFormat {

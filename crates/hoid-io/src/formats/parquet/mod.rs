@@ -1,4 +1,5 @@
-//! Apache Parquet (<https://parquet.apache.org/docs/file-format/>) by the crate `parquet`, as far as flat tables need it.
+//! Apache Parquet (<https://parquet.apache.org/docs/file-format/>) by the crate `parquet`, as far
+//! as flat tables need it.
 //!
 //! | module | what it holds |
 //! |---|---|

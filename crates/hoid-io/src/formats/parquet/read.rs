@@ -1,7 +1,7 @@
 //! Tables of any program.
 //!
-//! A file is not trusted: values are fetched in parts, so that memory grows with what was decoded and not with what the file
-//! promises, and a panic of the crate becomes an error.
+//! A file is not trusted: values are fetched in parts, so that memory grows with what was decoded
+//! and not with what the file promises, and a panic of the crate becomes an error.
 
 use bytes::Bytes;
 use half::f16;
@@ -119,7 +119,8 @@ struct ColumnPath<'a> {
 }
 
 impl ColumnPath<'_> {
-    /// The values by their logical type or, in older files, the converted one, which the crate fills in where there is such.
+    /// The values by their logical type or, in older files, the converted one, which the crate
+    /// fills in where there is such.
     fn data(&mut self, column: &ColumnDescriptor) -> Result<Data, IoError> {
         use ConvertedType as C;
         let unit = 10_f64.powi(column.type_scale());

@@ -1,7 +1,7 @@
 //! Records in Parquet.
 //!
-//! Numeric columns of any type are numbers here, a null is a missing value, and text counts as in CSV. Units and sample time
-//! stand in the comments, in the words of CSV.
+//! Numeric columns of any type are numbers here, a null is a missing value, and text counts as in
+//! CSV. Units and sample time stand in the comments, in the words of CSV.
 
 use super::columns::{Data, ReadColumn};
 use super::read::read;

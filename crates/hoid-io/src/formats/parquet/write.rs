@@ -22,7 +22,8 @@ const CREATED_BY: &str = concat!("hoid version ", env!("CARGO_PKG_VERSION"));
 
 /// The state of a file between its row groups.
 struct Writer {
-    /// Writes into memory, from where each row group goes into the file: the file is lent for one call at a time.
+    /// Writes into memory, from where each row group goes into the file: the file is lent for one
+    /// call at a time.
     inner: SerializedFileWriter<Vec<u8>>,
 }
 

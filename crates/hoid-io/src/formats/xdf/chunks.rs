@@ -1,6 +1,8 @@
-//! The chunks of XDF (github.com/sccn/xdf/wiki/Specifications, version 1.0): a length, a tag, the content.
+//! The chunks of XDF (github.com/sccn/xdf/wiki/Specifications, version 1.0): a length, a tag, the
+//! content.
 //!
-//! Each sample may have a time stamp; one without follows the sample before by the nominal sample time.
+//! Each sample may have a time stamp; one without follows the sample before by the nominal sample
+//! time.
 
 use std::collections::HashMap;
 

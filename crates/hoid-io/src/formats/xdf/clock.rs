@@ -1,11 +1,13 @@
-//! Time stamps of a stream on the clock of the recorder, without jitter, as pyxdf computes them (Kothe et al., "The Lab
-//! Streaming Layer for synchronized multimodal recording", 2024; pyxdf 1.17).
+//! Time stamps of a stream on the clock of the recorder, without jitter, as pyxdf computes them
+//! (Kothe et al., "The Lab Streaming Layer for synchronized multimodal recording", 2024; pyxdf
+//! 1.17).
 //!
-//! The offset `o_k` of the recorder's clock was measured at the times `c_k`. A line `o = b_0 + b_1 c` is fitted under Huber's
-//! loss by the alternating direction method of multipliers (Boyd et al., 2011, section 6.1.1), in units of 1e-4 s, so that
-//! a measurement over a busy network counts little. Then `t <- t + b_0 + b_1 t`. Where the clock was set anew, each part has a
-//! line of its own. At last, of a stream with a nominal rate, the time stamps between two breaks are replaced by their
-//! least-squares line over the number of the sample.
+//! The offset `o_k` of the recorder's clock was measured at the times `c_k`. A line
+//! `o = b_0 + b_1 c` is fitted under Huber's loss by the alternating direction method of
+//! multipliers (Boyd et al., 2011, section 6.1.1), in units of 1e-4 s, so that a measurement over a
+//! busy network counts little. Then `t <- t + b_0 + b_1 t`. Where the clock was set anew, each part
+//! has a line of its own. At last, of a stream with a nominal rate, the time stamps between two
+//! breaks are replaced by their least-squares line over the number of the sample.
 
 use super::chunks::Stream;
 use crate::wording::shown;
@@ -13,7 +15,8 @@ use crate::wording::shown;
 /// The unit of the fit, s: deviations beyond it count linearly.
 const UNIT_S: f64 = 1e-4;
 const ITERATIONS: usize = 1000;
-/// A reset: time between offsets off its median by more than so many deviations and s, and the offsets likewise.
+/// A reset: time between offsets off its median by more than so many deviations and s, and the
+/// offsets likewise.
 const RESET_TIME: (f64, f64) = (5.0, 5.0);
 const RESET_VALUE: (f64, f64) = (10.0, 1.0);
 /// A break: the longer of so many s and so many samples.
@@ -92,7 +95,8 @@ fn resets(offsets: &[(f64, f64)]) -> Vec<(usize, usize)> {
     parts(breaks, offsets.len())
 }
 
-/// Where a step differs from the median by more than so many median absolute deviations, and by more than so much.
+/// Where a step differs from the median by more than so many median absolute deviations, and by
+/// more than so much.
 fn glitches(steps: &[f64], (deviations, least): (f64, f64)) -> Vec<bool> {
     let middle = median(steps);
     let off: Vec<f64> = steps.iter().map(|step| (step - middle).abs()).collect();
@@ -161,7 +165,8 @@ fn line(offsets: &[(f64, f64)]) -> (f64, f64) {
     (UNIT_S * (x.0 - x.1 * start), x.1)
 }
 
-/// Replaces the time stamps between two breaks by their line; the number of parts, and the mean rate in Hz.
+/// Replaces the time stamps between two breaks by their line; the number of parts, and the mean
+/// rate in Hz.
 fn straighten(times: &mut [f64], longest_s: f64) -> (usize, Option<f64>) {
     let breaks: Vec<usize> = (1..times.len())
         .filter(|k| (times[*k] - times[k - 1]).abs() > longest_s)

@@ -1,5 +1,5 @@
-//! The header of a stream, in XML: `info` with `name`, `channel_count`, `nominal_srate`, `channel_format`, and in `desc` the
-//! labels and units of the channels.
+//! The header of a stream, in XML: `info` with `name`, `channel_count`, `nominal_srate`,
+//! `channel_format`, and in `desc` the labels and units of the channels.
 
 use roxmltree::{Document, Node};
 

@@ -7,8 +7,8 @@
 //! | `clock` | the time stamps on one clock, without jitter, as pyxdf does it |
 //! | `streams` | paths and arrays |
 //!
-//! A channel has the path `stream.label`, and the time stamps of its stream are `stream.t`, in seconds from the first sample of
-//! the file.
+//! A channel has the path `stream.label`, and the time stamps of its stream are `stream.t`, in
+//! seconds from the first sample of the file.
 
 mod chunks;
 mod clock;

@@ -136,7 +136,8 @@ mod tests {
             for line in expected.lines().filter_map(|line| line.strip_prefix(start.as_str())) {
                 let (row, t) = line.split_once(',').unwrap();
                 let (found, t) = (times[row.parse::<usize>().unwrap()], t.parse::<f64>().unwrap());
-                // Sums in another order; an offset of 3000 s in units of 1e-4 s leaves 1e-9 s of rounding.
+                // Sums in another order; an offset of 3000 s in units of 1e-4 s leaves 1e-9 s of
+                // rounding.
                 assert!((found - t).abs() < 2e-9, "{} {row}: {found} {t}", stream.header.name);
                 compared += 1;
             }

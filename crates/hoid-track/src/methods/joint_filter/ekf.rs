@@ -1,8 +1,11 @@
-//! The extended Kalman filter: with F the Jacobian of the transition and h the gradient of the output,
+//! The extended Kalman filter: with F the Jacobian of the transition and h the gradient of the
+//! output,
 //!
-//! `P <- F P F' + Q`, `g = P h/(h' P h + R)`, `X <- X + g eps`, `P <- (I - g h') P (I - g h')' + R g g'`
+//! `P <- F P F' + Q`, `g = P h/(h' P h + R)`, `X <- X + g eps`,
+//! `P <- (I - g h') P (I - g h')' + R g g'`
 //!
-//! (A. H. Jazwinski, *Stochastic Processes and Filtering Theory*, 1970, section 8.3; the last in the form of P. D. Joseph).
+//! (A. H. Jazwinski, *Stochastic Processes and Filtering Theory*, 1970, section 8.3; the last in
+//! the form of P. D. Joseph).
 
 use super::belief::{Belief, Matrix, Model, N};
 

@@ -1,20 +1,28 @@
-//! Joint estimation of state and parameters, as the literature on time-varying human control has it: for comparison.
+//! Joint estimation of state and parameters, as the literature on time-varying human control has
+//! it: for comparison.
 //!
-//! The state of the neuromuscular system, p (its response to the delayed error) and v (the rate of p), is estimated together with the parameters, which drift:
+//! The state of the neuromuscular system, p (its response to the delayed error) and v (the rate of
+//! p), is estimated together with the parameters, which drift:
 //!
 //! `X = [p, v, K_e, K_e_dot, omega_nm, zeta_nm]`, `u = K_e p + K_e_dot v + n`.
 //!
-//! The transition is the exact hold. With [`DividedDifferences`] at the poles times Ts, `R = omega^2 Ts Phi_1`, `A = q Phi_2` and `m = e - p`,
+//! The transition is the exact hold. With [`DividedDifferences`] at the poles times Ts,
+//! `R = omega^2 Ts Phi_1`, `A = q Phi_2` and `m = e - p`,
 //!
 //! `p <- e - (1 - A) m + (R/omega^2) v`, `v <- R m + (1 - A - 2 zeta R/omega) v`;
 //!
-//! the parameters make a random walk, the remnant is taken to be white noise in u and in the drive of v. Neither is true of a coloured remnant in a closed loop; it is what the
-//! published estimators suppose. [`ekf`] linearises (A. Popovici, P. M. T. Zaal, D. M. Pool, *Dual extended Kalman filter for the identification of
-//! time-varying human manual control behavior*, AIAA 2017-3666, there with two filters that take turns), [`ukf`] sends points through
-//! (J. Rojer, D. M. Pool, M. M. van Paassen, M. Mulder, *UKF-based identification of time-varying manual control behaviour*, IFAC-PapersOnLine 52-19 (2019)).
+//! the parameters make a random walk, the remnant is taken to be white noise in u and in the drive
+//! of v. Neither is true of a coloured remnant in a closed loop; it is what the published
+//! estimators suppose. [`ekf`] linearises (A. Popovici, P. M. T. Zaal, D. M. Pool, *Dual extended
+//! Kalman filter for the identification of time-varying human manual control behavior*, AIAA
+//! 2017-3666, there with two filters that take turns), [`ukf`] sends points through (J. Rojer, D.
+//! M. Pool, M. M. van Paassen, M. Mulder, *UKF-based identification of time-varying manual control
+//! behaviour*, IFAC-PapersOnLine 52-19 (2019)).
 //!
-//! The noise of both is in proportion to the variance of the remnant of the start fit, `sigma^2` times the power of the impulse response of 1/D, and the drift in proportion to
-//! the start values; the factors were set on conditions C3 and C5 with remnants of order 2 and 3, as those of the method adaptive were.
+//! The noise of both is in proportion to the variance of the remnant of the start fit, `sigma^2`
+//! times the power of the impulse response of 1/D, and the drift in proportion to the start values;
+//! the factors were set on conditions C3 and C5 with remnants of order 2 and 3, as those of the
+//! method adaptive were.
 
 mod belief;
 mod ekf;

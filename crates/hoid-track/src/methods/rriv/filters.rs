@@ -1,4 +1,5 @@
-//! The filters of the refined recursion: what D/F makes of a signal, and the response of a model to an input.
+//! The filters of the refined recursion: what D/F makes of a signal, and the response of a model to
+//! an input.
 
 use hoid_model::Orders;
 

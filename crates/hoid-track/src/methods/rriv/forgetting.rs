@@ -1,7 +1,9 @@
-//! The gain of a vector of instruments: the covariance of the kernel ([`hoid_core::adaptation`]) with z in the place of psi.
+//! The gain of a vector of instruments: the covariance of the kernel ([`hoid_core::adaptation`])
+//! with z in the place of psi.
 //!
-//! The kernel's covariance is that of a recursion with the gradient z; whether its innovation is that of a gradient or of instruments
-//! does not enter the gain. Where rounding has lost it, as by a jump of the scale of 1e8 and more, it starts again.
+//! The kernel's covariance is that of a recursion with the gradient z; whether its innovation is
+//! that of a gradient or of instruments does not enter the gain. Where rounding has lost it, as by
+//! a jump of the scale of 1e8 and more, it starts again.
 
 use hoid_core::state::{State, visit_all};
 use hoid_core::{
@@ -29,7 +31,8 @@ impl State for Forgetting {
 }
 
 impl Forgetting {
-    /// From P by rows, and a factor in (0, 1] for each parameter. `None` when P is not positive, or too large for the room.
+    /// From P by rows, and a factor in (0, 1] for each parameter. `None` when P is not positive, or
+    /// too large for the room.
     pub fn new(start: &[f64], lambda: &[f64]) -> Option<Self> {
         let p = lambda.len();
         let mut matrix = [[0.0; ROOM]; ROOM];

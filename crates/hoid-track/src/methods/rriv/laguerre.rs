@@ -1,20 +1,23 @@
 //! The part of the input that follows an external signal, sample by sample.
 //!
-//! As in the batch method ([`hoid_ident::iv`]) the response of e to f_t is an expansion in Laguerre filters,
-//! `L_0 = sqrt(1 - p^2)/(1 - p q^-1)`, `L_k = L_{k-1} (q^-1 - p)/(1 - p q^-1)` (B. Wahlberg, *IEEE Trans. Automatic Control* 36
-//! (1991) 551-562); its weights follow by recursive least squares with a long memory. The value at t is made with the weights of
-//! t - 1: they hold the noise of the past alone, and of that one part in memory over filters.
+//! As in the batch method ([`hoid_ident::iv`]) the response of e to f_t is an expansion in Laguerre
+//! filters, `L_0 = sqrt(1 - p^2)/(1 - p q^-1)`, `L_k = L_{k-1} (q^-1 - p)/(1 - p q^-1)` (B.
+//! Wahlberg, *IEEE Trans. Automatic Control* 36 (1991) 551-562); its weights follow by recursive
+//! least squares with a long memory. The value at t is made with the weights of t - 1: they hold
+//! the noise of the past alone, and of that one part in memory over filters.
 
 use super::forgetting::Forgetting;
 use crate::past::{bounded, weighted};
 
-/// Number of filters. A loop remembers a second or two: 16 filters with a time constant of 16 samples span about 500.
+/// Number of filters. A loop remembers a second or two: 16 filters with a time constant of 16
+/// samples span about 500.
 const FILTERS: usize = 16;
 /// Time constant of the filters in samples.
 const TIME_CONSTANT: f64 = 16.0;
 /// Memory of the weights in samples.
 const MEMORY: f64 = 4096.0;
-/// P of the weights at the start, for signals of unit power: they are drawn to zero by a hundredth of a sample.
+/// P of the weights at the start, for signals of unit power: they are drawn to zero by a hundredth
+/// of a sample.
 const START: f64 = 100.0;
 
 /// Filters and weights.

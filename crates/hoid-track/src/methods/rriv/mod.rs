@@ -1,26 +1,31 @@
-//! Recursive refined instrumental variable for `u = (B/F) q^-nk e + (1/D) eps` (P. C. Young, *Recursive Estimation and Time-Series
-//! Analysis*, 2nd ed. 2011, ch. 7 and 8; his C is D here; *Automatica* 52 (2015) 35-46).
+//! Recursive refined instrumental variable for `u = (B/F) q^-nk e + (1/D) eps` (P. C. Young,
+//! *Recursive Estimation and Time-Series Analysis*, 2nd ed. 2011, ch. 7 and 8; his C is D here;
+//! *Automatica* 52 (2015) 35-46).
 //!
-//! With the auxiliary model, e, u and its noise-free output `x = (B/F) q^-nk e'` are filtered by D/F (index f), and for
+//! With the auxiliary model, e, u and its noise-free output `x = (B/F) q^-nk e'` are filtered by
+//! D/F (index f), and for
 //!
 //! `phi = [e_f(t-nk) .., -u_f(t-1) ..]`,  `z = [e'_f(t-nk) .., -x_f(t-1) ..]`
 //!
 //! the symmetric form of the method takes the gain from the instruments alone,
-//! `g = P z/(1 + z' P z)`,  `rho <- rho + g (u_f - phi' rho)`; D follows by recursive least squares on
-//! `xi = u - (B/F) q^-nk e`. Histories are a-posteriori:
-//! each filter takes a sample again with the auxiliary model that has just moved.
+//! `g = P z/(1 + z' P z)`, `rho <- rho + g (u_f - phi' rho)`; D follows by recursive least squares
+//! on `xi = u - (B/F) q^-nk e`. Histories are a-posteriori: each filter takes a sample again with
+//! the auxiliary model that has just moved.
 //!
-//! **Auxiliary model.** It is the estimate, low-pass filtered with the shortest memory of B and F. The estimate itself in its place
-//! makes its own instruments out of its errors, and with short memories runs are lost. The innovation that is reported, and the
-//! innovation variance, are those of the auxiliary model, whose filters run in any case.
+//! **Auxiliary model.** It is the estimate, low-pass filtered with the shortest memory of B and F.
+//! The estimate itself in its place makes its own instruments out of its errors, and with short
+//! memories runs are lost. The innovation that is reported, and the innovation variance, are those
+//! of the auxiliary model, whose filters run in any case.
 //!
-//! **Instruments.** e' is e itself, or the part of e that follows an external signal ([`super::laguerre`]). With e the method needs the
-//! right noise model in a closed loop: z then holds past noise, which is independent of a white eps only.
+//! **Instruments.** e' is e itself, or the part of e that follows an external signal
+//! ([`super::laguerre`]). With e the method needs the right noise model in a closed loop: z then
+//! holds past noise, which is independent of a white eps only.
 //!
-//! **Covariance.** To first order the errors go on as `t <- (I - A) t - g eps` with rows `g_i phi'` for B and F and `g_i psi'` for D
-//! (psi the gradient for all parameters: D inherits what B and F are wrong by), so that `sigma^2 C` with
-//! `C <- (I - A) C (I - A)' + g g'` is the covariance of theta, whatever gain was used: for lambda = 1 that of the batch method, with
-//! forgetting about `P/(1 + lambda)`.
+//! **Covariance.** To first order the errors go on as `t <- (I - A) t - g eps` with rows `g_i phi'`
+//! for B and F and `g_i psi'` for D (psi the gradient for all parameters: D inherits what B and F
+//! are wrong by), so that `sigma^2 C` with `C <- (I - A) C (I - A)' + g g'` is the covariance of
+//! theta, whatever gain was used: for lambda = 1 that of the batch method, with forgetting about
+//! `P/(1 + lambda)`.
 //!
 //! **Stability.** A step of B and F is halved until the roots of F lie within [`RADIUS`].
 
@@ -238,11 +243,13 @@ struct Work {
 }
 
 impl RefinedRecursion {
-    /// From a start, with a forgetting factor in (0, 1] for each parameter; `external` makes the instruments of the external signal
-    /// of each sample (where one is missing, the last one holds).
+    /// From a start, with a forgetting factor in (0, 1] for each parameter; `external` makes the
+    /// instruments of the external signal of each sample (where one is missing, the last one
+    /// holds).
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for orders with A or C, or factors out of range; [`IdentError::BadStart`].
+    /// [`IdentError::BadOption`] for orders with A or C, or factors out of range;
+    /// [`IdentError::BadStart`].
     pub fn new(orders: Orders, start: RefinedStart<'_>, lambda: &[f64], external: bool) -> Result<Self, IdentError> {
         let p = orders.parameters();
         check(&orders, &start, lambda)?;
@@ -327,7 +334,8 @@ impl RefinedRecursion {
         StepOutcome { innovation, shortened }
     }
 
-    /// The filters' theta takes its step, unless that leads out of the region of stable F, which is not convex for nf > 2.
+    /// The filters' theta takes its step, unless that leads out of the region of stable F, which is
+    /// not convex for nf > 2.
     fn follow_theta(&mut self) {
         let w = &mut self.work;
         for (trial, (auxiliary, theta)) in w.trial.iter_mut().zip(self.auxiliary.iter().zip(&self.theta)) {
@@ -438,7 +446,8 @@ impl RefinedRecursion {
             self.spread.copy_from_slice(&self.first_spread);
         }
         for i in 0..p {
-            // To first order the recursion can be unstable where it is not: then nothing is known, and no less than that.
+            // To first order the recursion can be unstable where it is not: then nothing is known,
+            // and no less than that.
             let limit = LARGEST_GROWTH * self.first_spread[i * (p + 1)];
             let found = self.spread[i * (p + 1)];
             if limit > 0.0 && found > limit {

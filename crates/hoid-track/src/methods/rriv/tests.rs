@@ -22,7 +22,8 @@ fn textbook() -> Orders {
     }
 }
 
-/// `u = (B/F) q^-2 e + (1/D) eps` with white e and eps of unit variance; B is `gain` times the usual one from the middle on.
+/// `u = (B/F) q^-2 e + (1/D) eps` with white e and eps of unit variance; B is `gain` times the
+/// usual one from the middle on.
 fn open_loop(n: usize, replication: u64, d: &[f64], gain: f64) -> (Vec<f64>, Vec<f64>) {
     let white = |cell| {
         RunSeed {
@@ -111,7 +112,8 @@ fn without_forgetting_it_comes_to_the_batch_estimate() {
             assert!((recursion.innovation_variance() / batch.innovation_variance() - 1.0).abs() < 2e-3);
         }
         println!("{orders}: farthest {worst:.3} standard errors");
-        // Of second order: filters and instruments of the past were those of an estimate of the past.
+        // Of second order: filters and instruments of the past were those of an estimate of the
+        // past.
         assert!(worst < 0.15, "{orders}: {worst}");
     }
 }
@@ -355,6 +357,7 @@ fn a_missing_output_is_bridged_by_its_prediction() {
         }
     }
     assert_eq!(recursion.theta(), theta);
-    // 780 squares of unit variance have a relative spread of 5 %; the noise forgets the gap in about five samples.
+    // 780 squares of unit variance have a relative spread of 5 %; the noise forgets the gap in
+    // about five samples.
     assert!((squares / count - 1.0_f64).abs() < 0.2, "{}", squares / count);
 }

@@ -1,0 +1,45 @@
+//! The examples of the facade run, and stay short enough to be read in a minute.
+#![allow(clippy::unwrap_used)]
+
+use std::process::Command;
+
+/// What an example prints; cargo has built it beside this test.
+fn printed(name: &str) -> String {
+    let here = std::env::current_exe().unwrap();
+    let built = here.parent().unwrap().parent().unwrap().join("examples").join(name);
+    let output = Command::new(built.with_extension(std::env::consts::EXE_EXTENSION))
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn a_file_is_identified() {
+    let text = printed("identify_file");
+    assert!(text.contains("omega_nm") && text.contains("report.html"), "{text}");
+}
+
+#[test]
+fn a_person_is_tracked_live() {
+    let text = printed("track_live");
+    assert!(
+        text.contains("80.0 s") && text.contains("8192 samples, 0 skipped"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_study_runs() {
+    let text = printed("simulate_and_study");
+    assert!(text.contains("finished: true") && text.contains("median"), "{text}");
+}
+
+#[test]
+fn each_has_less_than_forty_lines() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/examples");
+    for name in ["identify_file", "simulate_and_study", "track_live"] {
+        let text = std::fs::read_to_string(format!("{folder}/{name}.rs")).unwrap();
+        assert!(text.lines().count() < 40, "{name}: {}", text.lines().count());
+    }
+}
