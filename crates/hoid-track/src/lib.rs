@@ -59,10 +59,7 @@ pub use columns::{Columns, value_of};
 pub use forgetting::ForgettingRule;
 pub use live::{Choose, Live, LiveOutcome, WarmUp};
 pub use memory::{CommonMemory, Memory, MemoryOptions};
-pub use methods::{
-    AdaptiveOptions, EkfOptions, FusedOptions, Method, PhysicalOptions, RlsOptions, RpemOptions, RrivOptions,
-    UkfOptions, WindowOptions,
-};
+pub use methods::*;
 pub use options::TrackOptions;
 pub use outcome::{Counts, Outcome};
 pub use over_record::{track, track_from};
