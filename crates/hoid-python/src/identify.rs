@@ -183,9 +183,11 @@ pub fn identify<'py>(
     })
 }
 
-/// Name of each batch estimator, and the keywords that it takes.
+/// Name of each batch estimator, the structures that it serves, and the keywords that it takes.
 #[pyfunction]
-pub fn batch_estimators() -> Vec<(&'static str, Vec<&'static str>)> {
+pub fn batch_estimators() -> Vec<(&'static str, Vec<&'static str>, Vec<&'static str>)> {
+    let structures = |spec: &MethodSpec| spec.structures.iter().map(|structure| structure.name()).collect();
     let keywords = |spec: &MethodSpec| spec.settings.iter().map(|setting| setting.name).collect();
-    estimators().iter().map(|spec| (spec.name, keywords(spec))).collect()
+    let of = |spec: &MethodSpec| (spec.name, structures(spec), keywords(spec));
+    estimators().iter().map(of).collect()
 }

@@ -28,6 +28,7 @@ __all__ = [
     "Trace",
     "Tracker",
     "__version__",
+    "batch_estimators",
     "check_record",
     "convert_discrete",
     "convert_operator",
@@ -43,6 +44,7 @@ __all__ = [
     "plan_names",
     "read",
     "read_table",
+    "recursive_methods",
     "reproduce",
     "simulate",
     "simulate_group",
@@ -387,7 +389,7 @@ def simulate_group(
     seed: int,
     trouble: list[str],
 ) -> int: ...
-def batch_estimators() -> list[tuple[str, list[str]]]: ...
+def batch_estimators() -> list[tuple[str, list[str], list[str]]]: ...
 def recursive_methods() -> list[tuple[str, str, str, list[str]]]: ...
 def track(
     record: Record,

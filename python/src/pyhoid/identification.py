@@ -16,7 +16,15 @@ __all__ = ["identify"]
 
 
 #: The keywords that each batch estimator takes, from the registry of the library.
-_KEYWORDS = {name: set(keywords) for name, keywords in _pyhoid.batch_estimators()}
+_KEYWORDS = {name: set(keywords) for name, _, keywords in _pyhoid.batch_estimators()}
+#: Estimators that are named as structures.
+_MODELS = ("grey-box", "time-varying")
+#: The structure of a method that fits no other.
+_OF_METHOD = {
+    name: structures[0]
+    for name, structures, _ in _pyhoid.batch_estimators()
+    if len(structures) == 1 and name not in _MODELS
+}
 #: What to give in place of a keyword.
 _INSTEAD = {
     "delay": "; else give nk",
@@ -36,8 +44,7 @@ def _check(structure: str, method: str, given: Mapping[str, object]) -> None:
         of = [estimator for estimator, keywords in _KEYWORDS.items() if option in keywords]
         if of and option not in own:
             names = ", ".join(
-                f'structure="{one}"' if one in ("grey-box", "time-varying") else f'method="{one}"'
-                for one in of
+                f'structure="{one}"' if one in _MODELS else f'method="{one}"' for one in of
             )
             raise OptionError(f"{name} belongs to {names}{_INSTEAD.get(option, '')}")
 
@@ -190,10 +197,9 @@ def identify(
     settings = {
         name: value for name, value in locals().items() if name not in ("records", "progress")
     }
-    methods = {"iv4": "arx", "sriv": "oe", "rivbj": "bj"}
-    own = methods.get(method.lower(), "bj")
+    own = _OF_METHOD.get(method.lower(), "bj")
     name = (structure or own).lower().replace("_", "-")
-    if structure is not None and method.lower() in methods and name != own:
+    if structure is not None and method.lower() in _OF_METHOD and name != own:
         raise OptionError(
             f'method="{method}" fits the structure {own}; drop structure, or use method="pem"'
         )

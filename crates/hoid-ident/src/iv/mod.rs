@@ -27,14 +27,12 @@
 //! not matter for consistency, only for how well the instruments follow the regressors: a jump at
 //! the start, raised by D, would outweigh all that follows. Several records add up, row by row,
 //! with a common theta.
-
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | `estimator` | options, and the fit |
-//! | `method` | the list of the methods |
+//! | `methods` | the methods, a file each, and their list |
 //! | `instruments`, `external_signal` | what the instruments are made of |
-//! | `iv4`, `sriv`, `rivbj` | the methods |
 //! | `refined` | the iteration of the refined methods |
 //! | `algorithm` | what a method gives to the estimator, and gets from it |
 //! | `equation` | the filtered equation, its instruments and its solution |
@@ -48,12 +46,9 @@ pub(crate) mod equation;
 mod estimator;
 mod external_signal;
 mod instruments;
-mod iv4;
-mod method;
+mod methods;
 mod refined;
-mod rivbj;
-mod sriv;
 
 pub use estimator::InstrumentalVariable;
 pub use instruments::{FORCING_CHANNEL, Instruments};
-pub use method::IvMethod;
+pub use methods::IvMethod;

@@ -14,7 +14,7 @@
 
 use hoid_model::{Orders, Structure};
 
-use super::{
+use crate::iv::{
     algorithm::{Algorithm, IterationLimits, IvSolution},
     covariance,
     equation::IvProblem,

@@ -1,11 +1,15 @@
-//! The methods of instrumental variables. A new one is a file with its [`Algorithm`] and a line in
-//! the list below.
+//! The methods of instrumental variables. A new one is a file beside these with its [`Algorithm`],
+//! its `mod` line and its line in the list below.
+
+mod iv4;
+mod rivbj;
+mod sriv;
 
 use std::fmt;
 
 use hoid_model::Structure;
 
-use super::{algorithm::Algorithm, iv4, rivbj, sriv};
+use super::algorithm::Algorithm;
 
 /// The list of the methods: variant, and the file that holds its algorithm.
 macro_rules! methods {
@@ -21,7 +25,7 @@ macro_rules! methods {
             /// All methods.
             pub const ALL: [Self; [$(stringify!($method)),+].len()] = [$(Self::$method),+];
 
-            pub(super) fn algorithm(self) -> &'static Algorithm {
+            pub(in crate::iv) fn algorithm(self) -> &'static Algorithm {
                 match self {
                     $(Self::$method => &$file::ALGORITHM,)+
                 }

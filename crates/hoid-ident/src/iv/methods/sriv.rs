@@ -8,7 +8,7 @@
 
 use hoid_model::Structure;
 
-use super::{
+use crate::iv::{
     algorithm::{Algorithm, IterationLimits, IvSolution},
     columns::cut,
     covariance::covariance,
