@@ -8,10 +8,11 @@
 //! use hoid_ident::Estimator;
 //! use hoid_model::{Structure, scenario::{Condition, Scenario}};
 //! use hoid_report::{ModelSection, Report, known_operator};
-//! use hoid_sim::{Simulator, Stream};
+//! use hoid_sim::{RunSeed, Simulator};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let records = [Simulator::new(&Scenario::condition(Condition::C1))?.run(Stream::default(), false)?];
+//! let simulator = Simulator::new(&Scenario::condition(Condition::C1))?;
+//! let records = [simulator.run(RunSeed::default(), false)?];
 //! let fit = Estimator::new(Structure::Arx, Structure::Arx.operator_orders(29)).fit(&records)?;
 //! let report = Report {
 //!     title: "A simulated run of condition C1".to_owned(),

@@ -2,20 +2,17 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | `options` | what is to be tracked, and how |
-//! | `start` | where a recursion starts: batch fit, theta, nothing |
-//! | `gain` | the way of forgetting |
-//! | `kernel` | RLS, RPEM and the physical recursion of the real-time kernel |
-//! | `adaptive`, `change` | the bank of hypotheses of the real-time kernel, and the changes that it declares |
-//! | `reported`, `smooth` | what a recursion with a noise model that stays reports; the two-sided estimate of a recorded run |
-//! | `fused` | least squares with the poles of RPEM |
-//! | `joint` | extended and unscented Kalman filter of state and parameters |
-//! | `window`, `predictor` | the batch fit over a sliding window |
-//! | `refined`, `laguerre`, `forgetting` | recursive refined instrumental variable |
-//! | `plan` | orders that are still open, searched on the start span |
-//! | `live` | the warm-up of a stream, then its tracker |
-//! | `saved` | a tracker as numbers, to go on elsewhere |
-//! | `trace`, `columns` | the estimate at every sample |
+//! | `methods`, `method` | [`Method`]: the recursive methods, a file or folder each; what each says of itself |
+//! | `options`, `shared_options`, `memory`, `forgetting` | [`TrackOptions`]: what is to be tracked, and how |
+//! | `plan` | [`TrackPlan`]: orders that are still open, searched on the start span |
+//! | `setup`, `start`, `gain` | what a recursion is built of: structure, start, way of forgetting |
+//! | `kernel`, `recursion` | RLS, RPEM and the physical recursion of the real-time kernel; what every recursion does |
+//! | `predictor`, `past`, `reported` | signals and reports for methods that are not of the kernel |
+//! | `tracker`, `outcome`, `saved` | [`Tracker`]: one sample at a time; a tracker as numbers, to go on elsewhere |
+//! | `live` | [`Live`]: the warm-up of a stream, then its tracker |
+//! | `over_record`, `smoother` | [`track()`]: a record; the two-sided estimate of a recorded run |
+//! | `trace`, `columns`, `summary`, `in_words` | [`Trace`]: the estimate at every sample, as columns and in words |
+//! | `change` | [`Change`]: when a person changed |
 //!
 //! **A recursion starts with what is known.** By default it is the batch fit of the first third of
 //! a record, with the covariance of that fit; until the end of that span the filters follow and the
