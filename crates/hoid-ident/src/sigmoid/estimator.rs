@@ -30,14 +30,14 @@ pub struct SigmoidChange {
     pub nd: usize,
     /// Shortest and longest delay tau_e, s; any fraction of a sample. Equal ends fix it.
     pub delay_range_s: (f64, f64),
-    /// Fixed and bounded parameters by name ([`SIGMOID_NAMES`], d1 ...). By default t_M lies in the
-    /// middle nine tenths of the span that the records have in common, and G between 5/span and
-    /// 2/Ts.
+    /// Fixed and bounded parameters by name ([`SIGMOID_NAMES`](crate::SIGMOID_NAMES), d1 ...). By
+    /// default t_M lies in the middle nine tenths of the span that the records have in common, and
+    /// G between 5/span and 2/Ts.
     pub constraints: BTreeMap<String, Constraint>,
     /// Size of the innovations over the record.
     pub noise_level: NoiseLevel,
-    /// Start instead of the own ones: the parameters of [`SIGMOID_NAMES`] in their units, then d1
-    /// ... d_nd.
+    /// Start instead of the own ones: the parameters of [`SIGMOID_NAMES`](crate::SIGMOID_NAMES) in
+    /// their units, then d1 ... d_nd.
     pub start: Option<Vec<f64>>,
     /// Method and limits of each search.
     pub search: SearchOptions,
