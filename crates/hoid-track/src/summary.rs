@@ -15,7 +15,7 @@ impl fmt::Display for Trace {
             f,
             "{} of {}({}), {} rows",
             options.method,
-            options.structure,
+            options.structure.label(),
             options.orders,
             self.len()
         )?;

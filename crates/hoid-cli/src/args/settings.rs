@@ -46,8 +46,7 @@ fn argument(setting: &Setting, methods: &[MethodSpec]) -> Arg {
     let arg = Arg::new(setting.name)
         .long(flag(setting.name))
         .help(help(setting, methods))
-        .allow_hyphen_values(true)
-        .hide_possible_values(false);
+        .allow_hyphen_values(setting.kind != Kind::Flag);
     match setting.kind {
         Kind::Flag => arg.action(ArgAction::SetTrue),
         Kind::Choice(words) => arg.value_name("NAME").value_parser(PossibleValuesParser::new(words)),

@@ -32,7 +32,7 @@
 //! | [`Excitation`] | the lines: given, of a forcing function, or found in a channel |
 //! | `window`, `spectrum` | whole periods, offsets between channels, Fourier coefficients |
 //! | [`DescribingOptions`] | averaging, span, offset, controlled element |
-//! | `describe` | [`describe`]: lines of all runs, averages, standard errors |
+//! | `describe` | [`describe()`]: lines of all runs, averages, standard errors |
 //! | `remnant` | power off the lines: spectrum, share, noise ratio |
 //! | `open_loop` | crossover frequency and phase margin by interpolation, with their spread |
 //! | `gain_lead_delay` | gain, lead and delay by weighted least squares |

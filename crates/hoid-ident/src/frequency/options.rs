@@ -41,7 +41,7 @@ pub struct MeasuredElement {
     pub disturbance: Option<String>,
 }
 
-/// Options of [`super::describe`].
+/// Options of [`super::describe()`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescribingOptions {
     /// How runs are averaged. Default [`Averaging::Ratios`].

@@ -117,7 +117,7 @@ impl RecursiveMethod for AdaptiveOptions {
             name: "adaptive",
             help: "a bank of hypotheses of when the person changed, which sets its memory itself and tells of changes",
             source: "Andersson 1985; Willsky and Jones 1976; Adams and MacKay 2007; the book, page A person who changes",
-            structures: &[Structure::BoxJenkins, Structure::OutputError],
+            structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
             defaults: &[],
         }
     }

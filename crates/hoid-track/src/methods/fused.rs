@@ -65,7 +65,7 @@ impl RecursiveMethod for FusedOptions {
             name: "fused",
             help: "least squares for B with the poles of rpem, for comparison",
             source: "the reference text, section VII",
-            structures: &[Structure::BoxJenkins, Structure::OutputError],
+            structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
             defaults: &[("memory", "2.56s for b, inf for the others")],
         }
     }

@@ -40,7 +40,7 @@ impl RecursiveMethod for PhysicalOptions {
             name: "physical",
             help: "recursive prediction-error method in the operator's parameters",
             source: "Ljung 1999, section 11.5, with the Jacobian of the exact hold",
-            structures: &[Structure::BoxJenkins, Structure::OutputError],
+            structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
             defaults: &[
                 ("memory", "5s for K_e, 1.5s for K_e_dot, inf for the others"),
                 ("limit", "5"),

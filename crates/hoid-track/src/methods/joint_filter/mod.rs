@@ -55,7 +55,7 @@ macro_rules! joint_filter {
                     name: $name,
                     help: $help,
                     source: $source,
-                    structures: &[Structure::BoxJenkins, Structure::OutputError],
+                    structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
                     defaults: &[],
                 }
             }

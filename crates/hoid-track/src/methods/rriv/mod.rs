@@ -80,7 +80,7 @@ impl RecursiveMethod for RrivOptions {
             name: "rriv",
             help: "recursive refined instrumental variable",
             source: "Young 2011, chapters 7 and 8; Young 2015",
-            structures: &[Structure::BoxJenkins, Structure::OutputError],
+            structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
             defaults: &[("memory", "2.56s for b, 20.48s for the others")],
         }
     }

@@ -1,0 +1,175 @@
+"""The recursive methods and their options, made from the registry of the library.
+
+`HOID_UPDATE_DOCS=1 cargo test -p hoid-cli` renews this file; it is not edited by hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal, TypedDict
+
+__all__ = ["METHODS", "SETTINGS", "MethodSettings", "RecursiveMethod", "Structure"]
+
+#: A recursive method.
+RecursiveMethod = Literal[
+    "rls",
+    "rpem",
+    "physical",
+    "window",
+    "rriv",
+    "adaptive",
+    "fused",
+    "ekf",
+    "ukf",
+]
+
+#: A polynomial structure.
+Structure = Literal[
+    "fir",
+    "ar",
+    "ma",
+    "arx",
+    "arma",
+    "armax",
+    "ararx",
+    "ararmax",
+    "oe",
+    "bj",
+    "general",
+]
+
+
+class MethodSettings(TypedDict, total=False):
+    """Options of the recursive methods."""
+
+    # Covariance P at the start: X times the unit matrix, in units of the innovation variance
+    # (the reference text: 0.1). For rls, rpem, physical, fused.
+    covariance: float | None
+
+    # Standard deviations beyond which an innovation moves the estimate no further. For rls,
+    # rpem, physical, adaptive, fused.
+    limit: float | None
+
+    # Memory of single parameters, or of all of one letter, as b0=256,f=inf,K_e=5s. For rls,
+    # rpem, physical, rriv, fused.
+    memory_of: Mapping[str, float | str] | None
+
+    # Memory of all parameters, in which the weight of a sample falls to 1/e: samples (256),
+    # seconds (2.56s) or inf. For rls, rpem, physical, rriv, fused.
+    memory: float | str | None
+
+    # Factor of forgetting instead of a memory: lambda = 1 - 1/memory in samples. For rls, rpem,
+    # physical, rriv, fused.
+    forgetting_factor: float | None
+
+    # How it forgets; window, variable and directional take the shortest memory. For rls, rpem,
+    # physical.
+    forgetting: (
+        Literal[
+            "exponential",
+            "random-walk",
+            "window",
+            "variable",
+            "directional",
+            "gradient",
+        ]
+        | None
+    )
+
+    # For forgetting by a random walk: by how much a parameter drifts in one second (standard
+    # deviation), as K_e=.01,K_e_dot=.01. For rls, rpem, physical.
+    drift: Mapping[str, float] | None
+
+    # For forgetting by the gradient: step size. For rls, rpem, physical.
+    rate: float | None
+
+    # Pseudo-linear regression (extended least squares) instead of the gradient. For rpem.
+    pseudo_linear: bool | None
+
+    # Polynomials kept stable: predictor (C and F), or noise (D too). For rpem, physical, fused.
+    stable: Literal["predictor", "noise"] | None
+
+    # Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1... For physical, adaptive,
+    # ekf, ukf.
+    bound: Mapping[str, tuple[float | None, float | None]] | None
+
+    # Follow the delay tau_e too, within this range: as a parameter by physical, in whole
+    # samples by adaptive. For physical, adaptive.
+    track_delay: tuple[float, float] | None
+
+    # Length of the window: samples or seconds. For window.
+    window: float | str | None
+
+    # Samples between two fits. For window.
+    refit: int | None
+
+    # Channel of the signal from outside the loop of which the instruments are made. For rriv.
+    instruments: str | None
+
+    # Logarithm of the odds from which a change is declared. For adaptive.
+    alarm: float | None
+
+    # At each sample what all of a recorded run says of it, by hypotheses run from both ends, in
+    # place of what the past alone says. For adaptive.
+    smooth: bool | None
+
+
+#: The methods, as the documentation of `track` lists them.
+METHODS = """``"rls"``: recursive least squares;
+        ``"rpem"``: recursive prediction-error method, for every structure;
+        ``"physical"``: recursive prediction-error method in the operator's parameters;
+        ``"window"``: a batch fit of the last seconds, again and again;
+        ``"rriv"``: recursive refined instrumental variable;
+        ``"adaptive"``: a bank of hypotheses of when the person changed, which sets its memory
+        itself and tells of changes;
+        ``"fused"``: least squares for B with the poles of rpem, for comparison;
+        ``"ekf"``: extended Kalman filter of state and parameters, for comparison;
+        ``"ukf"``: unscented Kalman filter of state and parameters, for comparison."""
+
+#: The options, as the documentation of `track` lists them.
+SETTINGS = """covariance : float
+            Covariance P at the start: X times the unit matrix, in units of the innovation
+            variance (the reference text: 0.1). For rls, rpem, physical, fused.
+        limit : float
+            Standard deviations beyond which an innovation moves the estimate no further. For
+            rls, rpem, physical, adaptive, fused.
+        memory_of : Mapping[str, float | str]
+            Memory of single parameters, or of all of one letter, as b0=256,f=inf,K_e=5s. For
+            rls, rpem, physical, rriv, fused.
+        memory : float | str
+            Memory of all parameters, in which the weight of a sample falls to 1/e: samples
+            (256), seconds (2.56s) or inf. For rls, rpem, physical, rriv, fused.
+        forgetting_factor : float
+            Factor of forgetting instead of a memory: lambda = 1 - 1/memory in samples. For rls,
+            rpem, physical, rriv, fused.
+        forgetting : Literal['exponential', 'random-walk', 'window', 'variable', 'directional', 'gradient']
+            How it forgets; window, variable and directional take the shortest memory. For rls,
+            rpem, physical.
+        drift : Mapping[str, float]
+            For forgetting by a random walk: by how much a parameter drifts in one second
+            (standard deviation), as K_e=.01,K_e_dot=.01. For rls, rpem, physical.
+        rate : float
+            For forgetting by the gradient: step size. For rls, rpem, physical.
+        pseudo_linear : bool
+            Pseudo-linear regression (extended least squares) instead of the gradient. For rpem.
+        stable : Literal['predictor', 'noise']
+            Polynomials kept stable: predictor (C and F), or noise (D too). For rpem, physical,
+            fused.
+        bound : Mapping[str, tuple[float | None, float | None]]
+            Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1... For physical,
+            adaptive, ekf, ukf.
+        track_delay : tuple[float, float]
+            Follow the delay tau_e too, within this range: as a parameter by physical, in whole
+            samples by adaptive. For physical, adaptive.
+        window : float | str
+            Length of the window: samples or seconds. For window.
+        refit : int
+            Samples between two fits. For window.
+        instruments : str
+            Channel of the signal from outside the loop of which the instruments are made. For
+            rriv.
+        alarm : float
+            Logarithm of the odds from which a change is declared. For adaptive.
+        smooth : bool
+            At each sample what all of a recorded run says of it, by hypotheses run from both
+            ends, in place of what the past alone says. For adaptive."""
