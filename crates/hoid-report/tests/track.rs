@@ -167,9 +167,9 @@ fn three_methods_over_each_other_show_all_that_is_asked_for() {
     let b0 = bj[1].parameters()[0].1;
     let (value, error) = hoid_report::numbers::with_uncertainty(b0.value, b0.standard_error);
     assert!(html.contains(&format!("<td class=\"n\">{value} \u{b1} {error}</td>")));
-    assert!(html.contains(
-        "exponential forgetting, memory 2.56 s (256 samples) for b0, b1; 20.48 s (2048 samples) for d1, f1, f2"
-    ));
+    assert!(
+        html.contains("exponential forgetting, memory b0 b1 2.56 s (256 samples), d1 f1 f2 20.48 s (2048 samples)")
+    );
 }
 
 #[test]

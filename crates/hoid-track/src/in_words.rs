@@ -41,10 +41,9 @@ impl TrackOptions {
         if let [(memory, _)] = groups.as_slice() {
             return memory.in_words(sample_time);
         }
-        let of = |(memory, names): &(Memory, Vec<String>)| {
-            format!("{} for {}", memory.in_words(sample_time), names.join(", "))
-        };
-        groups.iter().map(of).collect::<Vec<_>>().join("; ")
+        let of =
+            |(memory, names): &(Memory, Vec<String>)| format!("{} {}", names.join(" "), memory.in_words(sample_time));
+        groups.iter().map(of).collect::<Vec<_>>().join(", ")
     }
 
     /// Where the recursion starts.
@@ -101,7 +100,7 @@ mod tests {
         assert_eq!(of(&[]), "exponential forgetting, memory 2.56 s (256 samples)");
         assert_eq!(
             of(&[("memory_of", "b=inf")]),
-            "exponential forgetting, memory 2.56 s (256 samples) for a1, a2; without end for b0, b1"
+            "exponential forgetting, memory a1 a2 2.56 s (256 samples), b0 b1 without end"
         );
         assert!(of(&[("forgetting", "gradient")]).ends_with("rate 0.1"));
     }

@@ -67,8 +67,8 @@ impl fmt::Display for Bounds {
             Self::PositiveFinite => f.write_str("a positive finite number"),
             Self::NonNegative => f.write_str("a finite number of zero or more"),
             Self::AtLeast(least) => write!(f, "{least} or more"),
-            Self::Between(low, high) => write!(f, "more than {low} and less than {high}"),
-            Self::UpTo(low, high) => write!(f, "more than {low} and at most {high}"),
+            Self::Between(low, high) => write!(f, "a number between {low} and {high}"),
+            Self::UpTo(low, high) => write!(f, "a number above {low} and up to {high}"),
         }
     }
 }

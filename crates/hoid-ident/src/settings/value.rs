@@ -161,7 +161,7 @@ pub fn named_pairs(text: &str) -> Result<Vec<(String, String)>, String> {
             .filter(|(name, value)| !name.is_empty() && !value.is_empty())
             .ok_or_else(|| format!("NAME=VALUE in place of {item:?}"))?;
         if pairs.iter().any(|(known, _)| known == name) {
-            return Err(format!("{name} once"));
+            return Err(format!("each name once; {name} is given twice"));
         }
         pairs.push((name.to_owned(), value.to_owned()));
     }

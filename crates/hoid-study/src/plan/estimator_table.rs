@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use hoid_ident::{
-    Estimator, GreyBox, InitialState, SearchOptions,
+    Estimator, GreyBox, IdentError, InitialState, SearchOptions,
     settings::{Kind, Setting},
 };
 use hoid_model::{Detrend, NamedChoice, Orders, Structure};
@@ -166,6 +166,12 @@ impl EstimatorTable {
                 return Err(at(key, format!("has no effect here: it belongs to {of}")));
             }
         }
+        if self.settings.contains_key("memory") && self.settings.contains_key("lambda") {
+            return Err(at(
+                "lambda",
+                "and memory are both given: leave one of them out".to_owned(),
+            ));
+        }
         if let (None, Some(key)) = (method, self.settings.keys().next()) {
             let of = methods_with(key);
             return Err(at(
@@ -239,9 +245,13 @@ impl EstimatorTable {
                 continue;
             };
             let text = text_of(value, setting.kind).map_err(|reason| at(&key, reason))?;
+            if !method.settings().list().iter().any(|own| own.name == setting.name) {
+                let of = methods_with(&key).join(", ");
+                return Err(at(&key, format!("has no effect here: it belongs to {of}")));
+            }
             method
                 .set(setting.name, &text)
-                .map_err(|error| at(&key, format!("is wrong: {error}")))?;
+                .map_err(|error| at(&key, in_plan(&error)))?;
         }
         if let Some(key) = left.keys().next() {
             return Err(at(key, unknown_key(&method)));
@@ -310,6 +320,14 @@ fn in_words(kind: Kind) -> &'static str {
         Kind::Span | Kind::OpenSpan => "two numbers",
         Kind::Choice(_) | Kind::Channel => "a text",
         Kind::Named(_) => "a table of values by name",
+    }
+}
+
+/// What is wrong with a value, behind its key.
+fn in_plan(error: &IdentError) -> String {
+    match error {
+        IdentError::BadOption { found, expected, .. } => format!("is {found}, expected {expected}"),
+        other => format!("is wrong: {other}"),
     }
 }
 
