@@ -55,7 +55,7 @@ settings! {
 settings! {
     /// Bounds of the operator's parameters.
     pub struct BoundOptions {
-        /// Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1..
+        /// Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1..2; an end may be left open
         pub bound: BTreeMap<String, Constraint> = BTreeMap::new(),
     }
 }

@@ -132,6 +132,22 @@ impl<'ast> Visit<'ast> for Paths<'_> {
     }
 }
 
+/// Names of the types that a macro declares, or would where it is used.
+fn declared(stream: TokenStream, found: &mut BTreeSet<String>) {
+    let mut declares = false;
+    for token in stream {
+        match token {
+            TokenTree::Ident(ident) if declares => {
+                found.insert(ident.to_string());
+                declares = false;
+            }
+            TokenTree::Ident(ident) => declares = ident == "struct" || ident == "enum",
+            TokenTree::Group(group) => declared(group.stream(), found),
+            _ => declares = false,
+        }
+    }
+}
+
 /// Runs of names with `::` between them.
 fn tokens(stream: TokenStream, found: &mut Vec<Vec<String>>) {
     let (mut run, mut colons) = (Vec::new(), 0);
@@ -193,7 +209,12 @@ impl Crate {
                     };
                     self.modules[at].children.insert(name, index);
                 }
-                other => Paths(&mut self.modules[at]).visit_item(other),
+                other => {
+                    if let Item::Macro(used) = other {
+                        declared(used.mac.tokens.clone(), &mut self.modules[at].items);
+                    }
+                    Paths(&mut self.modules[at]).visit_item(other);
+                }
             }
         }
         at

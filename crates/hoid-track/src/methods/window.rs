@@ -49,7 +49,7 @@ settings! {
         /// Length of the window: samples or seconds
         pub window: Memory = Memory::Seconds(20.0),
         /// Samples between two fits
-        #[setting(unit("samples"), bounds(Bounds::AtLeast(1.0)))]
+        #[setting(bounds(Bounds::AtLeast(1.0)))]
         pub refit: usize = 25,
     }
 }
