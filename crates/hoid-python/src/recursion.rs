@@ -72,7 +72,10 @@ pub fn plan(options: &Bound<'_, PyDict>, sample_time: SampleTime) -> Outcome<Tra
 /// The method with its options, which come as texts by name.
 fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
     let mut method = match get::<String>(options, "method")? {
-        Some(name) => name.parse::<Method>()?,
+        Some(name) => {
+            let words = Method::all().into_iter().map(|method| (method.name(), method));
+            names::word("method", &name, &words.collect::<Vec<_>>())?
+        }
         None => Method::physical(),
     };
     let mut given: BTreeMap<String, String> = get(options, "settings")?.unwrap_or_default();

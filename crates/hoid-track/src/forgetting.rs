@@ -105,7 +105,7 @@ impl ForgettingRule {
         match self {
             Self::RandomWalk(drift) if drift.is_empty() => Err(IdentError::BadOption {
                 option: "forgetting".to_owned(),
-                found: "random-walk without drift".to_owned(),
+                found: "random-walk, which needs drift".to_owned(),
                 expected: "the standard deviation of the drift in one second, as drift K_e=.01".to_owned(),
             }),
             Self::Gradient(rate) if !Self::rate().bounds.hold(*rate) => Err(IdentError::BadOption {

@@ -37,15 +37,9 @@ pub(crate) struct About {
 }
 
 /// A recursive method with its options.
-pub(crate) trait RecursiveMethod {
+pub(crate) trait RecursiveMethod: Settings {
     /// The words for it.
     fn about(&self) -> About;
-
-    /// Its options by name.
-    fn settings(&self) -> &dyn Settings;
-
-    /// Its options by name, to be set.
-    fn settings_mut(&mut self) -> &mut dyn Settings;
 
     /// Memory of a parameter when none is given.
     fn usual_memory(&self, parameter: &str) -> Memory;
@@ -158,7 +152,7 @@ pub(crate) fn spec(method: &dyn RecursiveMethod) -> MethodSpec {
         help: about.help,
         source: about.source,
         structures: about.structures,
-        settings: method.settings().list().into_iter().map(own).collect(),
+        settings: method.list().into_iter().map(own).collect(),
     }
 }
 

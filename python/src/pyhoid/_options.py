@@ -6,7 +6,7 @@ import math
 import operator
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 from .errors import DataError, OptionError
 from .record import Record
@@ -109,11 +109,11 @@ def text(name: str, value: Any) -> str | None:
         low, high = ("" if end is None else text(name, end) for end in value)
         return f"{low}..{high}"
     try:
-        return str(operator.index(value))
+        return str(operator.index(cast(Any, value)))
     except TypeError:
         pass
     try:
-        return repr(float(value))
+        return repr(float(cast(Any, value)))
     except (TypeError, ValueError):
         raise OptionError(
             f"{name} is {value!r}, expected a number, a text, a pair, or values by name"

@@ -89,8 +89,8 @@ class MethodSettings(TypedDict, total=False):
     # Polynomials kept stable: predictor (C and F), or noise (D too). For rpem, physical, fused.
     stable: Literal["predictor", "noise"] | None
 
-    # Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1... For physical, adaptive,
-    # ekf, ukf.
+    # Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1..2; an end may be left open.
+    # For physical, adaptive, ekf, ukf.
     bound: Mapping[str, tuple[float | None, float | None]] | None
 
     # Follow the delay tau_e too, within this range: as a parameter by physical, in whole
@@ -156,8 +156,8 @@ SETTINGS = """covariance : float
             Polynomials kept stable: predictor (C and F), or noise (D too). For rpem, physical,
             fused.
         bound : Mapping[str, tuple[float | None, float | None]]
-            Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1... For physical,
-            adaptive, ekf, ukf.
+            Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1..2; an end may be left
+            open. For physical, adaptive, ekf, ukf.
         track_delay : tuple[float, float]
             Follow the delay tau_e too, within this range: as a parameter by physical, in whole
             samples by adaptive. For physical, adaptive.

@@ -24,10 +24,7 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate},
 };
 
-use hoid_ident::{
-    Constraint, IdentError, settings,
-    settings::{Bounds, Settings},
-};
+use hoid_ident::{Constraint, IdentError, settings, settings::Bounds};
 
 use crate::{
     change::Change,
@@ -120,14 +117,6 @@ impl RecursiveMethod for AdaptiveOptions {
             structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
             defaults: &[],
         }
-    }
-
-    fn settings(&self) -> &dyn Settings {
-        self
-    }
-
-    fn settings_mut(&mut self) -> &mut dyn Settings {
-        self
     }
 
     fn usual_nd(&self) -> Option<usize> {

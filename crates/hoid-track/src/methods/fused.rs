@@ -20,10 +20,7 @@ use hoid_core::{
 };
 use hoid_model::{Orders, SampleTime, Structure};
 
-use hoid_ident::{
-    IdentError, settings,
-    settings::{Bounds, Settings},
-};
+use hoid_ident::{IdentError, settings, settings::Bounds};
 
 use super::rpem::LIMIT;
 use crate::{
@@ -68,14 +65,6 @@ impl RecursiveMethod for FusedOptions {
             structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
             defaults: &[("memory", "2.56s for b, inf for the others")],
         }
-    }
-
-    fn settings(&self) -> &dyn Settings {
-        self
-    }
-
-    fn settings_mut(&mut self) -> &mut dyn Settings {
-        self
     }
 
     fn usual_memory(&self, parameter: &str) -> Memory {

@@ -117,7 +117,7 @@ impl Method {
 
     /// Its options by name.
     pub fn settings(&self) -> &dyn Settings {
-        self.inner().settings()
+        self.inner()
     }
 
     /// Sets an option from its text.
@@ -126,7 +126,7 @@ impl Method {
     /// [`IdentError::BadOption`] for an option that the method does not have, or a text that is no
     /// value of it.
     pub fn set(&mut self, name: &str, text: &str) -> Result<(), IdentError> {
-        if self.inner_mut().settings_mut().set(name, text)? {
+        if self.inner_mut().set(name, text)? {
             return Ok(());
         }
         let of: Vec<&str> = Self::registry()

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use hoid_core::recursion::Stable;
-use hoid_ident::{Constraint, IdentError, settings, settings::Settings};
+use hoid_ident::{Constraint, IdentError, settings};
 use hoid_model::{SampleTime, Structure};
 
 use super::rpem::LIMIT;
@@ -46,14 +46,6 @@ impl RecursiveMethod for PhysicalOptions {
                 ("limit", "5"),
             ],
         }
-    }
-
-    fn settings(&self) -> &dyn Settings {
-        self
-    }
-
-    fn settings_mut(&mut self) -> &mut dyn Settings {
-        self
     }
 
     /// A person hardly changes the others within a run.

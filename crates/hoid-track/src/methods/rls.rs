@@ -1,7 +1,7 @@
 //! Recursive least squares for structures that are linear in theta (L. Ljung, *System
 //! Identification*, 1999, section 11.2).
 
-use hoid_ident::{IdentError, settings, settings::Settings};
+use hoid_ident::{IdentError, settings};
 use hoid_model::{SampleTime, Structure};
 
 use crate::{
@@ -33,14 +33,6 @@ impl RecursiveMethod for RlsOptions {
             structures: &[Structure::Arx, Structure::Fir],
             defaults: &[("memory", "2.56s"), ("limit", "inf")],
         }
-    }
-
-    fn settings(&self) -> &dyn Settings {
-        self
-    }
-
-    fn settings_mut(&mut self) -> &mut dyn Settings {
-        self
     }
 
     /// The text's 256 samples at 100 Hz.

@@ -2,7 +2,7 @@
 //! 1999, section 11.5).
 
 use hoid_core::{predictor::Regressor, recursion::Stable};
-use hoid_ident::{IdentError, settings, settings::Settings};
+use hoid_ident::{IdentError, settings};
 use hoid_model::{SampleTime, Structure};
 
 use crate::{
@@ -44,16 +44,8 @@ impl RecursiveMethod for RpemOptions {
         }
     }
 
-    fn settings(&self) -> &dyn Settings {
-        self
-    }
-
-    fn settings_mut(&mut self) -> &mut dyn Settings {
-        self
-    }
-
     fn usual_memory(&self, parameter: &str) -> Memory {
-        gain_fast(parameter)
+        short_for_b(parameter)
     }
 
     fn check(&self, _setup: &Setup) -> Result<(), IdentError> {
@@ -100,7 +92,7 @@ impl RecursiveMethod for RpemOptions {
 }
 
 /// B follows the gains and is short, the others long.
-pub(crate) fn gain_fast(parameter: &str) -> Memory {
+pub(crate) fn short_for_b(parameter: &str) -> Memory {
     if parameter.starts_with('b') {
         Memory::Seconds(2.56)
     } else {

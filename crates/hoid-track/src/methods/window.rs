@@ -20,10 +20,10 @@ use hoid_model::{Channel, Record, SampleTime, Structure};
 
 use hoid_ident::{
     Estimator, Fit, IdentError, first_residual, settings,
-    settings::{Bounds, Settings, Value},
+    settings::{Bounds, Value},
 };
 
-use super::rpem::gain_fast;
+use super::rpem::short_for_b;
 use crate::{
     memory::Memory,
     method::{About, RecursiveMethod, bad},
@@ -65,17 +65,9 @@ impl RecursiveMethod for WindowOptions {
         }
     }
 
-    fn settings(&self) -> &dyn Settings {
-        self
-    }
-
-    fn settings_mut(&mut self) -> &mut dyn Settings {
-        self
-    }
-
     /// Not used: the window is what it remembers.
     fn usual_memory(&self, parameter: &str) -> Memory {
-        gain_fast(parameter)
+        short_for_b(parameter)
     }
 
     fn memory_in_words(&self) -> Option<String> {

@@ -31,7 +31,7 @@ mod ukf;
 
 use std::collections::BTreeMap;
 
-use hoid_ident::{Constraint, IdentError, settings, settings::Settings};
+use hoid_ident::{Constraint, IdentError, settings};
 use hoid_model::{SampleTime, Structure};
 
 use super::adaptive::check_model_of_change;
@@ -58,14 +58,6 @@ macro_rules! joint_filter {
                     structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
                     defaults: &[],
                 }
-            }
-
-            fn settings(&self) -> &dyn Settings {
-                self
-            }
-
-            fn settings_mut(&mut self) -> &mut dyn Settings {
-                self
             }
 
             /// It follows from a random walk of the parameters.

@@ -32,25 +32,25 @@
 mod filters;
 mod forgetting;
 mod laguerre;
+mod options;
 
-use hoid_core::state::{State, visit_all};
-use hoid_core::{error_bars::LARGEST_GROWTH, stability::roots_inside};
-use hoid_model::{Orders, Record, SampleTime, Structure};
+use hoid_core::{
+    error_bars::LARGEST_GROWTH,
+    stability::roots_inside,
+    state::{State, visit_all},
+};
+use hoid_ident::{IdentError, linalg::dot};
+use hoid_model::Orders;
 
-use hoid_ident::{IdentError, iv::FORCING_CHANNEL, linalg::dot, settings, settings::Settings};
-
-use super::rpem::gain_fast;
 use crate::{
-    memory::{Memory, MemoryOptions},
-    method::{About, RecursiveMethod, bad},
     past::{Past, bounded, weighted},
     recursion::{Recursion, Sample, StepOutcome},
-    setup::Setup,
-    start::StartState,
 };
 use filters::{Filtered, Parts, Simulated, fill_f};
 use forgetting::{Forgetting, ROOM};
 use laguerre::Following;
+
+pub use options::RrivOptions;
 
 /// Circle that holds the roots of F: the filters forget within 10 000 samples.
 const RADIUS: f64 = 0.9999;
@@ -60,104 +60,6 @@ const HALVINGS: usize = 20;
 const LEAST_SHARE: f64 = 1.0 / 1024.0;
 /// Smallest innovation variance as a share of the one at the start.
 const LEAST: f64 = 1e-16;
-
-settings! {
-    /// Options of the recursive refined instrumental variable.
-    pub struct RrivOptions {
-        /// Channel of the signal from outside the loop of which the instruments are made
-        #[setting(default("f_t where a record has it, else the error itself"))]
-        pub instruments: Option<String> = None,
-    }
-    groups {
-        /// Memories.
-        pub memories: MemoryOptions,
-    }
-}
-
-impl RecursiveMethod for RrivOptions {
-    fn about(&self) -> About {
-        About {
-            name: "rriv",
-            help: "recursive refined instrumental variable",
-            source: "Young 2011, chapters 7 and 8; Young 2015",
-            structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
-            defaults: &[("memory", "2.56s for b, 20.48s for the others")],
-        }
-    }
-
-    fn settings(&self) -> &dyn Settings {
-        self
-    }
-
-    fn settings_mut(&mut self) -> &mut dyn Settings {
-        self
-    }
-
-    fn usual_memory(&self, parameter: &str) -> Memory {
-        gain_fast(parameter)
-    }
-
-    fn check(&self, setup: &Setup) -> Result<(), IdentError> {
-        let o = &setup.orders;
-        if o.na == 0 && o.nc == 0 && o.nb > 0 && o.nf > 0 {
-            return Ok(());
-        }
-        Err(bad(
-            "the structure of rriv",
-            format!("{} with {o}", setup.structure),
-            "bj with nc = 0, or oe",
-        ))
-    }
-
-    fn build(
-        &self,
-        setup: &Setup,
-        from: &StartState,
-        sample_time: SampleTime,
-    ) -> Result<Box<dyn Recursion>, IdentError> {
-        if !from.from_fit {
-            return Err(IdentError::BadStart {
-                reason: "rriv makes its instruments with a model; start it from the batch fit of a span".to_owned(),
-            });
-        }
-        let covariance: Vec<f64> = from.spread.iter().map(|s| s * from.variance).collect();
-        let start = RefinedStart {
-            theta: &from.values,
-            covariance: &covariance,
-            innovation_variance: from.variance,
-            samples: from.residuals as usize,
-        };
-        let lambda = setup
-            .memories
-            .iter()
-            .map(|(_, memory)| memory.lambda(sample_time))
-            .collect::<Result<Vec<f64>, _>>()?;
-        Ok(Box::new(RefinedRecursion::new(
-            setup.orders,
-            start,
-            &lambda,
-            self.instruments.is_some(),
-        )?))
-    }
-
-    fn memories(&self) -> Option<&MemoryOptions> {
-        Some(&self.memories)
-    }
-
-    fn reference_channel(&self) -> Option<&str> {
-        self.instruments.as_deref()
-    }
-
-    fn prepare(&mut self, record: &Record) {
-        if self.instruments.is_none() && record.channel(FORCING_CHANNEL).is_some() {
-            self.instruments = Some(FORCING_CHANNEL.to_owned());
-        }
-    }
-
-    fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
-        self.memories.memory_of.retain(|key, _| known(key));
-    }
-}
 
 /// What the recursion goes on from: a batch fit, or a guess.
 #[derive(Debug, Clone, Copy)]
