@@ -29,7 +29,7 @@ use crate::{
 /// asks for all the memory.
 const MOST_SAMPLES: usize = 100_000_000;
 
-/// A state of adaptation: the operator and what he controls.
+/// A state of adaptation: the operator and what they control.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OperatingState {
     /// The operator.

@@ -1,5 +1,29 @@
 //! Recursive estimates: sample by sample, over a record or live.
 //!
+//! A person changes while they act. A recursion moves the estimate at every sample against the
+//! prediction error,
+//!
+//! `theta(t) = theta(t-1) + P(t) psi(t) eps(t)`,
+//!
+//! and forgets the past, so that it can follow (L. Ljung, *System Identification*, 1999, chapter
+//! 11). The methods differ in psi, in what theta is, and in what they suppose of the change.
+//!
+//! ```
+//! use hoid_model::scenario::{Condition, Scenario};
+//! use hoid_sim::{RunSeed, Simulator};
+//! use hoid_track::{Method, TrackOptions, track};
+//!
+//! let simulator = Simulator::new(&Scenario::condition(Condition::C4))?;
+//! let record = simulator.run(RunSeed::default(), false)?;
+//! let options = TrackOptions::usual(Method::physical(), 29).with(&[("memory_of", "K_e=4s")])?;
+//! let trace = track(&record, &options, 100)?;
+//!
+//! // The task changes at 40.96 s, and K_e_dot rises from .036 to .084 s.
+//! let last = trace.operator(trace.len() - 1)?;
+//! assert!((last.k_e_dot.value - 0.084).abs() < 0.02);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! | module | what it holds |
 //! |---|---|
 //! | `methods`, `method` | [`Method`]: the recursive methods, a file or folder each; what each says of itself |
