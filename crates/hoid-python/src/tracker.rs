@@ -40,7 +40,7 @@ fn started(plan: &TrackPlan, record: &Record) -> Result<(Tracker, Option<Choice>
             u: record.output()[k],
             reference: reference.map(|r| r[k]),
         };
-        tracker.take(sample, false);
+        tracker.update(sample, false);
     }
     Ok((tracker, choice))
 }
@@ -58,10 +58,10 @@ impl PyTracker {
 
     fn take(&mut self, sample: Sample, update: bool) -> f64 {
         if let (Live::Tracking(tracker), false) = (&mut self.live, update) {
-            return tracker.take(sample, false).innovation.unwrap_or(f64::NAN);
+            return tracker.update(sample, false).innovation.unwrap_or(f64::NAN);
         }
         let plan = &self.plan;
-        let taken = self.live.take(sample, &|record| plan.choose(record, &|| {}));
+        let taken = self.live.update(sample, &|record| plan.choose(record, &|| {}));
         if let Some((_, choice)) = taken.started {
             self.choice = choice;
         }

@@ -99,7 +99,7 @@ fn follow(record: &Record, options: &TrackOptions) -> Found {
             u: record.output()[k],
             reference: None,
         };
-        tracker.take(sample, t >= from);
+        tracker.update(sample, t >= from);
         if tracker.change().is_some() {
             declared[usize::from(t >= CHANGE_S)] += 1.0;
             if (CHANGE_S..FOUND_UNTIL_S).contains(&t) {
@@ -191,7 +191,7 @@ fn detection(runs: usize) {
                 reference: None,
             };
             let after_start = t >= START_S - 0.005;
-            tracker.take(sample, after_start);
+            tracker.update(sample, after_start);
             let distance = baseline.step(e);
             if after_start {
                 both[0].push((t, tracker.change_odds().unwrap()));
@@ -461,7 +461,7 @@ fn joined(files: &[String]) {
                 u: record.output()[k],
                 reference: None,
             };
-            tracker.take(sample, t >= start_s);
+            tracker.update(sample, t >= start_s);
             let distance = baseline.step(e);
             if t >= start_s {
                 // As if the seam were at the change of the conditions.

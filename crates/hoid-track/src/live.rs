@@ -51,11 +51,11 @@ impl Live {
 
     /// Takes a sample; NaN stands for what is faulty or missing. The fit of the warm-up is made
     /// when its last sample comes, with the options that `choose` gives for it.
-    pub fn take(&mut self, sample: Sample, choose: Choose<'_>) -> LiveOutcome {
+    pub fn update(&mut self, sample: Sample, choose: Choose<'_>) -> LiveOutcome {
         let warm_up = match self {
             Self::Tracking(tracker) => {
                 return LiveOutcome {
-                    outcome: Some(tracker.take(sample, true)),
+                    outcome: Some(tracker.update(sample, true)),
                     started: None,
                 };
             }
@@ -187,7 +187,7 @@ impl WarmUp {
         let (options, choice) = choose(&record)?;
         let mut tracker = Tracker::new(&options, Some(&record), self.sample_time)?;
         for sample in &self.samples {
-            tracker.take(*sample, false);
+            tracker.update(*sample, false);
         }
         Ok((tracker, choice))
     }

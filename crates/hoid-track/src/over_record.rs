@@ -5,10 +5,9 @@ use hoid_model::Record;
 
 use crate::{
     options::TrackOptions,
-    outcome::Counts,
     recursion::Sample,
     smoother,
-    trace::{self, Trace, pack, packed_len},
+    trace::{self, Trace, pack},
     tracker::Tracker,
 };
 
@@ -47,48 +46,19 @@ pub fn track_from(
     let mut options = options.clone();
     options.method.inner_mut().prepare(record);
     let options = &options;
-    let reference = match options.method.inner().reference_channel() {
-        None => None,
-        Some(name) => Some(record.channel(name).ok_or_else(|| {
-            IdentError::NoChannel {
-                channel: name.to_owned(),
-                label: record.label().to_owned(),
-                available: record
-                    .channels()
-                    .map(|c| c.name.as_str())
-                    .collect::<Vec<_>>()
-                    .join(", "),
-            }
-        })?),
-    };
+    let reference = reference(record, options)?;
     let mut tracker = Tracker::from_fit(options, span.as_ref(), start, sample_time)?;
     let known = span.is_some() && options.method.covariance().is_none();
     let from_s = options
         .update_from_s
         .unwrap_or(if known { end_s } else { f64::NEG_INFINITY })
         .max(record.time_s(0));
-    let p = options.polynomial_orders().parameters();
     let rows = record.len().div_ceil(every);
-    let mut trace = Trace {
-        options: options.clone(),
-        sample_time,
-        times_s: Vec::with_capacity(rows),
-        theta: Vec::with_capacity(rows * p),
-        covariance: Vec::with_capacity(rows * packed_len(p)),
-        operator: Vec::new(),
-        innovation: Vec::with_capacity(rows),
-        innovation_variance: Vec::with_capacity(rows),
-        shortened: Vec::with_capacity(rows),
-        change_odds: Vec::new(),
-        changes: Vec::new(),
-        counts: Counts::default(),
-        start: tracker.start.fit.clone(),
-        failures: None,
-        every,
-        averaged: 1,
-        updated_from_s: from_s,
-    };
+    let mut trace = Trace::empty(options.clone(), sample_time, rows, every);
+    trace.start = tracker.start.fit.clone();
+    trace.updated_from_s = from_s;
     let (input, output) = (record.input(), record.output());
+    let p = options.polynomial_orders().parameters();
     let mut covariance = vec![0.0; p * p];
     // Half a sample, so that rounding of the times does not decide.
     let first_update = from_s - sample_time.s() / 2.0;
@@ -99,7 +69,7 @@ pub fn track_from(
             u: output[k],
             reference: reference.map(|r| r[k]),
         };
-        let outcome = tracker.take(sample, t >= first_update);
+        let outcome = tracker.update(sample, t >= first_update);
         if let Some(change) = tracker.change() {
             trace.changes.push((t, change));
         }
@@ -124,4 +94,26 @@ pub fn track_from(
         smoother::smooth(record, &mut trace, &tracker.start)?;
     }
     Ok(trace)
+}
+
+/// The signal from outside the loop that the method takes, where it takes one.
+fn reference<'r>(record: &'r Record, options: &TrackOptions) -> Result<Option<&'r [f64]>, IdentError> {
+    let Some(name) = options.method.inner().reference_channel() else {
+        return Ok(None);
+    };
+    let names = || {
+        record
+            .channels()
+            .map(|c| c.name.as_str())
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    match record.channel(name) {
+        Some(values) => Ok(Some(values)),
+        None => Err(IdentError::NoChannel {
+            channel: name.to_owned(),
+            label: record.label().to_owned(),
+            available: names(),
+        }),
+    }
 }

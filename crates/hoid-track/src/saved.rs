@@ -160,15 +160,15 @@ mod tests {
             };
             let mut first = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
             (0..3000).for_each(|k| {
-                first.take(sample(k), true);
+                first.update(sample(k), true);
             });
             let numbers = first.saved();
             let mut second = Tracker::restored(&options, record.sample_time(), &numbers).unwrap();
             let name = format!("{:?}", options.method);
             for k in 3000..5000 {
                 assert_eq!(
-                    first.take(sample(k), true),
-                    second.take(sample(k), true),
+                    first.update(sample(k), true),
+                    second.update(sample(k), true),
                     "{name} at {k}"
                 );
             }

@@ -44,6 +44,30 @@ pub struct Trace {
 pub const OPERATOR_COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
 
 impl Trace {
+    /// Without rows, with room for some.
+    pub(crate) fn empty(options: TrackOptions, sample_time: SampleTime, rows: usize, every: usize) -> Self {
+        let p = options.polynomial_orders().parameters();
+        Self {
+            options,
+            sample_time,
+            times_s: Vec::with_capacity(rows),
+            theta: Vec::with_capacity(rows * p),
+            covariance: Vec::with_capacity(rows * packed_len(p)),
+            operator: Vec::new(),
+            innovation: Vec::with_capacity(rows),
+            innovation_variance: Vec::with_capacity(rows),
+            shortened: Vec::with_capacity(rows),
+            change_odds: Vec::new(),
+            changes: Vec::new(),
+            counts: Counts::default(),
+            start: None,
+            failures: None,
+            every,
+            averaged: 1,
+            updated_from_s: f64::NEG_INFINITY,
+        }
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.times_s.len()

@@ -67,12 +67,12 @@ impl Tracker {
 
     /// Takes a sample.
     pub fn step(&mut self, e: f64, u: f64) -> Outcome {
-        self.take(Sample { e, u, reference: None }, true)
+        self.update(Sample { e, u, reference: None }, true)
     }
 
-    /// Takes a sample, with the external signal where it is known. With `update` false only the
+    /// Takes a sample, with the external signal where it is known. With `moves` false only the
     /// filters follow.
-    pub fn take(&mut self, sample: Sample, update: bool) -> Outcome {
+    pub fn update(&mut self, sample: Sample, moves: bool) -> Outcome {
         self.counts.samples += 1;
         let sound = |v: f64| v.abs() <= self.options.largest;
         let (e_sound, u_sound) = (sound(sample.e), sound(sample.u));
@@ -92,7 +92,7 @@ impl Tracker {
                 shortened: false,
             };
         }
-        let taken = if update && !skipped {
+        let taken = if moves && !skipped {
             self.recursion.step(sample)
         } else {
             self.recursion.follow(sample)

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use hoid_io::readable_endings;
 use hoid_model::{ContinuousTransferFunction, discretise};
 
 use super::parse::parse_transfer_function;
@@ -10,8 +11,7 @@ use crate::orders::parse_numbers;
 
 #[derive(Debug, Args)]
 pub struct InfoArgs {
-    /// File of any format that is read: CSV, Parquet, NPZ, NPY, MATLAB .mat, XDF
-    #[arg(value_name = "FILE")]
+    #[arg(value_name = "FILE", help = format!("File of any format that is read: {}", readable_endings()))]
     pub file: PathBuf,
     /// Print one JSON object instead of tables
     #[arg(long)]

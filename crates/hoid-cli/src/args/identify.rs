@@ -8,6 +8,7 @@ use hoid_ident::{
     order_selection::Criterion,
     settings::{Kind, MethodSpec},
 };
+use hoid_io::{readable_endings, writable_endings};
 use hoid_model::{ContinuousTransferFunction, Structure, remnant::RemnantDiscretisation};
 
 use super::{
@@ -19,9 +20,10 @@ use crate::orders::parse_range;
 
 #[derive(Debug, Args)]
 pub struct IdentifyArgs {
-    /// Record files (CSV, Parquet, NPZ, MATLAB .mat, XDF); several share one model and have initial
-    /// states of their own
-    #[arg(required = true, value_name = "RECORD")]
+    #[arg(required = true, value_name = "RECORD", help = format!(
+        "Record files: {}; several share one model and have initial states of their own",
+        readable_endings()
+    ))]
     pub records: Vec<PathBuf>,
     #[command(flatten)]
     pub read: ReadArgs,
@@ -44,9 +46,10 @@ pub struct IdentifyArgs {
     pub delay: Option<(f64, f64)>,
     #[arg(long, help = about("individual"), value_name = "NAMES", value_delimiter = ',')]
     pub individual: Vec<String>,
-    /// Write K_e, T_L and K_e_dot over time into this file (CSV, Parquet, NPZ or .mat), for
-    /// time-varying
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help = format!(
+        "Write K_e, T_L and K_e_dot over time into this file, for time-varying: {}",
+        writable_endings()
+    ))]
     pub trace: Option<PathBuf>,
     #[arg(long, help = about("orders"), value_name = "LIST")]
     pub orders: Option<String>,

@@ -7,7 +7,7 @@ use clap::{
     builder::{PossibleValue, PossibleValuesParser},
 };
 use hoid_ident::{order_selection::Criterion, settings::MethodSpec};
-use hoid_io::Scaling;
+use hoid_io::{Scaling, readable_endings, writable_endings};
 use hoid_model::Structure;
 use hoid_track::Method;
 
@@ -48,8 +48,7 @@ pub struct RecursionArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct TrackArgs {
-    /// Record file (CSV, Parquet, NPZ, MATLAB .mat, XDF)
-    #[arg(value_name = "RECORD")]
+    #[arg(value_name = "RECORD", help = format!("Record file: {}", readable_endings()))]
     pub record: PathBuf,
     #[command(flatten)]
     pub read: ReadArgs,
@@ -68,9 +67,10 @@ pub struct TrackArgs {
     /// Keep every N-th sample of the trace
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_count)]
     pub every: usize,
-    /// File for the trace (CSV, Parquet, NPZ or .mat): the estimate at each sample with its
-    /// standard errors
-    #[arg(long, value_name = "TRACE")]
+    #[arg(long, value_name = "TRACE", help = format!(
+        "File for the trace, the estimate at each sample with its standard errors: {}",
+        writable_endings()
+    ))]
     pub out: PathBuf,
     /// Write a report (HTML) into this directory: parameters over time with bands, innovations,
     /// standard errors

@@ -210,7 +210,7 @@ impl Session {
         }
         let plan = &self.plan;
         let sample = Sample { e, u, reference };
-        let LiveOutcome { outcome, started } = self.live.take(sample, &|record| plan.choose(record));
+        let LiveOutcome { outcome, started } = self.live.update(sample, &|record| plan.choose(record));
         if let Some(outcome) = outcome {
             self.innovation = outcome.innovation;
             self.counts.shortened += u64::from(outcome.shortened);
