@@ -7,7 +7,7 @@ use crate::{
     memory::Memory,
     method::bad,
     methods::Method,
-    setup::{Setup, StartAt, parameter_names},
+    setup::{Setup, StartAt, parameter_names, polynomial_orders},
 };
 
 /// Options of a recursive estimate: the method with its own, and what all methods share.
@@ -93,10 +93,7 @@ impl TrackOptions {
 
     /// Orders of the polynomials that the method reports.
     pub(crate) fn polynomial_orders(&self) -> Orders {
-        match self.delay_parameter_s() {
-            Some(_) => Orders { nb: 3, ..self.orders },
-            None => self.orders,
-        }
+        polynomial_orders(self.orders, self.delay_parameter_s().is_some())
     }
 
     /// Memory of each parameter, in the order of [`TrackOptions::parameter_names`].

@@ -72,10 +72,15 @@ impl Setup {
     /// Orders of the polynomials that the method reports: a delay between two samples takes one
     /// coefficient of B more.
     pub fn polynomial_orders(&self) -> Orders {
-        match self.delay_parameter_s {
-            Some(_) => Orders { nb: 3, ..self.orders },
-            None => self.orders,
-        }
+        polynomial_orders(self.orders, self.delay_parameter_s.is_some())
+    }
+}
+
+/// Orders of the polynomials: a delay between two samples takes one coefficient of B more.
+pub(crate) fn polynomial_orders(orders: Orders, with_delay: bool) -> Orders {
+    match with_delay {
+        true => Orders { nb: 3, ..orders },
+        false => orders,
     }
 }
 
