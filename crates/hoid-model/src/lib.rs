@@ -54,10 +54,12 @@
 //! | [`controlled_element`], [`forcing`], [`schedule`], [`scenario`] | the task: plant, target signal, change over time, conditions C1-C6 |
 //! | [`margins`] | crossover frequency, phase and gain margin |
 //! | [`remnant_gain`] | the gain K_n that gives a demanded noise level |
+//! | [`Finding`], [`Verdict`] | what makes a result doubtful, and what it is worth |
 //! | [`named_choice!`], [`NamedChoice`] | the names that users type |
 
 mod error;
 mod estimate;
+mod finding;
 mod named_choice;
 
 pub mod controlled_element;
@@ -84,6 +86,7 @@ pub mod uncertainty;
 
 pub use delayed_operator::{DelayedOperator, delayed_operator, delayed_operator_jacobian};
 pub use error::{ModelError, NotConvertible};
+pub use finding::{Finding, Severity, Verdict, VerdictLevel};
 pub use named_choice::{NamedChoice, UnknownName};
 pub use num_complex::Complex64;
 pub use operator::{DiscreteOperator, OperatorParameters};
