@@ -47,6 +47,7 @@
 //! | [`second_order`] | exact zero-order hold of second-order systems, both ways, with derivatives |
 //! | [`operator`] | [`OperatorParameters`] and their discrete model |
 //! | [`delayed_operator`](mod@delayed_operator) | the operator with a delay of any fraction of a sample |
+//! | [`operator_family`] | gain, lead and lag with their powers: the operators that people are found to be |
 //! | [`remnant`] | the remnant filter, its discretisations and its retrieval |
 //! | [`remnant_noise`] | the noise model of the exactly held remnant as a function of T_n, with derivatives |
 //! | [`uncertainty`] | standard errors of derived quantities by the delta method |
@@ -70,6 +71,7 @@ pub mod forcing;
 pub mod margins;
 pub mod numbers;
 pub mod operator;
+pub mod operator_family;
 pub mod polynomial;
 pub mod polynomial_model;
 pub mod record;
@@ -90,6 +92,7 @@ pub use finding::{Finding, Severity, Verdict, VerdictLevel};
 pub use named_choice::{NamedChoice, UnknownName};
 pub use num_complex::Complex64;
 pub use operator::{DiscreteOperator, OperatorParameters};
+pub use operator_family::{FamilyOperator, Form};
 pub use polynomial_model::PolynomialModel;
 pub use record::{Channel, Detrend, Record};
 pub use sample_time::SampleTime;

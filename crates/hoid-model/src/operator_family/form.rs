@@ -1,0 +1,131 @@
+//! The forms of the family: which parameters an operator has.
+
+use super::dual::{Dual, PARTIALS};
+
+/// A form of the operator, without its delay and neuromuscular part; p is the power of the lead, q
+/// that of the lag.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Form {
+    /// `K` (p = 0, q = 0).
+    Gain,
+    /// `K (T_L s + 1)` (p = 1, q = 0; eq. 4).
+    Lead,
+    /// `K (T_L s + 1)^2` (p = 2, q = 0).
+    Lead2,
+    /// `K / (T_I s + 1)` (p = 0, q = 1).
+    Lag,
+    /// `K (T_L s + 1) / (T_I s + 1)` (p = 1, q = 1; eq. 2.2).
+    LeadLag,
+    /// `K (T_L s + 1)^2 / (T_I s + 1)` (p = 2, q = 1).
+    Lead2Lag,
+    /// `K_I (1 + c_1 s + c_2 s^2) / s`: a free quadratic numerator over s.
+    QuadraticIntegral,
+    /// `K (T_L s + 1) (1 + alpha/s)`: a lead with the droop of the phase at low frequencies,
+    /// `e^{-j alpha/omega}` by its rational approximation.
+    LeadDroop,
+}
+
+crate::named_choice!(Form, "form of the operator", 8, {
+    Gain => "gain",
+    Lead => "lead",
+    Lead2 => "lead2",
+    Lag => "lag",
+    LeadLag => "lead-lag",
+    Lead2Lag => "lead2-lag",
+    QuadraticIntegral => "quadratic-integral",
+    LeadDroop => "lead-droop",
+});
+
+/// A coordinate in which an operator is fitted. Lag and neuromuscular part are fitted in
+/// coordinates whose estimates are nearly normal also where the data say little.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Coordinate {
+    /// K without a lag, `K/T_I` with one.
+    Gain,
+    /// T_L, s.
+    Lead,
+    /// `1/T_I`, 1/s; zero is a pure integration.
+    LagRate,
+    /// c_1 of the quadratic numerator, s.
+    Linear,
+    /// c_2 of the quadratic numerator, s^2.
+    Quadratic,
+    /// alpha of the droop, rad/s.
+    Droop,
+    /// `ln omega_nm`, omega_nm in rad/s.
+    LogOmega,
+    /// `ln zeta_nm`.
+    LogZeta,
+    /// tau_e, s.
+    Delay,
+}
+
+/// Numerator `n_0 + n_1 s + n_2 s^2` and pole `-a` of an operator, where it has one.
+pub(super) struct Rational {
+    pub numerator: [Dual; 3],
+    pub pole: Option<Dual>,
+}
+
+impl Form {
+    /// Power p of the lead; the degree of the numerator.
+    pub fn degree(self) -> usize {
+        match self {
+            Self::Gain | Self::Lag => 0,
+            Self::Lead | Self::LeadLag => 1,
+            Self::Lead2 | Self::Lead2Lag | Self::QuadraticIntegral | Self::LeadDroop => 2,
+        }
+    }
+
+    /// True where the form has a pole of its own: a lag or an integration.
+    pub fn has_pole(self) -> bool {
+        !matches!(self, Self::Gain | Self::Lead | Self::Lead2)
+    }
+
+    /// True where the pole is a lag with a time constant T_I.
+    pub fn has_lag(self) -> bool {
+        matches!(self, Self::Lag | Self::LeadLag | Self::Lead2Lag)
+    }
+
+    /// True where the numerator is of no higher degree than the denominator, so that the operator
+    /// has no pure derivative.
+    pub fn is_proper(self, neuromuscular: bool) -> bool {
+        self.degree() <= usize::from(self.has_pole()) + if neuromuscular { 2 } else { 0 }
+    }
+
+    /// The coordinates, in the order in which they are fitted.
+    pub fn coordinates(self, neuromuscular: bool) -> Vec<Coordinate> {
+        let mut all = vec![Coordinate::Gain];
+        match self {
+            Self::Gain => {}
+            Self::Lead | Self::Lead2 => all.push(Coordinate::Lead),
+            Self::Lag => all.push(Coordinate::LagRate),
+            Self::LeadLag | Self::Lead2Lag => all.extend([Coordinate::Lead, Coordinate::LagRate]),
+            Self::QuadraticIntegral => all.extend([Coordinate::Linear, Coordinate::Quadratic]),
+            Self::LeadDroop => all.extend([Coordinate::Lead, Coordinate::Droop]),
+        }
+        if neuromuscular {
+            all.extend([Coordinate::LogOmega, Coordinate::LogZeta]);
+        }
+        all.push(Coordinate::Delay);
+        all
+    }
+
+    /// Numerator and pole from the first coordinates.
+    pub(super) fn rational(self, x: &[Dual]) -> Rational {
+        let zero = Dual::constant(0.0);
+        let k = x[0];
+        let (numerator, pole) = match self {
+            Self::Gain => ([k, zero, zero], None),
+            Self::Lead => ([k, k * x[1], zero], None),
+            Self::Lead2 => ([k, (k * x[1]).scaled(2.0), k * x[1] * x[1]], None),
+            Self::Lag => ([k, zero, zero], Some(x[1])),
+            Self::LeadLag => ([k, k * x[1], zero], Some(x[2])),
+            Self::Lead2Lag => ([k, (k * x[1]).scaled(2.0), k * x[1] * x[1]], Some(x[2])),
+            Self::QuadraticIntegral => ([k, k * x[1], k * x[2]], Some(zero)),
+            Self::LeadDroop => ([k * x[2], k + k * x[1] * x[2], k * x[1]], Some(zero)),
+        };
+        Rational { numerator, pole }
+    }
+}
+
+const _: () = assert!(PARTIALS >= 6);

@@ -1,0 +1,412 @@
+//! The exact discrete model of an operator of the family behind a zero-order hold, with a delay of
+//! any fraction of a sample, and its derivatives.
+//!
+//! In controllable canonical form `x' = A x + B e(t - tau)`, `u = C x + D e(t - tau)` with
+//! `tau = l Ts + delta`, `0 <= delta < Ts`. Over a sample the delayed input is `e(k-l-1)` for
+//! delta, then `e(k-l)`, so that
+//!
+//! `x(k+1) = Phi x(k) + Gamma_1 e(k-l-1) + Gamma_0 e(k-l)`,
+//! `Phi = Phi_2 Phi_1`, `Gamma_1 = Phi_2 Gamma(delta)`, `Gamma_0 = Gamma(Ts - delta)`
+//!
+//! (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2). The matrices
+//! are those of the exponential of `[A B; 0 0] h`, by scaling and squaring of its series. F is the
+//! characteristic polynomial of Phi, B the product of F and the impulse response. Everything is
+//! computed with numbers that carry their derivatives along the coordinates ([`super::dual`]).
+//!
+//! **Direct part.** A form whose numerator has the degree of its denominator passes e on at once.
+//! Of the held error, at the instant of a sample, that would be one sample or the next, with a step
+//! where the delay is a whole number of samples. Its direct part is taken from the error
+//! interpolated between the samples around `t - tau - Ts/2`: the delay that the hold gives to all
+//! other parts.
+
+use super::{
+    dual::{Dual, PARTIALS},
+    form::Rational,
+    operator::FamilyOperator,
+};
+use crate::{ModelError, SampleTime, delayed_operator::whole_samples};
+
+/// Highest order of the dynamics.
+const ORDER: usize = 3;
+/// States and input.
+const SIZE: usize = ORDER + 1;
+/// Terms of the series at a norm of at most one: 1/20! is 4e-19.
+const TERMS: usize = 20;
+
+type Matrix = [[Dual; SIZE]; SIZE];
+
+/// `q^-nk B/F` with the derivatives of its coefficients.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldFamily {
+    /// Delay of the first coefficient of B, in samples.
+    pub nk: usize,
+    /// Coefficients of B.
+    pub b: Vec<f64>,
+    /// Coefficients of F without the leading one.
+    pub f: Vec<f64>,
+    /// A row for each coefficient of B, then of F, with a derivative for each coordinate.
+    pub jacobian: Vec<[f64; PARTIALS]>,
+}
+
+impl FamilyOperator {
+    /// Numbers of coefficients of B and F in the discrete model of this form, whatever its
+    /// parameters, and how many samples nk is more than the whole samples of tau.
+    pub fn held_orders(&self) -> (usize, usize, usize) {
+        let order = self.order();
+        if self.has_direct_part() {
+            (order + 3, order, 0)
+        } else {
+            (order + 1, order, 1)
+        }
+    }
+
+    /// Order of the dynamics.
+    pub fn order(&self) -> usize {
+        usize::from(self.form().has_pole()) + if self.has_neuromuscular() { 2 } else { 0 }
+    }
+
+    fn has_direct_part(&self) -> bool {
+        self.form().degree() == self.order()
+    }
+
+    /// The exact discrete model.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] when an exponential overflows or the delay has too many samples.
+    pub fn hold(&self, sample_time: SampleTime) -> Result<HeldFamily, ModelError> {
+        self.hold_within(whole_samples(self.tau_e_s(), sample_time)?, sample_time)
+    }
+
+    /// As [`FamilyOperator::hold`], with the sample in which the delay lies chosen by the caller:
+    /// `delta = tau - sample Ts` may be 0 or Ts at the borders, where the two meet.
+    ///
+    /// # Errors
+    /// As [`FamilyOperator::hold`].
+    pub fn hold_within(&self, sample: usize, sample_time: SampleTime) -> Result<HeldFamily, ModelError> {
+        let variables = self.variables();
+        let delay = variables[variables.len() - 1];
+        let ts = sample_time.s();
+        // In units of a sample: all matrices have entries of moderate size.
+        let delta = delay.scaled(1.0 / ts) - Dual::constant(sample as f64);
+        let (numerator, denominator) = self.by_samples(&variables, ts);
+        let order = self.order();
+        let direct = if self.has_direct_part() {
+            numerator[order]
+        } else {
+            Dual::constant(0.0)
+        };
+        let zero = Dual::constant(0.0);
+        let one = Dual::constant(1.0);
+
+        // The strictly proper part, c_i = n_i - D d_i.
+        let output: Vec<Dual> = (0..order).map(|i| numerator[i] - direct * denominator[i]).collect();
+        let rest = one - delta;
+        let (mut phi, mut gamma_old, mut gamma_new) = ([[zero; SIZE]; SIZE], [zero; SIZE], [zero; SIZE]);
+        if order > 0 {
+            let first = exponential(&companion(&denominator, order), delta);
+            let second = exponential(&companion(&denominator, order), rest);
+            phi = product(&second, &first, order);
+            for i in 0..order {
+                gamma_new[i] = second[i][order];
+                gamma_old[i] = (0..order).fold(zero, |sum, j| sum + second[i][j] * first[j][order]);
+            }
+        }
+        let f = characteristic(&phi, order);
+
+        // Impulse response from e(k-l-1), then B = F h; h ends where B does.
+        let (nb, _, shift) = self.held_orders();
+        let first_dynamic = 1 - shift;
+        let mut impulse = vec![zero; nb];
+        let mut state = gamma_new;
+        let mut late = gamma_old;
+        for j in first_dynamic..nb {
+            let value = |x: &[Dual; SIZE]| (0..order).fold(zero, |sum, i| sum + output[i] * x[i]);
+            impulse[j] = impulse[j] + value(&state);
+            if j + 1 < nb {
+                impulse[j + 1] = impulse[j + 1] + value(&late);
+            }
+            state = times(&phi, &state, order);
+            late = times(&phi, &late, order);
+        }
+        if self.has_direct_part() {
+            // tau + Ts/2 = (sample + whole + part) Ts.
+            let late_by = delta + Dual::constant(0.5);
+            let whole = usize::from(late_by.value >= 1.0);
+            let part = late_by - Dual::constant(whole as f64);
+            impulse[whole] = impulse[whole] + direct * (one - part);
+            impulse[whole + 1] = impulse[whole + 1] + direct * part;
+        }
+        let b: Vec<Dual> = (0..nb)
+            .map(|k| (1..=order.min(k)).fold(impulse[k], |sum, i| sum + f[i - 1] * impulse[k - i]))
+            .collect();
+        if b.iter().chain(&f).any(|c| !c.value.is_finite()) {
+            return Err(ModelError::OutOfRange {
+                quantity: "the discrete model of the operator",
+                found: f64::INFINITY,
+                expected: "finite coefficients; check omega_nm, zeta_nm and 1/T_I against the sample time",
+            });
+        }
+        Ok(HeldFamily {
+            nk: sample + shift,
+            jacobian: b.iter().chain(&f).map(|c| c.partials).collect(),
+            b: b.iter().map(|c| c.value).collect(),
+            f: f.iter().map(|c| c.value).collect(),
+        })
+    }
+
+    /// Numerator and monic denominator by ascending powers of `s Ts`.
+    fn by_samples(&self, variables: &[Dual], ts: f64) -> ([Dual; SIZE], [Dual; SIZE]) {
+        let zero = Dual::constant(0.0);
+        let one = Dual::constant(1.0);
+        let Rational { numerator, pole } = self.form().rational(variables);
+        let (mut num, mut den) = ([zero; SIZE], [zero; SIZE]);
+        num[..3].copy_from_slice(&numerator);
+        den[0] = one;
+        if let Some(a) = pole {
+            (den[0], den[1]) = (a, one);
+        }
+        if let Some((omega, zeta)) = self.neuromuscular_of(variables) {
+            let square = omega * omega;
+            let middle = (zeta * omega).scaled(2.0);
+            num = num.map(|c| c * square);
+            let before = den;
+            den = std::array::from_fn(|i| {
+                let shifted = |by: usize| if i >= by { before[i - by] } else { zero };
+                square * shifted(0) + middle * shifted(1) + shifted(2)
+            });
+        }
+        // s^i = (s Ts)^i / Ts^i, then monic again.
+        let order = self.order() as i32;
+        let scale = |i: usize| ts.powi(order - i as i32);
+        (
+            std::array::from_fn(|i| num[i].scaled(scale(i))),
+            std::array::from_fn(|i| den[i].scaled(scale(i))),
+        )
+    }
+}
+
+/// `[A B; 0 0]` of the controllable canonical form, in units of a sample.
+fn companion(denominator: &[Dual; SIZE], order: usize) -> Matrix {
+    let mut m = [[Dual::constant(0.0); SIZE]; SIZE];
+    for i in 0..order {
+        m[i][i + 1] = Dual::constant(1.0);
+    }
+    for (entry, d) in m[order - 1].iter_mut().zip(denominator).take(order) {
+        *entry = -*d;
+    }
+    m
+}
+
+/// `exp(M h)`, one row and column more than the states.
+fn exponential(m: &Matrix, h: Dual) -> Matrix {
+    let m: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| m[i][j] * h));
+    let row = |r: &[Dual; SIZE]| r.iter().map(|c| c.value.abs()).sum::<f64>();
+    let norm = m.iter().map(row).fold(0.0, f64::max);
+    // An unreasonable norm overflows anyway.
+    let halvings = if norm > 1.0 {
+        norm.log2().ceil().min(60.0) as i32
+    } else {
+        0
+    };
+    let small = 0.5_f64.powi(halvings);
+    let m: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| m[i][j].scaled(small)));
+    let mut sum = identity();
+    let mut term = identity();
+    for k in 1..=TERMS {
+        term = product(&term, &m, SIZE);
+        for i in 0..SIZE {
+            for j in 0..SIZE {
+                term[i][j] = term[i][j].scaled(1.0 / k as f64);
+                sum[i][j] = sum[i][j] + term[i][j];
+            }
+        }
+    }
+    for _ in 0..halvings {
+        sum = product(&sum, &sum, SIZE);
+    }
+    sum
+}
+
+fn identity() -> Matrix {
+    std::array::from_fn(|i| std::array::from_fn(|j| Dual::constant(f64::from(u8::from(i == j)))))
+}
+
+fn product(a: &Matrix, b: &Matrix, size: usize) -> Matrix {
+    let zero = Dual::constant(0.0);
+    let mut c = [[zero; SIZE]; SIZE];
+    for i in 0..size {
+        for j in 0..size {
+            c[i][j] = (0..size).fold(zero, |sum, k| sum + a[i][k] * b[k][j]);
+        }
+    }
+    c
+}
+
+fn times(a: &Matrix, x: &[Dual; SIZE], size: usize) -> [Dual; SIZE] {
+    let zero = Dual::constant(0.0);
+    let mut y = [zero; SIZE];
+    for i in 0..size {
+        y[i] = (0..size).fold(zero, |sum, j| sum + a[i][j] * x[j]);
+    }
+    y
+}
+
+/// Coefficients of `det(I - q^-1 Phi)` without the leading one, by the method of Faddeev and
+/// LeVerrier.
+fn characteristic(phi: &Matrix, order: usize) -> Vec<Dual> {
+    let mut coefficients = Vec::with_capacity(order);
+    let mut m = identity();
+    for k in 1..=order {
+        let next = product(phi, &m, order);
+        let trace = (0..order).fold(Dual::constant(0.0), |sum, i| sum + next[i][i]);
+        let c = trace.scaled(-1.0 / k as f64);
+        coefficients.push(c);
+        m = next;
+        for (i, row) in m.iter_mut().enumerate().take(order) {
+            row[i] = row[i] + c;
+        }
+    }
+    coefficients
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        delayed_operator::delayed_operator,
+        operator_family::{Coordinate, Form},
+        polynomial,
+    };
+    use num_complex::Complex64;
+
+    fn ts() -> SampleTime {
+        SampleTime::new(1.0 / 60.0).unwrap()
+    }
+
+    fn operator(form: Form, neuromuscular: bool, tau: f64) -> FamilyOperator {
+        let values: Vec<f64> = form
+            .coordinates(neuromuscular)
+            .iter()
+            .map(|c| match c {
+                Coordinate::Gain => 4.0,
+                Coordinate::Lead => 0.6,
+                Coordinate::LagRate => 0.2,
+                Coordinate::Linear => 0.9,
+                Coordinate::Quadratic => 0.3,
+                Coordinate::Droop => 0.4,
+                Coordinate::LogOmega => 11.0_f64.ln(),
+                Coordinate::LogZeta => 0.25_f64.ln(),
+                Coordinate::Delay => tau,
+            })
+            .collect();
+        FamilyOperator::new(form, neuromuscular, &values).unwrap()
+    }
+
+    fn all() -> Vec<FamilyOperator> {
+        let mut operators = Vec::new();
+        for form in Form::ALL {
+            for neuromuscular in [true, false] {
+                for tau in [0.1437, 0.16] {
+                    if form.is_proper(neuromuscular) {
+                        operators.push(operator(form, neuromuscular, tau));
+                    }
+                }
+            }
+        }
+        operators
+    }
+
+    #[test]
+    fn the_lead_is_the_delayed_operator() {
+        for tau in [0.0, 0.1, 0.1437, 0.2] {
+            let of_family = operator(Form::Lead, true, tau).hold(ts()).unwrap();
+            let known = delayed_operator([4.0, 2.4, 11.0, 0.25, tau], ts()).unwrap();
+            assert_eq!(of_family.nk, known.nk);
+            let pairs = of_family.b.iter().zip(&known.b).chain(of_family.f.iter().zip(&known.f));
+            for (a, b) in pairs {
+                assert!((a - b).abs() < 1e-12 * (1.0 + b.abs()), "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn jacobian_agrees_with_finite_differences() {
+        for operator in all() {
+            let sample = whole_samples(operator.tau_e_s(), ts()).unwrap();
+            let exact = operator.hold(ts()).unwrap();
+            for i in 0..operator.coordinates().len() {
+                let h = 1e-6;
+                let at = |by: f64| {
+                    let mut x = operator.coordinates().to_vec();
+                    x[i] += by;
+                    let moved = FamilyOperator::new(operator.form(), operator.has_neuromuscular(), &x).unwrap();
+                    let held = moved.hold_within(sample, ts()).unwrap();
+                    [held.b, held.f].concat()
+                };
+                let scale = exact.jacobian.iter().map(|row| row[i].abs()).fold(1e-3, f64::max);
+                for ((row, up), down) in exact.jacobian.iter().zip(at(h)).zip(at(-h)) {
+                    // Truncation h^2 and rounding eps/h.
+                    let error = (row[i] - (up - down) / (2.0 * h)).abs();
+                    assert!(error < 1e-8 * scale + 1e-7, "{operator:?} {i} {error}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn response_is_that_of_the_operator_behind_a_hold() {
+        let ts_s = 1e-3;
+        let fine = SampleTime::new(ts_s).unwrap();
+        for operator in all() {
+            let held = operator.hold(fine).unwrap();
+            for omega in [0.5, 4.0, 15.0] {
+                let backward = Complex64::from_polar(1.0, -omega * ts_s);
+                let f = [&[1.0][..], &held.f].concat();
+                let h = polynomial::value(&held.b, backward) / polynomial::value(&f, backward)
+                    * backward.powi(held.nk as i32);
+                let hold = Complex64::from_polar(1.0, -omega * ts_s / 2.0);
+                let expected = operator.response(omega) * hold;
+                // The hold and the aliases are (omega Ts)^2 at most.
+                let error = (h - expected).norm() / expected.norm();
+                assert!(error < (omega * ts_s).powi(2) + 2e-5, "{operator:?} {omega} {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn gain_at_zero_and_continuity_in_the_delay() {
+        for form in [Form::Gain, Form::Lead, Form::LeadLag, Form::Lead2Lag] {
+            let held = operator(form, true, 0.13).hold(ts()).unwrap();
+            let sum: f64 = held.b.iter().sum::<f64>() / (1.0 + held.f.iter().sum::<f64>());
+            let expected = if form.has_lag() { 20.0 } else { 4.0 };
+            assert!((sum - expected).abs() < 1e-8 * expected, "{form} {sum}");
+        }
+        for operator_at in [
+            |tau| operator(Form::LeadLag, true, tau),
+            |tau| operator(Form::LeadLag, false, tau),
+        ] {
+            let border = 9.0 / 60.0;
+            let shifted = |held: HeldFamily| [vec![0.0; held.nk], held.b].concat();
+            let below = shifted(operator_at(border - 1e-12).hold(ts()).unwrap());
+            let above = shifted(operator_at(border + 1e-12).hold(ts()).unwrap());
+            for i in 0..below.len().max(above.len()) {
+                let at = |b: &[f64]| b.get(i).copied().unwrap_or(0.0);
+                assert!((at(&below) - at(&above)).abs() < 1e-8);
+            }
+        }
+    }
+
+    #[test]
+    fn extremes_stay_finite_or_are_refused() {
+        let with = |log_omega: f64, log_zeta: f64, rate: f64| {
+            FamilyOperator::new(Form::LeadLag, true, &[1.0, 0.5, rate, log_omega, log_zeta, 0.2]).unwrap()
+        };
+        for (log_omega, log_zeta, rate) in [(5.2, -4.0, 0.0), (5.2, 3.0, 40.0), (-3.0, 0.0, 0.0), (2.0, 0.0, 1e-12)] {
+            let held = with(log_omega, log_zeta, rate).hold(ts()).unwrap();
+            let roots = polynomial::roots(&[&[1.0][..], &held.f].concat()).unwrap();
+            // A pure integration lies on the circle, up to the rounding of a root beside two others.
+            assert!(roots.iter().all(|z| z.norm() < 1.0 + 1e-9), "{roots:?}");
+        }
+        assert!(with(400.0, 0.0, 0.1).hold(ts()).is_err());
+    }
+}

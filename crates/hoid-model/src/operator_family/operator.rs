@@ -1,0 +1,390 @@
+//! One operator of the family.
+
+use num_complex::Complex64;
+
+use super::{
+    dual::{Dual, PARTIALS},
+    form::{Coordinate, Form, Rational},
+};
+use crate::{ContinuousTransferFunction, ModelError, polynomial};
+
+/// An operator: its form and the values of its coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FamilyOperator {
+    form: Form,
+    neuromuscular: bool,
+    coordinates: Vec<f64>,
+}
+
+/// `Y(j omega)` and its derivatives along the coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FamilyResponse {
+    /// `Y(j omega)`.
+    pub value: Complex64,
+    /// A derivative for each coordinate.
+    pub gradient: Vec<Complex64>,
+}
+
+/// A parameter as it is reported.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NamedParameter {
+    /// K, K_over_T_I, T_L, T_I, omega_nm, zeta_nm, tau_e and so on.
+    pub name: &'static str,
+    /// Its unit; empty for a ratio of control and error.
+    pub unit: &'static str,
+    /// Its value; infinite for T_I of a pure integration.
+    pub value: f64,
+    /// Its coordinate, where it is a function of one.
+    pub coordinate: Option<Coordinate>,
+}
+
+impl FamilyOperator {
+    /// An operator with these coordinates, in the order of [`Form::coordinates`].
+    ///
+    /// # Errors
+    /// [`ModelError::Operator`] for an improper form, a wrong number of coordinates, or a value
+    /// that is not finite; [`ModelError::OutOfRange`] for a negative delay.
+    pub fn new(form: Form, neuromuscular: bool, coordinates: &[f64]) -> Result<Self, ModelError> {
+        let wrong = |reason: String| Err(ModelError::Operator { reason });
+        if !form.is_proper(neuromuscular) {
+            return wrong(format!(
+                "the form {form} without neuromuscular dynamics is a pure derivative, which no sampled model holds; add \
+                 the neuromuscular part or take a form with a lag"
+            ));
+        }
+        let expected = form.coordinates(neuromuscular);
+        if coordinates.len() != expected.len() {
+            return wrong(format!(
+                "{} coordinates for the form {form}; expected {}",
+                coordinates.len(),
+                expected.len()
+            ));
+        }
+        if let Some(bad) = coordinates.iter().position(|c| !c.is_finite()) {
+            return wrong(format!(
+                "the coordinate {:?} is {}; expected a finite number",
+                expected[bad], coordinates[bad]
+            ));
+        }
+        let delay = coordinates[coordinates.len() - 1];
+        if delay < 0.0 {
+            return Err(ModelError::OutOfRange {
+                quantity: "delay tau_e in s",
+                found: delay,
+                expected: "zero or more",
+            });
+        }
+        Ok(Self {
+            form,
+            neuromuscular,
+            coordinates: coordinates.to_vec(),
+        })
+    }
+
+    /// From the parameters by name: `K` (or `K_over_T_I`, or `K_e`), `T_L`, `T_I`, `omega_nm`,
+    /// `zeta_nm`, `tau_e`, `c_1`, `c_2`, `alpha`; those that the form has. The neuromuscular part
+    /// is there when omega_nm is named. A missing tau_e is zero.
+    ///
+    /// # Errors
+    /// [`ModelError::Operator`] for a name that is unknown, lacking, or said twice, and for values
+    /// without a meaning; else as [`FamilyOperator::new`].
+    pub fn of_names(form: Form, pairs: &[(String, f64)]) -> Result<Self, ModelError> {
+        let wrong = |reason: String| ModelError::Operator { reason };
+        let find = |name: &str| pairs.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
+        let need = |name: &str| find(name).ok_or_else(|| wrong(format!("{name} is lacking for the form {form}")));
+        let neuromuscular = find("omega_nm").is_some() || find("zeta_nm").is_some();
+        let positive = |name: &str| {
+            let value = need(name)?;
+            if value > 0.0 {
+                Ok(value)
+            } else {
+                Err(wrong(format!("{name} is {value}; expected a positive number")))
+            }
+        };
+        let mut known = vec!["tau_e"];
+        let mut values = Vec::new();
+        for coordinate in form.coordinates(neuromuscular) {
+            let (names, value): (&[&str], f64) = match coordinate {
+                Coordinate::Gain if form.has_lag() => match find("K_over_T_I") {
+                    Some(ratio) => (&["K_over_T_I"], ratio),
+                    None => (&["K"], need("K")? / positive("T_I")?),
+                },
+                Coordinate::Gain if form == Form::QuadraticIntegral => (&["K_I"], need("K_I")?),
+                Coordinate::Gain => match find("K") {
+                    Some(k) => (&["K"], k),
+                    None => (&["K_e"], need("K_e")?),
+                },
+                Coordinate::Lead => (&["T_L"], need("T_L")?),
+                Coordinate::LagRate => (&["T_I"], 1.0 / positive("T_I")?),
+                Coordinate::Linear => (&["c_1"], need("c_1")?),
+                Coordinate::Quadratic => (&["c_2"], need("c_2")?),
+                Coordinate::Droop => (&["alpha"], need("alpha")?),
+                Coordinate::LogOmega => (&["omega_nm"], positive("omega_nm")?.ln()),
+                Coordinate::LogZeta => (&["zeta_nm"], positive("zeta_nm")?.ln()),
+                Coordinate::Delay => (&["tau_e"], find("tau_e").unwrap_or(0.0)),
+            };
+            known.extend(names);
+            values.push(value);
+        }
+        if let Some((name, _)) = pairs.iter().find(|(name, _)| !known.contains(&name.as_str())) {
+            return Err(wrong(format!(
+                "there is no parameter {name} in the form {form}; expected {}",
+                known.join(", ")
+            )));
+        }
+        Self::new(form, neuromuscular, &values)
+    }
+
+    /// The form.
+    pub fn form(&self) -> Form {
+        self.form
+    }
+
+    /// True with the neuromuscular part.
+    pub fn has_neuromuscular(&self) -> bool {
+        self.neuromuscular
+    }
+
+    /// The coordinates, in the order of [`Form::coordinates`].
+    pub fn coordinates(&self) -> &[f64] {
+        &self.coordinates
+    }
+
+    fn coordinate(&self, wanted: Coordinate) -> Option<f64> {
+        let all = self.form.coordinates(self.neuromuscular);
+        let index = all.iter().position(|c| *c == wanted)?;
+        Some(self.coordinates[index])
+    }
+
+    /// Delay tau_e in s.
+    pub fn tau_e_s(&self) -> f64 {
+        self.coordinates[self.coordinates.len() - 1]
+    }
+
+    /// Neuromuscular frequency in rad/s and damping ratio.
+    pub fn neuromuscular(&self) -> Option<(f64, f64)> {
+        let (log_omega, log_zeta) = (
+            self.coordinate(Coordinate::LogOmega)?,
+            self.coordinate(Coordinate::LogZeta)?,
+        );
+        Some((log_omega.exp(), log_zeta.exp()))
+    }
+
+    /// The parameters under their names: `K`, `K_over_T_I`, `T_L`, `T_I`, `omega_nm`, `zeta_nm`,
+    /// `tau_e`; `K_e`, `T_L`, `K_e_dot` for the lead; `c_1`, `c_2`, `alpha` for the rivals.
+    pub fn named(&self) -> Vec<NamedParameter> {
+        let gain = self.coordinates[0];
+        let mut all = Vec::new();
+        let mut put = |name, unit, value, coordinate| {
+            all.push(NamedParameter {
+                name,
+                unit,
+                value,
+                coordinate,
+            });
+        };
+        for (coordinate, &x) in self.form.coordinates(self.neuromuscular).iter().zip(&self.coordinates) {
+            let own = Some(*coordinate);
+            match coordinate {
+                Coordinate::Gain if self.form.has_lag() => {
+                    let rate = self.coordinate(Coordinate::LagRate).unwrap_or(0.0);
+                    put("K", "", gain / rate, None);
+                    put("K_over_T_I", "1/s", gain, own);
+                }
+                Coordinate::Gain if self.form == Form::Lead => put("K_e", "", gain, own),
+                Coordinate::Gain if self.form == Form::QuadraticIntegral => put("K_I", "1/s", gain, own),
+                Coordinate::Gain => put("K", "", gain, own),
+                Coordinate::Lead => {
+                    put("T_L", "s", x, own);
+                    if self.form == Form::Lead {
+                        put("K_e_dot", "s", gain * x, None);
+                    }
+                }
+                Coordinate::LagRate => put("T_I", "s", 1.0 / x, own),
+                Coordinate::Linear => put("c_1", "s", x, own),
+                Coordinate::Quadratic => put("c_2", "s^2", x, own),
+                Coordinate::Droop => put("alpha", "rad/s", x, own),
+                Coordinate::LogOmega => put("omega_nm", "rad/s", x.exp(), own),
+                Coordinate::LogZeta => put("zeta_nm", "", x.exp(), own),
+                Coordinate::Delay => put("tau_e", "s", x, own),
+            }
+        }
+        all
+    }
+
+    /// The coordinates as variables.
+    pub(super) fn variables(&self) -> Vec<Dual> {
+        let variable = |(i, &x): (usize, &f64)| Dual::variable(x, i);
+        self.coordinates.iter().enumerate().map(variable).collect()
+    }
+
+    /// `(omega, zeta)` as functions of the coordinates.
+    pub(super) fn neuromuscular_of(&self, variables: &[Dual]) -> Option<(Dual, Dual)> {
+        let n = variables.len();
+        self.neuromuscular
+            .then(|| (variables[n - 3].exp(), variables[n - 2].exp()))
+    }
+
+    /// `Y(j omega)` and its derivatives, delay included.
+    pub fn response_and_gradient(&self, omega_rad_s: f64) -> FamilyResponse {
+        let variables = self.variables();
+        let s = Complex64::new(0.0, omega_rad_s);
+        let Rational { numerator, pole } = self.form.rational(&variables);
+        let zero = Complex64::new(0.0, 0.0);
+        // Value and derivatives of a polynomial in s whose coefficients are functions of the
+        // coordinates.
+        let of = |coefficients: &[Dual]| {
+            let mut value = zero;
+            let mut partials = [zero; PARTIALS];
+            for c in coefficients.iter().rev() {
+                value = value * s + c.value;
+                for (p, d) in partials.iter_mut().zip(c.partials) {
+                    *p = *p * s + d;
+                }
+            }
+            (value, partials)
+        };
+        let (n, n_slopes) = of(&numerator);
+        let mut value = n;
+        let mut gradient = n_slopes;
+        let mut divide = |(d, slopes): (Complex64, [Complex64; PARTIALS])| {
+            value /= d;
+            for (g, slope) in gradient.iter_mut().zip(slopes) {
+                *g = (*g - value * slope) / d;
+            }
+        };
+        let one = Dual::constant(1.0);
+        if let Some(a) = pole {
+            divide(of(&[a, one]));
+        }
+        if let Some((omega, zeta)) = self.neuromuscular_of(&variables) {
+            divide(of(&[one, (zeta / omega).scaled(2.0), one / (omega * omega)]));
+        }
+        let delay = self.coordinates.len() - 1;
+        let turn = (-s * self.tau_e_s()).exp();
+        gradient[delay] -= value * s;
+        FamilyResponse {
+            value: value * turn,
+            gradient: gradient[..self.coordinates.len()].iter().map(|g| g * turn).collect(),
+        }
+    }
+
+    /// `Y(j omega)`, delay included.
+    pub fn response(&self, omega_rad_s: f64) -> Complex64 {
+        self.response_and_gradient(omega_rad_s).value
+    }
+
+    /// Y(s) as a transfer function with its delay.
+    ///
+    /// # Errors
+    /// As [`ContinuousTransferFunction::new`].
+    pub fn transfer_function(&self) -> Result<ContinuousTransferFunction, ModelError> {
+        let variables = self.variables();
+        let Rational { numerator, pole } = self.form.rational(&variables);
+        let mut num: Vec<f64> = numerator.iter().rev().map(|c| c.value).collect();
+        let mut den = vec![1.0];
+        if let Some(a) = pole {
+            den = vec![1.0, a.value];
+        }
+        if let Some((omega, zeta)) = self.neuromuscular() {
+            let square = omega * omega;
+            num.iter_mut().for_each(|c| *c *= square);
+            den = polynomial::product(&den, &[1.0, 2.0 * zeta * omega, square]);
+        }
+        ContinuousTransferFunction::new(&num, &den)?.with_delay(self.tau_e_s())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn usual(form: Form) -> FamilyOperator {
+        let tail = [11.0_f64.ln(), 0.25_f64.ln(), 0.1837];
+        let head: &[f64] = match form {
+            Form::Gain => &[3.0],
+            Form::Lead | Form::Lead2 => &[1.5, 0.5],
+            Form::Lag => &[4.0, 0.2],
+            Form::LeadLag | Form::Lead2Lag => &[4.0, 0.6, 0.2],
+            Form::QuadraticIntegral => &[2.0, 0.9, 0.3],
+            Form::LeadDroop => &[1.5, 0.5, 0.4],
+        };
+        FamilyOperator::new(form, true, &[head, &tail].concat()).unwrap()
+    }
+
+    #[test]
+    fn gradient_agrees_with_finite_differences() {
+        for form in Form::ALL {
+            let operator = usual(form);
+            for omega in [0.3, 2.0, 9.0, 25.0] {
+                let exact = operator.response_and_gradient(omega);
+                for i in 0..operator.coordinates.len() {
+                    let h = 1e-6;
+                    let at = |by: f64| {
+                        let mut x = operator.coordinates.clone();
+                        x[i] += by;
+                        FamilyOperator::new(form, true, &x).unwrap().response(omega)
+                    };
+                    let difference = (at(h) - at(-h)) / (2.0 * h);
+                    let error = (exact.gradient[i] - difference).norm();
+                    assert!(error < 1e-7 * (1.0 + difference.norm()), "{form} {i}: {error}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn response_is_that_of_the_transfer_function() {
+        for form in Form::ALL {
+            let operator = usual(form);
+            let transfer = operator.transfer_function().unwrap();
+            for omega in [0.5, 3.0, 20.0] {
+                let difference = (operator.response(omega) - transfer.response(omega)).norm();
+                assert!(difference < 1e-12 * transfer.response(omega).norm(), "{form}");
+            }
+        }
+    }
+
+    #[test]
+    fn names_and_coordinates_are_inverse() {
+        for form in Form::ALL {
+            let operator = usual(form);
+            let pairs: Vec<(String, f64)> = operator
+                .named()
+                .iter()
+                .filter(|p| !["K_e_dot"].contains(&p.name))
+                .filter(|p| !(form.has_lag() && p.name == "K"))
+                .map(|p| (p.name.to_owned(), p.value))
+                .collect();
+            let back = FamilyOperator::of_names(form, &pairs).unwrap();
+            for (a, b) in back.coordinates.iter().zip(&operator.coordinates) {
+                assert!((a - b).abs() < 1e-14 * (1.0 + b.abs()), "{form}");
+            }
+        }
+        let k = |name: &str, value: f64| (name.to_owned(), value);
+        let lag = FamilyOperator::of_names(Form::Lag, &[k("K", 10.0), k("T_I", 5.0)]).unwrap();
+        assert_eq!(
+            (lag.coordinates(), lag.has_neuromuscular()),
+            (&[2.0, 0.2, 0.0][..], false)
+        );
+    }
+
+    #[test]
+    fn what_has_no_meaning_is_refused() {
+        assert!(FamilyOperator::new(Form::Lead, false, &[1.0, 0.5, 0.2]).is_err());
+        assert!(FamilyOperator::new(Form::Gain, false, &[1.0]).is_err());
+        assert!(FamilyOperator::new(Form::Gain, false, &[1.0, -0.1]).is_err());
+        assert!(FamilyOperator::new(Form::Gain, false, &[f64::NAN, 0.1]).is_err());
+        let pair = |name: &str, value: f64| (name.to_owned(), value);
+        let lag = |pairs: &[(String, f64)]| FamilyOperator::of_names(Form::Lag, pairs);
+        assert!(
+            lag(&[pair("K", 1.0)])
+                .unwrap_err()
+                .to_string()
+                .contains("T_I is lacking")
+        );
+        assert!(lag(&[pair("K", 1.0), pair("T_I", -2.0)]).is_err());
+        assert!(lag(&[pair("K", 1.0), pair("T_I", 2.0), pair("T_L", 1.0)]).is_err());
+        assert!(lag(&[pair("K", 1.0), pair("T_I", 2.0), pair("zeta_nm", 1.0)]).is_err());
+    }
+}
