@@ -59,6 +59,7 @@
 //! | [`validation`] | VAF, NRMSE, residual tests |
 //! | [`order_selection`] | ranges of orders and delay, criteria, the chosen model |
 //! | [`iv`] | instrumental variables, in open and closed loop |
+//! | [`family`] | operators of recorded people: form, parameters, errors that hold, a verdict |
 //! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
 //! | [`SigmoidChange`] | gains that follow a sigmoid, with the time and the rate of the change |
 //! | [`frequency`] | describing function, coherence, remnant spectrum and margins by Fourier coefficients |
@@ -80,6 +81,7 @@ mod criterion;
 mod derived;
 mod error;
 mod estimator;
+pub mod family;
 mod fit;
 pub mod frequency;
 pub mod grey_box;

@@ -137,6 +137,12 @@ pub enum ModelError {
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum NotConvertible {
+    /// The operator is of another form than a gain with a lead.
+    #[error("the operator has the form {form}, which has other parameters than K_e, T_L and K_e_dot")]
+    OtherForm {
+        /// Name of the form.
+        form: String,
+    },
     /// A pole on the closed negative real axis has no real logarithm.
     #[error("the pole z = {pole:.6} lies on the closed negative real axis, so that no real continuous system has it")]
     NegativeRealPole {

@@ -15,6 +15,9 @@ use crate::{IdentError, informative_data::common_sample_time};
 /// Amplitude of a line, as a part of the rms of its channel, below which it is rounding.
 const LEAST_LINE: f64 = 1e-12;
 
+/// Bins off the lines from which the remnant at a line is taken.
+const NEIGHBOURS: usize = 8;
+
 /// The describing function at one line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
@@ -29,13 +32,17 @@ pub struct Line {
     /// Standard deviation of the ratios of single runs, as the root of the mean square modulus;
     /// `None` for one run.
     pub spread: Option<f64>,
+    /// sigma as the remnant beside the line has it: of `N = U - H E` at the nearest bins off the
+    /// lines, where there is nothing but remnant. It does not hold what differs between runs, and
+    /// exists for one run too.
+    pub neighbour_error: f64,
     /// Squared coherence, 0 to 1; `None` for one run, where it is always 1.
     pub coherence: Option<f64>,
     /// `U_i/E_i`.
     pub per_run: Vec<Complex64>,
     /// The controlled element, where it is estimated.
     pub element: Option<Complex64>,
-    pub(super) ratio: Ratio,
+    pub(crate) ratio: Ratio,
     pub(super) element_ratio: Option<Ratio>,
 }
 
@@ -60,6 +67,11 @@ impl Line {
     fn relative_error(&self) -> Option<f64> {
         self.standard_error
             .map(|s| s / (std::f64::consts::SQRT_2 * self.response.norm()))
+    }
+
+    /// H without one of the runs.
+    pub fn response_without(&self, run: usize) -> Complex64 {
+        self.ratio.value(Some(run))
     }
 
     /// Centre and radius of the circle in the complex plane that holds the true H with this
@@ -147,7 +159,10 @@ pub fn describe(
     }
     let lines = excitation.harmonics().iter().zip(excitation.omega_rad_s());
     let lines: Result<Vec<Line>, IdentError> = lines.map(|(&n, omega)| line(&runs, n, omega, options)).collect();
-    let lines = lines?;
+    let mut lines = lines?;
+    for line in &mut lines {
+        line.neighbour_error = neighbour_error(&runs, line, excitation.harmonics());
+    }
 
     let controls: Vec<Control<'_>> = runs
         .iter()
@@ -349,8 +364,30 @@ fn line(runs: &[Run], harmonic: usize, omega_rad_s: f64, options: &DescribingOpt
         spread,
         coherence: (runs.len() > 1).then(|| cross.norm_sqr() / (power_u * power_d)),
         per_run,
+        neighbour_error: f64::NAN,
         element,
         ratio,
         element_ratio,
     })
+}
+
+/// sigma of a line from the bins beside it: `sigma^2 = sum_i |D_i|^2 S_i / |sum_i b_i|^2` with S_i
+/// the mean of `|U - H E|^2` over the nearest bins of run i off the lines, `b_i = E_i D_i*`.
+fn neighbour_error(runs: &[Run], line: &Line, harmonics: &[usize]) -> f64 {
+    let mut squares = 0.0;
+    for (run, (_, b)) in runs.iter().zip(&line.ratio.0) {
+        let periods = run.window.periods;
+        let is_line = |k: usize| k.is_multiple_of(periods) && harmonics.binary_search(&(k / periods)).is_ok();
+        let at = line.harmonic * periods;
+        let mut beside: Vec<usize> = (1..run.e.len()).filter(|&k| !is_line(k)).collect();
+        beside.sort_by_key(|k| k.abs_diff(at));
+        beside.truncate(NEIGHBOURS);
+        let power = |k: &usize| (run.u[*k] - line.response * run.e[*k]).norm_sqr();
+        let mean = beside.iter().map(power).sum::<f64>() / beside.len() as f64;
+        // |D_i| as the products with it have it.
+        let d = b.norm_sqr() / run.e[at].norm_sqr();
+        squares += d * mean;
+    }
+    let whole: Complex64 = line.ratio.0.iter().map(|(_, b)| b).sum();
+    squares.sqrt() / whole.norm()
 }

@@ -14,7 +14,7 @@ use hoid_model::{Complex64, uncertainty::Estimate};
 
 /// Terms of numerator and denominator, one of each a run.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Ratio(pub Vec<(Complex64, Complex64)>);
+pub(crate) struct Ratio(pub Vec<(Complex64, Complex64)>);
 
 impl Ratio {
     fn sums(&self, without: Option<usize>) -> (Complex64, Complex64) {

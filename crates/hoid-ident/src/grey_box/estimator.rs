@@ -5,8 +5,9 @@ use std::{collections::BTreeMap, ops::RangeInclusive};
 use hoid_model::{PolynomialModel, Record, SampleTime, Structure, remnant::HIGHEST_ORDER};
 
 use super::{
-    layout::{self, Layout, SLOTS, TIME_CONSTANT},
+    layout::{self, Layout, TIME_CONSTANT},
     objective::PhysicalCriterion,
+    parametrisation::Parametrisation,
     result::{GreyBoxFit, OrderCandidate, OrderFigures},
     starts::{self, Start},
 };
@@ -80,7 +81,7 @@ impl GreyBox {
             }
         }
         let data: Vec<Data<'_>> = Data::of(records);
-        let criteria: Vec<PhysicalCriterion<'_>> = layouts
+        let criteria: Vec<PhysicalCriterion<'_, Layout>> = layouts
             .into_iter()
             .map(|layout| PhysicalCriterion::new(layout, data.clone(), self.initial_state, first))
             .collect();
@@ -160,7 +161,7 @@ impl GreyBox {
             .collect()
     }
 
-    fn check_records(&self, criterion: &PhysicalCriterion<'_>, records: &[Record]) -> Result<(), IdentError> {
+    fn check_records(&self, criterion: &PhysicalCriterion<'_, Layout>, records: &[Record]) -> Result<(), IdentError> {
         let unknowns = criterion.layout.names.len() + criterion.states();
         if criterion.residuals() > unknowns {
             return Ok(());
@@ -175,7 +176,7 @@ impl GreyBox {
 
     fn fit_order(
         &self,
-        criterion: &PhysicalCriterion<'_>,
+        criterion: &PhysicalCriterion<'_, Layout>,
         starts: &[Start],
         before: Option<&[f64]>,
         search: &SearchOptions,
@@ -218,7 +219,7 @@ impl GreyBox {
 
     fn result(
         &self,
-        criterion: &PhysicalCriterion<'_>,
+        criterion: &PhysicalCriterion<'_, Layout>,
         minimum: Minimum,
         start: String,
     ) -> Result<GreyBoxFit, IdentError> {
@@ -240,21 +241,23 @@ impl GreyBox {
         for record in 0..criterion.data.len() {
             let polynomials = criterion.model_of(&eta, record)?;
             let of_theta = covariance.as_ref().map(|covariance| {
-                let places = &layout.positions[record][..layout.slots_in_use()];
-                let rows = &polynomials.jacobian;
-                let of = |row: &[f64; SLOTS], other: &[f64; SLOTS]| -> f64 {
+                let places = layout.positions(record);
+                let columns = &polynomials.columns;
+                let of = |row: usize, other: usize| -> f64 {
                     let pairs = places.iter().enumerate().flat_map(|(i, &a)| {
                         places
                             .iter()
                             .enumerate()
-                            .map(move |(j, &b)| row[i] * covariance[a * p + b] * other[j])
+                            .map(move |(j, &b)| columns[i][row] * covariance[a * p + b] * columns[j][other])
                     });
                     pairs.sum()
                 };
-                rows.iter()
-                    .flat_map(|row| rows.iter().map(move |other| of(row, other)))
+                let rows = 0..polynomials.theta.len();
+                rows.clone()
+                    .flat_map(|row| rows.clone().map(move |other| of(row, other)))
                     .collect()
             });
+            let held = vec![false; polynomials.theta.len()];
             fits.push(Fit {
                 model: PolynomialModel::new(
                     Structure::BoxJenkins,
@@ -270,7 +273,7 @@ impl GreyBox {
                 initial_state: self.initial_state,
                 termination: minimum.termination,
                 start: start.clone(),
-                held: vec![false; polynomials.jacobian.len()],
+                held,
                 output_variance: output_variance(&criterion.data, criterion.first),
                 robust: false,
                 physical: None,
@@ -298,7 +301,7 @@ impl GreyBox {
     }
 }
 
-fn candidate(criterion: &PhysicalCriterion<'_>, found: Result<&GreyBoxFit, &IdentError>) -> OrderCandidate {
+fn candidate(criterion: &PhysicalCriterion<'_, Layout>, found: Result<&GreyBoxFit, &IdentError>) -> OrderCandidate {
     OrderCandidate {
         order: criterion.layout.order,
         outcome: found.map_err(Clone::clone).map(|fit| OrderFigures {

@@ -6,7 +6,7 @@
 //! many as there are records. K_e_dot is the coordinate of the lead unless the user constrains T_L
 //! itself: `K_e_dot = K_e T_L` is well determined also where K_e is small.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, ops::Range};
 
 use hoid_model::{
     ModelError, Orders, SampleTime,
@@ -14,6 +14,7 @@ use hoid_model::{
     remnant_noise::remnant_noise,
 };
 
+use super::parametrisation::{Mapped, Parametrisation};
 use crate::{Constraint, IdentError};
 
 /// Number of slots with a remnant filter.
@@ -199,11 +200,6 @@ impl Layout {
         if self.order == 0 { TIME_CONSTANT } else { SLOTS }
     }
 
-    /// Places of the delays in eta.
-    pub fn delays(&self) -> Vec<usize> {
-        (0..self.slots.len()).filter(|&i| self.slots[i] == DELAY).collect()
-    }
-
     /// Longest delay that eta can take, in samples of nk.
     pub fn longest_nk(&self) -> Result<usize, ModelError> {
         let longest = self.delays().into_iter().map(|i| self.limits[i].1).fold(0.0, f64::max);
@@ -270,6 +266,47 @@ impl Layout {
             theta,
             jacobian,
         })
+    }
+}
+
+impl Parametrisation for Layout {
+    fn positions(&self, record: usize) -> &[usize] {
+        &self.positions[record][..self.slots_in_use()]
+    }
+
+    fn limits(&self) -> &[(f64, f64)] {
+        &self.limits
+    }
+
+    fn delays(&self) -> Vec<usize> {
+        (0..self.slots.len()).filter(|&i| self.slots[i] == DELAY).collect()
+    }
+
+    fn delay_of(&self, record: usize) -> usize {
+        self.positions[record][DELAY]
+    }
+
+    fn sample_time(&self) -> SampleTime {
+        self.sample_time
+    }
+
+    fn orders(&self, nk: usize) -> Orders {
+        orders(self.order, nk)
+    }
+
+    fn stable_blocks(&self) -> Vec<Range<usize>> {
+        Vec::new()
+    }
+
+    fn map(&self, eta: &[f64], record: usize, sample: Option<usize>) -> Result<Mapped, ModelError> {
+        let Polynomials {
+            orders,
+            theta,
+            jacobian,
+        } = self.polynomials(eta, record, sample)?;
+        let column = |slot: usize| -> Vec<f64> { jacobian.iter().map(|row| row[slot]).collect() };
+        let columns = (0..self.slots_in_use()).map(column).collect();
+        Ok(Mapped { orders, theta, columns })
     }
 }
 

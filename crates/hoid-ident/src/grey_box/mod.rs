@@ -19,13 +19,15 @@
 //! |---|---|
 //! | `estimator` | options, and the fit |
 //! | `layout` | order and bounds of the physical parameters |
+//! | `parametrisation` | what the criterion needs to know of physical parameters |
 //! | `objective` | the criterion in physical parameters, and its derivatives |
 //! | `starts` | where the searches begin |
 //! | `result` | the fit with its uncertainty |
 
 mod estimator;
 mod layout;
-mod objective;
+pub(crate) mod objective;
+pub(crate) mod parametrisation;
 mod result;
 mod starts;
 

@@ -13,24 +13,55 @@ use crate::{
     optimize::{Minimum, Objective, SearchOptions, minimise},
 };
 
-use super::layout::{DELAY, Layout, Polynomials};
+use super::parametrisation::{Mapped, Parametrisation};
 
 /// The criterion over one or several records.
 #[derive(Debug, Clone)]
-pub(crate) struct PhysicalCriterion<'a> {
-    pub layout: Layout,
+pub(crate) struct PhysicalCriterion<'a, P> {
+    pub layout: P,
     pub data: Vec<Data<'a>>,
     pub initial: InitialState,
     pub first: usize,
-    /// Sample in which each delay of [`Layout::delays`] is held; by the delay itself where there is
+    /// Sample in which each delay of [`Parametrisation::delays`] is held; by the delay itself where there is
     /// none.
     pub samples: Option<Vec<usize>>,
     pub limits: Vec<(f64, f64)>,
+    /// What is known before the data, in units of the residuals; none where there is nothing.
+    pub penalty: Vec<Penalty>,
 }
 
-impl<'a> PhysicalCriterion<'a> {
-    pub fn new(layout: Layout, data: Vec<Data<'a>>, initial: InitialState, first: usize) -> Self {
-        let limits = layout.limits.clone();
+/// `weight (g(eta_i) - mean)^2`, added to the sum of squares: a normal prior of g with the standard
+/// deviation s has the weight `sigma^2/s^2`, sigma^2 the innovation variance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Penalty {
+    /// Place in eta.
+    pub place: usize,
+    /// True for `g = ln eta_i` of a positive element, false for eta_i itself.
+    pub logarithmic: bool,
+    pub mean: f64,
+    pub weight: f64,
+}
+
+impl Penalty {
+    /// Adds its square and derivatives to a linearisation of p parameters.
+    pub fn add_to(&self, eta: &[f64], total: &mut Linearisation) {
+        let (i, x) = (self.place, eta[self.place]);
+        let (off, slope) = match self.logarithmic {
+            true => (
+                self.mean - x.max(f64::MIN_POSITIVE).ln(),
+                1.0 / x.max(f64::MIN_POSITIVE),
+            ),
+            false => (self.mean - x, 1.0),
+        };
+        total.sum_of_squares += self.weight * off * off;
+        total.descent[i] += self.weight * off * slope;
+        total.gram[i * eta.len() + i] += self.weight * slope * slope;
+    }
+}
+
+impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
+    pub fn new(layout: P, data: Vec<Data<'a>>, initial: InitialState, first: usize) -> Self {
+        let limits = layout.limits().to_vec();
         Self {
             layout,
             data,
@@ -38,6 +69,7 @@ impl<'a> PhysicalCriterion<'a> {
             first,
             samples: None,
             limits,
+            penalty: Vec::new(),
         }
     }
 
@@ -47,10 +79,7 @@ impl<'a> PhysicalCriterion<'a> {
 
     /// Number of initial states over all records.
     pub fn states(&self) -> usize {
-        let of_record = |record: usize| {
-            self.criterion(super::layout::orders(self.layout.order, 1), record)
-                .states()
-        };
+        let of_record = |record: usize| self.criterion(self.layout.orders(1), record).states();
         (0..self.data.len()).map(of_record).sum()
     }
 
@@ -64,13 +93,13 @@ impl<'a> PhysicalCriterion<'a> {
         }
     }
 
-    fn polynomials(&self, eta: &[f64], record: usize) -> Option<Polynomials> {
+    fn polynomials(&self, eta: &[f64], record: usize) -> Option<Mapped> {
         let sample = self.samples.as_ref().and_then(|samples| {
-            let place = self.layout.positions[record][DELAY];
+            let place = self.layout.delay_of(record);
             let index = self.layout.delays().iter().position(|&i| i == place)?;
             samples.get(index).copied()
         });
-        self.layout.polynomials(eta, record, sample).ok()
+        self.layout.map(eta, record, sample).ok()
     }
 
     /// The gains that are best for the other parameters, and the sum of squares there: the residual
@@ -113,7 +142,7 @@ impl<'a> PhysicalCriterion<'a> {
 
     /// Moves from sample to sample as long as the loss falls.
     fn search_by_samples(&self, minimum: Minimum, options: &SearchOptions, workspace: &mut Workspace) -> Minimum {
-        let (delays, ts) = (self.layout.delays(), self.layout.sample_time.s());
+        let (delays, ts) = (self.layout.delays(), self.layout.sample_time().s());
         let mut samples: Vec<usize> = delays
             .iter()
             .map(|&i| (minimum.theta[i] / ts).floor().max(0.0) as usize)
@@ -173,15 +202,15 @@ impl<'a> PhysicalCriterion<'a> {
     }
 
     /// What the polynomials of a record are at eta.
-    pub fn model_of(&self, eta: &[f64], record: usize) -> Result<Polynomials, IdentError> {
-        Ok(self.layout.polynomials(eta, record, None)?)
+    pub fn model_of(&self, eta: &[f64], record: usize) -> Result<Mapped, IdentError> {
+        Ok(self.layout.map(eta, record, None)?)
     }
 }
 
 /// Distance to the border of a sample, in samples, below which the next sample is tried.
 const NEAR_BORDER: f64 = 1e-6;
 
-impl Objective for PhysicalCriterion<'_> {
+impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
     type Workspace = Workspace;
 
     fn is_feasible(&self, eta: &[f64]) -> bool {
@@ -209,10 +238,9 @@ impl Objective for PhysicalCriterion<'_> {
                 .criterion(polynomials.orders, record)
                 .linearise(&polynomials.theta, workspace);
             total.sum_of_squares += of_theta.sum_of_squares;
-            let positions = &self.layout.positions[record][..self.layout.slots_in_use()];
+            let positions = self.layout.positions(record);
             let n = polynomials.theta.len();
-            let column = |slot: usize| -> Vec<f64> { polynomials.jacobian.iter().map(|row| row[slot]).collect() };
-            let columns: Vec<Vec<f64>> = (0..positions.len()).map(column).collect();
+            let columns = &polynomials.columns;
             for (i, &place) in positions.iter().enumerate() {
                 total.descent[place] += dot(&columns[i], &of_theta.descent);
                 let product: Vec<f64> = (0..n)
@@ -223,7 +251,14 @@ impl Objective for PhysicalCriterion<'_> {
                 }
             }
         }
+        for penalty in &self.penalty {
+            penalty.add_to(eta, &mut total);
+        }
         total
+    }
+
+    fn stable_blocks(&self) -> Vec<std::ops::Range<usize>> {
+        self.layout.stable_blocks()
     }
 
     fn output_power(&self) -> f64 {
@@ -242,7 +277,7 @@ mod tests {
     use hoid_model::SampleTime;
 
     use super::*;
-    use crate::{Constraint, criterion::first_residual};
+    use crate::{Constraint, criterion::first_residual, grey_box::layout::Layout};
 
     fn signals(n: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
         let mut state = 7_u64;

@@ -47,7 +47,7 @@ pub(crate) struct Start {
 }
 
 /// The same data with one set of parameters for all records and K_e_dot as coordinate.
-pub(crate) fn scout<'a>(criterion: &PhysicalCriterion<'a>, order: usize) -> PhysicalCriterion<'a> {
+pub(crate) fn scout<'a>(criterion: &PhysicalCriterion<'a, Layout>, order: usize) -> PhysicalCriterion<'a, Layout> {
     let of_slot = |slot: usize| {
         let bounds = criterion
             .layout
@@ -80,7 +80,7 @@ pub(crate) fn scout<'a>(criterion: &PhysicalCriterion<'a>, order: usize) -> Phys
 
 /// The best points of the grid, with the gains that are best for them: so many with a lead, and the
 /// best without one where it is better.
-pub(crate) fn grid(criterion: &PhysicalCriterion<'_>, starts: usize, workspace: &mut Workspace) -> Vec<Start> {
+pub(crate) fn grid(criterion: &PhysicalCriterion<'_, Layout>, starts: usize, workspace: &mut Workspace) -> Vec<Start> {
     let scout = scout(criterion, criterion.layout.order.min(1));
     let bounded = |slot: usize, value: f64| value.clamp(scout.limits[slot].0, scout.limits[slot].1);
     let (low, high) = scout.limits[DELAY];
@@ -136,7 +136,11 @@ fn leading(points: &[(Start, f64)], n: usize) -> Vec<Start> {
 }
 
 /// The operator of a Box-Jenkins fit at this delay.
-pub(crate) fn box_jenkins(records: &[Record], nearest: &Start, criterion: &PhysicalCriterion<'_>) -> Option<Start> {
+pub(crate) fn box_jenkins(
+    records: &[Record],
+    nearest: &Start,
+    criterion: &PhysicalCriterion<'_, Layout>,
+) -> Option<Start> {
     let ts = criterion.layout.sample_time.s();
     let nk = (nearest.slots[DELAY] / ts).round() as usize + 1;
     let mut estimator = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(nk));
@@ -160,7 +164,7 @@ pub(crate) fn box_jenkins(records: &[Record], nearest: &Start, criterion: &Physi
 
 /// The start as an eta of this criterion, with the best T_n of a few for its order.
 pub(crate) fn complete(
-    criterion: &PhysicalCriterion<'_>,
+    criterion: &PhysicalCriterion<'_, Layout>,
     start: &Start,
     time_constants_s: &[f64],
     workspace: &mut Workspace,

@@ -76,6 +76,8 @@ impl Sub for Dual {
     }
 }
 
+// The rules of derivatives, which the lint takes for slips.
+#[allow(clippy::suspicious_arithmetic_impl)]
 impl Mul for Dual {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
@@ -87,6 +89,7 @@ impl Mul for Dual {
     }
 }
 
+#[allow(clippy::suspicious_arithmetic_impl)]
 impl Div for Dual {
     type Output = Self;
     fn div(self, other: Self) -> Self {

@@ -18,7 +18,8 @@ pub enum Form {
     LeadLag,
     /// `K (T_L s + 1)^2 / (T_I s + 1)` (p = 2, q = 1).
     Lead2Lag,
-    /// `K_I (1 + c_1 s + c_2 s^2) / s`: a free quadratic numerator over s.
+    /// `K_I (1 + c_1 s + c_2 s^2) / s`: a free quadratic numerator over s. The integration here and
+    /// below leaks by 1e-4 1/s.
     QuadraticIntegral,
     /// `K (T_L s + 1) (1 + alpha/s)`: a lead with the droop of the phase at low frequencies,
     /// `e^{-j alpha/omega}` by its rational approximation.
@@ -35,6 +36,9 @@ crate::named_choice!(Form, "form of the operator", 8, {
     QuadraticIntegral => "quadratic-integral",
     LeadDroop => "lead-droop",
 });
+
+/// Pole of an integration, 1/s: a leak that no record shows keeps the discrete model stable.
+const LEAK: f64 = 1e-4;
 
 /// A coordinate in which an operator is fitted. Lag and neuromuscular part are fitted in
 /// coordinates whose estimates are nearly normal also where the data say little.
@@ -121,8 +125,8 @@ impl Form {
             Self::Lag => ([k, zero, zero], Some(x[1])),
             Self::LeadLag => ([k, k * x[1], zero], Some(x[2])),
             Self::Lead2Lag => ([k, (k * x[1]).scaled(2.0), k * x[1] * x[1]], Some(x[2])),
-            Self::QuadraticIntegral => ([k, k * x[1], k * x[2]], Some(zero)),
-            Self::LeadDroop => ([k * x[2], k + k * x[1] * x[2], k * x[1]], Some(zero)),
+            Self::QuadraticIntegral => ([k, k * x[1], k * x[2]], Some(Dual::constant(LEAK))),
+            Self::LeadDroop => ([k * x[2], k + k * x[1] * x[2], k * x[1]], Some(Dual::constant(LEAK))),
         };
         Rational { numerator, pole }
     }

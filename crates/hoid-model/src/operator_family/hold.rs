@@ -22,18 +22,10 @@
 use super::{
     dual::{Dual, PARTIALS},
     form::Rational,
+    matrices::{SIZE, Vector, characteristic, companion, exponential, product, times},
     operator::FamilyOperator,
 };
 use crate::{ModelError, SampleTime, delayed_operator::whole_samples};
-
-/// Highest order of the dynamics.
-const ORDER: usize = 3;
-/// States and input.
-const SIZE: usize = ORDER + 1;
-/// Terms of the series at a norm of at most one: 1/20! is 4e-19.
-const TERMS: usize = 20;
-
-type Matrix = [[Dual; SIZE]; SIZE];
 
 /// `q^-nk B/F` with the derivatives of its coefficients.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,6 +38,29 @@ pub struct HeldFamily {
     pub f: Vec<f64>,
     /// A row for each coefficient of B, then of F, with a derivative for each coordinate.
     pub jacobian: Vec<[f64; PARTIALS]>,
+}
+
+impl HeldFamily {
+    /// The model with this impulse response from lag nk on, and these poles: `B = F h`.
+    pub(super) fn of_impulse_response(nk: usize, impulse: &[Dual], f: &[Dual]) -> Result<Self, ModelError> {
+        let order = f.len();
+        let b: Vec<Dual> = (0..impulse.len())
+            .map(|k| (1..=order.min(k)).fold(impulse[k], |sum, i| sum + f[i - 1] * impulse[k - i]))
+            .collect();
+        if b.iter().chain(f).any(|c| !c.value.is_finite()) {
+            return Err(ModelError::OutOfRange {
+                quantity: "the discrete model of the operator",
+                found: f64::INFINITY,
+                expected: "finite coefficients; check omega_nm, zeta_nm and 1/T_I against the sample time",
+            });
+        }
+        Ok(Self {
+            nk,
+            jacobian: b.iter().chain(f).map(|c| c.partials).collect(),
+            b: b.iter().map(|c| c.value).collect(),
+            f: f.iter().map(|c| c.value).collect(),
+        })
+    }
 }
 
 impl FamilyOperator {
@@ -65,7 +80,7 @@ impl FamilyOperator {
         usize::from(self.form().has_pole()) + if self.has_neuromuscular() { 2 } else { 0 }
     }
 
-    fn has_direct_part(&self) -> bool {
+    pub(super) fn has_direct_part(&self) -> bool {
         self.form().degree() == self.order()
     }
 
@@ -120,7 +135,7 @@ impl FamilyOperator {
         let mut state = gamma_new;
         let mut late = gamma_old;
         for j in first_dynamic..nb {
-            let value = |x: &[Dual; SIZE]| (0..order).fold(zero, |sum, i| sum + output[i] * x[i]);
+            let value = |x: &Vector| (0..order).fold(zero, |sum, i| sum + output[i] * x[i]);
             impulse[j] = impulse[j] + value(&state);
             if j + 1 < nb {
                 impulse[j + 1] = impulse[j + 1] + value(&late);
@@ -136,26 +151,11 @@ impl FamilyOperator {
             impulse[whole] = impulse[whole] + direct * (one - part);
             impulse[whole + 1] = impulse[whole + 1] + direct * part;
         }
-        let b: Vec<Dual> = (0..nb)
-            .map(|k| (1..=order.min(k)).fold(impulse[k], |sum, i| sum + f[i - 1] * impulse[k - i]))
-            .collect();
-        if b.iter().chain(&f).any(|c| !c.value.is_finite()) {
-            return Err(ModelError::OutOfRange {
-                quantity: "the discrete model of the operator",
-                found: f64::INFINITY,
-                expected: "finite coefficients; check omega_nm, zeta_nm and 1/T_I against the sample time",
-            });
-        }
-        Ok(HeldFamily {
-            nk: sample + shift,
-            jacobian: b.iter().chain(&f).map(|c| c.partials).collect(),
-            b: b.iter().map(|c| c.value).collect(),
-            f: f.iter().map(|c| c.value).collect(),
-        })
+        HeldFamily::of_impulse_response(sample + shift, &impulse, &f)
     }
 
     /// Numerator and monic denominator by ascending powers of `s Ts`.
-    fn by_samples(&self, variables: &[Dual], ts: f64) -> ([Dual; SIZE], [Dual; SIZE]) {
+    pub(super) fn by_samples(&self, variables: &[Dual], ts: f64) -> (Vector, Vector) {
         let zero = Dual::constant(0.0);
         let one = Dual::constant(1.0);
         let Rational { numerator, pole } = self.form().rational(variables);
@@ -183,90 +183,6 @@ impl FamilyOperator {
             std::array::from_fn(|i| den[i].scaled(scale(i))),
         )
     }
-}
-
-/// `[A B; 0 0]` of the controllable canonical form, in units of a sample.
-fn companion(denominator: &[Dual; SIZE], order: usize) -> Matrix {
-    let mut m = [[Dual::constant(0.0); SIZE]; SIZE];
-    for i in 0..order {
-        m[i][i + 1] = Dual::constant(1.0);
-    }
-    for (entry, d) in m[order - 1].iter_mut().zip(denominator).take(order) {
-        *entry = -*d;
-    }
-    m
-}
-
-/// `exp(M h)`, one row and column more than the states.
-fn exponential(m: &Matrix, h: Dual) -> Matrix {
-    let m: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| m[i][j] * h));
-    let row = |r: &[Dual; SIZE]| r.iter().map(|c| c.value.abs()).sum::<f64>();
-    let norm = m.iter().map(row).fold(0.0, f64::max);
-    // An unreasonable norm overflows anyway.
-    let halvings = if norm > 1.0 {
-        norm.log2().ceil().min(60.0) as i32
-    } else {
-        0
-    };
-    let small = 0.5_f64.powi(halvings);
-    let m: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| m[i][j].scaled(small)));
-    let mut sum = identity();
-    let mut term = identity();
-    for k in 1..=TERMS {
-        term = product(&term, &m, SIZE);
-        for i in 0..SIZE {
-            for j in 0..SIZE {
-                term[i][j] = term[i][j].scaled(1.0 / k as f64);
-                sum[i][j] = sum[i][j] + term[i][j];
-            }
-        }
-    }
-    for _ in 0..halvings {
-        sum = product(&sum, &sum, SIZE);
-    }
-    sum
-}
-
-fn identity() -> Matrix {
-    std::array::from_fn(|i| std::array::from_fn(|j| Dual::constant(f64::from(u8::from(i == j)))))
-}
-
-fn product(a: &Matrix, b: &Matrix, size: usize) -> Matrix {
-    let zero = Dual::constant(0.0);
-    let mut c = [[zero; SIZE]; SIZE];
-    for i in 0..size {
-        for j in 0..size {
-            c[i][j] = (0..size).fold(zero, |sum, k| sum + a[i][k] * b[k][j]);
-        }
-    }
-    c
-}
-
-fn times(a: &Matrix, x: &[Dual; SIZE], size: usize) -> [Dual; SIZE] {
-    let zero = Dual::constant(0.0);
-    let mut y = [zero; SIZE];
-    for i in 0..size {
-        y[i] = (0..size).fold(zero, |sum, j| sum + a[i][j] * x[j]);
-    }
-    y
-}
-
-/// Coefficients of `det(I - q^-1 Phi)` without the leading one, by the method of Faddeev and
-/// LeVerrier.
-fn characteristic(phi: &Matrix, order: usize) -> Vec<Dual> {
-    let mut coefficients = Vec::with_capacity(order);
-    let mut m = identity();
-    for k in 1..=order {
-        let next = product(phi, &m, order);
-        let trace = (0..order).fold(Dual::constant(0.0), |sum, i| sum + next[i][i]);
-        let c = trace.scaled(-1.0 / k as f64);
-        coefficients.push(c);
-        m = next;
-        for (i, row) in m.iter_mut().enumerate().take(order) {
-            row[i] = row[i] + c;
-        }
-    }
-    coefficients
 }
 
 #[cfg(test)]

@@ -15,11 +15,15 @@
 //! | `form` | [`Form`], [`Coordinate`] |
 //! | `operator` | [`FamilyOperator`]: one operator, its response, its named parameters |
 //! | `hold` | its exact discrete model for a held input, with the derivatives |
+//! | `interpolate` | the same for an error that is smooth between samples |
+//! | `matrices` | the matrix exponential |
 //! | `dual` | numbers with their derivatives |
 
 mod dual;
 mod form;
 mod hold;
+mod interpolate;
+mod matrices;
 mod operator;
 
 pub use dual::PARTIALS;

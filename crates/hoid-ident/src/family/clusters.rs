@@ -1,0 +1,301 @@
+//! Error bars that hold where the model does not: from the scores of runs, or of blocks of them.
+//!
+//! With `g_c = sum psi eps` and `G_c = sum psi psi'` over cluster c, the estimate without it is, in
+//! one Gauss-Newton step from the whole,
+//!
+//! `eta_(c) = eta - (G + P - G_c)^-1 g_c`
+//!
+//! and the jackknife over n clusters, `(n-1)/n sum (eta_(c) - mean)^2`, is the covariance (the
+//! estimator CR3 of the sandwich: R. M. Bell and D. F. McCaffrey, *Survey Methodology* 28 (2002)
+//! 169-181; J. G. MacKinnon, M. O. Nielsen and M. D. Webb, *J. Econometrics* 232 (2023) 272-299).
+//! It holds whatever the residuals are within a cluster, and is not too small with few of them.
+//! Its quantiles are Student's with n - 1 degrees of freedom.
+//!
+//! **Clusters** are the records where there are five or more. Fewer are cut into blocks of equal
+//! length, some eight in all, none shorter than four seconds: longer than the memory of residuals
+//! and of the loop. Single variances of so few blocks scatter by themselves; blocks give one number,
+//! the inflation kappa of all variances ([`inflation`]), at least one. What differs from one run to
+//! the next cannot be seen in one run: the variation of people's gain is added as it was seen in
+//! others ([`Covariances::add_run_to_run`]).
+//!
+//! **The prior** P is a measurement that no cluster holds: what it leaves open is added,
+//! `kappa sigma^2 H^-1 P H^-1`, H = G + P.
+
+use hoid_model::{Complex64, operator_family::Coordinate, uncertainty::variance_along};
+
+use super::{layout::FamilyLayout, prediction::PredictionFit};
+use crate::{
+    IdentError,
+    criterion::{Criterion, Workspace},
+    grey_box::{objective::PhysicalCriterion, parametrisation::Parametrisation},
+    linalg::least_squares::dot,
+};
+
+/// Records from which on each of them is a cluster.
+const FEWEST_RECORDS: usize = 5;
+/// Blocks into which fewer records are cut.
+const BLOCKS: usize = 8;
+/// Frequencies at which the response is judged, rad/s.
+const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
+/// Shortest block, s.
+const SHORTEST_BLOCK_S: f64 = 4.0;
+
+/// What the clusters are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ClusterKind {
+    /// Each record is one.
+    Runs,
+    /// Blocks of records.
+    Blocks,
+}
+
+/// Scores and information of each cluster.
+#[derive(Debug, Clone)]
+pub(super) struct Clusters {
+    pub kind: ClusterKind,
+    /// `(g_c, G_c)`.
+    pub parts: Vec<(Vec<f64>, Vec<f64>)>,
+}
+
+impl Clusters {
+    pub fn of(
+        criterion: &PhysicalCriterion<'_, FamilyLayout>,
+        eta: &[f64],
+        workspace: &mut Workspace,
+    ) -> Result<Self, IdentError> {
+        let (p, records) = (eta.len(), criterion.data.len());
+        let kind = if records >= FEWEST_RECORDS {
+            ClusterKind::Runs
+        } else {
+            ClusterKind::Blocks
+        };
+        let shortest = (SHORTEST_BLOCK_S / criterion.layout.sample_time.s()).ceil() as usize;
+        let mut parts = Vec::new();
+        for record in 0..records {
+            let mapped = criterion.model_of(eta, record)?;
+            let of_theta = Criterion {
+                orders: mapped.orders,
+                data: vec![criterion.data[record]],
+                initial: criterion.initial,
+                first: criterion.first,
+                weights: None,
+            };
+            let residuals = of_theta.residuals_of(&mapped.theta, 0, workspace);
+            let psi = of_theta.jacobian(&mapped.theta, 0, workspace);
+            let positions = criterion.layout.positions(record);
+            let n = residuals.len();
+            let wanted = match kind {
+                ClusterKind::Runs => 1,
+                ClusterKind::Blocks => BLOCKS.div_ceil(records).min(n / shortest.max(1)).max(1),
+            };
+            for block in 0..wanted {
+                let span = block * n / wanted..(block + 1) * n / wanted;
+                let part: Vec<&[f64]> = psi.iter().map(|column| &column[span.clone()]).collect();
+                let q = part.len();
+                let scores: Vec<f64> = part.iter().map(|c| dot(c, &residuals[span.clone()])).collect();
+                let mut gram = vec![0.0; q * q];
+                for i in 0..q {
+                    for j in 0..=i {
+                        gram[i * q + j] = dot(part[i], part[j]);
+                        gram[j * q + i] = gram[i * q + j];
+                    }
+                }
+                let (mut g, mut big) = (vec![0.0; p], vec![0.0; p * p]);
+                for (column, &place) in mapped.columns.iter().zip(positions) {
+                    g[place] += dot(column, &scores);
+                    let product: Vec<f64> = (0..q).map(|k| dot(&gram[k * q..(k + 1) * q], column)).collect();
+                    for (other, &at) in mapped.columns.iter().zip(positions) {
+                        big[place * p + at] += dot(other, &product);
+                    }
+                }
+                parts.push((g, big));
+            }
+        }
+        Ok(Self { kind, parts })
+    }
+}
+
+/// Covariances of eta: by clusters with the prior's part, and by the model.
+#[derive(Debug, Clone)]
+pub(super) struct Covariances {
+    pub clustered: Vec<f64>,
+    pub model_based: Vec<f64>,
+}
+
+impl Covariances {
+    /// Adds what two methods differ by: the estimate may lie anywhere between, a rectangular
+    /// distribution of half-width d with the variance `d d'/3` (JCGM 100:2008, *Guide to the
+    /// Expression of Uncertainty in Measurement*, 4.3.7). Elements at a bound stay without a
+    /// variance.
+    pub fn add_difference(&mut self, fit: &PredictionFit<'_>, other: &[f64]) {
+        let p = fit.parameters();
+        let mut difference = vec![0.0; p];
+        let free = fit.free();
+        for (&place, x) in fit.layout().positions(0).iter().zip(other) {
+            if free.contains(&place) {
+                difference[place] = fit.eta()[place] - x;
+            }
+        }
+        for i in 0..p {
+            for j in 0..p {
+                self.clustered[i * p + j] += difference[i] * difference[j] / 3.0;
+            }
+        }
+    }
+}
+
+impl Covariances {
+    /// Adds what people's gain varies by from one run to the next, where blocks of few runs cannot
+    /// show it: `(share x gain)^2` over the number of records.
+    pub fn add_run_to_run(&mut self, fit: &PredictionFit<'_>, share: f64) {
+        if fit.clusters.kind == ClusterKind::Runs {
+            return;
+        }
+        let p = fit.parameters();
+        let records = fit.criterion.data.len() as f64;
+        for (place, (coordinate, record)) in fit.layout().elements.iter().enumerate() {
+            if *coordinate == Coordinate::Gain {
+                let runs = if record.is_some() { 1.0 } else { records };
+                self.clustered[place * p + place] += (share * fit.eta()[place]).powi(2) / runs;
+            }
+        }
+    }
+}
+
+/// Inverse of `G + P` by rows, zero for elements at a bound.
+fn inverse(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
+    let p = fit.parameters();
+    let mut inverse = vec![0.0; p * p];
+    for i in fit.free() {
+        let mut unit = vec![0.0; p];
+        unit[i] = 1.0;
+        let column = fit.solve(None, &unit)?;
+        (0..p).for_each(|j| inverse[j * p + i] = column[j]);
+    }
+    Some(inverse)
+}
+
+/// The covariances of a fit; `None` where its information is singular.
+pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
+    let p = fit.parameters();
+    let inverse = inverse(fit)?;
+    let model_based: Vec<f64> = inverse.iter().map(|g| g * fit.innovation_variance).collect();
+    let penalties: Vec<(usize, f64)> = fit
+        .criterion
+        .penalty
+        .iter()
+        .map(|penalty| {
+            let x = fit.eta()[penalty.place];
+            let slope = if penalty.logarithmic {
+                1.0 / x.max(f64::MIN_POSITIVE)
+            } else {
+                1.0
+            };
+            (penalty.place, penalty.weight * slope * slope)
+        })
+        .collect();
+    // H^-1 P H^-1: the prior is weighed as the inflated data are.
+    let scale = fit.innovation_variance * fit.inflation;
+    let mut of_prior = vec![0.0; p * p];
+    for &(place, weight) in &penalties {
+        for i in 0..p {
+            for j in 0..p {
+                of_prior[i * p + j] += weight * inverse[i * p + place] * inverse[j * p + place];
+            }
+        }
+    }
+    let clustered = match fit.clusters.kind {
+        ClusterKind::Runs => {
+            let jackknife = jackknife(fit)?;
+            jackknife
+                .iter()
+                .zip(&of_prior)
+                .map(|(j, of_prior)| j + scale * of_prior)
+                .collect()
+        }
+        // H^-1 G H^-1 + H^-1 P H^-1 = H^-1, all of it inflated.
+        ClusterKind::Blocks => inverse.iter().map(|g| scale * g).collect(),
+    };
+    Some(Covariances { clustered, model_based })
+}
+
+/// The jackknife over clusters.
+fn jackknife(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
+    let p = fit.parameters();
+    let parts = &fit.clusters.parts;
+    let n = parts.len();
+    if n < 2 {
+        return None;
+    }
+    let steps: Option<Vec<Vec<f64>>> = parts.iter().map(|(g, big)| fit.solve(Some(big), g)).collect();
+    let steps = steps?;
+    let mean: Vec<f64> = (0..p)
+        .map(|i| steps.iter().map(|s| s[i]).sum::<f64>() / n as f64)
+        .collect();
+    let mut covariance = vec![0.0; p * p];
+    for step in &steps {
+        for i in 0..p {
+            for j in 0..p {
+                covariance[i * p + j] += (step[i] - mean[i]) * (step[j] - mean[j]) * (n as f64 - 1.0) / n as f64;
+            }
+        }
+    }
+    Some(covariance)
+}
+
+/// The estimates without each of the clusters.
+pub(super) fn without_each(fit: &PredictionFit<'_>) -> Option<Vec<Vec<f64>>> {
+    let limits = &fit.criterion.limits;
+    let of = |(g, big): &(Vec<f64>, Vec<f64>)| {
+        let step = fit.solve(Some(big), g)?;
+        let moved = fit.eta().iter().zip(step).zip(limits);
+        Some(moved.map(|((x, s), (low, high))| (x - s).clamp(*low, *high)).collect())
+    };
+    fit.clusters.parts.iter().map(of).collect()
+}
+
+/// kappa: clustered over model-based variance of the frequency response, gain and phase, the mean
+/// over the band of manual control; at least one. `None` for fewer than two clusters.
+///
+/// The ratio for single coordinates would rest on the chance of a few clusters, and on those that
+/// the data hardly determine; the response is what they do determine.
+pub(super) fn inflation(fit: &PredictionFit<'_>) -> Option<f64> {
+    let p = fit.parameters();
+    let (clustered, inverse) = (jackknife(fit)?, inverse(fit)?);
+    // The model's own variance without what the prior adds to the information: H^-1 G H^-1.
+    let mut by_model: Vec<f64> = inverse.clone();
+    for penalty in &fit.criterion.penalty {
+        let x = fit.eta()[penalty.place];
+        let slope = if penalty.logarithmic {
+            1.0 / x.max(f64::MIN_POSITIVE)
+        } else {
+            1.0
+        };
+        let weight = penalty.weight * slope * slope;
+        for i in 0..p {
+            for j in 0..p {
+                by_model[i * p + j] -= weight * inverse[i * p + penalty.place] * inverse[j * p + penalty.place];
+            }
+        }
+    }
+    let operator = fit.layout().operator(fit.eta(), 0).ok()?;
+    let places = &fit.layout().positions(0)[..fit.layout().coordinates()];
+    let mut ratios = Vec::new();
+    for omega in BAND_RAD_S {
+        let response = operator.response_and_gradient(omega);
+        let parts: [fn(Complex64) -> f64; 2] = [|z| z.re, |z| z.im];
+        for part in parts {
+            let mut gradient = vec![0.0; p];
+            for (&place, g) in places.iter().zip(&response.gradient) {
+                gradient[place] += part(g / response.value);
+            }
+            let ratio = variance_along(&gradient, &clustered)
+                / (variance_along(&gradient, &by_model) * fit.innovation_variance);
+            if ratio.is_finite() {
+                ratios.push(ratio);
+            }
+        }
+    }
+    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+    mean.is_finite().then(|| mean.max(1.0))
+}

@@ -1,0 +1,101 @@
+//! Within what the coordinates of an operator are sought.
+
+use hoid_model::{
+    SampleTime,
+    operator_family::{Coordinate, Form},
+};
+
+/// Longest lead time, s: a longer one is a pure derivative to any record of people.
+const LONGEST_LEAD_S: f64 = 30.0;
+/// Bounds of `1/T_I`, 1/s: a pure integration below, no lag at all above.
+pub(super) const LAG_RATE: (f64, f64) = (1e-3, 30.0);
+/// Largest droop, rad/s.
+const LARGEST_DROOP: f64 = 10.0;
+/// Bounds of the damping ratio: nearly undamped below, two separate lags above.
+const DAMPING: (f64, f64) = (0.02, 5.0);
+/// Lowest neuromuscular frequency, rad/s: below, it is no muscle that is seen.
+const LOWEST_FREQUENCY: f64 = 2.0;
+/// Largest omega_nm as a part of pi/Ts.
+const HIGHEST_FREQUENCY: f64 = 0.95;
+
+/// Lower and upper bound of each coordinate.
+pub(super) fn limits(
+    form: Form,
+    neuromuscular: bool,
+    delay_range_s: (f64, f64),
+    sample_time: SampleTime,
+) -> Vec<(f64, f64)> {
+    let highest = HIGHEST_FREQUENCY * sample_time.nyquist_rad_s();
+    let of = |coordinate: &Coordinate| match coordinate {
+        Coordinate::Gain | Coordinate::Linear | Coordinate::Quadratic => (f64::NEG_INFINITY, f64::INFINITY),
+        Coordinate::Lead => (0.0, LONGEST_LEAD_S),
+        Coordinate::LagRate => LAG_RATE,
+        Coordinate::Droop => (0.0, LARGEST_DROOP),
+        Coordinate::LogOmega => (LOWEST_FREQUENCY.min(0.5 * highest).ln(), highest.ln()),
+        Coordinate::LogZeta => (DAMPING.0.ln(), DAMPING.1.ln()),
+        Coordinate::Delay => delay_range_s,
+    };
+    form.coordinates(neuromuscular).iter().map(of).collect()
+}
+
+/// Values of a coordinate from which searches start.
+pub(super) fn start_values(coordinate: Coordinate, (low, high): (f64, f64)) -> Vec<f64> {
+    let values: &[f64] = match coordinate {
+        // The gain is solved for.
+        Coordinate::Gain => &[1.0],
+        Coordinate::Lead => &[0.15, 0.5, 1.2, 3.0],
+        Coordinate::LagRate => &[0.03, 0.2, 1.0],
+        Coordinate::Linear => &[0.5, 1.5],
+        Coordinate::Quadratic => &[0.05, 0.4],
+        Coordinate::Droop => &[0.1, 0.6],
+        Coordinate::LogOmega => &[2.35],
+        Coordinate::LogZeta => &[-1.2],
+        Coordinate::Delay => {
+            let steps = 4;
+            return (0..=steps)
+                .map(|i| low + (high - low) * (i as f64 + 0.5) / (steps as f64 + 1.0))
+                .map(|tau| tau.min(high))
+                .collect();
+        }
+    };
+    values.iter().map(|v| v.clamp(low, high)).collect()
+}
+
+/// All combinations of the starting values of a form.
+pub(super) fn start_grid(form: Form, neuromuscular: bool, limits: &[(f64, f64)]) -> Vec<Vec<f64>> {
+    let mut grid: Vec<Vec<f64>> = vec![Vec::new()];
+    for (coordinate, bounds) in form.coordinates(neuromuscular).into_iter().zip(limits) {
+        let values = start_values(coordinate, *bounds);
+        grid = grid
+            .into_iter()
+            .flat_map(|head| {
+                values.iter().map(move |v| {
+                    let mut next = head.clone();
+                    next.push(*v);
+                    next
+                })
+            })
+            .collect();
+    }
+    grid
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn starts_lie_within_the_limits() {
+        for form in Form::ALL {
+            for neuromuscular in [true, false] {
+                let limits = limits(form, neuromuscular, (0.05, 0.6), SampleTime::HUNDREDTH);
+                let grid = start_grid(form, neuromuscular, &limits);
+                assert!(!grid.is_empty());
+                for start in grid {
+                    assert_eq!(start.len(), limits.len());
+                    assert!(start.iter().zip(&limits).all(|(x, (low, high))| low <= x && x <= high));
+                }
+            }
+        }
+    }
+}

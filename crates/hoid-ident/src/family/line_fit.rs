@@ -1,0 +1,134 @@
+//! The operator at the lines of the excitation, with its errors by the jackknife over runs.
+
+use hoid_model::{FamilyOperator, Form, SampleTime};
+
+use super::{
+    lines::LineData,
+    response_fit::{ResponseCriterion, ResponseMinimum},
+};
+use crate::{IdentError, SearchOptions, Termination};
+
+/// Runs from which on the covariance is that of the jackknife over them.
+const FEWEST_RUNS: usize = 5;
+
+/// A fit of one form at the lines.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LineFit {
+    /// The operator.
+    pub operator: FamilyOperator,
+    /// Covariance of its coordinates by rows: by the jackknife over five or more runs, else from
+    /// the variances of the lines; with the part that the prior leaves open.
+    pub covariance: Option<Vec<f64>>,
+    /// chi^2 of the lines.
+    pub chi_squared: f64,
+    /// Real equations (two a line) less free parameters.
+    pub degrees_of_freedom: usize,
+    /// chi^2 of each run against the fit without it; none for fewer than three runs.
+    pub held_out: Option<Vec<f64>>,
+    /// How the search ended.
+    pub termination: Termination,
+}
+
+impl LineFit {
+    /// chi^2 per degree of freedom; `None` where there is none.
+    pub fn reduced_chi_squared(&self) -> Option<f64> {
+        (self.degrees_of_freedom > 0).then(|| self.chi_squared / self.degrees_of_freedom as f64)
+    }
+
+    /// Sum of chi^2 of the held-out runs.
+    pub fn held_out_total(&self) -> Option<f64> {
+        self.held_out.as_ref().map(|runs| runs.iter().sum())
+    }
+}
+
+/// Fits one form.
+///
+/// # Errors
+/// [`IdentError::NoFiniteLoss`].
+pub(super) fn line_fit(
+    lines: &LineData<'_>,
+    criterion: &ResponseCriterion<'_>,
+    search: &SearchOptions,
+    sample_time: SampleTime,
+) -> Result<(LineFit, ResponseMinimum), IdentError> {
+    let found = criterion.fit(search)?;
+    let (form, neuromuscular) = (criterion.form, criterion.neuromuscular);
+    let operator_of = |x: &[f64]| FamilyOperator::new(form, neuromuscular, x);
+    let runs = lines.runs();
+    let (mut others, mut held_out) = (Vec::new(), Vec::new());
+    if runs >= 3 {
+        for run in 0..runs {
+            let points = lines.without(run);
+            let Some(without) = criterion.with_points(&points).fit_from(&found.coordinates, search) else {
+                continue;
+            };
+            held_out.push(lines.chi_squared_of_run(run, &operator_of(&without.coordinates)?, sample_time));
+            others.push(without.coordinates);
+        }
+    }
+    let covariance = criterion.covariance(&found).map(|by_lines| {
+        if runs >= FEWEST_RUNS && others.len() == runs {
+            with_prior(jackknife(&others), &by_lines, criterion, &found.coordinates)
+        } else {
+            by_lines
+        }
+    });
+    let free = (found.coordinates.iter().zip(&criterion.limits))
+        .filter(|(x, (low, high))| low < *x && *x < high)
+        .count();
+    let fit = LineFit {
+        operator: operator_of(&found.coordinates)?,
+        covariance,
+        chi_squared: found.chi_squared,
+        degrees_of_freedom: (2 * lines.points.len()).saturating_sub(free),
+        held_out: (held_out.len() == runs && runs >= 3).then_some(held_out),
+        termination: found.termination,
+    };
+    Ok((fit, found))
+}
+
+/// `(n-1)/n sum (x_(i) - mean)(x_(i) - mean)'`.
+fn jackknife(others: &[Vec<f64>]) -> Vec<f64> {
+    let (n, p) = (others.len() as f64, others[0].len());
+    let mean: Vec<f64> = (0..p).map(|i| others.iter().map(|x| x[i]).sum::<f64>() / n).collect();
+    let mut covariance = vec![0.0; p * p];
+    for x in others {
+        for i in 0..p {
+            for j in 0..p {
+                covariance[i * p + j] += (x[i] - mean[i]) * (x[j] - mean[j]) * (n - 1.0) / n;
+            }
+        }
+    }
+    covariance
+}
+
+/// Adds `H^-1 P H^-1`, what the prior leaves open.
+fn with_prior(
+    mut covariance: Vec<f64>,
+    inverse: &[f64],
+    criterion: &ResponseCriterion<'_>,
+    coordinates: &[f64],
+) -> Vec<f64> {
+    let p = coordinates.len();
+    for penalty in &criterion.penalty {
+        let place = penalty.place;
+        let slope = if penalty.logarithmic {
+            1.0 / coordinates[place].max(f64::MIN_POSITIVE)
+        } else {
+            1.0
+        };
+        let weight = penalty.weight * slope * slope;
+        for i in 0..p {
+            for j in 0..p {
+                covariance[i * p + j] += weight * inverse[i * p + place] * inverse[j * p + place];
+            }
+        }
+    }
+    covariance
+}
+
+/// The forms in the order in which they are preferred where they do equally well: fewer
+/// coordinates first, the family before its rivals.
+pub(super) fn by_simplicity(forms: &mut [Form]) {
+    forms.sort_by_key(|form| (form.coordinates(false).len(), *form));
+}

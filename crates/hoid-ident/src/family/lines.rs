@@ -1,0 +1,86 @@
+//! The describing function at the lines of a periodic excitation, with variances that few runs can
+//! carry.
+//!
+//! The scatter of n runs gives the variance of a line with 2(n - 1) degrees of freedom, and the
+//! smallest of few such variances would decide the fit. The relative variances `r_j = v_j/|H_j|^2`
+//! are drawn towards those of the remnant beside the line, which rest on many bins:
+//! `r_j <- (nu r_j + nu_0 c b_j)/(nu + nu_0)`, `nu = 2(n - 1)`, b_j from the remnant and c the
+//! median of `r_j/b_j`, what runs differ by beyond their remnant (moderated variances; G. K. Smyth,
+//! *Statistical Applications in Genetics and Molecular Biology* 3 (2004), article 3).
+
+use hoid_model::{Complex64, FamilyOperator, SampleTime};
+
+use super::response_fit::{MeasuredResponse, hold};
+use crate::frequency::DescribingFunction;
+
+/// Degrees of freedom nu_0 of what a variance is drawn towards.
+const PRIOR_FREEDOM: f64 = 8.0;
+/// Runs from which on their scatter has a say in c.
+const FEWEST_RUNS: usize = 3;
+
+/// The lines of one or several runs.
+#[derive(Debug, Clone)]
+pub(super) struct LineData<'d> {
+    pub describing: &'d DescribingFunction,
+    pub points: Vec<MeasuredResponse>,
+}
+
+impl<'d> LineData<'d> {
+    pub fn new(describing: &'d DescribingFunction) -> Self {
+        let runs = describing.runs.len();
+        let lines = &describing.lines;
+        let beside = |i: usize| lines[i].neighbour_error.powi(2);
+        let nu = 2.0 * (runs as f64 - 1.0);
+        let mut ratios: Vec<f64> = (0..lines.len())
+            .filter_map(|i| Some(lines[i].standard_error?.powi(2) / beside(i)))
+            .filter(|r| r.is_finite())
+            .collect();
+        ratios.sort_by(f64::total_cmp);
+        // Runs that differ by less than their remnant do so by chance.
+        let excess = match ratios.get(ratios.len() / 2) {
+            Some(median) if runs >= FEWEST_RUNS => median.max(1.0),
+            _ => 1.0,
+        };
+        let variance = |i: usize| match lines[i].standard_error {
+            Some(s) if runs >= FEWEST_RUNS => (nu * s * s + PRIOR_FREEDOM * excess * beside(i)) / (nu + PRIOR_FREEDOM),
+            _ => beside(i),
+        };
+        let point = |i: usize| MeasuredResponse {
+            omega_rad_s: lines[i].omega_rad_s,
+            response: lines[i].response,
+            variance: variance(i),
+        };
+        Self {
+            points: (0..lines.len()).map(point).collect(),
+            describing,
+        }
+    }
+
+    pub fn runs(&self) -> usize {
+        self.describing.runs.len()
+    }
+
+    /// The points of all runs but one; their variances are those of so many runs.
+    pub fn without(&self, run: usize) -> Vec<MeasuredResponse> {
+        let n = self.runs() as f64;
+        let fewer = |(point, line): (&MeasuredResponse, &crate::frequency::Line)| MeasuredResponse {
+            response: line.response_without(run),
+            variance: point.variance * n / (n - 1.0),
+            ..*point
+        };
+        self.points.iter().zip(&self.describing.lines).map(fewer).collect()
+    }
+
+    /// chi^2 of one run against an operator that was fitted without it.
+    pub fn chi_squared_of_run(&self, run: usize, operator: &FamilyOperator, sample_time: SampleTime) -> f64 {
+        let n = self.runs() as f64;
+        let of = |(point, line): (&MeasuredResponse, &crate::frequency::Line)| {
+            let (a, b) = line.ratio.0[run];
+            let whole: Complex64 = line.ratio.0.iter().map(|(_, b)| b).sum();
+            let model = operator.response(point.omega_rad_s) * hold(point.omega_rad_s, sample_time);
+            // An error of n times the variance of the mean.
+            2.0 * ((a - model * b) * n / whole).norm_sqr() / (n * point.variance)
+        };
+        self.points.iter().zip(&self.describing.lines).map(of).sum()
+    }
+}

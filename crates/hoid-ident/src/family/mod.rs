@@ -1,0 +1,68 @@
+//! Operators of recorded people: the family of operators with errors that hold.
+//!
+//! `u = Y e + (C/D) eps` with Y an operator of the family ([`hoid_model::operator_family`]). People
+//! differ from a simulation in three ways that decide whether their parameters mean anything: they
+//! integrate slow errors (a lag that the operator must have), their remnant is no filter of first
+//! order (the noise model must be rich), and they vary (error bars must come from the scatter
+//! between runs). What the data do not determine is said to be so.
+//!
+//! 1. The describing function at the lines of a periodic excitation, where one was recorded
+//!    ([`crate::frequency`]); each form is fitted to it ([`LineFit`]). Without one, the response of
+//!    an ARX model of high order gives the starts.
+//! 2. Each form by prediction error, with an autoregressive (or ARMA) noise model whose order
+//!    Akaike's criterion chooses, and a weak prior on what seconds of tracking do not tell
+//!    ([`OperatorPrior`]).
+//! 3. The form that held-out runs choose ([`FormFigures`]).
+//! 4. Errors by the scatter of runs or blocks; intervals in coordinates that are nearly normal, by
+//!    profile likelihood where they are not ([`Parameter`]).
+//! 5. Both methods beside each other ([`Agreement`]), a free model of the same orders
+//!    ([`FreeModel`]), and the [`Verdict`](hoid_model::Verdict) on all of it.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `estimator` | [`FamilyEstimator`]: options, and the way from records to a result |
+//! | `result` | [`FamilyFit`] |
+//! | `parameter` | a parameter with its interval, its prior share, and whether it is determined |
+//! | `prior` | what is known before the data |
+//! | `coordinates` | bounds and starting values of the coordinates |
+//! | `lines`, `line_fit` | the lines with their variances; the operator through them |
+//! | `response_fit` | least squares on a frequency response |
+//! | `arx_response` | a response without a form |
+//! | `layout` | places of coordinates and noise coefficients |
+//! | `noise` | autoregressions: starts and orders of the noise model |
+//! | `prediction` | the prediction error fit of one form |
+//! | `clusters` | covariance by runs or blocks |
+//! | `profile` | intervals by profile likelihood |
+//! | `choice` | which form |
+//! | `agreement` | do two methods agree |
+//! | `open_loop` | crossover and phase margin |
+//! | `judgement` | what makes a result doubtful |
+
+mod agreement;
+mod arx_response;
+mod choice;
+mod clusters;
+mod coordinates;
+mod estimator;
+mod judgement;
+mod layout;
+mod line_fit;
+mod lines;
+mod noise;
+mod open_loop;
+mod parameter;
+mod prediction;
+mod prior;
+mod profile;
+mod response_fit;
+mod result;
+
+pub use agreement::{Agreement, AgreementRow};
+pub use choice::FormFigures;
+pub use clusters::ClusterKind;
+pub use estimator::{FamilyEstimator, HIGHEST_NOISE_ORDER};
+pub use line_fit::LineFit;
+pub use open_loop::{LoopMeasures, loop_measures};
+pub use parameter::Parameter;
+pub use prior::{OperatorPrior, ParameterPrior};
+pub use result::{FamilyFit, FreeModel, OperatorOfRecord};

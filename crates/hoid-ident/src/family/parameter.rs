@@ -1,0 +1,259 @@
+//! A parameter as it is reported: with its interval, how much of it is prior, and whether the data
+//! determine it.
+//!
+//! Estimates are nearly normal in the coordinates of the family, not in the parameters: where a lag
+//! is long, `1/T_I` has a symmetric error and T_I has none. Intervals are made in the coordinates
+//! and carried over; one that reaches `1/T_I = 0` is open above in T_I and in K.
+//!
+//! **Determined** is what the data say: less than half of the variance before the data is left of
+//! it ([`Parameter::prior_share`]), it does not rest at a bound of what is sought, and its interval
+//! excludes zero; for omega_nm and zeta_nm, whose prior has a scale, that it is known within a
+//! factor of two.
+
+use hoid_model::{
+    FamilyOperator,
+    operator_family::{Coordinate, NamedParameter},
+};
+
+/// Largest part of the prior's variance in what is determined.
+const LARGEST_PRIOR_SHARE: f64 = 0.5;
+/// Largest standard error of a logarithm that is determined.
+const LARGEST_LOG_ERROR: f64 = 0.35;
+
+/// One parameter of an operator.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    /// K, K_over_T_I, T_L, T_I, omega_nm, zeta_nm, tau_e ...
+    pub name: String,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Its value; infinite for T_I of a pure integration.
+    pub value: f64,
+    /// Standard error, to first order; `None` where there is none.
+    pub standard_error: Option<f64>,
+    /// Interval of 95 %; an end that is open is infinite.
+    pub interval: Option<(f64, f64)>,
+    /// Variance after the data over that before; 0 without a prior.
+    pub prior_share: f64,
+    /// True where the data determine it.
+    pub determined: bool,
+}
+
+/// What is known of the coordinates of one operator.
+pub(super) struct Known<'a> {
+    pub operator: &'a FamilyOperator,
+    pub covariance: Option<&'a [f64]>,
+    /// For each coordinate.
+    pub prior_share: &'a [f64],
+    /// For each coordinate, what was sought.
+    pub limits: &'a [(f64, f64)],
+    /// Intervals by profile likelihood, where there are such.
+    pub profile: &'a [Option<(f64, f64)>],
+    /// Quantile of Student's distribution for 95 %.
+    pub quantile: f64,
+}
+
+impl Known<'_> {
+    pub fn parameters(&self) -> Vec<Parameter> {
+        self.operator
+            .named()
+            .iter()
+            .map(|named| self.parameter(named))
+            .collect()
+    }
+
+    fn place(&self, wanted: Coordinate) -> Option<usize> {
+        let all = self.operator.form().coordinates(self.operator.has_neuromuscular());
+        all.iter().position(|c| *c == wanted)
+    }
+
+    /// Standard error of a coordinate; none at a bound.
+    fn error(&self, i: usize) -> Option<f64> {
+        let x = self.operator.coordinates();
+        let (low, high) = self.limits[i];
+        let c = self.covariance?;
+        let inside = low < x[i] && x[i] < high;
+        (inside && c[i * x.len() + i] > 0.0).then(|| c[i * x.len() + i].sqrt())
+    }
+
+    /// 95 % of a coordinate, within what was sought.
+    fn interval(&self, i: usize) -> Option<(f64, f64)> {
+        let x = self.operator.coordinates()[i];
+        if let Some(profile) = self.profile[i] {
+            return Some(profile);
+        }
+        let s = self.error(i)?;
+        let (low, high) = self.limits[i];
+        Some(((x - self.quantile * s).max(low), (x + self.quantile * s).min(high)))
+    }
+
+    fn is_determined(&self, i: usize) -> bool {
+        let coordinate = self.operator.form().coordinates(self.operator.has_neuromuscular())[i];
+        if self.prior_share[i] > LARGEST_PRIOR_SHARE {
+            return false;
+        }
+        let (Some(s), Some((low, high))) = (self.error(i), self.interval(i)) else {
+            return false;
+        };
+        match coordinate {
+            Coordinate::LogOmega | Coordinate::LogZeta => s < LARGEST_LOG_ERROR,
+            Coordinate::Gain | Coordinate::Linear | Coordinate::Quadratic => low * high > 0.0,
+            _ => low > self.limits[i].0 && low > 0.0,
+        }
+    }
+
+    fn parameter(&self, named: &NamedParameter) -> Parameter {
+        let x = self.operator.coordinates();
+        let p = x.len();
+        let mut made = Parameter {
+            name: named.name.to_owned(),
+            unit: named.unit,
+            value: named.value,
+            standard_error: None,
+            interval: None,
+            prior_share: 0.0,
+            determined: false,
+        };
+        let Some(coordinate) = named.coordinate else {
+            return self.product(made);
+        };
+        let Some(i) = self.place(coordinate) else {
+            return made;
+        };
+        let s = self.error(i);
+        made.prior_share = self.prior_share[i];
+        made.determined = self.is_determined(i);
+        let interval = self.interval(i);
+        match coordinate {
+            Coordinate::LagRate => {
+                // Zero up to the bound of what is sought is a pure integration.
+                let end = |rate: f64| {
+                    if rate <= self.limits[i].0 {
+                        f64::INFINITY
+                    } else {
+                        1.0 / rate
+                    }
+                };
+                made.value = end(x[i]);
+                made.standard_error = s.map(|s| s / (x[i] * x[i]));
+                made.interval = interval.map(|(low, high)| (1.0 / high, end(low)));
+            }
+            Coordinate::LogOmega | Coordinate::LogZeta => {
+                made.standard_error = s.map(|s| s * made.value);
+                made.interval = interval.map(|(low, high)| (low.exp(), high.exp()));
+            }
+            _ => {
+                made.standard_error = s;
+                made.interval = interval;
+            }
+        }
+        debug_assert!(i < p);
+        made
+    }
+
+    /// K = (K/T_I) T_I, or K_e_dot = K_e T_L.
+    fn product(&self, mut made: Parameter) -> Parameter {
+        let x = self.operator.coordinates();
+        let p = x.len();
+        let (Some(c), Some(gain)) = (self.covariance, self.place(Coordinate::Gain)) else {
+            return made;
+        };
+        let (other, sign) = match (self.place(Coordinate::LagRate), self.place(Coordinate::Lead)) {
+            (Some(rate), _) => (rate, -1.0),
+            (None, Some(lead)) => (lead, 1.0),
+            (None, None) => return made,
+        };
+        if self.error(gain).is_none() || self.error(other).is_none() {
+            if sign < 0.0 && x[other] <= self.limits[other].0 {
+                made.value = f64::INFINITY.copysign(x[gain]);
+            }
+            return made;
+        }
+        // Of the logarithm: d ln y = dx_g/x_g +- dx_o/x_o.
+        let variance = c[gain * p + gain] / (x[gain] * x[gain])
+            + c[other * p + other] / (x[other] * x[other])
+            + 2.0 * sign * c[gain * p + other] / (x[gain] * x[other]);
+        let relative = variance.max(0.0).sqrt();
+        made.standard_error = Some(relative * made.value.abs());
+        made.prior_share = self.prior_share[gain].max(self.prior_share[other]);
+        made.determined = self.is_determined(gain) && self.is_determined(other);
+        let factor = (self.quantile * relative).exp();
+        let (mut low, mut high) = (made.value / factor, made.value * factor);
+        if let Some((rate, _)) = self.interval(other)
+            && sign < 0.0
+            && rate <= self.limits[other].0
+        {
+            // K grows without bound as 1/T_I goes to zero.
+            if made.value > 0.0 {
+                high = f64::INFINITY;
+            } else {
+                low = f64::NEG_INFINITY;
+            }
+        }
+        made.interval = Some((low.min(high), low.max(high)));
+        made
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hoid_model::Form;
+
+    fn known(rate: f64, error: f64) -> Vec<Parameter> {
+        let operator = FamilyOperator::new(Form::LeadLag, true, &[5.0, 0.6, rate, 2.4, -1.2, 0.15]).unwrap();
+        let mut covariance = vec![0.0; 36];
+        for (i, s) in [0.2, 0.03, error, 0.1, 0.45, 0.01].iter().enumerate() {
+            covariance[i * 7] = s * s;
+        }
+        Known {
+            operator: &operator,
+            covariance: Some(&covariance),
+            prior_share: &[0.0, 0.0, 0.0, 0.1, 0.8, 0.05],
+            limits: &[
+                (f64::NEG_INFINITY, f64::INFINITY),
+                (0.0, 30.0),
+                (1e-3, 30.0),
+                (0.7, 5.0),
+                (-4.0, 1.6),
+                (0.0, 0.8),
+            ],
+            profile: &[None; 6],
+            quantile: 2.0,
+        }
+        .parameters()
+    }
+
+    fn of<'p>(all: &'p [Parameter], name: &str) -> &'p Parameter {
+        all.iter().find(|p| p.name == name).unwrap()
+    }
+
+    #[test]
+    fn a_lag_that_is_known_has_a_time_constant() {
+        let all = known(0.2, 0.02);
+        let t_i = of(&all, "T_I");
+        assert_eq!((t_i.value, t_i.determined), (5.0, true));
+        let (low, high) = t_i.interval.unwrap();
+        assert!((low - 1.0 / 0.24).abs() < 1e-12 && (high - 1.0 / 0.16).abs() < 1e-12);
+        let k = of(&all, "K");
+        assert!(k.determined && (k.value - 25.0).abs() < 1e-12);
+        // Relative errors .04 and .1.
+        assert!((k.standard_error.unwrap() - 25.0 * (0.04_f64.powi(2) + 0.01).sqrt()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_lag_that_is_not_known_is_open_above() {
+        let all = known(0.02, 0.03);
+        for name in ["T_I", "K"] {
+            let open = of(&all, name);
+            assert!(!open.determined && open.interval.unwrap().1.is_infinite(), "{name}");
+        }
+        let ratio = of(&all, "K_over_T_I");
+        assert!(ratio.determined && ratio.interval.unwrap() == (4.6, 5.4));
+        // The damping is the prior, the frequency is not.
+        assert!(!of(&all, "zeta_nm").determined && of(&all, "omega_nm").determined);
+        // At the bound: a pure integration.
+        let at_bound = known(1e-3, 0.02);
+        assert!(of(&at_bound, "T_I").value.is_infinite() && of(&at_bound, "K").value.is_infinite());
+    }
+}

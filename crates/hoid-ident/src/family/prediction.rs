@@ -1,0 +1,304 @@
+//! An operator of the family with its noise model, by prediction error.
+//!
+//! The model is `u = Y e + (C/D) eps` with Y the operator behind a hold, exactly discretised, and
+//! the criterion that of the general model ([`crate::criterion`]) in the coordinates of the family.
+//! A prior stands beside the data as `kappa sigma^2 sum_i (g_i - m_i)^2/s_i^2`. Its weight is in
+//! units of the innovation variance sigma^2, and of kappa, by how much the variances of clusters
+//! (runs, or blocks of one) exceed those that white residuals would give: people vary in ways that
+//! no stationary noise holds, so that their samples say less than as many of a simulation (M.
+//! Ribatet, D. Cooley and A. C. Davison, *Statistica Sinica* 22 (2012) 813-845, the magnitude
+//! adjustment).
+
+use hoid_model::{
+    SampleTime,
+    operator_family::{Coordinate, Form},
+};
+
+use super::{
+    clusters, clusters::Clusters, coordinates, layout::FamilyLayout, noise::NoiseProducts, prior::OperatorPrior,
+};
+use crate::{
+    IdentError, InitialState, SearchOptions,
+    criterion::{Criterion, Data, Workspace, first_residual},
+    grey_box::{
+        objective::{Penalty, PhysicalCriterion},
+        parametrisation::Parametrisation,
+    },
+    linalg::least_squares::solve_symmetric,
+    optimize::{Linearisation, Minimum},
+};
+
+/// Rounds in which sigma^2 and kappa of the prior are brought up to date.
+const ROUNDS: usize = 3;
+/// Relative change of the weight of the prior that needs no other round.
+const SETTLED: f64 = 0.05;
+
+/// The records, and what all forms have in common.
+#[derive(Debug, Clone)]
+pub(super) struct Prediction<'a> {
+    pub data: Vec<Data<'a>>,
+    pub sample_time: SampleTime,
+    pub initial: InitialState,
+    /// First residual that counts, the same for all forms.
+    pub first: usize,
+    pub delay_range_s: (f64, f64),
+    pub prior: OperatorPrior,
+    pub individual: Vec<Coordinate>,
+    pub search: SearchOptions,
+}
+
+/// Orders (nc, nd) of the noise model.
+pub(super) type NoiseOrders = (usize, usize);
+
+/// A fit of one form.
+#[derive(Debug, Clone)]
+pub(super) struct PredictionFit<'a> {
+    pub criterion: PhysicalCriterion<'a, FamilyLayout>,
+    pub minimum: Minimum,
+    /// Loss `sum eps^2/n`, without the prior.
+    pub loss: f64,
+    /// Unbiased innovation variance.
+    pub innovation_variance: f64,
+    pub residuals: usize,
+    pub states: usize,
+    pub clusters: Clusters,
+    /// kappa.
+    pub inflation: f64,
+}
+
+impl<'a> Prediction<'a> {
+    /// The least first residual that serves all these forms and orders.
+    pub fn first_residual(
+        forms: &[(Form, bool)],
+        (nc, nd): NoiseOrders,
+        delay_range_s: (f64, f64),
+        initial: InitialState,
+        sample_time: SampleTime,
+    ) -> Result<usize, IdentError> {
+        let mut first = 0;
+        for &(form, neuromuscular) in forms {
+            let limits = coordinates::limits(form, neuromuscular, delay_range_s, sample_time);
+            let layout = FamilyLayout::new((form, neuromuscular), (nc, nd), 1, &[], &limits, sample_time);
+            first = first.max(first_residual(&layout.orders(layout.longest_nk()?), initial));
+        }
+        Ok(first)
+    }
+
+    fn layout(&self, form: (Form, bool), noise: NoiseOrders) -> FamilyLayout {
+        let limits = coordinates::limits(form.0, form.1, self.delay_range_s, self.sample_time);
+        let records = self.data.len();
+        FamilyLayout::new(form, noise, records, &self.individual, &limits, self.sample_time)
+    }
+
+    pub fn criterion(&self, form: (Form, bool), noise: NoiseOrders) -> PhysicalCriterion<'a, FamilyLayout> {
+        PhysicalCriterion::new(self.layout(form, noise), self.data.clone(), self.initial, self.first)
+    }
+
+    /// What an operator leaves of u in each record: `v = u - Y e`, the states of Y estimated.
+    pub fn unexplained(
+        &self,
+        form: (Form, bool),
+        coordinates: &[f64],
+        workspace: &mut Workspace,
+    ) -> Result<Vec<Vec<f64>>, IdentError> {
+        let criterion = self.criterion(form, (0, 0));
+        let eta = criterion.layout.spread(coordinates, &[]);
+        (0..self.data.len())
+            .map(|record| {
+                let mapped = criterion.model_of(&eta, record)?;
+                Ok(self
+                    .of_record(&mapped.orders, record)
+                    .residuals_of(&mapped.theta, 0, workspace))
+            })
+            .collect()
+    }
+
+    fn of_record(&self, orders: &hoid_model::Orders, record: usize) -> Criterion<'a> {
+        Criterion {
+            orders: *orders,
+            data: vec![self.data[record]],
+            initial: self.initial,
+            first: self.first,
+            weights: None,
+        }
+    }
+
+    /// The fit of a form from these coordinates, and from the noise model that is best for them.
+    ///
+    /// # Errors
+    /// [`IdentError::NoFiniteLoss`], and those of the model.
+    pub fn fit(
+        &self,
+        form: (Form, bool),
+        noise: NoiseOrders,
+        start: &[f64],
+        workspace: &mut Workspace,
+    ) -> Result<PredictionFit<'a>, IdentError> {
+        let series = self.unexplained(form, start, workspace)?;
+        let products = NoiseProducts::new(&series, noise.1);
+        let start_of_noise = products.fit(noise.1).ok_or(IdentError::NoFiniteLoss)?;
+        let mut criterion = self.criterion(form, noise);
+        let coefficients = [vec![0.0; noise.0], start_of_noise.d].concat();
+        let mut eta = criterion.layout.spread(start, &coefficients);
+        let unit = self.penalties(&criterion.layout);
+        let mut weight = start_of_noise.loss;
+        let mut found = None;
+        for round in 0..ROUNDS {
+            criterion.penalty = scaled(&unit, weight);
+            let minimum = criterion
+                .search(eta, &self.search, None, workspace)
+                .ok_or(IdentError::NoFiniteLoss)?;
+            let fit = self.judged(criterion.clone(), minimum, workspace)?;
+            let next = fit.innovation_variance * fit.inflation;
+            eta = fit.minimum.theta.clone();
+            found = Some(fit);
+            if unit.is_empty() || (next / weight - 1.0).abs() < SETTLED || round + 1 == ROUNDS {
+                break;
+            }
+            weight = next;
+        }
+        found.ok_or(IdentError::NoFiniteLoss)
+    }
+
+    /// The prior for each place in eta, in units of one standard deviation.
+    fn penalties(&self, layout: &FamilyLayout) -> Vec<Penalty> {
+        let all = layout.form.coordinates(layout.neuromuscular);
+        let unit = self.prior.penalties(layout.form, layout.neuromuscular);
+        let places = |penalty: Penalty| {
+            let coordinate = all[penalty.place];
+            let own = layout
+                .elements
+                .iter()
+                .enumerate()
+                .filter(move |(_, e)| e.0 == coordinate);
+            own.map(move |(place, _)| Penalty { place, ..penalty })
+                .collect::<Vec<_>>()
+        };
+        unit.into_iter().flat_map(places).collect()
+    }
+
+    /// Loss, innovation variance, clusters and their inflation at a minimum.
+    fn judged(
+        &self,
+        criterion: PhysicalCriterion<'a, FamilyLayout>,
+        minimum: Minimum,
+        workspace: &mut Workspace,
+    ) -> Result<PredictionFit<'a>, IdentError> {
+        let (n, states) = (criterion.residuals(), criterion.states());
+        let penalty = penalty_at(&criterion.penalty, &minimum.theta);
+        let squares = minimum.at.sum_of_squares - penalty;
+        let p = minimum.theta.len();
+        let freedom = n
+            .checked_sub(p + states)
+            .filter(|f| *f > 0)
+            .ok_or(IdentError::NoFiniteLoss)?;
+        let clusters = Clusters::of(&criterion, &minimum.theta, workspace)?;
+        let mut fit = PredictionFit {
+            loss: squares / n as f64,
+            innovation_variance: squares / freedom as f64,
+            residuals: n,
+            states,
+            inflation: 1.0,
+            criterion,
+            minimum,
+            clusters,
+        };
+        fit.inflation = clusters::inflation(&fit).unwrap_or(1.0);
+        Ok(fit)
+    }
+}
+
+impl PredictionFit<'_> {
+    pub fn layout(&self) -> &FamilyLayout {
+        &self.criterion.layout
+    }
+
+    pub fn eta(&self) -> &[f64] {
+        &self.minimum.theta
+    }
+
+    /// What the search minimised: sum of squares with the prior.
+    pub fn objective(&self) -> f64 {
+        self.minimum.at.sum_of_squares
+    }
+
+    /// Residuals of one record.
+    pub fn residuals_of(&self, record: usize, workspace: &mut Workspace) -> Option<Vec<f64>> {
+        let mapped = self.criterion.model_of(self.eta(), record).ok()?;
+        Some(
+            self.of_record(&mapped.orders, record)
+                .residuals_of(&mapped.theta, 0, workspace),
+        )
+    }
+
+    fn of_record(&self, orders: &hoid_model::Orders, record: usize) -> Criterion<'_> {
+        Criterion {
+            orders: *orders,
+            data: vec![self.criterion.data[record]],
+            initial: self.criterion.initial,
+            first: self.criterion.first,
+            weights: None,
+        }
+    }
+
+    /// Number of free parameters.
+    pub fn parameters(&self) -> usize {
+        self.minimum.theta.len()
+    }
+
+    /// Sum of squares of the residuals of one record, at any eta; `None` where there is no model.
+    pub fn squares_of(&self, eta: &[f64], record: usize, workspace: &mut Workspace) -> Option<f64> {
+        let mapped = self.criterion.model_of(eta, record).ok()?;
+        let residuals = self
+            .of_record(&mapped.orders, record)
+            .residuals_of(&mapped.theta, 0, workspace);
+        let squares: f64 = residuals.iter().map(|e| e * e).sum();
+        squares.is_finite().then_some(squares)
+    }
+
+    /// `G + P` less what is taken away, solved for a right-hand side over the free elements.
+    pub fn solve(&self, less: Option<&[f64]>, rhs: &[f64]) -> Option<Vec<f64>> {
+        let p = self.parameters();
+        let free = self.free();
+        let gram = |i: usize, j: usize| self.minimum.at.gram[i * p + j] - less.map_or(0.0, |l| l[i * p + j]);
+        let part: Vec<f64> = free
+            .iter()
+            .flat_map(|&i| free.iter().map(move |&j| (i, j)))
+            .map(|(i, j)| gram(i, j))
+            .collect();
+        let right: Vec<f64> = free.iter().map(|&i| rhs[i]).collect();
+        let solution = solve_symmetric(&part, &right)?;
+        let mut whole = vec![0.0; p];
+        free.iter().zip(solution).for_each(|(&i, v)| whole[i] = v);
+        Some(whole)
+    }
+
+    /// Elements of eta off their bounds.
+    pub fn free(&self) -> Vec<usize> {
+        let limits = &self.criterion.limits;
+        let eta = self.eta();
+        (0..eta.len())
+            .filter(|&i| limits[i].0 < eta[i] && eta[i] < limits[i].1)
+            .collect()
+    }
+}
+
+fn scaled(unit: &[Penalty], weight: f64) -> Vec<Penalty> {
+    let of = |p: &Penalty| Penalty {
+        weight: p.weight * weight,
+        ..*p
+    };
+    unit.iter().map(of).collect()
+}
+
+/// What the prior adds to the sum of squares.
+fn penalty_at(penalty: &[Penalty], eta: &[f64]) -> f64 {
+    let p = eta.len();
+    let mut total = Linearisation {
+        sum_of_squares: 0.0,
+        descent: vec![0.0; p],
+        gram: vec![0.0; p * p],
+    };
+    penalty.iter().for_each(|one| one.add_to(eta, &mut total));
+    total.sum_of_squares
+}

@@ -1,0 +1,217 @@
+//! What is known of people before they are measured.
+//!
+//! Some seconds of tracking say little about the neuromuscular system: its resonance lies above the
+//! frequencies at which people are excited. A weak prior keeps its parameters where people's are,
+//! and does nothing where the data speak. A positive parameter x has a log-normal prior,
+//! `ln x ~ N(ln centre, spread)`, so that the spread is relative. In the criterion it stands as one
+//! more measurement of the parameter (a maximum a posteriori estimate; L. Ljung, *System
+//! Identification*, 1999, section 7.4).
+//!
+//! How much of a result is prior is the ratio of its variance after the data to that before
+//! ([`prior share`](super::Parameter::prior_share)): one means that the data said nothing.
+
+use std::{fmt, str::FromStr};
+
+use hoid_model::operator_family::{Coordinate, Form};
+
+use crate::{IdentError, grey_box::objective::Penalty};
+
+/// Spread of a parameter that is in all but name fixed: refused, as `--fix` says so openly.
+const LEAST_SPREAD: f64 = 1e-3;
+
+/// What is known of one parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterPrior {
+    /// `omega_nm`, `zeta_nm`, `tau_e`, `T_L` or `T_I`.
+    pub parameter: String,
+    /// The value that is as likely exceeded as not, in the unit of the parameter.
+    pub centre: f64,
+    /// Standard deviation of its natural logarithm.
+    pub spread: f64,
+    /// Where that is known from.
+    pub source: String,
+}
+
+/// What is known of the parameters of an operator before the data.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct OperatorPrior {
+    entries: Vec<ParameterPrior>,
+}
+
+/// The parameters that can have a prior, and their coordinates.
+const KNOWN: [(&str, Coordinate); 5] = [
+    ("omega_nm", Coordinate::LogOmega),
+    ("zeta_nm", Coordinate::LogZeta),
+    ("tau_e", Coordinate::Delay),
+    ("T_L", Coordinate::Lead),
+    ("T_I", Coordinate::LagRate),
+];
+
+/// Source of the neuromuscular part of the population.
+const NEUROMUSCULAR: &str = "published pilots: D. T. McRuer et al., IEEE Trans. Man-Machine Systems 9 (1968) 61-71; P. M. T. Zaal et al., \
+                             J. Guidance, Control, and Dynamics 32 (2009) 1089-1099";
+
+impl OperatorPrior {
+    /// Nothing is known.
+    pub fn none() -> Self {
+        Self::default()
+    }
+
+    /// People in manual control: omega_nm 10.5 rad/s within a third, zeta_nm 0.3 within a factor of
+    /// 1.6, tau_e 0.2 s within a factor of two.
+    pub fn population() -> Self {
+        let entry = |parameter: &str, centre, spread| ParameterPrior {
+            parameter: parameter.to_owned(),
+            centre,
+            spread,
+            source: NEUROMUSCULAR.to_owned(),
+        };
+        Self {
+            entries: vec![
+                entry("omega_nm", 10.5, 0.3),
+                entry("zeta_nm", 0.3, 0.5),
+                entry("tau_e", 0.2, 0.7),
+            ],
+        }
+    }
+
+    /// These entries.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] for a parameter that cannot have a prior or has two, and for a
+    /// centre or spread that is not positive.
+    pub fn new(entries: Vec<ParameterPrior>) -> Result<Self, IdentError> {
+        for (i, entry) in entries.iter().enumerate() {
+            let refuse = |found: String, expected: &str| {
+                Err(IdentError::BadOption {
+                    option: "the prior".to_owned(),
+                    found,
+                    expected: expected.to_owned(),
+                })
+            };
+            if !KNOWN.iter().any(|(name, _)| *name == entry.parameter) {
+                let names: Vec<&str> = KNOWN.iter().map(|(name, _)| *name).collect();
+                return refuse(entry.parameter.clone(), &format!("one of {}", names.join(", ")));
+            }
+            if entries[..i].iter().any(|other| other.parameter == entry.parameter) {
+                return refuse(format!("{} twice", entry.parameter), "each parameter once");
+            }
+            if !(entry.centre.is_finite() && entry.centre > 0.0) {
+                return refuse(
+                    format!("{}={}", entry.parameter, entry.centre),
+                    "a positive centre, as omega_nm=10.5:0.3",
+                );
+            }
+            if !(entry.spread.is_finite() && entry.spread >= LEAST_SPREAD) {
+                return refuse(
+                    format!("{}={}:{}", entry.parameter, entry.centre, entry.spread),
+                    "a spread (standard deviation of the logarithm) of 0.001 or more, as omega_nm=10.5:0.3",
+                );
+            }
+        }
+        Ok(Self { entries })
+    }
+
+    /// What is known of each parameter.
+    pub fn entries(&self) -> &[ParameterPrior] {
+        &self.entries
+    }
+
+    /// The same as measurements of the coordinates of a form, in units of one standard deviation.
+    pub(crate) fn penalties(&self, form: Form, neuromuscular: bool) -> Vec<Penalty> {
+        let coordinates = form.coordinates(neuromuscular);
+        let of = |entry: &ParameterPrior| {
+            let (_, coordinate) = KNOWN.iter().find(|(name, _)| *name == entry.parameter)?;
+            let place = coordinates.iter().position(|c| c == coordinate)?;
+            let sign = if *coordinate == Coordinate::LagRate { -1.0 } else { 1.0 };
+            Some(Penalty {
+                place,
+                logarithmic: !matches!(coordinate, Coordinate::LogOmega | Coordinate::LogZeta),
+                mean: sign * entry.centre.ln(),
+                weight: 1.0 / (entry.spread * entry.spread),
+            })
+        };
+        self.entries.iter().filter_map(of).collect()
+    }
+}
+
+impl fmt::Display for OperatorPrior {
+    /// As it is typed: `omega_nm=10.5:0.3,zeta_nm=0.3:0.5`, or `none`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.entries.is_empty() {
+            return f.write_str("none");
+        }
+        let entry = |e: &ParameterPrior| format!("{}={}:{}", e.parameter, e.centre, e.spread);
+        f.write_str(&self.entries.iter().map(entry).collect::<Vec<_>>().join(","))
+    }
+}
+
+impl FromStr for OperatorPrior {
+    type Err = IdentError;
+
+    /// `population`, `none`, or `NAME=CENTRE:SPREAD,...`.
+    fn from_str(text: &str) -> Result<Self, IdentError> {
+        match text.trim() {
+            "population" => return Ok(Self::population()),
+            "none" => return Ok(Self::none()),
+            _ => {}
+        }
+        let entry = |part: &str| {
+            let parsed = part.split_once('=').and_then(|(name, rest)| {
+                let (centre, spread) = rest.split_once(':')?;
+                Some((name.trim(), centre.trim().parse().ok()?, spread.trim().parse().ok()?))
+            });
+            let (parameter, centre, spread) = parsed.ok_or_else(|| IdentError::BadOption {
+                option: "the prior".to_owned(),
+                found: part.to_owned(),
+                expected: "population, none, or NAME=CENTRE:SPREAD separated by commas, as omega_nm=10.5:0.3"
+                    .to_owned(),
+            })?;
+            Ok(ParameterPrior {
+                parameter: parameter.to_owned(),
+                centre,
+                spread,
+                source: "given by the user".to_owned(),
+            })
+        };
+        Self::new(text.split(',').map(entry).collect::<Result<_, IdentError>>()?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn priors_as_typed() {
+        let typed: OperatorPrior = "omega_nm=10.5:0.3, zeta_nm=0.3:0.5".parse().unwrap();
+        assert_eq!(typed.to_string(), "omega_nm=10.5:0.3,zeta_nm=0.3:0.5");
+        assert_eq!("none".parse::<OperatorPrior>().unwrap(), OperatorPrior::none());
+        assert_eq!("population".parse::<OperatorPrior>().unwrap().entries().len(), 3);
+        for bad in [
+            "",
+            "omega_nm",
+            "omega_nm=10",
+            "K=1:1",
+            "omega_nm=-1:0.3",
+            "omega_nm=1:0",
+            "T_L=1:1,T_L=2:1",
+        ] {
+            assert!(bad.parse::<OperatorPrior>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn only_the_coordinates_of_the_form_are_penalised() {
+        let prior = OperatorPrior::population();
+        assert_eq!(prior.penalties(Form::LeadLag, true).len(), 3);
+        assert_eq!(prior.penalties(Form::LeadLag, false).len(), 1);
+        let lag: OperatorPrior = "T_I=5:0.5".parse().unwrap();
+        let [penalty] = lag.penalties(Form::LeadLag, true)[..] else {
+            panic!("one penalty")
+        };
+        // ln(1/T_I) is centred at -ln 5.
+        assert_eq!((penalty.place, penalty.mean), (2, -(5.0_f64.ln())));
+        assert!(lag.penalties(Form::Lead, true).is_empty());
+    }
+}

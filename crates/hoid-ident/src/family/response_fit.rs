@@ -1,0 +1,358 @@
+//! An operator of the family through a frequency response that was measured.
+//!
+//! With `H_j` the response at omega_j and `v_j = E|dH_j|^2` its variance (real and imaginary part
+//! have half of it each), the fit minimises
+//!
+//! `chi^2 = sum_j 2 |H_j - Y(j omega_j) Z(omega_j)|^2 / v_j + sum_i (g_i - m_i)^2 / s_i^2`
+//!
+//! where Z is the error between its samples and the second sum is the prior.
+//! Source: R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach*,
+//! 2012, chapter 9 (the sample maximum likelihood estimator; the errors of input and output
+//! together are those of their ratio).
+
+use hoid_model::{
+    Complex64, FamilyOperator, SampleTime,
+    operator_family::{Coordinate, Form},
+};
+
+use super::{coordinates, prior::OperatorPrior};
+use crate::{
+    IdentError, SearchOptions, Termination,
+    grey_box::objective::Penalty,
+    linalg::least_squares::solve_symmetric,
+    optimize::{Linearisation, Minimum, Objective, minimise},
+};
+
+/// Starts from which the search runs to its end.
+const SEARCHES: usize = 6;
+
+/// A response at one frequency, and how well it is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredResponse {
+    /// Frequency, rad/s.
+    pub omega_rad_s: f64,
+    /// H from e to u, as sampled.
+    pub response: Complex64,
+    /// `E|dH|^2`.
+    pub variance: f64,
+}
+
+/// What the error between its samples does to a sinusoid: straight lines, half a sample late
+/// ([`FamilyOperator::interpolate`]).
+pub(super) fn hold(omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
+    let half = 0.5 * omega_rad_s * sample_time.s();
+    let sinc = if half.abs() < 1e-8 { 1.0 } else { half.sin() / half };
+    Complex64::from_polar(sinc * sinc, -half)
+}
+
+/// The criterion over the coordinates of a form.
+#[derive(Debug, Clone)]
+pub(super) struct ResponseCriterion<'p> {
+    pub form: Form,
+    pub neuromuscular: bool,
+    pub sample_time: SampleTime,
+    pub points: &'p [MeasuredResponse],
+    pub limits: Vec<(f64, f64)>,
+    pub penalty: Vec<Penalty>,
+}
+
+/// Where a search ended.
+#[derive(Debug, Clone)]
+pub(super) struct ResponseMinimum {
+    pub coordinates: Vec<f64>,
+    /// chi^2 without the prior.
+    pub chi_squared: f64,
+    /// Half the second derivative of chi^2 with the prior, by rows: the inverse covariance.
+    pub information: Vec<f64>,
+    pub termination: Termination,
+}
+
+impl<'p> ResponseCriterion<'p> {
+    pub fn new(
+        form: Form,
+        neuromuscular: bool,
+        points: &'p [MeasuredResponse],
+        prior: &OperatorPrior,
+        delay_range_s: (f64, f64),
+        sample_time: SampleTime,
+    ) -> Self {
+        Self {
+            form,
+            neuromuscular,
+            sample_time,
+            points,
+            limits: coordinates::limits(form, neuromuscular, delay_range_s, sample_time),
+            penalty: prior.penalties(form, neuromuscular),
+        }
+    }
+
+    /// The same with other points.
+    pub fn with_points<'q>(&self, points: &'q [MeasuredResponse]) -> ResponseCriterion<'q> {
+        ResponseCriterion {
+            points,
+            form: self.form,
+            neuromuscular: self.neuromuscular,
+            sample_time: self.sample_time,
+            limits: self.limits.clone(),
+            penalty: self.penalty.clone(),
+        }
+    }
+
+    /// The best of the searches from the best points of a grid.
+    ///
+    /// # Errors
+    /// [`IdentError::NoFiniteLoss`].
+    pub fn fit(&self, search: &SearchOptions) -> Result<ResponseMinimum, IdentError> {
+        let mut starts: Vec<(f64, Vec<f64>)> = coordinates::start_grid(self.form, self.neuromuscular, &self.limits)
+            .into_iter()
+            .filter_map(|mut start| Some((self.best_gain(&mut start)?, start)))
+            .collect();
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut best: Option<Minimum> = None;
+        for (_, start) in starts.into_iter().take(SEARCHES) {
+            let known = best.as_ref().map(|b| b.at.sum_of_squares);
+            if let Some(found) = minimise(self, start, search, None, &mut ())
+                && known.is_none_or(|known| found.at.sum_of_squares < known)
+            {
+                best = Some(found);
+            }
+        }
+        best.map(|minimum| self.result(minimum)).ok_or(IdentError::NoFiniteLoss)
+    }
+
+    /// The search from one point.
+    pub fn fit_from(&self, start: &[f64], search: &SearchOptions) -> Option<ResponseMinimum> {
+        minimise(self, start.to_vec(), search, None, &mut ()).map(|minimum| self.result(minimum))
+    }
+
+    /// Covariance of the coordinates where the points have theirs, `information^-1`; zero for those
+    /// at a bound. `None` where it does not exist.
+    pub fn covariance(&self, minimum: &ResponseMinimum) -> Option<Vec<f64>> {
+        let p = minimum.coordinates.len();
+        let free = self.inner(&minimum.coordinates);
+        let part: Vec<f64> = free
+            .iter()
+            .flat_map(|&i| free.iter().map(move |&j| (i, j)))
+            .map(|(i, j)| minimum.information[i * p + j])
+            .collect();
+        let mut covariance = vec![0.0; p * p];
+        for (k, &i) in free.iter().enumerate() {
+            let mut unit = vec![0.0; free.len()];
+            unit[k] = 1.0;
+            let column = solve_symmetric(&part, &unit)?;
+            free.iter().zip(column).for_each(|(&j, v)| covariance[j * p + i] = v);
+        }
+        Some(covariance)
+    }
+
+    /// Coordinates off their bounds.
+    fn inner(&self, x: &[f64]) -> Vec<usize> {
+        (0..x.len())
+            .filter(|&i| self.limits[i].0 < x[i] && x[i] < self.limits[i].1)
+            .collect()
+    }
+
+    /// chi^2 at these coordinates, without the prior.
+    pub fn chi_squared(&self, x: &[f64]) -> Option<f64> {
+        let operator = FamilyOperator::new(self.form, self.neuromuscular, x).ok()?;
+        let of = |point: &MeasuredResponse| {
+            let model = operator.response(point.omega_rad_s) * hold(point.omega_rad_s, self.sample_time);
+            2.0 * (point.response - model).norm_sqr() / point.variance
+        };
+        Some(self.points.iter().map(of).sum())
+    }
+
+    fn result(&self, minimum: Minimum) -> ResponseMinimum {
+        ResponseMinimum {
+            chi_squared: self.chi_squared(&minimum.theta).unwrap_or(f64::NAN),
+            coordinates: minimum.theta,
+            information: minimum.at.gram,
+            termination: minimum.termination,
+        }
+    }
+
+    /// Sets the gain that is best for the other coordinates; the criterion there.
+    fn best_gain(&self, x: &mut [f64]) -> Option<f64> {
+        debug_assert_eq!(self.form.coordinates(self.neuromuscular)[0], Coordinate::Gain);
+        x[0] = 1.0;
+        let operator = FamilyOperator::new(self.form, self.neuromuscular, x).ok()?;
+        let (mut cross, mut power) = (0.0, 0.0);
+        for point in self.points {
+            let model = operator.response(point.omega_rad_s) * hold(point.omega_rad_s, self.sample_time);
+            cross += (model.conj() * point.response).re / point.variance;
+            power += model.norm_sqr() / point.variance;
+        }
+        x[0] = cross / power;
+        let value = self.linearise(x, &mut ()).sum_of_squares;
+        (value.is_finite() && x[0] != 0.0).then_some(value)
+    }
+}
+
+impl Objective for ResponseCriterion<'_> {
+    type Workspace = ();
+
+    fn is_feasible(&self, x: &[f64]) -> bool {
+        FamilyOperator::new(self.form, self.neuromuscular, x).is_ok()
+    }
+
+    fn linearise(&self, x: &[f64], _: &mut ()) -> Linearisation {
+        let p = x.len();
+        let mut total = Linearisation {
+            sum_of_squares: 0.0,
+            descent: vec![0.0; p],
+            gram: vec![0.0; p * p],
+        };
+        let Ok(operator) = FamilyOperator::new(self.form, self.neuromuscular, x) else {
+            total.sum_of_squares = f64::NAN;
+            return total;
+        };
+        for point in self.points {
+            let hold = hold(point.omega_rad_s, self.sample_time);
+            let model = operator.response_and_gradient(point.omega_rad_s);
+            let weight = 2.0 / point.variance;
+            let off = point.response - model.value * hold;
+            total.sum_of_squares += weight * off.norm_sqr();
+            let slopes: Vec<Complex64> = model.gradient.iter().map(|g| g * hold).collect();
+            for i in 0..p {
+                total.descent[i] += weight * (slopes[i].conj() * off).re;
+                for j in 0..p {
+                    total.gram[i * p + j] += weight * (slopes[i].conj() * slopes[j]).re;
+                }
+            }
+        }
+        for penalty in &self.penalty {
+            penalty.add_to(x, &mut total);
+        }
+        total
+    }
+
+    fn output_power(&self) -> f64 {
+        self.points
+            .iter()
+            .map(|p| 2.0 * p.response.norm_sqr() / p.variance)
+            .sum()
+    }
+
+    fn limits(&self) -> Option<&[(f64, f64)]> {
+        Some(&self.limits)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const OMEGA: [f64; 11] = [0.63, 0.94, 1.57, 2.2, 3.46, 4.08, 5.34, 5.97, 7.23, 9.11, 9.74];
+
+    fn points(truth: &FamilyOperator, ts: SampleTime) -> Vec<MeasuredResponse> {
+        OMEGA
+            .iter()
+            .map(|&omega| {
+                let response = truth.response(omega) * hold(omega, ts);
+                MeasuredResponse {
+                    omega_rad_s: omega,
+                    response,
+                    variance: 0.01 * response.norm_sqr(),
+                }
+            })
+            .collect()
+    }
+
+    fn truth(form: Form) -> FamilyOperator {
+        let tail = [11.0_f64.ln(), 0.25_f64.ln(), 0.19];
+        let head: &[f64] = match form {
+            Form::Gain => &[3.0],
+            Form::Lead | Form::Lead2 => &[1.5, 0.5],
+            Form::Lag => &[4.0, 0.4],
+            Form::LeadLag | Form::Lead2Lag => &[4.0, 0.6, 0.2],
+            Form::QuadraticIntegral => &[2.0, 0.9, 0.3],
+            Form::LeadDroop => &[1.5, 0.5, 0.4],
+        };
+        FamilyOperator::new(form, true, &[head, &tail].concat()).unwrap()
+    }
+
+    #[test]
+    fn an_exact_response_gives_its_operator_back() {
+        let ts = SampleTime::new(1.0 / 60.0).unwrap();
+        for form in Form::ALL {
+            let truth = truth(form);
+            let points = points(&truth, ts);
+            let none = OperatorPrior::none();
+            let criterion = ResponseCriterion::new(form, true, &points, &none, (0.0, 0.6), ts);
+            let found = criterion.fit(&SearchOptions::default()).unwrap();
+            for (a, b) in found.coordinates.iter().zip(truth.coordinates()) {
+                assert!((a - b).abs() < 1e-6 * (1.0 + b.abs()), "{form}: {a} {b}");
+            }
+            assert!(found.chi_squared < 1e-9, "{form}");
+        }
+    }
+
+    #[test]
+    fn derivatives_agree_with_finite_differences() {
+        let ts = SampleTime::new(1.0 / 60.0).unwrap();
+        let points = points(&truth(Form::LeadLag), ts);
+        let prior = OperatorPrior::population();
+        let criterion = ResponseCriterion::new(Form::LeadLag, true, &points, &prior, (0.0, 0.6), ts);
+        let x = [3.0, 0.8, 0.3, 2.2, -1.0, 0.25];
+        let at = criterion.linearise(&x, &mut ());
+        for i in 0..x.len() {
+            let value = |by: f64| {
+                let mut moved = x;
+                moved[i] += by;
+                criterion.linearise(&moved, &mut ()).sum_of_squares
+            };
+            let difference = -(value(1e-6) - value(-1e-6)) / 4e-6;
+            assert!(
+                (at.descent[i] - difference).abs() < 1e-6 * at.descent[i].abs().max(1.0),
+                "{i}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_errors_are_those_of_repeated_measurements() {
+        // 400 measurements with a fixed seed: a standard deviation is known to 3.5 %.
+        let mut state = 5_u64;
+        let mut uniform = move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let ts = SampleTime::new(1.0 / 60.0).unwrap();
+        let truth = truth(Form::LeadLag);
+        let exact: Vec<MeasuredResponse> = points(&truth, ts)
+            .into_iter()
+            .map(|p| MeasuredResponse {
+                variance: 0.0004 * p.response.norm_sqr(),
+                ..p
+            })
+            .collect();
+        let none = OperatorPrior::none();
+        let mut all = Vec::new();
+        let mut covariance = Vec::new();
+        for _ in 0..400 {
+            // Twelve uniform deviates: variance 1.
+            let mut normal = || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+            let noisy: Vec<MeasuredResponse> = exact
+                .iter()
+                .map(|p| MeasuredResponse {
+                    response: p.response + Complex64::new(normal(), normal()) * (p.variance / 2.0).sqrt(),
+                    ..*p
+                })
+                .collect();
+            let criterion = ResponseCriterion::new(Form::LeadLag, true, &noisy, &none, (0.0, 0.6), ts);
+            let found = criterion
+                .fit_from(truth.coordinates(), &SearchOptions::default())
+                .unwrap();
+            covariance = criterion.covariance(&found).unwrap();
+            all.push(found.coordinates);
+        }
+        for i in 0..6 {
+            let mean = all.iter().map(|x| x[i]).sum::<f64>() / 400.0;
+            let deviation = (all.iter().map(|x| (x[i] - mean).powi(2)).sum::<f64>() / 399.0).sqrt();
+            let ratio = deviation / covariance[i * 7].sqrt();
+            assert!((ratio - 1.0).abs() < 0.2, "{i}: {ratio}");
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! What a fit of the family found.
+
+use hoid_model::{
+    ContinuousTransferFunction, FamilyOperator, Form, SampleTime, Verdict, operator_family::Coordinate,
+    uncertainty::Estimate,
+};
+
+use super::{
+    agreement::Agreement,
+    choice::FormFigures,
+    clusters::ClusterKind,
+    line_fit::LineFit,
+    open_loop::{LoopMeasures, loop_measures},
+    parameter::Parameter,
+    prior::OperatorPrior,
+};
+use crate::{Fit, Termination};
+
+/// An operator of one or several records.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OperatorOfRecord {
+    /// The operator.
+    pub operator: FamilyOperator,
+    /// Covariance of its coordinates by rows: clustered, with what the prior leaves open. `None`
+    /// where the information is singular.
+    pub covariance: Option<Vec<f64>>,
+    /// The same from the model alone, as if residuals were white and nothing varied.
+    pub model_based: Option<Vec<f64>>,
+    /// Its parameters.
+    pub parameters: Vec<Parameter>,
+    /// The same model as polynomials, for prediction and simulation.
+    pub polynomial_fit: Fit,
+}
+
+/// Whether the form can be told from a Box-Jenkins model of the same orders.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FreeModel {
+    /// Loss of Box-Jenkins with the orders and the delay of the fit.
+    pub loss: f64,
+    /// `n ln(V/V_bj)/kappa`: the likelihood ratio, in units of the inflated variance.
+    pub likelihood_ratio: f64,
+    /// Parameters that Box-Jenkins has more.
+    pub degrees_of_freedom: usize,
+    /// Probability of a ratio as large where the form is right.
+    pub p_value: f64,
+}
+
+/// The result of [`super::FamilyEstimator::fit`].
+#[derive(Debug, Clone)]
+pub struct FamilyFit {
+    /// The form that was chosen or given.
+    pub form: Form,
+    /// True with the neuromuscular part.
+    pub neuromuscular: bool,
+    /// Orders nc and nd of the noise model.
+    pub noise_orders: (usize, usize),
+    /// Coefficients c and d of the noise model `v = (C/D) eps`.
+    pub noise: (Vec<f64>, Vec<f64>),
+    /// The operator: one for all records, or one for each where some parameters are individual.
+    pub operators: Vec<OperatorOfRecord>,
+    /// The prior.
+    pub prior: OperatorPrior,
+    /// The forms that were compared, simplest first.
+    pub forms: Vec<FormFigures>,
+    /// The fit at the lines of the excitation, of the same form.
+    pub lines: Option<LineFit>,
+    /// Why there is none.
+    pub no_lines: Option<String>,
+    /// Prediction error method and lines beside each other.
+    pub agreement: Option<Agreement>,
+    /// Box-Jenkins of the same orders.
+    pub free_model: Option<FreeModel>,
+    /// What the error bars are made from.
+    pub cluster_kind: ClusterKind,
+    /// How many clusters.
+    pub clusters: usize,
+    /// kappa: clustered over model-based variances.
+    pub inflation: f64,
+    /// Largest ratio of a clustered to a model-based standard error.
+    pub error_ratio: Option<f64>,
+    /// Loss `V = sum eps^2/n`.
+    pub loss: f64,
+    /// Unbiased innovation variance.
+    pub innovation_variance: f64,
+    /// Number n of residuals.
+    pub residuals: usize,
+    /// Variance of u that the excitation explains: mean squared coherence at the lines, weighted
+    /// with the power of u there.
+    pub coherent_share: Option<f64>,
+    /// How the search ended.
+    pub termination: Termination,
+    /// Time between two samples.
+    pub sample_time: SampleTime,
+    /// What the result is worth.
+    pub verdict: Verdict,
+}
+
+impl FamilyFit {
+    /// The operator of a record; of records beyond them, the last.
+    pub fn operator(&self, record: usize) -> &OperatorOfRecord {
+        &self.operators[record.min(self.operators.len() - 1)]
+    }
+
+    /// Crossover frequency and phase margin of a record with a controlled element; `None` where
+    /// the loop has no crossover.
+    pub fn loop_measures(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
+        let of = self.operator(record);
+        loop_measures(&of.operator, of.covariance.as_deref(), element, self.sample_time)
+    }
+
+    /// Crossover frequency and phase margin of the fit at the lines.
+    pub fn loop_measures_at_lines(&self, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
+        let lines = self.lines.as_ref()?;
+        loop_measures(&lines.operator, lines.covariance.as_deref(), element, self.sample_time)
+    }
+
+    /// A coordinate of a record with its standard error.
+    pub fn coordinate(&self, record: usize, wanted: Coordinate) -> Option<Estimate> {
+        let of = self.operator(record);
+        let all = self.form.coordinates(self.neuromuscular);
+        let i = all.iter().position(|c| *c == wanted)?;
+        let x = of.operator.coordinates();
+        Some(match &of.covariance {
+            Some(c) => Estimate::with_variance(x[i], c[i * x.len() + i]),
+            None => Estimate::fixed(x[i]),
+        })
+    }
+}
