@@ -4,12 +4,13 @@ use hoid_ident::frequency::{
     Averaging, DescribingFunction, DescribingOptions, Excitation, GainLeadDelayOptions, LineSearch, LineWeights,
     Realisation, describe,
 };
-use hoid_model::{ContinuousTransferFunction, uncertainty::Estimate};
+use hoid_model::uncertainty::Estimate;
 use numpy::{Complex64, PyArray1};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
     arrays::{self, Wanted, array},
+    controlled_element::ControlledElement,
     errors::{Outcome, bad_option},
     figures::{error_or_nan, pair},
     names,
@@ -175,10 +176,9 @@ impl PyDescribingFunction {
         Ok(all)
     }
 
-    /// Crossover frequency and phase margin with a controlled element, by descending powers of s.
-    fn margins<'py>(&self, py: Python<'py>, num: Vec<f64>, den: Vec<f64>) -> Outcome<Bound<'py, PyDict>> {
-        let element = ContinuousTransferFunction::new(&num, &den)?;
-        let margins = self.found.open_loop(&element).margins();
+    /// Crossover frequency and phase margin with a controlled element.
+    fn margins<'py>(&self, py: Python<'py>, element: ControlledElement) -> Outcome<Bound<'py, PyDict>> {
+        let margins = self.found.open_loop(&element.transfer_function()?).margins();
         let all = PyDict::new(py);
         all.set_item("crossover_rad_s", margins.crossover_rad_s.map(pair))?;
         all.set_item("phase_margin_deg", margins.phase_margin_deg.map(pair))?;

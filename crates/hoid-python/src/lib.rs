@@ -23,6 +23,7 @@
 )]
 
 mod arrays;
+mod controlled_element;
 mod describing;
 mod errors;
 mod figures;

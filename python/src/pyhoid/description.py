@@ -90,12 +90,15 @@ class DescribingFunction:
             for name, pair in found.items()
         }
 
-    def margins(self, num: Sequence[float], den: Sequence[float]) -> dict[str, Estimate | None]:
+    def margins(
+        self, num: str | Sequence[float], den: Sequence[float] | None = None
+    ) -> dict[str, Estimate | None]:
         """Crossover frequency and phase margin with a controlled element.
 
-        `num` and `den` are its coefficients by descending powers of s.
+        `num` is the element as text, such as ``"90/(s(s+6))"``; or `num` and `den` are its
+        coefficients by descending powers of s.
         """
-        return estimates(self._native.margins([float(v) for v in num], [float(v) for v in den]))
+        return estimates(self._native.margins(_options.controlled_element(num, den)))
 
     def to_pandas(self) -> pd.DataFrame:
         """The lines as a table."""
