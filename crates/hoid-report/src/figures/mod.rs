@@ -34,7 +34,6 @@ mod legend;
 mod maps;
 mod palette;
 mod panel;
-mod phase;
 mod scale;
 mod series;
 mod style;
