@@ -60,14 +60,14 @@ def controlled_element(
         if den is not None:
             raise OptionError(f"the controlled element {element!r} is whole, expected no den beside it")
         return element
-    parts = tuple(element) if den is None else (element, den)
     try:
+        parts: tuple[Any, ...] = tuple(element) if den is None else (element, den)
         if len(parts) != 2:
             raise TypeError
-        return [float(v) for v in cast(Any, parts[0])], [float(v) for v in cast(Any, parts[1])]
+        return [float(v) for v in parts[0]], [float(v) for v in parts[1]]
     except (TypeError, ValueError):
         raise OptionError(
-            f"the controlled element is {parts!r}, expected text such as '90/(s(s+6))', "
+            f"the controlled element is {element!r}, expected text such as '90/(s(s+6))', "
             "or numerator and denominator by descending powers of s"
         ) from None
 

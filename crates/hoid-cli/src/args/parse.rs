@@ -1,4 +1,4 @@
-//! Values as they are typed: spans of numbers.
+//! Values as they are typed: spans of numbers, widths of figures.
 
 /// `LO..HI`, finite and in order.
 pub fn parse_span(text: &str) -> Result<(f64, f64), String> {
@@ -12,9 +12,30 @@ pub fn parse_span(text: &str) -> Result<(f64, f64), String> {
     }
 }
 
+/// A width on paper, `85mm`, `8.5cm` or `3.3in`, in mm.
+pub fn parse_width(text: &str) -> Result<f64, String> {
+    let units = [("mm", 1.0), ("cm", 10.0), ("in", 25.4)];
+    let of = |(unit, mm): (&str, f64)| Some(text.trim().strip_suffix(unit)?.trim().parse::<f64>().ok()? * mm);
+    units
+        .into_iter()
+        .find_map(of)
+        .filter(|mm| (10.0..=2000.0).contains(mm))
+        .ok_or_else(|| format!("{text:?} is no width; write one from 10mm to 2000mm, as 85mm, 17cm or 3.3in"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn widths_as_typed() {
+        assert_eq!(parse_width("85mm"), Ok(85.0));
+        assert_eq!(parse_width(" 17 cm"), Ok(170.0));
+        assert!((parse_width("3.3in").unwrap() - 83.82).abs() < 1e-12);
+        for bad in ["", "85", "mm", "-85mm", "1e9mm", "NaNmm", "85px"] {
+            assert!(parse_width(bad).is_err(), "{bad}");
+        }
+    }
 
     #[test]
     fn spans_as_typed() {

@@ -52,7 +52,7 @@ pub(super) struct Judged<'a> {
 }
 
 /// Squared coherence that one of twenty sets of n unrelated runs exceeds; none for one run.
-pub(super) fn chance_coherence(n: usize) -> Option<f64> {
+pub fn chance_coherence(n: usize) -> Option<f64> {
     (n > 1).then(|| 1.0 - LEVEL.powf(1.0 / (n as f64 - 1.0)))
 }
 

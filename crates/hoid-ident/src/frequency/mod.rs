@@ -62,6 +62,7 @@ mod synthetic_records;
 
 pub use describe::{DescribingFunction, Line, RunSummary, describe};
 pub use description::{Description, DescriptionOptions, USUAL_EXCITATIONS, describe_runs};
+pub use doubts::chance_coherence;
 pub use excitation::{Excitation, LineSearch};
 pub use gain_lead_delay::{GainLeadDelay, GainLeadDelayOptions, LineWeights};
 pub use open_loop::{Crossover, DescribingMargins, OpenLoop};
