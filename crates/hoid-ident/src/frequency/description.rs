@@ -128,12 +128,7 @@ pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result
         ..DescribingOptions::default()
     };
     let function = describe(records, &excitation, &describing)?;
-    let delay_s = function
-        .fit_gain_lead_delay(&GainLeadDelayOptions::default())
-        .map(|fit| fit.delay_s.value)
-        .ok()
-        .filter(|delay| (0.0..=LONGEST_DELAY_S).contains(delay))
-        .unwrap_or(0.0);
+    let delay_s = delay_of(&function);
     let open_loop = options
         .controlled_element
         .as_ref()
@@ -157,6 +152,24 @@ pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result
         margins,
         verdict,
     })
+}
+
+/// Delay of gain, lead and delay through the lines; without the lead where it would be negative,
+/// and so a part of the delay.
+fn delay_of(function: &DescribingFunction) -> f64 {
+    let fit = |lead| {
+        let options = GainLeadDelayOptions {
+            lead,
+            ..GainLeadDelayOptions::default()
+        };
+        function.fit_gain_lead_delay(&options).ok()
+    };
+    fit(true)
+        .filter(|fit| fit.lead_s.value >= 0.0)
+        .or_else(|| fit(false))
+        .map(|fit| fit.delay_s.value)
+        .filter(|delay| (0.0..=LONGEST_DELAY_S).contains(delay))
+        .unwrap_or(0.0)
 }
 
 /// The lines, and the channel that they are in if there is one.

@@ -12,6 +12,8 @@ use super::{
 };
 use crate::numbers::Z_95;
 
+/// In the legend; equal names stand there once.
+const NAME: &str = "describing function, bars 95 %";
 /// Frequencies of a model curve.
 const POINTS: usize = 240;
 
@@ -100,19 +102,13 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
     let gain_of = |model: &ModelCurve| model.response.iter().map(|h| 20.0 * h.norm().log10()).collect();
     // Models first: the points lie on them.
     let mut magnitude: Vec<Curve> = models.iter().enumerate().map(|m| line(m, gain_of(m.1))).collect();
-    magnitude.push(points(
-        &magnitudes,
-        if models.is_empty() { "" } else { "describing function" },
-    ));
+    magnitude.push(points(&magnitudes, NAME));
     let mut phase: Vec<Curve> = models
         .iter()
         .enumerate()
         .map(|m| line(m, m.1.phase_deg(&known)))
         .collect();
-    phase.push(points(
-        &phases,
-        if models.is_empty() { "" } else { "describing function" },
-    ));
+    phase.push(points(&phases, NAME));
     let mut panels = vec![panel("magnitude", "dB", magnitude), panel("phase", "deg", phase)];
     let coherences: Vec<Estimate> = lines.iter().filter_map(|l| l.coherence).map(Estimate::fixed).collect();
     // Without the excitation it is that of u with e, which says little in a loop.
@@ -121,7 +117,7 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
         let ends = models.iter().flat_map(|m| m.omega_rad_s.iter()).chain(&omega);
         let (low, high) = ends.fold((f64::INFINITY, 0.0_f64), |(l, h), w| (l.min(*w), h.max(*w)));
         let level = Curve {
-            name: "coherence of unrelated runs (95 %)".to_owned(),
+            name: "unrelated runs stay below (95 %)".to_owned(),
             kind: LineKind::Truth,
             shade: Shade::of_method(0),
             x: vec![low, high],
