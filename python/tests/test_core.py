@@ -194,6 +194,33 @@ def test_a_describing_function(c1: pyhoid.Record, fit: pyhoid.Fit) -> None:
         pyhoid.describing_function(c1, start=0, stop=50)
 
 
+def test_a_description_with_its_verdict(c1: pyhoid.Record) -> None:
+    runs = [pyhoid.simulate("C1", seed=1, replication=k) for k in range(4)]
+    found = pyhoid.describe(runs, controlled_element="90/(s(s+6))")
+    assert found.verdict == "trustworthy" and not found.reasons, found
+    assert found.excitation == "f_t" and abs(found.period - 81.92) < 1e-9
+    by_hand = pyhoid.describing_function(runs, averaging="reference", reference="f_t")
+    assert np.array_equal(found.function.response, by_hand.response)
+    # No jumps, and each phase a whole number of turns from its principal value.
+    turns = (found.phase_deg - by_hand["phase_deg"]) / 360
+    assert np.allclose(turns, np.round(turns)) and np.all(np.diff(found.phase_deg)[3:] < 0)
+    assert found.open_loop is not None
+    for name, truth in (("crossover_rad_s", 1.5635), ("phase_margin_deg", 76.2)):
+        estimate = found.open_loop[name]
+        assert estimate is not None and estimate.standard_error is not None
+        assert abs(estimate.value - truth) < 3 * estimate.standard_error
+    pair = pyhoid.describe(runs, controlled_element=([90], [1, 6, 0]))
+    assert pair.open_loop == found.open_loop and "trustworthy" in repr(pair)
+    alone = pyhoid.describe(c1)
+    assert alone.verdict == "doubtful" and alone.open_loop is None
+    with pytest.raises(pyhoid.OptionError, match="at character 5"):
+        pyhoid.describe(runs, controlled_element="1/(s")
+    with pytest.raises(pyhoid.OptionError, match="expected text"):
+        pyhoid.describe(runs, controlled_element=3)  # type: ignore[arg-type]
+    with pytest.raises(pyhoid.Error, match="one of"):
+        pyhoid.describe(runs, excitation="w")
+
+
 def test_progress_and_interrupt(c1: pyhoid.Record) -> None:
     calls: list[tuple[int, int]] = []
     pyhoid.identify(c1, nk=(27, 31), nd=1, progress=lambda done, total: calls.append((done, total)))

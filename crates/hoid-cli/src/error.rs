@@ -18,6 +18,9 @@ pub enum CliError {
     /// A stream that cannot be read, understood or written.
     #[error("{0}")]
     Stream(String),
+    /// A result that was printed, and says that the data do not determine what was asked.
+    #[error("the data do not determine what was asked: {0}")]
+    NotDetermined(String),
     /// Work that was interrupted and can be resumed.
     #[error("{0}")]
     Stopped(String),

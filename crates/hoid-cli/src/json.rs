@@ -6,7 +6,7 @@ use hoid_ident::{
     validation::{GoodnessOfFit, LjungBox, Validation},
 };
 use hoid_model::{
-    NotConvertible, Orders, Record,
+    Finding, NotConvertible, Orders, Record, Verdict,
     margins::Margins,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
@@ -27,6 +27,18 @@ pub fn optional(value: Option<f64>) -> Value {
 
 pub fn estimate(e: &Estimate) -> Value {
     json!({"value": number(e.value), "standard_error": optional(e.standard_error)})
+}
+
+/// What a result is worth: the level, what speaks against it, what is worth knowing besides, and
+/// all of it with its names for programs.
+pub fn verdict(v: &Verdict) -> Value {
+    let finding = |f: &Finding| json!({"kind": f.kind, "severity": f.severity.name(), "words": f.words});
+    json!({
+        "level": v.level.name(),
+        "reasons": v.reasons().collect::<Vec<_>>(),
+        "notes": v.notes().collect::<Vec<_>>(),
+        "findings": v.findings().iter().map(finding).collect::<Vec<_>>(),
+    })
 }
 
 /// A change of the person, declared at a time in s.
@@ -101,7 +113,7 @@ pub fn margins(m: &Margins) -> Map<String, Value> {
     map
 }
 
-fn margin_estimates(m: &MarginEstimates) -> Value {
+pub fn margin_estimates(m: &MarginEstimates) -> Value {
     let or_null = |e: &Option<Estimate>| e.as_ref().map_or(Value::Null, estimate);
     json!({
         "crossover_rad_s": or_null(&m.crossover_rad_s),

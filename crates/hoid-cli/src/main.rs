@@ -28,6 +28,7 @@ fn main() -> ExitCode {
         Command::Demo(args) => commands::demo::run(&args),
         Command::Simulate(args) => commands::simulate::run(&args),
         Command::Identify(args) => commands::identify::run(&args),
+        Command::Describe(args) => commands::describe::run(&args),
         Command::Track(args) => commands::track::run(&args),
         Command::Stream(args) => commands::stream::run(&args),
         Command::Info(args) => commands::info::run(&args),

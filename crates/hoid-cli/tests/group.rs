@@ -169,7 +169,7 @@ fn a_manifest_is_made_from_names_and_mistakes_are_named() {
     let text = fs::read_to_string(at.join("group.toml")).unwrap();
     for (wrong, expected) in [
         ("[conditions.C9]\nlead = true\n", "no run has this condition"),
-        ("[conditions.C1]\ncontrolled_element = \"1\"\n", "has no slash"),
+        ("[conditions.C1]\ncontrolled_element = \"1/(s\"\n", "at character 5"),
         ("[conditions.C1]\nmystery = 1\n", "mystery"),
     ] {
         fs::write(at.join("wrong.toml"), format!("{text}\n{wrong}")).unwrap();

@@ -1,4 +1,6 @@
-//! Transfer functions in s and in z.
+//! Transfer functions in s and in z. `text` reads and shows those in s.
+
+mod text;
 
 use num_complex::Complex64;
 

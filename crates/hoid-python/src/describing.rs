@@ -1,17 +1,19 @@
-//! `pyhoid.describing_function`: how a person responds at the lines of the excitation.
+//! `pyhoid.describe` and `pyhoid.describing_function`: how a person responds at the lines of the
+//! excitation.
 
 use hoid_ident::frequency::{
-    Averaging, DescribingFunction, DescribingOptions, Excitation, GainLeadDelayOptions, LineSearch, LineWeights,
-    Realisation, describe,
+    Averaging, DescribingFunction, DescribingOptions, Description, DescriptionOptions, Excitation,
+    GainLeadDelayOptions, LineSearch, LineWeights, Realisation, describe as describe_lines, describe_runs,
 };
-use hoid_model::{ContinuousTransferFunction, uncertainty::Estimate};
+use hoid_model::uncertainty::Estimate;
 use numpy::{Complex64, PyArray1};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
     arrays::{self, Wanted, array},
+    controlled_element::ControlledElement,
     errors::{Outcome, bad_option},
-    figures::{error_or_nan, pair},
+    figures::{Pair, error_or_nan, pair},
     names,
 };
 
@@ -19,6 +21,94 @@ use crate::{
 #[pyclass(name = "DescribingFunction", module = "pyhoid._pyhoid", frozen)]
 pub struct PyDescribingFunction {
     found: DescribingFunction,
+}
+
+/// A description with its verdict; the package wraps it in `pyhoid.Description`.
+#[pyclass(name = "Description", module = "pyhoid._pyhoid", frozen)]
+pub struct PyDescription {
+    found: Description,
+}
+
+#[pyfunction]
+#[pyo3(signature = (records, *, excitation, lines, period, controlled_element, start, stop, offset_samples, detrend))]
+#[allow(clippy::too_many_arguments)]
+pub fn describe<'py>(
+    py: Python<'py>,
+    records: Vec<Bound<'py, PyAny>>,
+    excitation: Option<String>,
+    lines: Option<Vec<f64>>,
+    period: Option<f64>,
+    controlled_element: Option<ControlledElement>,
+    start: Option<f64>,
+    stop: Option<f64>,
+    offset_samples: f64,
+    detrend: &str,
+) -> Outcome<PyDescription> {
+    let records = arrays::records(&records, Wanted::All)?;
+    let element = controlled_element.map(|e| e.transfer_function()).transpose()?;
+    let options = DescriptionOptions {
+        excitation,
+        lines_rad_s: lines,
+        period_s: period,
+        controlled_element: element,
+        from_s: start,
+        to_s: stop,
+        offset_samples,
+        detrend: names::detrend(detrend)?,
+    };
+    let found = py.detach(|| describe_runs(&records, &options))?;
+    Ok(PyDescription { found })
+}
+
+#[pymethods]
+impl PyDescription {
+    /// The describing function alone.
+    fn function(&self) -> PyDescribingFunction {
+        PyDescribingFunction {
+            found: self.found.function.clone(),
+        }
+    }
+
+    /// Phase in deg at each line, without jumps.
+    #[getter]
+    fn phase_deg<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array(py, self.found.phases_deg().iter().map(|p| p.value).collect())
+    }
+
+    /// Crossover and margins; none without a controlled element.
+    #[getter]
+    fn open_loop<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(margins) = &self.found.margins else {
+            return Ok(None);
+        };
+        let all = PyDict::new(py);
+        all.set_item("crossover_rad_s", margins.crossover_rad_s.map(pair))?;
+        all.set_item("phase_margin_deg", margins.phase_margin_deg.map(pair))?;
+        all.set_item("gain_margin_db", margins.gain_margin_db.map(pair))?;
+        all.set_item("phase_crossover_rad_s", margins.phase_crossover_rad_s.map(pair))?;
+        Ok(Some(all))
+    }
+
+    /// Share of the power of u off the lines, and with the part at the lines.
+    #[getter]
+    fn remnant(&self) -> (Pair, Pair) {
+        let function = &self.found.function;
+        (pair(function.off_line_share), pair(function.noise_ratio))
+    }
+
+    /// Level, reasons and notes.
+    #[getter]
+    fn verdict(&self) -> (&'static str, Vec<String>, Vec<String>) {
+        let v = &self.found.verdict;
+        let reasons = v.reasons().map(str::to_owned).collect();
+        (v.level.name(), reasons, v.notes().map(str::to_owned).collect())
+    }
+
+    /// Channel of the excitation and its period in s.
+    #[getter]
+    fn excitation(&self) -> (Option<String>, f64) {
+        (self.found.channel.clone(), self.found.excitation.period_s())
+    }
 }
 
 #[pyfunction]
@@ -89,7 +179,7 @@ pub fn describing_function<'py>(
         smoothing_bins,
         element: None,
     };
-    let found = py.detach(|| describe(&records, &excitation, &options))?;
+    let found = py.detach(|| describe_lines(&records, &excitation, &options))?;
     Ok(PyDescribingFunction { found })
 }
 
@@ -175,10 +265,9 @@ impl PyDescribingFunction {
         Ok(all)
     }
 
-    /// Crossover frequency and phase margin with a controlled element, by descending powers of s.
-    fn margins<'py>(&self, py: Python<'py>, num: Vec<f64>, den: Vec<f64>) -> Outcome<Bound<'py, PyDict>> {
-        let element = ContinuousTransferFunction::new(&num, &den)?;
-        let margins = self.found.open_loop(&element).margins();
+    /// Crossover frequency and phase margin with a controlled element.
+    fn margins<'py>(&self, py: Python<'py>, element: ControlledElement) -> Outcome<Bound<'py, PyDict>> {
+        let margins = self.found.open_loop(&element.transfer_function()?).margins();
         let all = PyDict::new(py);
         all.set_item("crossover_rad_s", margins.crossover_rad_s.map(pair))?;
         all.set_item("phase_margin_deg", margins.phase_margin_deg.map(pair))?;

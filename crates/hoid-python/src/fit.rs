@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use hoid_ident::{Candidate, Choice, Fit, GreyBoxFit, MarginEstimates, Series, grey_box::OrderCandidate};
-use hoid_model::{ContinuousTransferFunction, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
+use hoid_model::{Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
 use hoid_report::{ModelSection, Report, known_operator, write_report};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::{
@@ -13,6 +13,7 @@ use pyo3::{
 
 use crate::{
     arrays::{self, Wanted, array, matrix},
+    controlled_element::ControlledElement,
     errors::Outcome,
     figures::{self, Pair, pair},
     names,
@@ -38,8 +39,8 @@ impl PyFit {
         }
     }
 
-    fn margins_with(&self, num: &[f64], den: &[f64]) -> Outcome<MarginEstimates> {
-        let element = ContinuousTransferFunction::new(num, den)?;
+    fn margins_with(&self, element: &ControlledElement) -> Outcome<MarginEstimates> {
+        let element = element.transfer_function()?;
         let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
         // The sampled model says nothing above half the sampling frequency.
         let high = high.min(self.fit.model().sample_time().nyquist_rad_s());
@@ -261,10 +262,9 @@ impl PyFit {
         self.fit.roots().into_iter().map(one).collect()
     }
 
-    /// Crossover and margins of the operator in series with a controlled element, by descending
-    /// powers of s.
-    fn margins<'py>(&self, py: Python<'py>, num: Vec<f64>, den: Vec<f64>) -> Outcome<Bound<'py, PyDict>> {
-        Ok(figures::margins(py, &self.margins_with(&num, &den)?)?)
+    /// Crossover and margins of the operator in series with a controlled element.
+    fn margins<'py>(&self, py: Python<'py>, element: ControlledElement) -> Outcome<Bound<'py, PyDict>> {
+        Ok(figures::margins(py, &self.margins_with(&element)?)?)
     }
 
     /// Writes the page about the model and its records into a directory.
@@ -276,11 +276,11 @@ impl PyFit {
         directory: PathBuf,
         title: String,
         settings: Vec<(String, String)>,
-        controlled_element: Option<(Vec<f64>, Vec<f64>)>,
+        controlled_element: Option<ControlledElement>,
     ) -> Outcome<PathBuf> {
         let records = arrays::records(&records, Wanted::All)?;
         let margins = controlled_element
-            .map(|(num, den)| self.margins_with(&num, &den))
+            .map(|element| self.margins_with(&element))
             .transpose()?;
         let page = py.detach(|| {
             let report = Report {

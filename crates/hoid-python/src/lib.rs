@@ -23,6 +23,7 @@
 )]
 
 mod arrays;
+mod controlled_element;
 mod describing;
 mod errors;
 mod figures;
@@ -46,12 +47,14 @@ use pyo3::prelude::*;
 fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<describing::PyDescribingFunction>()?;
+    module.add_class::<describing::PyDescription>()?;
     module.add_class::<fit::PyFit>()?;
     module.add_class::<study::PyPlan>()?;
     module.add_class::<time_varying::PyTimeVaryingFit>()?;
     module.add_class::<track::PyTrace>()?;
     module.add_class::<tracker::PyTracker>()?;
     for function in [
+        wrap_pyfunction!(describing::describe, module)?,
         wrap_pyfunction!(describing::describing_function, module)?,
         wrap_pyfunction!(files::check_record, module)?,
         wrap_pyfunction!(files::detrended, module)?,

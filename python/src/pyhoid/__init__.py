@@ -20,7 +20,7 @@ from . import errors
 from ._pyhoid import __version__
 from .control_models import from_control
 from .conversion import Conversion, DiscreteTransferFunction, convert, discretise
-from .description import DescribingFunction, describing_function
+from .description import DescribingFunction, Description, describe, describing_function
 from .errors import (
     DataError,
     Error,
@@ -54,6 +54,7 @@ __all__ = [
     "Conversion",
     "DataError",
     "DescribingFunction",
+    "Description",
     "DiscreteTransferFunction",
     "Error",
     "Estimate",
@@ -80,6 +81,7 @@ __all__ = [
     "Validation",
     "__version__",
     "convert",
+    "describe",
     "describing_function",
     "discretise",
     "errors",

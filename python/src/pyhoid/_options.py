@@ -16,6 +16,7 @@ __all__ = [
     "Progress",
     "as_records",
     "bounds",
+    "controlled_element",
     "numbers",
     "order",
     "reporter",
@@ -48,6 +49,27 @@ def order(name: str, value: Any) -> tuple[int, int]:
             f"{name} is {value!r}, expected numbers of zero or more, the smaller first"
         )
     return low, high
+
+
+def controlled_element(
+    element: str | Sequence[float] | tuple[Sequence[float], Sequence[float]],
+    den: Sequence[float] | None = None,
+) -> str | tuple[list[float], list[float]]:
+    """A controlled element as text, or its numerator and denominator, in one or two values."""
+    if isinstance(element, str):
+        if den is not None:
+            raise OptionError(f"the controlled element {element!r} is whole, expected no den beside it")
+        return element
+    try:
+        parts: tuple[Any, ...] = tuple(element) if den is None else (element, den)
+        if len(parts) != 2:
+            raise TypeError
+        return [float(v) for v in parts[0]], [float(v) for v in parts[1]]
+    except (TypeError, ValueError):
+        raise OptionError(
+            f"the controlled element is {element!r}, expected text such as '90/(s(s+6))', "
+            "or numerator and denominator by descending powers of s"
+        ) from None
 
 
 def numbers(name: str, values: Mapping[str, Any]) -> dict[str, float]:

@@ -22,6 +22,7 @@ _Left = tuple[bool, int, list[Any]]
 
 __all__ = [
     "DescribingFunction",
+    "Description",
     "Fit",
     "Plan",
     "TimeVaryingFit",
@@ -32,6 +33,7 @@ __all__ = [
     "check_record",
     "convert_discrete",
     "convert_operator",
+    "describe",
     "describing_function",
     "detrended",
     "discretise_transfer_function",
@@ -66,7 +68,21 @@ class DescribingFunction:
     def gain_lead_delay(
         self, *, lead: bool, weights: str, delay: tuple[float, float]
     ) -> dict[str, Any]: ...
-    def margins(self, num: list[float], den: list[float]) -> dict[str, Any]: ...
+    def margins(self, element: str | tuple[list[float], list[float]]) -> dict[str, Any]: ...
+
+@final
+class Description:
+    def function(self) -> DescribingFunction: ...
+    @property
+    def phase_deg(self) -> _Array: ...
+    @property
+    def open_loop(self) -> dict[str, Any] | None: ...
+    @property
+    def remnant(self) -> tuple[tuple[float, float | None], tuple[float, float | None]]: ...
+    @property
+    def verdict(self) -> tuple[str, list[str], list[str]]: ...
+    @property
+    def excitation(self) -> tuple[str | None, float]: ...
 
 @final
 class Fit:
@@ -109,7 +125,7 @@ class Fit:
     def residuals(self, record: Record) -> tuple[int, _Array]: ...
     def validate(self, record: Record) -> dict[str, Any]: ...
     def frequency_response(self, omega: _Array) -> list[_Array]: ...
-    def margins(self, num: list[float], den: list[float]) -> dict[str, Any]: ...
+    def margins(self, element: str | tuple[list[float], list[float]]) -> dict[str, Any]: ...
     def report(
         self,
         records: Sequence[Record],
@@ -117,7 +133,7 @@ class Fit:
         *,
         title: str,
         settings: list[tuple[str, str]],
-        controlled_element: tuple[list[float], list[float]] | None,
+        controlled_element: str | tuple[list[float], list[float]] | None,
     ) -> Any: ...
 
 @final
@@ -264,6 +280,18 @@ def convert_discrete(
     f: tuple[float, float], b: tuple[float, float], nk: int, sample_time: float
 ) -> dict[str, Any]: ...
 def convert_operator(operator: list[tuple[str, float]], sample_time: float) -> dict[str, Any]: ...
+def describe(
+    records: Sequence[Record],
+    *,
+    excitation: str | None,
+    lines: list[float] | None,
+    period: float | None,
+    controlled_element: str | tuple[list[float], list[float]] | None,
+    start: float | None,
+    stop: float | None,
+    offset_samples: float,
+    detrend: str,
+) -> Description: ...
 def describing_function(
     records: Sequence[Record],
     *,

@@ -16,7 +16,7 @@ from .record import Record
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["DescribingFunction", "describing_function"]
+__all__ = ["DescribingFunction", "Description", "describe", "describing_function"]
 
 
 class DescribingFunction:
@@ -90,12 +90,15 @@ class DescribingFunction:
             for name, pair in found.items()
         }
 
-    def margins(self, num: Sequence[float], den: Sequence[float]) -> dict[str, Estimate | None]:
+    def margins(
+        self, num: str | Sequence[float], den: Sequence[float] | None = None
+    ) -> dict[str, Estimate | None]:
         """Crossover frequency and phase margin with a controlled element.
 
-        `num` and `den` are its coefficients by descending powers of s.
+        `num` is the element as text, such as ``"90/(s(s+6))"``; or `num` and `den` are its
+        coefficients by descending powers of s.
         """
-        return estimates(self._native.margins([float(v) for v in num], [float(v) for v in den]))
+        return estimates(self._native.margins(_options.controlled_element(num, den)))
 
     def to_pandas(self) -> pd.DataFrame:
         """The lines as a table."""
@@ -197,5 +200,116 @@ def describing_function(
             offset_samples=offset_samples,
             detrend=detrend,
             smoothing_bins=smoothing_bins,
+        )
+    )
+
+
+class Description:
+    """A describing function, its loop, and what it is worth. `describe` makes it.
+
+    Attributes
+    ----------
+    function : DescribingFunction
+        Lines with standard errors and coherence, remnant, runs.
+    phase_deg : ndarray
+        Phase at each line in deg, without jumps from line to line.
+    open_loop : dict or None
+        Crossover frequency (rad/s), phase margin (deg), gain margin (dB) and its frequency, each an
+        Estimate or None; None without a controlled element.
+    remnant_share, noise_ratio : Estimate
+        Share of the power of u off the lines, and with its part at the lines (P_n).
+    verdict : {"trustworthy", "doubtful", "not determined"}
+        What the result is worth.
+    reasons, notes : list of str
+        What speaks against it, and what is worth knowing besides.
+    excitation : str or None
+        The channel that the average refers to.
+    period : float
+        Period of the excitation, s.
+    """
+
+    def __init__(self, native: _pyhoid.Description) -> None:
+        self.function = DescribingFunction(native.function())
+        self.phase_deg: FloatArray = native.phase_deg
+        found = native.open_loop
+        self.open_loop: dict[str, Estimate | None] | None = (
+            None if found is None else estimates(found)
+        )
+        share, ratio = native.remnant
+        self.remnant_share = Estimate(*share)
+        self.noise_ratio = Estimate(*ratio)
+        self.verdict, self.reasons, self.notes = native.verdict
+        self.excitation, self.period = native.excitation
+
+    def __repr__(self) -> str:
+        parts = [f"Verdict: {self.verdict}", *(f"- {reason}" for reason in self.reasons)]
+        parts.append(repr(self.function))
+        parts.extend(f"{name}: {value}" for name, value in (self.open_loop or {}).items())
+        parts.append(f"remnant: {self.remnant_share} of the power of u off the lines")
+        return "\n".join(parts)
+
+
+def describe(
+    records: Record | Sequence[Record],
+    *,
+    excitation: str | None = None,
+    lines: Sequence[float] | None = None,
+    period: float | None = None,
+    controlled_element: str | tuple[Sequence[float], Sequence[float]] | None = None,
+    start: float | None = None,
+    stop: float | None = None,
+    offset_samples: float = 0.0,
+    detrend: str = "none",
+) -> Description:
+    """Describe how a person responds at the lines of a periodic excitation, without a model.
+
+    It is ``hoid describe``: records are the runs where there are three or more, else their periods
+    are.
+
+    Parameters
+    ----------
+    records : Record or sequence of Record
+        Runs of one person in one task, each over whole periods of the excitation.
+    excitation : str, optional
+        Channel of the recorded disturbance or target; by default the first of the usual names that
+        there is with lines.
+    lines : sequence of float, optional
+        Its lines in rad/s, which need `period`; by default those found.
+    period : float, optional
+        Its period in s.
+    controlled_element : str or (array_like, array_like), optional
+        As text, such as ``"90/(s(s+6))"``, or numerator and denominator by descending powers of s:
+        adds crossover and margins.
+    start, stop : float, optional
+        Span in s.
+    offset_samples : float
+        ``e[k]`` belongs to ``u[k + offset_samples]``.
+    detrend : {"none", "mean", "linear"}
+
+    Returns
+    -------
+    Description
+
+    Raises
+    ------
+    OptionError
+        When no channel holds an excitation, or the lines are none of the period.
+    DataError
+        When the span does not hold whole periods, or a line has no power.
+    """
+    element = None
+    if controlled_element is not None:
+        element = _options.controlled_element(controlled_element)
+    return Description(
+        _pyhoid.describe(
+            _options.as_records(records),
+            excitation=excitation,
+            lines=None if lines is None else [float(w) for w in lines],
+            period=period,
+            controlled_element=element,
+            start=start,
+            stop=stop,
+            offset_samples=offset_samples,
+            detrend=detrend,
         )
     )

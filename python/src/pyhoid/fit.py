@@ -277,12 +277,15 @@ class Fit:
         frequencies = signal(np.atleast_1d(omega) if np.isscalar(omega) else omega, "omega")
         return FrequencyResponse(frequencies, *self._native.frequency_response(frequencies))
 
-    def margins(self, num: Sequence[float], den: Sequence[float]) -> dict[str, Estimate | None]:
+    def margins(
+        self, num: str | Sequence[float], den: Sequence[float] | None = None
+    ) -> dict[str, Estimate | None]:
         """Crossover frequency and margins with a controlled element.
 
-        `num` and `den` are its coefficients by descending powers of s.
+        `num` is the element as text, such as ``"90/(s(s+6))"``; or `num` and `den` are its
+        coefficients by descending powers of s.
         """
-        return estimates(self._native.margins([float(v) for v in num], [float(v) for v in den]))
+        return estimates(self._native.margins(_options.controlled_element(num, den)))
 
     def to_control(self) -> control.TransferFunction:
         """The model from e to u as a transfer function of python-control, in z.
@@ -353,7 +356,7 @@ class Fit:
         directory: str | PathLike[str],
         *,
         title: str | None = None,
-        controlled_element: tuple[Sequence[float], Sequence[float]] | None = None,
+        controlled_element: str | tuple[Sequence[float], Sequence[float]] | None = None,
     ) -> Path:
         """Write the page about the model, ``report.html``, into a directory.
 
@@ -365,9 +368,9 @@ class Fit:
             Created if it does not exist.
         title : str, optional
             Heading of the page.
-        controlled_element : (array_like, array_like), optional
-            Numerator and denominator by descending powers of s. The page then has the margins of
-            the loop.
+        controlled_element : str or (array_like, array_like), optional
+            As text, such as ``"90/(s(s+6))"``, or numerator and denominator by descending powers
+            of s. The page then has the margins of the loop.
 
         Returns
         -------
@@ -387,8 +390,7 @@ class Fit:
         what = labels[0] if len(labels) == 1 else f"{len(labels)} records"
         element = None
         if controlled_element is not None:
-            num, den = controlled_element
-            element = ([float(v) for v in num], [float(v) for v in den])
+            element = _options.controlled_element(controlled_element)
         return Path(
             self._native.report(
                 list(self.records),

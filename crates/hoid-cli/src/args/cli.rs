@@ -4,6 +4,7 @@ use clap::{Parser, Subcommand};
 
 use super::{
     convert::{ConvertArgs, InfoArgs},
+    describe::DescribeArgs,
     group::{GroupArgs, SimulateGroupArgs},
     identify::IdentifyArgs,
     recursion::{StreamArgs, TrackArgs},
@@ -30,6 +31,9 @@ pub enum Command {
     Simulate(SimulateArgs),
     /// Identify a model and the operator's parameters from one or several records
     Identify(Box<IdentifyArgs>),
+    /// How a person responds at the lines of a periodic excitation, without a model: describing
+    /// function, crossover, margins, remnant
+    Describe(Box<DescribeArgs>),
     /// Track a model and the operator's parameters over a record, sample by sample
     Track(Box<TrackArgs>),
     /// Track live: samples as lines on standard input, one JSON line a sample on standard output

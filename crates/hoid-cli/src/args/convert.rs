@@ -6,7 +6,6 @@ use clap::{Args, ValueEnum};
 use hoid_io::readable_endings;
 use hoid_model::{ContinuousTransferFunction, discretise};
 
-use super::parse::parse_transfer_function;
 use crate::orders::parse_numbers;
 
 #[derive(Debug, Args)]
@@ -48,8 +47,9 @@ pub struct ConvertArgs {
     /// for T_L)
     #[arg(long, value_name = "LIST", value_parser = parse_numbers, allow_hyphen_values = true)]
     pub operator: Option<std::vec::Vec<(String, f64)>>,
-    /// Transfer function NUM/DEN to discretise, by descending powers of s, as 1,2/1,3,4
-    #[arg(long, value_name = "NUM/DEN", value_parser = parse_transfer_function, allow_hyphen_values = true)]
+    /// Transfer function to discretise, as (s+2)/(s^2+3s+4), or NUM/DEN by descending powers of s, as
+    /// 1,2/1,3,4
+    #[arg(long, value_name = "H", allow_hyphen_values = true)]
     pub transfer_function: Option<ContinuousTransferFunction>,
     /// Discretisation of the transfer function
     #[arg(long, value_name = "NAME", default_value = "zoh")]

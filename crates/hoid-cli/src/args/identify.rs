@@ -13,7 +13,7 @@ use hoid_model::{ContinuousTransferFunction, Structure, remnant::RemnantDiscreti
 
 use super::{
     choices::{by_name, choice_of},
-    parse::{parse_span, parse_transfer_function},
+    parse::parse_span,
     reading::{MaskArgs, ReadArgs},
 };
 use crate::orders::parse_range;
@@ -83,9 +83,9 @@ pub struct IdentifyArgs {
     /// Discretisation that is inverted to get T_n and K_n from the noise model
     #[arg(long, value_name = "NAME", default_value = "zoh", value_parser = choice_of(&RemnantDiscretisation::ALL))]
     pub remnant_discretisation: RemnantDiscretisation,
-    /// Controlled element NUM/DEN by descending powers of s, as 90/1,6,0: adds crossover frequency
-    /// and margins
-    #[arg(long, value_name = "NUM/DEN", value_parser = parse_transfer_function, allow_hyphen_values = true)]
+    /// Controlled element in s, as 90/(s(s+6)), or NUM/DEN by descending powers of s, as 90/1,6,0:
+    /// adds crossover frequency and margins
+    #[arg(long, value_name = "ELEMENT", allow_hyphen_values = true)]
     pub controlled_element: Option<ContinuousTransferFunction>,
     /// Also judge the prediction K samples ahead
     #[arg(long, value_name = "K")]

@@ -5,6 +5,7 @@
 //! | `cli` | the program: its commands |
 //! | `simulate` | `hoid demo`, `hoid simulate`, `hoid margins` |
 //! | `identify` | `hoid identify` |
+//! | `describe` | `hoid describe` |
 //! | `recursion`, `settings` | `hoid track`, `hoid stream`; the options of the methods, from the registry |
 //! | `reading` | all commands that read records |
 //! | `convert` | `hoid convert`, `hoid info` |
@@ -13,6 +14,7 @@
 mod choices;
 mod cli;
 mod convert;
+mod describe;
 mod group;
 mod identify;
 mod parse;
@@ -24,6 +26,7 @@ mod study;
 
 pub use cli::{Cli, Command};
 pub use convert::{ConvertArgs, InfoArgs};
+pub use describe::DescribeArgs;
 pub use group::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs};
 pub use identify::{IdentifyArgs, ModelKind, estimators_with};
 pub use parse::parse_span;

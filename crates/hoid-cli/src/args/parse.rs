@@ -1,6 +1,4 @@
-//! Values as they are typed: spans of numbers, transfer functions.
-
-use hoid_model::ContinuousTransferFunction;
+//! Values as they are typed: spans of numbers, widths of figures.
 
 /// `LO..HI`, finite and in order.
 pub fn parse_span(text: &str) -> Result<(f64, f64), String> {
@@ -14,22 +12,15 @@ pub fn parse_span(text: &str) -> Result<(f64, f64), String> {
     }
 }
 
-/// `NUM/DEN`, coefficients by descending powers of s, separated by commas.
-pub fn parse_transfer_function(text: &str) -> Result<ContinuousTransferFunction, String> {
-    let usage = "write NUM/DEN by descending powers of s, as 90/1,6,0";
-    let (num, den) = text
-        .split_once('/')
-        .ok_or_else(|| format!("{text:?} has no '/'; {usage}"))?;
-    let coefficients = |part: &str| {
-        part.split(',')
-            .map(|c| {
-                c.trim()
-                    .parse::<f64>()
-                    .map_err(|_| format!("{c:?} is no number; {usage}"))
-            })
-            .collect::<Result<Vec<f64>, String>>()
-    };
-    ContinuousTransferFunction::new(&coefficients(num)?, &coefficients(den)?).map_err(|e| e.to_string())
+/// A width on paper, `85mm`, `8.5cm` or `3.3in`, in mm.
+pub fn parse_width(text: &str) -> Result<f64, String> {
+    let units = [("mm", 1.0), ("cm", 10.0), ("in", 25.4)];
+    let of = |(unit, mm): (&str, f64)| Some(text.trim().strip_suffix(unit)?.trim().parse::<f64>().ok()? * mm);
+    units
+        .into_iter()
+        .find_map(of)
+        .filter(|mm| (10.0..=2000.0).contains(mm))
+        .ok_or_else(|| format!("{text:?} is no width; write one from 10mm to 2000mm, as 85mm, 17cm or 3.3in"))
 }
 
 #[cfg(test)]
@@ -37,11 +28,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn transfer_functions_as_typed() {
-        let h = parse_transfer_function("90/1,6,0").unwrap();
-        assert_eq!((h.num(), h.den()), (&[90.0][..], &[1.0, 6.0, 0.0][..]));
-        for bad in ["90", "a/1", "1,0,0/1", "1/0", ""] {
-            assert!(parse_transfer_function(bad).is_err(), "{bad}");
+    fn widths_as_typed() {
+        assert_eq!(parse_width("85mm"), Ok(85.0));
+        assert_eq!(parse_width(" 17 cm"), Ok(170.0));
+        assert!((parse_width("3.3in").unwrap() - 83.82).abs() < 1e-12);
+        for bad in ["", "85", "mm", "-85mm", "1e9mm", "NaNmm", "85px"] {
+            assert!(parse_width(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn spans_as_typed() {
+        assert_eq!(parse_span("0.05..0.6"), Ok((0.05, 0.6)));
+        assert_eq!(parse_span("-1 .. -1"), Ok((-1.0, -1.0)));
+        for bad in ["", "1", "2..1", "a..b", "0..inf", ".."] {
+            assert!(parse_span(bad).is_err(), "{bad}");
         }
     }
 }

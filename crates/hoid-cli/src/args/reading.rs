@@ -7,7 +7,7 @@ use hoid_model::Detrend;
 use super::choices::choice_of;
 
 /// How record files are read.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct ReadArgs {
     /// Column of the input (tracking error): a name, -name, or a difference such as r-y
     #[arg(long, value_name = "COLUMN", default_value = "e", allow_hyphen_values = true)]
@@ -38,7 +38,7 @@ pub struct ReadArgs {
 }
 
 /// What is done to a record before it is used, in this order.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct PrepareArgs {
     /// Drop rows that are there twice, time included
     #[arg(long)]

@@ -2,6 +2,7 @@
 
 pub mod convert;
 pub mod demo;
+pub mod describe;
 pub mod group;
 pub mod identify;
 pub mod info;

@@ -35,9 +35,14 @@
 //! | `describe` | [`describe()`]: lines of all runs, averages, standard errors |
 //! | `remnant` | power off the lines: spectrum, share, noise ratio |
 //! | `open_loop` | crossover frequency and phase margin by interpolation, with their spread |
+//! | `description` | [`describe_runs()`]: all of it with every choice that the records decide, and its verdict |
+//! | `doubts` | what makes a describing function doubtful |
+//! | `unwrapping` | [`unwrapped_deg()`]: phase without jumps |
 //! | `gain_lead_delay` | gain, lead and delay by weighted least squares |
 
 mod describe;
+mod description;
+mod doubts;
 mod excitation;
 mod gain_lead_delay;
 mod open_loop;
@@ -45,16 +50,22 @@ mod options;
 mod ratio;
 mod remnant;
 mod spectrum;
+mod unwrapping;
 mod window;
 
+#[cfg(test)]
+mod descriptions;
 #[cfg(test)]
 mod simulated_runs;
 #[cfg(test)]
 mod synthetic_records;
 
 pub use describe::{DescribingFunction, Line, RunSummary, describe};
+pub use description::{Description, DescriptionOptions, USUAL_EXCITATIONS, describe_runs};
+pub use doubts::chance_coherence;
 pub use excitation::{Excitation, LineSearch};
 pub use gain_lead_delay::{GainLeadDelay, GainLeadDelayOptions, LineWeights};
 pub use open_loop::{Crossover, DescribingMargins, OpenLoop};
 pub use options::{Averaging, DescribingOptions, MeasuredElement, Realisation};
 pub use remnant::RemnantBand;
+pub use unwrapping::unwrapped_deg;

@@ -6,7 +6,9 @@
 //! function of one run scatters above the crossover, where coherence is low, and may pass 0 dB
 //! there again. The phase is followed from one line to the next along the shorter way. A delay
 //! bends the phase over log omega, so that between lines half an octave apart the straight line is
-//! a degree or so too low; with the delay taken out before and put back after, it is not. Standard
+//! a degree or so too low; with the delay taken out before and put back after, it is not. The gain
+//! margin is the negative magnitude where the phase falls through -180 deg, in the same way; of
+//! several the one nearest to 0 dB. Standard
 //! errors are those of the jackknife over runs (`ratio.rs`); the spread is that of single runs.
 
 use hoid_model::{Complex64, ContinuousTransferFunction, uncertainty::Estimate};
@@ -48,6 +50,10 @@ pub struct DescribingMargins {
     pub crossover_rad_s: Option<Estimate>,
     /// Phase margin phi_m, deg.
     pub phase_margin_deg: Option<Estimate>,
+    /// Frequency where the phase falls through -180 deg, rad/s.
+    pub phase_crossover_rad_s: Option<Estimate>,
+    /// Gain margin there, dB.
+    pub gain_margin_db: Option<Estimate>,
     /// Those of each run.
     pub per_run: Vec<Option<Crossover>>,
     /// Standard deviation of the crossover over the runs that have one, rad/s.
@@ -130,6 +136,12 @@ impl OpenLoop {
             let others: Vec<Option<f64>> = without.iter().map(|c| c.as_ref().map(get)).collect();
             of(&self.response).map(|c| jackknife(get(&c), &others))
         };
+        let turning = |response: &Vec<Complex64>| PhaseCrossover::of(&self.omega_rad_s, response, delay_s);
+        let turning_without: Vec<Option<PhaseCrossover>> = self.without.iter().map(turning).collect();
+        let of_turning = |get: fn(&PhaseCrossover) -> f64| {
+            let others: Vec<Option<f64>> = turning_without.iter().map(|c| c.as_ref().map(get)).collect();
+            turning(&self.response).map(|c| jackknife(get(&c), &others))
+        };
         let spread = |get: fn(&Crossover) -> f64| {
             let known: Vec<f64> = per_run.iter().flatten().map(get).collect();
             deviation(&known)
@@ -137,6 +149,8 @@ impl OpenLoop {
         DescribingMargins {
             crossover_rad_s: estimate(|c| c.omega_rad_s),
             phase_margin_deg: estimate(|c| c.phase_margin_deg),
+            phase_crossover_rad_s: of_turning(|c| c.omega_rad_s),
+            gain_margin_db: of_turning(|c| c.gain_margin_db),
             crossover_spread_rad_s: spread(|c| c.omega_rad_s),
             phase_margin_spread_deg: spread(|c| c.phase_margin_deg),
             per_run,
@@ -166,6 +180,51 @@ impl Crossover {
             };
             found.phase_margin_deg.is_finite().then_some(found)
         })
+    }
+}
+
+/// Where the phase of L passes -180 deg.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct PhaseCrossover {
+    omega_rad_s: f64,
+    gain_margin_db: f64,
+}
+
+impl PhaseCrossover {
+    /// The fall through -180 deg at which the magnitude is nearest to 1.
+    fn of(omega_rad_s: &[f64], response: &[Complex64], delay_s: f64) -> Option<Self> {
+        let of_pair = |(w, l): (&[f64], &[Complex64])| {
+            let by_delay = |omega: f64| Complex64::from_polar(1.0, -delay_s * omega);
+            let rest = (l[1] / l[0] / by_delay(w[1] - w[0])).arg();
+            // Phase above -180 deg at a part of the way over log omega.
+            let ratio = (w[1] / w[0]).ln();
+            let above = |part: f64| {
+                let turned = part * rest - delay_s * w[0] * ((part * ratio).exp() - 1.0);
+                (-l[0]).arg() + turned
+            };
+            if !(above(0.0) >= 0.0 && above(1.0) < 0.0) {
+                return None;
+            }
+            let (mut low, mut high) = (0.0, 1.0);
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if above(middle) >= 0.0 {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            let logs = (l[0].norm().ln(), l[1].norm().ln());
+            let found = Self {
+                omega_rad_s: w[0] * (low * ratio).exp(),
+                gain_margin_db: -20.0 / std::f64::consts::LN_10 * (logs.0 + low * (logs.1 - logs.0)),
+            };
+            (found.omega_rad_s.is_finite() && found.gain_margin_db.is_finite()).then_some(found)
+        };
+        let pairs = omega_rad_s.windows(2).zip(response.windows(2));
+        pairs
+            .filter_map(of_pair)
+            .min_by(|a, b| a.gain_margin_db.abs().total_cmp(&b.gain_margin_db.abs()))
     }
 }
 
@@ -203,6 +262,30 @@ mod tests {
         assert!((found.phase_margin_deg - (90.0 - 1.2_f64.to_degrees())).abs() < 1e-10);
         assert!(Crossover::of(&omega, &response, 0.0).unwrap().phase_margin_deg < found.phase_margin_deg - 1.0);
         assert_eq!(Crossover::of(&omega, &response, f64::NAN), None);
+    }
+
+    #[test]
+    fn the_gain_margin_is_where_the_phase_falls_through_the_negative_axis() {
+        // 4/s behind 0.3 s: -180 deg at pi/0.6, where the gain is 4 * 0.6/pi.
+        let omega = [0.7, 3.0, 9.0, 14.0];
+        let response: Vec<Complex64> = omega
+            .iter()
+            .map(|w| Complex64::new(0.0, -4.0 / w) * Complex64::from_polar(1.0, -0.3 * w))
+            .collect();
+        let at = std::f64::consts::PI / 0.6;
+        let found = PhaseCrossover::of(&omega, &response, 0.3).unwrap();
+        assert!((found.omega_rad_s - at).abs() < 1e-12);
+        assert!((found.gain_margin_db + 20.0 * (4.0 / at).log10()).abs() < 1e-12);
+        // Without the delay the phase is straight over log omega, from 3 to 9 rad/s.
+        let straight = PhaseCrossover::of(&omega, &response, 0.0).unwrap();
+        let part = (0.5 * std::f64::consts::PI - 0.9) / 1.8;
+        assert!((straight.omega_rad_s - 3.0 * 3.0_f64.powf(part)).abs() < 1e-12);
+        assert_eq!(PhaseCrossover::of(&omega[..2], &response[..2], 0.3), None);
+        let rising: Vec<Complex64> = response.iter().map(|l| l.conj()).collect();
+        assert_eq!(PhaseCrossover::of(&omega, &rising, -0.3), None);
+        let broken = [Complex64::new(f64::NAN, 0.0); 2];
+        assert_eq!(PhaseCrossover::of(&[1.0, 2.0], &broken, 0.0), None);
+        assert_eq!(PhaseCrossover::of(&[], &[], 0.0), None);
     }
 
     #[test]

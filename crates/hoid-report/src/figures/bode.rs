@@ -8,7 +8,7 @@
 
 use std::f64::consts::TAU;
 
-use hoid_ident::{Fit, ResponsePoint};
+use hoid_ident::{Fit, ResponsePoint, frequency::unwrapped_deg};
 use hoid_model::{Complex64, OperatorParameters, PolynomialModel, Record, SampleTime, Structure};
 use kuva::prelude::{BandPlot, Plot};
 
@@ -16,7 +16,6 @@ use super::{
     bode_points::BodePoints,
     frame::Area,
     legend::{Entry, Sample, add_legend},
-    phase::unwrap,
     scale::Scale,
     style::{self, BLACK, MODEL_COLOURS},
 };
@@ -212,7 +211,7 @@ struct Curve {
 impl Curve {
     fn of_model(response: &[ResponsePoint], delay_s: f64) -> Self {
         let phases: Vec<(f64, f64)> = response.iter().map(|p| (p.omega_rad_s, p.phase_deg.value)).collect();
-        let unwrapped = unwrap(&phases, delay_s);
+        let unwrapped = unwrapped_deg(&phases, delay_s);
         Self {
             magnitude_db: response
                 .iter()
@@ -248,7 +247,7 @@ impl Curve {
             .collect();
         Self {
             magnitude_db: response.iter().map(|h| (20.0 * h.norm().log10(), None)).collect(),
-            phase_deg: unwrap(&phases, delay_s).into_iter().map(|p| (p, None)).collect(),
+            phase_deg: unwrapped_deg(&phases, delay_s).into_iter().map(|p| (p, None)).collect(),
         }
     }
 }

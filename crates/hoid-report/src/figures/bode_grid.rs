@@ -4,13 +4,13 @@
 //! The phase is unwrapped with the delay taken out, which turns fastest, and put back, as in
 //! [`super::bode`].
 
+use hoid_ident::frequency::unwrapped_deg;
 use hoid_model::{Complex64, uncertainty::Estimate};
 
 use super::{
     bode_points::BodePoints,
     curves::{Curve, CurveGrid, CurvePanel, LineKind, curves},
     palette::Shade,
-    phase::unwrap,
 };
 use crate::numbers::Z_95;
 
@@ -116,7 +116,7 @@ impl BodeCurve {
         let pairs = self.omega_rad_s.iter().copied().zip(self.phase_deg.iter().copied());
         let pairs: Vec<(f64, f64)> = pairs.collect();
         let delay_s = if self.delay_s.is_finite() { self.delay_s } else { 0.0 };
-        let unwrapped = unwrap(&pairs, delay_s);
+        let unwrapped = unwrapped_deg(&pairs, delay_s);
         let turned: Vec<f64> = unwrapped.iter().zip(&pairs).map(|(to, (_, from))| to - from).collect();
         let moved = |ends: &[(f64, f64)]| -> Vec<(f64, f64)> {
             let pairs = ends.iter().zip(&turned);

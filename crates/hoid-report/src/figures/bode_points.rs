@@ -5,11 +5,11 @@
 //! the first curve, and without a curve unwrapped from point to point with the delay of the points
 //! taken out.
 
-use hoid_ident::frequency::DescribingFunction;
+use hoid_ident::frequency::{DescribingFunction, unwrapped_deg};
 use hoid_model::uncertainty::Estimate;
 use kuva::render::render::Scene;
 
-use super::{draw, phase::unwrap, scale::Scale};
+use super::{draw, scale::Scale};
 use crate::numbers::Z_95;
 
 const RADIUS: f64 = 2.4;
@@ -73,7 +73,7 @@ impl BodePoints {
             .copied()
             .zip(self.phase_deg.iter().map(|p| p.value))
             .collect();
-        let unwrapped = unwrap(&pairs, self.delay_s);
+        let unwrapped = unwrapped_deg(&pairs, self.delay_s);
         for ((phase, &omega), alone) in self.phase_deg.iter_mut().zip(&self.omega_rad_s).zip(unwrapped) {
             phase.value = match curve.and_then(|(w, y)| interpolated(w, y, omega)) {
                 Some(near) => phase.value + 360.0 * ((near - phase.value) / 360.0).round(),

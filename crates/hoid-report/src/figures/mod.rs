@@ -9,6 +9,7 @@
 //! | [`box_plots`] | the spread of the results of many runs, in groups and series |
 //! | [`maps`] | a value over two orders as coloured cells |
 //! | [`bode_grid`] | several responses in each of several Bode pairs |
+//! | [`describing`] | a describing function with its errors and coherence, models through it |
 //! | [`curves`] | any other curves, with bands, error bars, markers and stems |
 //!
 //! Figures are 420 units wide, or 840 where panels stand side by side, with 13-unit text: 7.5 pt in
@@ -27,6 +28,7 @@ mod boxes;
 mod colour_bar;
 mod correlation;
 mod curves;
+mod describing;
 mod draw;
 mod frame;
 mod labels;
@@ -34,7 +36,6 @@ mod legend;
 mod maps;
 mod palette;
 mod panel;
-mod phase;
 mod scale;
 mod series;
 mod style;
@@ -49,6 +50,7 @@ pub use boxes::{BoxGrid, BoxPanel, BoxRange, BoxSeries, box_plots};
 pub use colour_bar::MapColours;
 pub use correlation::{autocorrelation, cross_correlation};
 pub use curves::{Curve, CurveGrid, CurvePanel, LineKind, curves};
+pub use describing::{ModelCurve, describing, with_width_mm};
 pub use maps::{MapGrid, MapPanel, maps};
 pub use palette::{Shade, shade};
 pub use panel::{Beyond, CurveKind, Ordinate, TraceCurve, TracePanel};

@@ -9,7 +9,7 @@ use super::preparation_settings::PreparationSettings;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ConditionSettings {
-    /// Controlled element as `numerator/denominator`, by falling powers of s.
+    /// Controlled element, as `90/(s(s+6))` or `90/1,6,0` (by descending powers of s).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub controlled_element: Option<String>,
     /// Channel whose lines excite the loop: f_t or a disturbance.

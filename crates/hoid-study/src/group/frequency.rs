@@ -25,11 +25,10 @@ use hoid_ident::frequency::{
     Averaging, DescribingFunction, DescribingOptions, Excitation, GainLeadDelayOptions, Line, LineSearch, describe,
 };
 use hoid_io::OutputTable;
-use hoid_model::{Record, uncertainty::Estimate};
+use hoid_model::{ContinuousTransferFunction, ModelError, Record, uncertainty::Estimate};
 
 use super::{
     condition_settings::ConditionSettings,
-    controlled_element::transfer_function,
     manifest::Manifest,
     reading::read_run,
     responses::{MedianResponse, ResponseAverages},
@@ -214,7 +213,11 @@ fn of_records(
     put("gain", fit.gain);
     put("lead_s", fit.lead_s);
     put("delay_s", fit.delay_s);
-    let element = facts.controlled_element.as_deref().map(transfer_function).transpose()?;
+    let element = facts.controlled_element.as_deref();
+    let element: Option<ContinuousTransferFunction> = element
+        .map(str::parse)
+        .transpose()
+        .map_err(|error: ModelError| error.to_string())?;
     let mut margins_of_lines = None;
     if let Some(element) = &element {
         let at = found.open_loop(element).margins();

@@ -33,17 +33,19 @@
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
+    str::FromStr,
 };
 
 use hoid_io::Preparation;
+use hoid_model::ContinuousTransferFunction;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::StudyError;
 
 use super::{
-    analysis_settings::AnalysisSettings, condition_settings::ConditionSettings, controlled_element::transfer_function,
-    pattern::Pattern, preparation_settings::PreparationSettings, read_settings::ReadSettings,
+    analysis_settings::AnalysisSettings, condition_settings::ConditionSettings, pattern::Pattern,
+    preparation_settings::PreparationSettings, read_settings::ReadSettings,
 };
 
 /// Name of the copy of the manifest beside the results.
@@ -166,8 +168,8 @@ impl Manifest {
         }
         for (name, facts) in &self.conditions {
             if let Some(element) = &facts.controlled_element {
-                transfer_function(element)
-                    .map_err(|reason| format!("[conditions.{name}]: controlled_element {reason}"))?;
+                ContinuousTransferFunction::from_str(element)
+                    .map_err(|reason| format!("[conditions.{name}]: controlled_element: {reason}"))?;
             }
         }
         self.prepare

@@ -25,7 +25,6 @@ mod analysis_settings;
 mod averages;
 mod block;
 mod condition_settings;
-mod controlled_element;
 mod frequency;
 mod join;
 mod manifest;

@@ -11,7 +11,6 @@ use hoid_track::Trace;
 
 use super::{
     condition_settings::ConditionSettings,
-    controlled_element::transfer_function,
     manifest::{Manifest, RunEntry},
     responses::{followed_phases_deg, grid, responses_schema},
     tables::{real, schema, text},
@@ -59,10 +58,7 @@ impl<'a> RunRows<'a> {
         let columns = TraceColumns::of(&manifest.analysis);
         Self {
             entry,
-            element: condition
-                .controlled_element
-                .as_deref()
-                .and_then(|e| transfer_function(e).ok()),
+            element: condition.controlled_element.as_deref().and_then(|e| e.parse().ok()),
             condition,
             estimates: Rows::new(&estimates_schema()),
             responses: Rows::new(&responses_schema()),

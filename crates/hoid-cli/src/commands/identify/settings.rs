@@ -36,10 +36,7 @@ pub fn common_settings(args: &IdentifyArgs, with_input: bool) -> Vec<(String, St
         }
     }
     if let Some(h) = &args.controlled_element {
-        list.push((
-            "controlled element".to_owned(),
-            format!("{:?} / {:?}", h.num(), h.den()),
-        ));
+        list.push(("controlled element".to_owned(), h.to_string()));
     }
     list
 }

@@ -1,0 +1,51 @@
+//! Options of `hoid describe`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use hoid_ident::frequency::USUAL_EXCITATIONS;
+use hoid_io::readable_endings;
+use hoid_model::ContinuousTransferFunction;
+
+use super::{
+    parse::parse_width,
+    reading::{MaskArgs, ReadArgs},
+};
+
+#[derive(Debug, Args)]
+pub struct DescribeArgs {
+    #[arg(required = true, value_name = "RECORD", help = format!(
+        "Record files: {}; several are runs of one person in one task",
+        readable_endings()
+    ))]
+    pub records: Vec<PathBuf>,
+    #[command(flatten)]
+    pub read: ReadArgs,
+    #[command(flatten)]
+    pub mask: MaskArgs,
+    #[arg(long, value_name = "COLUMN", help = format!(
+        "Column of the recorded disturbance or target. Its lines are found in it; the span must be whole periods \
+         [default: the first of {} that there is with lines]",
+        USUAL_EXCITATIONS.join(", ")
+    ))]
+    pub excitation: Option<String>,
+    /// Lines of the excitation in rad/s, as 0.63,1.57,2.2; they need --period [default: those found]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "period")]
+    pub lines: Option<Vec<f64>>,
+    /// Period of the excitation in s [default: the longest that all lines found have in common]
+    #[arg(long, value_name = "S")]
+    pub period: Option<f64>,
+    /// Controlled element in s, as 90/(s(s+6)), or NUM/DEN by descending powers of s, as 90/1,6,0:
+    /// adds crossover frequency and margins
+    #[arg(long, value_name = "ELEMENT", allow_hyphen_values = true)]
+    pub controlled_element: Option<ContinuousTransferFunction>,
+    /// Draw magnitude, phase and coherence with error bars into this file (.svg)
+    #[arg(long, value_name = "FILE")]
+    pub figure: Option<PathBuf>,
+    /// Width of the figure, as 85mm, 17cm or 3.3in [default: 420 pixels]
+    #[arg(long, value_name = "WIDTH", value_parser = parse_width, requires = "figure")]
+    pub width: Option<f64>,
+    /// Print one JSON object instead of tables
+    #[arg(long)]
+    pub json: bool,
+}

@@ -1,0 +1,157 @@
+//! From records to a describing function: read, describe, draw.
+
+use std::path::Path;
+
+use hoid_ident::frequency::{Description, DescriptionOptions, describe_runs};
+use hoid_io::{Offset, write_atomically};
+use hoid_model::{Detrend, Record, VerdictLevel};
+use hoid_report::figures::{describing, with_width_mm};
+
+use super::form::Described;
+use crate::{
+    args::{DescribeArgs, ReadArgs},
+    commands::reading::{self, ReadAll},
+    error::CliError,
+    json, output,
+};
+
+pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
+    if let Some(path) = &args.figure {
+        check_figure(path)?;
+    }
+    let (read, offsets) = without_offsets(&args.read);
+    let ReadAll {
+        files,
+        records,
+        accounts,
+    } = reading::read_all(&args.records, &read, &args.mask, true)?;
+    let offset_samples = match records.first() {
+        Some(record) => offset_of_output(record, &offsets)?,
+        None => 0.0,
+    };
+    let options = DescriptionOptions {
+        excitation: args.excitation.clone(),
+        lines_rad_s: args.lines.clone(),
+        period_s: args.period,
+        controlled_element: args.controlled_element.clone(),
+        offset_samples,
+        // It is part of reading.
+        detrend: Detrend::None,
+        ..DescriptionOptions::default()
+    };
+    let found = describe_runs(&records, &options)?;
+    let described = Described {
+        files: &files,
+        records: &records,
+        accounts: &accounts,
+        found: &found,
+        settings: settings(args, &options, &found),
+        element: args.controlled_element.as_ref(),
+    };
+    if let Some(path) = &args.figure {
+        let svg = describing("describing", &described.title(), &found, &[]);
+        let svg = args.width.map_or(svg.clone(), |mm| with_width_mm(&svg, mm));
+        write_atomically(path, |file| file.write_all(svg.as_bytes()))?;
+        output::message(&format!("figure: {}", path.display()));
+    }
+    if args.json {
+        json::print(&described.to_json());
+    } else {
+        output::print(&described.page());
+    }
+    if found.verdict.level == VerdictLevel::NotDetermined {
+        let reasons: Vec<&str> = found.verdict.reasons().collect();
+        return Err(CliError::NotDetermined(reasons.join("; ")));
+    }
+    Ok(())
+}
+
+/// Figures are SVG: known before anything is read.
+fn check_figure(path: &Path) -> Result<(), CliError> {
+    match path.extension() {
+        Some(ending) if ending.eq_ignore_ascii_case("svg") => Ok(()),
+        _ => Err(CliError::Usage(format!(
+            "--figure {}: figures are written as .svg; name the file so, and convert it to PDF or PNG with a program such as \
+             Inkscape or a browser",
+            path.display()
+        ))),
+    }
+}
+
+/// How to read without moving rows, and the offsets. A row that is cut would leave less than whole
+/// periods, and of what is periodic an offset is a phase. With another sampling rate, which the
+/// offset comes before, it stays with the reading.
+fn without_offsets(read: &ReadArgs) -> (ReadArgs, Vec<(String, Offset)>) {
+    let mut read = read.clone();
+    let kept = read.prepare.decimate.is_none() && read.prepare.new_fs.is_none();
+    let offsets = if kept {
+        std::mem::take(&mut read.prepare.offset)
+    } else {
+        Vec::new()
+    };
+    (read, offsets)
+}
+
+/// By how many samples the output is later than the input. The offset of another channel turns its
+/// own phase alone, which no average depends on.
+fn offset_of_output(record: &Record, offsets: &[(String, Offset)]) -> Result<f64, CliError> {
+    let names: Vec<&str> = record.channels().map(|c| c.name.as_str()).collect();
+    let mut late = 0.0;
+    for (name, offset) in reading::by_channel("--offset", offsets)? {
+        let role = match name.as_str() {
+            "e" => Some(0),
+            "u" => Some(1),
+            _ => None,
+        };
+        let Some(channel) = names.iter().position(|known| *known == name).or(role) else {
+            return Err(CliError::Usage(format!(
+                "--offset: there is no channel {name:?}; the record has {}, and e and u stand for input and output",
+                names.join(", ")
+            )));
+        };
+        let samples = match offset {
+            Offset::Samples(samples) => samples,
+            Offset::Seconds(seconds) => seconds / record.sample_time().s(),
+        };
+        match channel {
+            0 => late -= samples,
+            1 => late += samples,
+            _ => {}
+        }
+    }
+    Ok(late)
+}
+
+fn settings(args: &DescribeArgs, options: &DescriptionOptions, found: &Description) -> Vec<(String, String)> {
+    let mut list = reading::settings(&args.read, true);
+    if options.offset_samples != 0.0 {
+        list.push((
+            "offset of the output".to_owned(),
+            format!("{} samples, as a phase", options.offset_samples),
+        ));
+    }
+    if !args.mask.mask.is_empty() {
+        let kinds: Vec<&str> = args.mask.mask.iter().map(|kind| kind.name()).collect();
+        list.push(("masked".to_owned(), kinds.join(", ")));
+    }
+    let lines = match (&args.lines, &found.channel) {
+        (Some(_), None) => "given".to_owned(),
+        (Some(_), Some(channel)) => format!("given, in {channel}"),
+        (None, channel) => format!("found in {}", channel.as_deref().unwrap_or("nothing")),
+    };
+    list.extend([
+        ("lines".to_owned(), lines),
+        (
+            "average".to_owned(),
+            match &found.channel {
+                Some(channel) => format!("cross spectra with {channel}"),
+                None => "ratios of u and e".to_owned(),
+            },
+        ),
+        (
+            "delay taken out between lines".to_owned(),
+            format!("{:.3} s", found.delay_s),
+        ),
+    ]);
+    list
+}

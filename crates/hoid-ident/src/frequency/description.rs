@@ -1,0 +1,229 @@
+//! From records to a describing function with its loop and its verdict, with every choice that the
+//! records decide.
+//!
+//! | choice | how it is made |
+//! |---|---|
+//! | excitation | the channel named; else the first of those that usually hold one in which there are lines |
+//! | lines | those of the options; else found in that channel |
+//! | average | `sum U_i D_i* / sum E_i D_i*` with D of the channel; the mean of `U_i/E_i` where there is none |
+//! | runs | records, whatever number of periods they have, where there are three or more; else their periods |
+//! | delay | that of gain, lead and delay through the lines: it unwraps the phase, and the margin is interpolated without it |
+//!
+//! Records are the runs wherever they can be: the remnant of neighbouring periods is one signal, so
+//! that periods of one run are not independent, and what a person does from day to day is not in
+//! the scatter of one run.
+
+use hoid_model::{ContinuousTransferFunction, Detrend, Record, Verdict, uncertainty::Estimate};
+
+use super::{
+    describe::{DescribingFunction, describe},
+    doubts::{Judged, doubts},
+    excitation::{Excitation, LineSearch, refuse},
+    gain_lead_delay::GainLeadDelayOptions,
+    open_loop::DescribingMargins,
+    options::{Averaging, DescribingOptions, Realisation},
+    unwrapping::unwrapped_deg,
+    window::Window,
+};
+use crate::IdentError;
+
+/// Names of channels that usually hold the excitation, in the order in which they are looked for.
+pub const USUAL_EXCITATIONS: [&str; 8] = ["f_t", "d", "r", "f_d", "target", "disturbance", "reference", "forcing"];
+
+/// Runs from which on their scatter alone gives the errors.
+const RUNS_ENOUGH: usize = 3;
+/// Delays beyond that of a person are what noise makes of the phase.
+const LONGEST_DELAY_S: f64 = 0.6;
+
+/// What is asked for. By default all is found in the records.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct DescriptionOptions {
+    /// Channel of the recorded disturbance or target.
+    pub excitation: Option<String>,
+    /// Its lines, rad/s.
+    pub lines_rad_s: Option<Vec<f64>>,
+    /// Its period, s. Lines that are given need it.
+    pub period_s: Option<f64>,
+    /// The controlled element, for the open loop.
+    pub controlled_element: Option<ContinuousTransferFunction>,
+    /// Start of the span, s.
+    pub from_s: Option<f64>,
+    /// End of the span, s, which is not part of it.
+    pub to_s: Option<f64>,
+    /// `e[k]` belongs to `u[k + offset_samples]`, a whole number or not.
+    pub offset_samples: f64,
+    /// What is taken out of e and u of each run beforehand.
+    pub detrend: Detrend,
+}
+
+/// A describing function, and what it is worth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Description {
+    /// Lines, runs, remnant.
+    pub function: DescribingFunction,
+    /// The lines and their period.
+    pub excitation: Excitation,
+    /// The channel that the average refers to.
+    pub channel: Option<String>,
+    /// What counted as a run.
+    pub realisation: Realisation,
+    /// Delay that is taken out where phases are unwrapped and interpolated, s.
+    pub delay_s: f64,
+    /// Crossover and margins, with a controlled element.
+    pub margins: Option<DescribingMargins>,
+    /// What speaks for and against it.
+    pub verdict: Verdict,
+}
+
+impl Description {
+    /// Phase at each line in deg, without jumps from line to line.
+    pub fn phases_deg(&self) -> Vec<Estimate> {
+        let known: Vec<Estimate> = self.function.lines.iter().map(|line| line.phase_deg()).collect();
+        let omega = self.function.lines.iter().map(|line| line.omega_rad_s);
+        let pairs: Vec<(f64, f64)> = omega.zip(known.iter().map(|p| p.value)).collect();
+        let unwrapped = unwrapped_deg(&pairs, self.delay_s);
+        let whole = |(value, p): (f64, Estimate)| Estimate { value, ..p };
+        unwrapped.into_iter().zip(known).map(whole).collect()
+    }
+}
+
+/// The describing function of one or several runs.
+///
+/// # Errors
+/// [`IdentError::BadOption`] where no excitation is found, and those of [`describe()`] and
+/// [`Excitation::found_in`].
+pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result<Description, IdentError> {
+    let (from_s, to_s) = (options.from_s, options.to_s);
+    let cut = |r: &Record| match (from_s, to_s) {
+        (None, None) => Ok(r.clone()),
+        _ => r.span(from_s.unwrap_or(f64::NEG_INFINITY), to_s.unwrap_or(f64::INFINITY)),
+    };
+    // The offset may need what lies beyond the span, so that `records` are what is described.
+    let parts = records.iter().map(cut).collect::<Result<Vec<Record>, _>>()?;
+    let Some(first) = parts.first() else {
+        return Err(IdentError::NoRecords);
+    };
+    let (excitation, channel) = excitation_of(first, options)?;
+    let periods: Result<Vec<usize>, IdentError> = parts
+        .iter()
+        .map(|part| Window::of_span(part, None, None, excitation.period_s()).map(|w| w.periods))
+        .collect();
+    let realisation = match (parts.len() >= RUNS_ENOUGH, periods?.iter().sum::<usize>()) {
+        (false, 2..) => Realisation::Period,
+        _ => Realisation::Record,
+    };
+    let averaging = match &channel {
+        Some(channel) => Averaging::Reference {
+            channel: channel.clone(),
+        },
+        None => Averaging::Ratios,
+    };
+    let describing = DescribingOptions {
+        averaging,
+        realisation,
+        from_s,
+        to_s,
+        offset_samples: options.offset_samples,
+        detrend: options.detrend,
+        ..DescribingOptions::default()
+    };
+    let function = describe(records, &excitation, &describing)?;
+    let delay_s = delay_of(&function);
+    let open_loop = options
+        .controlled_element
+        .as_ref()
+        .map(|element| function.open_loop(element));
+    let margins = open_loop.as_ref().map(|l| l.margins_with_delay(delay_s));
+    let judged = Judged {
+        function: &function,
+        excitation: &excitation,
+        channel: channel.as_deref(),
+        realisation,
+        in_loop: open_loop.as_ref().zip(margins.as_ref()),
+        offset_samples: options.offset_samples,
+    };
+    let verdict = Verdict::of(doubts(&judged, &parts)?);
+    Ok(Description {
+        function,
+        excitation,
+        channel,
+        realisation,
+        delay_s,
+        margins,
+        verdict,
+    })
+}
+
+/// Delay of gain, lead and delay through the lines; without the lead where it would be negative,
+/// and so a part of the delay.
+fn delay_of(function: &DescribingFunction) -> f64 {
+    let fit = |lead| {
+        let options = GainLeadDelayOptions {
+            lead,
+            ..GainLeadDelayOptions::default()
+        };
+        function.fit_gain_lead_delay(&options).ok()
+    };
+    fit(true)
+        .filter(|fit| fit.lead_s.value >= 0.0)
+        .or_else(|| fit(false))
+        .map(|fit| fit.delay_s.value)
+        .filter(|delay| (0.0..=LONGEST_DELAY_S).contains(delay))
+        .unwrap_or(0.0)
+}
+
+/// The lines, and the channel that they are in if there is one.
+fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excitation, Option<String>), IdentError> {
+    let search = LineSearch {
+        period_s: options.period_s,
+        ..LineSearch::default()
+    };
+    let given = match (&options.lines_rad_s, options.period_s) {
+        (None, _) => None,
+        (Some(lines), Some(period_s)) => Some(Excitation::new(lines, period_s)?),
+        (Some(_), None) => {
+            return refuse(
+                "the lines of the excitation",
+                "no period beside them",
+                "the period in s, of which they are harmonics",
+            );
+        }
+    };
+    if let Some(channel) = &options.excitation {
+        let found = match given {
+            Some(given) => given,
+            None => Excitation::found_in(record, channel, &search)?,
+        };
+        return Ok((found, Some(channel.clone())));
+    }
+    let there = || {
+        USUAL_EXCITATIONS
+            .into_iter()
+            .filter(|name| record.channel(name).is_some())
+    };
+    let mut reason = None;
+    for name in there() {
+        match (Excitation::found_in(record, name, &search), &given) {
+            (Ok(found), None) => return Ok((found, Some(name.to_owned()))),
+            (Ok(found), Some(given)) if found == *given => return Ok((found, Some(name.to_owned()))),
+            (Ok(_), Some(_)) => {}
+            // A target of zero beside a disturbance is none, and not what is wrong.
+            (Err(IdentError::NoExcitation { .. }), _) => {}
+            (Err(error), _) => {
+                reason.get_or_insert(error);
+            }
+        }
+    }
+    match (given, reason) {
+        (Some(given), _) => Ok((given, None)),
+        (None, Some(error)) => Err(error),
+        (None, None) => {
+            let names: Vec<&str> = record.channels().map(|c| c.name.as_str()).collect();
+            refuse(
+                &format!("the excitation of record {}", record.label()),
+                format!("none among {}", names.join(", ")),
+                "the name of the channel that holds the recorded disturbance or target, or its lines in rad/s and its period",
+            )
+        }
+    }
+}

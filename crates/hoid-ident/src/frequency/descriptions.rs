@@ -1,0 +1,284 @@
+//! Descriptions with their verdicts: of simulated runs, and of signals made to be doubtful.
+
+use std::f64::consts::TAU;
+
+use hoid_model::{
+    Channel, ContinuousTransferFunction, Record, SampleTime, VerdictLevel,
+    scenario::{Condition, Scenario},
+};
+use hoid_sim::{RunSeed, Simulator};
+
+use super::*;
+use crate::IdentError;
+
+const PERIOD: usize = 200;
+const HARMONICS: [usize; 5] = [2, 5, 9, 14, 23];
+
+fn runs(n: u64) -> Vec<Record> {
+    let mut scenario = Scenario::condition(Condition::C1);
+    scenario.run_in_s = 60.0;
+    let simulator = Simulator::new(&scenario).unwrap();
+    let of = |replication| RunSeed {
+        seed: 31,
+        cell: 0,
+        replication,
+    };
+    (0..n).map(|i| simulator.run(of(i), false).unwrap()).collect()
+}
+
+fn element() -> ContinuousTransferFunction {
+    let initial = Scenario::condition(Condition::C1).initial;
+    initial.controlled_element.transfer_function().unwrap()
+}
+
+fn kinds(found: &Description) -> Vec<&'static str> {
+    found.verdict.findings().iter().map(|f| f.kind).collect()
+}
+
+/// Five lines over one period of 20 s.
+fn excitation(k: usize) -> f64 {
+    let wave = |h: usize| (TAU * (h * k) as f64 / PERIOD as f64 + h as f64).sin();
+    HARMONICS.iter().map(|h| wave(*h)).sum()
+}
+
+/// Normal noise of a named stream, by Box and Muller over a linear congruence.
+fn noise(stream: u64, n: usize) -> Vec<f64> {
+    let mut state = stream.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x1234_5678_9ABC_DEF1;
+    let mut uniform = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+    };
+    (0..n)
+        .map(|_| (-2.0 * uniform().ln()).sqrt() * (TAU * uniform()).cos())
+        .collect()
+}
+
+/// A record over `samples` with the excitation d, an e that follows it and a u of its own.
+fn record(samples: usize, e: impl Fn(usize) -> f64, u: impl Fn(usize) -> f64) -> Record {
+    let ts = SampleTime::new(0.1).unwrap();
+    let channel = |name: &str, of: &dyn Fn(usize) -> f64| Channel::new(name, "", (0..samples).map(of).collect());
+    let zero = Channel::new("r", "", vec![0.0; samples]);
+    Record::new(ts, channel("e", &e), channel("u", &u))
+        .and_then(|r| r.with_channel(zero))
+        .and_then(|r| r.with_channel(channel("d", &excitation)))
+        .unwrap()
+        .labelled("run")
+}
+
+#[test]
+fn several_runs_are_described_by_default() {
+    let (records, element) = (runs(5), element());
+    let options = DescriptionOptions {
+        controlled_element: Some(element.clone()),
+        ..DescriptionOptions::default()
+    };
+    let found = describe_runs(&records, &options).unwrap();
+    assert_eq!(
+        (found.channel.as_deref(), found.realisation),
+        (Some("f_t"), Realisation::Record)
+    );
+    assert_eq!(found.excitation.harmonics(), [3, 5, 8, 13, 22, 34, 53, 86, 139, 229]);
+    let by_hand = DescribingOptions {
+        averaging: Averaging::Reference {
+            channel: "f_t".to_owned(),
+        },
+        ..DescribingOptions::default()
+    };
+    let function = describe(&records, &found.excitation, &by_hand).unwrap();
+    assert_eq!(found.function, function);
+    // The delay of 0.28 s stands for the lag of the neuromuscular system too, 2 zeta/omega = 0.06 s
+    // at low frequency and more near its resonance.
+    assert!((0.28..0.45).contains(&found.delay_s), "{}", found.delay_s);
+    let margins = found.margins.as_ref().unwrap();
+    assert_eq!(*margins, function.open_loop(&element).margins_with_delay(found.delay_s));
+    let within = |e: Option<hoid_model::uncertainty::Estimate>, truth: f64| {
+        let e = e.unwrap();
+        let s = e.standard_error.unwrap();
+        assert!((e.value - truth).abs() < 3.0 * s && s < 0.1 * truth, "{truth}: {e}");
+    };
+    within(margins.crossover_rad_s, 1.5635);
+    within(margins.phase_margin_deg, 76.67);
+    assert_eq!(found.verdict.level, VerdictLevel::Trustworthy, "{}", found.verdict);
+    // From lead to far beyond a turn: no jumps, each phase a whole number of turns from its
+    // principal value.
+    let phases = found.phases_deg();
+    for (phase, line) in phases.iter().zip(&function.lines) {
+        let turns = (phase.value - line.phase_deg().value) / 360.0;
+        assert!((turns - turns.round()).abs() < 1e-9 && phase.standard_error == line.phase_deg().standard_error);
+    }
+    assert!(phases.windows(2).skip(3).all(|p| p[1].value < p[0].value) && phases[9].value < -200.0);
+}
+
+#[test]
+fn one_run_is_doubtful_and_says_why() {
+    let records = runs(1);
+    let found = describe_runs(&records, &DescriptionOptions::default()).unwrap();
+    assert_eq!((found.realisation, found.function.runs.len()), (Realisation::Record, 1));
+    assert_eq!(
+        (found.verdict.level, kinds(&found)),
+        (VerdictLevel::Doubtful, vec!["few-runs"])
+    );
+    assert!(found.phases_deg().iter().all(|p| p.standard_error.is_none()));
+    // Four periods of one run, with a little noise.
+    let rough = noise(3, 4 * PERIOD);
+    let one = record(4 * PERIOD, excitation, |k| 2.0 * excitation(k) + 0.1 * rough[k]);
+    let found = describe_runs(std::slice::from_ref(&one), &DescriptionOptions::default()).unwrap();
+    assert_eq!((found.realisation, found.function.runs.len()), (Realisation::Period, 4));
+    assert_eq!(
+        (found.verdict.level, kinds(&found)),
+        (VerdictLevel::Trustworthy, vec!["periods-as-runs"])
+    );
+    // A target of zero is passed over.
+    assert_eq!(found.channel.as_deref(), Some("d"));
+    let span = DescriptionOptions {
+        from_s: Some(20.0),
+        to_s: Some(60.0),
+        ..DescriptionOptions::default()
+    };
+    let found = describe_runs(&[one], &span).unwrap();
+    assert_eq!((found.function.runs.len(), kinds(&found)), (2, vec!["few-runs"]));
+}
+
+#[test]
+fn a_person_who_does_not_follow_is_not_described() {
+    let options = DescriptionOptions::default();
+    // Unrelated in 1 of 20 by chance: 400 sets of two periods, standard error 0.011.
+    let mut followed = 0;
+    for stream in 0..400 {
+        let u = noise(stream, 2 * PERIOD);
+        let found = describe_runs(&[record(2 * PERIOD, excitation, |k| u[k])], &options).unwrap();
+        if found.verdict.level == VerdictLevel::NotDetermined {
+            assert!(kinds(&found).contains(&"unrelated"));
+        } else {
+            followed += 1;
+        }
+    }
+    assert!((7..=33).contains(&followed), "{followed}");
+    // Lines that are lost in noise beside others that are not.
+    let slow = |k: usize| (TAU * (2 * k) as f64 / PERIOD as f64).sin() + (TAU * (5 * k) as f64 / PERIOD as f64).sin();
+    let runs: Vec<Record> = (0..6)
+        .map(|i| {
+            let rough = noise(900 + i, PERIOD);
+            record(PERIOD, excitation, |k| slow(k) + 0.5 * rough[k])
+        })
+        .collect();
+    let found = describe_runs(&runs, &options).unwrap();
+    assert_eq!(
+        (found.verdict.level, kinds(&found)),
+        (VerdictLevel::Doubtful, vec!["low-coherence"])
+    );
+}
+
+#[test]
+fn the_loop_is_doubted_where_it_says_nothing() {
+    let rough: Vec<Vec<f64>> = (0..4).map(|i| noise(50 + i, PERIOD)).collect();
+    let runs: Vec<Record> = rough
+        .iter()
+        .map(|n| record(PERIOD, excitation, |k| 2.0 * excitation(k) + 0.1 * n[k]))
+        .collect();
+    let with = |text: &str| {
+        let options = DescriptionOptions {
+            controlled_element: Some(text.parse().unwrap()),
+            ..DescriptionOptions::default()
+        };
+        describe_runs(&runs, &options).unwrap()
+    };
+    let found = with("1/s");
+    assert_eq!(found.verdict.level, VerdictLevel::Trustworthy, "{}", found.verdict);
+    let crossover = found.margins.unwrap().crossover_rad_s.unwrap();
+    assert!((crossover.value - 2.0).abs() < 4.0 * crossover.standard_error.unwrap());
+    for (text, expected) in [
+        ("0.01/s", "below 0.628"),
+        ("100/s", "above 7.2"),
+        ("0.05s/(s+1)", "below"),
+    ] {
+        let found = with(text);
+        assert_eq!(kinds(&found), ["no-crossover"]);
+        assert_eq!(found.verdict.level, VerdictLevel::Doubtful);
+        assert!(found.verdict.to_string().contains(expected), "{}", found.verdict);
+    }
+}
+
+#[test]
+fn what_is_wrong_with_the_signals_is_found() {
+    let rough = noise(7, 4 * PERIOD);
+    let of = |samples| record(samples, excitation, |k| 2.0 * excitation(k) + 0.1 * rough[k]);
+    // A disturbance that was measured: 0.0025 of 2.5025 are noise.
+    let measured = Channel::new(
+        "w",
+        "",
+        (0..4 * PERIOD).map(|k| excitation(k) + 0.05 * rough[k]).collect(),
+    );
+    let noisy = DescriptionOptions {
+        excitation: Some("w".to_owned()),
+        ..DescriptionOptions::default()
+    };
+    let found = describe_runs(&[of(4 * PERIOD).with_channel(measured).unwrap()], &noisy).unwrap();
+    assert_eq!(found.verdict.level, VerdictLevel::Trustworthy, "{}", found.verdict);
+    assert!(
+        found.verdict.to_string().contains("w of run has 0.10 % of its power"),
+        "{}",
+        found.verdict
+    );
+    // A line that is there but not named.
+    let missing = DescriptionOptions {
+        excitation: Some("d".to_owned()),
+        lines_rad_s: Some([2.0, 5.0, 9.0].map(|h| h * TAU / 20.0).to_vec()),
+        period_s: Some(20.0),
+        ..DescriptionOptions::default()
+    };
+    let found = describe_runs(&[of(4 * PERIOD)], &missing).unwrap();
+    assert_eq!(kinds(&found), ["leakage", "periods-as-runs"]);
+    assert_eq!(found.verdict.level, VerdictLevel::Doubtful);
+    // Without a channel there is no reference.
+    let alone = DescriptionOptions {
+        excitation: None,
+        ..missing.clone()
+    };
+    let found = describe_runs(&[of(4 * PERIOD)], &alone).unwrap();
+    assert!(found.channel.is_none() && kinds(&found).contains(&"no-reference"));
+    let late = DescriptionOptions {
+        offset_samples: 1.002,
+        ..DescriptionOptions::default()
+    };
+    let found = describe_runs(&[of(4 * PERIOD)], &late).unwrap();
+    assert!(kinds(&found).contains(&"offset-not-whole"));
+}
+
+#[test]
+fn what_cannot_be_described_is_refused() {
+    let options = DescriptionOptions::default();
+    assert!(matches!(describe_runs(&[], &options), Err(IdentError::NoRecords)));
+    let message =
+        |records: &[Record], options: &DescriptionOptions| describe_runs(records, options).unwrap_err().to_string();
+    let ts = SampleTime::new(0.1).unwrap();
+    let wave: Vec<f64> = (0..PERIOD).map(excitation).collect();
+    let bare = Record::new(ts, Channel::new("e", "", wave.clone()), Channel::new("u", "", wave)).unwrap();
+    let text = message(std::slice::from_ref(&bare), &options);
+    assert!(
+        text.contains("none among e, u") && text.contains("lines in rad/s"),
+        "{text}"
+    );
+    let lines = DescriptionOptions {
+        lines_rad_s: Some(vec![1.0]),
+        ..DescriptionOptions::default()
+    };
+    assert!(message(std::slice::from_ref(&bare), &lines).contains("period in s"));
+    let named = DescriptionOptions {
+        excitation: Some("w".to_owned()),
+        ..DescriptionOptions::default()
+    };
+    assert!(message(&[bare], &named).contains("one of e, u"));
+    // Not whole periods: what is wrong with the channel that is there is said.
+    let half = record(PERIOD * 5 / 4, excitation, excitation);
+    assert!(message(&[half], &options).contains("whole periods"));
+    let twice = record(PERIOD, excitation, |k| 2.0 * excitation(k));
+    let nonsense = DescriptionOptions {
+        from_s: Some(5.0),
+        to_s: Some(1.0),
+        ..DescriptionOptions::default()
+    };
+    assert!(describe_runs(&[twice], &nonsense).is_err());
+}

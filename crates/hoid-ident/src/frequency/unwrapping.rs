@@ -1,0 +1,59 @@
+//! Phase without jumps of whole turns.
+//!
+//! Between two lines the phase is known but for whole turns. It is taken along the shorter way once
+//! the phase of a delay, which turns fastest, is taken out: `phi + omega tau` moves by less than
+//! half a turn from line to line where tau is right within `pi/(omega_{k+1} - omega_k)`.
+
+use std::f64::consts::PI;
+
+/// Phases in deg without jumps, for pairs of frequency in rad/s and phase in deg, with the phase of
+/// a delay in s taken out beforehand and put back. The first value is the principal one with the
+/// delay taken out. What is not finite stays as it is.
+pub fn unwrapped_deg(phases: &[(f64, f64)], delay_s: f64) -> Vec<f64> {
+    let mut before: Option<f64> = None;
+    phases
+        .iter()
+        .map(|&(omega, phase)| {
+            let by_delay = omega * delay_s * 180.0 / PI;
+            let rest = phase + by_delay;
+            let turns = match before {
+                None => (rest / 360.0).round(),
+                Some(last) => ((rest - last) / 360.0).round(),
+            };
+            let rest = rest - 360.0 * turns;
+            if rest.is_finite() {
+                before = Some(rest);
+            }
+            rest - by_delay
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::Complex64;
+
+    use super::*;
+
+    #[test]
+    fn unwrapped_phase_of_a_delay_is_a_line() {
+        // 0.9 s of delay and 1 rad/s steps: 52 deg a step, far beyond one round.
+        let phases: Vec<(f64, f64)> = (1..200)
+            .map(|k| {
+                let omega = f64::from(k);
+                (omega, Complex64::from_polar(1.0, -0.9 * omega).arg().to_degrees())
+            })
+            .collect();
+        for (phase, (omega, _)) in unwrapped_deg(&phases, 0.9).iter().zip(&phases) {
+            assert!((phase + (0.9 * omega).to_degrees()).abs() < 1e-9);
+        }
+        // A step of 8 rad/s turns by 413 deg: with a delay that is wrong by 0.3 s, it still follows.
+        let coarse: Vec<(f64, f64)> = phases.iter().copied().step_by(8).collect();
+        for (phase, (omega, _)) in unwrapped_deg(&coarse, 0.6).iter().zip(&coarse) {
+            assert!((phase + (0.9 * omega).to_degrees()).abs() < 1e-9);
+        }
+        assert!(unwrapped_deg(&[], 0.1).is_empty());
+        let broken = unwrapped_deg(&[(1.0, 170.0), (2.0, f64::NAN), (3.0, -170.0)], 0.0);
+        assert!(broken[1].is_nan() && broken[2] == 190.0);
+    }
+}

@@ -1,0 +1,255 @@
+//! A describing function with its errors, over frequency: magnitude, phase and coherence, with any
+//! models drawn through it.
+//!
+//! The phase of a model is drawn in the turn in which it lies nearest to the points.
+
+use hoid_ident::frequency::{Description, chance_coherence, unwrapped_deg};
+use hoid_model::{Complex64, uncertainty::Estimate};
+
+use super::{
+    curves::{Curve, CurveGrid, CurvePanel, LineKind, curves},
+    palette::Shade,
+};
+use crate::numbers::Z_95;
+
+/// In the legend; equal names stand there once.
+const NAME: &str = "describing function, bars 95 %";
+/// Frequencies of a model curve.
+const POINTS: usize = 240;
+
+/// A frequency response that is drawn through the points.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelCurve {
+    /// Its name in the legend.
+    pub name: String,
+    /// Frequencies, rad/s, ascending.
+    pub omega_rad_s: Vec<f64>,
+    /// The response at each.
+    pub response: Vec<Complex64>,
+    /// Its delay, which is taken out while the phase is unwrapped, s.
+    pub delay_s: f64,
+}
+
+impl ModelCurve {
+    /// A response over the frequencies of a description, and a little beyond.
+    pub fn over(found: &Description, name: &str, delay_s: f64, response: impl Fn(f64) -> Complex64) -> Self {
+        let lines = &found.function.lines;
+        let ends = lines.first().zip(lines.last());
+        let (low, high) = ends.map_or((0.1, 10.0), |(a, b)| (0.9 * a.omega_rad_s, 1.1 * b.omega_rad_s));
+        let step = (high / low).ln() / (POINTS - 1) as f64;
+        let omega_rad_s: Vec<f64> = (0..POINTS).map(|k| low * (step * k as f64).exp()).collect();
+        Self {
+            name: name.to_owned(),
+            response: omega_rad_s.iter().map(|omega| response(*omega)).collect(),
+            omega_rad_s,
+            delay_s,
+        }
+    }
+
+    /// Phase in deg, in the turn that is nearest to points of frequency and phase.
+    fn phase_deg(&self, points: &[(f64, f64)]) -> Vec<f64> {
+        let principal = self.response.iter().map(|h| h.arg().to_degrees());
+        let pairs: Vec<(f64, f64)> = self.omega_rad_s.iter().copied().zip(principal).collect();
+        let phase = unwrapped_deg(&pairs, self.delay_s);
+        let mut turns: Vec<f64> = points
+            .iter()
+            .filter_map(|(omega, of_point)| {
+                let k = self
+                    .omega_rad_s
+                    .partition_point(|w| w < omega)
+                    .min(phase.len().checked_sub(1)?);
+                Some(((of_point - phase[k]) / 360.0).round()).filter(|t| t.is_finite())
+            })
+            .collect();
+        turns.sort_by(f64::total_cmp);
+        let turn = turns.get(turns.len() / 2).copied().unwrap_or(0.0);
+        phase.iter().map(|p| p + 360.0 * turn).collect()
+    }
+}
+
+/// The describing function as points with error bars of 1.96 standard errors, and models as lines.
+/// `title` is what a screen reader says.
+pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCurve]) -> String {
+    let lines = &found.function.lines;
+    let omega: Vec<f64> = lines.iter().map(|line| line.omega_rad_s).collect();
+    let magnitudes: Vec<Estimate> = lines.iter().map(|line| line.magnitude_db()).collect();
+    let phases = found.phases_deg();
+    let points = |values: &[Estimate], name: &str| Curve {
+        name: name.to_owned(),
+        kind: LineKind::Points,
+        shade: Shade::of_method(0),
+        x: omega.clone(),
+        y: values.iter().map(|v| v.value).collect(),
+        band: Vec::new(),
+        bars: values.iter().map(bar).collect(),
+    };
+    let line = |(k, model): (usize, &ModelCurve), y: Vec<f64>| Curve {
+        name: model.name.clone(),
+        kind: LineKind::Line,
+        shade: Shade::of_method(k + 1),
+        x: model.omega_rad_s.clone(),
+        y,
+        band: Vec::new(),
+        bars: Vec::new(),
+    };
+    let panel = |name: &str, unit: &str, curves: Vec<Curve>| CurvePanel {
+        name: name.to_owned(),
+        unit: unit.to_owned(),
+        curves,
+        ..CurvePanel::default()
+    };
+    let known: Vec<(f64, f64)> = omega.iter().copied().zip(phases.iter().map(|p| p.value)).collect();
+    let gain_of = |model: &ModelCurve| model.response.iter().map(|h| 20.0 * h.norm().log10()).collect();
+    // Models first: the points lie on them.
+    let mut magnitude: Vec<Curve> = models.iter().enumerate().map(|m| line(m, gain_of(m.1))).collect();
+    magnitude.push(points(&magnitudes, NAME));
+    let mut phase: Vec<Curve> = models
+        .iter()
+        .enumerate()
+        .map(|m| line(m, m.1.phase_deg(&known)))
+        .collect();
+    phase.push(points(&phases, NAME));
+    let mut panels = vec![panel("magnitude", "dB", magnitude), panel("phase", "deg", phase)];
+    let coherences: Vec<Estimate> = lines.iter().filter_map(|l| l.coherence).map(Estimate::fixed).collect();
+    // Without the excitation it is that of u with e, which says little in a loop.
+    let shown = found.channel.is_some() && coherences.len() == omega.len();
+    if let Some(chance) = chance_coherence(found.function.runs.len()).filter(|_| shown) {
+        let ends = models.iter().flat_map(|m| m.omega_rad_s.iter()).chain(&omega);
+        let (low, high) = ends.fold((f64::INFINITY, 0.0_f64), |(l, h), w| (l.min(*w), h.max(*w)));
+        let level = Curve {
+            name: "unrelated runs stay below (95 %)".to_owned(),
+            kind: LineKind::Truth,
+            shade: Shade::of_method(0),
+            x: vec![low, high],
+            y: vec![chance; 2],
+            band: Vec::new(),
+            bars: Vec::new(),
+        };
+        let mut coherence = panel("coherence", "", vec![points(&coherences, ""), level]);
+        coherence.within = Some((0.0, 1.05));
+        panels.push(coherence);
+    }
+    let grid = CurveGrid {
+        panels,
+        columns: 1,
+        titles: Vec::new(),
+        abscissa: "frequency \u{3c9} (rad/s)".to_owned(),
+        logarithmic_abscissa: true,
+        shared_ordinates: false,
+    };
+    curves(id, title, &grid)
+}
+
+/// Ends of an error bar; none where there is no error.
+fn bar(v: &Estimate) -> (f64, f64) {
+    let half = v.standard_error.map_or(f64::NAN, |s| Z_95 * s);
+    (v.value - half, v.value + half)
+}
+
+/// The same figure in another size: its width in mm, and the height that goes with it. The text
+/// grows with it; it has 7.5 pt at 85 mm.
+pub fn with_width_mm(svg: &str, width_mm: f64) -> String {
+    let size = |name: &str| -> Option<f64> {
+        let (_, rest) = svg.split_once(&format!(" {name}=\""))?;
+        rest.split_once('"')?.0.parse().ok()
+    };
+    let (Some(width), Some(height)) = (size("width"), size("height")) else {
+        return svg.to_owned();
+    };
+    let height_mm = height / width * width_mm;
+    svg.replacen(&format!(" width=\"{width}\""), &format!(" width=\"{width_mm}mm\""), 1)
+        .replacen(
+            &format!(" height=\"{height}\""),
+            &format!(" height=\"{height_mm:.2}mm\""),
+            1,
+        )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use hoid_ident::frequency::{DescriptionOptions, describe_runs};
+    use hoid_model::{Channel, Record, SampleTime};
+
+    use super::{super::draw::tests::has, *};
+
+    /// `u(t) = 2 e(t - 0.3)` at lines of 1 to 23 times TAU/20 rad/s, with a disturbance of each run.
+    fn described(runs: u32) -> Description {
+        let ts = SampleTime::new(0.1).unwrap();
+        let wave = |t: f64| {
+            [1.0, 4.0, 9.0, 23.0]
+                .map(|h: f64| (TAU * h * t / 20.0 + h).sin())
+                .iter()
+                .sum::<f64>()
+        };
+        let record = |run: u32| {
+            let t = |k: u32| 0.1 * f64::from(k);
+            let rough = |k: u32| 0.2 * f64::from(run) * (f64::from(k * k) * 0.37 + f64::from(run)).sin();
+            let e: Vec<f64> = (0..200).map(|k| wave(t(k))).collect();
+            let u = (0..200).map(|k| 2.0 * wave(t(k) - 0.3) + rough(k)).collect();
+            Record::new(ts, Channel::new("e", "", e.clone()), Channel::new("u", "", u))
+                .and_then(|r| r.with_channel(Channel::new("d", "", e)))
+                .unwrap()
+        };
+        let records: Vec<Record> = (0..runs).map(record).collect();
+        describe_runs(&records, &DescriptionOptions::default()).unwrap()
+    }
+
+    #[test]
+    fn a_model_lies_in_the_turn_of_the_points() {
+        let found = described(4);
+        let model = |turn: f64| ModelCurve::over(&found, "m", 0.3, |w| Complex64::from_polar(2.0, turn - 0.3 * w));
+        let points: Vec<(f64, f64)> = found
+            .function
+            .lines
+            .iter()
+            .map(|l| (l.omega_rad_s, -(0.3 * l.omega_rad_s).to_degrees() + 720.0))
+            .collect();
+        for turn in [0.0, TAU, -3.0 * TAU] {
+            let model = model(turn);
+            for (phase, omega) in model.phase_deg(&points).iter().zip(&model.omega_rad_s) {
+                assert!((phase - 720.0 + (0.3 * omega).to_degrees()).abs() < 1e-9);
+            }
+        }
+        assert!(model(0.0).phase_deg(&[]).iter().all(|p| *p < 0.0));
+        let empty = ModelCurve {
+            omega_rad_s: Vec::new(),
+            response: Vec::new(),
+            ..model(0.0)
+        };
+        assert!(empty.phase_deg(&points).is_empty());
+    }
+
+    #[test]
+    fn the_figure_has_points_models_and_coherence() {
+        let found = described(4);
+        let model = ModelCurve::over(&found, "gain and delay", 0.3, |w| Complex64::from_polar(2.0, -0.3 * w));
+        let svg = describing("d", "t", &found, std::slice::from_ref(&model));
+        for text in [
+            "magnitude",
+            "phase",
+            "coherence",
+            "gain and delay",
+            "describing function",
+            "unrelated runs",
+        ] {
+            assert!(svg.contains(text), "{text}");
+        }
+        assert_eq!(svg, describing("d", "t", &found, &[model]));
+        // One run has neither errors nor coherence.
+        let alone = describing("d", "t", &described(1), &[]);
+        assert!(!alone.contains("coherence") && !alone.contains("NaN"));
+    }
+
+    #[test]
+    fn a_figure_has_the_width_that_is_asked_for() {
+        let svg = describing("d", "t", &described(1), &[]);
+        let wide = with_width_mm(&svg, 85.0);
+        assert!(has(&wide, "svg", &[]) && wide.contains("width=\"85mm\" height=\""));
+        let (_, height) = svg.split_once(" height=\"").unwrap();
+        let height: f64 = height.split_once('"').unwrap().0.parse().unwrap();
+        assert!(wide.contains(&format!("height=\"{:.2}mm\"", height * 85.0 / 420.0)));
+        assert_eq!(with_width_mm("<svg>", 85.0), "<svg>");
+    }
+}
