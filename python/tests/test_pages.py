@@ -49,6 +49,17 @@ def digests(directory: Path, kind: str) -> dict[str, str]:
     }
 
 
+def test_virtual_people(cli: Any, tmp_path: Path) -> None:
+    arguments = "simulate-group --people --subjects 1 --runs 2 --plants integrator --out"
+    cli.run(*arguments.split(), tmp_path / "runs")
+    assert pyhoid.simulate_people(tmp_path / "same", subjects=1, runs=2, plants=["integrator"]) == 2
+    assert digests(tmp_path / "same", "*.csv") == digests(tmp_path / "runs", "*.csv")
+    run = pyhoid.read(tmp_path / "same" / "S1_integrator_1.csv")
+    assert len(run) == 2400
+    with pytest.raises(pyhoid.OptionError, match="double-integrator"):
+        pyhoid.simulate_people(tmp_path / "other", plants=["1/s"])
+
+
 def test_a_virtual_experiment_and_its_pages(cli: Any, tmp_path: Path) -> None:
     cli.run(
         *"simulate-group --subjects 2 --runs 2 --conditions C1 --out".split(), tmp_path / "runs"

@@ -651,3 +651,57 @@ fn what_cannot_be_simulated_ends_with_one_and_writes_nothing() {
     let (code, _) = bad(d, &["simulate", "--condition", "C1", "--out", "no/such/place.csv"]);
     assert_eq!(code, 1);
 }
+
+/// A scenario of the family is simulated, and its margins are those of its loop.
+#[test]
+fn a_person_of_the_family_is_simulated() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    let person = include_str!("../../../fixtures/scenario/person.toml");
+    fs::write(d.join("person.toml"), person).unwrap();
+    let said = good(
+        d,
+        &["simulate", "--scenario", "person.toml", "--seed", "3", "--out", "p.csv"],
+    );
+    assert!(said.contains("a person: 3600 samples"), "{said}");
+    let run = fs::read_to_string(d.join("p.csv")).unwrap();
+    let header = run.lines().find(|line| !line.starts_with('#')).unwrap();
+    for name in ["e", "u", "f_t", "d", "y", "n", "K_over_T_I", "T_I", "zeta_nm", "tau_e"] {
+        assert!(header.split(',').any(|column| column == name), "{header} lacks {name}");
+    }
+    let initial = json(d, &["margins", "--scenario", "person.toml", "--json"]);
+    let last = json(
+        d,
+        &["margins", "--scenario", "person.toml", "--state", "last", "--json"],
+    );
+    // |Y P| = 1 at the crossover, by hand: K/T_I |0.6 jw + 1|/|jw + 0.2| |NM|/w.
+    let omega = initial["crossover_rad_s"].as_f64().unwrap();
+    let lead = (0.36 * omega * omega + 1.0).sqrt() / (omega * omega + 0.04).sqrt();
+    let ratio = omega / 11.0;
+    let muscles = ((1.0 - ratio * ratio).powi(2) + (0.5 * ratio).powi(2)).sqrt();
+    assert!((4.0 * lead / muscles / omega - 1.0).abs() < 1e-6);
+    assert_ne!(initial["phase_margin_deg"], last["phase_margin_deg"]);
+    assert_eq!(initial["remnant_gain"].as_array().unwrap().len(), 3);
+    assert_eq!(last["remnant_gain"][2]["gain"], 0.03);
+    let table = good(d, &["margins", "--scenario", "person.toml"]);
+    assert!(
+        table.contains("Crossover frequency") && table.contains("given gain"),
+        "{table}"
+    );
+    let (code, message) = bad(
+        d,
+        &[
+            "simulate",
+            "--scenario",
+            "person.toml",
+            "--noise-level",
+            "0.1",
+            "--out",
+            "x.csv",
+        ],
+    );
+    assert!(code == 2 && message.contains("[[remnant]]"), "{message}");
+    fs::write(d.join("wild.toml"), person.replace("K = 20 ", "K = 200 ")).unwrap();
+    let (code, message) = bad(d, &["simulate", "--scenario", "wild.toml", "--out", "x.csv"]);
+    assert!(code == 1 && message.contains("not stable"), "{message}");
+}

@@ -188,3 +188,45 @@ fn a_manifest_is_made_from_names_and_mistakes_are_named() {
         "{estimates}"
     );
 }
+
+#[test]
+fn people_are_simulated_and_their_options_are_theirs() {
+    let directory = TempDir::new().unwrap();
+    let at = directory.path();
+    let usual = [
+        "simulate-group",
+        "--people",
+        "--subjects",
+        "1",
+        "--runs",
+        "1",
+        "--out",
+        "people",
+    ];
+    let more = [
+        "--plants",
+        "integrator",
+        "--remnants",
+        "pulsed",
+        "--remnant-share",
+        "0.1..0.2",
+        "--sample-time",
+        "0.01",
+    ];
+    let said = good(at, &[&usual[..], &more].concat());
+    assert!(said.contains("1 runs") && said.contains("truth.csv"), "{said}");
+    let run = fs::read_to_string(at.join("people/S1_integrator_1.csv")).unwrap();
+    assert!(run.starts_with("t,e,u,d,y\n") && run.lines().count() == 4001);
+    let truth = fs::read_to_string(at.join("people/truth.csv")).unwrap();
+    assert!(truth.contains(",lead-lag,pulsed,"), "{truth}");
+    let manifest = fs::read_to_string(at.join("people/group.toml")).unwrap();
+    assert!(manifest.contains("controlled_element = \"1/1,0\"") && manifest.contains("excitation = \"d\""));
+    for wrong in [
+        &["simulate-group", "--people", "--noise-level", "0.2", "--out", "x"][..],
+        &["simulate-group", "--plants", "integrator", "--out", "x"],
+        &["simulate-group", "--people", "--plants", "1/s", "--out", "x"],
+        &["simulate-group", "--people", "--sample-time", "0", "--out", "x"],
+    ] {
+        bad(at, wrong);
+    }
+}

@@ -79,7 +79,10 @@ pub use preparation::{NewRate, Offset, Preparation, Scaling, Step};
 pub use read_options::{ReadOptions, Repair};
 pub use record_file::{read, read_prepared, read_record, write_record, write_record_csv};
 pub use record_from_table::ReadRecord;
-pub use scenario_file::{ScenarioFileError, parse_scenario, read_scenario, scenario_schema};
+pub use scenario_file::{
+    AnyScenario, ScenarioFileError, family_scenario_schema, parse_any_scenario, parse_scenario, read_any_scenario,
+    read_scenario, scenario_schema,
+};
 pub use segments::read_segments;
 pub use survey::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey, survey};
 pub use table_file::{check_table_path, read_table, write_table};

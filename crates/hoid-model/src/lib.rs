@@ -53,6 +53,8 @@
 //! | [`uncertainty`] | standard errors of derived quantities by the delta method |
 //! | [`numbers`], [`estimate_table`] | numbers with as many digits as their standard error allows, also as a table |
 //! | [`controlled_element`], [`forcing`], [`schedule`], [`scenario`] | the task: plant, target signal, change over time, conditions C1-C6 |
+//! | [`family_scenario`] | tasks of people: any operator of the family, any controlled element, a rich remnant |
+//! | [`held_system`] | exact zero-order hold of any rational transfer function |
 //! | [`margins`] | crossover frequency, phase and gain margin |
 //! | [`remnant_gain`] | the gain K_n that gives a demanded noise level |
 //! | [`Finding`], [`Verdict`] | what makes a result doubtful, and what it is worth |
@@ -67,7 +69,9 @@ pub mod controlled_element;
 pub mod delayed_operator;
 pub mod discretise;
 pub mod estimate_table;
+pub mod family_scenario;
 pub mod forcing;
+pub mod held_system;
 pub mod margins;
 pub mod numbers;
 pub mod operator;
@@ -88,6 +92,7 @@ pub mod uncertainty;
 
 pub use delayed_operator::{DelayedOperator, delayed_operator, delayed_operator_jacobian};
 pub use error::{ModelError, NotConvertible};
+pub use family_scenario::{FamilyScenario, FamilyState};
 pub use finding::{Finding, Severity, Verdict, VerdictLevel};
 pub use named_choice::{NamedChoice, UnknownName};
 pub use num_complex::Complex64;

@@ -3,11 +3,15 @@
 
 use std::path::{Path, PathBuf};
 
-use hoid_model::scenario::Condition;
+use hoid_model::{Form, SampleTime, scenario::Condition};
 use hoid_report::{ReportError, write_group_pages};
+use hoid_sim::people::{Plant, Population, Range, RemnantKind};
 use hoid_study::{
     RunOptions,
-    group::{Manifest, Pattern, SamplingDefect, VirtualExperiment, run_group, simulate_group as simulate_into},
+    group::{
+        Manifest, Pattern, PeopleExperiment, SamplingDefect, VirtualExperiment, run_group,
+        simulate_group as simulate_into, simulate_people as people_into,
+    },
 };
 use pyo3::prelude::*;
 
@@ -61,6 +65,57 @@ pub fn group_manifest(directory: PathBuf, pattern: &str) -> Outcome<(String, Vec
     Ok((manifest.text(), others))
 }
 
+/// Simulates runs of people drawn over the family into a directory; returns their number.
+#[pyfunction]
+#[pyo3(signature = (directory, *, subjects, plants, form, remnants, remnant_share, sample_time, runs, between_runs, seed, trouble))]
+#[allow(clippy::too_many_arguments)]
+pub fn simulate_people(
+    py: Python<'_>,
+    directory: PathBuf,
+    subjects: u64,
+    plants: Vec<String>,
+    form: Option<String>,
+    remnants: Vec<String>,
+    remnant_share: (f64, f64),
+    sample_time: f64,
+    runs: u64,
+    between_runs: f64,
+    seed: u64,
+    trouble: Vec<String>,
+) -> Outcome<usize> {
+    let experiment = PeopleExperiment {
+        subjects,
+        plants: plants
+            .iter()
+            .map(|name| names::choice::<Plant>("plants", name))
+            .collect::<Outcome<_>>()?,
+        form: form.map(|name| names::choice::<Form>("form", &name)).transpose()?,
+        remnants: remnants
+            .iter()
+            .map(|name| names::choice::<RemnantKind>("remnants", name))
+            .collect::<Outcome<_>>()?,
+        runs,
+        between_runs,
+        population: Population {
+            remnant_share: Range::new(remnant_share.0, remnant_share.1),
+            ..Population::default()
+        },
+        sample_time: SampleTime::new(sample_time)?,
+        seed,
+        defects: defects(&trouble)?,
+    };
+    let manifest = py.detach(|| people_into(&experiment, &directory, &|| ()))?;
+    Ok(manifest.runs.len())
+}
+
+fn defects(trouble: &[String]) -> Outcome<Vec<SamplingDefect>> {
+    let known = SamplingDefect::ALL.map(|trouble| (trouble.name(), trouble));
+    trouble
+        .iter()
+        .map(|name| names::word("trouble", name, &known))
+        .collect()
+}
+
 /// Simulates the runs of a virtual experiment into a directory; returns their number.
 #[pyfunction]
 #[pyo3(signature = (directory, *, subjects, conditions, runs, between_subjects, between_runs, remnant_order, noise_level, seed, trouble))]
@@ -90,10 +145,7 @@ pub fn simulate_group(
         remnant_order,
         noise_level,
         seed,
-        defects: trouble
-            .iter()
-            .map(|name| names::word("trouble", name, &SamplingDefect::ALL.map(|t| (t.name(), t))))
-            .collect::<Outcome<_>>()?,
+        defects: defects(&trouble)?,
     };
     let manifest = py.detach(|| simulate_into(&experiment, &directory, &|| ()))?;
     Ok(manifest.runs.len())

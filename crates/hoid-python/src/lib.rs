@@ -64,6 +64,7 @@ fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(group::group, module)?,
         wrap_pyfunction!(group::group_manifest, module)?,
         wrap_pyfunction!(group::simulate_group, module)?,
+        wrap_pyfunction!(group::simulate_people, module)?,
         wrap_pyfunction!(identify::batch_estimators, module)?,
         wrap_pyfunction!(identify::identify, module)?,
         wrap_pyfunction!(recursion::recursive_methods, module)?,

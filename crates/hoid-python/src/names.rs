@@ -29,7 +29,7 @@ pub fn word<T: Clone>(option: &str, found: &str, words: &[(&str, T)]) -> Outcome
 }
 
 /// A choice of the library by its name.
-fn choice<T: NamedChoice>(option: &str, found: &str) -> Outcome<T> {
+pub fn choice<T: NamedChoice>(option: &str, found: &str) -> Outcome<T> {
     let words: Vec<_> = T::CHOICES
         .iter()
         .map(|choice| (choice.choice_name(), *choice))

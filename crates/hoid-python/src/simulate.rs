@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use hoid_io::{parse_scenario, read_scenario};
+use hoid_io::{AnyScenario, parse_any_scenario, read_any_scenario};
 use hoid_model::{
-    ContinuousTransferFunction, DiscreteOperator, ModelError, OperatorParameters, SampleTime,
+    ContinuousTransferFunction, DiscreteOperator, FamilyScenario, ModelError, OperatorParameters, SampleTime,
     discretise::discretise,
     margins::{MANUAL_CONTROL_RANGE_RAD_S, margins as margins_of},
     remnant::HIGHEST_ORDER,
@@ -12,7 +12,7 @@ use hoid_model::{
     second_order::HeldSecondOrder,
     uncertainty::OperatorEstimate,
 };
-use hoid_sim::{RunSeed, Simulator};
+use hoid_sim::{FamilySimulator, RunSeed, Simulator};
 use numpy::PyArray1;
 use pyo3::{
     prelude::*,
@@ -26,11 +26,14 @@ use crate::{
 };
 
 /// A condition, a scenario file, or the text of one.
-fn scenario(condition: Option<&str>, file: Option<PathBuf>, text: Option<&str>) -> Outcome<Scenario> {
+fn scenario(condition: Option<&str>, file: Option<PathBuf>, text: Option<&str>) -> Outcome<AnyScenario> {
     match (condition, file, text) {
-        (Some(condition), None, None) => Ok(Scenario::condition(condition.parse::<Condition>()?)),
-        (None, Some(file), None) => Ok(read_scenario(&file)?),
-        (None, None, Some(text)) => Ok(parse_scenario(text, "(text)", "scenario")?),
+        (Some(condition), None, None) => {
+            let scenario = Scenario::condition(condition.parse::<Condition>()?);
+            Ok(AnyScenario::Reference(Box::new(scenario)))
+        }
+        (None, Some(file), None) => Ok(read_any_scenario(&file)?),
+        (None, None, Some(text)) => Ok(parse_any_scenario(text, "(text)", "scenario")?),
         _ => Err(bad_option("give either condition, such as \"C4\", or scenario")),
     }
 }
@@ -56,7 +59,32 @@ pub fn simulate<'py>(
     replication: u64,
     keep_run_in: bool,
 ) -> Outcome<Bound<'py, PyDict>> {
-    let mut scenario = scenario(condition.as_deref(), scenario_file, scenario_text.as_deref())?;
+    let run_seed = RunSeed {
+        seed,
+        cell,
+        replication,
+    };
+    let realisation = realisation.as_deref().map(names::realisation).transpose()?;
+    let mut scenario = match scenario(condition.as_deref(), scenario_file, scenario_text.as_deref())? {
+        AnyScenario::Reference(scenario) => *scenario,
+        AnyScenario::Family(mut scenario) => {
+            let has_remnant = remnant_order.is_some() || remnant_time_constant.is_some();
+            if has_remnant || noise_level.is_some() || noise_definition.is_some() {
+                return Err(bad_option(
+                    "remnant_order, remnant_time_constant, noise_level and noise_definition are of the reference text's \
+                     remnant: in a scenario with a form the tables [[remnant]] say it",
+                ));
+            }
+            if let Some(ts) = sample_time {
+                scenario.sample_time = SampleTime::new(ts)?;
+            }
+            if let Some(realisation) = realisation {
+                scenario.realisation = realisation;
+            }
+            let record = py.detach(|| FamilySimulator::new(&scenario)?.run_with_truth(run_seed, keep_run_in))?;
+            return Ok(parts(py, record)?);
+        }
+    };
     if let Some(order) = remnant_order {
         scenario.remnant.order = order;
     }
@@ -66,8 +94,8 @@ pub fn simulate<'py>(
     if let Some(ts) = sample_time {
         scenario.sample_time = SampleTime::new(ts)?;
     }
-    if let Some(where_) = realisation {
-        scenario.realisation = names::realisation(&where_)?;
+    if let Some(realisation) = realisation {
+        scenario.realisation = realisation;
     }
     let definition = noise_definition.as_deref().map(names::noise_definition).transpose()?;
     scenario.remnant.strength = scenario
@@ -75,11 +103,6 @@ pub fn simulate<'py>(
         .strength
         .changed(noise_level, definition)
         .ok_or_else(|| bad_option("noise_definition needs noise_level: the scenario gives K_n itself"))?;
-    let run_seed = RunSeed {
-        seed,
-        cell,
-        replication,
-    };
     let record = py.detach(|| Simulator::new(&scenario)?.run(run_seed, keep_run_in))?;
     Ok(parts(py, record)?)
 }
@@ -98,6 +121,10 @@ pub fn margins<'py>(
 ) -> Outcome<Bound<'py, PyDict>> {
     let scenario = scenario(condition.as_deref(), scenario_file, scenario_text.as_deref())?;
     let last = names::word("state", state, &[("initial", false), ("last", true)])?;
+    let scenario = match scenario {
+        AnyScenario::Reference(scenario) => *scenario,
+        AnyScenario::Family(scenario) => return family_margins(py, &scenario, last),
+    };
     let state = if last { scenario.last } else { scenario.initial };
     let open_loop = state
         .operator
@@ -124,6 +151,26 @@ pub fn margins<'py>(
             }
             gains.append(row)?;
         }
+    }
+    all.set_item("remnant_gain", gains)?;
+    Ok(all)
+}
+
+/// Those of an operator of the family, with the gains of the parts of its remnant.
+fn family_margins<'py>(py: Python<'py>, scenario: &FamilyScenario, last: bool) -> Outcome<Bound<'py, PyDict>> {
+    let state = if last { &scenario.last } else { &scenario.initial };
+    let all = figures::plain_margins(py, &state.margins()?)?;
+    let simulator = FamilySimulator::new(scenario)?;
+    let gains = PyList::empty(py);
+    for (part, gain) in scenario
+        .remnant
+        .iter()
+        .zip(simulator.remnant_gains()[usize::from(last)])
+    {
+        let row = PyDict::new(py);
+        row.set_item("share", part.share())?;
+        row.set_item("gain", *gain)?;
+        gains.append(row)?;
     }
     all.set_item("remnant_gain", gains)?;
     Ok(all)

@@ -22,6 +22,18 @@ pub enum SimError {
         /// Name of the scenario.
         scenario: String,
     },
+    /// Ranges in which no person is found.
+    #[error(
+        "no loop is taken in {draws} draws of the form {form} on the element {plant}: widen the ranges of the population, or take smaller spreads"
+    )]
+    NobodyFound {
+        /// Form of the operator.
+        form: String,
+        /// Controlled element.
+        plant: String,
+        /// Draws that were made.
+        draws: usize,
+    },
     /// Noise of another length than the run.
     #[error("the noise has {found} samples, the run needs {expected} (run-in and measurement)")]
     NoiseLength {

@@ -26,14 +26,19 @@
 //! | `run_seed` | [`RunSeed`]: what names the random numbers of one run |
 //! | `normal_deviates` | standard normal deviates by the ziggurat |
 //! | `cascade` | exact zero-order hold of the remnant filter |
+//! | [`family`] | the loop of any operator of the family: [`FamilySimulator`] |
+//! | [`people`] | virtual people drawn over the family |
 //! | `error` | [`SimError`]: why a simulation gives no record |
 
 mod cascade;
 mod error;
+pub mod family;
 mod normal_deviates;
+pub mod people;
 mod run_seed;
 mod simulator;
 
 pub use error::SimError;
+pub use family::{FamilySignals, FamilySimulator};
 pub use run_seed::RunSeed;
 pub use simulator::{Signals, Simulator};

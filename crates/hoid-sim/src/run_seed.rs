@@ -4,7 +4,10 @@
 //! generator, so that any run can be repeated alone, in any order and on any number of threads, and
 //! no two runs share a stream.
 
-use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+use rand_chacha::{
+    ChaCha8Rng,
+    rand_core::{Rng, SeedableRng},
+};
 
 use crate::normal_deviates::normal_deviates;
 
@@ -33,14 +36,34 @@ impl RunSeed {
 
     /// The first samples of [`RunSeed::white_noise`], into memory that was used before.
     pub fn white_noise_into(&self, noise: &mut [f64]) {
+        normal_deviates(self.generator(REMNANT), noise);
+    }
+
+    /// White Gaussian noise of unit variance of another use of the run.
+    pub(crate) fn white_noise_of(&self, tag: u64, n: usize) -> Vec<f64> {
+        let mut noise = vec![0.0; n];
+        normal_deviates(self.generator(tag), &mut noise);
+        noise
+    }
+
+    /// Numbers from `[0, 1)`, each equally likely, of another use of the run.
+    pub(crate) fn uniform_of(&self, tag: u64, n: usize) -> Vec<f64> {
+        let mut generator = self.generator(tag);
+        // The 53 bits that a number from [0, 1) has.
+        (0..n)
+            .map(|_| (generator.next_u64() >> 11) as f64 / (1u64 << 53) as f64)
+            .collect()
+    }
+
+    fn generator(&self, tag: u64) -> ChaCha8Rng {
         let mut key = [0; 32];
         for (bytes, number) in key
             .chunks_exact_mut(8)
-            .zip([self.seed, self.cell, self.replication, REMNANT])
+            .zip([self.seed, self.cell, self.replication, tag])
         {
             bytes.copy_from_slice(&number.to_le_bytes());
         }
-        normal_deviates(ChaCha8Rng::from_seed(key), noise);
+        ChaCha8Rng::from_seed(key)
     }
 }
 

@@ -10,10 +10,16 @@ use std::{
 
 use hoid_io::{ColumnValues, OutputTable, read_table, write_record};
 use hoid_model::scenario::{Condition, Scenario};
-use hoid_sim::{RunSeed, Simulator};
+use hoid_sim::{
+    RunSeed, Simulator,
+    people::{Plant, RemnantKind},
+};
 use hoid_study::{
     RunOptions, StudyError,
-    group::{Manifest, Pattern, SamplingDefect, VirtualExperiment, run_group, simulate_group},
+    group::{
+        Manifest, Pattern, PeopleExperiment, SamplingDefect, VirtualExperiment, run_group, simulate_group,
+        simulate_people,
+    },
 };
 
 /// Two subjects with different gains, two conditions, two runs each.
@@ -452,4 +458,67 @@ fn grey_box_error_bars_hold_in_a_virtual_experiment() {
     let mean = |name: &str| reals(&delays, name).iter().sum::<f64>() / 30.0;
     let (arx, bj) = (mean("ARX_nk"), mean("BJ_nk"));
     assert!((bj - 29.0).abs() < 2.0 && arx > bj + 3.0, "ARX {arx}, BJ {bj}");
+}
+
+/// Virtual people: their files are those of recorded experiments, with all that is true beside them.
+#[test]
+fn virtual_people_have_their_truth_beside_them() {
+    let experiment = PeopleExperiment {
+        subjects: 2,
+        runs: 2,
+        remnants: vec![RemnantKind::BroadBand, RemnantKind::Pulsed],
+        ..PeopleExperiment::default()
+    };
+    let directory = tempfile::tempdir().unwrap();
+    let (plain, again) = (directory.path().join("plain"), directory.path().join("again"));
+    let manifest = simulate_people(&experiment, &plain, &|| ()).unwrap();
+    simulate_people(&experiment, &again, &|| ()).unwrap();
+    assert!(content(&plain) == content(&again), "the same seed, the same bytes");
+    assert_eq!(Manifest::read(&plain.join("group.toml")).unwrap(), manifest);
+    assert_eq!(manifest.runs.len(), 12);
+    assert!(simulate_people(&experiment, &plain, &|| ()).is_err());
+
+    let truth = read_table(&plain.join("truth.csv")).unwrap();
+    assert_eq!(texts(&truth, "remnant")[0], "broad-band");
+    assert_eq!(texts(&truth, "remnant")[11], "pulsed");
+    for (row, entry) in manifest.runs.iter().enumerate() {
+        assert_eq!(texts(&truth, "condition")[row], entry.condition);
+        let margin = reals(&truth, "phase_margin_deg")[row];
+        // The spread between runs leads out of the range of persons by some degrees.
+        assert!((10.0..75.0).contains(&margin), "{margin}");
+        let run = read_table(&plain.join(&entry.file)).unwrap();
+        let names: Vec<&str> = run.columns.iter().map(|column| column.name.as_str()).collect();
+        assert_eq!(names, ["t", "e", "u", "d", "y"]);
+        let (t, e, y) = (reals(&run, "t"), reals(&run, "e"), reals(&run, "y"));
+        assert_eq!(t.len(), 2400);
+        let offset = reals(&truth, "offset_e")[row];
+        assert!((0..2400).all(|k| (e[k] + y[k] - offset).abs() < 1e-9));
+    }
+    // Of a lead-lag K/T_I is there always, T_I where it is finite.
+    let forms = texts(&truth, "form");
+    let ratio = reals(&truth, "K_over_T_I");
+    assert!((0..12).all(|row| (forms[row] == "lead") == ratio[row].is_nan()));
+    for bad in [
+        PeopleExperiment {
+            runs: 0,
+            ..experiment.clone()
+        },
+        PeopleExperiment {
+            plants: vec![Plant::Integrator; 2],
+            ..experiment.clone()
+        },
+        PeopleExperiment {
+            between_runs: 1.5,
+            ..experiment.clone()
+        },
+        PeopleExperiment {
+            form: Some(hoid_model::Form::Lag),
+            ..experiment
+        },
+    ] {
+        let directory = directory.path().join("bad");
+        let refused = simulate_people(&bad, &directory, &|| ());
+        assert!(matches!(refused, Err(StudyError::Virtual { .. })));
+        assert!(!directory.exists(), "nothing is written of what is refused");
+    }
 }

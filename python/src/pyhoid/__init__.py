@@ -34,7 +34,7 @@ from .errors import (
 )
 from .estimates import Estimate, Operator, Remnant
 from .fit import Fit, FrequencyResponse, Series, Validation
-from .groups import group, group_manifest, simulate_group
+from .groups import group, group_manifest, simulate_group, simulate_people
 from .identification import identify
 from .reading import info, read, read_segments, write
 from .record import Record
@@ -100,6 +100,7 @@ __all__ = [
     "results",
     "simulate",
     "simulate_group",
+    "simulate_people",
     "study",
     "track",
     "write",

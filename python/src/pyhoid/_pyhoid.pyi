@@ -50,6 +50,7 @@ __all__ = [
     "reproduce",
     "simulate",
     "simulate_group",
+    "simulate_people",
     "track",
     "write",
 ]
@@ -414,6 +415,20 @@ def simulate_group(
     between_runs: float,
     remnant_order: int,
     noise_level: float,
+    seed: int,
+    trouble: list[str],
+) -> int: ...
+def simulate_people(
+    directory: _Path,
+    *,
+    subjects: int,
+    plants: list[str],
+    form: str | None,
+    remnants: list[str],
+    remnant_share: tuple[float, float],
+    sample_time: float,
+    runs: int,
+    between_runs: float,
     seed: int,
     trouble: list[str],
 ) -> int: ...

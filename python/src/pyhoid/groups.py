@@ -11,7 +11,7 @@ from ._options import Progress
 from .errors import StudyStateError
 from .studies import Results
 
-__all__ = ["group", "group_manifest", "simulate_group"]
+__all__ = ["group", "group_manifest", "simulate_group", "simulate_people"]
 
 
 def group(
@@ -126,6 +126,76 @@ def simulate_group(
         between_runs=float(between_runs),
         remnant_order=int(remnant_order),
         noise_level=float(noise_level),
+        seed=int(seed),
+        trouble=list(trouble),
+    )
+
+
+def simulate_people(
+    directory: str | PathLike[str],
+    *,
+    subjects: int = 3,
+    plants: Sequence[str] = ("integrator", "lagged-integrator", "double-integrator"),
+    form: str | None = None,
+    remnants: Sequence[str] = ("lag", "broad-band", "signal-dependent", "pulsed", "intermittent"),
+    remnant_share: tuple[float, float] = (0.05, 0.5),
+    sample_time: float = 1 / 60,
+    runs: int = 5,
+    between_runs: float = 0.03,
+    seed: int = 1,
+    trouble: Sequence[str] = (),
+) -> int:
+    """Simulate people who are like people.
+
+    Persons are drawn over the family of operators, from published ranges. Writes a file with the
+    columns t, e, u, d, y for each run, the true parameters in ``truth.csv``, and a manifest for
+    `group`.
+
+    Parameters
+    ----------
+    directory : path
+        Created if it does not exist.
+    subjects, runs : int
+        Number of subjects, and of runs for each subject and controlled element.
+    plants : sequence of str
+        Controlled elements: ``"integrator"`` 1/s, ``"lagged-integrator"`` 1/(s(s+1)),
+        ``"double-integrator"`` 1/s^2.
+    form : str, optional
+        Form of all operators; default those that people have on each element.
+    remnants : sequence of str
+        Kinds of remnant, subject after subject.
+    remnant_share : tuple of float
+        Least and greatest share of the remnant in the variance of u.
+    sample_time : float
+        In s.
+    between_runs : float
+        Spread of the parameters between the runs of a subject; 0.1 is 10 %.
+    seed : int
+    trouble : sequence of str
+        As in `simulate_group`.
+
+    Returns
+    -------
+    int
+        Number of runs.
+
+    Raises
+    ------
+    OptionError
+        For an experiment that is not valid.
+    StudyStateError
+        When the directory already holds an experiment.
+    """
+    return _pyhoid.simulate_people(
+        Path(directory),
+        subjects=int(subjects),
+        plants=list(plants),
+        form=form,
+        remnants=list(remnants),
+        remnant_share=(float(remnant_share[0]), float(remnant_share[1])),
+        sample_time=float(sample_time),
+        runs=int(runs),
+        between_runs=float(between_runs),
         seed=int(seed),
         trouble=list(trouble),
     )

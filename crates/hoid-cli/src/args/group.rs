@@ -3,8 +3,11 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use hoid_model::scenario::Condition;
+use hoid_model::{Form, scenario::Condition};
+use hoid_sim::people::{Plant, RemnantKind};
 use hoid_study::group::SamplingDefect;
+
+use super::{choices::choice_of, parse::parse_span};
 
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
@@ -65,6 +68,12 @@ pub struct SimulateGroupArgs {
     /// Subjects
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub subjects: u64,
+    /// People like people in place of subjects near the reference text: drawn over the family of
+    /// operators, on the elements of --plants, columns t, e, u, d, y
+    #[arg(long, conflicts_with_all = ["conditions", "between_subjects", "remnant_order", "noise_level"])]
+    pub people: bool,
+    #[command(flatten)]
+    pub people_options: PeopleOptions,
     /// Conditions, separated by commas
     #[arg(
         long,
@@ -95,6 +104,41 @@ pub struct SimulateGroupArgs {
     /// quantised, stalled
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_trouble)]
     pub trouble: Vec<SamplingDefect>,
+}
+
+/// What --people takes besides.
+#[derive(Debug, Args)]
+pub struct PeopleOptions {
+    /// With --people: controlled elements 1/s, 1/(s(s+1)), 1/s^2 by name, separated by commas
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        requires = "people",
+        default_value = "integrator,lagged-integrator,double-integrator",
+        value_parser = choice_of(&Plant::ALL)
+    )]
+    pub plants: Vec<Plant>,
+    /// With --people: form of all operators [default: lead-lag on 1/s, lead2-lag or lead on the
+    /// others]
+    #[arg(long, value_name = "FORM", requires = "people", value_parser = choice_of(&Form::ALL))]
+    pub form: Option<Form>,
+    /// With --people: kinds of remnant, separated by commas, subject after subject
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        requires = "people",
+        default_value = "lag,broad-band,signal-dependent,pulsed,intermittent",
+        value_parser = choice_of(&RemnantKind::ALL)
+    )]
+    pub remnants: Vec<RemnantKind>,
+    /// With --people: share of the remnant in the variance of u
+    #[arg(long, value_name = "LO..HI", requires = "people", default_value = "0.05..0.5", value_parser = parse_span)]
+    pub remnant_share: (f64, f64),
+    /// With --people: sample time in s [default: 1/60]
+    #[arg(long, value_name = "S", requires = "people")]
+    pub sample_time: Option<f64>,
 }
 
 fn parse_trouble(text: &str) -> Result<SamplingDefect, String> {

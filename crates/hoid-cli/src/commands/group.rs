@@ -5,10 +5,14 @@ use std::{
     sync::atomic::Ordering,
 };
 
+use hoid_model::SampleTime;
 use hoid_report::write_group_pages;
+use hoid_sim::people::{Population, Range};
 use hoid_study::{
     RunOptions,
-    group::{MANIFEST, Manifest, Pattern, VirtualExperiment, run_group, simulate_group},
+    group::{
+        MANIFEST, Manifest, Pattern, PeopleExperiment, VirtualExperiment, run_group, simulate_group, simulate_people,
+    },
 };
 use serde_json::json;
 
@@ -30,7 +34,33 @@ pub fn run(args: &GroupArgs) -> Result<(), CliError> {
 }
 
 pub fn simulate(args: &SimulateGroupArgs) -> Result<(), CliError> {
-    let experiment = VirtualExperiment {
+    let conditions = if args.people {
+        args.people_options.plants.len()
+    } else {
+        args.conditions.len()
+    };
+    let total = args
+        .subjects
+        .saturating_mul(args.runs)
+        .saturating_mul(conditions as u64);
+    let bar = output::progress(usize::try_from(total).unwrap_or(usize::MAX), "runs");
+    let manifest = if args.people {
+        simulate_people(&people(args)?, &args.out, &|| bar.inc(1))
+    } else {
+        simulate_group(&subjects(args), &args.out, &|| bar.inc(1))
+    };
+    bar.finish_and_clear();
+    output::print(&format!(
+        "{} runs in {}, their true parameters in truth.csv; next: hoid group {} --out DIR\n",
+        manifest?.runs.len(),
+        args.out.display(),
+        args.out.display()
+    ));
+    Ok(())
+}
+
+fn subjects(args: &SimulateGroupArgs) -> VirtualExperiment {
+    VirtualExperiment {
         subjects: args.subjects,
         conditions: args.conditions.clone(),
         runs: args.runs,
@@ -40,21 +70,27 @@ pub fn simulate(args: &SimulateGroupArgs) -> Result<(), CliError> {
         noise_level: args.noise_level,
         seed: args.seed,
         defects: args.trouble.clone(),
-    };
-    let total = args
-        .subjects
-        .saturating_mul(args.runs)
-        .saturating_mul(args.conditions.len() as u64);
-    let bar = output::progress(usize::try_from(total).unwrap_or(usize::MAX), "runs");
-    let manifest = simulate_group(&experiment, &args.out, &|| bar.inc(1));
-    bar.finish_and_clear();
-    output::print(&format!(
-        "{} runs in {}, their true parameters in truth.csv; next: hoid group {} --out DIR\n",
-        manifest?.runs.len(),
-        args.out.display(),
-        args.out.display()
-    ));
-    Ok(())
+    }
+}
+
+fn people(args: &SimulateGroupArgs) -> Result<PeopleExperiment, CliError> {
+    let own = &args.people_options;
+    let (low, high) = own.remnant_share;
+    Ok(PeopleExperiment {
+        subjects: args.subjects,
+        plants: own.plants.clone(),
+        form: own.form,
+        remnants: own.remnants.clone(),
+        runs: args.runs,
+        between_runs: args.between_runs,
+        population: Population {
+            remnant_share: Range::new(low, high),
+            ..Population::default()
+        },
+        sample_time: own.sample_time.map_or(Ok(SampleTime::SIXTIETH), SampleTime::new)?,
+        seed: args.seed,
+        defects: args.trouble.clone(),
+    })
 }
 
 fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {

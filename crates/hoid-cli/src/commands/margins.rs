@@ -1,11 +1,13 @@
 //! `hoid margins`: crossover, margins and remnant gains of a scenario.
 
+use hoid_io::AnyScenario;
 use hoid_model::{
-    ModelError,
+    FamilyScenario, ModelError,
     margins::{MANUAL_CONTROL_RANGE_RAD_S, margins},
     remnant::HIGHEST_ORDER,
     remnant_gain::NoiseDefinition,
 };
+use hoid_sim::FamilySimulator;
 use serde_json::{Value, json};
 
 use super::scenario::chosen_scenario;
@@ -23,7 +25,10 @@ struct Gain {
 }
 
 pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
-    let scenario = chosen_scenario(&args.base)?;
+    let scenario = match chosen_scenario(&args.base)? {
+        AnyScenario::Reference(scenario) => *scenario,
+        AnyScenario::Family(scenario) => return of_family(&scenario, args),
+    };
     let state = match args.state {
         StateName::Initial => scenario.initial,
         StateName::Last => scenario.last,
@@ -81,10 +86,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
         NoiseDefinition::Response => "var(u_n)/var(u)",
         NoiseDefinition::Remnant => "var(n)/var(u)",
     };
-    let state_name = match args.state {
-        StateName::Initial => "initial",
-        StateName::Last => "last",
-    };
+    let state_name = name_of(args.state);
     output::print(&format!(
         "{}, {state_name} state.\n{}\nRemnant gain K_n for P_n = {share}, T_n = {} s, Ts = {} s:\n{table}\n",
         scenario.name,
@@ -93,4 +95,51 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
         scenario.sample_time.s(),
     ));
     Ok(())
+}
+
+/// An operator of the family: the margins of its loop, and the gains of the parts of its remnant.
+fn of_family(scenario: &FamilyScenario, args: &MarginsArgs) -> Result<(), CliError> {
+    let (state, which) = match args.state {
+        StateName::Initial => (&scenario.initial, 0),
+        StateName::Last => (&scenario.last, 1),
+    };
+    let found = state.margins()?;
+    let simulator = FamilySimulator::new(scenario)?;
+    let gains = simulator.remnant_gains()[which];
+    let shares: Vec<Option<f64>> = scenario.remnant.iter().map(|part| part.share()).collect();
+    if args.json {
+        let mut object = json::margins(&found);
+        let rows = gains
+            .iter()
+            .zip(&shares)
+            .map(|(gain, share)| json!({"share": share, "gain": json::number(*gain)}))
+            .collect();
+        object.insert("remnant_gain".to_owned(), Value::Array(rows));
+        json::print(&Value::Object(object));
+        return Ok(());
+    }
+    let mut table = text::table(&["part of the remnant", "share of var(u)", "gain"]);
+    for ((k, gain), share) in (1..).zip(gains).zip(shares) {
+        let share = share.map_or_else(|| "given gain".to_owned(), |share| format!("{share}"));
+        table.add_row(vec![format!("{k}"), share, format!("{gain:.5}")]);
+    }
+    let parts = if gains.is_empty() {
+        String::new()
+    } else {
+        format!("{table}\n")
+    };
+    output::print(&format!(
+        "{}, {} state.\n{}\n{parts}",
+        scenario.name,
+        name_of(args.state),
+        text::margins(&found.into()),
+    ));
+    Ok(())
+}
+
+fn name_of(state: StateName) -> &'static str {
+    match state {
+        StateName::Initial => "initial",
+        StateName::Last => "last",
+    }
 }

@@ -1,22 +1,27 @@
 //! `hoid simulate`: one closed-loop run into a file.
 
-use hoid_io::{write_record, write_record_csv};
-use hoid_model::{Record, SampleTime, scenario::Scenario};
+use hoid_io::{AnyScenario, write_record, write_record_csv};
+use hoid_model::{FamilyScenario, Record, SampleTime, scenario::Scenario};
 use hoid_report::numbers;
-use hoid_sim::{RunSeed, Simulator};
+use hoid_sim::{FamilySimulator, RunSeed, Simulator};
 
 use super::scenario::chosen_scenario;
 use crate::{args::SimulateArgs, error::CliError, output};
 
 pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
-    let scenario = with_changes(chosen_scenario(&args.base)?, args)?;
-    let simulator = Simulator::new(&scenario)?;
     let run_seed = RunSeed {
         seed: args.seed,
         cell: args.cell,
         replication: args.replication,
     };
-    let record = simulator.run(run_seed, args.keep_run_in)?;
+    let record = match chosen_scenario(&args.base)? {
+        AnyScenario::Reference(scenario) => {
+            Simulator::new(&with_changes(*scenario, args)?)?.run(run_seed, args.keep_run_in)?
+        }
+        AnyScenario::Family(scenario) => {
+            FamilySimulator::new(&of_family(*scenario, args)?)?.run_with_truth(run_seed, args.keep_run_in)?
+        }
+    };
     let piped = args.out.as_os_str() == "-";
     if piped {
         write_out(&record)?;
@@ -26,7 +31,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
     let rms = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
     let summary = format!(
         "{}: {} samples of {} s, seed {}, replication {}; rms e {} deg, rms u {} deg.\nWritten to {}.\n",
-        scenario.name,
+        record.label(),
         record.len(),
         record.sample_time().s(),
         args.seed,
@@ -75,5 +80,27 @@ fn with_changes(mut scenario: Scenario, args: &SimulateArgs) -> Result<Scenario,
         ));
     };
     scenario.remnant.strength = strength;
+    Ok(scenario)
+}
+
+/// The remnant of an operator of the family is what its file says.
+fn of_family(mut scenario: FamilyScenario, args: &SimulateArgs) -> Result<FamilyScenario, CliError> {
+    let remnant = [
+        ("--remnant-order", args.remnant_order.is_some()),
+        ("--noise-level", args.noise_level.is_some()),
+        ("--noise-definition", args.noise_definition.is_some()),
+        ("--remnant-time-constant", args.remnant_time_constant.is_some()),
+    ];
+    if let Some((option, _)) = remnant.iter().find(|(_, given)| *given) {
+        return Err(CliError::Usage(format!(
+            "{option} is of the reference text's remnant: in a scenario with a form the tables [[remnant]] say it"
+        )));
+    }
+    if let Some(ts) = args.sample_time {
+        scenario.sample_time = SampleTime::new(ts)?;
+    }
+    if let Some(realisation) = args.realisation {
+        scenario.realisation = realisation;
+    }
     Ok(scenario)
 }

@@ -29,17 +29,27 @@
 //! | `[remnant]` | `order`, `T_n_s`; `noise_level` and `noise_definition` ("response", "remnant"), or `K_n_initial_deg` and `K_n_last_deg` |
 //! | `[[forcing]]` | `amplitude_deg`, `phase_rad`, and `omega_rad_s` or `cycles` (within `measurement_s`); `forcing = []` is a target at rest |
 //!
+//! A file with the key `form` describes an operator of the family around any controlled element
+//! ([`AnyScenario`]); its keys are in `family_keys`.
+//!
 //! What the file leaves out is that of the condition; without one, the parameters of `[last]` are
 //! those of `[initial]`, and all else is as in C1.
 
 mod error;
+mod family;
+mod family_keys;
+#[cfg(test)]
+mod family_tests;
 mod keys;
 mod reading;
 mod scenario;
 mod values;
 
 pub use error::ScenarioFileError;
-pub use reading::{parse_scenario, read_scenario, scenario_schema};
+pub use reading::{
+    AnyScenario, family_scenario_schema, parse_any_scenario, parse_scenario, read_any_scenario, read_scenario,
+    scenario_schema,
+};
 
 #[cfg(test)]
 mod tests;

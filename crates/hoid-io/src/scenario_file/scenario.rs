@@ -135,7 +135,7 @@ impl Source<'_> {
         Ok(())
     }
 
-    fn schedule(&self, given: Option<ScheduleTable>, base: Schedule) -> Result<Schedule, ScenarioFileError> {
+    pub(super) fn schedule(&self, given: Option<ScheduleTable>, base: Schedule) -> Result<Schedule, ScenarioFileError> {
         let Some(given) = given else { return Ok(base) };
         let rate = self.positive("schedule.rate_per_s", given.rate_per_s)?;
         let midpoint = self.finite("schedule.midpoint_s", given.midpoint_s)?;

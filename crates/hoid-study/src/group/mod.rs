@@ -11,6 +11,7 @@
 //! | `traces` | its recursive estimates as rows |
 //! | `responses` | frequency responses of the fits |
 //! | [`VirtualExperiment`] | the same from simulated subjects, with the defects of recorded data ([`SamplingDefect`]) |
+//! | [`PeopleExperiment`] | the same from persons drawn over the family of operators |
 //! | `frequency` | describing functions by subject and condition, and how far the fits are from them |
 //! | `settling` | how fast the recursions follow a change at a known instant, and how noisy they are |
 //! | `averages` | means over the runs, chosen delays, averages of traces |
@@ -40,6 +41,7 @@ mod sampling_defects;
 mod settling;
 mod tables;
 mod traces;
+mod virtual_people;
 mod virtual_subjects;
 mod windows;
 
@@ -51,4 +53,5 @@ pub use preparation_settings::{NumberOrText, PreparationSettings};
 pub use read_settings::{Detrending, ReadSettings};
 pub use run::run_group;
 pub use sampling_defects::SamplingDefect;
+pub use virtual_people::{PeopleExperiment, simulate_people};
 pub use virtual_subjects::{VirtualExperiment, simulate_group};

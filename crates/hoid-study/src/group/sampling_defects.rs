@@ -34,6 +34,11 @@ impl SamplingDefect {
         Self::Stalled,
     ];
 
+    /// True where the times of the rows are no longer even.
+    pub(super) fn is_uneven(self) -> bool {
+        matches!(self, Self::Jitter | Self::Missing | Self::Repeated)
+    }
+
     /// Its name.
     pub fn name(self) -> &'static str {
         match self {
@@ -48,9 +53,9 @@ impl SamplingDefect {
     }
 }
 
-/// The columns of a run as a recorder with these defects would have written them. `noise` are
-/// normal deviates, one a sample.
-pub(super) fn recorded(record: &Record, defects: &[SamplingDefect], noise: &[f64]) -> OutputTable {
+/// t and the named columns of a run as a recorder with these defects would have written them.
+/// `noise` are normal deviates, one a sample.
+pub(super) fn recorded(record: &Record, names: &[&str], defects: &[SamplingDefect], noise: &[f64]) -> OutputTable {
     let has = |defect: SamplingDefect| defects.contains(&defect);
     let n = record.len();
     let ts = record.sample_time().s();
@@ -107,12 +112,11 @@ pub(super) fn recorded(record: &Record, defects: &[SamplingDefect], noise: &[f64
             .iter()
             .map(|defect| format!("trouble: {}", defect.name()))
             .collect(),
-        columns: vec![
-            column("t", &t),
-            column("f_t", record.channel("f_t").unwrap_or_default()),
-            column("e", record.input()),
-            column("u", &u),
-            column("x", record.channel("x").unwrap_or_default()),
-        ],
+        columns: std::iter::once(column("t", &t))
+            .chain(names.iter().map(|name| match *name {
+                "u" => column("u", &u),
+                other => column(other, record.channel(other).unwrap_or_default()),
+            }))
+            .collect(),
     }
 }

@@ -85,7 +85,7 @@ pub fn simulate_group(
                 let (scenario, record) = experiment.run(subject, cell as u64, *condition, run)?;
                 let file = format!("S{subject}_{condition}_{run}.csv");
                 let noise = experiment.sampling_noise(subject, cell as u64, run, record.len());
-                let table = recorded(&record, &experiment.defects, &noise);
+                let table = recorded(&record, &["f_t", "e", "u", "x"], &experiment.defects, &noise);
                 hoid_io::write_table(&directory.join(&file), &table)?;
                 truth_row(&mut truth, subject, *condition, run, &scenario);
                 runs.push(RunEntry {
@@ -116,17 +116,10 @@ pub fn simulate_group(
         };
         (condition.to_string(), facts)
     };
-    let uneven = [
-        SamplingDefect::Jitter,
-        SamplingDefect::Missing,
-        SamplingDefect::Repeated,
-    ]
-    .iter()
-    .any(|defect| experiment.defects.contains(defect));
     let manifest = Manifest {
         name: "virtual-experiment".to_owned(),
         read: ReadSettings {
-            resample: uneven,
+            resample: experiment.defects.iter().any(|defect| defect.is_uneven()),
             ..ReadSettings::default()
         },
         prepare: PreparationSettings::default(),

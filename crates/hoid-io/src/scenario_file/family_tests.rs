@@ -1,0 +1,125 @@
+use hoid_model::{
+    FamilyScenario, Form, SampleTime,
+    family_scenario::{Followed, PartStrength, RemnantShape},
+    scenario::Realisation,
+    schedule::Schedule,
+};
+
+use super::*;
+
+const EXAMPLE: &str = include_str!("../../../../fixtures/scenario/person.toml");
+
+fn parse(text: &str) -> Result<FamilyScenario, ScenarioFileError> {
+    parse_any_scenario(text, "x.toml", "x").map(|scenario| match scenario {
+        AnyScenario::Family(scenario) => *scenario,
+        AnyScenario::Reference(_) => panic!("not of the family"),
+    })
+}
+
+#[test]
+fn a_file_with_every_table_is_read() {
+    let scenario = parse(EXAMPLE).unwrap();
+    assert_eq!(scenario.name, "a person");
+    assert_eq!(scenario.sample_time, SampleTime::SIXTIETH);
+    assert_eq!((scenario.measurement_s, scenario.run_in_s), (60.0, 5.0));
+    assert_eq!(scenario.realisation, Realisation::Output);
+    let (initial, last) = (&scenario.initial, &scenario.last);
+    assert_eq!(initial.operator.form(), Form::LeadLag);
+    let expected = [4.0, 0.6, 0.2, 11.0_f64.ln(), 0.25_f64.ln(), 0.1437];
+    assert_eq!(initial.operator.coordinates(), expected);
+    // K = 20 of [initial] with the T_I of [last].
+    let expected = [20.0 / 4.0, 0.5, 0.25, 11.0_f64.ln(), 0.25_f64.ln(), 0.1437];
+    assert_eq!(last.operator.coordinates(), expected);
+    assert_eq!(initial.controlled_element.den(), [1.0, 0.0]);
+    assert_eq!(last.controlled_element.num(), [1.5]);
+    let Schedule::Sigmoid { rate_per_s, midpoint_s } = scenario.schedule else {
+        panic!("no sigmoid");
+    };
+    assert_eq!((rate_per_s, midpoint_s), (100.0, 30.0));
+    assert!(scenario.disturbance.random_phases && !scenario.target.random_phases);
+    assert_eq!(scenario.disturbance.function.sinusoids().len(), 7);
+    assert_eq!(scenario.target.function.sinusoids()[0].phase_rad, 0.5);
+    let [band, peak, ar] = &scenario.remnant[..] else {
+        panic!("three parts");
+    };
+    assert_eq!(band.strength, PartStrength::Share(0.15));
+    assert_eq!(band.signal_dependence.unwrap().follows, Followed::Rate);
+    assert_eq!(band.pulses.unwrap().rate_per_s, 2.0);
+    assert_eq!(peak.intermittence.unwrap().off_s, 2.0);
+    assert!(matches!(peak.shape, RemnantShape::Resonance { zeta, .. } if zeta == 0.2));
+    assert!(matches!(&ar.shape, RemnantShape::Ar { coefficients } if coefficients[..] == [-0.9]));
+    assert_eq!(
+        ar.strength,
+        PartStrength::Gain {
+            initial: 0.02,
+            last: 0.03
+        }
+    );
+    assert_eq!(scenario.stick.offset_u, -0.1);
+}
+
+const SHORT: &str = "form = \"lead-lag\"\n[initial]\nK_over_T_I = 4\nT_L_s = 0.6\nT_I_s = inf\nomega_nm_rad_s = 11\nzeta_nm = 0.3\ntau_e_s = 0.15\ncontrolled_element = \"1/1,0\"\n";
+
+#[test]
+fn a_pure_integration_is_an_infinite_lag() {
+    let scenario = parse(SHORT).unwrap();
+    assert_eq!(scenario.initial.operator.coordinates()[2], 0.0);
+    assert_eq!(
+        (scenario.measurement_s, scenario.sample_time),
+        (40.0, SampleTime::SIXTIETH)
+    );
+    assert_eq!(scenario.initial, scenario.last);
+}
+
+#[test]
+fn what_does_not_fit_is_refused_with_its_remedy() {
+    let with = |from: &str, to: &str| SHORT.replace(from, to);
+    let more = |tail: &str| format!("{SHORT}{tail}\n");
+    for (text, part) in [
+        (with("lead-lag", "lead-leg"), "line 1: form is lead-leg"),
+        (with("T_L_s = 0.6\n", ""), "lacks T_L_s"),
+        (with("K_over_T_I", "K"), "give K_over_T_I"),
+        (with("zeta_nm = 0.3", "zeta_nm = -1"), "expected a positive number"),
+        (with("T_L_s = 0.6\n", "T_L_s = 0.6\nc_1_s = 1\n"), "[initial] has c_1_s"),
+        (with("1/1,0", "1,0,0/1,0"), "higher degree"),
+        (with("1/1,0", "one"), "line 9: initial.controlled_element is one"),
+        (with("controlled_element = \"1/1,0\"\n", ""), "lacks controlled_element"),
+        (with("form", "sample_time_s = 0\nform"), "line 1: sample_time_s is 0"),
+        (
+            with("form", "sample_time_s = 0.01\nsampling_rate_hz = 100\nform"),
+            "say the same",
+        ),
+        (more("K_e = 1"), "unknown field `K_e`"),
+        (more("[last]\nT_L_s = 0.5"), "add [schedule]"),
+        (more("[schedule]\nrate_per_s = 1\nmidpoint_s = 20"), "no [last]"),
+        (
+            more("[[remnant]]\nshape = \"lag\"\nshare = 0.1"),
+            "takes T_n_s and order",
+        ),
+        (
+            more("[[remnant]]\nshape = \"white\"\nshare = 0.1\nzeta = 0.2"),
+            "has no zeta",
+        ),
+        (more("[[remnant]]\nshape = \"white\""), "give share"),
+        (
+            more("[[remnant]]\nshape = \"white\"\nshare = 0.1\non_s = 1"),
+            "lacks off_s",
+        ),
+        (more("[[remnant]]\nshape = \"white\"\nshare = 1.1"), "below one"),
+        (more("[disturbance]\nrms = 1\nlines = []"), "give one of both"),
+    ] {
+        let message = parse(&text).unwrap_err().to_string();
+        assert!(
+            message.contains(part) && message.contains("x.toml"),
+            "{message} lacks {part}"
+        );
+    }
+    // Studies take the operator of the reference text.
+    let message = parse_scenario(SHORT, "x.toml", "x").unwrap_err().to_string();
+    assert!(message.contains("key form"), "{message}");
+    assert!(matches!(
+        parse_any_scenario("condition = \"C1\"", "x.toml", "x"),
+        Ok(AnyScenario::Reference(_))
+    ));
+    assert!(family_scenario_schema().contains("K_over_T_I"));
+}

@@ -1,0 +1,118 @@
+//! Sums of sines at prime multiples of one frequency, as tasks with people use them.
+//!
+//! `d(t) = sum over primes p of A_p sin(2 pi p t/T + phi_p)`, `A_p` proportional to `1/p`: no line
+//! is a harmonic of another, so that what a person makes of one line does not fall on another, and
+//! the power lies where people follow (D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in
+//! Electronics 8 (1967) 231-249; M. M. van Paassen and M. Mulder, *Identification of Human Control
+//! Behaviour*, 2006; M. Yamagami et al., IEEE Trans. Cybernetics 53 (2023) 2039-2050 with primes
+//! times 0.05 Hz). Phases are random in each run, so that nobody learns the signal by heart.
+
+use std::f64::consts::TAU;
+
+use crate::{
+    ModelError,
+    forcing::{ForcingFunction, Sinusoid},
+};
+
+/// A target or a disturbance.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Excitation {
+    /// Its sinusoids; none is no signal.
+    pub function: ForcingFunction,
+    /// True where each run draws its phases anew, uniform over the circle.
+    pub random_phases: bool,
+}
+
+/// A sum of sines at prime multiples of `1/period_s`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MultiSine {
+    /// Period T, s. Default 20 s.
+    pub period_s: f64,
+    /// The largest multiple. Default 31: 1.55 Hz.
+    pub largest: u32,
+    /// Root mean square. Default 1.
+    pub rms: f64,
+}
+
+impl Default for MultiSine {
+    fn default() -> Self {
+        Self {
+            period_s: 20.0,
+            largest: 31,
+            rms: 1.0,
+        }
+    }
+}
+
+impl MultiSine {
+    /// The primes up to the largest multiple.
+    pub fn multiples(&self) -> Vec<u32> {
+        let is_prime = |n: &u32| (2..).take_while(|d| d * d <= *n).all(|d| !n.is_multiple_of(d));
+        (2..=self.largest).filter(is_prime).collect()
+    }
+
+    /// The excitation, its phases drawn anew in each run.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] for a period that is not positive, an rms that is not finite, or
+    /// a largest multiple outside 2 to 10000.
+    pub fn excitation(&self) -> Result<Excitation, ModelError> {
+        let refuse = |quantity, found, expected| {
+            Err(ModelError::OutOfRange {
+                quantity,
+                found,
+                expected,
+            })
+        };
+        if !(self.period_s.is_finite() && self.period_s > 0.0) {
+            return refuse("period of a multi-sine in s", self.period_s, "a positive finite number");
+        }
+        if !(self.rms.is_finite() && self.rms >= 0.0) {
+            return refuse("rms of a multi-sine", self.rms, "a finite number, zero or more");
+        }
+        if !(2..=10_000).contains(&self.largest) {
+            let found = f64::from(self.largest);
+            return refuse("largest multiple of a multi-sine", found, "2 to 10000");
+        }
+        let multiples = self.multiples();
+        let power: f64 = multiples.iter().map(|p| f64::from(*p).powi(-2) / 2.0).sum();
+        let line = |p: &u32| Sinusoid {
+            amplitude_deg: self.rms / power.sqrt() / f64::from(*p),
+            omega_rad_s: f64::from(*p) * TAU / self.period_s,
+            phase_rad: 0.0,
+        };
+        Ok(Excitation {
+            function: ForcingFunction::new(multiples.iter().map(line).collect())?,
+            random_phases: true,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_primes_and_fall() {
+        let sum = MultiSine::default();
+        assert_eq!(sum.multiples(), [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31]);
+        let excitation = sum.excitation().unwrap();
+        assert!(excitation.random_phases);
+        assert!((excitation.function.rms_deg() - 1.0).abs() < 1e-14);
+        let lines = excitation.function.sinusoids();
+        assert!((lines[0].omega_rad_s - 0.2 * std::f64::consts::PI).abs() < 1e-14);
+        assert!((lines[10].amplitude_deg * 31.0 - lines[0].amplitude_deg * 2.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn senseless_ones_are_refused() {
+        let usual = MultiSine::default();
+        for bad in [
+            MultiSine { period_s: 0.0, ..usual },
+            MultiSine { rms: f64::NAN, ..usual },
+            MultiSine { largest: 1, ..usual },
+        ] {
+            assert!(bad.excitation().is_err(), "{bad:?}");
+        }
+    }
+}

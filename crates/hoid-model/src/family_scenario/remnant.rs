@@ -1,0 +1,333 @@
+//! What u holds beside the response to the error: the remnant, and a stick that is not at rest.
+//!
+//! The remnant is a sum of independent parts. Each part is a sequence of unit variance through a
+//! shaping filter and a gain,
+//!
+//! `n(k) = K G(q) w(k)`, `w = m(k) [sqrt(1 - p) g(k) + sqrt(p) b(k) h(k)/sqrt(lambda Ts)] s(k)/sqrt(D)`,
+//!
+//! with g and h normal, b = 1 with probability `lambda Ts` (Poisson pulses; else 0), s on or off
+//! for times that are exponential with means `T_on`, `T_off`, `D = T_on/(T_on + T_off)`, and
+//! `m^2 = 1 - c + c r^2/E r^2`, r^2 the running mean square of u or of its rate, `E r^2` that of the
+//! whole run. All factors of g and h are known before sample k: w is white and of unit variance, so
+//! that spectrum and strength of the remnant are those of the filter.
+//!
+//! | part | source |
+//! |---|---|
+//! | broad band, `1/(T_n s + 1)^m` | eq. 3 of the reference text; W. H. Levison, S. Baron and D. L. Kleinman, IEEE Trans. Man-Machine Systems 10 (1969) 101-108 |
+//! | peak near omega_nm | the tremor that the neuromuscular loop lets through: R. E. Magdaleno and D. T. McRuer, NASA CR-1757 (1971) |
+//! | slow drift | `1/(T_n s + 1)` with T_n of many seconds |
+//! | signal-dependent | C. M. Harris and D. M. Wolpert, Nature 394 (1998) 780-784; Levison et al. for the scaling with the signals |
+//! | pulses | L. R. Young and J. L. Meiry, IEEE Trans. Automatic Control 10 (1965) 336-341; R. A. Hess, J. Guidance and Control 2 (1979) 221-227 |
+//! | on and off | P. Gawthrop, I. Loram, M. Lakie and H. Gollee, Biological Cybernetics 104 (2011) 31-51 |
+
+use crate::{ModelError, polynomial, remnant::HIGHEST_ORDER};
+
+/// The shaping filter of a part.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RemnantShape {
+    /// `1`: white.
+    White,
+    /// `1/(T_n s + 1)^m`, exactly held. With a T_n of many seconds it is a drift.
+    Lag {
+        /// T_n, s.
+        time_constant_s: f64,
+        /// m, 1 to 4.
+        order: usize,
+    },
+    /// `omega^2/(s^2 + 2 zeta omega s + omega^2)`, exactly held.
+    Resonance {
+        /// omega, rad/s.
+        omega_rad_s: f64,
+        /// zeta.
+        zeta: f64,
+    },
+    /// `1/(1 + d_1 q^-1 + d_2 q^-2 + ...)`.
+    Ar {
+        /// d_1, d_2, ...
+        coefficients: Vec<f64>,
+    },
+}
+
+/// How strong a part is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PartStrength {
+    /// Share of the variance of u that is this part's, through the closed loop.
+    Share(f64),
+    /// The gain K itself, before and after the change.
+    Gain {
+        /// K of the initial state.
+        initial: f64,
+        /// K of the last state.
+        last: f64,
+    },
+}
+
+/// What the strength of a signal-dependent remnant follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Followed {
+    /// The running rms of u.
+    Control,
+    /// The running rms of the rate of u.
+    Rate,
+}
+
+crate::named_choice!(Followed, "signal that a remnant follows", 2, { Control => "control", Rate => "rate" });
+
+/// A standard deviation that follows u.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SignalDependence {
+    /// What is followed.
+    pub follows: Followed,
+    /// c: part of the variance that follows it, 0 to 1.
+    pub part: f64,
+    /// Memory of the running mean square, s.
+    pub memory_s: f64,
+}
+
+/// Poisson pulses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pulses {
+    /// p: part of the variance that comes in pulses, 0 to 1.
+    pub part: f64,
+    /// lambda: mean number in a second.
+    pub rate_per_s: f64,
+}
+
+/// A part that is there and not there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Intermittence {
+    /// Mean time T_on, s.
+    pub on_s: f64,
+    /// Mean time T_off, s.
+    pub off_s: f64,
+}
+
+/// A part of the remnant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RemnantPart {
+    /// Its filter.
+    pub shape: RemnantShape,
+    /// Its strength.
+    pub strength: PartStrength,
+    /// Whether it follows u.
+    pub signal_dependence: Option<SignalDependence>,
+    /// Whether it comes in pulses.
+    pub pulses: Option<Pulses>,
+    /// Whether it is there at times only.
+    pub intermittence: Option<Intermittence>,
+}
+
+/// A stick that is not at rest, and records with an offset. The first two are in the loop: the
+/// controlled element feels them, and the person acts on what follows. The others are of the
+/// recorder alone.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Stick {
+    /// Constant part of u.
+    pub bias: f64,
+    /// Standard deviation of the random walk of u, per root second.
+    pub walk_per_root_s: f64,
+    /// Offset of the recorded e.
+    pub offset_e: f64,
+    /// Offset of the recorded u.
+    pub offset_u: f64,
+}
+
+impl RemnantPart {
+    /// A Gaussian, stationary part with a share of the variance of u.
+    pub fn new(shape: RemnantShape, share: f64) -> Self {
+        Self {
+            shape,
+            strength: PartStrength::Share(share),
+            signal_dependence: None,
+            pulses: None,
+            intermittence: None,
+        }
+    }
+
+    /// The share of the variance of u that is given.
+    pub fn share(&self) -> Option<f64> {
+        match self.strength {
+            PartStrength::Share(share) => Some(share),
+            PartStrength::Gain { .. } => None,
+        }
+    }
+
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`], [`ModelError::Operator`] with the quantity.
+    pub(super) fn check(&self) -> Result<(), ModelError> {
+        let positive = "a positive finite number";
+        let part = "a number from 0 to 1";
+        let demand = |quantity, found: f64, holds: bool, expected| {
+            if found.is_finite() && holds {
+                Ok(())
+            } else {
+                Err(ModelError::OutOfRange {
+                    quantity,
+                    found,
+                    expected,
+                })
+            }
+        };
+        match &self.shape {
+            RemnantShape::White => {}
+            RemnantShape::Lag { time_constant_s, order } => {
+                let t_n = *time_constant_s;
+                demand("time constant T_n of the remnant in s", t_n, t_n > 0.0, positive)?;
+                let m = *order as f64;
+                demand(
+                    "order m of the remnant",
+                    m,
+                    (1..=HIGHEST_ORDER).contains(order),
+                    "1 to 4",
+                )?;
+            }
+            RemnantShape::Resonance { omega_rad_s, zeta } => {
+                let quantity = "frequency of the peak of the remnant in rad/s";
+                demand(quantity, *omega_rad_s, *omega_rad_s > 0.0, positive)?;
+                demand("damping of the peak of the remnant", *zeta, *zeta > 0.0, positive)?;
+            }
+            RemnantShape::Ar { coefficients } => {
+                let inverse = [&[1.0][..], coefficients].concat();
+                let inside = polynomial::roots(&inverse).is_some_and(|all| all.iter().all(|z| z.norm() < 1.0));
+                if !inside {
+                    return Err(ModelError::Operator {
+                        reason: format!(
+                            "the remnant with the coefficients {coefficients:?} is not stable; expected all roots of \
+                             z^n + d_1 z^(n-1) + ... within the unit circle"
+                        ),
+                    });
+                }
+            }
+        }
+        match self.strength {
+            PartStrength::Share(share) => demand(
+                "share of the remnant in the variance of u",
+                share,
+                (0.0..1.0).contains(&share),
+                "zero or more, below one",
+            )?,
+            PartStrength::Gain { initial, last } => {
+                for gain in [initial, last] {
+                    demand(
+                        "gain of the remnant",
+                        gain,
+                        gain >= 0.0,
+                        "a finite number, zero or more",
+                    )?;
+                }
+            }
+        }
+        if let Some(SignalDependence { part: c, memory_s, .. }) = self.signal_dependence {
+            demand("part of the remnant that follows u", c, (0.0..=1.0).contains(&c), part)?;
+            let quantity = "memory of the rms that the remnant follows in s";
+            demand(quantity, memory_s, memory_s > 0.0, positive)?;
+        }
+        if let Some(Pulses { part: p, rate_per_s }) = self.pulses {
+            demand("part of the remnant in pulses", p, (0.0..=1.0).contains(&p), part)?;
+            demand("rate of pulses in 1/s", rate_per_s, rate_per_s > 0.0, positive)?;
+        }
+        if let Some(Intermittence { on_s, off_s }) = self.intermittence {
+            demand("mean time with remnant in s", on_s, on_s > 0.0, positive)?;
+            let expected = "a finite number, zero or more";
+            demand("mean time without remnant in s", off_s, off_s >= 0.0, expected)?;
+        }
+        if self.signal_dependence.is_some() && self.intermittence.is_some() {
+            return Err(ModelError::Operator {
+                reason: "a part of the remnant follows u and is there at times only: u is larger while it is there, and its \
+                         strength would not be what is asked for; make two parts of it"
+                    .to_owned(),
+            });
+        }
+        Ok(())
+    }
+}
+
+impl Stick {
+    pub(super) fn check(&self) -> Result<(), ModelError> {
+        for (quantity, found, holds) in [
+            ("bias of the stick", self.bias, true),
+            (
+                "random walk of the stick per root second",
+                self.walk_per_root_s,
+                self.walk_per_root_s >= 0.0,
+            ),
+            ("offset of the recorded e", self.offset_e, true),
+            ("offset of the recorded u", self.offset_u, true),
+        ] {
+            if !(found.is_finite() && holds) {
+                return Err(ModelError::OutOfRange {
+                    quantity,
+                    found,
+                    expected: "a finite number, zero or more for the walk",
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn senseless_parts_are_refused() {
+        let good = RemnantPart::new(RemnantShape::White, 0.2);
+        assert!(good.check().is_ok());
+        let shaped = |shape| RemnantPart { shape, ..good.clone() };
+        for bad in [
+            RemnantPart::new(RemnantShape::White, 1.0),
+            RemnantPart::new(RemnantShape::White, f64::NAN),
+            shaped(RemnantShape::Lag {
+                time_constant_s: 0.0,
+                order: 1,
+            }),
+            shaped(RemnantShape::Lag {
+                time_constant_s: 0.1,
+                order: 5,
+            }),
+            shaped(RemnantShape::Resonance {
+                omega_rad_s: 10.0,
+                zeta: 0.0,
+            }),
+            shaped(RemnantShape::Ar {
+                coefficients: vec![-1.01],
+            }),
+            RemnantPart {
+                strength: PartStrength::Gain {
+                    initial: 0.1,
+                    last: -0.1,
+                },
+                ..good.clone()
+            },
+            RemnantPart {
+                pulses: Some(Pulses {
+                    part: 1.2,
+                    rate_per_s: 1.0,
+                }),
+                ..good.clone()
+            },
+            RemnantPart {
+                intermittence: Some(Intermittence { on_s: 0.0, off_s: 1.0 }),
+                ..good.clone()
+            },
+            RemnantPart {
+                signal_dependence: Some(SignalDependence {
+                    follows: Followed::Rate,
+                    part: 0.5,
+                    memory_s: 0.0,
+                }),
+                ..good.clone()
+            },
+        ] {
+            assert!(bad.check().is_err(), "{bad:?}");
+        }
+        let stick = Stick {
+            walk_per_root_s: -1.0,
+            ..Stick::default()
+        };
+        assert!(stick.check().is_err() && Stick::default().check().is_ok());
+    }
+}

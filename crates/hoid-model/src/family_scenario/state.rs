@@ -1,0 +1,87 @@
+//! Operator and controlled element at one instant.
+
+use crate::{
+    ContinuousTransferFunction, FamilyOperator, ModelError,
+    margins::{MANUAL_CONTROL_RANGE_RAD_S, Margins, closed_loop_is_stable, margins},
+    operator_family::Coordinate,
+};
+
+/// A state of adaptation: an operator of the family and what they control.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FamilyState {
+    /// The operator.
+    pub operator: FamilyOperator,
+    /// The controlled element.
+    pub controlled_element: ContinuousTransferFunction,
+}
+
+impl FamilyState {
+    /// `Y(s) P(s)`.
+    ///
+    /// # Errors
+    /// As [`FamilyOperator::transfer_function`].
+    pub fn open_loop(&self) -> Result<ContinuousTransferFunction, ModelError> {
+        Ok(self.operator.transfer_function()?.series(&self.controlled_element))
+    }
+
+    /// Crossover frequency and margins in continuous time.
+    ///
+    /// # Errors
+    /// As [`FamilyState::open_loop`]; [`ModelError::UnstableLoop`].
+    pub fn margins(&self) -> Result<Margins, ModelError> {
+        let open_loop = self.open_loop()?;
+        if !closed_loop_is_stable(&open_loop) {
+            return Err(ModelError::UnstableLoop {
+                reason: "the characteristic equation 1 + Y P = 0 has roots that are not in the left half plane"
+                    .to_owned(),
+            });
+        }
+        Ok(margins(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S))
+    }
+
+    /// True when both states have the same form, so that one can turn into the other.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        let (a, b) = (&self.operator, &other.operator);
+        let (c, d) = (&self.controlled_element, &other.controlled_element);
+        a.form() == b.form()
+            && a.has_neuromuscular() == b.has_neuromuscular()
+            && (c.num().len(), c.den().len()) == (d.num().len(), d.den().len())
+    }
+
+    /// The state on the way from this one to another, each parameter by `between`: those of
+    /// [`FamilyOperator::coordinates`], with omega_nm and zeta_nm themselves in place of their
+    /// logarithms; of the element its leading gain, and numerator and denominator without it. The
+    /// delay is this one's.
+    pub(super) fn towards(&self, other: &Self, between: impl Fn(f64, f64) -> f64) -> Result<Self, ModelError> {
+        let (a, b) = (&self.operator, &other.operator);
+        let kinds = a.form().coordinates(a.has_neuromuscular());
+        let on_its_way = |(kind, (x, y)): (&Coordinate, (&f64, &f64))| match kind {
+            Coordinate::Delay => *x,
+            // An end of the way is that end to the last bit.
+            _ if x == y => *x,
+            Coordinate::LogOmega | Coordinate::LogZeta => between(x.exp(), y.exp()).ln(),
+            _ => between(*x, *y),
+        };
+        let coordinates: Vec<f64> = kinds
+            .iter()
+            .zip(a.coordinates().iter().zip(b.coordinates()))
+            .map(on_its_way)
+            .collect();
+        let (c, d) = (&self.controlled_element, &other.controlled_element);
+        let pairs = |p: &[f64], q: &[f64]| p.iter().zip(q).map(|(p, q)| between(*p, *q)).collect::<Vec<f64>>();
+        let shape = |p: &[f64]| {
+            p.iter()
+                .map(|c| if p[0] == 0.0 { *c } else { c / p[0] })
+                .collect::<Vec<f64>>()
+        };
+        let gain = between(c.num()[0], d.num()[0]);
+        let num: Vec<f64> = pairs(&shape(c.num()), &shape(d.num()))
+            .iter()
+            .map(|c| c * gain)
+            .collect();
+        Ok(Self {
+            operator: FamilyOperator::new(a.form(), a.has_neuromuscular(), &coordinates)?,
+            controlled_element: ContinuousTransferFunction::new(&num, &pairs(c.den(), d.den()))?,
+        })
+    }
+}

@@ -1,0 +1,163 @@
+//! The gain of each part of the remnant that has its share of the variance of u.
+//!
+//! Part i of gain 1 makes `V_i = sum over k of h_i(k)^2` of the variance of u, h_i the response of u,
+//! through the closed loop, to one unit of w at sample 0. The sinusoids of target and disturbance
+//! make `V_0 = sum of A^2/2 |u/f|^2` at their frequencies, responses being those of the samples. All
+//! parts are independent, so that with shares p_i
+//!
+//! `var u = (V_0 + sum of K_j^2 V_j of given gains) / (1 - sum of p_i)`, `K_i^2 = p_i var u / V_i`.
+//!
+//! The response also shows whether the loop is stable: it then dies away.
+
+use hoid_model::Complex64;
+use hoid_model::{
+    ModelError,
+    family_scenario::{FamilyScenario, PartStrength},
+};
+
+use super::{
+    held_loop::{HeldLoop, Inputs, LoopState, Outputs},
+    noise::{Shaped, Shaping},
+};
+
+/// The first horizon, in samples.
+const FIRST: usize = 512;
+/// A response that has not died away by then is one of a loop that is not stable.
+const LONGEST: usize = 1 << 20;
+/// Part of the energy in the second half of the horizon at which a response has died away: what
+/// comes behind is its square.
+const LEFT: f64 = 1e-7;
+
+/// Mean squares of u, of its steps and of e.
+type MeanSquares = [f64; 3];
+
+/// Strength of the remnant in one state.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Calibration {
+    /// K of each part.
+    pub gains: Vec<f64>,
+    /// Mean square of u, of its step from one sample to the next, and of e.
+    pub mean_squares: MeanSquares,
+}
+
+impl Calibration {
+    pub fn of(
+        held: &HeldLoop,
+        scenario: &FamilyScenario,
+        shapings: &[Shaping],
+        is_last: bool,
+    ) -> Result<Self, ModelError> {
+        // Stable or not, with and without a remnant.
+        energy(held, &Shaping::White)?;
+        let mut sum = line_power(held, scenario)?;
+        let mut energies = Vec::with_capacity(shapings.len());
+        let mut shares = 0.0;
+        for (shaping, part) in shapings.iter().zip(&scenario.remnant) {
+            let own = energy(held, shaping)?;
+            match part.strength {
+                PartStrength::Share(share) => shares += share,
+                PartStrength::Gain { initial, last } => {
+                    let gain = if is_last { last } else { initial };
+                    sum = add(sum, scaled(own, gain * gain));
+                }
+            }
+            energies.push(own);
+        }
+        if sum[0] == 0.0 && shares > 0.0 {
+            return Err(ModelError::OutOfRange {
+                quantity: "variance of u without the parts of the remnant that are a share of it",
+                found: 0.0,
+                expected: "more than zero: give a target, a disturbance or the gain of a part",
+            });
+        }
+        let variance = sum[0] / (1.0 - shares);
+        let mut mean_squares = sum;
+        let mut gains = Vec::with_capacity(energies.len());
+        for (own, part) in energies.iter().zip(&scenario.remnant) {
+            gains.push(match part.strength {
+                PartStrength::Gain { initial, last } => {
+                    if is_last {
+                        last
+                    } else {
+                        initial
+                    }
+                }
+                PartStrength::Share(share) => {
+                    let square = share * variance / own[0];
+                    mean_squares = add(mean_squares, scaled(*own, square));
+                    square.sqrt()
+                }
+            });
+        }
+        Ok(Self { gains, mean_squares })
+    }
+}
+
+fn add(a: MeanSquares, b: MeanSquares) -> MeanSquares {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+fn scaled(a: MeanSquares, by: f64) -> MeanSquares {
+    a.map(|x| by * x)
+}
+
+/// Sums of squares of the responses of u, of its steps and of e to one unit of w.
+fn energy(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError> {
+    let mut state = LoopState::at_rest(held, held.delay());
+    let mut shaped = Shaped::at_rest(shaping);
+    let (mut total, mut before, mut w) = ([0.0; 3], 0.0, 1.0);
+    let mut horizon = FIRST;
+    let mut done = 0;
+    loop {
+        let mut block = [0.0; 3];
+        while done < horizon {
+            let remnant = shaped.step(w);
+            w = 0.0;
+            let inputs = Inputs {
+                remnant,
+                ..Inputs::default()
+            };
+            let Outputs { e, u, .. } = held.step(&mut state, inputs);
+            block = add(block, [u * u, (u - before) * (u - before), e * e]);
+            before = u;
+            done += 1;
+        }
+        total = add(total, block);
+        let unstable = |reason: &str| ModelError::UnstableLoop {
+            reason: reason.to_owned(),
+        };
+        if !total[0].is_finite() {
+            return Err(unstable("the response of u to a unit of remnant grows without bound"));
+        }
+        if horizon > FIRST && block[0] <= LEFT * total[0] {
+            return Ok(total);
+        }
+        if horizon >= LONGEST {
+            return Err(unstable("the response of u to a unit of remnant does not die away"));
+        }
+        horizon *= 2;
+    }
+}
+
+/// Mean squares that target and disturbance make.
+fn line_power(held: &HeldLoop, scenario: &FamilyScenario) -> Result<MeanSquares, ModelError> {
+    let mut sum = [0.0; 3];
+    for (excitation, is_target) in [(&scenario.target, true), (&scenario.disturbance, false)] {
+        for line in excitation.function.sinusoids() {
+            let omega = line.omega_rad_s;
+            let [y, p] = held.responses(omega).ok_or(ModelError::OutOfRange {
+                quantity: "frequency of a sinusoid in rad/s",
+                found: omega,
+                expected: "one that is no pole of operator or controlled element",
+            })?;
+            let closed = 1.0 + y * p;
+            let of_e = if is_target { Complex64::from(1.0) } else { -p } / closed;
+            let of_u = y * of_e;
+            let power = (line.amplitude_deg * of_u.norm()).powi(2) / 2.0;
+            let step = (Complex64::from_polar(1.0, omega * scenario.sample_time.s()) - 1.0).norm_sqr();
+            let of_error = (line.amplitude_deg * of_e.norm()).powi(2) / 2.0;
+            sum = add(sum, [power, power * step, of_error]);
+        }
+    }
+    Ok(sum)
+}

@@ -1,0 +1,181 @@
+//! One sample of the loop.
+//!
+//! At sample k, with the parameters in force at its time,
+//!
+//! `u = r(k - l) + n`, `y = C x_p + D (u + d)`, `e = f - y`,
+//!
+//! r the response of the operator behind the part of a sample of their delay `tau = l Ts + delta`,
+//! x_p the state of the controlled element. Operator and element are then taken over one sample
+//! exactly, for inputs that are held ([`hoid_model::held_system`]). An operator without
+//! neuromuscular part may pass e on at once: of the held error that would be one sample or the next,
+//! and it is taken from the error interpolated around `t - delta - Ts/2`, as
+//! [`FamilyOperator::hold`](hoid_model::FamilyOperator::hold) has it. Where that part and D meet
+//! within a sample, both equations are solved together.
+
+use hoid_model::{
+    ModelError, SampleTime, family_scenario::FamilyState, held_system::HeldSystem, scenario::Realisation,
+};
+
+use hoid_model::Complex64;
+
+/// Smallest size of `1 + D Y` within a sample.
+const SMALLEST: f64 = 1e-9;
+
+/// The loop with its parameters at one instant.
+#[derive(Debug, Clone)]
+pub(super) struct HeldLoop {
+    operator: HeldSystem,
+    /// What passes of e(k), e(k-1), e(k-2) besides.
+    taps: [f64; 3],
+    delay: usize,
+    element: HeldSystem,
+    element_input: f64,
+    element_output: f64,
+    sample_time: SampleTime,
+}
+
+/// What enters a sample: target, disturbance, remnant.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Inputs {
+    pub target: f64,
+    pub disturbance: f64,
+    pub remnant: f64,
+}
+
+/// What a sample gives: error, control, output of the element.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Outputs {
+    pub e: f64,
+    pub u: f64,
+    pub y: f64,
+}
+
+/// Where the loop stands between two samples.
+pub(super) struct LoopState {
+    operator: Vec<f64>,
+    element: Vec<f64>,
+    next: Vec<f64>,
+    /// e(k-1), e(k-2).
+    errors: [f64; 2],
+    /// Responses, that of sample k in place k of a ring.
+    ring: Vec<f64>,
+    k: usize,
+}
+
+impl HeldLoop {
+    /// With a delay of whole samples and a part of one.
+    pub fn new(
+        state: &FamilyState,
+        (delay, late): (usize, f64),
+        realisation: Realisation,
+        sample_time: SampleTime,
+    ) -> Result<Self, ModelError> {
+        let transfer = state.operator.transfer_function()?;
+        let operator = HeldSystem::new(transfer.num(), transfer.den(), late, sample_time)?;
+        let mut taps = [0.0; 3];
+        let late_by = late + 0.5;
+        let (whole, part) = (late_by.floor(), late_by.fract());
+        taps[whole as usize] = operator.direct() * (1.0 - part);
+        taps[whole as usize + 1] = operator.direct() * part;
+        let p = &state.controlled_element;
+        // The leading gain apart: a step of it does or does not make y jump.
+        let gain = p.num()[0];
+        let num: Vec<f64> = p
+            .num()
+            .iter()
+            .map(|c| if gain == 0.0 { *c } else { c / gain })
+            .collect();
+        let (element_input, element_output) = match realisation {
+            Realisation::Input => (gain, 1.0),
+            Realisation::Output => (1.0, gain),
+        };
+        let held = Self {
+            operator,
+            taps,
+            delay,
+            element: HeldSystem::new(&num, p.den(), 0.0, sample_time)?,
+            element_input,
+            element_output,
+            sample_time,
+        };
+        if held.at_once().abs() < SMALLEST {
+            return Err(ModelError::UnstableLoop {
+                reason: "the direct parts of operator and controlled element cancel within a sample".to_owned(),
+            });
+        }
+        Ok(held)
+    }
+
+    /// Delay in whole samples.
+    pub fn delay(&self) -> usize {
+        self.delay
+    }
+
+    fn element_direct(&self) -> f64 {
+        self.element_input * self.element_output * self.element.direct()
+    }
+
+    /// `1 + D Y` of what passes within a sample.
+    fn at_once(&self) -> f64 {
+        1.0 + self.element_direct() * if self.delay == 0 { self.taps[0] } else { 0.0 }
+    }
+
+    /// One sample on.
+    #[inline]
+    pub fn step(&self, state: &mut LoopState, inputs: Inputs) -> Outputs {
+        let mask = state.ring.len() - 1;
+        let [e1, e2] = state.errors;
+        let past = self.operator.output(&state.operator) + self.taps[1] * e1 + self.taps[2] * e2;
+        let (known, tap) = if self.delay == 0 {
+            (past, self.taps[0])
+        } else {
+            (state.ring[state.k.wrapping_sub(self.delay) & mask], 0.0)
+        };
+        let direct = self.element_direct();
+        let of_state = self.element_output * self.element.output(&state.element);
+        let rest = inputs.target - of_state - direct * (known + inputs.remnant + inputs.disturbance);
+        let e = if tap == 0.0 { rest } else { rest / (1.0 + direct * tap) };
+        let u = known + tap * e + inputs.remnant;
+        state.ring[state.k & mask] = past + self.taps[0] * e;
+        state.k += 1;
+        self.operator
+            .step(&state.operator, e, e1, &mut state.next[..self.operator.order()]);
+        state.operator.copy_from_slice(&state.next[..self.operator.order()]);
+        let driven = self.element_input * (u + inputs.disturbance);
+        self.element
+            .step(&state.element, driven, 0.0, &mut state.next[..self.element.order()]);
+        state.element.copy_from_slice(&state.next[..self.element.order()]);
+        state.errors = [e, e1];
+        Outputs {
+            e,
+            u,
+            y: inputs.target - e,
+        }
+    }
+
+    /// Response of the operator and of the element at a frequency, as the samples have them.
+    pub fn responses(&self, omega_rad_s: f64) -> Option<[Complex64; 2]> {
+        let backward = Complex64::from_polar(1.0, -omega_rad_s * self.sample_time.s());
+        let [a, b, c] = self.taps;
+        let operator = self.operator.response(omega_rad_s)? + a + (b + c * backward) * backward;
+        let element = self.element.response(omega_rad_s)? + self.element.direct();
+        Some([
+            operator * backward.powu(self.delay as u32),
+            element * self.element_input * self.element_output,
+        ])
+    }
+}
+
+impl LoopState {
+    pub fn at_rest(held: &HeldLoop, longest_delay: usize) -> Self {
+        let (operator, element) = (held.operator.order(), held.element.order());
+        Self {
+            operator: vec![0.0; operator],
+            element: vec![0.0; element],
+            next: vec![0.0; operator.max(element)],
+            errors: [0.0; 2],
+            ring: vec![0.0; (longest_delay + 1).next_power_of_two()],
+            k: 0,
+        }
+    }
+}

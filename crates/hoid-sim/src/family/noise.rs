@@ -1,0 +1,122 @@
+//! The parts of the remnant, sample by sample.
+//!
+//! `n = K G w` with the white sequence w of [`hoid_model::family_scenario`]'s remnant. Each part has
+//! random streams of its own.
+
+use hoid_model::{
+    ModelError, SampleTime,
+    family_scenario::{RemnantPart, RemnantShape},
+    held_system::HeldSystem,
+};
+
+use crate::RunSeed;
+
+/// The shaping filter of a part.
+#[derive(Debug, Clone)]
+pub(super) enum Shaping {
+    White,
+    Held(HeldSystem),
+    Ar(Vec<f64>),
+}
+
+impl Shaping {
+    pub fn new(shape: &RemnantShape, sample_time: SampleTime) -> Result<Self, ModelError> {
+        Ok(match shape {
+            RemnantShape::White => Self::White,
+            RemnantShape::Ar { coefficients } => Self::Ar(coefficients.clone()),
+            RemnantShape::Lag { time_constant_s, order } => {
+                let a = 1.0 / time_constant_s;
+                let den = (0..*order).fold(vec![1.0], |den, _| hoid_model::polynomial::product(&den, &[1.0, a]));
+                Self::Held(HeldSystem::new(&[a.powi(*order as i32)], &den, 0.0, sample_time)?)
+            }
+            RemnantShape::Resonance { omega_rad_s, zeta } => {
+                let square = omega_rad_s * omega_rad_s;
+                let den = [1.0, 2.0 * zeta * omega_rad_s, square];
+                Self::Held(HeldSystem::new(&[square], &den, 0.0, sample_time)?)
+            }
+        })
+    }
+}
+
+/// A filter and where it stands.
+pub(super) struct Shaped<'a> {
+    shaping: &'a Shaping,
+    state: Vec<f64>,
+    next: Vec<f64>,
+}
+
+impl<'a> Shaped<'a> {
+    pub fn at_rest(shaping: &'a Shaping) -> Self {
+        let order = match shaping {
+            Shaping::White => 0,
+            Shaping::Held(system) => system.order(),
+            Shaping::Ar(coefficients) => coefficients.len(),
+        };
+        Self {
+            shaping,
+            state: vec![0.0; order],
+            next: vec![0.0; order],
+        }
+    }
+
+    /// The output of this sample; `w` is its input, which a held filter feels from the next on.
+    #[inline]
+    pub fn step(&mut self, w: f64) -> f64 {
+        match self.shaping {
+            Shaping::White => w,
+            Shaping::Held(system) => {
+                let output = system.output(&self.state);
+                system.step(&self.state, w, 0.0, &mut self.next);
+                std::mem::swap(&mut self.state, &mut self.next);
+                output
+            }
+            Shaping::Ar(coefficients) => {
+                let past: f64 = coefficients.iter().zip(&self.state).map(|(d, v)| d * v).sum();
+                let output = w - past;
+                self.state.rotate_right(1);
+                if let Some(newest) = self.state.first_mut() {
+                    *newest = output;
+                }
+                output
+            }
+        }
+    }
+}
+
+/// The factors of w that do not hang on u: normal deviates, pulses, on and off.
+pub(super) fn driving(part: &RemnantPart, run: RunSeed, index: u64, ts_s: f64, samples: usize) -> Vec<f64> {
+    let mut w = if index == 0 {
+        // The deviates of a single remnant are those of `Simulator` too.
+        run.white_noise(samples)
+    } else {
+        run.white_noise_of(STREAMS + 4 * index, samples)
+    };
+    if let Some(pulses) = part.pulses {
+        // More pulses than samples are one in each.
+        let chance = (pulses.rate_per_s * ts_s).min(1.0);
+        let heights = run.white_noise_of(STREAMS + 4 * index + 1, samples);
+        let places = run.uniform_of(STREAMS + 4 * index + 2, samples);
+        let (steady, size) = ((1.0 - pulses.part).sqrt(), (pulses.part / chance).sqrt());
+        for ((w, height), place) in w.iter_mut().zip(heights).zip(places) {
+            *w = steady * *w + if place < chance { size * height } else { 0.0 };
+        }
+    }
+    if let Some(times) = part.intermittence.filter(|times| times.off_s > 0.0) {
+        let draws = run.uniform_of(STREAMS + 4 * index + 3, samples);
+        let duty = times.on_s / (times.on_s + times.off_s);
+        // The chain of two states with these mean times, seen at the samples.
+        let settled = 1.0 - (-ts_s * (1.0 / times.on_s + 1.0 / times.off_s)).exp();
+        let mut on = draws.first().is_some_and(|draw| *draw < duty);
+        for (w, draw) in w.iter_mut().zip(draws) {
+            *w = if on { *w / duty.sqrt() } else { 0.0 };
+            let chance = settled * if on { 1.0 - duty } else { duty };
+            if draw < chance {
+                on = !on;
+            }
+        }
+    }
+    w
+}
+
+/// First tag of the streams of parts; part 0 has the stream of [`RunSeed::white_noise`].
+pub(super) const STREAMS: u64 = u64::from_le_bytes(*b"\0people\0");

@@ -1,0 +1,287 @@
+//! A scenario of the family made ready, and its runs.
+//!
+//! Parameters that change are those of the sigmoid at each sample, with the exact hold of these
+//! values ([`held_loop`](super::held_loop)); gains of the remnant are found in both states and go
+//! along the same sigmoid. The random numbers of a run are named by its [`RunSeed`]: those of each
+//! part of the remnant, of the stick, and of the phases of target and disturbance have streams of
+//! their own.
+
+use std::f64::consts::TAU;
+
+use hoid_model::{
+    Channel, Record,
+    family_scenario::{Excitation, FamilyScenario, FamilyState, Followed, ResolvedFamilyScenario, Stick},
+    forcing::{ForcingFunction, Sinusoid},
+};
+
+use super::{
+    calibration::Calibration,
+    held_loop::{HeldLoop, Inputs, LoopState},
+    noise::{Shaped, Shaping, driving},
+};
+use crate::{RunSeed, SimError};
+
+/// A scenario made ready: held models of all samples, gains of the remnant.
+#[derive(Debug, Clone)]
+pub struct FamilySimulator {
+    scenario: ResolvedFamilyScenario,
+    /// Each with the state that it is of.
+    loops: Vec<(FamilyState, HeldLoop)>,
+    /// Place in `loops` of each sample; empty where there is one for all.
+    places: Vec<usize>,
+    shapings: Vec<Shaping>,
+    calibrations: [Calibration; 2],
+}
+
+/// The signals of one run, run-in included.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FamilySignals {
+    /// Error e, as recorded.
+    pub e: Vec<f64>,
+    /// Control u, as recorded.
+    pub u: Vec<f64>,
+    /// Output y of the controlled element.
+    pub y: Vec<f64>,
+    /// Remnant n, with bias and walk of the stick.
+    pub n: Vec<f64>,
+    /// Target f.
+    pub f: Vec<f64>,
+    /// Disturbance d.
+    pub d: Vec<f64>,
+}
+
+const TARGET_PHASES: u64 = u64::from_le_bytes(*b"target\0\0");
+const DISTURBANCE_PHASES: u64 = u64::from_le_bytes(*b"disturb\0");
+const WALK: u64 = u64::from_le_bytes(*b"stick\0\0\0");
+
+impl FamilySimulator {
+    /// Prepares a scenario. Runs share what is computed here.
+    ///
+    /// # Errors
+    /// [`SimError::Model`] when the scenario has no meaning or the loop of one of its states is not
+    /// stable.
+    pub fn new(scenario: &FamilyScenario) -> Result<Self, SimError> {
+        let resolved = scenario.resolve()?;
+        let ts = scenario.sample_time;
+        let held = |state: &FamilyState, delay| HeldLoop::new(state, delay, scenario.realisation, ts);
+        let samples = resolved.run_in_samples() + resolved.measurement_samples();
+        let changes = scenario.initial != scenario.last && scenario.schedule.change_s().is_some();
+        let mut loops: Vec<(FamilyState, HeldLoop)> = Vec::new();
+        let mut places = Vec::new();
+        for k in 0..if changes { samples } else { 1 } {
+            let t_s = resolved.time_s(k);
+            let state = resolved.state_at(t_s)?;
+            if loops.last().is_none_or(|(last, _)| *last != state) {
+                let held = held(&state, resolved.delay_at(t_s))?;
+                loops.push((state, held));
+            }
+            if changes {
+                places.push(loops.len() - 1);
+            }
+        }
+        let shapings = (scenario.remnant.iter())
+            .map(|part| Shaping::new(&part.shape, ts))
+            .collect::<Result<Vec<_>, _>>()?;
+        let calibrated =
+            |state: &FamilyState, delay, is_last| Calibration::of(&held(state, delay)?, scenario, &shapings, is_last);
+        let delays = resolved.delays();
+        let initial = calibrated(&scenario.initial, delays[0], false)?;
+        let last = if changes {
+            calibrated(&scenario.last, delays[1], true)?
+        } else {
+            initial.clone()
+        };
+        Ok(Self {
+            scenario: resolved,
+            loops,
+            places,
+            shapings,
+            calibrations: [initial, last],
+        })
+    }
+
+    /// The same with another stick, which changes nothing else.
+    ///
+    /// # Errors
+    /// [`SimError::Model`] when a number of it has no meaning.
+    pub fn with_stick(mut self, stick: Stick) -> Result<Self, SimError> {
+        let scenario = FamilyScenario {
+            stick,
+            ..self.scenario.scenario().clone()
+        };
+        self.scenario = scenario.resolve()?;
+        Ok(self)
+    }
+
+    /// The scenario.
+    pub fn scenario(&self) -> &ResolvedFamilyScenario {
+        &self.scenario
+    }
+
+    /// Samples of a run: run-in and measurement.
+    pub fn samples(&self) -> usize {
+        self.scenario.run_in_samples() + self.scenario.measurement_samples()
+    }
+
+    /// Gains K of the parts of the remnant, before and after the change.
+    pub fn remnant_gains(&self) -> [&[f64]; 2] {
+        let [initial, last] = &self.calibrations;
+        [&initial.gains, &last.gains]
+    }
+
+    /// Variance of u in a long run, without bias and walk of the stick, before and after the change.
+    pub fn control_variance(&self) -> [f64; 2] {
+        [0, 1].map(|i| self.calibrations[i].mean_squares[0])
+    }
+
+    /// Variance of e, likewise.
+    pub fn error_variance(&self) -> [f64; 2] {
+        [0, 1].map(|i| self.calibrations[i].mean_squares[2])
+    }
+
+    /// The signals of a run.
+    ///
+    /// # Errors
+    /// [`SimError::Diverged`].
+    pub fn signals(&self, run: RunSeed) -> Result<FamilySignals, SimError> {
+        let scenario = self.scenario.scenario();
+        let (ts, samples) = (scenario.sample_time, self.samples());
+        let start_s = self.scenario.time_s(0);
+        let mut signals = FamilySignals {
+            f: phased(&scenario.target, run, TARGET_PHASES)?.samples(start_s, ts, samples),
+            d: phased(&scenario.disturbance, run, DISTURBANCE_PHASES)?.samples(start_s, ts, samples),
+            ..FamilySignals::default()
+        };
+        let driven: Vec<Vec<f64>> = (0..)
+            .zip(&scenario.remnant)
+            .map(|(i, part)| driving(part, run, i, ts.s(), samples))
+            .collect();
+        let steps = if scenario.stick.walk_per_root_s == 0.0 {
+            vec![0.0; samples]
+        } else {
+            run.white_noise_of(WALK, samples)
+        };
+        let mut shaped: Vec<Shaped> = self.shapings.iter().map(Shaped::at_rest).collect();
+        // Each running mean square in units of its mean over the run.
+        let mut followed = vec![1.0; shaped.len()];
+        let forgets: Vec<f64> = (scenario.remnant.iter())
+            .map(|part| {
+                part.signal_dependence
+                    .map_or(1.0, |s| 1.0 - (-ts.s() / s.memory_s).exp())
+            })
+            .collect();
+        let longest = self.loops.iter().map(|(_, held)| held.delay()).max().unwrap_or(0);
+        let mut state = LoopState::at_rest(&self.loops[0].1, longest);
+        let (mut walk, mut before) = (scenario.stick.bias, 0.0);
+        for k in 0..samples {
+            let place = self.places.get(k).copied().unwrap_or(0);
+            let t_s = start_s + k as f64 * ts.s();
+            let between = |of: fn(&Calibration, usize) -> f64, i: usize| {
+                let [a, b] = &self.calibrations;
+                if self.places.is_empty() {
+                    of(a, i)
+                } else {
+                    scenario.schedule.value(of(a, i), of(b, i), t_s)
+                }
+            };
+            let mut n = walk;
+            for (i, part) in scenario.remnant.iter().enumerate() {
+                let mut w = driven[i][k];
+                if let Some(own) = part.signal_dependence {
+                    w *= (1.0 - own.part + own.part * followed[i]).sqrt();
+                }
+                n += between(|c, i| c.gains[i], i) * shaped[i].step(w);
+            }
+            let inputs = Inputs {
+                target: signals.f[k],
+                disturbance: signals.d[k],
+                remnant: n,
+            };
+            let now = self.loops[place].1.step(&mut state, inputs);
+            for (i, part) in scenario.remnant.iter().enumerate() {
+                if let Some(own) = part.signal_dependence {
+                    let (square, mean) = match own.follows {
+                        Followed::Control => (now.u * now.u, between(|c, _| c.mean_squares[0], 0)),
+                        Followed::Rate => ((now.u - before).powi(2), between(|c, _| c.mean_squares[1], 0)),
+                    };
+                    followed[i] += forgets[i] * (square / mean - followed[i]);
+                }
+            }
+            before = now.u;
+            walk += scenario.stick.walk_per_root_s * ts.s().sqrt() * steps[k];
+            signals.e.push(now.e + scenario.stick.offset_e);
+            signals.u.push(now.u + scenario.stick.offset_u);
+            signals.y.push(now.y);
+            signals.n.push(n);
+        }
+        for (signal, values) in [("e", &signals.e), ("u", &signals.u)] {
+            if let Some(k) = values.iter().position(|v| !v.is_finite()) {
+                return Err(SimError::Diverged {
+                    signal,
+                    time_s: self.scenario.time_s(k),
+                    scenario: scenario.name.clone(),
+                });
+            }
+        }
+        Ok(signals)
+    }
+
+    /// One run as a record of the measurement (or from the start of the run-in): e, u, d, y, n, and
+    /// f_t where there is a target.
+    ///
+    /// # Errors
+    /// [`SimError::Diverged`].
+    pub fn run(&self, run: RunSeed, keep_run_in: bool) -> Result<Record, SimError> {
+        let signals = self.signals(run)?;
+        let scenario = self.scenario.scenario();
+        let first = if keep_run_in { 0 } else { self.scenario.run_in_samples() };
+        let channel = |name: &str, mut values: Vec<f64>| {
+            values.drain(..first);
+            Channel::new(name, "deg", values)
+        };
+        let mut record = Record::new(scenario.sample_time, channel("e", signals.e), channel("u", signals.u))?
+            .labelled(scenario.name.clone())
+            .starting_at(self.scenario.time_s(first));
+        let mut others = vec![("d", signals.d), ("y", signals.y), ("n", signals.n)];
+        if !scenario.target.function.sinusoids().is_empty() {
+            others.insert(0, ("f_t", signals.f));
+        }
+        for (name, values) in others {
+            record = record.with_channel(channel(name, values))?;
+        }
+        Ok(record)
+    }
+
+    /// The same record with the true parameters of the operator at each sample under their names,
+    /// those that are finite throughout.
+    ///
+    /// # Errors
+    /// As [`FamilySimulator::run`].
+    pub fn run_with_truth(&self, run: RunSeed, keep_run_in: bool) -> Result<Record, SimError> {
+        let mut record = self.run(run, keep_run_in)?;
+        let first = self.samples() - record.len();
+        let named: Vec<_> = self.loops.iter().map(|(state, _)| state.operator.named()).collect();
+        for (i, parameter) in named[0].iter().enumerate() {
+            let value = |k: usize| named[self.places.get(k).copied().unwrap_or(0)][i].value;
+            let values: Vec<f64> = (first..self.samples()).map(value).collect();
+            if values.iter().all(|v| v.is_finite()) {
+                record = record.with_channel(Channel::new(parameter.name, parameter.unit, values))?;
+            }
+        }
+        Ok(record)
+    }
+}
+
+/// The function with the phases of a run.
+fn phased(excitation: &Excitation, run: RunSeed, tag: u64) -> Result<ForcingFunction, SimError> {
+    if !excitation.random_phases {
+        return Ok(excitation.function.clone());
+    }
+    let lines = excitation.function.sinusoids();
+    let phases = run.uniform_of(tag, lines.len());
+    let with = |(line, phase): (&Sinusoid, f64)| Sinusoid {
+        phase_rad: TAU * phase,
+        ..*line
+    };
+    Ok(ForcingFunction::new(lines.iter().zip(phases).map(with).collect())?)
+}

@@ -1,0 +1,32 @@
+//! Virtual people: persons drawn over the family of operators, and their runs.
+//!
+//! A person is an operator of the family with parameters from ranges that have been published, a
+//! remnant like people's, and a stick that drifts; the task is that of recorded experiments: hold a
+//! zero reference against a multi-sine disturbance at the input of `1/s`, `1/(s(s+1))` or `1/s^2`,
+//! 5 s of run-in and 40 s at 60 Hz. All true values are known.
+//!
+//! ```
+//! use hoid_sim::people::{Person, Plant, Population, RemnantKind, Task};
+//!
+//! let task = Task::default();
+//! let person = Person::draw(&Population::default(), &task, Plant::Integrator, None, RemnantKind::BroadBand, 7, 0)?;
+//! let run = person.run(1)?;
+//! assert_eq!(run.record.len(), 2400);
+//! assert_eq!(run.record, person.run(1)?.record);
+//! assert!((20.0..=65.0).contains(&person.phase_margin_deg));
+//! # Ok::<(), hoid_sim::SimError>(())
+//! ```
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `population` | [`Population`]: the ranges, with their sources; [`Plant`] |
+//! | `remnants` | [`RemnantKind`]: remnants like people's |
+//! | `person` | [`Person`], [`Task`], [`PersonRun`] |
+
+mod person;
+mod population;
+mod remnants;
+
+pub use person::{Person, PersonRun, Task};
+pub use population::{Plant, Population, Range};
+pub use remnants::RemnantKind;

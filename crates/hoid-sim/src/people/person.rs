@@ -1,0 +1,292 @@
+//! One virtual person, and their runs.
+//!
+//! Numbers from `[0, 1)` of the stream (seed, person) give the parameters, in an order that never
+//! changes; a draw that [`Population`] does not take is followed by the next. In each run gain, lead,
+//! `1/T_I`, omega_nm, zeta_nm and delay are multiplied by `exp(b z)`, z normal deviates of the run, b
+//! the spread between runs; a run whose loop is not stable is drawn again.
+
+use hoid_model::{
+    Complex64, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, Record, SampleTime,
+    family_scenario::{RemnantPart, Stick},
+    margins::{MANUAL_CONTROL_RANGE_RAD_S, closed_loop_is_stable, margins},
+    operator_family::Coordinate,
+};
+
+use super::{
+    population::{Plant, Population},
+    remnants::RemnantKind,
+};
+use crate::{RunSeed, SimError, family::FamilySimulator};
+
+/// The task of all persons.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Task {
+    /// Time between two samples. Default 1/60 s.
+    pub sample_time: SampleTime,
+    /// Measurement, s. Default 40 s: two periods of the disturbance.
+    pub measurement_s: f64,
+    /// Run-in, s. Default 5 s.
+    pub run_in_s: f64,
+    /// Spread of the parameters between runs, 0.03 for 3 %. Default none.
+    pub between_runs: f64,
+}
+
+impl Default for Task {
+    fn default() -> Self {
+        Self {
+            sample_time: SampleTime::SIXTIETH,
+            measurement_s: 40.0,
+            run_in_s: 5.0,
+            between_runs: 0.0,
+        }
+    }
+}
+
+/// A person with everything true of them.
+#[derive(Debug, Clone)]
+pub struct Person {
+    /// What they control.
+    pub plant: Plant,
+    /// Their operator, and the controlled element.
+    pub state: FamilyState,
+    /// Kind of remnant.
+    pub kind: RemnantKind,
+    /// Share of the remnant in the variance of u.
+    pub remnant_share: f64,
+    /// Its parts.
+    pub remnant: Vec<RemnantPart>,
+    /// Drift and offsets of the stick.
+    pub stick: Stick,
+    /// Crossover frequency of `Y P`, rad/s.
+    pub crossover_rad_s: f64,
+    /// Phase margin of `Y P`, deg.
+    pub phase_margin_deg: f64,
+    task: Task,
+    streams: RunSeed,
+    simulator: FamilySimulator,
+}
+
+/// A run of a person.
+#[derive(Debug, Clone)]
+pub struct PersonRun {
+    /// The operator of this run; that of the person where runs have no spread.
+    pub state: FamilyState,
+    /// e, u, d, y, n from the start of the measurement.
+    pub record: Record,
+}
+
+/// Draws of a person before the ranges count as empty.
+const MOST_DRAWS: usize = 2000;
+/// Draws of a run.
+const MOST_RUN_DRAWS: usize = 50;
+/// Numbers of one draw.
+const NUMBERS: usize = 16;
+const PERSON: u64 = u64::from_le_bytes(*b"person\0\0");
+const SPREAD: u64 = u64::from_le_bytes(*b"spread\0\0");
+
+impl Person {
+    /// The person of a seed and a number. Without a form, one that people have on this element.
+    ///
+    /// # Errors
+    /// [`SimError::Model`] for ranges or a task without meaning, and [`SimError::NobodyFound`]
+    /// where the ranges hold no loop that is taken.
+    pub fn draw(
+        population: &Population,
+        task: &Task,
+        plant: Plant,
+        form: Option<Form>,
+        kind: RemnantKind,
+        seed: u64,
+        person: u64,
+    ) -> Result<Self, SimError> {
+        population.check()?;
+        if !(0.0..=1.0).contains(&task.between_runs) {
+            return Err(SimError::Model(ModelError::OutOfRange {
+                quantity: "spread of the parameters between runs",
+                found: task.between_runs,
+                expected: "0 to 1",
+            }));
+        }
+        let streams = RunSeed {
+            seed,
+            cell: person,
+            replication: 0,
+        };
+        let numbers = streams.uniform_of(PERSON, NUMBERS * MOST_DRAWS);
+        for draw in numbers.chunks_exact(NUMBERS) {
+            let form = form.unwrap_or_else(|| {
+                let forms = plant.forms();
+                forms[(draw[0] * forms.len() as f64) as usize % forms.len()]
+            });
+            let Some(taken) = loop_of(population, plant, form, &draw[1..])? else {
+                continue;
+            };
+            let Taken {
+                state,
+                crossover_rad_s,
+                phase_margin_deg,
+            } = taken;
+            let remnant_share = population.remnant_share.at(draw[9]);
+            let omega = state.operator.neuromuscular().map_or(11.0, |(omega, _)| omega);
+            let remnant = kind.parts(remnant_share, omega, [draw[10], draw[11], draw[12]]);
+            let mut scenario = FamilyScenario::new(state.clone(), task.sample_time);
+            scenario.name = format!("person {person}");
+            scenario.disturbance = plant.disturbance().excitation()?;
+            scenario.remnant.clone_from(&remnant);
+            scenario.measurement_s = task.measurement_s;
+            scenario.run_in_s = task.run_in_s;
+            // What is stable in continuous time need not be so behind the holds.
+            let simulator = match FamilySimulator::new(&scenario) {
+                Err(SimError::Model(ModelError::UnstableLoop { .. })) => continue,
+                other => other?,
+            };
+            let rms = |variance: [f64; 2]| variance[0].sqrt();
+            let (of_u, of_e) = (rms(simulator.control_variance()), rms(simulator.error_variance()));
+            let stick = Stick {
+                bias: 0.0,
+                walk_per_root_s: population.walk_per_root_s * of_u,
+                offset_e: population.offset * (2.0 * draw[13] - 1.0) * of_e,
+                offset_u: population.offset * (2.0 * draw[14] - 1.0) * of_u,
+            };
+            return Ok(Self {
+                plant,
+                kind,
+                remnant_share,
+                remnant,
+                stick,
+                crossover_rad_s,
+                phase_margin_deg,
+                task: *task,
+                streams,
+                simulator: simulator.with_stick(stick)?,
+                state,
+            });
+        }
+        Err(SimError::NobodyFound {
+            form: form.map_or_else(|| "any".to_owned(), |form| form.to_string()),
+            plant: plant.to_string(),
+            draws: MOST_DRAWS,
+        })
+    }
+
+    /// The scenario of a run without spread.
+    pub fn scenario(&self) -> &FamilyScenario {
+        self.simulator.scenario().scenario()
+    }
+
+    /// Random streams of a run.
+    pub fn run_seed(&self, run: u64) -> RunSeed {
+        RunSeed {
+            replication: run,
+            ..self.streams
+        }
+    }
+
+    /// A run by its number.
+    ///
+    /// # Errors
+    /// [`SimError::NobodyFound`] where the spread between runs leaves no stable loop.
+    pub fn run(&self, run: u64) -> Result<PersonRun, SimError> {
+        let seed = self.run_seed(run);
+        if self.task.between_runs == 0.0 {
+            return Ok(PersonRun {
+                state: self.state.clone(),
+                record: self.simulator.run(seed, false)?,
+            });
+        }
+        let kinds = self
+            .state
+            .operator
+            .form()
+            .coordinates(self.state.operator.has_neuromuscular());
+        let deviates = seed.white_noise_of(SPREAD, kinds.len() * MOST_RUN_DRAWS);
+        for z in deviates.chunks_exact(kinds.len()) {
+            let spread = |((x, kind), z): ((&f64, &Coordinate), &f64)| {
+                let by = self.task.between_runs * z;
+                match kind {
+                    Coordinate::LogOmega | Coordinate::LogZeta => x + by,
+                    _ => x * by.exp(),
+                }
+            };
+            let own = self.state.operator.coordinates();
+            let coordinates: Vec<f64> = own.iter().zip(&kinds).zip(z).map(spread).collect();
+            let operator = &self.state.operator;
+            let state = FamilyState {
+                operator: FamilyOperator::new(operator.form(), operator.has_neuromuscular(), &coordinates)?,
+                ..self.state.clone()
+            };
+            let mut scenario = self.scenario().clone();
+            scenario.initial = state.clone();
+            scenario.last = state.clone();
+            match FamilySimulator::new(&scenario).and_then(|simulator| simulator.run(seed, false)) {
+                Ok(record) => return Ok(PersonRun { state, record }),
+                Err(SimError::Model(ModelError::UnstableLoop { .. }) | SimError::Diverged { .. }) => {}
+                Err(other) => return Err(other),
+            }
+        }
+        Err(SimError::NobodyFound {
+            form: self.state.operator.form().to_string(),
+            plant: self.plant.to_string(),
+            draws: MOST_RUN_DRAWS,
+        })
+    }
+}
+
+/// A loop that a population takes.
+struct Taken {
+    state: FamilyState,
+    crossover_rad_s: f64,
+    phase_margin_deg: f64,
+}
+
+/// The loop of one draw with its crossover and margin, where the population takes it.
+fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> Result<Option<Taken>, SimError> {
+    let kinds = form.coordinates(true);
+    let value = |kind: &Coordinate| match kind {
+        Coordinate::Gain => 1.0,
+        Coordinate::Lead | Coordinate::Linear => population.lead_s.at_log(draw[0]),
+        Coordinate::LagRate if draw[1] < population.integrates => 0.0,
+        Coordinate::LagRate => 1.0 / population.lag_s.at_log(draw[2]),
+        // A lead twice where the roots of the numerator are real: c_2 up to (c_1/2)^2.
+        Coordinate::Quadratic => (population.lead_s.at_log(draw[0]) / 2.0).powi(2) * draw[3],
+        // The droop of a lag: alpha of the order of 1/T_I.
+        Coordinate::Droop => 1.0 / population.lag_s.at_log(draw[2]),
+        Coordinate::LogOmega => population.omega_nm_rad_s.at(draw[4]).ln(),
+        Coordinate::LogZeta => population.zeta_nm.at_log(draw[5]).ln(),
+        Coordinate::Delay => population.tau_e_s.at(draw[6]),
+    };
+    let mut coordinates: Vec<f64> = kinds.iter().map(value).collect();
+    let element = plant.transfer_function()?;
+    let crossover = population.crossover_rad_s.at_log(draw[7]);
+    let unit = FamilyOperator::new(form, true, &coordinates)?;
+    let at = unit.response(crossover) * element.response(crossover);
+    let margin = (-at).arg().to_degrees();
+    if !population.phase_margin_deg.contains(margin) {
+        return Ok(None);
+    }
+    coordinates[0] = 1.0 / at.norm();
+    let state = FamilyState {
+        operator: FamilyOperator::new(form, true, &coordinates)?,
+        controlled_element: element,
+    };
+    let open_loop = state.open_loop()?;
+    // From a tenth of the crossover to ten times it.
+    let rings = (-40..=40).any(|i| {
+        let l = open_loop.response(crossover * 10f64.powf(f64::from(i) / 40.0));
+        (Complex64::from(1.0) + l).norm() * population.largest_sensitivity < 1.0
+    });
+    if rings || !closed_loop_is_stable(&open_loop) {
+        return Ok(None);
+    }
+    // The gain may cross one elsewhere too: what counts is what the definition finds.
+    let found = margins(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S);
+    let (Some(crossover_rad_s), Some(phase_margin_deg)) = (found.crossover_rad_s, found.phase_margin_deg) else {
+        return Ok(None);
+    };
+    let taken = population.phase_margin_deg.contains(phase_margin_deg);
+    Ok(taken.then_some(Taken {
+        state,
+        crossover_rad_s,
+        phase_margin_deg,
+    }))
+}

@@ -1,0 +1,209 @@
+//! Who is drawn, and what they control.
+//!
+//! Each parameter is drawn uniformly over a range, the time constants and the damping over its
+//! logarithm. The gain follows from a crossover frequency that is drawn likewise. A loop whose phase
+//! margin lies outside its range, that rings or is not stable is drawn again with all its
+//! parameters.
+//!
+//! | parameter | range | source |
+//! |---|---|---|
+//! | T_L | 0.3 to 2 s | D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249 |
+//! | T_I | 2 to 20 s, or infinite | the same: low-frequency lag of people on `K/s` |
+//! | omega_nm | 8 to 16 rad/s | R. E. Magdaleno and D. T. McRuer, NASA CR-1757 (1971); M. M. van Paassen, *Biophysics in Aircraft Control* (1994) |
+//! | zeta_nm | 0.1 to 0.6 | the same |
+//! | tau | 0.12 to 0.4 s | McRuer and Jex: 0.12 to 0.2 s with practised people on `K/s`, more on elements of higher order |
+//! | phase margin | 20 to 65 deg | the same |
+
+use hoid_model::{ContinuousTransferFunction, Form, ModelError, family_scenario::MultiSine};
+
+/// A range of values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// Least.
+    pub low: f64,
+    /// Greatest.
+    pub high: f64,
+}
+
+impl Range {
+    /// From least to greatest.
+    pub const fn new(low: f64, high: f64) -> Self {
+        Self { low, high }
+    }
+
+    /// The value at a part of the way, 0 to 1.
+    pub(super) fn at(&self, part: f64) -> f64 {
+        self.low + (self.high - self.low) * part
+    }
+
+    /// The same on a logarithmic scale.
+    pub(super) fn at_log(&self, part: f64) -> f64 {
+        self.low * (self.high / self.low).powf(part)
+    }
+
+    /// True where it holds the value.
+    pub fn contains(&self, value: f64) -> bool {
+        (self.low..=self.high).contains(&value)
+    }
+
+    pub(super) fn check(&self, quantity: &'static str, least: f64) -> Result<(), ModelError> {
+        let ordered = self.low.is_finite() && self.high.is_finite() && self.low <= self.high && self.low >= least;
+        if ordered {
+            return Ok(());
+        }
+        Err(ModelError::OutOfRange {
+            quantity,
+            found: if self.low >= least { self.high } else { self.low },
+            expected: "a range from a positive number (zero or more for shares) to one that is no smaller",
+        })
+    }
+}
+
+/// The ranges.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Population {
+    /// T_L, s.
+    pub lead_s: Range,
+    /// T_I, s, where it is finite.
+    pub lag_s: Range,
+    /// Chance that a person with a lag integrates without end: T_I is infinite. Default 0.25.
+    pub integrates: f64,
+    /// omega_nm, rad/s.
+    pub omega_nm_rad_s: Range,
+    /// zeta_nm.
+    pub zeta_nm: Range,
+    /// tau_e, s.
+    pub tau_e_s: Range,
+    /// Crossover frequency, rad/s. Default 1 to 5.
+    pub crossover_rad_s: Range,
+    /// Phase margin, deg.
+    pub phase_margin_deg: Range,
+    /// Largest `|1/(1 + Y P)|`: beyond it a loop rings. Default 4, that of a phase margin of 14 deg.
+    pub largest_sensitivity: f64,
+    /// Share of the remnant in the variance of u. Default 0.05 to 0.5.
+    pub remnant_share: Range,
+    /// Greatest offset of recorded e and u, either way, in their own rms. Default 0.3.
+    pub offset: f64,
+    /// Random walk of the stick, in rms of u per root second. Default 0.03.
+    pub walk_per_root_s: f64,
+}
+
+impl Default for Population {
+    fn default() -> Self {
+        Self {
+            lead_s: Range::new(0.3, 2.0),
+            lag_s: Range::new(2.0, 20.0),
+            integrates: 0.25,
+            omega_nm_rad_s: Range::new(8.0, 16.0),
+            zeta_nm: Range::new(0.1, 0.6),
+            tau_e_s: Range::new(0.12, 0.4),
+            crossover_rad_s: Range::new(1.0, 5.0),
+            phase_margin_deg: Range::new(20.0, 65.0),
+            largest_sensitivity: 4.0,
+            remnant_share: Range::new(0.05, 0.5),
+            offset: 0.3,
+            walk_per_root_s: 0.03,
+        }
+    }
+}
+
+impl Population {
+    pub(super) fn check(&self) -> Result<(), ModelError> {
+        let tiny = f64::MIN_POSITIVE;
+        self.lead_s.check("lead T_L of the population in s", tiny)?;
+        self.lag_s.check("lag T_I of the population in s", tiny)?;
+        self.omega_nm_rad_s.check("omega_nm of the population in rad/s", tiny)?;
+        self.zeta_nm.check("zeta_nm of the population", tiny)?;
+        self.tau_e_s.check("delay tau_e of the population in s", 0.0)?;
+        self.crossover_rad_s
+            .check("crossover of the population in rad/s", tiny)?;
+        self.phase_margin_deg
+            .check("phase margin of the population in deg", 0.0)?;
+        self.remnant_share.check("remnant share of the population", 0.0)?;
+        for (quantity, found, most) in [
+            ("chance of an infinite T_I", self.integrates, 1.0),
+            ("remnant share of the population", self.remnant_share.high, 0.9),
+            ("offset of the population in rms", self.offset, 1e3),
+            ("walk of the stick in rms per root second", self.walk_per_root_s, 1e3),
+        ] {
+            if !(0.0..=most).contains(&found) {
+                return Err(ModelError::OutOfRange {
+                    quantity,
+                    found,
+                    expected: "zero or more; a chance up to 1, a share up to 0.9",
+                });
+            }
+        }
+        if self.largest_sensitivity.is_nan() || self.largest_sensitivity <= 1.0 {
+            return Err(ModelError::OutOfRange {
+                quantity: "largest sensitivity |1/(1 + Y P)| of the population",
+                found: self.largest_sensitivity,
+                expected: "more than one",
+            });
+        }
+        Ok(())
+    }
+}
+
+/// What a virtual person controls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Plant {
+    /// `1/s`.
+    Integrator,
+    /// `1/(s(s+1))`.
+    LaggedIntegrator,
+    /// `1/s^2`.
+    DoubleIntegrator,
+}
+
+hoid_model::named_choice!(Plant, "controlled element", 3, {
+    Integrator => "integrator",
+    LaggedIntegrator => "lagged-integrator",
+    DoubleIntegrator => "double-integrator",
+});
+
+impl Plant {
+    /// Its denominator by descending powers of s; the numerator is one.
+    pub fn denominator(self) -> &'static [f64] {
+        match self {
+            Self::Integrator => &[1.0, 0.0],
+            Self::LaggedIntegrator => &[1.0, 1.0, 0.0],
+            Self::DoubleIntegrator => &[1.0, 0.0, 0.0],
+        }
+    }
+
+    /// As a manifest writes it, `NUM/DEN`.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Integrator => "1/1,0",
+            Self::LaggedIntegrator => "1/1,1,0",
+            Self::DoubleIntegrator => "1/1,0,0",
+        }
+    }
+
+    /// Its transfer function.
+    ///
+    /// # Errors
+    /// None in truth: as [`ContinuousTransferFunction::new`].
+    pub fn transfer_function(self) -> Result<ContinuousTransferFunction, ModelError> {
+        ContinuousTransferFunction::new(&[1.0], self.denominator())
+    }
+
+    /// The forms that people have on it, each as likely: gain, lead and lag on `1/s`; a lead, or
+    /// two with a lag, on elements of second order.
+    pub fn forms(self) -> &'static [Form] {
+        match self {
+            Self::Integrator => &[Form::LeadLag],
+            Self::LaggedIntegrator | Self::DoubleIntegrator => &[Form::Lead2Lag, Form::Lead],
+        }
+    }
+
+    /// The disturbance: primes up to 31 times 0.05 Hz on `1/s`, up to 17 on elements of second
+    /// order, whose loops are slower.
+    pub fn disturbance(self) -> MultiSine {
+        MultiSine {
+            largest: if self == Self::Integrator { 31 } else { 17 },
+            ..MultiSine::default()
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Remnants like people's.
+//!
+//! All but the first have three parts: a broad band `1/(T_n s + 1)` with T_n = 0.05 to 0.3 s, 70 %
+//! of the remnant; a peak at the person's own omega_nm with a damping of 0.15 to 0.4, 20 %; a drift
+//! `1/(T_n s + 1)` with T_n = 3 to 10 s, 10 %. What makes each kind is told with its source in
+//! [`hoid_model::family_scenario`].
+
+use hoid_model::family_scenario::{Followed, Intermittence, Pulses, RemnantPart, RemnantShape, SignalDependence};
+
+use super::population::Range;
+
+/// A kind of remnant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum RemnantKind {
+    /// `1/(T_n s + 1)` alone, as in the reference text.
+    Lag,
+    /// Broad band, peak and drift, Gaussian.
+    BroadBand,
+    /// The same, 80 % of the variance of the broad band following the running rms of u (1 s).
+    SignalDependent,
+    /// The same, 80 % of the variance of the broad band in two pulses a second.
+    Pulsed,
+    /// The same, the broad band there for 2 s and away for 2 s in the mean.
+    Intermittent,
+}
+
+hoid_model::named_choice!(RemnantKind, "kind of remnant", 5, {
+    Lag => "lag",
+    BroadBand => "broad-band",
+    SignalDependent => "signal-dependent",
+    Pulsed => "pulsed",
+    Intermittent => "intermittent",
+});
+
+const BAND_S: Range = Range::new(0.05, 0.3);
+const DRIFT_S: Range = Range::new(3.0, 10.0);
+const DAMPING: Range = Range::new(0.15, 0.4);
+
+impl RemnantKind {
+    /// The parts of a person, by three numbers from `[0, 1)`.
+    pub(super) fn parts(self, share: f64, omega_nm_rad_s: f64, numbers: [f64; 3]) -> Vec<RemnantPart> {
+        let lag = |time_constant_s| RemnantShape::Lag {
+            time_constant_s,
+            order: 1,
+        };
+        let shape = lag(BAND_S.at_log(numbers[0]));
+        if self == Self::Lag {
+            return vec![RemnantPart::new(shape, share)];
+        }
+        let band = RemnantPart::new(shape, 0.7 * share);
+        let band = match self {
+            Self::Lag | Self::BroadBand => band,
+            Self::SignalDependent => RemnantPart {
+                signal_dependence: Some(SignalDependence {
+                    follows: Followed::Control,
+                    part: 0.8,
+                    memory_s: 1.0,
+                }),
+                ..band
+            },
+            Self::Pulsed => RemnantPart {
+                pulses: Some(Pulses {
+                    part: 0.8,
+                    rate_per_s: 2.0,
+                }),
+                ..band
+            },
+            Self::Intermittent => RemnantPart {
+                intermittence: Some(Intermittence { on_s: 2.0, off_s: 2.0 }),
+                ..band
+            },
+        };
+        let peak = RemnantShape::Resonance {
+            omega_rad_s: omega_nm_rad_s,
+            zeta: DAMPING.at_log(numbers[1]),
+        };
+        let drift = lag(DRIFT_S.at_log(numbers[2]));
+        vec![
+            band,
+            RemnantPart::new(peak, 0.2 * share),
+            RemnantPart::new(drift, 0.1 * share),
+        ]
+    }
+}

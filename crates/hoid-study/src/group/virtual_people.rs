@@ -1,0 +1,275 @@
+//! A virtual experiment with people like people: persons drawn over the family of operators.
+//!
+//! Each subject is a person for each controlled element ([`hoid_sim::people`]): parameters from
+//! published ranges, a remnant like people's, a stick that drifts. The kinds of remnant go round
+//! over the subjects. Files have the columns t, e, u, d, y of recorded experiments; `truth.csv` has
+//! the true parameters of each run with its crossover and margin. An empty T_I of a form with a lag
+//! is an infinite one.
+
+use std::path::Path;
+
+use hoid_io::{ColumnKind, ColumnSchema, TableSchema};
+use hoid_model::{Form, ModelError, SampleTime};
+use hoid_sim::{
+    RunSeed, SimError,
+    people::{Person, PersonRun, Plant, Population, RemnantKind, Task},
+};
+
+use super::{
+    analysis_settings::AnalysisSettings,
+    condition_settings::ConditionSettings,
+    manifest::{MANIFEST, Manifest, RunEntry},
+    preparation_settings::PreparationSettings,
+    read_settings::ReadSettings,
+    sampling_defects::{SamplingDefect, recorded},
+};
+use crate::{StudyError, columns::Rows};
+
+/// What is to be simulated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PeopleExperiment {
+    /// Number of subjects.
+    pub subjects: u64,
+    /// What they control: a condition each.
+    pub plants: Vec<Plant>,
+    /// Form of their operators; `None` for those that people have on each element.
+    pub form: Option<Form>,
+    /// Kinds of remnant, subject after subject.
+    pub remnants: Vec<RemnantKind>,
+    /// Runs of each subject and condition.
+    pub runs: u64,
+    /// Spread of the parameters between the runs of a subject.
+    pub between_runs: f64,
+    /// Who they are.
+    pub population: Population,
+    /// Time between two samples.
+    pub sample_time: SampleTime,
+    /// Seed of all random streams.
+    pub seed: u64,
+    /// Defects of the sampling.
+    pub defects: Vec<SamplingDefect>,
+}
+
+impl Default for PeopleExperiment {
+    /// Three subjects on all elements, with all kinds of remnant, five runs each.
+    fn default() -> Self {
+        Self {
+            subjects: 3,
+            plants: Plant::ALL.to_vec(),
+            form: None,
+            remnants: RemnantKind::ALL.to_vec(),
+            runs: 5,
+            between_runs: 0.03,
+            population: Population::default(),
+            sample_time: SampleTime::SIXTIETH,
+            seed: 1,
+            defects: Vec::new(),
+        }
+    }
+}
+
+/// Columns of a file besides t.
+const COLUMNS: [&str; 4] = ["e", "u", "d", "y"];
+/// Parameters of all forms, as [`hoid_model::FamilyOperator::named`] calls them.
+const PARAMETERS: [&str; 13] = [
+    "K",
+    "K_over_T_I",
+    "K_I",
+    "K_e",
+    "K_e_dot",
+    "T_L",
+    "T_I",
+    "c_1",
+    "c_2",
+    "alpha",
+    "omega_nm",
+    "zeta_nm",
+    "tau_e",
+];
+/// What else is true.
+const OTHERS: [&str; 7] = [
+    "crossover_rad_s",
+    "phase_margin_deg",
+    "remnant_share",
+    "walk_per_root_s",
+    "offset_e",
+    "offset_u",
+    "sample_time_s",
+];
+/// Streams of the defects: no person has this number.
+const DEFECTS: u64 = u64::MAX / 2;
+
+/// Simulates the experiment into a directory: a file a run, `truth.csv`, `group.toml`.
+///
+/// # Errors
+/// [`StudyError::Virtual`] for an experiment without meaning, [`StudyError::ExperimentThere`],
+/// [`StudyError::Io`].
+pub fn simulate_people(
+    experiment: &PeopleExperiment,
+    directory: &Path,
+    each: &dyn Fn(),
+) -> Result<Manifest, StudyError> {
+    experiment.check()?;
+    if directory.join(MANIFEST).exists() {
+        return Err(StudyError::ExperimentThere {
+            directory: directory.display().to_string(),
+        });
+    }
+    // Nobody is written before everybody is found.
+    let mut people = Vec::new();
+    for subject in 1..=experiment.subjects {
+        for (place, plant) in (0..).zip(&experiment.plants) {
+            people.push((subject, experiment.person(subject, place, *plant)?));
+        }
+    }
+    hoid_io::make_directory(directory)?;
+    let mut runs = Vec::new();
+    let mut truth = Rows::new(&truth_schema());
+    for (subject, person) in &people {
+        for run in 1..=experiment.runs {
+            let found = person.run(run).map_err(|error| virtual_error(&error))?;
+            let condition = person.plant.to_string();
+            let file = format!("S{subject}_{condition}_{run}.csv");
+            let noise = RunSeed {
+                cell: DEFECTS - person.run_seed(run).cell,
+                ..person.run_seed(run)
+            }
+            .white_noise(found.record.len());
+            let table = recorded(&found.record, &COLUMNS, &experiment.defects, &noise);
+            hoid_io::write_table(&directory.join(&file), &table)?;
+            truth_row(&mut truth, *subject, run, person, &found)?;
+            runs.push(RunEntry {
+                then: None,
+                file: file.into(),
+                subject: format!("S{subject}"),
+                condition,
+                run: run.to_string(),
+                counts: true,
+            });
+            each();
+        }
+    }
+    hoid_io::write_table(&directory.join("truth.csv"), &truth.into_table(Vec::new()))?;
+    let facts = |plant: &Plant| {
+        let facts = ConditionSettings {
+            controlled_element: Some(plant.text().to_owned()),
+            excitation: Some("d".to_owned()),
+            period_s: Some(plant.disturbance().period_s),
+            ..ConditionSettings::default()
+        };
+        (plant.to_string(), facts)
+    };
+    let manifest = Manifest {
+        name: "virtual-people".to_owned(),
+        read: ReadSettings {
+            resample: experiment.defects.iter().any(|defect| defect.is_uneven()),
+            ..ReadSettings::default()
+        },
+        prepare: PreparationSettings::default(),
+        analysis: AnalysisSettings {
+            // Remnants like people's are no lag of first order.
+            nd: (1, 6),
+            ..AnalysisSettings::default()
+        },
+        conditions: experiment.plants.iter().map(facts).collect(),
+        runs,
+    };
+    let text = manifest.text();
+    hoid_io::write_atomically(&directory.join(MANIFEST), |file| file.write_all(text.as_bytes()))?;
+    Ok(manifest)
+}
+
+impl PeopleExperiment {
+    fn check(&self) -> Result<(), StudyError> {
+        let bad = |reason: String| Err(StudyError::Virtual { reason });
+        let least = [
+            self.subjects,
+            self.runs,
+            self.plants.len() as u64,
+            self.remnants.len() as u64,
+        ];
+        if least.contains(&0) {
+            return bad("there are no subjects, runs, plants or remnants, expected at least one of each".to_owned());
+        }
+        for (i, plant) in self.plants.iter().enumerate() {
+            if self.plants[..i].contains(plant) {
+                return bad(format!("the plant {plant} is named twice; name each once"));
+            }
+        }
+        if !(0.0..=1.0).contains(&self.between_runs) {
+            return bad(format!(
+                "the spread between runs is {}, expected 0 to 1",
+                self.between_runs
+            ));
+        }
+        Ok(())
+    }
+
+    fn person(&self, subject: u64, place: u64, plant: Plant) -> Result<Person, StudyError> {
+        let task = Task {
+            sample_time: self.sample_time,
+            between_runs: self.between_runs,
+            ..Task::default()
+        };
+        let kind = self.remnants[(subject - 1) as usize % self.remnants.len()];
+        let number = subject * 1000 + place;
+        Person::draw(&self.population, &task, plant, self.form, kind, self.seed, number)
+            .map_err(|error| virtual_error(&error))
+    }
+}
+
+fn virtual_error(error: &SimError) -> StudyError {
+    StudyError::Virtual {
+        reason: error.to_string(),
+    }
+}
+
+fn truth_schema() -> TableSchema {
+    let of = |kind: ColumnKind, names: &[&str]| -> Vec<ColumnSchema> {
+        let column = |name: &&str| ColumnSchema {
+            name: (*name).to_owned(),
+            kind,
+        };
+        names.iter().map(column).collect()
+    };
+    let texts = ["subject", "condition", "run", "form", "remnant"];
+    TableSchema {
+        comments: Vec::new(),
+        columns: [
+            of(ColumnKind::Text, &texts),
+            of(ColumnKind::Real, &PARAMETERS),
+            of(ColumnKind::Real, &OTHERS),
+        ]
+        .concat(),
+    }
+}
+
+fn truth_row(rows: &mut Rows, subject: u64, run: u64, person: &Person, found: &PersonRun) -> Result<(), StudyError> {
+    let wrong = |error: ModelError| virtual_error(&SimError::Model(error));
+    rows.begin();
+    rows.text("subject", &format!("S{subject}"));
+    rows.text("condition", &person.plant.to_string());
+    rows.text("run", &run.to_string());
+    rows.text("form", &found.state.operator.form().to_string());
+    rows.text("remnant", &person.kind.to_string());
+    for parameter in found.state.operator.named() {
+        if parameter.value.is_finite() {
+            rows.real(parameter.name, parameter.value);
+        }
+    }
+    let margins = found.state.margins().map_err(wrong)?;
+    for (name, value) in [
+        ("crossover_rad_s", margins.crossover_rad_s),
+        ("phase_margin_deg", margins.phase_margin_deg),
+        ("remnant_share", Some(person.remnant_share)),
+        ("walk_per_root_s", Some(person.stick.walk_per_root_s)),
+        ("offset_e", Some(person.stick.offset_e)),
+        ("offset_u", Some(person.stick.offset_u)),
+        ("sample_time_s", Some(found.record.sample_time().s())),
+    ] {
+        if let Some(value) = value {
+            rows.real(name, value);
+        }
+    }
+    Ok(())
+}
