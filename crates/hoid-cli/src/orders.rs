@@ -143,7 +143,7 @@ pub fn priors(text: Option<&str>) -> Result<BTreeMap<String, Prior>, CliError> {
         })
     };
     named(
-        "--prior",
+        "--coefficient-prior",
         text,
         guess,
         "VALUE:WEIGHT with a weight that is not negative",

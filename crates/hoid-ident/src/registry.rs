@@ -4,11 +4,12 @@
 //! options, Python what belongs to what. A new instrumental-variable method is in the list by being
 //! in [`IvMethod::ALL`].
 
-use hoid_model::{NamedChoice, Structure};
+use hoid_model::{Form, NamedChoice, Structure};
 
 use crate::{
     criterion::InitialState,
     estimator::Focus,
+    family::FamilyEstimator,
     iv::IvMethod,
     optimize::{SearchMethod, SearchOptions},
     settings::{Bounds, Kind, MethodSpec, Setting},
@@ -36,7 +37,7 @@ pub fn estimators() -> Vec<MethodSpec> {
                 start(),
                 fix(),
                 bound(),
-                prior(),
+                coefficient_prior(),
                 robust(),
                 focus(),
                 stable(),
@@ -56,6 +57,28 @@ pub fn estimators() -> Vec<MethodSpec> {
         ]
         .concat(),
     };
+    let family = MethodSpec {
+        name: "family",
+        help: "the operator of a person: form, parameters with prior, errors by runs, a verdict",
+        source: "McRuer and Jex 1967; the reference text, equation 2.2",
+        structures: &[Structure::BoxJenkins],
+        settings: [
+            vec![
+                form(),
+                neuromuscular(),
+                operator_prior(),
+                excitation(),
+                period(),
+                noise_orders(),
+                family_delay(),
+                individual(),
+                run_to_run(),
+                initial_state(),
+            ],
+            search(),
+        ]
+        .concat(),
+    };
     let sigmoid = MethodSpec {
         name: "time-varying",
         help: "the operator's gains change once, by a sigmoid",
@@ -66,7 +89,7 @@ pub fn estimators() -> Vec<MethodSpec> {
     [pem]
         .into_iter()
         .chain(instrumental)
-        .chain([grey_box, sigmoid])
+        .chain([family, grey_box, sigmoid])
         .collect()
 }
 
@@ -129,6 +152,65 @@ fn remnant_order() -> Setting {
     )
 }
 
+fn form() -> Setting {
+    let mut words = vec!["auto"];
+    words.extend(named::<Form>());
+    let help = format!("Form of the operator: {}; auto: the simplest that held-out runs do not refute", words.join(", "));
+    setting("form", Kind::Channel, "auto", &help)
+}
+
+fn neuromuscular() -> Setting {
+    setting(
+        "neuromuscular",
+        Kind::Choice(&["yes", "no"]),
+        "yes",
+        "With neuromuscular dynamics omega_nm, zeta_nm",
+    )
+}
+
+fn operator_prior() -> Setting {
+    setting(
+        "prior",
+        Kind::Channel,
+        "population",
+        "What is known of the person before the data: population (published people), none, a JSON result of another fit, or \
+         NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L, T_I, as omega_nm=10.5:0.3 (the spread is relative)",
+    )
+}
+
+fn excitation() -> Setting {
+    setting(
+        "excitation",
+        Kind::Channel,
+        "f_t, d, r ... where one has lines",
+        "Column of the recorded disturbance or target, for the fit at its lines; none for no such fit",
+    )
+}
+
+fn period() -> Setting {
+    let help = "Period of the excitation";
+    setting("period", Kind::Number, "found in it", help).unit("s").bounds(Bounds::PositiveFinite)
+}
+
+fn noise_orders() -> Setting {
+    setting(
+        "orders",
+        Kind::Named(&Kind::Count),
+        "nc=0,nd=0..24",
+        "Orders of the noise model, each a number or a range to search",
+    )
+}
+
+fn family_delay() -> Setting {
+    setting("delay", Kind::Span, "0.02..0.8", "Shortest and longest delay tau_e").unit("s")
+}
+
+fn run_to_run() -> Setting {
+    let usual = FamilyEstimator::default().run_to_run.to_string();
+    let help = "What a person's gain varies by from run to run, as a part of it: in the error bars of fewer than five records";
+    setting("run_to_run", Kind::Number, &usual, help).bounds(Bounds::AtLeast(0.0))
+}
+
 fn delay() -> Setting {
     setting("delay", Kind::Span, "0.05..0.6", "Shortest and longest delay tau_e").unit("s")
 }
@@ -175,9 +257,9 @@ fn bound() -> Setting {
     setting("bound", Kind::Named(&Kind::OpenSpan), "", help)
 }
 
-fn prior() -> Setting {
+fn coefficient_prior() -> Setting {
     let help = "Guesses of coefficients with a weight W, as f1=-1.9:0.5: the loss grows by W (f1 + 1.9)^2";
-    setting("prior", Kind::Named(&Kind::Channel), "", help)
+    setting("coefficient_prior", Kind::Named(&Kind::Channel), "", help)
 }
 
 fn robust() -> Setting {
@@ -244,7 +326,7 @@ mod tests {
             }
         }
         let names: Vec<&str> = all.iter().map(|spec| spec.name).collect();
-        assert_eq!(names, ["pem", "iv4", "sriv", "rivbj", "grey-box", "time-varying"]);
+        assert_eq!(names, ["pem", "iv4", "sriv", "rivbj", "family", "grey-box", "time-varying"]);
     }
 
     #[test]

@@ -9,11 +9,11 @@ use hoid_ident::{
     settings::{Kind, MethodSpec},
 };
 use hoid_io::{readable_endings, writable_endings};
-use hoid_model::{ContinuousTransferFunction, Structure, remnant::RemnantDiscretisation};
+use hoid_model::{ContinuousTransferFunction, Form, Structure, remnant::RemnantDiscretisation};
 
 use super::{
     choices::{by_name, choice_of},
-    parse::parse_span,
+    parse::{parse_span, parse_width},
     reading::{MaskArgs, ReadArgs},
 };
 use crate::orders::parse_range;
@@ -29,9 +29,10 @@ pub struct IdentifyArgs {
     pub read: ReadArgs,
     #[command(flatten)]
     pub mask: MaskArgs,
-    /// What is fitted: a polynomial structure, grey-box (operator and remnant in physical
-    /// parameters, with a real delay), or time-varying (the operator's gains change once, by a
-    /// sigmoid) [default: bj, or that of --method]
+    /// What is fitted: grey-box (the operator in physical parameters: the family of operators of
+    /// people, or with --remnant-order the operator of a gain and a lead), a polynomial structure, or
+    /// time-varying (the operator's gains change once, by a sigmoid) [default: grey-box; that of
+    /// --method; bj with options that polynomials alone have, as --nk]
     #[arg(long, value_name = "NAME", value_parser = by_name(ModelKind::named()))]
     pub structure: Option<ModelKind>,
     /// How: pem the prediction error method; iv4 (for arx), sriv (for oe), rivbj (for bj)
@@ -40,6 +41,18 @@ pub struct IdentifyArgs {
     pub method: std::option::Option<IvMethod>,
     #[arg(long, help = about("instruments"), value_name = "CHANNEL|simulated")]
     pub instruments: Option<String>,
+    #[arg(long, help = about("form"), value_name = "FORM", default_value = "auto", value_parser = by_name(forms()))]
+    pub form: std::option::Option<Form>,
+    #[arg(long, help = about("neuromuscular"), value_name = "YES|NO", default_value = "yes", value_parser = by_name([("yes", true), ("no", false)]))]
+    pub neuromuscular: bool,
+    #[arg(long, help = about("prior"), value_name = "PRIOR", allow_hyphen_values = true)]
+    pub prior: Option<String>,
+    #[arg(long, help = about("excitation"), value_name = "COLUMN|none")]
+    pub excitation: Option<String>,
+    #[arg(long, help = about("period"), value_name = "S")]
+    pub period: Option<f64>,
+    #[arg(long, help = about("run_to_run"), value_name = "SHARE")]
+    pub run_to_run: Option<f64>,
     #[arg(long, help = about("remnant_order"), value_name = "M|LO..HI", value_parser = parse_range)]
     pub remnant_order: Option<RangeInclusive<usize>>,
     #[arg(long, help = about("delay"), value_name = "LO..HI", value_parser = parse_span)]
@@ -66,8 +79,8 @@ pub struct IdentifyArgs {
     pub fix: Option<String>,
     #[arg(long, help = about("bound"), value_name = "LIST", allow_hyphen_values = true)]
     pub bound: Option<String>,
-    #[arg(long, help = about("prior"), value_name = "LIST", allow_hyphen_values = true)]
-    pub prior: Option<String>,
+    #[arg(long, help = about("coefficient_prior"), value_name = "LIST", allow_hyphen_values = true)]
+    pub coefficient_prior: Option<String>,
     #[arg(long, help = about("robust"), value_name = "K", num_args = 0..=1, default_missing_value = "1.345")]
     pub robust: Option<f64>,
     #[arg(long, help = about("focus"), value_name = "WHAT", default_value = "prediction", value_parser = choice_of(&Focus::ALL))]
@@ -87,6 +100,12 @@ pub struct IdentifyArgs {
     /// adds crossover frequency and margins
     #[arg(long, value_name = "ELEMENT", allow_hyphen_values = true)]
     pub controlled_element: Option<ContinuousTransferFunction>,
+    /// Draw the describing function with the fitted operator through it into this file (.svg)
+    #[arg(long, value_name = "FILE")]
+    pub figure: Option<PathBuf>,
+    /// Width of the figure, as 85mm, 17cm or 3.3in [default: 420 pixels]
+    #[arg(long, value_name = "WIDTH", value_parser = parse_width, requires = "figure")]
+    pub width: Option<f64>,
     /// Also judge the prediction K samples ahead
     #[arg(long, value_name = "K")]
     pub horizon: Option<usize>,
@@ -106,7 +125,9 @@ pub struct IdentifyArgs {
 pub enum ModelKind {
     /// A polynomial structure.
     Polynomial(Structure),
-    /// The operator and its remnant in physical parameters.
+    /// An operator of the family of people.
+    Family,
+    /// A gain with a lead, and its remnant of order m, in physical parameters.
     GreyBox,
     /// The operator with gains that change once.
     TimeVarying,
@@ -116,9 +137,14 @@ impl ModelKind {
     /// The names that are typed, in the order of the help page.
     fn named() -> impl Iterator<Item = (&'static str, Self)> {
         let structures = Structure::ALL.map(|structure| (structure.name(), Self::Polynomial(structure)));
-        let others = [("grey-box", Self::GreyBox), ("time-varying", Self::TimeVarying)];
+            let others = [("grey-box", Self::Family), ("time-varying", Self::TimeVarying)];
         structures.into_iter().chain(others)
     }
+}
+
+/// The forms by name; auto is none of them.
+fn forms() -> impl Iterator<Item = (&'static str, Option<Form>)> {
+    [("auto", None)].into_iter().chain(Form::ALL.map(|form| (form.name(), Some(form))))
 }
 
 /// Instrumental variables by name, and the prediction error method, which is none of them.
@@ -149,7 +175,7 @@ fn about(name: &str) -> String {
         text.push_str(&format!(" [for {}]", of.join(", ")));
     }
     // Where clap knows the default it prints it itself.
-    let known = matches!(setting.kind, Kind::Choice(_) | Kind::Flag) || ["max_iterations", "tolerance"].contains(&name);
+    let known = matches!(setting.kind, Kind::Choice(_) | Kind::Flag) || ["max_iterations", "tolerance", "form"].contains(&name);
     if !known && !setting.default.is_empty() {
         text.push_str(&format!(" [default: {}]", setting.default));
     }

@@ -45,6 +45,25 @@ pub fn read(path: &Path, args: &ReadArgs, with_input: bool) -> Result<(Record, A
 /// # Errors
 /// As [`read`].
 pub fn read_all(paths: &[PathBuf], args: &ReadArgs, mask: &MaskArgs, with_input: bool) -> Result<ReadAll, CliError> {
+    read_with(paths, args, mask, with_input, with_account)
+}
+
+/// The same records again, read another way: what is wrong with them has been said.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_again(paths: &[PathBuf], args: &ReadArgs, mask: &MaskArgs) -> Result<Vec<Record>, CliError> {
+    let silent = |_: &Path, read: ReadRecord| (read.record, Account::default());
+    Ok(read_with(paths, args, mask, true, silent)?.records)
+}
+
+fn read_with(
+    paths: &[PathBuf],
+    args: &ReadArgs,
+    mask: &MaskArgs,
+    with_input: bool,
+    with_account: impl Fn(&Path, ReadRecord) -> (Record, Account),
+) -> Result<ReadAll, CliError> {
     let (options, preparation) = (options(args, with_input)?, preparation(args)?);
     let mut all = ReadAll::default();
     for path in paths {

@@ -26,7 +26,7 @@ use crate::{
     Fit, IdentError, InitialState, SearchOptions,
     criterion::{Criterion, Data, Workspace, output_variance},
     fit::Physical,
-    frequency::{Averaging, DescribingFunction, DescribingOptions, Excitation, LineSearch, Realisation, describe},
+    frequency::{DescribingFunction, DescriptionOptions, describe_runs},
     grey_box::parametrisation::Parametrisation,
     informative_data,
     optimize::minimise,
@@ -110,6 +110,28 @@ impl FamilyEstimator {
     /// [`IdentError`] for records or options without meaning, and where no form could be fitted.
     /// What makes a result doubtful is part of it ([`FamilyFit::verdict`]).
     pub fn fit(&self, records: &[Record]) -> Result<FamilyFit, IdentError> {
+        let described = self.excitation.as_ref().map(|channel| {
+            let options = DescriptionOptions {
+                excitation: Some(channel.clone()),
+                period_s: self.period_s,
+                ..DescriptionOptions::default()
+            };
+            describe_runs(records, &options).map(|found| found.function)
+        });
+        self.fit_beside(records, described)
+    }
+
+    /// As [`FamilyEstimator::fit`], with a describing function that was made elsewhere, or the
+    /// reason why there is none: of other spans of the same runs, or with an offset that is no
+    /// whole number of samples.
+    ///
+    /// # Errors
+    /// As [`FamilyEstimator::fit`].
+    pub fn fit_beside(
+        &self,
+        records: &[Record],
+        describing: Option<Result<DescribingFunction, IdentError>>,
+    ) -> Result<FamilyFit, IdentError> {
         let sample_time = informative_data::common_sample_time(records)?;
         let records: Vec<Record> = records.iter().map(|r| r.clone().detrended(self.detrend)).collect();
         let forms = self.sorted_forms()?;
@@ -118,7 +140,7 @@ impl FamilyEstimator {
         let first = Prediction::first_residual(&pairs, highest, self.delay_range_s, self.initial_state, sample_time)?;
         self.check(&records, first)?;
 
-        let (describing, no_lines) = match self.describing_function(&records) {
+        let (describing, no_lines) = match describing {
             None => (None, None),
             Some(Ok(found)) => (Some(found), None),
             Some(Err(error)) => (None, Some(error.to_string())),
@@ -251,30 +273,6 @@ impl FamilyEstimator {
             )?;
         }
         Ok(())
-    }
-
-    fn describing_function(&self, records: &[Record]) -> Option<Result<DescribingFunction, IdentError>> {
-        let channel = self.excitation.clone()?;
-        let found = || {
-            let search = LineSearch {
-                period_s: self.period_s,
-                ..LineSearch::default()
-            };
-            let excitation = Excitation::found_in(&records[0], &channel, &search)?;
-            let options = DescribingOptions {
-                averaging: Averaging::Reference {
-                    channel: channel.clone(),
-                },
-                realisation: if records.len() == 1 {
-                    Realisation::Period
-                } else {
-                    Realisation::Record
-                },
-                ..DescribingOptions::default()
-            };
-            describe(records, &excitation, &options)
-        };
-        Some(found())
     }
 
     /// The fit at the lines, and coordinates to start from.

@@ -64,6 +64,23 @@ pub enum Coordinate {
     Delay,
 }
 
+impl Coordinate {
+    /// Its name: that of the parameter, or what of it is fitted.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gain => "gain",
+            Self::Lead => "T_L",
+            Self::LagRate => "1/T_I",
+            Self::Linear => "c_1",
+            Self::Quadratic => "c_2",
+            Self::Droop => "alpha",
+            Self::LogOmega => "ln omega_nm",
+            Self::LogZeta => "ln zeta_nm",
+            Self::Delay => "tau_e",
+        }
+    }
+}
+
 /// Numerator `n_0 + n_1 s + n_2 s^2` and pole `-a` of an operator, where it has one.
 pub(super) struct Rational {
     pub numerator: [Dual; 3],

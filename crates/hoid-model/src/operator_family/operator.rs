@@ -212,6 +212,32 @@ impl FamilyOperator {
         all
     }
 
+    /// The parameters of [`FamilyOperator::named`], each with its derivatives along the coordinates.
+    pub fn named_gradients(&self) -> Vec<(NamedParameter, Vec<f64>)> {
+        let x = &self.coordinates;
+        let all = self.form.coordinates(self.neuromuscular);
+        let place = |wanted: Coordinate| all.iter().position(|c| *c == wanted);
+        let with = |parameter: NamedParameter| {
+            let mut gradient = vec![0.0; x.len()];
+            match (parameter.coordinate.and_then(place), parameter.coordinate) {
+                (Some(i), Some(Coordinate::LagRate)) => gradient[i] = -1.0 / (x[i] * x[i]),
+                (Some(i), Some(Coordinate::LogOmega | Coordinate::LogZeta)) => gradient[i] = parameter.value,
+                (Some(i), _) => gradient[i] = 1.0,
+                // K = (K/T_I)/(1/T_I), or K_e_dot = K_e T_L.
+                (None, _) => match (place(Coordinate::LagRate), place(Coordinate::Lead)) {
+                    (Some(i), _) => {
+                        gradient[0] = 1.0 / x[i];
+                        gradient[i] = -x[0] / (x[i] * x[i]);
+                    }
+                    (None, Some(i)) => (gradient[0], gradient[i]) = (x[i], x[0]),
+                    (None, None) => {}
+                },
+            }
+            (parameter, gradient)
+        };
+        self.named().into_iter().map(with).collect()
+    }
+
     /// The coordinates as variables.
     pub(super) fn variables(&self) -> Vec<Dual> {
         let variable = |(i, &x): (usize, &f64)| Dual::variable(x, i);
@@ -367,6 +393,25 @@ mod tests {
             (lag.coordinates(), lag.has_neuromuscular()),
             (&[2.0, 0.2, 0.0][..], false)
         );
+    }
+
+    #[test]
+    fn gradients_of_names_agree_with_finite_differences() {
+        for form in Form::ALL {
+            let operator = usual(form);
+            for (k, (parameter, gradient)) in operator.named_gradients().into_iter().enumerate() {
+                for i in 0..operator.coordinates.len() {
+                    let at = |by: f64| {
+                        let mut x = operator.coordinates.clone();
+                        x[i] += by;
+                        FamilyOperator::new(form, true, &x).unwrap().named()[k].value
+                    };
+                    let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
+                    let error = (gradient[i] - difference).abs();
+                    assert!(error < 1e-6 * (1.0 + difference.abs()), "{form} {}: {error}", parameter.name);
+                }
+            }
+        }
     }
 
     #[test]

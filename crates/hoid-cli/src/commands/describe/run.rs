@@ -67,7 +67,7 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
 }
 
 /// Figures are SVG: known before anything is read.
-fn check_figure(path: &Path) -> Result<(), CliError> {
+pub fn check_figure(path: &Path) -> Result<(), CliError> {
     match path.extension() {
         Some(ending) if ending.eq_ignore_ascii_case("svg") => Ok(()),
         _ => Err(CliError::Usage(format!(
@@ -81,7 +81,7 @@ fn check_figure(path: &Path) -> Result<(), CliError> {
 /// How to read without moving rows, and the offsets. A row that is cut would leave less than whole
 /// periods, and of what is periodic an offset is a phase. With another sampling rate, which the
 /// offset comes before, it stays with the reading.
-fn without_offsets(read: &ReadArgs) -> (ReadArgs, Vec<(String, Offset)>) {
+pub fn without_offsets(read: &ReadArgs) -> (ReadArgs, Vec<(String, Offset)>) {
     let mut read = read.clone();
     let kept = read.prepare.decimate.is_none() && read.prepare.new_fs.is_none();
     let offsets = if kept {
@@ -94,7 +94,7 @@ fn without_offsets(read: &ReadArgs) -> (ReadArgs, Vec<(String, Offset)>) {
 
 /// By how many samples the output is later than the input. The offset of another channel turns its
 /// own phase alone, which no average depends on.
-fn offset_of_output(record: &Record, offsets: &[(String, Offset)]) -> Result<f64, CliError> {
+pub fn offset_of_output(record: &Record, offsets: &[(String, Offset)]) -> Result<f64, CliError> {
     let names: Vec<&str> = record.channels().map(|c| c.name.as_str()).collect();
     let mut late = 0.0;
     for (name, offset) in reading::by_channel("--offset", offsets)? {

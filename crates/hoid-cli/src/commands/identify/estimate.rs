@@ -26,8 +26,11 @@ pub fn kind(args: &IdentifyArgs) -> Result<ModelKind, CliError> {
     let method = args.method;
     let typed = args.structure;
     let kind = match (typed, method) {
+        (Some(ModelKind::Family), None) if is_grey_box(args) => ModelKind::GreyBox,
         (Some(kind), None) => kind,
-        (None, None) => ModelKind::Polynomial(Structure::BoxJenkins),
+        (None, None) if is_polynomial(args) => ModelKind::Polynomial(Structure::BoxJenkins),
+        (None, None) if is_grey_box(args) => ModelKind::GreyBox,
+        (None, None) => ModelKind::Family,
         (typed, Some(method)) => {
             let own = ModelKind::Polynomial(method.structure());
             if typed.is_some_and(|kind| kind != own) {
@@ -45,9 +48,33 @@ pub fn kind(args: &IdentifyArgs) -> Result<ModelKind, CliError> {
     }
 }
 
+/// True with an option that only a polynomial model has.
+fn is_polynomial(args: &IdentifyArgs) -> bool {
+    let of_polynomials = |text: &str| {
+        let names = text.split(',').filter_map(|part| part.split('=').next());
+        names.map(str::trim).any(|name| !matches!(name, "nc" | "nd"))
+    };
+    args.nk.is_some()
+        || args.orders.as_deref().is_some_and(of_polynomials)
+        || args.start.is_some()
+        || args.fix.is_some()
+        || args.bound.is_some()
+        || args.coefficient_prior.is_some()
+        || args.robust.is_some()
+        || args.focus != Focus::default()
+        || args.stable
+}
+
+/// True with an option that only the grey box with a remnant of order m has.
+fn is_grey_box(args: &IdentifyArgs) -> bool {
+    let own = |name: &String| matches!(name.as_str(), "K_e_dot" | "T_n");
+    args.remnant_order.is_some() || args.fix.is_some() || args.bound.is_some() || args.individual.iter().any(own)
+}
+
 /// The first option that has no meaning for this kind of fit, and what it belongs to.
 fn misplaced(args: &IdentifyArgs, kind: ModelKind) -> Option<(String, String)> {
     let estimator = match (kind, args.method) {
+        (ModelKind::Family, _) => "family",
         (ModelKind::GreyBox, _) => "grey-box",
         (ModelKind::TimeVarying, _) => "time-varying",
         (_, Some(method)) => method.name(),
@@ -64,7 +91,13 @@ fn misplaced(args: &IdentifyArgs, kind: ModelKind) -> Option<(String, String)> {
         ("start", args.start.is_some()),
         ("fix", args.fix.is_some()),
         ("bound", args.bound.is_some()),
+        ("form", args.form.is_some()),
+        ("neuromuscular", !args.neuromuscular),
         ("prior", args.prior.is_some()),
+        ("excitation", args.excitation.is_some()),
+        ("period", args.period.is_some()),
+        ("run_to_run", args.run_to_run.is_some()),
+        ("coefficient_prior", args.coefficient_prior.is_some()),
         ("robust", args.robust.is_some()),
         ("focus", args.focus != Focus::default()),
         ("stable", args.stable),
@@ -85,6 +118,11 @@ fn misplaced(args: &IdentifyArgs, kind: ModelKind) -> Option<(String, String)> {
             args.controlled_element.is_some() && !input,
             "--controlled-element",
             "a structure with an input",
+        ),
+        (
+            args.figure.is_some() && kind != ModelKind::Family,
+            "--figure",
+            "--structure grey-box without --remnant-order",
         ),
         (args.trace.is_some() && !changing, "--trace", "--structure time-varying"),
         (args.validate.is_some() && changing, "--validate", steady),
@@ -107,13 +145,14 @@ fn misplaced(args: &IdentifyArgs, kind: ModelKind) -> Option<(String, String)> {
 /// What an option belongs to, and what to give in its place.
 fn belongs_to(name: &str, of: &[&str]) -> String {
     let flag = |name: &&str| match *name {
-        "grey-box" | "time-varying" => format!("--structure {name}"),
+        "family" => "--structure grey-box".to_owned(),
+        "grey-box" => "--structure grey-box --remnant-order M".to_owned(),
+        "time-varying" => format!("--structure {name}"),
         _ => format!("--method {name}"),
     };
     let instead = match name {
         "delay" => "; else give --nk",
         "nk" => "; else give --delay in s",
-        "orders" => "; a grey box has --remnant-order",
         _ => "",
     };
     let flags: Vec<String> = of.iter().map(flag).collect();
@@ -124,7 +163,7 @@ fn belongs_to(name: &str, of: &[&str]) -> String {
 pub fn fit(args: &IdentifyArgs, kind: ModelKind, records: &[Record]) -> Result<Estimated, CliError> {
     match kind {
         ModelKind::Polynomial(structure) => polynomial(args, structure, records),
-        ModelKind::GreyBox | ModelKind::TimeVarying => grey_box(args, records),
+        ModelKind::Family | ModelKind::GreyBox | ModelKind::TimeVarying => grey_box(args, records),
     }
 }
 
@@ -151,8 +190,8 @@ fn polynomial(args: &IdentifyArgs, structure: Structure, records: &[Record]) -> 
         ("focus".to_owned(), args.focus.to_string()),
         ("start".to_owned(), args.start.clone().unwrap_or("own".to_owned())),
     ];
-    if let Some(prior) = &args.prior {
-        settings.push(("prior".to_owned(), prior.clone()));
+    if let Some(prior) = &args.coefficient_prior {
+        settings.push(("prior of coefficients".to_owned(), prior.clone()));
     }
     if let Some(threshold) = args.robust {
         let text = format!("Huber, {threshold} standard deviations");
@@ -202,7 +241,7 @@ fn prediction_error(
         initial_state: args.initial_state,
         search: search(args),
         constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
-        priors: orders::priors(args.prior.as_deref())?,
+        priors: orders::priors(args.coefficient_prior.as_deref())?,
         loss: args
             .robust
             .map_or(Loss::Quadratic, |threshold| Loss::Huber { threshold }),

@@ -1,6 +1,8 @@
 //! `hoid identify`: records to a model and the operator's parameters.
 
 mod estimate;
+mod family;
+mod family_form;
 mod run;
 mod settings;
 mod sigmoid;

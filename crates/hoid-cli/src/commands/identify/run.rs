@@ -9,6 +9,7 @@ use hoid_report::{ModelSection, Report, known_operator, write_report};
 
 use super::{
     estimate::{self, Estimated},
+    family,
     settings::common_settings,
     sigmoid,
 };
@@ -24,7 +25,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let kind = estimate::kind(args)?;
     let with_input = match kind {
         ModelKind::Polynomial(structure) => structure.has_input(),
-        ModelKind::GreyBox | ModelKind::TimeVarying => true,
+        ModelKind::Family | ModelKind::GreyBox | ModelKind::TimeVarying => true,
     };
     let ReadAll {
         files,
@@ -33,6 +34,9 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     } = reading::read_all(&args.records, &args.read, &args.mask, with_input)?;
     if kind == ModelKind::TimeVarying {
         return sigmoid::run(args, &files, &records, &accounts);
+    }
+    if kind == ModelKind::Family {
+        return family::run(args, &files, &records, &accounts);
     }
     let Estimated {
         fit,

@@ -1,0 +1,296 @@
+//! `hoid identify` by default: the operator of a person, of the family of operators.
+
+use std::path::Path;
+
+use hoid_ident::{
+    SearchOptions,
+    family::{FamilyEstimator, HIGHEST_NOISE_ORDER, OperatorPrior, ParameterPrior},
+    frequency::{Description, DescriptionOptions, describe_runs},
+};
+use hoid_io::{read_text, write_atomically};
+use hoid_model::{Detrend, Form, Record, VerdictLevel, operator_family::Coordinate};
+use hoid_report::{
+    ModelSection, Report,
+    figures::{ModelCurve, describing, with_width_mm},
+    write_report,
+};
+use serde_json::Value;
+
+use super::{family_form::Found, settings::common_settings};
+use crate::{
+    args::IdentifyArgs,
+    commands::{
+        describe::{check_figure, offset_of_output, without_offsets},
+        reading::{self, Account},
+    },
+    error::CliError,
+    json, orders, output,
+};
+
+pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: &[Account]) -> Result<(), CliError> {
+    if let Some(path) = &args.figure {
+        check_figure(path)?;
+    }
+    let estimator = estimator(args)?;
+    let described = description(args, records);
+    let of_lines = match &described {
+        Ok(found) => Some(Ok(found.function.clone())),
+        // What was looked for by name is missed; what was looked for by itself is not.
+        Err(CliError::Ident(error)) if args.excitation.as_deref().is_some_and(|e| e != "none") => Some(Err(error.clone())),
+        Err(_) => None,
+    };
+    let fit = estimator.fit_beside(records, of_lines)?;
+    let described = described.ok();
+    let validation = match &args.validate {
+        Some(path) => {
+            let other = reading::read(path, &args.read, true)?.0.detrended(estimator.detrend);
+            Some((path.display().to_string(), fit.operator(0).polynomial_fit.quality(&[other])?))
+        }
+        None => None,
+    };
+    let mut settings = settings(args, &estimator);
+    settings.extend(common_settings(args, true));
+    if let Some(channel) = described.as_ref().and_then(|d| d.channel.clone()) {
+        settings.push(("excitation".to_owned(), channel));
+    }
+    let prepared: Vec<Record> = records.iter().map(|r| r.clone().detrended(estimator.detrend)).collect();
+    let found = Found {
+        fit: &fit,
+        files,
+        records: &prepared,
+        accounts,
+        element: args.controlled_element.as_ref(),
+        validation: validation.as_ref().map(|(file, q)| (file.as_str(), *q)),
+        settings: &settings,
+    };
+    if let Some(path) = &args.figure {
+        let Some(described) = &described else {
+            return Err(CliError::Usage(
+                "--figure draws the operator through the describing function, which needs a recorded periodic excitation: name \
+                 its column by --excitation, and take a span of whole periods by --from and --to"
+                    .to_owned(),
+            ));
+        };
+        let svg = describing("describing", &format!("{} through the describing function", fit.form), described, &curves(&found, described));
+        let svg = args.width.map_or(svg.clone(), |mm| with_width_mm(&svg, mm));
+        write_atomically(path, |file| file.write_all(svg.as_bytes()))?;
+        output::message(&format!("figure: {}", path.display()));
+    }
+    if let Some(directory) = &args.report {
+        report(&found, directory)?;
+    }
+    if args.json {
+        json::print(&found.to_json()?);
+    } else {
+        output::print(&found.page()?);
+    }
+    if fit.verdict.level == VerdictLevel::NotDetermined {
+        let reasons: Vec<&str> = fit.verdict.reasons().collect();
+        return Err(CliError::NotDetermined(reasons.join("; ")));
+    }
+    Ok(())
+}
+
+/// The describing function of the records without the offset of u, which is a phase of it: moved
+/// rows would leave less than whole periods.
+fn description(args: &IdentifyArgs, records: &[Record]) -> Result<Description, CliError> {
+    let (read, offsets) = without_offsets(&args.read);
+    let unmoved;
+    let (records, offset_samples) = if offsets.is_empty() {
+        (records, 0.0)
+    } else {
+        unmoved = reading::read_again(&args.records, &read, &args.mask)?;
+        let late = unmoved.first().map_or(Ok(0.0), |r| offset_of_output(r, &offsets))?;
+        (unmoved.as_slice(), late)
+    };
+    if args.excitation.as_deref() == Some("none") {
+        return Err(CliError::Usage("no excitation was asked for".to_owned()));
+    }
+    let options = DescriptionOptions {
+        excitation: args.excitation.clone(),
+        period_s: args.period,
+        offset_samples,
+        detrend: Detrend::None,
+        ..DescriptionOptions::default()
+    };
+    Ok(describe_runs(records, &options)?)
+}
+
+fn estimator(args: &IdentifyArgs) -> Result<FamilyEstimator, CliError> {
+    let usual = FamilyEstimator::default();
+    let (nc, nd) = noise_orders(args)?;
+    let typed = SearchOptions {
+        method: args.search_method,
+        max_iterations: args.max_iterations,
+        tolerance: args.tolerance,
+    };
+    Ok(FamilyEstimator {
+        forms: args.form.map_or(usual.forms, |form| vec![form]),
+        neuromuscular: args.neuromuscular,
+        prior: args.prior.as_deref().map_or(Ok(usual.prior), prior)?,
+        delay_range_s: args.delay.unwrap_or(usual.delay_range_s),
+        nc,
+        nd,
+        individual: args.individual.iter().map(|name| coordinate(name)).collect::<Result<_, _>>()?,
+        run_to_run: args.run_to_run.unwrap_or(usual.run_to_run),
+        // What was asked for in reading has been done.
+        detrend: if args.read.detrend == Detrend::None { usual.detrend } else { Detrend::None },
+        initial_state: args.initial_state.unwrap_or_default(),
+        search: if typed == SearchOptions::default() { usual.search } else { typed },
+        ..usual
+    })
+}
+
+/// nc and nd from `--orders nc=..,nd=..`.
+fn noise_orders(args: &IdentifyArgs) -> Result<(std::ops::RangeInclusive<usize>, std::ops::RangeInclusive<usize>), CliError> {
+    let (mut nc, mut nd) = (0..=0, 0..=HIGHEST_NOISE_ORDER);
+    for (name, value) in orders::parse_pairs(args.orders.as_deref().unwrap_or_default()).map_err(CliError::Usage)? {
+        let range = orders::parse_range(&value).map_err(|e| CliError::Usage(format!("--orders {name}: {e}")))?;
+        match name.as_str() {
+            "nc" => nc = range,
+            "nd" => nd = range,
+            _ => {
+                return Err(CliError::Usage(format!(
+                    "--orders {name}: the operator of the family has the noise orders nc and nd alone; its form says the others"
+                )));
+            }
+        }
+    }
+    // An ARMA model is searched over few autoregressive orders.
+    if *nc.end() > 0 && args.orders.as_deref().is_none_or(|text| !text.contains("nd")) {
+        nd = 0..=8;
+    }
+    Ok((nc, nd))
+}
+
+fn coordinate(name: &str) -> Result<Coordinate, CliError> {
+    Ok(match name {
+        "K" | "K_over_T_I" | "K_I" | "K_e" => Coordinate::Gain,
+        "T_L" => Coordinate::Lead,
+        "T_I" => Coordinate::LagRate,
+        "c_1" => Coordinate::Linear,
+        "c_2" => Coordinate::Quadratic,
+        "alpha" => Coordinate::Droop,
+        "omega_nm" => Coordinate::LogOmega,
+        "zeta_nm" => Coordinate::LogZeta,
+        "tau_e" => Coordinate::Delay,
+        _ => {
+            return Err(CliError::Usage(format!(
+                "--individual: there is no parameter {name}; expected K, T_L, T_I, omega_nm, zeta_nm or tau_e"
+            )));
+        }
+    })
+}
+
+/// `population`, `none`, `NAME=CENTRE:SPREAD,...`, or the JSON of another fit.
+fn prior(text: &str) -> Result<OperatorPrior, CliError> {
+    let path = Path::new(text);
+    if path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("json")) {
+        return Ok(text.parse()?);
+    }
+    let wrong = |why: &str| CliError::Usage(format!("--prior {text}: {why}; give the output of `hoid identify --json`"));
+    let result: Value = serde_json::from_str(&read_text(path)?).map_err(|error| wrong(&error.to_string()))?;
+    let parameters = result["parameters"].as_array().ok_or_else(|| wrong("it has no parameters"))?;
+    let entry = |p: &Value| {
+        let name = p["name"].as_str()?;
+        let (value, error) = (p["value"].as_f64()?, p["standard_error"].as_f64()?);
+        let counts = matches!(name, "omega_nm" | "zeta_nm" | "tau_e" | "T_L" | "T_I");
+        (counts && p["determined"].as_bool()? && value > 0.0 && error > 0.0).then(|| ParameterPrior {
+            parameter: name.to_owned(),
+            centre: value,
+            spread: (error / value).max(1e-3),
+            source: text.to_owned(),
+        })
+    };
+    let entries: Vec<ParameterPrior> = parameters.iter().filter_map(entry).collect();
+    if entries.is_empty() {
+        return Err(wrong("no parameter in it is determined and has an error"));
+    }
+    Ok(OperatorPrior::new(entries)?)
+}
+
+fn settings(args: &IdentifyArgs, estimator: &FamilyEstimator) -> Vec<(String, String)> {
+    let forms: Vec<&str> = estimator.forms.iter().map(|form| form.name()).collect();
+    let range = |r: &std::ops::RangeInclusive<usize>| {
+        if r.start() == r.end() {
+            r.start().to_string()
+        } else {
+            format!("{}..{}", r.start(), r.end())
+        }
+    };
+    let (low, high) = estimator.delay_range_s;
+    let mut list = vec![
+        ("structure".to_owned(), "grey-box".to_owned()),
+        (
+            "form".to_owned(),
+            match args.form {
+                Some(form) => form.to_string(),
+                None => format!("auto of {}", forms.join(", ")),
+            },
+        ),
+        (
+            "neuromuscular".to_owned(),
+            if estimator.neuromuscular { "yes" } else { "no" }.to_owned(),
+        ),
+        ("prior".to_owned(), estimator.prior.to_string()),
+        (
+            "noise orders".to_owned(),
+            format!("nc={}, nd={}, by AIC", range(&estimator.nc), range(&estimator.nd)),
+        ),
+        ("delay in s".to_owned(), format!("{low}..{high}")),
+        ("taken out of e and u".to_owned(), estimator.detrend.to_string()),
+        ("variation from run to run".to_owned(), estimator.run_to_run.to_string()),
+    ];
+    if !args.individual.is_empty() {
+        list.push(("individual".to_owned(), args.individual.join(", ")));
+    }
+    list
+}
+
+/// The fitted operator, by prediction error and at the lines.
+fn curves(found: &Found<'_>, described: &Description) -> Vec<ModelCurve> {
+    let operator = &found.fit.operator(0).operator;
+    let half = 0.5 * found.fit.sample_time.s();
+    let curve = |name: &str, operator: &hoid_model::FamilyOperator| {
+        let turn = |omega: f64| hoid_model::Complex64::from_polar(1.0, -omega * half);
+        ModelCurve::over(described, name, operator.tau_e_s() + half, |omega| {
+            operator.response(omega) * turn(omega)
+        })
+    };
+    let form: Form = found.fit.form;
+    let mut all = vec![curve(&format!("{form}, prediction error"), operator)];
+    if let Some(lines) = &found.fit.lines {
+        all.push(curve(&format!("{form}, at the lines"), &lines.operator));
+    }
+    all
+}
+
+fn report(found: &Found<'_>, directory: &Path) -> Result<(), CliError> {
+    let fit = &found.fit.operator(0).polynomial_fit;
+    let title = match found.records {
+        [only] => format!("Identification of {}", only.label()),
+        all => format!("Identification of {} records", all.len()),
+    };
+    let mut facts = vec![
+        ("hoid".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+        ("records".to_owned(), found.files.join(", ")),
+    ];
+    facts.extend(found.settings.iter().cloned());
+    facts.extend(reading::accounts(found.files, found.accounts));
+    let report = Report {
+        title,
+        settings: facts,
+        models: vec![ModelSection {
+            name: found.title(),
+            fit,
+            records: found.records,
+            candidates: None,
+            truth: None,
+            margins: found.margins(),
+        }],
+        notes: found.notes(),
+    };
+    let page = write_report(directory, &report.to_html()?)?;
+    output::message(&format!("report: {}", page.display()));
+    Ok(())
+}

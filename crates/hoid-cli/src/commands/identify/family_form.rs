@@ -1,0 +1,483 @@
+//! The operator of a person, shown to people and to programs.
+
+use hoid_ident::{
+    MarginEstimates,
+    family::{ClusterKind, FamilyFit, FormFigures, LoopMeasures, OperatorOfRecord, Parameter},
+    validation::GoodnessOfFit,
+};
+use hoid_model::{ContinuousTransferFunction, FamilyOperator, Record, uncertainty::Estimate};
+use hoid_report::numbers;
+use serde_json::{Map, Value, json};
+
+use crate::{
+    commands::reading::Account,
+    error::CliError,
+    json::{self, number, optional},
+    text,
+};
+
+/// Everything that was found.
+pub struct Found<'a> {
+    pub fit: &'a FamilyFit,
+    pub files: &'a [String],
+    /// As they were fitted: without their mean.
+    pub records: &'a [Record],
+    pub accounts: &'a [Account],
+    pub element: Option<&'a ContinuousTransferFunction>,
+    pub validation: Option<(&'a str, GoodnessOfFit)>,
+    pub settings: &'a [(String, String)],
+}
+
+impl Found<'_> {
+    /// The fit in a line.
+    pub fn title(&self) -> String {
+        let (nc, nd) = self.fit.noise_orders;
+        let muscles = match self.fit.neuromuscular {
+            true => " with neuromuscular dynamics",
+            false => "",
+        };
+        format!("Operator: {}{muscles}; noise nc = {nc}, nd = {nd}", self.fit.form)
+    }
+
+    /// The verdict and its reasons, a remark each.
+    pub fn notes(&self) -> Vec<String> {
+        let verdict = &self.fit.verdict;
+        let mut notes = vec![format!("Verdict: {}.", verdict.level)];
+        notes.extend(verdict.reasons().chain(verdict.notes()).map(str::to_owned));
+        notes
+    }
+
+    /// Crossover and margin in the form of all reports.
+    pub fn margins(&self) -> Option<MarginEstimates> {
+        let found = self.fit.loop_measures(0, self.element?)?;
+        Some(MarginEstimates {
+            crossover_rad_s: Some(found.crossover_rad_s),
+            phase_margin_deg: Some(found.phase_margin_deg),
+            phase_crossover_rad_s: None,
+            gain_margin_db: None,
+        })
+    }
+
+    fn quality(&self) -> Result<GoodnessOfFit, CliError> {
+        let mut validations = Vec::with_capacity(self.records.len());
+        for (k, record) in self.records.iter().enumerate() {
+            validations.push(self.fit.operator(k).polynomial_fit.validate(record)?);
+        }
+        Ok(GoodnessOfFit::pooled(self.records.iter().zip(&validations)))
+    }
+
+    pub fn page(&self) -> Result<String, CliError> {
+        let fit = self.fit;
+        let mut page = format!("{}\n\n", fit.verdict);
+        page.push_str(&self.title());
+        page.push('\n');
+        for (k, of) in fit.operators.iter().enumerate() {
+            if fit.operators.len() > 1 {
+                page.push_str(&format!("{}:\n", self.files[k]));
+            }
+            page.push_str(&parameters(of));
+            page.push('\n');
+        }
+        if let Some(element) = self.element {
+            let here = fit.loop_measures(0, element);
+            page.push_str(&format!("Open loop with {element}: {}\n", measures(here.as_ref())));
+            if fit.lines.is_some() {
+                let at_lines = fit.loop_measures_at_lines(element);
+                page.push_str(&format!("  of the fit at the lines: {}\n", measures(at_lines.as_ref())));
+            }
+        }
+        page.push_str(&self.methods());
+        if fit.forms.len() > 1 {
+            page.push_str(&format!("\n{}\n", forms(&fit.forms, fit.form.name())));
+        }
+        page.push_str(&self.about()?);
+        page.push('\n');
+        page.push_str(&text::records(self.files, self.records, self.accounts));
+        if let Some((file, q)) = &self.validation {
+            page.push_str(&format!(
+                "On {file}: VAF simulation {:.2} %, prediction {:.2} %.\n",
+                q.vaf_simulation, q.vaf_prediction
+            ));
+        }
+        page.push_str(&text::settings(self.settings));
+        Ok(page)
+    }
+
+    /// Prediction error and lines side by side.
+    fn methods(&self) -> String {
+        let Some(lines) = &self.fit.lines else {
+            return String::new();
+        };
+        let of = line_parameters(&lines.operator, lines.covariance.as_deref());
+        let mut rows = text::table(&["parameter", "prediction error", "at the lines"]);
+        for (here, (_, there)) in self.fit.operator(0).parameters.iter().zip(of) {
+            rows.add_row([named(here), with_error(here.value, here.standard_error), there]);
+        }
+        let mut page = format!("\n{rows}\n");
+        let reduced = lines.reduced_chi_squared();
+        page.push_str(&format!(
+            "At the lines: chi^2 = {:.1} with {} degrees of freedom{}.\n",
+            lines.chi_squared,
+            lines.degrees_of_freedom,
+            reduced.map_or(String::new(), |r| format!(" ({r:.2} each)"))
+        ));
+        if let Some(agreement) = &self.fit.agreement {
+            page.push_str(&format!(
+                "Agreement of the two methods over {} determined coordinates: chi^2 = {:.1}, p = {:.2}.\n",
+                agreement.rows.len(),
+                agreement.statistic,
+                agreement.p_value
+            ));
+        }
+        page
+    }
+
+    fn about(&self) -> Result<String, CliError> {
+        let fit = self.fit;
+        let mut page = String::from("\n");
+        if let Some(free) = &fit.free_model {
+            page.push_str(&format!(
+                "Box-Jenkins of the same orders: loss {} against {}, likelihood ratio {:.1} with {} degrees of freedom (p = {:.2}).\n",
+                numbers::plain(free.loss),
+                numbers::plain(fit.loss),
+                free.likelihood_ratio,
+                free.degrees_of_freedom,
+                free.p_value
+            ));
+        }
+        let clusters = match fit.cluster_kind {
+            ClusterKind::Runs => format!("{} runs", fit.clusters),
+            ClusterKind::Blocks => format!("{} blocks of the records", fit.clusters),
+        };
+        page.push_str(&format!(
+            "Errors by the scatter of {clusters}: variances {:.2} times those of white residuals. Intervals of 95 %, Student's.\n",
+            fit.inflation
+        ));
+        let quality = self.quality()?;
+        page.push_str(&format!(
+            "VAF prediction {:.2} %; simulation {:.2} %, which says little of people: an operator with a lag integrates offset and \
+             drift of e{}.\n",
+            quality.vaf_prediction,
+            quality.vaf_simulation,
+            fit.coherent_share.map_or(String::new(), |share| format!(
+                "; at the lines {:.0} % of the power of u is coherent with the excitation",
+                100.0 * share
+            ))
+        ));
+        page.push_str(&format!("Search: {}.\n", fit.termination));
+        for entry in fit.prior.entries() {
+            page.push_str(&format!(
+                "Prior: {} = {} within a factor of {:.2} ({}).\n",
+                entry.parameter,
+                entry.centre,
+                entry.spread.exp(),
+                entry.source
+            ));
+        }
+        Ok(page)
+    }
+
+    pub fn to_json(&self) -> Result<Value, CliError> {
+        let fit = self.fit;
+        let of = fit.operator(0);
+        let mut map = Map::new();
+        let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
+        set("hoid", json!(env!("CARGO_PKG_VERSION")));
+        set("verdict", json::verdict(&fit.verdict));
+        set("records", json::records(self.files, self.records, self.accounts));
+        set("warnings", json::warnings(self.files, self.accounts));
+        set("structure", json!("grey-box"));
+        set("form", json!(fit.form.name()));
+        set("neuromuscular", json!(fit.neuromuscular));
+        set("orders", json::orders(&of.polynomial_fit.orders()));
+        set("parameters", of.parameters.iter().map(parameter).collect());
+        if let Some(element) = self.element {
+            set("open_loop", open_loop(fit.loop_measures(0, element).as_ref()));
+        }
+        set("loss", number(fit.loss));
+        set("innovation_variance", number(fit.innovation_variance));
+        set("residuals", json!(fit.residuals));
+        set(
+            "termination",
+            json!({
+                "reason": fit.termination.reason.to_string(),
+                "converged": fit.termination.converged(),
+                "iterations": fit.termination.iterations,
+            }),
+        );
+        let quality = self.quality()?;
+        set(
+            "fit",
+            json!({
+                "vaf_simulation": number(quality.vaf_simulation),
+                "vaf_prediction": number(quality.vaf_prediction),
+                "nrmse_simulation": number(quality.nrmse_simulation),
+                "nrmse_prediction": number(quality.nrmse_prediction),
+                "coherent_share": optional(fit.coherent_share),
+            }),
+        );
+        set("operator", operator(of));
+        if fit.operators.len() > 1 {
+            set("operators", fit.operators.iter().map(operator).collect());
+        }
+        set("remnant", Value::Null);
+        set("noise", json!({"c": fit.noise.0, "d": fit.noise.1}));
+        set("forms", fit.forms.iter().map(form_figures).collect());
+        set("lines", self.lines_json());
+        set("agreement", self.agreement_json());
+        set(
+            "box_jenkins",
+            fit.free_model.map_or(Value::Null, |free| {
+                json!({
+                    "loss": number(free.loss),
+                    "likelihood_ratio": number(free.likelihood_ratio),
+                    "degrees_of_freedom": free.degrees_of_freedom,
+                    "p_value": number(free.p_value),
+                })
+            }),
+        );
+        set("covariance", covariance(&of.operator, of.covariance.as_deref()));
+        set(
+            "errors",
+            json!({
+                "clusters": fit.clusters,
+                "kind": match fit.cluster_kind {
+                    ClusterKind::Runs => "runs",
+                    ClusterKind::Blocks => "blocks",
+                },
+                "inflation": number(fit.inflation),
+                "largest_ratio_to_model_based": optional(fit.error_ratio),
+                "model_based": covariance(&of.operator, of.model_based.as_deref()),
+            }),
+        );
+        let prior = fit.prior.entries().iter();
+        set(
+            "prior",
+            prior
+                .map(|e| json!({"parameter": e.parameter, "centre": e.centre, "spread": e.spread, "source": e.source}))
+                .collect(),
+        );
+        if let Some((file, q)) = &self.validation {
+            set(
+                "validation",
+                json!({
+                    "file": file,
+                    "vaf_simulation": number(q.vaf_simulation),
+                    "vaf_prediction": number(q.vaf_prediction),
+                    "nrmse_simulation": number(q.nrmse_simulation),
+                    "nrmse_prediction": number(q.nrmse_prediction),
+                }),
+            );
+        }
+        set("candidates", json!([]));
+        let settings: Map<String, Value> = self.settings.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
+        set("settings", Value::Object(settings));
+        Ok(Value::Object(map))
+    }
+
+    fn lines_json(&self) -> Value {
+        let Some(lines) = &self.fit.lines else {
+            return match &self.fit.no_lines {
+                Some(why) => json!({"reason": why}),
+                None => Value::Null,
+            };
+        };
+        let parameters: Vec<Value> = estimates(&lines.operator, lines.covariance.as_deref())
+            .into_iter()
+            .map(|(name, e)| json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)}))
+            .collect();
+        let mut map = Map::new();
+        map.insert("parameters".to_owned(), Value::Array(parameters));
+        map.insert("chi2".to_owned(), number(lines.chi_squared));
+        map.insert("degrees_of_freedom".to_owned(), json!(lines.degrees_of_freedom));
+        map.insert("held_out".to_owned(), optional(lines.held_out_total()));
+        map.insert("converged".to_owned(), json!(lines.termination.converged()));
+        if let Some(element) = self.element {
+            map.insert(
+                "open_loop".to_owned(),
+                open_loop(self.fit.loop_measures_at_lines(element).as_ref()),
+            );
+        }
+        Value::Object(map)
+    }
+
+    fn agreement_json(&self) -> Value {
+        self.fit.agreement.as_ref().map_or(Value::Null, |agreement| {
+            let row = |r: &hoid_ident::family::AgreementRow| {
+                let pair = |(value, error): (f64, f64)| json!({"value": number(value), "standard_error": number(error)});
+                json!({
+                    "coordinate": r.coordinate.name(),
+                    "prediction_error": pair(r.prediction_error),
+                    "lines": pair(r.lines),
+                    "difference_in_errors": number(r.difference_in_errors),
+                })
+            };
+            json!({
+                "coordinates": agreement.rows.iter().map(row).collect::<Vec<_>>(),
+                "chi2": number(agreement.statistic),
+                "p_value": number(agreement.p_value),
+            })
+        })
+    }
+}
+
+/// Named parameters of coordinates with a covariance, errors by the delta method.
+fn estimates(operator: &FamilyOperator, covariance: Option<&[f64]>) -> Vec<(&'static str, Estimate)> {
+    let named = operator.named_gradients();
+    let of = |(parameter, gradient): (hoid_model::operator_family::NamedParameter, Vec<f64>)| {
+        let estimate = match covariance {
+            Some(c) if parameter.value.is_finite() => {
+                Estimate::with_variance(parameter.value, hoid_model::uncertainty::variance_along(&gradient, c))
+            }
+            _ => Estimate::fixed(parameter.value),
+        };
+        (parameter.name, estimate)
+    };
+    named.into_iter().map(of).collect()
+}
+
+fn line_parameters(operator: &FamilyOperator, covariance: Option<&[f64]>) -> Vec<(&'static str, String)> {
+    let text = |(name, e): (&'static str, Estimate)| (name, with_error(e.value, e.standard_error));
+    estimates(operator, covariance).into_iter().map(text).collect()
+}
+
+fn named(p: &Parameter) -> String {
+    if p.unit.is_empty() {
+        p.name.clone()
+    } else {
+        format!("{} ({})", p.name, p.unit)
+    }
+}
+
+/// Value and error with the digits that the error allows; no false digits where the error exceeds
+/// the value.
+fn with_error(value: f64, error: Option<f64>) -> String {
+    match error {
+        _ if value.is_infinite() => "infinite".to_owned(),
+        Some(error) if error > value.abs() => "not known".to_owned(),
+        Some(_) => {
+            let (value, error) = numbers::with_uncertainty(value, error);
+            format!("{value} ± {error}")
+        }
+        None => numbers::plain(value),
+    }
+}
+
+/// Parameters with interval, prior share and whether they are determined.
+fn parameters(of: &OperatorOfRecord) -> String {
+    let mut rows = text::table(&["parameter", "value", "95 % from", "to", "of it prior", ""]);
+    for p in &of.parameters {
+        let end = |v: f64| if v.is_infinite() { "open".to_owned() } else { significant(v) };
+        let (low, high) = p.interval.map_or_else(Default::default, |(low, high)| (end(low), end(high)));
+        let share = if p.prior_share > 0.0 {
+            format!("{:.0} %", 100.0 * p.prior_share)
+        } else {
+            String::new()
+        };
+        let words = match (p.determined, p.prior_share > 0.5) {
+            (true, _) => "",
+            (false, true) => "the prior alone",
+            (false, false) => "not determined",
+        };
+        let value = if p.determined || p.prior_share > 0.5 {
+            with_error(p.value, p.standard_error)
+        } else {
+            String::new()
+        };
+        rows.add_row([named(p), value, low, high, share, words.to_owned()]);
+    }
+    rows.to_string()
+}
+
+/// Three digits: an interval has no more.
+fn significant(value: f64) -> String {
+    hoid_model::numbers::significant(value, 3)
+}
+
+fn measures(found: Option<&LoopMeasures>) -> String {
+    let Some(m) = found else {
+        return "no crossover".to_owned();
+    };
+    format!(
+        "crossover {} rad/s, phase margin {} deg",
+        with_error(m.crossover_rad_s.value, m.crossover_rad_s.standard_error),
+        with_error(m.phase_margin_deg.value, m.phase_margin_deg.standard_error)
+    )
+}
+
+fn forms(all: &[FormFigures], chosen: &str) -> String {
+    let mut rows = text::table(&["form", "loss", "criterion", "held out", "chi^2", "degrees", ""]);
+    let least = all.iter().filter_map(|f| f.criterion).fold(f64::INFINITY, f64::min);
+    for f in all {
+        let number = |v: Option<f64>| v.map_or(String::new(), |v| format!("{v:.1}"));
+        let sign = if f.form.name() == chosen { "chosen" } else { "" };
+        rows.add_row([
+            f.form.to_string(),
+            f.loss.map_or("none".to_owned(), numbers::plain),
+            f.criterion.map_or(String::new(), |c| format!("+{:.1}", c - least)),
+            number(f.held_out),
+            number(f.chi_squared),
+            f.degrees_of_freedom.map_or(String::new(), |d| d.to_string()),
+            sign.to_owned(),
+        ]);
+    }
+    rows.to_string()
+}
+
+fn parameter(p: &Parameter) -> Value {
+    json!({
+        "name": p.name,
+        "unit": p.unit,
+        "value": number(p.value),
+        "standard_error": optional(p.standard_error),
+        "interval": p.interval.map_or(Value::Null, |(low, high)| json!([number(low), number(high)])),
+        "prior_share": number(p.prior_share),
+        "determined": p.determined,
+    })
+}
+
+/// The operator by the names of its parameters.
+fn operator(of: &OperatorOfRecord) -> Value {
+    let mut map = Map::new();
+    map.insert("convertible".to_owned(), json!(true));
+    map.insert("form".to_owned(), json!(of.operator.form().name()));
+    for p in &of.parameters {
+        let mut value = parameter(p);
+        if let Some(fields) = value.as_object_mut() {
+            fields.remove("name");
+        }
+        map.insert(p.name.clone(), value);
+    }
+    Value::Object(map)
+}
+
+fn open_loop(found: Option<&LoopMeasures>) -> Value {
+    let estimate = |e: Option<Estimate>| e.as_ref().map_or(Value::Null, json::estimate);
+    json!({
+        "crossover_rad_s": estimate(found.map(|m| m.crossover_rad_s)),
+        "phase_margin_deg": estimate(found.map(|m| m.phase_margin_deg)),
+    })
+}
+
+fn form_figures(f: &FormFigures) -> Value {
+    json!({
+        "form": f.form.name(),
+        "loss": optional(f.loss),
+        "criterion": optional(f.criterion),
+        "held_out": optional(f.held_out),
+        "chi2": optional(f.chi_squared),
+        "degrees_of_freedom": f.degrees_of_freedom,
+        "converged": f.converged,
+    })
+}
+
+/// Coordinates with their names and the rows of their covariance.
+fn covariance(operator: &FamilyOperator, covariance: Option<&[f64]>) -> Value {
+    let coordinates = operator.form().coordinates(operator.has_neuromuscular());
+    let p = coordinates.len();
+    let names: Vec<&str> = coordinates.iter().map(|c| c.name()).collect();
+    covariance.map_or(Value::Null, |c| {
+        let rows: Vec<Vec<Value>> = c.chunks(p).map(|row| row.iter().map(|v| number(*v)).collect()).collect();
+        json!({"coordinates": names, "values": operator.coordinates(), "matrix": rows})
+    })
+}
