@@ -20,6 +20,7 @@ use super::{
     algorithm::IterationLimits,
     equation::{Equation, IvProblem, Prefilter},
     external_signal::following,
+    own_poles::solve_for_own_poles,
 };
 
 /// Iterations of the start.
@@ -36,6 +37,17 @@ pub(super) struct NoiseModel {
     pub d: Vec<f64>,
 }
 
+impl NoiseModel {
+    /// The filter `D/(C F)` with these poles.
+    pub fn prefilter<'p>(&'p self, f: &'p [f64]) -> Prefilter<'p> {
+        Prefilter {
+            d: &self.d,
+            c: &self.c,
+            f,
+        }
+    }
+}
+
 /// Where the iteration ended.
 pub(super) struct LastIterate {
     pub system: Vec<f64>,
@@ -43,6 +55,32 @@ pub(super) struct LastIterate {
     /// The last filtered equation.
     pub equation: Equation,
     pub termination: Termination,
+}
+
+/// Iterates, and where that does not settle goes on in the nonlinear form ([`super::own_poles`]);
+/// `noise_of` gives the noise model that belongs to a system.
+pub(super) fn settle(
+    limits: IterationLimits,
+    problem: &IvProblem<'_>,
+    mut noise_of: impl FnMut(&[f64]) -> NoiseModel,
+) -> Result<LastIterate, IdentError> {
+    let plain = iterate(limits, problem, &mut noise_of)?;
+    if plain.termination.converged() || limits.max_iterations <= FULL_STEPS {
+        return Ok(plain);
+    }
+    // From where it has come to, and where that is far from everything once more from the start.
+    let mut spent = plain.termination.iterations;
+    let mut last = plain;
+    for from in [last.system.clone(), problem.stabilised(&start(problem)?)?.0] {
+        let mut found = solve_for_own_poles(limits, problem, &from, &mut noise_of)?;
+        spent += found.termination.iterations;
+        found.termination.iterations = spent;
+        last = found;
+        if last.termination.converged() {
+            break;
+        }
+    }
+    Ok(last)
 }
 
 /// Iterates; `noise_of` gives the noise model that belongs to a system.
@@ -55,12 +93,7 @@ pub(super) fn iterate(
     let mut iterations = 0;
     loop {
         let noise = noise_of(&system);
-        let filter = Prefilter {
-            c: &noise.c,
-            d: &noise.d,
-            f: &system[..problem.poles],
-        };
-        let equation = problem.equation(filter, &system);
+        let equation = problem.equation(noise.prefilter(&system[..problem.poles]), &system);
         let next = problem.solve(&equation)?;
         iterations += 1;
         let mut step = vec![0.0; equation.y.len()];

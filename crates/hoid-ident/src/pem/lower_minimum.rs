@@ -7,7 +7,7 @@
 //! found.
 //!
 //! **Where.** A record of some hundred samples has many minima, and a model with more coefficients
-//! than the operator's (nb, nf > 2, nc > 0) has them in longer records too. There the first few
+//! than the operator's (nb, nf > 2, nc > 0, nd > 4) has them in longer records too. There the first few
 //! steps are taken on a part of the record, which costs the same however long the record is.
 
 use super::{constraints::ConstrainedCriterion, fit_settings::FitSettings};
@@ -21,6 +21,8 @@ use crate::{
 /// Residuals up to which every model is searched widely, and on which others take their first
 /// steps.
 const SPAN: usize = 1000;
+/// Coefficients of D that the operator's models have at most.
+const LARGEST_ND: usize = 4;
 /// Starts that take a few steps, the best by their loss.
 const TRIED: usize = 24;
 /// Steps of each.
@@ -79,7 +81,7 @@ pub(crate) fn lower_minimum(
 /// than the operator's.
 fn may_have_more_minima(criterion: &Criterion<'_>) -> bool {
     let o = criterion.orders;
-    let larger = o.nb > 2 || o.nc > 0 || o.nf > 2;
+    let larger = o.nb > 2 || o.nc > 0 || o.nd > LARGEST_ND || o.nf > 2;
     o.na == 0 && o.nb > 0 && o.nf > 0 && (larger || criterion.residuals() <= SPAN)
 }
 

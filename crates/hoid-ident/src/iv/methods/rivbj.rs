@@ -42,7 +42,7 @@ fn solve(
     limits: IterationLimits,
 ) -> Result<IvSolution, IdentError> {
     let mut noise_before: Option<NoiseModel> = None;
-    let last = refined::iterate(limits, problem, |system| {
+    let last = refined::settle(limits, problem, |system| {
         let noise = noise_of(system, problem, criterion, noise_before.as_ref());
         noise_before = Some(noise.clone());
         noise
