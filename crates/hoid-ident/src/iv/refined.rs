@@ -27,6 +27,9 @@ use super::{
 const START_ROUNDS: usize = 5;
 /// Iterations after which only half of each step is taken, should the iteration swing.
 const FULL_STEPS: usize = 20;
+/// A zero of the equation whose residual is larger than the smallest one by this factor is another
+/// one than that of the operator.
+const FAR: f64 = 1.15;
 /// Steps below this share of the output are rounding.
 const ROUNDING: f64 = 1e-12;
 
@@ -48,6 +51,14 @@ impl NoiseModel {
     }
 }
 
+impl LastIterate {
+    /// Mean square of the filtered residual.
+    fn variance(&self) -> f64 {
+        let residual = self.equation.residual(&self.system);
+        dot(&residual, &residual) / residual.len() as f64
+    }
+}
+
 /// Where the iteration ended.
 pub(super) struct LastIterate {
     pub system: Vec<f64>,
@@ -64,30 +75,65 @@ pub(super) fn settle(
     problem: &IvProblem<'_>,
     mut noise_of: impl FnMut(&[f64]) -> NoiseModel,
 ) -> Result<LastIterate, IdentError> {
-    let plain = iterate(limits, problem, &mut noise_of)?;
+    let mut whitest = Whitest::default();
+    let plain = iterate(limits, problem, &mut noise_of, &mut whitest)?;
     if plain.termination.converged() || limits.max_iterations <= FULL_STEPS {
         return Ok(plain);
     }
-    // From where it has come to, and where that is far from everything once more from the start.
+    // From where it has come to; where that leads far away, from its best system and from its start.
     let mut spent = plain.termination.iterations;
-    let mut last = plain;
-    for from in [last.system.clone(), problem.stabilised(&start(problem)?)?.0] {
-        let mut found = solve_for_own_poles(limits, problem, &from, &mut noise_of)?;
+    let starts = [
+        plain.system.clone(),
+        whitest.system.unwrap_or_default(),
+        problem.stabilised(&start(problem)?)?.0,
+    ];
+    let (mut best, mut rank) = (plain, (f64::INFINITY, f64::INFINITY));
+    for from in starts.iter().filter(|from| !from.is_empty()) {
+        let found = solve_for_own_poles(limits, problem, from, &mut noise_of)?;
         spent += found.termination.iterations;
-        found.termination.iterations = spent;
-        last = found;
-        if last.termination.converged() {
+        let variance = found.variance();
+        let far = variance > FAR * whitest.variance;
+        let class = match found.termination.reason {
+            Reason::Settled | Reason::InstrumentsHeld if !far => 0.0,
+            _ if far => 2.0,
+            _ => 1.0,
+        };
+        if (class, variance) < rank {
+            (best, rank) = (found, (class, variance));
+        }
+        if class == 0.0 {
             break;
         }
     }
-    Ok(last)
+    if rank.0 == 2.0 {
+        // Another zero of the equation, far from what the data are like.
+        best.termination.reason = Reason::IterationLimit;
+    }
+    best.termination.iterations = spent;
+    Ok(best)
 }
 
-/// Iterates; `noise_of` gives the noise model that belongs to a system.
-pub(super) fn iterate(
+/// The system with the smallest filtered residual that an iteration met.
+struct Whitest {
+    variance: f64,
+    system: Option<Vec<f64>>,
+}
+
+impl Default for Whitest {
+    fn default() -> Self {
+        Self {
+            variance: f64::INFINITY,
+            system: None,
+        }
+    }
+}
+
+/// The iteration alone; `noise_of` gives the noise model that belongs to a system.
+fn iterate(
     limits: IterationLimits,
     problem: &IvProblem<'_>,
     mut noise_of: impl FnMut(&[f64]) -> NoiseModel,
+    whitest: &mut Whitest,
 ) -> Result<LastIterate, IdentError> {
     let (mut system, _) = problem.stabilised(&start(problem)?)?;
     let mut iterations = 0;
@@ -105,6 +151,14 @@ pub(super) fn iterate(
         let moved = dot(&step, &step);
         let settled = moved <= limits.tolerance * limits.tolerance * variance
             || moved <= ROUNDING * ROUNDING * dot(&equation.y, &equation.y);
+        let own = equation.residual(&system);
+        let of_system = dot(&own, &own) / own.len() as f64;
+        if of_system < whitest.variance {
+            *whitest = Whitest {
+                variance: of_system,
+                system: Some(system.clone()),
+            };
+        }
         let (next, reflected) = problem.stabilised(&next)?;
         let reason = match (settled || iterations >= limits.max_iterations, reflected, settled) {
             (true, true, _) => Some(Reason::UnstableEstimate),
@@ -156,4 +210,13 @@ fn of_noise_free_parts(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> 
         system = parts.least_squares(filter)?;
     }
     Ok(system)
+}
+
+/// The iteration alone, for a start.
+pub(super) fn plain_iteration(
+    limits: IterationLimits,
+    problem: &IvProblem<'_>,
+    noise_of: impl FnMut(&[f64]) -> NoiseModel,
+) -> Result<LastIterate, IdentError> {
+    iterate(limits, problem, noise_of, &mut Whitest::default())
 }

@@ -8,7 +8,7 @@
 use super::{
     algorithm::IterationLimits,
     equation::{IvProblem, Source},
-    refined::{NoiseModel, iterate},
+    refined::{NoiseModel, plain_iteration},
     simulation_error::simulation_error,
 };
 use crate::{criterion::Criterion, noise_model::noise_model};
@@ -36,5 +36,5 @@ pub(crate) fn refined_system(criterion: &Criterion<'_>, nd: usize) -> Option<Vec
         let (c, d) = noise_model(&simulation_error(&[b, poles].concat(), criterion), 0, nd);
         NoiseModel { c, d }
     };
-    Some(iterate(LIMITS, &problem, noise_of).ok()?.system)
+    Some(plain_iteration(LIMITS, &problem, noise_of).ok()?.system)
 }
