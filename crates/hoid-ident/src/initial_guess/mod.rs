@@ -7,9 +7,11 @@
 //! | `pole_grid`, `arx_poles` | poles in the range of human operators; poles by linear least squares |
 //! | `shared_poles` | models whose A stands beside a noise model or beside F |
 //! | `instrument_chain` | instrumental variables, and C and D of what is left |
+//! | `broad` | starts from all over the region of stability, for records with many minima |
 //! | `c_drawn_inside` | starts for a search that ended on the unit circle |
 
 pub mod arx_poles;
+pub mod broad;
 pub mod c_drawn_inside;
 pub mod continuation;
 pub mod guesses;

@@ -1,5 +1,6 @@
-//! Poles in the range of human operators: F of an operator's neuromuscular system at a few
-//! frequencies and dampings, through the exact zero-order hold.
+//! Poles that know nothing of the data: in the range of human operators, F of an operator's
+//! neuromuscular system at a few frequencies and dampings, through the exact zero-order hold; and
+//! all over the unit disc, whatever the sample time.
 
 use hoid_model::{Complex64, SampleTime, polynomial};
 
@@ -25,6 +26,68 @@ pub(crate) fn pole_grid(nf: usize, sample_time: SampleTime) -> Vec<(String, Vec<
         .collect()
 }
 
+/// Real poles of the grid over the disc: closer to each other where they are slow.
+const REAL_POLES: [f64; 7] = [0.985, 0.95, 0.88, 0.7, 0.3, -0.5, -0.95];
+/// Angles of its pairs in rad, each with every radius.
+const ANGLES: [f64; 8] = [0.05, 0.1, 0.2, 0.4, 0.8, 1.3, 2.0, 2.6];
+const RADII: [f64; 2] = [0.98, 0.85];
+/// The third pole for nf > 2: slow, as the lag of an operator, or fast.
+const THIRD_POLES: [f64; 2] = [0.95, EXTRA_POLE];
+
+/// Real roots of the grid of C.
+const REAL_ZEROS: [f64; 6] = [0.98, 0.8, 0.3, -0.3, -0.8, -0.98];
+/// Angles of its pairs in rad, and their radius.
+const ZERO_ANGLES: [f64; 7] = [0.1, 0.3, 0.7, 1.2, 1.7, 2.2, 2.7];
+const ZERO_RADIUS: f64 = 0.9;
+
+/// F with its poles all over the unit disc: slow and fast, real and in pairs.
+pub(crate) fn anywhere(nf: usize) -> Vec<Vec<f64>> {
+    let two = real_and_pairs(nf, &REAL_POLES, &ANGLES, &RADII);
+    let third = if nf > 2 { &THIRD_POLES[..] } else { &THIRD_POLES[..1] };
+    let complete = |poles: &Vec<Complex64>, third: f64| {
+        let mut poles = poles.clone();
+        if poles.len() < nf {
+            poles.push(Complex64::new(third, 0.0));
+        }
+        poles.resize(nf, Complex64::new(EXTRA_POLE, 0.0));
+        polynomial::from_roots(&poles)[1..].to_vec()
+    };
+    two.iter()
+        .flat_map(|poles| third.iter().map(move |third| complete(poles, *third)))
+        .collect()
+}
+
+/// C with its roots all over the unit disc, close to the circle too; more than two are zero.
+pub(crate) fn noise_zeros(nc: usize) -> Vec<Vec<f64>> {
+    real_and_pairs(nc, &REAL_ZEROS, &ZERO_ANGLES, &[ZERO_RADIUS])
+        .into_iter()
+        .map(|mut roots| {
+            roots.resize(nc, Complex64::new(0.0, 0.0));
+            polynomial::from_roots(&roots)[1..].to_vec()
+        })
+        .collect()
+}
+
+/// Every two of the real roots, one twice too, and every pair; single roots where there is one
+/// alone, and the empty set where there is none.
+fn real_and_pairs(count: usize, real: &[f64], angles: &[f64], radii: &[f64]) -> Vec<Vec<Complex64>> {
+    let at = |x: f64| Complex64::new(x, 0.0);
+    match count {
+        0 => vec![Vec::new()],
+        1 => real.iter().map(|x| vec![at(*x)]).collect(),
+        _ => {
+            let real = (real.iter().enumerate()).flat_map(|(i, x)| real[i..].iter().map(move |y| vec![at(*x), at(*y)]));
+            let pairs = angles.iter().flat_map(|angle| {
+                radii.iter().map(move |radius| {
+                    let root = Complex64::from_polar(*radius, *angle);
+                    vec![root, root.conj()]
+                })
+            });
+            real.chain(pairs).collect()
+        }
+    }
+}
+
 fn grid_poles(nf: usize, omega: f64, zeta: f64, ts: f64) -> Vec<Complex64> {
     if nf == 1 {
         return vec![Complex64::new((-omega * ts).exp(), 0.0)];
@@ -33,4 +96,25 @@ fn grid_poles(nf: usize, omega: f64, zeta: f64, ts: f64) -> Vec<Complex64> {
     let mut poles = vec![s.exp(), s.exp().conj()];
     poles.resize(nf, Complex64::new(EXTRA_POLE, 0.0));
     poles
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_core::stability::roots_inside;
+
+    use super::*;
+
+    #[test]
+    fn grids_over_the_disc_have_the_order_and_are_stable() {
+        for (order, places) in [(0, 1), (1, 7), (2, 44), (3, 88), (4, 88)] {
+            let grid = anywhere(order);
+            assert_eq!(grid.len(), places);
+            assert!(grid.iter().all(|f| f.len() == order && roots_inside(f, 1.0)));
+        }
+        for (order, places) in [(0, 1), (1, 6), (2, 28), (5, 28)] {
+            let grid = noise_zeros(order);
+            assert_eq!(grid.len(), places);
+            assert!(grid.iter().all(|c| c.len() == order && roots_inside(c, 1.0)));
+        }
+    }
 }

@@ -234,6 +234,30 @@ impl<'a> IvProblem<'a> {
             .collect()
     }
 
+    /// The prediction error `eps = (D/C) (u - (B/F) q^-nk e)` of a system with stable F, 1/(C F) at
+    /// rest at the first row, and its negative gradient psi for F and B, where `filter` is
+    /// `D/(C F)` with the same F: from `F C eps = D (F u - B q^-nk e)`,
+    /// `psi_fi = -(D/(C F)) u(t-i) + (1/F) eps(t-i)` and `psi_bj = (D/(C F)) e(t-nk-j)`.
+    pub fn prediction_error(&self, filter: Prefilter<'_>, system: &[f64]) -> (Vec<f64>, Columns) {
+        let measured: Vec<(&[f64], &[f64])> = self.data.iter().map(|d| (d.u, d.e)).collect();
+        let mut psi = self.columns(filter, &measured);
+        let mut eps = self.filtered_output(filter);
+        for (column, t) in psi.iter().zip(system) {
+            add_scaled(&mut eps, -t, column);
+        }
+        let mut at = 0;
+        for n in self.rows(filter.d.len()) {
+            let mut through = eps[at..at + n].to_vec();
+            divide_in_place(filter.f, &mut through);
+            for (i, column) in psi[..self.poles].iter_mut().enumerate() {
+                let lag = (i + 1).min(n);
+                add_scaled(&mut column[at + lag..at + n], 1.0, &through[..n - lag]);
+            }
+            at += n;
+        }
+        (eps, psi)
+    }
+
     /// Least squares on the filtered equation.
     pub fn least_squares(&self, filter: Prefilter<'_>) -> Result<Vec<f64>, IdentError> {
         let measured: Vec<(&[f64], &[f64])> = self.data.iter().map(|d| (d.u, d.e)).collect();
@@ -254,20 +278,29 @@ impl<'a> IvProblem<'a> {
         Ok(solved.solution())
     }
 
-    /// Solution of `Z' Phi theta = Z' y`.
+    /// Orthonormal basis of the instruments.
     ///
     /// # Errors
     /// [`IdentError::SingularInstruments`].
-    pub fn solve(&self, equation: &Equation) -> Result<Vec<f64>, IdentError> {
-        let (q, kept) = orthonormal(&equation.z);
-        if let Some(lost) = (0..equation.z.len()).find(|i| !kept.contains(i)) {
-            let dependence = if dot(&equation.z[lost], &equation.z[lost]) == 0.0 {
+    pub fn basis(&self, z: &Columns) -> Result<Columns, IdentError> {
+        let (q, kept) = orthonormal(z);
+        if let Some(lost) = (0..z.len()).find(|i| !kept.contains(i)) {
+            let dependence = if dot(&z[lost], &z[lost]) == 0.0 {
                 format!("that of {} is zero", self.names[lost])
             } else {
                 format!("that of {} is a combination of the others", self.names[lost])
             };
             return Err(IdentError::SingularInstruments { dependence });
         }
+        Ok(q)
+    }
+
+    /// Solution of `Z' Phi theta = Z' y`.
+    ///
+    /// # Errors
+    /// [`IdentError::SingularInstruments`].
+    pub fn solve(&self, equation: &Equation) -> Result<Vec<f64>, IdentError> {
+        let q = self.basis(&equation.z)?;
         let mut product: Vec<f64> = equation
             .phi
             .iter()

@@ -34,6 +34,9 @@
 //! | `methods` | the methods, a file each, and their list |
 //! | `instruments`, `external_signal` | what the instruments are made of |
 //! | `refined` | the iteration of the refined methods |
+//! | `own_poles` | its nonlinear form, for where it does not settle |
+//! | `refined_system` | that iteration as a start of the prediction error method |
+//! | `simulation_error` | what a system leaves of the output |
 //! | `algorithm` | what a method gives to the estimator, and gets from it |
 //! | `equation` | the filtered equation, its instruments and its solution |
 //! | `columns` | columns over the rows of all records |
@@ -47,8 +50,12 @@ mod estimator;
 mod external_signal;
 mod instruments;
 mod methods;
+mod own_poles;
 mod refined;
+mod refined_system;
+mod simulation_error;
 
 pub use estimator::InstrumentalVariable;
 pub use instruments::{FORCING_CHANNEL, Instruments};
 pub use methods::IvMethod;
+pub(crate) use refined_system::refined_system;

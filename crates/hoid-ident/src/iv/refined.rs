@@ -20,12 +20,16 @@ use super::{
     algorithm::IterationLimits,
     equation::{Equation, IvProblem, Prefilter},
     external_signal::following,
+    own_poles::solve_for_own_poles,
 };
 
 /// Iterations of the start.
 const START_ROUNDS: usize = 5;
 /// Iterations after which only half of each step is taken, should the iteration swing.
 const FULL_STEPS: usize = 20;
+/// A zero of the equation whose residual is larger than the smallest one by this factor is another
+/// one than that of the operator.
+const FAR: f64 = 1.15;
 /// Steps below this share of the output are rounding.
 const ROUNDING: f64 = 1e-12;
 
@@ -34,6 +38,25 @@ const ROUNDING: f64 = 1e-12;
 pub(super) struct NoiseModel {
     pub c: Vec<f64>,
     pub d: Vec<f64>,
+}
+
+impl NoiseModel {
+    /// The filter `D/(C F)` with these poles.
+    pub fn prefilter<'p>(&'p self, f: &'p [f64]) -> Prefilter<'p> {
+        Prefilter {
+            d: &self.d,
+            c: &self.c,
+            f,
+        }
+    }
+}
+
+impl LastIterate {
+    /// Mean square of the filtered residual.
+    fn variance(&self) -> f64 {
+        let residual = self.equation.residual(&self.system);
+        dot(&residual, &residual) / residual.len() as f64
+    }
 }
 
 /// Where the iteration ended.
@@ -45,22 +68,78 @@ pub(super) struct LastIterate {
     pub termination: Termination,
 }
 
-/// Iterates; `noise_of` gives the noise model that belongs to a system.
-pub(super) fn iterate(
+/// Iterates, and where that does not settle goes on in the nonlinear form ([`super::own_poles`]);
+/// `noise_of` gives the noise model that belongs to a system.
+pub(super) fn settle(
     limits: IterationLimits,
     problem: &IvProblem<'_>,
     mut noise_of: impl FnMut(&[f64]) -> NoiseModel,
+) -> Result<LastIterate, IdentError> {
+    let mut whitest = Whitest::default();
+    let plain = iterate(limits, problem, &mut noise_of, &mut whitest)?;
+    if plain.termination.converged() || limits.max_iterations <= FULL_STEPS {
+        return Ok(plain);
+    }
+    // From where it has come to; where that leads far away, from its best system and from its start.
+    let mut spent = plain.termination.iterations;
+    let starts = [
+        plain.system.clone(),
+        whitest.system.unwrap_or_default(),
+        problem.stabilised(&start(problem)?)?.0,
+    ];
+    let (mut best, mut rank) = (plain, (f64::INFINITY, f64::INFINITY));
+    for from in starts.iter().filter(|from| !from.is_empty()) {
+        let found = solve_for_own_poles(limits, problem, from, &mut noise_of)?;
+        spent += found.termination.iterations;
+        let variance = found.variance();
+        let far = variance > FAR * whitest.variance;
+        let class = match found.termination.reason {
+            Reason::Settled | Reason::InstrumentsHeld if !far => 0.0,
+            _ if far => 2.0,
+            _ => 1.0,
+        };
+        if (class, variance) < rank {
+            (best, rank) = (found, (class, variance));
+        }
+        if class == 0.0 {
+            break;
+        }
+    }
+    if rank.0 == 2.0 {
+        // Another zero of the equation, far from what the data are like.
+        best.termination.reason = Reason::IterationLimit;
+    }
+    best.termination.iterations = spent;
+    Ok(best)
+}
+
+/// The system with the smallest filtered residual that an iteration met.
+struct Whitest {
+    variance: f64,
+    system: Option<Vec<f64>>,
+}
+
+impl Default for Whitest {
+    fn default() -> Self {
+        Self {
+            variance: f64::INFINITY,
+            system: None,
+        }
+    }
+}
+
+/// The iteration alone; `noise_of` gives the noise model that belongs to a system.
+fn iterate(
+    limits: IterationLimits,
+    problem: &IvProblem<'_>,
+    mut noise_of: impl FnMut(&[f64]) -> NoiseModel,
+    whitest: &mut Whitest,
 ) -> Result<LastIterate, IdentError> {
     let (mut system, _) = problem.stabilised(&start(problem)?)?;
     let mut iterations = 0;
     loop {
         let noise = noise_of(&system);
-        let filter = Prefilter {
-            c: &noise.c,
-            d: &noise.d,
-            f: &system[..problem.poles],
-        };
-        let equation = problem.equation(filter, &system);
+        let equation = problem.equation(noise.prefilter(&system[..problem.poles]), &system);
         let next = problem.solve(&equation)?;
         iterations += 1;
         let mut step = vec![0.0; equation.y.len()];
@@ -72,6 +151,14 @@ pub(super) fn iterate(
         let moved = dot(&step, &step);
         let settled = moved <= limits.tolerance * limits.tolerance * variance
             || moved <= ROUNDING * ROUNDING * dot(&equation.y, &equation.y);
+        let own = equation.residual(&system);
+        let of_system = dot(&own, &own) / own.len() as f64;
+        if of_system < whitest.variance {
+            *whitest = Whitest {
+                variance: of_system,
+                system: Some(system.clone()),
+            };
+        }
         let (next, reflected) = problem.stabilised(&next)?;
         let reason = match (settled || iterations >= limits.max_iterations, reflected, settled) {
             (true, true, _) => Some(Reason::UnstableEstimate),
@@ -123,4 +210,13 @@ fn of_noise_free_parts(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> 
         system = parts.least_squares(filter)?;
     }
     Ok(system)
+}
+
+/// The iteration alone, for a start.
+pub(super) fn plain_iteration(
+    limits: IterationLimits,
+    problem: &IvProblem<'_>,
+    noise_of: impl FnMut(&[f64]) -> NoiseModel,
+) -> Result<LastIterate, IdentError> {
+    iterate(limits, problem, noise_of, &mut Whitest::default())
 }

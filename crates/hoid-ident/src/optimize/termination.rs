@@ -21,6 +21,9 @@ pub enum Reason {
     NoDescent,
     /// An iteration of instrumental variables that moves the parameters no more.
     Settled,
+    /// An iteration of instrumental variables without an end, which moves the parameters by less
+    /// than half a standard error: they solve its equation for instruments that were then held.
+    InstrumentsHeld,
     /// Instrumental variables ended with a pole outside the unit circle, which was then reflected
     /// into it.
     UnstableEstimate,
@@ -38,6 +41,9 @@ impl fmt::Display for Reason {
             Self::IterationLimit => "not converged: iteration limit reached",
             Self::NoDescent => "not converged: no step inside the region of stable C and F lowers the loss",
             Self::Settled => "converged: a further iteration does not move the parameters",
+            Self::InstrumentsHeld => {
+                "converged with the instruments held: made anew they go on to move the parameters, by less than half a standard error"
+            }
             Self::UnstableEstimate => {
                 "not converged: the estimate had a pole outside the unit circle, reflected into it"
             }
@@ -59,7 +65,12 @@ impl Termination {
     pub fn converged(&self) -> bool {
         matches!(
             self.reason,
-            Reason::Direct | Reason::SmallDecrease | Reason::Border | Reason::ExactFit | Reason::Settled
+            Reason::Direct
+                | Reason::SmallDecrease
+                | Reason::Border
+                | Reason::ExactFit
+                | Reason::Settled
+                | Reason::InstrumentsHeld
         )
     }
 }

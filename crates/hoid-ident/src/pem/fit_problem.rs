@@ -10,7 +10,7 @@ use crate::{
     linalg::information::inverse_of_free,
     multistart::{LinearisationClient, MultiStart, Start},
     optimize::{Linearisation, Objective, free_parameters, minimise},
-    pem::{constraints::ConstrainedCriterion, fit_settings::FitSettings, robust},
+    pem::{constraints::ConstrainedCriterion, fit_settings::FitSettings, lower_minimum::lower_minimum, robust},
 };
 
 /// The searches of one fit.
@@ -58,6 +58,9 @@ impl<'q, 'a> FitProblem<'q, 'a> {
             settings, constrained, ..
         } = self;
         let (mut start, mut minimum) = self.searches.lowest().ok_or(IdentError::NoFiniteLoss)?;
+        if let Some((label, lower)) = lower_minimum(settings, constrained, &minimum, workspace) {
+            (start, minimum) = (label, lower);
+        }
         if settings.start.is_none() && matches!(minimum.termination.reason, Reason::Border | Reason::NoDescent) {
             // The loss often has a minimum on the border besides a lower one inside.
             let inside = with_c_drawn_inside(&settings.orders, &minimum.theta);

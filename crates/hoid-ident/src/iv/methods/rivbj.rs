@@ -19,6 +19,7 @@ use crate::iv::{
     covariance,
     equation::IvProblem,
     refined::{self, LastIterate, NoiseModel},
+    simulation_error::simulation_error,
 };
 use crate::{
     IdentError, InitialState, Reason, SearchOptions,
@@ -41,7 +42,7 @@ fn solve(
     limits: IterationLimits,
 ) -> Result<IvSolution, IdentError> {
     let mut noise_before: Option<NoiseModel> = None;
-    let last = refined::iterate(limits, problem, |system| {
+    let last = refined::settle(limits, problem, |system| {
         let noise = noise_of(system, problem, criterion, noise_before.as_ref());
         noise_before = Some(noise.clone());
         noise
@@ -106,24 +107,6 @@ fn noise_of(
         }
         None => NoiseModel { c, d },
     }
-}
-
-/// `u - (B/F) q^-nk e` of each record, the initial states of 1/F eliminated.
-fn simulation_error(theta: &[f64], criterion: &Criterion<'_>) -> Vec<Vec<f64>> {
-    let orders = Orders {
-        nc: 0,
-        nd: 0,
-        ..criterion.orders
-    };
-    let simulating = Criterion {
-        orders,
-        first: first_residual(&orders, InitialState::Estimate),
-        ..criterion.clone()
-    };
-    let mut workspace = Workspace::of_thread();
-    (0..criterion.data.len())
-        .map(|record| simulating.residuals_of(theta, record, &mut workspace))
-        .collect()
 }
 
 fn covariance(

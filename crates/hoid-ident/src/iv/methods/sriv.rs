@@ -26,7 +26,7 @@ pub(super) const ALGORITHM: Algorithm = Algorithm {
 };
 
 fn solve(problem: &IvProblem<'_>, _: &Criterion<'_>, limits: IterationLimits) -> Result<IvSolution, IdentError> {
-    let last = refined::iterate(limits, problem, |_| NoiseModel::default())?;
+    let last = refined::settle(limits, problem, |_| NoiseModel::default())?;
     let (poles, b) = last.system.split_at(problem.poles);
     let theta: Vec<f64> = b.iter().chain(poles).copied().collect();
     let covariance = (last.termination.reason != Reason::UnstableEstimate)

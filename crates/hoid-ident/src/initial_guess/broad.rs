@@ -1,0 +1,136 @@
+//! Starts from all over the region of stability, for records that have many minima: short ones, and
+//! models with more coefficients than the operator's.
+//!
+//! Given F, C and D the residual is affine in B; given F, C and B it is affine in D. So two grids
+//! that know nothing of the data, one of F and one of C, and least squares for the rest, reach every
+//! kind of minimum: slow real poles beside each other, a resonance, C and D that nearly cancel each
+//! other at any frequency.
+//!
+//! **Systems**, B and F: that of the minimum that is known; those of refined instrumental variables
+//! with autoregressive noise of two orders ([`crate::iv::refined_system`]); and the best places of
+//! a grid of poles ([`super::pole_grid::anywhere`]), ranked with an autoregression for their noise.
+//!
+//! **Noise models** of each system: C from a grid of its roots, D by least squares, and B once more
+//! with them. Those with the smallest loss are starts.
+
+use hoid_model::Orders;
+
+use super::pole_grid::{anywhere, noise_zeros};
+use crate::{
+    InitialState,
+    criterion::{Block, Criterion, Workspace, first_residual},
+    iv::refined_system,
+    multistart::Start,
+    optimize::Objective,
+};
+
+/// Places of the grid of poles that are taken.
+const PLACES: usize = 8;
+/// Noise models of a system that is fitted, and of one of the grid.
+const NOISE_MODELS: (usize, usize) = (4, 1);
+/// Orders of the autoregression of the instrumental variables.
+const IV_NOISE: [usize; 2] = [2, 6];
+/// Coefficients of the autoregression that ranks the grid, beyond those of the noise model.
+const MORE_NOISE: usize = 1;
+
+/// A proposal for B and F.
+struct System {
+    label: &'static str,
+    b: Vec<f64>,
+    f: Vec<f64>,
+    noise_models: usize,
+}
+
+/// The starts, each complete, the best first; `known` is a minimum.
+pub(crate) fn broad_starts(criterion: &Criterion<'_>, known: &[f64], workspace: &mut Workspace) -> Vec<Start> {
+    let o = criterion.orders;
+    let fitted = |label, b: &[f64], f: &[f64]| System {
+        label,
+        b: b.to_vec(),
+        f: f.to_vec(),
+        noise_models: NOISE_MODELS.0,
+    };
+    let mut systems = vec![fitted("known system", &known[..o.nb], &known[o.parameters() - o.nf..])];
+    for nd in IV_NOISE {
+        if let Some(system) = refined_system(criterion, nd) {
+            systems.push(fitted("refined instruments", &system[o.nf..], &system[..o.nf]));
+        }
+    }
+    systems.extend(best_places(criterion, workspace));
+    let mut starts: Vec<Start> = (systems.iter())
+        .flat_map(|system| with_noise_models(criterion, system, workspace))
+        .collect();
+    starts.sort_by(|a, b| a.value.total_cmp(&b.value));
+    starts
+}
+
+/// The places of the grid of poles with the smallest loss, each with an autoregression of its own.
+fn best_places(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<System> {
+    let o = criterion.orders;
+    let coloured = o.nc + o.nd > 0;
+    let orders = Orders {
+        nc: 0,
+        nd: if coloured { o.nc + o.nd + MORE_NOISE } else { 0 },
+        ..o
+    };
+    let ranking = Criterion {
+        orders,
+        initial: InitialState::Estimate,
+        first: criterion.first.max(first_residual(&orders, InitialState::Estimate)),
+        ..criterion.clone()
+    };
+    if ranking
+        .data
+        .iter()
+        .any(|d| d.u.len() <= ranking.first + orders.parameters())
+    {
+        return Vec::new();
+    }
+    let mut places: Vec<Start> = (anywhere(o.nf).iter())
+        .map(|f| {
+            let mut place = Start::of_poles("pole grid", &orders, f);
+            while let Some(block) = place.next_block() {
+                let there = ranking.linearise_block(&place.theta, block, workspace);
+                place.update(&orders, &there);
+            }
+            place
+        })
+        .filter(|place| place.value.is_finite())
+        .collect();
+    places.sort_by(|a, b| a.value.total_cmp(&b.value));
+    let system = |place: &Start| System {
+        label: "slow and fast poles",
+        b: place.theta[..o.nb].to_vec(),
+        f: place.theta[orders.parameters() - o.nf..].to_vec(),
+        noise_models: NOISE_MODELS.1,
+    };
+    places.iter().take(PLACES).map(system).collect()
+}
+
+/// A system with the noise models that suit it best.
+fn with_noise_models(criterion: &Criterion<'_>, system: &System, workspace: &mut Workspace) -> Vec<Start> {
+    let o = criterion.orders;
+    let mut starts = Vec::new();
+    for c in noise_zeros(o.nc) {
+        let theta = [&system.b[..], &c, &vec![0.0; o.nd], &system.f].concat();
+        if !criterion.is_feasible(&theta) {
+            continue;
+        }
+        let left = if o.nd > 0 {
+            vec![Block::B, Block::D]
+        } else {
+            vec![Block::B]
+        };
+        let mut start = Start::to_be_found(system.label, theta, left);
+        while let Some(block) = start.next_block().filter(|_| criterion.is_feasible(&start.theta)) {
+            let there = criterion.linearise_block(&start.theta, block, workspace);
+            start.update(&o, &there);
+        }
+        if start.value.is_finite() && criterion.is_feasible(&start.theta) {
+            starts.push(start);
+        }
+    }
+    starts.sort_by(|a, b| a.value.total_cmp(&b.value));
+    starts.truncate(system.noise_models);
+    starts
+}

@@ -1,0 +1,247 @@
+//! The equation solved for its own poles, where the iteration of the refined methods does not
+//! settle.
+//!
+//! The iteration solves `Z' L (F u - B q^-nk e) = 0` for F and B with the 1/F of the iteration before
+//! in L. Where F has a pole so slow that the record hardly tells it from one on the unit circle, as
+//! the lag of an operator is, or where the model is too small, that equation is solved by a pole
+//! outside the circle; reflected inside, it leads to the same again. What is sought is a zero of
+//!
+//! `g(theta) = Z' eps(theta)`,  `eps = (D/C) (u - (B/F) q^-nk e)`,
+//!
+//! which is the same at a fixed point, but has F stable by itself. So with Z, C and D of a system
+//! fixed, `|Q' eps(theta)|^2`, Q an orthonormal basis of Z, is minimised over B and stable F (damped
+//! Gauss-Newton, along the border of stability where that is in the way: [`crate::optimize`]). Then Z,
+//! C and D are made anew, until they no longer move theta ([`Extrapolation`] helps where that
+//! creeps or swings). Where g has no zero in the region of stability, the smallest value lies on its
+//! border, and the termination says so.
+//!
+//! **Where that has no end.** For a model that is smaller than the operator, eps is correlated with
+//! some of the instruments that other systems make, and theta may follow its own instruments without
+//! ever meeting them. Instruments need not come from the estimate itself: any auxiliary model gives
+//! a consistent one. So the estimate is then the zero of `Z' eps(theta)` for the Z, C and D whose
+//! zero is closest to the system that made them, and it counts as converged where these two differ
+//! by less than half a standard error.
+//!
+//! psi is the exact derivative with 1/(C F) at rest at the first row; what is unknown there is
+//! orthogonal to Z, from which the responses to it are projected out.
+//!
+//! This is the nonlinear form of the optimal instrumental variable estimate (T. Söderström and P.
+//! Stoica, *Instrumental Variable Methods for System Identification*, 1983, ch. 6; P. C. Young,
+//! *Automatica* 52 (2015) 35-46, on the stationary point of the refined iteration).
+
+use std::ops::Range;
+
+use hoid_core::stability::roots_inside;
+
+use super::{
+    algorithm::IterationLimits,
+    columns::Columns,
+    equation::IvProblem,
+    refined::{LastIterate, NoiseModel},
+};
+use crate::{
+    IdentError, Reason, SearchOptions, Termination,
+    linalg::least_squares::{add_scaled, dot, solve_symmetric},
+    optimize::{Linearisation, Objective, minimise},
+};
+
+/// Limits of the search with given instruments.
+const SEARCH_STEPS: usize = 30;
+/// Iterations that the extrapolation remembers, and what keeps their combination small.
+const REMEMBERED: usize = 5;
+const RIDGE: f64 = 1e-10;
+/// The search with given instruments ends at this part of the tolerance.
+const INNER: f64 = 1e-2;
+/// Radius from which on a pole lies on the unit circle.
+const ON_CIRCLE: f64 = 1.0 - 1e-7;
+/// A step of this many standard errors, over all parameters, says nothing about the operator.
+const IMMATERIAL: f64 = 0.5;
+/// The iteration has no end where so many steps in turn have not shortened it by this factor.
+const PATIENCE: usize = 12;
+const GAIN: f64 = 0.9;
+/// A step longer than the shortest one by this factor comes from an extrapolation too far.
+const ASTRAY: f64 = 10.0;
+
+/// `|Q' eps(theta)|^2` for given instruments and noise model.
+struct GivenInstruments<'p, 'a> {
+    problem: &'p IvProblem<'a>,
+    noise: &'p NoiseModel,
+    q: Columns,
+    /// What counts as the sum of squares of the output: smaller values than 1e-26 of it are zero.
+    power: f64,
+}
+
+impl Objective for GivenInstruments<'_, '_> {
+    type Workspace = ();
+
+    fn is_feasible(&self, system: &[f64]) -> bool {
+        system.iter().all(|v| v.is_finite()) && roots_inside(&system[..self.problem.poles], 1.0)
+    }
+
+    fn linearise(&self, system: &[f64], (): &mut ()) -> Linearisation {
+        let (eps, psi) = self
+            .problem
+            .prediction_error(self.noise.prefilter(&system[..self.problem.poles]), system);
+        let c: Vec<f64> = self.q.iter().map(|q| dot(q, &eps)).collect();
+        let along: Vec<Vec<f64>> = psi
+            .iter()
+            .map(|psi| self.q.iter().map(|q| dot(q, psi)).collect())
+            .collect();
+        Linearisation {
+            sum_of_squares: dot(&c, &c),
+            descent: along.iter().map(|column| dot(column, &c)).collect(),
+            gram: (along.iter())
+                .flat_map(|a| along.iter().map(move |b| dot(a, b)))
+                .collect(),
+        }
+    }
+
+    fn output_power(&self) -> f64 {
+        self.power
+    }
+
+    fn stable_blocks(&self) -> Vec<Range<usize>> {
+        vec![0..self.problem.poles]
+    }
+}
+
+/// Iterates from a system with stable F; `noise_of` gives the noise model that belongs to a system.
+///
+/// # Errors
+/// [`IdentError::SingularInstruments`], [`IdentError::NoFiniteLoss`].
+pub(super) fn solve_for_own_poles(
+    limits: IterationLimits,
+    problem: &IvProblem<'_>,
+    start: &[f64],
+    noise_of: &mut impl FnMut(&[f64]) -> NoiseModel,
+) -> Result<LastIterate, IdentError> {
+    let options = SearchOptions {
+        max_iterations: SEARCH_STEPS,
+        ..SearchOptions::default()
+    };
+    let mut system = start.to_vec();
+    let mut extrapolation = Extrapolation::default();
+    let mut nearest: Option<(f64, LastIterate)> = None;
+    let (mut iterations, mut without_gain) = (0, 0);
+    loop {
+        let noise = noise_of(&system);
+        let equation = problem.equation(noise.prefilter(&system[..problem.poles]), &system);
+        let residual = equation.residual(&system);
+        let variance = dot(&residual, &residual) / residual.len() as f64;
+        let objective = GivenInstruments {
+            problem,
+            noise: &noise,
+            q: problem.basis(&equation.z)?,
+            power: 1e26 * (INNER * limits.tolerance).powi(2) * variance,
+        };
+        let end = minimise(&objective, system.clone(), &options, None, &mut ()).ok_or(IdentError::NoFiniteLoss)?;
+        iterations += 1;
+        without_gain += 1;
+        let step: Vec<f64> = end.theta.iter().zip(&system).map(|(a, b)| a - b).collect();
+        let lengths = products(&equation.z);
+        let moved = (squared_length(&lengths, &step) / variance).sqrt();
+        let least = nearest.as_ref().map_or(f64::INFINITY, |(least, _)| *least);
+        let next = extrapolation.next(&system, step, &lengths);
+        let inside = objective.is_feasible(&next);
+        if moved < least {
+            if moved < GAIN * least {
+                without_gain = 0;
+            }
+            let there = LastIterate {
+                noise: noise.clone(),
+                system: end.theta.clone(),
+                equation,
+                termination: Termination {
+                    reason: reason(moved, limits.tolerance, &end.theta[..problem.poles]),
+                    iterations,
+                },
+            };
+            nearest = Some((moved, there));
+        }
+        let ended = moved <= limits.tolerance || iterations >= limits.max_iterations || without_gain >= PATIENCE;
+        if let (true, Some((_, mut last))) = (ended, nearest.take_if(|_| ended)) {
+            last.noise = noise_of(&last.system);
+            last.termination.iterations = iterations;
+            return Ok(last);
+        }
+        system = match &nearest {
+            // The extrapolation has led astray.
+            Some((least, near)) if moved > ASTRAY * least => {
+                extrapolation = Extrapolation::default();
+                near.system.clone()
+            }
+            _ if inside => next,
+            _ => end.theta,
+        };
+    }
+}
+
+/// How an iteration has ended whose next step has this length in standard errors.
+fn reason(moved: f64, tolerance: f64, f: &[f64]) -> Reason {
+    if moved > IMMATERIAL {
+        Reason::IterationLimit
+    } else if !roots_inside(f, ON_CIRCLE) {
+        Reason::Border
+    } else if moved <= tolerance {
+        Reason::Settled
+    } else {
+        Reason::InstrumentsHeld
+    }
+}
+
+/// The next point of a fixed-point iteration from the last few, by the combination of their steps
+/// that is shortest (D. G. Anderson, *J. ACM* 12 (1965) 547-560): the iteration may creep or swing
+/// where the model is too small for the noise to leave the instruments.
+#[derive(Default)]
+struct Extrapolation {
+    /// Point and step of the last iteration, and the differences of both between iterations.
+    last: Option<(Vec<f64>, Vec<f64>)>,
+    differences: Vec<(Vec<f64>, Vec<f64>)>,
+}
+
+impl Extrapolation {
+    fn next(&mut self, point: &[f64], step: Vec<f64>, lengths: &[f64]) -> Vec<f64> {
+        let p = point.len();
+        if let Some((point_before, step_before)) = self.last.take() {
+            self.differences
+                .push((minus(point, &point_before), minus(&step, &step_before)));
+            if self.differences.len() > REMEMBERED.min(p) {
+                self.differences.remove(0);
+            }
+        }
+        let times = |v: &[f64]| -> Vec<f64> { lengths.chunks_exact(p).map(|row| dot(row, v)).collect() };
+        let mut next: Vec<f64> = point.iter().zip(&step).map(|(x, f)| x + f).collect();
+        let weighed: Vec<Vec<f64>> = self.differences.iter().map(|(_, df)| times(df)).collect();
+        let gram: Vec<f64> = weighed
+            .iter()
+            .enumerate()
+            .flat_map(|(i, w)| {
+                let row = self.differences.iter().enumerate();
+                row.map(move |(j, (_, df))| dot(w, df) * if i == j { 1.0 + RIDGE } else { 1.0 })
+            })
+            .collect();
+        let right: Vec<f64> = weighed.iter().map(|w| dot(w, &step)).collect();
+        if let Some(shares) = solve_symmetric(&gram, &right).filter(|_| !right.is_empty()) {
+            for ((dx, df), share) in self.differences.iter().zip(shares) {
+                add_scaled(&mut next, -share, dx);
+                add_scaled(&mut next, -share, df);
+            }
+        }
+        self.last = Some((point.to_vec(), step));
+        next
+    }
+}
+
+fn minus(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+/// `Z'Z` by rows.
+fn products(z: &Columns) -> Vec<f64> {
+    z.iter().flat_map(|a| z.iter().map(move |b| dot(a, b))).collect()
+}
+
+/// `v' M v`.
+fn squared_length(m: &[f64], v: &[f64]) -> f64 {
+    m.chunks_exact(v.len()).zip(v).map(|(row, x)| x * dot(row, v)).sum()
+}

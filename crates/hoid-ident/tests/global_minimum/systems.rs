@@ -1,0 +1,177 @@
+//! Random Box-Jenkins systems with short records in an open loop.
+//!
+//! What a textbook would pick: nb = 3, nf = 2, nk = 1 .. 3, nc and nd 0 .. 2, 300 samples.
+//! Half of the systems have two real poles, most of them slow (0.8 to 0.99), half a pair; the noise
+//! has any colour with roots up to 0.95. The ratio of the variances of noise-free output and noise
+//! lies between 1 and 10, and the input is white, band-limited or a binary sequence of steps.
+
+use hoid_core::filter::{divide_in_place, fir, multiply};
+use hoid_model::{Channel, Complex64, Orders, Record, SampleTime, polynomial};
+use hoid_sim::RunSeed;
+
+/// Samples of a record.
+const SAMPLES: usize = 300;
+/// Samples before it.
+const RUN_IN: usize = 500;
+
+/// A system, what was recorded of it, and random numbers for whoever goes on with it.
+pub struct System {
+    pub orders: Orders,
+    pub theta: Vec<f64>,
+    pub record: Record,
+    pub draw: Draw,
+}
+
+/// Uniform numbers (S. Vigna's SplitMix64).
+pub struct Draw(u64);
+
+impl Draw {
+    /// The stream of a number.
+    pub fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5851_f42d_4c95_7f2d)
+    }
+
+    /// Uniform from `low` to `high`.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        low + (high - low) * ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// One of 0 .. n - 1.
+    pub fn one_of(&mut self, n: usize) -> usize {
+        ((self.between(0.0, 1.0) * n as f64) as usize).min(n - 1)
+    }
+
+    /// A polynomial of the system's kind: two poles.
+    pub fn slow_or_pair(&mut self) -> Vec<f64> {
+        if self.between(0.0, 1.0) < 0.5 {
+            let slow = self.between(0.8, 0.99);
+            let low = if self.between(0.0, 1.0) < 0.7 { 0.8 } else { 0.0 };
+            real(&[slow, self.between(low, 0.99)])
+        } else {
+            pair(self.between(0.6, 0.98), self.between(0.02, 1.5))
+        }
+    }
+
+    /// A polynomial of the noise.
+    pub fn noise(&mut self, order: usize) -> Vec<f64> {
+        match order {
+            0 => Vec::new(),
+            1 => real(&[self.between(-0.95, 0.95)]),
+            _ if self.between(0.0, 1.0) < 0.5 => real(&[self.between(-0.95, 0.95), self.between(-0.95, 0.95)]),
+            _ => pair(self.between(0.2, 0.95), self.between(0.1, 3.0)),
+        }
+    }
+}
+
+impl System {
+    /// The system of this number.
+    pub fn numbered(number: u64) -> Self {
+        let mut draw = Draw::new(number);
+        let orders = Orders {
+            nb: 3,
+            nc: draw.one_of(3),
+            nd: draw.one_of(3),
+            nf: 2,
+            nk: 1 + draw.one_of(3),
+            ..Orders::default()
+        };
+        let f = draw.slow_or_pair();
+        let normal = |cell, n| {
+            RunSeed {
+                seed: 300,
+                cell,
+                replication: number,
+            }
+            .white_noise(n)
+        };
+        let b = normal(0, orders.nb);
+        let (c, d) = (draw.noise(orders.nc), draw.noise(orders.nd));
+        let n = RUN_IN + SAMPLES;
+        let e = input(&mut draw, normal(1, n));
+        let mut w = vec![0.0; n];
+        fir(&b, orders.nk, &e, &mut w);
+        divide_in_place(&f, &mut w);
+        let mut v = vec![0.0; n];
+        multiply(&c, &normal(2, n), &mut v);
+        divide_in_place(&d, &mut v);
+        let ratio = f64::exp(draw.between(0.0, 10.0_f64.ln()));
+        let gain = (variance(&w) / variance(&v) / ratio).sqrt();
+        let u: Vec<f64> = w.iter().zip(&v).map(|(w, v)| w + gain * v).skip(RUN_IN).collect();
+        let sample_time = [0.01, 0.1, 1.0][draw.one_of(3)];
+        let record = Record::new(
+            SampleTime::new(sample_time).unwrap(),
+            Channel::new("e", "", e[RUN_IN..].to_vec()),
+            Channel::new("u", "", u),
+        )
+        .unwrap();
+        Self {
+            orders,
+            theta: [b, c, d, f].concat(),
+            record,
+            draw,
+        }
+    }
+
+    /// A random start: poles and noise of the system's kind, B by least squares.
+    pub fn random_start(&mut self) -> Vec<f64> {
+        let o = self.orders;
+        let f = self.draw.slow_or_pair();
+        let b = self.least_squares(&f);
+        let (c, d) = (self.draw.noise(o.nc), self.draw.noise(o.nd));
+        [b, c, d, f].concat()
+    }
+
+    /// B by least squares for given poles.
+    fn least_squares(&self, f: &[f64]) -> Vec<f64> {
+        let o = self.orders;
+        let columns: Vec<Vec<f64>> = (0..o.nb)
+            .map(|j| {
+                let mut column = vec![0.0; SAMPLES];
+                fir(&[1.0], o.nk + j, self.record.input(), &mut column);
+                divide_in_place(f, &mut column);
+                column
+            })
+            .collect();
+        let phi = nalgebra::DMatrix::from_fn(SAMPLES, o.nb, |t, j| columns[j][t]);
+        let u = nalgebra::DVector::from_column_slice(self.record.output());
+        let right = phi.transpose() * u;
+        let b = (phi.transpose() * &phi).lu().solve(&right);
+        b.map_or(vec![1.0; o.nb], |b| b.as_slice().to_vec())
+    }
+}
+
+/// White, behind two equal poles, or steps to +1 and -1 that last 5 to 20 samples.
+fn input(draw: &mut Draw, mut white: Vec<f64>) -> Vec<f64> {
+    match draw.one_of(3) {
+        0 => {}
+        1 => {
+            let pole = draw.between(0.5, 0.9);
+            divide_in_place(&real(&[pole, pole]), &mut white);
+        }
+        _ => {
+            let hold = 5 + draw.one_of(16);
+            let steps: Vec<f64> = white.iter().map(|x| x.signum()).collect();
+            white.iter_mut().enumerate().for_each(|(t, x)| *x = steps[t / hold]);
+        }
+    }
+    white
+}
+
+fn variance(x: &[f64]) -> f64 {
+    let x = &x[RUN_IN..];
+    let mean = x.iter().sum::<f64>() / x.len() as f64;
+    x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / x.len() as f64
+}
+
+fn real(poles: &[f64]) -> Vec<f64> {
+    let roots: Vec<Complex64> = poles.iter().map(|p| Complex64::new(*p, 0.0)).collect();
+    polynomial::from_roots(&roots)[1..].to_vec()
+}
+
+fn pair(radius: f64, angle: f64) -> Vec<f64> {
+    vec![-2.0 * radius * angle.cos(), radius * radius]
+}
