@@ -155,7 +155,10 @@ fn remnant_order() -> Setting {
 fn form() -> Setting {
     let mut words = vec!["auto"];
     words.extend(named::<Form>());
-    let help = format!("Form of the operator: {}; auto: the simplest that held-out runs do not refute", words.join(", "));
+    let help = format!(
+        "Form of the operator: {}; auto: the simplest that held-out runs do not refute",
+        words.join(", ")
+    );
     setting("form", Kind::Channel, "auto", &help)
 }
 
@@ -189,7 +192,9 @@ fn excitation() -> Setting {
 
 fn period() -> Setting {
     let help = "Period of the excitation";
-    setting("period", Kind::Number, "found in it", help).unit("s").bounds(Bounds::PositiveFinite)
+    setting("period", Kind::Number, "found in it", help)
+        .unit("s")
+        .bounds(Bounds::PositiveFinite)
 }
 
 fn noise_orders() -> Setting {
@@ -207,7 +212,8 @@ fn family_delay() -> Setting {
 
 fn run_to_run() -> Setting {
     let usual = FamilyEstimator::default().run_to_run.to_string();
-    let help = "What a person's gain varies by from run to run, as a part of it: in the error bars of fewer than five records";
+    let help =
+        "What a person's gain varies by from run to run, as a part of it: in the error bars of fewer than five records";
     setting("run_to_run", Kind::Number, &usual, help).bounds(Bounds::AtLeast(0.0))
 }
 
@@ -326,7 +332,10 @@ mod tests {
             }
         }
         let names: Vec<&str> = all.iter().map(|spec| spec.name).collect();
-        assert_eq!(names, ["pem", "iv4", "sriv", "rivbj", "family", "grey-box", "time-varying"]);
+        assert_eq!(
+            names,
+            ["pem", "iv4", "sriv", "rivbj", "family", "grey-box", "time-varying"]
+        );
     }
 
     #[test]

@@ -137,14 +137,16 @@ impl ModelKind {
     /// The names that are typed, in the order of the help page.
     fn named() -> impl Iterator<Item = (&'static str, Self)> {
         let structures = Structure::ALL.map(|structure| (structure.name(), Self::Polynomial(structure)));
-            let others = [("grey-box", Self::Family), ("time-varying", Self::TimeVarying)];
+        let others = [("grey-box", Self::Family), ("time-varying", Self::TimeVarying)];
         structures.into_iter().chain(others)
     }
 }
 
 /// The forms by name; auto is none of them.
 fn forms() -> impl Iterator<Item = (&'static str, Option<Form>)> {
-    [("auto", None)].into_iter().chain(Form::ALL.map(|form| (form.name(), Some(form))))
+    [("auto", None)]
+        .into_iter()
+        .chain(Form::ALL.map(|form| (form.name(), Some(form))))
 }
 
 /// Instrumental variables by name, and the prediction error method, which is none of them.
@@ -175,7 +177,8 @@ fn about(name: &str) -> String {
         text.push_str(&format!(" [for {}]", of.join(", ")));
     }
     // Where clap knows the default it prints it itself.
-    let known = matches!(setting.kind, Kind::Choice(_) | Kind::Flag) || ["max_iterations", "tolerance", "form"].contains(&name);
+    let known =
+        matches!(setting.kind, Kind::Choice(_) | Kind::Flag) || ["max_iterations", "tolerance", "form"].contains(&name);
     if !known && !setting.default.is_empty() {
         text.push_str(&format!(" [default: {}]", setting.default));
     }

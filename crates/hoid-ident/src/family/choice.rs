@@ -12,8 +12,8 @@
 //!   error, kappa the inflation of variances.
 //!
 //! With fewer than three runs nothing can be held out. A form that is too simple then does more harm
-//! than one that is too rich, since it bends the response: the least of Akaike's criterion decides,
-//! `chi^2 + 2 p` or `n ln V/kappa + 2 p`.
+//! than one that is too rich, since it bends the response: Akaike's criterion decides,
+//! `chi^2 + 2 p` or `n ln V/kappa + 2 p`, the simplest form within 2 of the least.
 
 use hoid_model::Form;
 
@@ -39,6 +39,9 @@ pub struct FormFigures {
 
 /// Difference of Schwarz's criterion that is strong evidence.
 const STRONG_EVIDENCE: f64 = 6.0;
+/// Difference of Akaike's criterion that is none (K. P. Burnham and D. R. Anderson, *Model Selection
+/// and Multimodel Inference*, 2002, section 2.6).
+const NO_EVIDENCE: f64 = 2.0;
 /// Standard errors of a paired difference that held-out runs must exceed.
 const PAIRED_ERRORS: f64 = 2.0;
 
@@ -58,7 +61,8 @@ pub(super) fn choose(candidates: &[Candidate]) -> Option<usize> {
     };
     let best = (0..candidates.len()).min_by(|a, b| merit(*a).total_cmp(&merit(*b)))?;
     let Some(held) = &held else {
-        return Some(best);
+        let near = |i: &usize| candidates[*i].criterion - candidates[best].criterion <= NO_EVIDENCE;
+        return (0..candidates.len()).find(near);
     };
     let refuted = |i: &usize| {
         is_worse(held[*i], held[best]) && candidates[*i].criterion - candidates[best].criterion > STRONG_EVIDENCE

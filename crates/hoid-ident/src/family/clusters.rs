@@ -36,7 +36,7 @@ const FEWEST_RECORDS: usize = 5;
 /// Blocks into which fewer records are cut.
 const BLOCKS: usize = 8;
 /// Frequencies at which the response is judged, rad/s.
-const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
+pub(super) const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
 /// Shortest block, s.
 const SHORTEST_BLOCK_S: f64 = 4.0;
 

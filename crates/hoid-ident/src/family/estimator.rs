@@ -2,7 +2,8 @@
 //! they are worth. The steps are those of the [module](super).
 
 use hoid_model::{
-    Detrend, Form, NotConvertible, PolynomialModel, Record, SampleTime, Structure, Verdict, operator_family::Coordinate,
+    Complex64, Detrend, Form, NotConvertible, PolynomialModel, Record, SampleTime, Structure, Verdict,
+    operator_family::Coordinate, uncertainty::variance_along,
 };
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
@@ -419,6 +420,7 @@ impl FamilyEstimator {
             cluster_kind: fit.clusters.kind,
             clusters: fit.clusters.parts.len(),
             has_covariance: covariances.is_some(),
+            response_error: response_error(&operators[0]),
         }));
         let noise = &fit.eta()[layout.operator_elements()..];
         Ok(FamilyFit {
@@ -687,15 +689,28 @@ fn residuals(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> ResidualMeas
     residual_measures(&pairs, fit.layout().sample_time.s())
 }
 
-/// Squared coherence of the lines, weighted with the power of u there.
+/// Mean squared coherence of the lines.
 fn coherent_share(describing: &DescribingFunction) -> Option<f64> {
-    let (mut sum, mut weight) = (0.0, 0.0);
-    for line in &describing.lines {
-        let power: f64 = line.ratio.0.iter().map(|(a, _)| a.norm_sqr()).sum();
-        sum += power * line.coherence?;
-        weight += power;
-    }
-    (weight > 0.0).then(|| sum / weight)
+    let all: Option<Vec<f64>> = describing.lines.iter().map(|line| line.coherence).collect();
+    let all = all.filter(|all| !all.is_empty())?;
+    Some(all.iter().sum::<f64>() / all.len() as f64)
+}
+
+/// Smallest relative standard error of the response over the band of manual control.
+fn response_error(of: &OperatorOfRecord) -> Option<f64> {
+    let covariance = of.covariance.as_deref()?;
+    let error = |omega: f64| {
+        let response = of.operator.response_and_gradient(omega);
+        let along = |part: fn(Complex64) -> f64| -> f64 {
+            let gradient: Vec<f64> = response.gradient.iter().map(|g| part(g / response.value)).collect();
+            variance_along(&gradient, covariance)
+        };
+        (along(|z| z.re) + along(|z| z.im)).sqrt()
+    };
+    clusters::BAND_RAD_S
+        .iter()
+        .map(|omega| error(*omega))
+        .min_by(f64::total_cmp)
 }
 
 /// One kappa for all forms, so that their criteria can be compared: the median.

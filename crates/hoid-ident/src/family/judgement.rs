@@ -5,7 +5,7 @@
 //! samples of ten runs every model of a person is refuted by a test, and what matters is how much
 //! the model misses.
 
-use hoid_model::{Finding, operator_family::Coordinate};
+use hoid_model::Finding;
 
 use super::{agreement::Agreement, clusters::ClusterKind, line_fit::LineFit, parameter::Parameter, result::FreeModel};
 use crate::Termination;
@@ -22,6 +22,8 @@ const LARGEST_REDUCED_CHI_SQUARED: f64 = 3.0;
 const LEVEL: f64 = 0.01;
 /// Loss above that of a free model beyond which a refuted form is said to be so.
 const LARGEST_EXCESS_LOSS: f64 = 0.01;
+/// Relative error of the response, at its best, beyond which nothing is known of the person.
+const LARGEST_RESPONSE_ERROR: f64 = 0.5;
 /// Ratio of clustered to model-based standard errors that is worth a note.
 const NOTED_ERROR_RATIO: f64 = 1.5;
 
@@ -40,6 +42,8 @@ pub(super) struct Judged<'a> {
     pub cluster_kind: ClusterKind,
     pub clusters: usize,
     pub has_covariance: bool,
+    /// Smallest relative standard error of the response over the band of manual control.
+    pub response_error: Option<f64>,
 }
 
 /// How far the residuals are from white.
@@ -139,13 +143,21 @@ fn determined(judged: &Judged<'_>, all: &mut Vec<Finding>) {
             .iter()
             .find(|p| p.name.split('[').next() == Some(name))
     };
-    // The gain of the form: without it nothing is known.
+    if let Some(error) = judged.response_error.filter(|e| *e > LARGEST_RESPONSE_ERROR) {
+        all.push(Finding::undetermined(
+            "response",
+            format!(
+                "the response of the person is not determined: its error is {:.0} % at the frequency at which it is known best",
+                100.0 * error
+            ),
+        ));
+    }
     let gain = ["K_over_T_I", "K_I", "K_e", "K"].iter().find_map(|name| find(name));
     if let Some(gain) = gain.filter(|g| !g.determined) {
-        all.push(Finding::undetermined(
+        all.push(Finding::note(
             "gain",
             format!(
-                "{} is not determined: its interval holds zero; there is too little response to e",
+                "{} is not determined, the response in the middle of the band is",
                 gain.name
             ),
         ));
@@ -243,7 +255,7 @@ fn methods(judged: &Judged<'_>, all: &mut Vec<Finding>) {
         let where_ = worst.map_or(String::new(), |row| {
             format!(
                 ", most in {} by {:.1} combined errors",
-                coordinate_name(row.coordinate),
+                row.coordinate.name(),
                 row.difference_in_errors.abs()
             )
         });
@@ -275,20 +287,5 @@ fn methods(judged: &Judged<'_>, all: &mut Vec<Finding>) {
             "no-lines",
             format!("no fit at the lines of the excitation: {why}"),
         ));
-    }
-}
-
-/// A coordinate as it is written.
-fn coordinate_name(coordinate: Coordinate) -> &'static str {
-    match coordinate {
-        Coordinate::Gain => "the gain",
-        Coordinate::Lead => "T_L",
-        Coordinate::LagRate => "1/T_I",
-        Coordinate::Linear => "c_1",
-        Coordinate::Quadratic => "c_2",
-        Coordinate::Droop => "alpha",
-        Coordinate::LogOmega => "ln omega_nm",
-        Coordinate::LogZeta => "ln zeta_nm",
-        Coordinate::Delay => "tau_e",
     }
 }

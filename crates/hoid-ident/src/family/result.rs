@@ -84,8 +84,7 @@ pub struct FamilyFit {
     pub innovation_variance: f64,
     /// Number n of residuals.
     pub residuals: usize,
-    /// Variance of u that the excitation explains: mean squared coherence at the lines, weighted
-    /// with the power of u there.
+    /// Part of the power of u at the lines that the excitation explains: mean squared coherence.
     pub coherent_share: Option<f64>,
     /// How the search ended.
     pub termination: Termination,

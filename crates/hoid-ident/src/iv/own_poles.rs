@@ -101,7 +101,7 @@ impl Objective for GivenInstruments<'_, '_> {
     }
 
     fn stable_blocks(&self) -> Vec<Range<usize>> {
-        vec![0..self.problem.poles]
+        std::iter::once(0..self.problem.poles).collect()
     }
 }
 

@@ -51,68 +51,40 @@ fn trial(text: &str) -> Record {
     .unwrap()
 }
 
+/// What says that it has converged is not worse than the prediction error method by much: on the
+/// border of stability it once was, by half of the loss.
 #[test]
-#[ignore = "prints the table of all cells; minutes"]
-fn table_of_recorded_people() {
-    let env = |n: &str| std::env::var(n).ok();
-    let mut rows = 0;
+#[ignore = "minutes; prints the table of all cells"]
+fn what_has_converged_predicts_well() {
     for cell in ["P03_fo", "P05_fo", "P09_fo", "P03_so", "P05_so", "P09_so"] {
-        if env("CELL").is_some_and(|c| c != cell) {
-            continue;
-        }
         let Some(records) = trials(cell) else {
             eprintln!("skipped: HOID_HUMAN_DATA names no directory of recordings");
             return;
         };
-        for (nb, nf) in [(2, 2), (3, 2), (4, 2), (3, 3), (4, 3)] {
-            for nd in [4, 8, 12, 24] {
-                if env("ORD").is_some_and(|c| c != format!("{nb},{nf},{nd}")) {
-                    continue;
-                }
-                let orders = Orders {
-                    nb,
-                    nd,
-                    nf,
-                    nk: env("NK").map_or(10, |s| s.parse().unwrap()),
-                    ..Orders::default()
-                };
-                let pem = Estimator::new(Structure::BoxJenkins, orders).fit(&records).unwrap();
-                for instruments in [Instruments::External("d".to_owned()), Instruments::Simulated] {
-                    if env("INS").is_some_and(|c| !instruments.to_string().contains(&c)) {
-                        continue;
-                    }
-                    let began = std::time::Instant::now();
-                    let estimator = InstrumentalVariable {
-                        instruments: instruments.clone(),
-                        ..InstrumentalVariable::new(IvMethod::RivBj, orders)
-                    };
-                    rows += 1;
-                    match estimator.fit(&records) {
-                        Ok(fit) => {
-                            let distance = |w: f64| (fit.model().response(w) / pem.model().response(w) - 1.0).norm();
-                            let z =
-                                hoid_model::polynomial::roots(&hoid_model::polynomial_model::monic(fit.model().f()))
-                                    .unwrap();
-                            println!(
-                                "{cell} {orders} {instruments}: {} {} {:.0} ms; loss / PEM {:.4}; from PEM {:.2} {:.2} {:.2}; se {} {:?}",
-                                fit.termination().converged(),
-                                fit.termination(),
-                                1e3 * began.elapsed().as_secs_f64(),
-                                fit.loss() / pem.loss(),
-                                distance(0.63),
-                                distance(2.0),
-                                distance(5.0),
-                                fit.covariance().is_some(),
-                                z.iter()
-                                    .map(|z| format!("{:.4}{:+.4}i", z.re, z.im))
-                                    .collect::<Vec<_>>()
-                            );
-                        }
-                        Err(error) => println!("{cell} {orders} {instruments}: {error}"),
-                    }
-                }
-            }
+        for (nb, nf, nd, nk) in [(2, 2, 8, 8), (2, 2, 8, 14), (3, 3, 12, 10)] {
+            let orders = Orders {
+                nb,
+                nd,
+                nf,
+                nk,
+                ..Orders::default()
+            };
+            let pem = Estimator::new(Structure::BoxJenkins, orders).fit(&records).unwrap();
+            let estimator = InstrumentalVariable {
+                instruments: Instruments::External("d".to_owned()),
+                ..InstrumentalVariable::new(IvMethod::RivBj, orders)
+            };
+            let fit = estimator.fit(&records).unwrap();
+            let ratio = fit.loss() / pem.loss();
+            let distance = (fit.model().response(2.0) / pem.model().response(2.0) - 1.0).norm();
+            println!(
+                "{cell} {orders}: {}; loss/PEM {ratio:.4}; from PEM {distance:.2}",
+                fit.termination()
+            );
+            assert!(
+                !fit.termination().converged() || ratio < 1.2,
+                "{cell} {orders}: {ratio}"
+            );
         }
     }
-    assert!(rows > 0);
 }

@@ -408,7 +408,11 @@ mod tests {
                     };
                     let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
                     let error = (gradient[i] - difference).abs();
-                    assert!(error < 1e-6 * (1.0 + difference.abs()), "{form} {}: {error}", parameter.name);
+                    assert!(
+                        error < 1e-6 * (1.0 + difference.abs()),
+                        "{form} {}: {error}",
+                        parameter.name
+                    );
                 }
             }
         }

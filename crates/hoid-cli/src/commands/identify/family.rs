@@ -8,7 +8,7 @@ use hoid_ident::{
     frequency::{Description, DescriptionOptions, describe_runs},
 };
 use hoid_io::{read_text, write_atomically};
-use hoid_model::{Detrend, Form, Record, VerdictLevel, operator_family::Coordinate};
+use hoid_model::{Detrend, Record, VerdictLevel, operator_family::Coordinate};
 use hoid_report::{
     ModelSection, Report,
     figures::{ModelCurve, describing, with_width_mm},
@@ -36,7 +36,9 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
     let of_lines = match &described {
         Ok(found) => Some(Ok(found.function.clone())),
         // What was looked for by name is missed; what was looked for by itself is not.
-        Err(CliError::Ident(error)) if args.excitation.as_deref().is_some_and(|e| e != "none") => Some(Err(error.clone())),
+        Err(CliError::Ident(error)) if args.excitation.as_deref().is_some_and(|e| e != "none") => {
+            Some(Err(error.clone()))
+        }
         Err(_) => None,
     };
     let fit = estimator.fit_beside(records, of_lines)?;
@@ -44,7 +46,10 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
     let validation = match &args.validate {
         Some(path) => {
             let other = reading::read(path, &args.read, true)?.0.detrended(estimator.detrend);
-            Some((path.display().to_string(), fit.operator(0).polynomial_fit.quality(&[other])?))
+            Some((
+                path.display().to_string(),
+                fit.operator(0).polynomial_fit.quality(&[other])?,
+            ))
         }
         None => None,
     };
@@ -71,7 +76,12 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
                     .to_owned(),
             ));
         };
-        let svg = describing("describing", &format!("{} through the describing function", fit.form), described, &curves(&found, described));
+        let svg = describing(
+            "describing",
+            &format!("{} through the describing function", fit.form),
+            described,
+            &curves(&found, described),
+        );
         let svg = args.width.map_or(svg.clone(), |mm| with_width_mm(&svg, mm));
         write_atomically(path, |file| file.write_all(svg.as_bytes()))?;
         output::message(&format!("figure: {}", path.display()));
@@ -131,18 +141,32 @@ fn estimator(args: &IdentifyArgs) -> Result<FamilyEstimator, CliError> {
         delay_range_s: args.delay.unwrap_or(usual.delay_range_s),
         nc,
         nd,
-        individual: args.individual.iter().map(|name| coordinate(name)).collect::<Result<_, _>>()?,
+        individual: args
+            .individual
+            .iter()
+            .map(|name| coordinate(name))
+            .collect::<Result<_, _>>()?,
         run_to_run: args.run_to_run.unwrap_or(usual.run_to_run),
         // What was asked for in reading has been done.
-        detrend: if args.read.detrend == Detrend::None { usual.detrend } else { Detrend::None },
+        detrend: if args.read.detrend == Detrend::None {
+            usual.detrend
+        } else {
+            Detrend::None
+        },
         initial_state: args.initial_state.unwrap_or_default(),
-        search: if typed == SearchOptions::default() { usual.search } else { typed },
+        search: if typed == SearchOptions::default() {
+            usual.search
+        } else {
+            typed
+        },
         ..usual
     })
 }
 
 /// nc and nd from `--orders nc=..,nd=..`.
-fn noise_orders(args: &IdentifyArgs) -> Result<(std::ops::RangeInclusive<usize>, std::ops::RangeInclusive<usize>), CliError> {
+fn noise_orders(
+    args: &IdentifyArgs,
+) -> Result<(std::ops::RangeInclusive<usize>, std::ops::RangeInclusive<usize>), CliError> {
     let (mut nc, mut nd) = (0..=0, 0..=HIGHEST_NOISE_ORDER);
     for (name, value) in orders::parse_pairs(args.orders.as_deref().unwrap_or_default()).map_err(CliError::Usage)? {
         let range = orders::parse_range(&value).map_err(|e| CliError::Usage(format!("--orders {name}: {e}")))?;
@@ -185,12 +209,21 @@ fn coordinate(name: &str) -> Result<Coordinate, CliError> {
 /// `population`, `none`, `NAME=CENTRE:SPREAD,...`, or the JSON of another fit.
 fn prior(text: &str) -> Result<OperatorPrior, CliError> {
     let path = Path::new(text);
-    if path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("json")) {
+    if path
+        .extension()
+        .is_none_or(|ending| !ending.eq_ignore_ascii_case("json"))
+    {
         return Ok(text.parse()?);
     }
-    let wrong = |why: &str| CliError::Usage(format!("--prior {text}: {why}; give the output of `hoid identify --json`"));
+    let wrong = |why: &str| {
+        CliError::Usage(format!(
+            "--prior {text}: {why}; give the output of `hoid identify --json`"
+        ))
+    };
     let result: Value = serde_json::from_str(&read_text(path)?).map_err(|error| wrong(&error.to_string()))?;
-    let parameters = result["parameters"].as_array().ok_or_else(|| wrong("it has no parameters"))?;
+    let parameters = result["parameters"]
+        .as_array()
+        .ok_or_else(|| wrong("it has no parameters"))?;
     let entry = |p: &Value| {
         let name = p["name"].as_str()?;
         let (value, error) = (p["value"].as_f64()?, p["standard_error"].as_f64()?);
@@ -257,10 +290,9 @@ fn curves(found: &Found<'_>, described: &Description) -> Vec<ModelCurve> {
             operator.response(omega) * turn(omega)
         })
     };
-    let form: Form = found.fit.form;
-    let mut all = vec![curve(&format!("{form}, prediction error"), operator)];
+    let mut all = vec![curve("prediction error", operator)];
     if let Some(lines) = &found.fit.lines {
-        all.push(curve(&format!("{form}, at the lines"), &lines.operator));
+        all.push(curve("fit at the lines", &lines.operator));
     }
     all
 }

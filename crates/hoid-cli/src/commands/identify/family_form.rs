@@ -160,20 +160,30 @@ impl Found<'_> {
             quality.vaf_prediction,
             quality.vaf_simulation,
             fit.coherent_share.map_or(String::new(), |share| format!(
-                "; at the lines {:.0} % of the power of u is coherent with the excitation",
-                100.0 * share
+                "; at the lines the mean coherence of u with the excitation is {:.2}",
+                share
             ))
         ));
         page.push_str(&format!("Search: {}.\n", fit.termination));
-        for entry in fit.prior.entries() {
-            page.push_str(&format!(
-                "Prior: {} = {} within a factor of {:.2} ({}).\n",
-                entry.parameter,
-                entry.centre,
-                entry.spread.exp(),
-                entry.source
-            ));
-        }
+        let entries = fit.prior.entries();
+        let entry = |e: &hoid_ident::family::ParameterPrior| {
+            format!(
+                "{} = {} within a factor of {:.2}",
+                e.parameter,
+                e.centre,
+                e.spread.exp()
+            )
+        };
+        let mut sources: Vec<&str> = entries.iter().map(|e| e.source.as_str()).collect();
+        sources.dedup();
+        page.push_str(&match entries {
+            [] => "Prior: none.\n".to_owned(),
+            all => format!(
+                "Prior: {} ({}).\n",
+                all.iter().map(entry).collect::<Vec<_>>().join(", "),
+                sources.join("; ")
+            ),
+        });
         Ok(page)
     }
 
@@ -304,7 +314,8 @@ impl Found<'_> {
     fn agreement_json(&self) -> Value {
         self.fit.agreement.as_ref().map_or(Value::Null, |agreement| {
             let row = |r: &hoid_ident::family::AgreementRow| {
-                let pair = |(value, error): (f64, f64)| json!({"value": number(value), "standard_error": number(error)});
+                let pair =
+                    |(value, error): (f64, f64)| json!({"value": number(value), "standard_error": number(error)});
                 json!({
                     "coordinate": r.coordinate.name(),
                     "prediction_error": pair(r.prediction_error),
@@ -367,8 +378,16 @@ fn with_error(value: f64, error: Option<f64>) -> String {
 fn parameters(of: &OperatorOfRecord) -> String {
     let mut rows = text::table(&["parameter", "value", "95 % from", "to", "of it prior", ""]);
     for p in &of.parameters {
-        let end = |v: f64| if v.is_infinite() { "open".to_owned() } else { significant(v) };
-        let (low, high) = p.interval.map_or_else(Default::default, |(low, high)| (end(low), end(high)));
+        let end = |v: f64| {
+            if v.is_infinite() {
+                "open".to_owned()
+            } else {
+                significant(v)
+            }
+        };
+        let (low, high) = p
+            .interval
+            .map_or_else(Default::default, |(low, high)| (end(low), end(high)));
         let share = if p.prior_share > 0.0 {
             format!("{:.0} %", 100.0 * p.prior_share)
         } else {
@@ -477,7 +496,10 @@ fn covariance(operator: &FamilyOperator, covariance: Option<&[f64]>) -> Value {
     let p = coordinates.len();
     let names: Vec<&str> = coordinates.iter().map(|c| c.name()).collect();
     covariance.map_or(Value::Null, |c| {
-        let rows: Vec<Vec<Value>> = c.chunks(p).map(|row| row.iter().map(|v| number(*v)).collect()).collect();
+        let rows: Vec<Vec<Value>> = c
+            .chunks(p)
+            .map(|row| row.iter().map(|v| number(*v)).collect())
+            .collect();
         json!({"coordinates": names, "values": operator.coordinates(), "matrix": rows})
     })
 }
