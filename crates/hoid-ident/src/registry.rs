@@ -69,8 +69,8 @@ pub fn estimators() -> Vec<MethodSpec> {
                 operator_prior(),
                 excitation(),
                 period(),
-                noise_orders(),
-                family_delay(),
+                orders(),
+                delay(),
                 individual(),
                 run_to_run(),
                 initial_state(),
@@ -124,7 +124,7 @@ fn orders() -> Setting {
     setting(
         "orders",
         Kind::Named(&Kind::Count),
-        "the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2",
+        "the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2; grey-box nc=0,nd=0..24 of its noise",
         "Orders, each a number or a range to search, as nb=2,nc=0,nd=1..4,nf=2; nb counts b0, b1, ...",
     )
 }
@@ -197,19 +197,6 @@ fn period() -> Setting {
         .bounds(Bounds::PositiveFinite)
 }
 
-fn noise_orders() -> Setting {
-    setting(
-        "orders",
-        Kind::Named(&Kind::Count),
-        "nc=0,nd=0..24",
-        "Orders of the noise model, each a number or a range to search",
-    )
-}
-
-fn family_delay() -> Setting {
-    setting("delay", Kind::Span, "0.02..0.8", "Shortest and longest delay tau_e").unit("s")
-}
-
 fn run_to_run() -> Setting {
     let usual = FamilyEstimator::default().run_to_run.to_string();
     let help =
@@ -218,7 +205,13 @@ fn run_to_run() -> Setting {
 }
 
 fn delay() -> Setting {
-    setting("delay", Kind::Span, "0.05..0.6", "Shortest and longest delay tau_e").unit("s")
+    setting(
+        "delay",
+        Kind::Span,
+        "0.05..0.6; of the family 0.02..0.8",
+        "Shortest and longest delay tau_e",
+    )
+    .unit("s")
 }
 
 fn individual() -> Setting {
@@ -226,7 +219,7 @@ fn individual() -> Setting {
         "individual",
         Kind::Channel,
         "",
-        "Parameters that each record has for itself, as K_e,T_L",
+        "Parameters that each record has for itself, as K,T_L",
     )
 }
 
