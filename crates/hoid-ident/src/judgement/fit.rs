@@ -306,8 +306,10 @@ mod tests {
         };
         let verdict = fitted(&Estimator::new(Structure::Ar, orders), &white);
         assert!(kinds(&verdict).is_empty(), "{verdict}");
-        let coloured =
-            Record::of_output(record.sample_time(), Channel::new("u", "", record.output().to_vec())).unwrap();
+        let shocks = noise(3001);
+        let moving_average = shocks.windows(2).map(|w| w[1] + 0.9 * w[0]).collect();
+        let output = Channel::new("u", "", moving_average);
+        let coloured = Record::of_output(record.sample_time(), output).unwrap();
         let verdict = fitted(&Estimator::new(Structure::Ar, orders), &coloured);
         assert_eq!(kinds(&verdict), ["residuals-not-white"], "{verdict}");
     }

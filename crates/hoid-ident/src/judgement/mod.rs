@@ -26,4 +26,4 @@ mod operator;
 pub(crate) mod residuals;
 mod sigmoid;
 
-pub use operator::{gain_findings, neuromuscular_finding, pole_findings};
+pub use operator::{gain_findings, is_open, neuromuscular_finding, pole_findings};

@@ -17,7 +17,7 @@ const LARGEST_DAMPING: f64 = 3.0;
 
 /// True where a value stands less than two of its standard errors from zero. A value without a
 /// standard error was given, not estimated.
-pub(super) fn is_open(e: &Estimate) -> bool {
+pub fn is_open(e: &Estimate) -> bool {
     e.standard_error
         .is_some_and(|error| e.value.abs() < LEAST_ERRORS * error)
 }
