@@ -6,7 +6,7 @@
 //! | kind | what was observed |
 //! |---|---|
 //! | `not-converged`, `border` | how the search ended |
-//! | `delay-at-bound` | the delay lies at the end of the range in which it was sought |
+//! | `delay-at-bound`, `parameter-at-bound` | the delay lies at the end of its range, another at a bound |
 //! | `unstable` | the model from e to u is unstable |
 //! | `gain`, `undetermined-parameter` | standard errors as large as the values |
 //! | `not-convertible` | coefficients that stand for no operator |

@@ -8,7 +8,7 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate},
 };
 
-use crate::Termination;
+use crate::{Reason, Termination};
 
 /// Standard errors from zero below which a value counts as not determined.
 const LEAST_ERRORS: f64 = 2.0;
@@ -102,7 +102,6 @@ pub(super) fn delay_finding(tau_s: f64, (low, high): (f64, f64), of: &str) -> Op
 
 /// How the search ended, where that matters.
 pub(super) fn search_finding(termination: Termination) -> Option<Finding> {
-    use crate::Reason;
     match termination.reason {
         Reason::Border => Some(Finding::doubt(
             "border",
@@ -122,7 +121,6 @@ mod tests {
     use hoid_model::OperatorParameters;
 
     use super::*;
-    use crate::Reason;
 
     fn ts() -> SampleTime {
         SampleTime::HUNDREDTH
