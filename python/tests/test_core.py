@@ -194,6 +194,22 @@ def test_a_describing_function(c1: pyhoid.Record, fit: pyhoid.Fit) -> None:
         pyhoid.describing_function(c1, start=0, stop=50)
 
 
+def test_fits_and_traces_say_what_they_are_worth(c1: pyhoid.Record, c4: pyhoid.Record) -> None:
+    fit = pyhoid.identify(c1, "bj", nk=29, nd=1)
+    assert fit.verdict == pyhoid.Verdict("trustworthy", [], []), fit.verdict
+    assert repr(fit.verdict) == "Verdict: trustworthy"
+    poor = pyhoid.identify(c1, "oe", nk=29).verdict
+    assert poor.level == "doubtful" and any("noise model" in reason for reason in poor.reasons)
+    change = pyhoid.identify(c1, "time-varying").verdict
+    assert change.level == "trustworthy" and any("no change" in note for note in change.notes)
+    trace = pyhoid.track(c4, "physical", nk=29, nd=1)
+    assert trace.verdict.level == "trustworthy", trace.verdict
+    start = pyhoid.Tracker("rpem", nk=29, nd=1, record=c4.span(0, 30)).start_fit
+    assert start is not None
+    with pytest.raises(pyhoid.DataError, match="no records"):
+        _ = start.verdict
+
+
 def test_a_description_with_its_verdict(c1: pyhoid.Record) -> None:
     runs = [pyhoid.simulate("C1", seed=1, replication=k) for k in range(4)]
     found = pyhoid.describe(runs, controlled_element="90/(s(s+6))")

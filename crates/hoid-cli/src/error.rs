@@ -2,7 +2,7 @@
 
 use hoid_ident::IdentError;
 use hoid_io::{IoError, ScenarioFileError};
-use hoid_model::ModelError;
+use hoid_model::{ModelError, Verdict, VerdictLevel};
 use hoid_report::ReportError;
 use hoid_sim::SimError;
 use hoid_study::StudyError;
@@ -44,6 +44,20 @@ pub enum CliError {
 }
 
 impl CliError {
+    /// What follows from the verdict on a result that has been printed.
+    ///
+    /// # Errors
+    /// [`CliError::NotDetermined`] where the data do not determine what was asked.
+    pub fn of_verdict(verdict: &Verdict) -> Result<(), Self> {
+        match verdict.level {
+            VerdictLevel::NotDetermined => {
+                let reasons: Vec<&str> = verdict.reasons().collect();
+                Err(Self::NotDetermined(reasons.join("; ")))
+            }
+            VerdictLevel::Trustworthy | VerdictLevel::Doubtful => Ok(()),
+        }
+    }
+
     /// 2 for wrong usage, 1 for data and tasks that give no result.
     pub fn exit_code(&self) -> u8 {
         match self {

@@ -173,6 +173,7 @@ fn quality(q: &GoodnessOfFit, fit: &Fit) -> Value {
 
 /// Everything that `identify` found.
 pub struct Identified<'a> {
+    pub verdict: &'a Verdict,
     pub files: &'a [String],
     pub records: &'a [Record],
     pub accounts: &'a [Account],
@@ -207,6 +208,7 @@ impl Identified<'_> {
         set("hoid", json!(env!("CARGO_PKG_VERSION")));
         set("records", records(self.files, self.records, self.accounts));
         set("warnings", warnings(self.files, self.accounts));
+        set("verdict", verdict(self.verdict));
         let structure = fit.model().structure().name();
         set(
             "structure",

@@ -7,7 +7,7 @@ use hoid_ident::{
     validation::{GoodnessOfFit, Validation},
 };
 use hoid_model::{
-    NotConvertible, Record,
+    NotConvertible, Record, Verdict,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
 use hoid_report::numbers;
@@ -40,6 +40,11 @@ pub fn table(header: &[&str]) -> Table {
 /// Value and standard error as two texts with the digits that the error allows.
 pub fn with_uncertainty(e: &Estimate) -> (String, String) {
     numbers::with_uncertainty(e.value, e.standard_error)
+}
+
+/// What the result is worth, on top of it.
+pub fn verdict(verdict: &Verdict) -> String {
+    format!("{verdict}\n\n")
 }
 
 /// The records in use, and what was done to them.

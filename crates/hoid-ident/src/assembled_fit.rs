@@ -56,6 +56,7 @@ pub(crate) fn assembled_fit(
         start,
         output_variance: output_variance(&criterion.data, criterion.first),
         robust: false,
+        instrumented: false,
         physical: None,
     })
 }

@@ -200,6 +200,7 @@ mod tests {
             start: String::new(),
             output_variance: 1.0,
             robust: false,
+            instrumented: false,
             physical: None,
         }
     }

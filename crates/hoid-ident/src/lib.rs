@@ -63,6 +63,7 @@
 //! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
 //! | [`SigmoidChange`] | gains that follow a sigmoid, with the time and the rate of the change |
 //! | [`frequency`] | describing function, coherence, remnant spectrum and margins by Fourier coefficients |
+//! | [`judgement`] | what speaks for and against a fit: [`Fit::verdict`] |
 //! | [`linalg`] | sums of products, least squares by QR, the inverse of an information matrix |
 //!
 //! and inside, each using those before it:
@@ -88,6 +89,7 @@ pub mod grey_box;
 mod informative_data;
 mod initial_guess;
 pub mod iv;
+pub mod judgement;
 pub mod linalg;
 mod multistart;
 mod noise_model;

@@ -13,7 +13,7 @@ use crate::{
     arrays::{self, Wanted, array},
     controlled_element::ControlledElement,
     errors::{Outcome, bad_option},
-    figures::{Pair, error_or_nan, pair},
+    figures::{Pair, VerdictParts, error_or_nan, pair, verdict},
     names,
 };
 
@@ -98,10 +98,8 @@ impl PyDescription {
 
     /// Level, reasons and notes.
     #[getter]
-    fn verdict(&self) -> (&'static str, Vec<String>, Vec<String>) {
-        let v = &self.found.verdict;
-        let reasons = v.reasons().map(str::to_owned).collect();
-        (v.level.name(), reasons, v.notes().map(str::to_owned).collect())
+    fn verdict(&self) -> VerdictParts {
+        verdict(&self.found.verdict)
     }
 
     /// Channel of the excitation and its period in s.

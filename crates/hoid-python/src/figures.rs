@@ -5,7 +5,7 @@ use hoid_ident::{
     validation::{GoodnessOfFit, LjungBox},
 };
 use hoid_model::{
-    NotConvertible, Orders,
+    NotConvertible, Orders, Verdict,
     margins::Margins,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
@@ -21,6 +21,14 @@ pub fn pair(e: Estimate) -> Pair {
 /// The standard error for an array: NaN where there is none.
 pub fn error_or_nan(e: Estimate) -> f64 {
     e.standard_error.unwrap_or(f64::NAN)
+}
+
+/// Level, reasons and notes.
+pub type VerdictParts = (&'static str, Vec<String>, Vec<String>);
+
+pub fn verdict(v: &Verdict) -> VerdictParts {
+    let reasons = v.reasons().map(str::to_owned).collect();
+    (v.level.name(), reasons, v.notes().map(str::to_owned).collect())
 }
 
 pub fn orders<'py>(py: Python<'py>, o: &Orders) -> PyResult<Bound<'py, PyDict>> {

@@ -15,7 +15,7 @@ use crate::{
     arrays::{self, Wanted, array, matrix},
     controlled_element::ControlledElement,
     errors::Outcome,
-    figures::{self, Pair, pair},
+    figures::{self, Pair, VerdictParts, pair},
     names,
 };
 
@@ -190,6 +190,15 @@ impl PyFit {
         let fit = &self.fit;
         let quality = py.detach(|| fit.quality(&records))?;
         Ok(figures::quality(py, &quality)?)
+    }
+
+    fn verdict(&self, py: Python<'_>, records: Vec<Bound<'_, PyAny>>) -> Outcome<VerdictParts> {
+        let records = arrays::records(&records, Wanted::Only(&[]))?;
+        let found = py.detach(|| match &self.grey_box {
+            Some(grey_box) => grey_box.verdict(&records),
+            None => self.fit.verdict(&records, self.choice.as_ref()),
+        })?;
+        Ok(figures::verdict(&found))
     }
 
     fn predict<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>, horizon: usize) -> Outcome<SeriesParts<'py>> {

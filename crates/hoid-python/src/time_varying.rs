@@ -8,7 +8,7 @@ use pyo3::{prelude::*, types::PyDict};
 use crate::{
     arrays::{self, Wanted, array, matrix},
     errors::Outcome,
-    figures::{self, Pair, error_or_nan, pair},
+    figures::{self, Pair, VerdictParts, error_or_nan, pair},
 };
 
 /// The package wraps it in `pyhoid.TimeVaryingFit`.
@@ -117,6 +117,12 @@ impl PyTimeVaryingFit {
         let record = arrays::record(record, Wanted::Only(&[]))?;
         let found = py.detach(|| self.fit.simulate(&record))?;
         Ok((found.first, array(py, found.values)))
+    }
+
+    fn verdict(&self, py: Python<'_>, records: Vec<Bound<'_, PyAny>>) -> Outcome<VerdictParts> {
+        let records = arrays::records(&records, Wanted::Only(&[]))?;
+        let found = py.detach(|| self.fit.verdict(&records))?;
+        Ok(figures::verdict(&found))
     }
 
     /// Whiteness of the residuals of a record.

@@ -143,6 +143,13 @@ impl PyTrace {
         Some(PyFit::new(fit, self.choice.clone(), None, 1))
     }
 
+    /// What the trace is worth, on the record that it was made of.
+    fn verdict(&self, py: Python<'_>, record: &Bound<'_, PyAny>) -> Outcome<figures::VerdictParts> {
+        let record = arrays::record(record, Wanted::Only(&[]))?;
+        let found = py.detach(|| self.trace.verdict(&record, self.choice.as_ref()))?;
+        Ok(figures::verdict(&found))
+    }
+
     /// All columns by name, as in a trace file; whole numbers stay whole.
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let trace = &self.trace;

@@ -36,6 +36,7 @@
 //! | `live` | [`Live`]: the warm-up of a stream, then its tracker |
 //! | `over_record`, `smoother` | [`track()`]: a record; the two-sided estimate of a recorded run |
 //! | `trace`, `columns`, `summary`, `in_words` | [`Trace`]: the estimate at every sample, as columns and in words |
+//! | `judgement` | what a trace, and the estimate of a moment, is worth: [`Trace::verdict`] |
 //! | `change` | [`Change`]: when a person changed |
 //!
 //! **A recursion starts with what is known.** By default it is the batch fit of the first third of
@@ -53,6 +54,7 @@ mod columns;
 mod forgetting;
 mod gain;
 mod in_words;
+mod judgement;
 mod kernel;
 mod live;
 mod memory;

@@ -45,6 +45,7 @@ from .time_varying import TimeVaryingFit
 from .trace import Trace
 from .tracker import Tracker
 from .tracking import track
+from .verdict import Verdict
 
 if TYPE_CHECKING:
     from . import dask as dask
@@ -79,6 +80,7 @@ __all__ = [
     "Trace",
     "Tracker",
     "Validation",
+    "Verdict",
     "__version__",
     "convert",
     "describe",

@@ -15,6 +15,7 @@ from ._arrays import FloatArray, signal
 from .errors import DataError, NotConvertibleError
 from .estimates import UNITS, Estimate, Operator, Remnant, estimates
 from .record import Record
+from .verdict import Verdict
 
 if TYPE_CHECKING:
     import control
@@ -101,6 +102,7 @@ class Fit:
         self.records: tuple[Record, ...] = tuple(records)
         self.settings: dict[str, Any] = dict(settings or {})
         self._quality: dict[str, float] | None = None
+        self._verdict: Verdict | None = None
 
     @property
     def structure(self) -> str:
@@ -219,6 +221,21 @@ class Fit:
         if self._quality is None:
             self._quality = self._native.quality(list(self.records))
         return self._quality
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the fit is worth on its records: `level`, `reasons` and `notes`.
+
+        Raises
+        ------
+        DataError
+            For a fit without records, such as the start of a `Tracker`.
+        """
+        if not self.records:
+            raise DataError("the fit has no records to be judged on; a fit by identify has them")
+        if self._verdict is None:
+            self._verdict = Verdict(*self._native.verdict(list(self.records)))
+        return self._verdict
 
     @property
     def candidates(self) -> list[dict[str, Any]]:

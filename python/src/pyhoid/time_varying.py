@@ -12,6 +12,7 @@ from ._arrays import FloatArray, signal
 from .estimates import Estimate, Operator
 from .fit import Series
 from .record import Record
+from .verdict import Verdict
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,6 +79,11 @@ class TimeVaryingFit:
     def termination(self) -> dict[str, Any]:
         """How the search ended."""
         return self._native.termination
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the fit is worth on its records: `level`, `reasons` and `notes`."""
+        return Verdict(*self._native.verdict(list(self.records)))
 
     @property
     def change(self) -> dict[str, Any]:

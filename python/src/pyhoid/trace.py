@@ -15,6 +15,7 @@ from ._arrays import FloatArray
 from .estimates import UNITS, Estimate, Operator
 from .fit import Fit
 from .record import Record
+from .verdict import Verdict
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,6 +47,7 @@ class Trace:
         self.record = record
         self.settings: dict[str, Any] = dict(settings or {})
         self._columns: dict[str, npt.NDArray[Any]] | None = None
+        self._verdict: Verdict | None = None
 
     @property
     def columns(self) -> dict[str, npt.NDArray[Any]]:
@@ -107,6 +109,13 @@ class Trace:
     def counts(self) -> dict[str, int]:
         """samples, skipped, steps_shortened."""
         return self._native.counts
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the trace is worth: `level`, `reasons` and `notes`."""
+        if self._verdict is None:
+            self._verdict = Verdict(*self._native.verdict(self.record))
+        return self._verdict
 
     @property
     def changes(self) -> list[dict[str, Any]]:

@@ -12,7 +12,7 @@ use super::{
     arx_response::arx_response,
     choice::{Candidate, FormFigures, choose},
     clusters::{self, Covariances},
-    judgement::{Judged, ResidualMeasures, findings, residual_measures},
+    judgement::{Judged, findings},
     line_fit::{LineFit, by_simplicity, line_fit},
     lines::LineData,
     noise::NoiseProducts,
@@ -30,6 +30,7 @@ use crate::{
     frequency::{DescribingFunction, DescriptionOptions, describe_runs},
     grey_box::parametrisation::Parametrisation,
     informative_data,
+    judgement::residuals::ResidualMeasures,
     optimize::minimise,
 };
 
@@ -557,6 +558,7 @@ impl FamilyEstimator {
             held,
             output_variance: output_variance(&fit.criterion.data, fit.criterion.first),
             robust: false,
+            instrumented: false,
             physical: Some(Box::new(Physical {
                 parameters: estimates,
                 free: p,
@@ -686,7 +688,7 @@ fn residuals(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> ResidualMeas
         .zip(data)
         .map(|(eps, d)| (eps.as_slice(), &d.e[first..first + eps.len()]))
         .collect();
-    residual_measures(&pairs, fit.layout().sample_time.s())
+    ResidualMeasures::of(&pairs, fit.layout().sample_time.s())
 }
 
 /// Mean squared coherence of the lines.

@@ -1,21 +1,13 @@
 //! What speaks for and against a fit of the family.
 //!
 //! Each rule is one observation with its own kind ([`hoid_model::Finding`]); the limits are stated
-//! where they are used. Limits on residuals are sizes and not levels of significance: with the
-//! samples of ten runs every model of a person is refuted by a test, and what matters is how much
-//! the model misses.
+//! where they are used; those on residuals are shared with all fits.
 
 use hoid_model::Finding;
 
 use super::{agreement::Agreement, clusters::ClusterKind, line_fit::LineFit, parameter::Parameter, result::FreeModel};
-use crate::Termination;
+use crate::{Termination, judgement::residuals::ResidualMeasures};
 
-/// Autocorrelation of the residuals beyond which the noise model is too poor.
-const LARGEST_AUTOCORRELATION: f64 = 0.1;
-/// Correlation of the residuals with earlier errors beyond which the operator misses something.
-const LARGEST_CROSS_CORRELATION: f64 = 0.1;
-/// Part of the sum of squares in one sample beyond which it carries the fit.
-const LARGEST_LEVERAGE: f64 = 0.05;
 /// chi^2 per degree of freedom at the lines beyond which the describing function is missed.
 const LARGEST_REDUCED_CHI_SQUARED: f64 = 3.0;
 /// Level below which methods do not agree, and below which a free model refutes the form.
@@ -46,53 +38,6 @@ pub(super) struct Judged<'a> {
     pub response_error: Option<f64>,
 }
 
-/// How far the residuals are from white.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct ResidualMeasures {
-    /// Largest modulus of the autocorrelation over lags 1 to 25.
-    pub autocorrelation: f64,
-    /// Largest modulus of the correlation with e at lags of 0 to 0.6 s before.
-    pub cross_correlation: f64,
-    /// Largest part of the sum of squares in one sample.
-    pub leverage: f64,
-    /// Where that is: record and sample.
-    pub at: (usize, usize),
-}
-
-/// Measures of the residuals of all records, with the error that belongs to each residual.
-pub(super) fn residual_measures(records: &[(&[f64], &[f64])], sample_time_s: f64) -> ResidualMeasures {
-    let total: f64 = records.iter().flat_map(|(eps, _)| eps.iter()).map(|x| x * x).sum();
-    let error_power: f64 = records.iter().flat_map(|(_, e)| e.iter()).map(|x| x * x).sum();
-    let mut measures = ResidualMeasures::default();
-    if total <= 0.0 || error_power <= 0.0 {
-        return measures;
-    }
-    let product = |lag: usize, of_error: bool| -> f64 {
-        let one = |(eps, e): &(&[f64], &[f64])| {
-            let past = if of_error { e } else { eps };
-            (lag..eps.len()).map(|t| eps[t] * past[t - lag]).sum::<f64>()
-        };
-        records.iter().map(one).sum()
-    };
-    for lag in 1..=25 {
-        measures.autocorrelation = measures.autocorrelation.max((product(lag, false) / total).abs());
-    }
-    let longest = (0.6 / sample_time_s).round().min(600.0) as usize;
-    for lag in 0..=longest {
-        let correlation = product(lag, true) / (total * error_power).sqrt();
-        measures.cross_correlation = measures.cross_correlation.max(correlation.abs());
-    }
-    for (record, (eps, _)) in records.iter().enumerate() {
-        for (t, x) in eps.iter().enumerate() {
-            if x * x / total > measures.leverage {
-                measures.leverage = x * x / total;
-                measures.at = (record, t);
-            }
-        }
-    }
-    measures
-}
-
 /// All findings.
 pub(super) fn findings(judged: &Judged<'_>) -> Vec<Finding> {
     let mut all = Vec::new();
@@ -118,7 +63,7 @@ pub(super) fn findings(judged: &Judged<'_>) -> Vec<Finding> {
         ));
     }
     determined(judged, &mut all);
-    residuals(judged, &mut all);
+    all.extend(judged.residuals.findings());
     methods(judged, &mut all);
     if let Some(ratio) = judged.error_ratio.filter(|r| *r > NOTED_ERROR_RATIO) {
         let what = match judged.cluster_kind {
@@ -201,39 +146,6 @@ fn determined(judged: &Judged<'_>, all: &mut Vec<Finding>) {
         all.push(Finding::note(
             "undetermined-parameter",
             format!("{} {verb} not determined by the data", open.join(", ")),
-        ));
-    }
-}
-
-fn residuals(judged: &Judged<'_>, all: &mut Vec<Finding>) {
-    let m = judged.residuals;
-    if m.autocorrelation > LARGEST_AUTOCORRELATION {
-        all.push(Finding::doubt(
-            "residuals-not-white",
-            format!(
-                "the residuals are correlated by {:.2} with their own past: the noise model is too poor",
-                m.autocorrelation
-            ),
-        ));
-    }
-    if m.cross_correlation > LARGEST_CROSS_CORRELATION {
-        all.push(Finding::doubt(
-            "structure",
-            format!(
-                "the residuals are correlated by {:.2} with past errors: the operator misses something of the response",
-                m.cross_correlation
-            ),
-        ));
-    }
-    if m.leverage > LARGEST_LEVERAGE {
-        all.push(Finding::doubt(
-            "leverage",
-            format!(
-                "one sample (record {}, residual {}) makes {:.0} % of the sum of squares: look at it, or leave it out",
-                m.at.0 + 1,
-                m.at.1,
-                100.0 * m.leverage
-            ),
         ));
     }
 }

@@ -276,6 +276,7 @@ impl GreyBox {
                 held,
                 output_variance: output_variance(&criterion.data, criterion.first),
                 robust: false,
+                instrumented: false,
                 physical: None,
             });
         }

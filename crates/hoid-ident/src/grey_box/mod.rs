@@ -25,7 +25,7 @@
 //! | `result` | the fit with its uncertainty |
 
 mod estimator;
-mod layout;
+pub(crate) mod layout;
 pub(crate) mod objective;
 pub(crate) mod parametrisation;
 mod result;

@@ -116,6 +116,7 @@ impl InstrumentalVariable {
         };
         Ok(Fit {
             covariance: solution.covariance.filter(|_| !exact),
+            instrumented: true,
             ..assembled_fit(criterion, self.method.structure(), sample_time, minimum)?
         })
     }

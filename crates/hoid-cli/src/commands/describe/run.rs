@@ -4,7 +4,7 @@ use std::path::Path;
 
 use hoid_ident::frequency::{Description, DescriptionOptions, describe_runs};
 use hoid_io::{Offset, write_atomically};
-use hoid_model::{Detrend, Record, VerdictLevel};
+use hoid_model::{Detrend, Record};
 use hoid_report::figures::{describing, with_width_mm};
 
 use super::form::Described;
@@ -59,11 +59,7 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
     } else {
         output::print(&described.page());
     }
-    if found.verdict.level == VerdictLevel::NotDetermined {
-        let reasons: Vec<&str> = found.verdict.reasons().collect();
-        return Err(CliError::NotDetermined(reasons.join("; ")));
-    }
-    Ok(())
+    CliError::of_verdict(&found.verdict)
 }
 
 /// Figures are SVG: known before anything is read.

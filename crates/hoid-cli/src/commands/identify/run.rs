@@ -62,7 +62,12 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         .map(|element| loop_margins(&fit, element));
     let validations = records.iter().map(|r| fit.validate(r)).collect::<Result<Vec<_>, _>>()?;
     let ahead = args.horizon.map(|k| prediction_ahead(&fit, &records, k)).transpose()?;
+    let verdict = match &grey_box {
+        Some(found) => found.verdict(&records)?,
+        None => fit.verdict(&records, choice.as_ref())?,
+    };
     let identified = Identified {
+        verdict: &verdict,
         files: &files,
         records: &records,
         accounts: &accounts,
@@ -110,7 +115,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     } else {
         output::print(&page(&identified));
     }
-    Ok(())
+    CliError::of_verdict(&verdict)
 }
 
 /// VAF and NRMSE of the prediction k samples ahead, over all records together.
@@ -133,7 +138,8 @@ fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> MarginEstima
 
 fn page(found: &Identified<'_>) -> String {
     let fit = found.fit;
-    let mut page = text::records(found.files, found.records, found.accounts);
+    let mut page = text::verdict(found.verdict);
+    page.push_str(&text::records(found.files, found.records, found.accounts));
     page.push('\n');
     if let Some(choice) = found.choice {
         page.push_str(&text::candidates(choice));

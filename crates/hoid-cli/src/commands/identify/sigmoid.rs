@@ -5,7 +5,7 @@ use hoid_ident::{
     validation::{LjungBox, whiteness},
 };
 use hoid_io::write_record;
-use hoid_model::{Channel, Record, uncertainty::Estimate};
+use hoid_model::{Channel, Record, Verdict, uncertainty::Estimate};
 use hoid_report::numbers;
 use serde_json::{Map, Value, json};
 
@@ -50,8 +50,10 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
         .iter()
         .map(test)
         .collect::<Result<Vec<Option<LjungBox>>, CliError>>()?;
+    let verdict = fit.verdict(records)?;
     let found = Found {
         fit: &fit,
+        verdict: &verdict,
         files,
         records,
         accounts,
@@ -63,7 +65,7 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
     } else {
         output::print(&found.page());
     }
-    Ok(())
+    CliError::of_verdict(&verdict)
 }
 
 /// nd from `--orders nd=N`; the other orders are those of the operator.
@@ -107,6 +109,7 @@ fn trace(fit: &SigmoidFit, record: &Record) -> Result<Record, CliError> {
 /// Everything that was found.
 struct Found<'a> {
     fit: &'a SigmoidFit,
+    verdict: &'a Verdict,
     files: &'a [String],
     records: &'a [Record],
     accounts: &'a [Account],
@@ -119,13 +122,15 @@ impl Found<'_> {
     fn page(&self) -> String {
         let Self {
             fit,
+            verdict,
             files,
             records,
             accounts,
             tests,
             settings,
         } = *self;
-        let mut page = text::records(files, records, accounts);
+        let mut page = text::verdict(verdict);
+        page.push_str(&text::records(files, records, accounts));
         let mut rows = text::table(&["parameter", "value", "standard error", "unit", ""]);
         for p in fit.parameters() {
             let (value, error) = text::with_uncertainty(&p.estimate);
@@ -188,6 +193,7 @@ impl Found<'_> {
     fn to_json(&self) -> Value {
         let Self {
             fit,
+            verdict,
             files,
             records,
             accounts,
@@ -215,6 +221,7 @@ impl Found<'_> {
             "hoid": env!("CARGO_PKG_VERSION"),
             "records": json::records(files, records, accounts),
             "warnings": json::warnings(files, accounts),
+            "verdict": json::verdict(verdict),
             "structure": "time-varying",
             "parameters": parameters,
             "loss": number(fit.loss()),

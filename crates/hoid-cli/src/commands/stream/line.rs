@@ -1,7 +1,7 @@
 //! One line of the output.
 
 use hoid_model::{
-    NotConvertible,
+    NotConvertible, VerdictLevel,
     uncertainty::{Estimate, OperatorEstimate},
 };
 use hoid_track::{Change, Live, Tracker};
@@ -32,6 +32,7 @@ struct Line<'a> {
     t: Option<f64>,
     parameters: Option<Parameters<'a>>,
     operator: Option<Operator>,
+    level: &'static str,
     innovation: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     change: Option<ChangeLine>,
@@ -134,14 +135,17 @@ impl Standing<'_> {
             Live::Tracking(tracker) => Some(tracker),
             Live::Collecting(_) => None,
         };
+        let operator = tracker.map(Tracker::operator);
+        let level = tracker.zip(operator.as_ref()).map(|(t, o)| t.level(o));
         let line = Line {
+            level: level.unwrap_or(VerdictLevel::NotDetermined).name(),
             t: self.t,
             parameters: tracker.map(|t| Parameters {
                 names: self.names,
                 estimates: t.parameters(),
             }),
             // Other orders have no meaning as an operator at all.
-            operator: tracker.map(Tracker::operator).and_then(|o| match o {
+            operator: operator.and_then(|o| match o {
                 Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. }) => None,
                 other => Some(Operator(other)),
             }),

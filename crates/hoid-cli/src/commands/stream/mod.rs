@@ -69,8 +69,9 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
             Err(e) => return Err(CliError::Stream(format!("standard output cannot be written: {e}"))),
         }
     }
-    output::message(&lock(&session).summary());
-    Ok(())
+    let session = lock(&session);
+    output::message(&session.summary());
+    session.end()
 }
 
 /// Everything that a line changes.
@@ -255,6 +256,16 @@ impl Session {
         standing.write(buffer).map_err(unwritable)
     }
 
+    /// A stream that ended without an estimate has not given what was asked.
+    fn end(&self) -> Result<(), CliError> {
+        match &self.live {
+            Live::Tracking(_) => Ok(()),
+            Live::Collecting(_) => Err(CliError::NotDetermined(
+                "the stream ended within the warm-up, without an estimate; give it more samples, or a shorter --warm-up".to_owned(),
+            )),
+        }
+    }
+
     /// What there was, for the end.
     fn summary(&self) -> String {
         let c = self.counts;
@@ -291,7 +302,7 @@ fn lock(session: &Mutex<Session>) -> MutexGuard<'_, Session> {
     session.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Ends with a summary and exit code 0 at an interrupt; a line that is being written is finished
+/// Ends with a summary at an interrupt, with exit code 0 where there is an estimate; a line that is being written is finished
 /// before.
 fn end_on_interrupt(session: &Arc<Mutex<Session>>) -> Result<(), CliError> {
     let session = Arc::clone(session);
@@ -300,7 +311,7 @@ fn end_on_interrupt(session: &Arc<Mutex<Session>>) -> Result<(), CliError> {
         loop {
             if let Ok(session) = session.try_lock() {
                 output::message(&session.summary());
-                process::exit(0);
+                process::exit(session.end().map_or_else(|error| i32::from(error.exit_code()), |()| 0));
             }
             // A start fit, or a reader that takes nothing: lines are written whole, so that none is
             // cut.

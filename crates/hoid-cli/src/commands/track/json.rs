@@ -33,6 +33,7 @@ impl Tracked<'_> {
             "warnings",
             json::warnings(std::slice::from_ref(&self.file), std::slice::from_ref(self.account)),
         );
+        set("verdict", json::verdict(self.verdict));
         set("method", json!(trace.options().method.name()));
         set("structure", json!(trace.options().structure.name()));
         set("orders", json::orders(&trace.options().orders));
@@ -70,9 +71,11 @@ impl Tracked<'_> {
     fn start_json(&self, fit: &Fit, span: &Record) -> Result<Value, CliError> {
         let records = std::slice::from_ref(span);
         let validation = fit.validate(span)?;
+        let verdict = fit.verdict(records, self.choice)?;
         let operator = fit.operator();
         let remnant = (fit.orders().nd > 0).then(|| fit.remnant(RemnantDiscretisation::ZeroOrderHold));
         Ok(Identified {
+            verdict: &verdict,
             files: std::slice::from_ref(&self.file),
             records,
             accounts: std::slice::from_ref(self.account),

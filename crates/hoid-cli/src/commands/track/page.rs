@@ -19,11 +19,12 @@ impl Tracked<'_> {
     /// # Errors
     /// Those of the quality of the start fit.
     pub fn page(&self) -> Result<String, CliError> {
-        let mut page = text::records(
+        let mut page = text::verdict(self.verdict);
+        page.push_str(&text::records(
             std::slice::from_ref(&self.file),
             std::slice::from_ref(self.record),
             std::slice::from_ref(self.account),
-        );
+        ));
         if let Some(choice) = self.choice {
             page.push('\n');
             page.push_str(&text::candidates(choice));

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use hoid_ident::{Choice, Fit};
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
-use hoid_model::{NotConvertible, Record, uncertainty::OperatorEstimate};
+use hoid_model::{NotConvertible, Record, Verdict, uncertainty::OperatorEstimate};
 use hoid_track::Trace;
 
 use super::errors::relative_errors;
@@ -12,6 +12,7 @@ use crate::commands::reading::Account;
 
 /// Everything that was found.
 pub struct Tracked<'a> {
+    pub verdict: &'a Verdict,
     pub file: String,
     pub record: &'a Record,
     pub account: &'a Account,

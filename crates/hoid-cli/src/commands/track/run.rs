@@ -60,7 +60,9 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     settings.extend(reading::settings(&args.read, with_input));
     settings.push(("rows of the trace".to_owned(), format!("every {} samples", args.every)));
 
+    let verdict = trace.verdict(&record, choice.as_ref())?;
     let tracked = Tracked {
+        verdict: &verdict,
         file: args.record.display().to_string(),
         span: span.ok().filter(|_| trace.start().is_some()),
         operators: trace.operators(),
@@ -81,7 +83,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     } else {
         output::print(&tracked.page()?);
     }
-    Ok(())
+    CliError::of_verdict(&verdict)
 }
 
 /// The span of the start fit and of the search: as typed, else the first third.

@@ -1,0 +1,196 @@
+//! What results are worth, as a user reads it.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Stdio},
+};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use common::{good, hoid, json};
+
+const BOX_JENKINS: [&str; 6] = ["--structure", "bj", "--nk", "29", "--orders", "nd=1"];
+
+fn simulated(condition: &str) -> TempDir {
+    let directory = TempDir::new().unwrap();
+    let arguments = ["simulate", "--condition", condition, "--seed", "1", "--out", "c.csv"];
+    good(directory.path(), &arguments);
+    directory
+}
+
+/// The same errors, with an output that has nothing to do with them.
+fn without_response(directory: &Path) {
+    let mut state = 11_u64;
+    let mut draw = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let lines = (0..4000).map(|k| {
+        let t = f64::from(k) / 100.0;
+        format!(
+            "{t},{},{}\n",
+            (1.7 * t).sin() + 0.5 * (9.1 * t).sin() + 0.1 * draw(),
+            draw()
+        )
+    });
+    fs::write(
+        directory.join("n.csv"),
+        "t,e,u\n".to_owned() + &lines.collect::<String>(),
+    )
+    .unwrap();
+}
+
+#[test]
+fn a_clean_run_is_trustworthy_on_the_page_and_in_json() {
+    let directory = simulated("C1");
+    let d = directory.path();
+    let mut arguments = vec!["identify", "c.csv"];
+    arguments.extend(BOX_JENKINS);
+    let page = good(d, &arguments);
+    assert!(
+        page.starts_with("Verdict: trustworthy\n\nc.csv: 8192 samples"),
+        "{page}"
+    );
+    arguments.push("--json");
+    let found = json(d, &arguments);
+    assert_eq!(found["verdict"]["level"], "trustworthy");
+    assert_eq!(found["verdict"]["reasons"], serde_json::json!([]));
+    let grey = [
+        "identify",
+        "c.csv",
+        "--structure",
+        "grey-box",
+        "--remnant-order",
+        "1",
+        "--json",
+    ];
+    assert_eq!(json(d, &grey)["verdict"]["level"], "trustworthy");
+}
+
+#[test]
+fn a_delay_at_the_end_of_its_range_is_the_first_line_of_the_page() {
+    let directory = simulated("C1");
+    let d = directory.path();
+    let arguments = [
+        "identify",
+        "c.csv",
+        "--structure",
+        "bj",
+        "--nk",
+        "20..24",
+        "--orders",
+        "nd=1",
+    ];
+    let page = good(d, &arguments);
+    assert!(page.starts_with("Verdict: doubtful\n- "), "{page}");
+    assert!(page.contains("lies at the end of the range 0.190 to 0.230 s"), "{page}");
+    let oe = json(d, &["identify", "c.csv", "--structure", "oe", "--nk", "29", "--json"]);
+    let kinds: Vec<&str> = oe["verdict"]["findings"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|f| f["kind"].as_str().unwrap())
+        .collect();
+    assert!(kinds.contains(&"residuals-not-white"), "{kinds:?}");
+}
+
+#[test]
+fn what_is_not_determined_is_printed_and_ends_with_one() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    without_response(d);
+    let arguments = [
+        "identify",
+        "n.csv",
+        "--structure",
+        "fir",
+        "--nk",
+        "29",
+        "--orders",
+        "nb=3",
+    ];
+    let output = hoid(d, &arguments);
+    assert_eq!(output.status.code(), Some(1));
+    let (page, said) = (
+        String::from_utf8(output.stdout).unwrap(),
+        String::from_utf8(output.stderr).unwrap(),
+    );
+    assert!(
+        page.starts_with("Verdict: not determined\n- B does not differ"),
+        "{page}"
+    );
+    assert!(
+        page.contains("b0") && said.contains("the data do not determine"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_trace_has_the_findings_of_its_start() {
+    let directory = simulated("C4");
+    let d = directory.path();
+    let physical = ["track", "c.csv", "--nk", "29", "--orders", "nd=1", "--out", "trace.csv"];
+    let page = good(d, &physical);
+    assert!(page.starts_with("Verdict: trustworthy\n"), "{page}");
+    let rls = json(
+        d,
+        &[
+            "track",
+            "c.csv",
+            "--method",
+            "rls",
+            "--nk",
+            "29",
+            "--out",
+            "trace.csv",
+            "--json",
+        ],
+    );
+    assert_eq!(rls["verdict"]["level"], "doubtful");
+    let reasons = rls["verdict"]["reasons"].as_array().unwrap();
+    assert!(
+        reasons.iter().any(|r| r.as_str().unwrap().starts_with("start fit: ")),
+        "{reasons:?}"
+    );
+    assert!(rls["start"]["verdict"]["level"].is_string());
+}
+
+/// Lines of a stream and its exit code.
+fn streamed(directory: &Path, more: &[&str]) -> (Vec<Value>, Option<i32>) {
+    let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
+        .args([
+            "stream", "--fs", "100", "--nk", "29", "--orders", "nd=1", "--every", "500",
+        ])
+        .args(more)
+        .stdin(fs::File::open(directory.join("c.csv")).unwrap())
+        .stderr(Stdio::null())
+        .output()
+        .unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let lines = text.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    (lines, output.status.code())
+}
+
+#[test]
+fn each_line_of_a_stream_has_a_level_and_one_without_an_estimate_ends_with_one() {
+    let directory = simulated("C1");
+    let (lines, code) = streamed(directory.path(), &[]);
+    assert_eq!(code, Some(0));
+    assert_eq!(lines[0]["level"], "not determined");
+    assert_eq!(
+        lines.last().unwrap()["level"],
+        "trustworthy",
+        "{}",
+        lines.last().unwrap()
+    );
+    let (lines, code) = streamed(directory.path(), &["--warm-up", "200"]);
+    assert_eq!(code, Some(1));
+    assert!(lines.iter().all(|line| line["level"] == "not determined"));
+}

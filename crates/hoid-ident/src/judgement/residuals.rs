@@ -1,0 +1,205 @@
+//! How far residuals are from white, as sizes.
+//!
+//! With `S = sum eps^2` over all records,
+//!
+//! - the autocorrelation `sum eps(t) eps(t-k) / S` at lags of 1 to 25: what the noise model misses;
+//! - the correlation `sum eps(t) e(t-k) / sqrt(S sum e^2)` at lags of 0 to 0.6 s: what the operator
+//!   misses. It asks for the past alone, as in a closed loop later errors follow the residuals;
+//! - the leverage `max eps^2 / S`: how much of the fit hangs on one sample.
+//!
+//! Limits are sizes and not levels of significance: with the samples of ten runs every model of a
+//! person is refuted by a test, and what matters is how much the model misses. In short records
+//! chance alone gives such sizes; there the limits are what chance does not reach: four standard
+//! errors `1/sqrt(n)` of a correlation of white noise, and 20/n of the sum of squares, which one
+//! of n normal residuals exceeds with the probability 8e-6 n.
+
+use hoid_model::Finding;
+
+/// Autocorrelation of the residuals beyond which the noise model is too poor.
+const LARGEST_AUTOCORRELATION: f64 = 0.1;
+/// Correlation of the residuals with earlier errors beyond which the operator misses something.
+const LARGEST_CROSS_CORRELATION: f64 = 0.1;
+/// The same in standard errors of a correlation of white noise, for short records.
+const CHANCE_CORRELATION: f64 = 4.0;
+/// Part of the sum of squares in one sample beyond which it carries the fit.
+const LARGEST_LEVERAGE: f64 = 0.05;
+/// The same in mean squares, for short records.
+const CHANCE_LEVERAGE: f64 = 20.0;
+/// Lags of the autocorrelation.
+const LAGS: usize = 25;
+/// Longest lag of the correlation with the error, in s and in samples.
+const LONGEST_LAG_S: f64 = 0.6;
+const LONGEST_LAG: f64 = 600.0;
+
+/// How far the residuals are from white.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct ResidualMeasures {
+    /// Number of residuals.
+    pub count: usize,
+    /// Largest modulus of the autocorrelation over lags 1 to 25.
+    pub autocorrelation: f64,
+    /// Largest modulus of the correlation with e at lags of 0 to 0.6 s before; zero without e.
+    pub cross_correlation: f64,
+    /// Largest part of the sum of squares in one sample.
+    pub leverage: f64,
+    /// Where that is: record and sample.
+    pub at: (usize, usize),
+}
+
+impl ResidualMeasures {
+    /// Measures of the residuals of all records, with the error that belongs to each residual (none
+    /// for a model without an input).
+    pub fn of(records: &[(&[f64], &[f64])], sample_time_s: f64) -> Self {
+        let sum_of_squares = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
+        let total: f64 = records.iter().map(|(eps, _)| sum_of_squares(eps)).sum();
+        let error_power: f64 = records.iter().map(|(_, e)| sum_of_squares(e)).sum();
+        let mut measures = Self {
+            count: records.iter().map(|(eps, _)| eps.len()).sum(),
+            ..Self::default()
+        };
+        if total <= 0.0 {
+            return measures;
+        }
+        let product = |lag: usize, of_error: bool| -> f64 {
+            let one = |(eps, e): &(&[f64], &[f64])| {
+                let past = if of_error { e } else { eps };
+                (lag..eps.len()).map(|t| eps[t] * past[t - lag]).sum::<f64>()
+            };
+            records.iter().map(one).sum()
+        };
+        for lag in 1..=LAGS {
+            measures.autocorrelation = measures.autocorrelation.max((product(lag, false) / total).abs());
+        }
+        if error_power > 0.0 {
+            let longest = (LONGEST_LAG_S / sample_time_s).round().min(LONGEST_LAG) as usize;
+            for lag in 0..=longest {
+                let correlation = product(lag, true) / (total * error_power).sqrt();
+                measures.cross_correlation = measures.cross_correlation.max(correlation.abs());
+            }
+        }
+        for (record, (eps, _)) in records.iter().enumerate() {
+            for (t, x) in eps.iter().enumerate() {
+                if x * x / total > measures.leverage {
+                    measures.leverage = x * x / total;
+                    measures.at = (record, t);
+                }
+            }
+        }
+        measures
+    }
+
+    /// A noise model that is too poor.
+    pub fn coloured(&self) -> Option<Finding> {
+        (self.autocorrelation > LARGEST_AUTOCORRELATION.max(self.chance())).then(|| {
+            Finding::doubt(
+                "residuals-not-white",
+                format!(
+                    "the residuals are correlated by {:.2} with their own past: the noise model is too poor",
+                    self.autocorrelation
+                ),
+            )
+        })
+    }
+
+    /// An operator that misses something.
+    pub fn structure(&self) -> Option<Finding> {
+        (self.cross_correlation > LARGEST_CROSS_CORRELATION.max(self.chance())).then(|| {
+            Finding::doubt(
+                "structure",
+                format!(
+                    "the residuals are correlated by {:.2} with past errors: the operator misses something of the \
+                     response",
+                    self.cross_correlation
+                ),
+            )
+        })
+    }
+
+    /// One sample that carries the fit.
+    pub fn leverage(&self) -> Option<Finding> {
+        (self.leverage > LARGEST_LEVERAGE.max(CHANCE_LEVERAGE / self.count as f64)).then(|| {
+            Finding::doubt(
+                "leverage",
+                format!(
+                    "one sample (record {}, residual {}) makes {:.0} % of the sum of squares: look at it, or leave it out",
+                    self.at.0 + 1,
+                    self.at.1,
+                    100.0 * self.leverage
+                ),
+            )
+        })
+    }
+
+    /// All findings.
+    pub fn findings(&self) -> impl Iterator<Item = Finding> {
+        [self.coloured(), self.structure(), self.leverage()]
+            .into_iter()
+            .flatten()
+    }
+
+    fn chance(&self) -> f64 {
+        CHANCE_CORRELATION / (self.count as f64).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// White noise, uniform in -0.5 to 0.5.
+    fn white(n: usize, seed: u64) -> Vec<f64> {
+        let mut state = seed;
+        let draw = |_| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        (0..n).map(draw).collect()
+    }
+
+    fn kinds(measures: &ResidualMeasures) -> Vec<&'static str> {
+        measures.findings().map(|f| f.kind).collect()
+    }
+
+    #[test]
+    fn white_residuals_of_any_length_give_no_finding() {
+        for n in [50, 300, 3000] {
+            let (eps, e) = (white(n, 1), white(n, 2));
+            let measures = ResidualMeasures::of(&[(&eps, &e)], 0.01);
+            assert!(kinds(&measures).is_empty(), "{n}: {measures:?}");
+            assert_eq!(measures.count, n);
+        }
+    }
+
+    #[test]
+    fn each_size_has_its_finding() {
+        let (eps, e) = (white(3000, 1), white(3000, 2));
+        let coloured: Vec<f64> = (1..3000).map(|t| eps[t] + 0.3 * eps[t - 1]).collect();
+        let measures = ResidualMeasures::of(&[(&coloured, &e[1..])], 0.01);
+        assert_eq!(kinds(&measures), ["residuals-not-white"]);
+        // eps(t) + 0.3 eps(t-1): 0.3/1.09.
+        assert!((measures.autocorrelation - 0.3 / 1.09).abs() < 0.05, "{measures:?}");
+        let missed: Vec<f64> = (20..3000).map(|t| eps[t] + 0.3 * e[t - 20]).collect();
+        let measures = ResidualMeasures::of(&[(&missed, &e[20..])], 0.01);
+        assert_eq!(kinds(&measures), ["structure"]);
+        // What lies more than 0.6 s back does not count.
+        let measures = ResidualMeasures::of(&[(&missed, &e[20..])], 0.1);
+        assert!(kinds(&measures).is_empty(), "{measures:?}");
+        let mut blow = eps.clone();
+        blow[1234] = 10.0;
+        let records = [(eps.as_slice(), e.as_slice()), (blow.as_slice(), e.as_slice())];
+        let measures = ResidualMeasures::of(&records, 0.01);
+        assert_eq!((kinds(&measures), measures.at), (vec!["leverage"], (1, 1234)));
+    }
+
+    #[test]
+    fn residuals_of_zero_and_models_without_input() {
+        let measures = ResidualMeasures::of(&[(&[0.0; 9], &[1.0; 9])], 0.01);
+        assert!(kinds(&measures).is_empty());
+        assert!(kinds(&ResidualMeasures::of(&[], 0.01)).is_empty());
+        let eps: Vec<f64> = (0..2000).map(|t| (0.1 * f64::from(t)).sin()).collect();
+        let measures = ResidualMeasures::of(&[(&eps, &[])], 0.01);
+        assert_eq!(kinds(&measures), ["residuals-not-white"]);
+    }
+}
