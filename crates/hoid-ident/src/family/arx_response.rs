@@ -12,6 +12,7 @@ use crate::{Estimator, IdentError};
 
 /// Order of A.
 const POLES: usize = 16;
+const FEWEST_POLES: usize = 1;
 /// Most coefficients of B.
 const MOST_GAINS: usize = 60;
 /// Frequencies of the response, rad/s, evenly over their logarithm.
@@ -33,7 +34,12 @@ pub(super) fn arx_response(records: &[Record]) -> Result<Vec<MeasuredResponse>, 
     let mut orders = Structure::Arx.operator_orders(1);
     orders.na = POLES.min(shortest / 12).max(2);
     orders.nb = gains.max(2);
-    let fit = Estimator::new(Structure::Arx, orders).fit(records)?;
+    let fit = loop {
+        match Estimator::new(Structure::Arx, orders).fit(records) {
+            Err(IdentError::SingularRegressors { .. }) if orders.na > FEWEST_POLES => orders.na /= 2,
+            other => break other?,
+        }
+    };
     let highest = BAND_RAD_S.1.min(0.8 * ts.nyquist_rad_s());
     let omega: Vec<f64> = (0..POINTS)
         .map(|i| BAND_RAD_S.0 * (highest / BAND_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0)))

@@ -1,0 +1,159 @@
+//! Do the error bars of operators of people hold? The numbers of the page "Error bars of people".
+//!
+//! `cargo xtask slow people-coverage [PEOPLE] [FIRST] [--given] [--rows FILE]`: 2000 people by
+//! default, from the first number on; `--given` leaves out the fits that choose the form, which take
+//! ten times as long; all fits as rows of a CSV file.
+#![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
+
+#[path = "../tests/common/people_coverage/mod.rs"]
+mod people_coverage;
+
+use std::{fmt::Write as _, path::PathBuf};
+
+use hoid::model::VerdictLevel;
+use people_coverage::{
+    fits::{Outcome, Variant, outcomes},
+    people::Spread,
+    tables::{QUANTITIES, Share, coverage, median, of_quantity},
+};
+use rayon::prelude::*;
+
+const SEED: u64 = 2026;
+
+fn main() {
+    let mut arguments = std::env::args().skip(1);
+    let (mut numbers, mut rows, mut variants) = (Vec::new(), None, Variant::ALL.to_vec());
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--rows" => rows = arguments.next().map(PathBuf::from),
+            "--given" => variants.retain(|v| v.form_given),
+            number => numbers.push(number.parse::<u64>().unwrap()),
+        }
+    }
+    let people = numbers.first().copied().unwrap_or(2000);
+    let first = numbers.get(1).copied().unwrap_or(0);
+    let all: Vec<Outcome> = (first..first + people)
+        .into_par_iter()
+        .flat_map_iter(|number| outcomes(SEED, number, &variants).unwrap())
+        .collect();
+    if let Some(file) = rows {
+        std::fs::write(file, as_rows(&all)).unwrap();
+    }
+    for variant in variants {
+        let of: Vec<&Outcome> = all.iter().filter(|o| o.variant == variant).collect();
+        report(variant, &of);
+    }
+}
+
+fn report(variant: Variant, of: &[&Outcome]) {
+    println!("\n## {} ({} people)\n", variant.name(), of.len());
+    let failed = of.iter().filter(|o| o.found.is_err()).count();
+    let seconds: Vec<f64> = of.iter().map(|o| o.seconds).collect();
+    println!(
+        "{failed} failed; {:.2} s a fit in the mean, {:.2} s at most",
+        seconds.iter().sum::<f64>() / seconds.len() as f64,
+        seconds.iter().copied().fold(0.0, f64::max)
+    );
+    let right = Share::over(of.iter().filter_map(|o| Some(o.found.as_ref().ok()?.form == o.true_form)));
+    println!("\nright form: {}", right.text());
+    println!("\n| quantity | determined | coverage | form right | median width/|truth| | bias, s.e. | rms of error/s.e. | left open: coverage |");
+    println!("|---|---|---|---|---|---|---|---|");
+    let with_right_form: Vec<&Outcome> = of.iter().copied().filter(|o| o.found.as_ref().is_ok_and(|f| f.form == o.true_form)).collect();
+    for name in QUANTITIES {
+        let all = of_quantity(of, name);
+        if all.is_empty() {
+            continue;
+        }
+        let determined = Share::over(all.iter().map(|q| q.determined));
+        let errors: Vec<f64> = all
+            .iter()
+            .filter(|q| q.determined)
+            .filter_map(|q| Some((q.value - q.truth) / q.standard_error?))
+            .filter(|z| z.is_finite())
+            .collect();
+        let n = errors.len().max(1) as f64;
+        let bias = errors.iter().sum::<f64>() / n;
+        let rms = (errors.iter().map(|z| z * z).sum::<f64>() / n).sqrt();
+        let width = median(
+            all.iter()
+                .filter(|q| q.determined)
+                .filter_map(|q| q.interval.map(|(l, h)| (h - l) / q.truth.abs())),
+        );
+        let open = Share::over(all.iter().filter(|q| !q.determined).filter_map(|q| q.holds()));
+        println!(
+            "| {name} | {} | {} | {} | {:.2} | {bias:+.2} ± {:.2} | {rms:.2} | {} |",
+            determined.text(),
+            coverage(&all).text(),
+            coverage(&of_quantity(&with_right_form, name)).text(),
+            width.unwrap_or(f64::NAN),
+            1.0 / n.sqrt(),
+            open.text(),
+        );
+    }
+    by("runs", of, &[1, 2, 5, 10].map(|n| n.to_string()), |o| o.cell.runs.to_string());
+    by("sample rate, Hz", of, &[60, 100].map(|n| n.to_string()), |o| o.cell.rate_hz.to_string());
+    by("spread between runs", of, &Spread::ALL.map(|s| s.name().to_owned()), |o| o.cell.spread.name().to_owned());
+    by("true form", of, &["lead", "lead-lag", "lead2-lag"].map(str::to_owned), |o| o.true_form.to_string());
+    let kinds: Vec<String> = hoid::sim::people::RemnantKind::ALL.iter().map(ToString::to_string).collect();
+    by("remnant", of, &kinds, |o| o.cell.kind.to_string());
+    println!("\n| verdict | share | response off by, median | 90 % below | coverage of all that is determined |");
+    println!("|---|---|---|---|---|");
+    for level in VerdictLevel::ALL {
+        let such: Vec<&Outcome> = of.iter().copied().filter(|o| o.found.as_ref().is_ok_and(|f| f.level == level)).collect();
+        let mut errors: Vec<f64> = such.iter().filter_map(|o| Some(o.found.as_ref().ok()?.response_error)).collect();
+        errors.sort_by(f64::total_cmp);
+        let part = |p: f64| errors.get((p * errors.len() as f64) as usize).map_or("–".to_owned(), |e| format!("{:.1} %", 100.0 * e));
+        println!(
+            "| {level} | {} | {} | {} | {} |",
+            Share { of: such.len(), all: of.len() }.text(),
+            part(0.5),
+            part(0.9),
+            over_all(&such).text()
+        );
+    }
+}
+
+/// Coverage over all quantities that are determined, each once.
+fn over_all(of: &[&Outcome]) -> Share {
+    let each = QUANTITIES.iter().filter(|n| !n.contains("1.96")).map(|name| coverage(&of_quantity(of, name)));
+    each.fold(Share::default(), |a, b| Share { of: a.of + b.of, all: a.all + b.all })
+}
+
+fn by(what: &str, of: &[&Outcome], values: &[String], key: impl Fn(&Outcome) -> String) {
+    let names: Vec<&str> = QUANTITIES.into_iter().filter(|name| !of_quantity(of, name).is_empty()).collect();
+    println!("\n| {what} | right form | {} |", names.join(" | "));
+    println!("|---|---|{}", "---|".repeat(names.len()));
+    for value in values {
+        let such: Vec<&Outcome> = of.iter().copied().filter(|o| key(o) == *value).collect();
+        let right = Share::over(such.iter().filter_map(|o| Some(o.found.as_ref().ok()?.form == o.true_form)));
+        let cells: Vec<String> = names.iter().map(|name| coverage(&of_quantity(&such, name)).text()).collect();
+        println!("| {value} | {} | {} |", right.text(), cells.join(" | "));
+    }
+}
+
+/// One row for each quantity of each fit.
+fn as_rows(all: &[Outcome]) -> String {
+    let mut text = "person,plant,kind,rate,runs,spread,lines,given,true_form,form,level,kinds,response_error,inflation,nd,seconds,name,truth,value,se,low,high,prior_share,determined,error\n".to_owned();
+    for o in all {
+        let head = format!(
+            "{},{},{},{},{},{},{},{},{}",
+            o.person, o.cell.plant, o.cell.kind, o.cell.rate_hz, o.cell.runs, o.cell.spread.name(), o.variant.excitation, o.variant.form_given, o.true_form
+        );
+        match &o.found {
+            Err(error) => writeln!(text, "{head},,,,,,,{:.3},,,,,,,,,{}", o.seconds, error.replace(',', ";")).unwrap(),
+            Ok(f) => {
+                for q in &f.quantities {
+                    let (low, high) = q.interval.unwrap_or((f64::NAN, f64::NAN));
+                    writeln!(
+                        text,
+                        "{head},{},{},{},{:.4},{:.3},{},{:.3},{},{},{},{},{low},{high},{:.3},{},",
+                        f.form, f.level, f.kinds.join(" "), f.response_error, f.inflation, f.noise_order, o.seconds,
+                        q.name, q.truth, q.value, q.standard_error.unwrap_or(f64::NAN), q.prior_share, q.determined
+                    )
+                    .unwrap();
+                }
+            }
+        }
+    }
+    text
+}

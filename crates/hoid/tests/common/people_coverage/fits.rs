@@ -1,0 +1,183 @@
+//! The fits of a person, and what each found of each quantity.
+
+use std::time::Instant;
+
+use hoid::{
+    ident::family::{FamilyEstimator, FamilyFit, loop_measures},
+    model::{FamilyOperator, Form, VerdictLevel, uncertainty::Estimate},
+    sim::{SimError, people::Person},
+};
+
+use super::people::{Cell, recorded};
+
+/// Where the response is compared, rad/s: the band of manual control.
+const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
+
+/// How a person is fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Variant {
+    /// With the recorded disturbance, so that there is a fit at its lines.
+    pub excitation: bool,
+    /// With the true form given, not chosen.
+    pub form_given: bool,
+}
+
+impl Variant {
+    /// All four.
+    pub const ALL: [Self; 4] = [
+        Self::new(true, false),
+        Self::new(false, false),
+        Self::new(true, true),
+        Self::new(false, true),
+    ];
+
+    const fn new(excitation: bool, form_given: bool) -> Self {
+        Self { excitation, form_given }
+    }
+
+    pub fn name(self) -> &'static str {
+        match (self.excitation, self.form_given) {
+            (true, false) => "lines, form chosen",
+            (false, false) => "no lines, form chosen",
+            (true, true) => "lines, form given",
+            (false, true) => "no lines, form given",
+        }
+    }
+}
+
+/// A quantity beside its truth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quantity {
+    pub name: String,
+    pub truth: f64,
+    pub value: f64,
+    pub standard_error: Option<f64>,
+    pub interval: Option<(f64, f64)>,
+    pub prior_share: f64,
+    pub determined: bool,
+}
+
+impl Quantity {
+    /// Whether the interval holds the truth; `None` where there is no interval.
+    pub fn holds(&self) -> Option<bool> {
+        self.interval.map(|(low, high)| low <= self.truth && self.truth <= high)
+    }
+}
+
+/// What a fit found.
+#[derive(Debug, Clone)]
+pub struct Found {
+    pub form: Form,
+    pub level: VerdictLevel,
+    /// Kinds of the findings.
+    pub kinds: Vec<String>,
+    /// Mean of |dY|/|Y| over the band.
+    pub response_error: f64,
+    pub inflation: f64,
+    pub noise_order: usize,
+    pub quantities: Vec<Quantity>,
+}
+
+/// A fit of a person.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    pub person: u64,
+    pub cell: Cell,
+    pub variant: Variant,
+    pub true_form: Form,
+    pub seconds: f64,
+    pub found: Result<Found, String>,
+}
+
+/// The fits of one person.
+///
+/// # Errors
+/// Those of the simulation.
+pub fn outcomes(seed: u64, number: u64, variants: &[Variant]) -> Result<Vec<Outcome>, SimError> {
+    let (cell, person, records) = recorded(seed, number)?;
+    let true_form = person.state.operator.form();
+    let of = |&variant: &Variant| {
+        let mut estimator = FamilyEstimator {
+            excitation: variant.excitation.then(|| "d".to_owned()),
+            ..FamilyEstimator::default()
+        };
+        if variant.form_given {
+            estimator.forms = vec![true_form];
+        }
+        let begun = Instant::now();
+        let fit = estimator.fit(&records);
+        Outcome {
+            person: number,
+            cell,
+            variant,
+            true_form,
+            seconds: begun.elapsed().as_secs_f64(),
+            found: fit.map(|fit| found(&fit, &person)).map_err(|e| e.to_string()),
+        }
+    };
+    Ok(variants.iter().map(of).collect())
+}
+
+fn found(fit: &FamilyFit, person: &Person) -> Found {
+    let truth = &person.state.operator;
+    let of = fit.operator(0);
+    let named = truth.named();
+    let mut quantities: Vec<Quantity> = (of.parameters.iter())
+        .filter_map(|p| {
+            let true_value = named.iter().find(|n| n.name == p.name)?.value;
+            Some(Quantity {
+                name: p.name.clone(),
+                truth: true_value,
+                value: p.value,
+                standard_error: p.standard_error,
+                interval: p.interval,
+                prior_share: p.prior_share,
+                determined: p.determined,
+            })
+        })
+        .collect();
+    let element = &person.state.controlled_element;
+    let true_loop = loop_measures(truth, None, element, fit.sample_time);
+    if let (Some(true_loop), Some(own)) = (true_loop, fit.loop_measures(0, element)) {
+        let mut put = |name: &str, truth: Estimate, own: Estimate| {
+            for (suffix, quantile) in [("", student(fit.clusters)), (" (1.96)", 1.96)] {
+                quantities.push(Quantity {
+                    name: format!("{name}{suffix}"),
+                    truth: truth.value,
+                    value: own.value,
+                    standard_error: own.standard_error,
+                    interval: own
+                        .standard_error
+                        .map(|s| (own.value - quantile * s, own.value + quantile * s)),
+                    prior_share: 0.0,
+                    determined: own.standard_error.is_some(),
+                });
+            }
+        };
+        put("crossover", true_loop.crossover_rad_s, own.crossover_rad_s);
+        put("phase margin", true_loop.phase_margin_deg, own.phase_margin_deg);
+    }
+    Found {
+        form: fit.form,
+        level: fit.verdict.level,
+        kinds: fit.verdict.findings().iter().map(|f| f.kind.to_string()).collect(),
+        response_error: response_error(&of.operator, truth),
+        inflation: fit.inflation,
+        noise_order: fit.noise_orders.1,
+        quantities,
+    }
+}
+
+/// Student's quantile for 95 % with n clusters, as the intervals of parameters have it.
+fn student(clusters: usize) -> f64 {
+    const QUANTILES: [f64; 9] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262];
+    QUANTILES[clusters.saturating_sub(2).min(QUANTILES.len() - 1)]
+}
+
+fn response_error(found: &FamilyOperator, truth: &FamilyOperator) -> f64 {
+    let of = |omega: f64| {
+        let own = truth.response(omega);
+        (found.response(omega) - own).norm() / own.norm()
+    };
+    BAND_RAD_S.map(of).iter().sum::<f64>() / BAND_RAD_S.len() as f64
+}

@@ -1,0 +1,79 @@
+//! Shares over fits.
+
+use super::fits::{Outcome, Quantity};
+
+/// The quantities in the order of the tables.
+pub const QUANTITIES: [&str; 13] = [
+    "K",
+    "K_over_T_I",
+    "K_e",
+    "K_e_dot",
+    "T_L",
+    "T_I",
+    "omega_nm",
+    "zeta_nm",
+    "tau_e",
+    "crossover",
+    "crossover (1.96)",
+    "phase margin",
+    "phase margin (1.96)",
+];
+
+/// A share k of n.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Share {
+    pub of: usize,
+    pub all: usize,
+}
+
+impl Share {
+    /// Of these answers.
+    pub fn over(answers: impl IntoIterator<Item = bool>) -> Self {
+        answers.into_iter().fold(Self::default(), |share, yes| Self {
+            of: share.of + usize::from(yes),
+            all: share.all + 1,
+        })
+    }
+
+    /// In percent.
+    pub fn percent(self) -> f64 {
+        100.0 * self.of as f64 / self.all as f64
+    }
+
+    /// Standard error, percent.
+    pub fn error(self) -> f64 {
+        let n = self.all as f64 + 4.0;
+        let p = (self.of as f64 + 2.0) / n;
+        100.0 * (p * (1.0 - p) / n).sqrt()
+    }
+
+    /// As a table has it: share, standard error, number.
+    pub fn text(self) -> String {
+        if self.all == 0 {
+            return "–".to_owned();
+        }
+        format!("{:.1} ± {:.1} ({})", self.percent(), self.error(), self.all)
+    }
+}
+
+/// The middle one; `None` of none.
+pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let mut all: Vec<f64> = values.into_iter().filter(|x| !x.is_nan()).collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied()
+}
+
+/// All of one quantity.
+pub fn of_quantity<'a>(outcomes: &[&'a Outcome], name: &str) -> Vec<&'a Quantity> {
+    outcomes
+        .iter()
+        .filter_map(|o| o.found.as_ref().ok())
+        .filter_map(|f| f.quantities.iter().find(|q| q.name == name))
+        .collect()
+}
+
+/// How often intervals of what is reported as determined hold the truth.
+pub fn coverage(quantities: &[&Quantity]) -> Share {
+    let determined = quantities.iter().filter(|q| q.determined);
+    Share::over(determined.map(|q| q.holds().unwrap_or(false)))
+}
