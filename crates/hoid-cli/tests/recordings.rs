@@ -5,7 +5,7 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{bad, good, hoid, json};
+use common::{bad, good, hoid, json, json_of_any_worth};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -57,7 +57,7 @@ fn parameters(found: &Value) -> Vec<f64> {
 }
 
 fn identify(at: &Path, options: &[&str]) -> Value {
-    json(at, &[&["identify"], options, &FIT[..]].concat())
+    json_of_any_worth(at, &[&["identify"], options, &FIT[..]].concat())
 }
 
 #[test]

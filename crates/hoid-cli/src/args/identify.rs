@@ -43,7 +43,7 @@ pub struct IdentifyArgs {
     pub instruments: Option<String>,
     #[arg(long, help = about("form"), value_name = "FORM", default_value = "auto", value_parser = by_name(forms()))]
     pub form: std::option::Option<Form>,
-    #[arg(long, help = about("neuromuscular"), value_name = "YES|NO", default_value = "yes", value_parser = by_name([("yes", true), ("no", false)]))]
+    #[arg(long, help = about("neuromuscular"), value_name = "YES|NO", default_value = "yes", action = clap::ArgAction::Set, value_parser = by_name([("yes", true), ("no", false)]))]
     pub neuromuscular: bool,
     #[arg(long, help = about("prior"), value_name = "PRIOR", allow_hyphen_values = true)]
     pub prior: Option<String>,

@@ -32,6 +32,17 @@ pub fn json(directory: &Path, arguments: &[&str]) -> Value {
     serde_json::from_str(&good(directory, arguments)).unwrap()
 }
 
+/// The result of a fit whatever it is worth: one that is not determined is printed too, and ends
+/// with 1.
+pub fn json_of_any_worth(directory: &Path, arguments: &[&str]) -> Value {
+    let output = hoid(directory, arguments);
+    let found: Value = serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|_| panic!("{arguments:?}: {}", String::from_utf8_lossy(&output.stderr)));
+    let level = found["verdict"]["level"].as_str().unwrap();
+    assert_eq!(output.status.code(), Some(i32::from(level == "not determined")));
+    found
+}
+
 /// Exit code and message of a command that fails, which must print nothing on standard output and
 /// leave no file behind.
 pub fn bad(directory: &Path, arguments: &[&str]) -> (i32, String) {

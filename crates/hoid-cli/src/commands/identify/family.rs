@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use hoid_ident::{
-    SearchOptions,
+    IdentError, SearchOptions,
     family::{FamilyEstimator, HIGHEST_NOISE_ORDER, OperatorPrior, ParameterPrior},
     frequency::{Description, DescriptionOptions, describe_runs},
 };
@@ -171,6 +171,11 @@ fn noise_orders(
     for (name, value) in orders::parse_pairs(args.orders.as_deref().unwrap_or_default()).map_err(CliError::Usage)? {
         let range = orders::parse_range(&value).map_err(|e| CliError::Usage(format!("--orders {name}: {e}")))?;
         match name.as_str() {
+            "nc" | "nd" if *range.end() > HIGHEST_NOISE_ORDER => {
+                return Err(CliError::Usage(format!(
+                    "--orders {name}: found {value}; expected orders of 0 to {HIGHEST_NOISE_ORDER}"
+                )));
+            }
             "nc" => nc = range,
             "nd" => nd = range,
             _ => {
@@ -213,7 +218,9 @@ fn prior(text: &str) -> Result<OperatorPrior, CliError> {
         .extension()
         .is_none_or(|ending| !ending.eq_ignore_ascii_case("json"))
     {
-        return Ok(text.parse()?);
+        return text
+            .parse()
+            .map_err(|error: IdentError| CliError::Usage(format!("--prior: {error}")));
     }
     let wrong = |why: &str| {
         CliError::Usage(format!(
