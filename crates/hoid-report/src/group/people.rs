@@ -36,6 +36,8 @@ pub struct PeopleTable {
     pub headings: Vec<String>,
     /// Cells of its rows.
     pub rows: Vec<Vec<String>>,
+    /// Where the columns of parameters begin; the last column is the verdict.
+    pub parameters: usize,
 }
 
 /// The people that there are results of, with columns for what they have.
@@ -50,6 +52,7 @@ pub fn people_table<'a>(people: impl Iterator<Item = &'a Person>) -> PeopleTable
     if in_loop {
         headings.extend(["crossover (rad/s)", "phase margin (deg)"].map(str::to_owned));
     }
+    let parameters = headings.len();
     headings.extend(columns.iter().map(|(_, heading)| (*heading).to_owned()));
     headings.push("verdict".to_owned());
     let row = |p: &&Person| {
@@ -61,13 +64,18 @@ pub fn people_table<'a>(people: impl Iterator<Item = &'a Person>) -> PeopleTable
         if in_loop {
             cells.extend([p.crossover_rad_s, p.phase_margin_deg].map(|e| e.map_or_else(dash, |e| estimate(&e))));
         }
-        cells.extend(columns.iter().map(|(name, _)| p.parameter(name).map_or_else(dash, parameter)));
+        cells.extend(
+            columns
+                .iter()
+                .map(|(name, _)| p.parameter(name).map_or_else(dash, parameter)),
+        );
         cells.push(p.verdict.map_or("", VerdictLevel::name).to_owned());
         cells
     };
     PeopleTable {
         headings,
         rows: people.iter().map(row).collect(),
+        parameters,
     }
 }
 

@@ -38,7 +38,10 @@ pub(super) fn read_aligned(
         let ts_s = read.record.sample_time().s();
         let reach_s = ts_s * reach(preparation, late_samples, ts_s);
         let wider = ReadOptions {
-            span_s: (options.span_s.0.map(|t| t - reach_s), options.span_s.1.map(|t| t + reach_s)),
+            span_s: (
+                options.span_s.0.map(|t| t - reach_s),
+                options.span_s.1.map(|t| t + reach_s),
+            ),
             ..options.clone()
         };
         if let Ok(wide) = read_prepared(path, &wider, &as_it_is)

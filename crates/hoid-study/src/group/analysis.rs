@@ -95,7 +95,10 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
     let mut analysis = RunAnalysis::new(manifest, &all);
     let read = |pairing| {
         let one = |run: &'_ RunEntry| read_run(manifest, base, run, pairing).ok();
-        let runs = cell.runs.iter().filter_map(|&run| Some((run.run.as_str(), one(run)?.record)));
+        let runs = cell
+            .runs
+            .iter()
+            .filter_map(|&run| Some((run.run.as_str(), one(run)?.record)));
         runs.unzip()
     };
     let (names, records): (Vec<&str>, Vec<Record>) = read(Pairing::Recorded);
@@ -103,7 +106,11 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
     let people = match (&cell.changes, records.is_empty()) {
         (Some(reason), _) => vec![Person::without(cell.key(), PersonStatus::Changes, reason)],
         // The run of a file that cannot be read says so.
-        (None, true) => vec![Person::without(cell.key(), PersonStatus::Failed, "no run could be read")],
+        (None, true) => vec![Person::without(
+            cell.key(),
+            PersonStatus::Failed,
+            "no run could be read",
+        )],
         // Only where u is late are there others.
         (None, false) if late_samples != 0.0 => {
             let (names, paired) = read(Pairing::InTheLoop);

@@ -62,7 +62,9 @@ const INDIVIDUAL: [(&str, Coordinate); 9] = [
 
 /// The names of the forms, for the schema.
 fn form_names() -> Vec<&'static str> {
-    std::iter::once(AUTO).chain(Form::ALL.iter().map(|form| form.name())).collect()
+    std::iter::once(AUTO)
+        .chain(Form::ALL.iter().map(|form| form.name()))
+        .collect()
 }
 
 /// The names of the recursive methods, for the schema.

@@ -50,7 +50,10 @@ pub(super) fn people_of_fit(
     if fit.operators.len() == 1 {
         return vec![person(ALL, 0)];
     }
-    runs.iter().enumerate().map(|(record, run)| person(run, record)).collect()
+    runs.iter()
+        .enumerate()
+        .map(|(record, run)| person(run, record))
+        .collect()
 }
 
 /// Parameters, loop and response of a fit of records that were put beside each other.

@@ -95,7 +95,9 @@ pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAvera
     let mut tables = Tables {
         lines: Rows::new(&schema(text(&keys).chain(real(&LINE)))),
         margins: Rows::new(&schema(
-            text(&keys).chain(text(&["status", "reason", "verdict", "reasons"])).chain(real(&numbers)),
+            text(&keys)
+                .chain(text(&["status", "reason", "verdict", "reasons"]))
+                .chain(real(&numbers)),
         )),
         agreement: Rows::new(&schema(
             text(&keys)
@@ -222,7 +224,10 @@ fn of_records(
                 put(name, estimate);
             }
         }
-        margins_of_lines = at.crossover_rad_s.zip(at.phase_margin_deg).map(|(c, m)| (c.value, m.value));
+        margins_of_lines = at
+            .crossover_rad_s
+            .zip(at.phase_margin_deg)
+            .map(|(c, m)| (c.value, m.value));
     }
     for (estimator, response) in fits.medians(subject, condition) {
         agreement.begin();

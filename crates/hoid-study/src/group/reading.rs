@@ -2,9 +2,7 @@
 
 use std::path::Path;
 
-use hoid_io::{
-    ColumnKind, ColumnSchema, OutputTable, Preparation, ReadOptions, ReadRecord, Repair, TableSchema,
-};
+use hoid_io::{ColumnKind, ColumnSchema, OutputTable, Preparation, ReadOptions, ReadRecord, Repair, TableSchema};
 use hoid_model::{Detrend, Record};
 
 use super::{
@@ -47,7 +45,10 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
     };
     let late_samples = match pairing {
         Pairing::Recorded => 0.0,
-        Pairing::InTheLoop => manifest.conditions.get(condition).map_or(0.0, |facts| facts.offset_samples),
+        Pairing::InTheLoop => manifest
+            .conditions
+            .get(condition)
+            .map_or(0.0, |facts| facts.offset_samples),
     };
     read_aligned(path, &options, &preparation, late_samples).map_err(text)
 }

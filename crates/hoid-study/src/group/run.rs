@@ -57,8 +57,7 @@ pub fn run_group(
     let is_there = |i: &usize| part(directory, *i as u64, "estimates").exists();
     // What is chosen for all runs of a person in a condition comes before each of them.
     let is_cell = |i: &usize| matches!(blocks[*i], Block::Cell(_));
-    let (cells, runs): (Vec<usize>, Vec<usize>) =
-        (0..blocks.len()).filter(|i| !is_there(i)).partition(is_cell);
+    let (cells, runs): (Vec<usize>, Vec<usize>) = (0..blocks.len()).filter(|i| !is_there(i)).partition(is_cell);
     let known = total - (cells.len() + runs.len()) as u64;
     let done = AtomicU64::new(known);
     let one = |&i: &usize| -> Result<bool, StudyError> {

@@ -178,7 +178,10 @@ mod tests {
         let failed = Person::without(("Q", "d"), PersonStatus::Failed, "too short");
         assert_eq!(judged(2, 0, std::slice::from_ref(&failed)).level, NotDetermined);
         let verdict = judged(2, 0, &[failed, person(Trustworthy)]);
-        assert_eq!((verdict.level, verdict.findings()[0].kind), (Doubtful, "condition-failed"));
+        assert_eq!(
+            (verdict.level, verdict.findings()[0].kind),
+            (Doubtful, "condition-failed")
+        );
         // Where all conditions change nothing was asked of the family.
         let changes = Person::without(("Q", "d"), PersonStatus::Changes, "at 40 s");
         assert_eq!(judged(2, 0, &[changes]).level, Trustworthy);

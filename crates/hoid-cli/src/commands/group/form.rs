@@ -2,7 +2,7 @@
 
 use hoid_ident::family::Parameter;
 use hoid_model::VerdictLevel;
-use hoid_report::people_table;
+use hoid_report::{PeopleTable, people_table};
 use hoid_study::group::{GroupSummary, Person, RunFailure};
 use serde_json::{Map, Value, json};
 
@@ -32,15 +32,15 @@ impl Finished<'_> {
         let mut page = format!("{verdict}\n\n{}: {runs} runs, {read}\n", self.name);
         let table = people_table(people.iter());
         if !table.rows.is_empty() {
-            let headings: Vec<&str> = table.headings.iter().map(String::as_str).collect();
-            let mut rows = text::table(&headings);
-            for cells in table.rows {
-                rows.add_row(cells);
-            }
+            let last = table.headings.len() - 1;
+            let in_loop: Vec<usize> = (0..table.parameters).chain([last]).collect();
+            let parameters: Vec<usize> = [0, 1].into_iter().chain(table.parameters..last).collect();
             page.push_str(&format!(
-                "\nOperators, each of all runs of a person in a condition\n{rows}\n\
+                "\nOperators, each of all runs of a person in a condition\n{}\n{}\n\
                  Value \u{b1} standard error by the scatter between runs. What the data do not determine is in \
-                 parentheses, or beyond a bound (> is a limit of 95 %).\n"
+                 parentheses, or beyond a bound (> is a limit of 95 %).\n",
+                columns_of(&table, &in_loop),
+                columns_of(&table, &parameters),
             ));
         }
         page.push_str("\nFiles:\n");
@@ -51,9 +51,8 @@ impl Finished<'_> {
     }
 
     pub fn to_json(&self) -> Value {
-        let failure = |f: &RunFailure| {
-            json!({"subject": f.subject, "condition": f.condition, "run": f.run, "reason": f.reason})
-        };
+        let failure =
+            |f: &RunFailure| json!({"subject": f.subject, "condition": f.condition, "run": f.run, "reason": f.reason});
         json!({
             "hoid": env!("CARGO_PKG_VERSION"),
             "group": self.name,
@@ -65,6 +64,16 @@ impl Finished<'_> {
             "reports": self.pages,
         })
     }
+}
+
+/// Some columns of the table of people: all of them are too wide for a screen.
+fn columns_of(table: &PeopleTable, columns: &[usize]) -> String {
+    let headings: Vec<&str> = columns.iter().map(|i| table.headings[*i].as_str()).collect();
+    let mut rows = text::table(&headings);
+    for cells in &table.rows {
+        rows.add_row(columns.iter().map(|i| cells[*i].as_str()));
+    }
+    rows.to_string()
 }
 
 fn person(p: &Person) -> Value {
@@ -94,7 +103,10 @@ fn person(p: &Person) -> Value {
     set("dof", json!(p.chi2.map(|(_, dof)| dof)));
     set("kappa", json::optional(p.kappa));
     set("noise_order", json!(p.noise_order));
-    set("verdict", json!({"level": VerdictLevel::name(level), "reasons": p.reasons, "notes": p.notes}));
+    set(
+        "verdict",
+        json!({"level": VerdictLevel::name(level), "reasons": p.reasons, "notes": p.notes}),
+    );
     Value::Object(map)
 }
 
