@@ -70,7 +70,15 @@ fn a_virtual_experiment_is_analysed_and_reported() {
     let directory = experiment();
     let at = directory.path();
     let said = good(at, &["group", "people", "--out", "out", "--csv"]);
+    assert!(said.starts_with("Verdict: "), "{said}");
+    // What failed and what is doubtful comes before the numbers.
+    let at_operators = said.find("Operators").unwrap();
+    assert!(
+        said.find("C3 has no operator of the whole run").unwrap() < at_operators,
+        "{said}"
+    );
     for name in [
+        "people.csv",
         "estimates.parquet",
         "averages.csv",
         "delays.csv",
@@ -84,6 +92,7 @@ fn a_virtual_experiment_is_analysed_and_reported() {
     for part in [
         "How fast the recursions follow",
         "|H(3j)|",
+        "<h2>Operators</h2>",
         "variance of a1",
         "ARX (RLS)",
         "subject ",
@@ -110,6 +119,27 @@ fn a_virtual_experiment_is_analysed_and_reported() {
     assert!(code == 1 && message.contains("--resume"), "{message}");
     let found = json(at, &["group", "people", "--out", "out", "--csv", "--resume", "--json"]);
     assert_eq!(found["runs"], 8);
+    assert_eq!(found["failures"].as_array().map(Vec::len), Some(0));
+    let people = found["people"].as_array().unwrap();
+    let of = |condition: &str| {
+        people
+            .iter()
+            .filter(|p| p["condition"] == condition)
+            .collect::<Vec<_>>()
+    };
+    assert!(of("C3").iter().all(|p| p["status"] == "changes") && of("C3").len() == 2);
+    for person in of("C1") {
+        let tau = &person["parameters"]["tau_e"];
+        let (value, error) = (tau["value"].as_f64().unwrap(), tau["standard_error"].as_f64().unwrap());
+        assert!((value - 0.28).abs() < 0.05 && error > 0.0 && error < 0.05, "{tau}");
+        assert!(
+            person["open_loop"]["crossover_rad_s"]["standard_error"]
+                .as_f64()
+                .unwrap()
+                > 0.0
+        );
+        assert!(person["verdict"]["level"].is_string());
+    }
     // A file that has changed is another group.
     fs::write(
         at.join("people/group.toml"),
@@ -168,7 +198,7 @@ fn a_manifest_is_made_from_names_and_mistakes_are_named() {
     assert!(code == 2 && message.contains("hoid group init"), "{message}");
     let text = fs::read_to_string(at.join("group.toml")).unwrap();
     for (wrong, expected) in [
-        ("[conditions.C9]\nlead = true\n", "no run has this condition"),
+        ("[conditions.C9]\nchange_s = 4.0\n", "no run has this condition"),
         ("[conditions.C1]\ncontrolled_element = \"1/(s\"\n", "at character 5"),
         ("[conditions.C1]\nmystery = 1\n", "mystery"),
     ] {
@@ -181,7 +211,12 @@ fn a_manifest_is_made_from_names_and_mistakes_are_named() {
     }
     let joined = text.replace("subject = \"anna\"", "then = \"nothing.csv\"\nsubject = \"anna\"");
     fs::write(at.join("joined.toml"), joined).unwrap();
-    good(at, &["group", "joined.toml", "--out", "joined", "--csv"]);
+    // All runs failed: no result, and what there is to say is written.
+    let (code, message) = bad(at, &["group", "joined.toml", "--out", "joined", "--csv"]);
+    assert!(
+        code == 1 && message.contains("none of the 1 runs could be read") && message.contains("nothing.csv"),
+        "{message}"
+    );
     let estimates = fs::read_to_string(at.join("joined/estimates.csv")).unwrap();
     assert!(
         estimates.contains("nothing.csv") && estimates.contains("failed"),

@@ -55,7 +55,7 @@ mod tables;
 mod track;
 
 pub use error::ReportError;
-pub use group::{FrequencyTables, GroupReport, GroupTables, write_group_pages};
+pub use group::{FrequencyTables, GroupReport, GroupTables, PeopleTable, people_table, write_group_pages};
 pub use hoid_model::numbers;
 pub use model_section::{ModelSection, known_operator};
 pub use page::{render_with, write_page, write_report};

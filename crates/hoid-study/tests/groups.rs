@@ -17,8 +17,8 @@ use hoid_sim::{
 use hoid_study::{
     RunOptions, StudyError,
     group::{
-        Manifest, Pattern, PeopleExperiment, SamplingDefect, VirtualExperiment, run_group, simulate_group,
-        simulate_people,
+        ConditionSettings, GroupSummary, Manifest, Pattern, PeopleExperiment, PersonStatus, SamplingDefect,
+        VirtualExperiment, run_group, simulate_group, simulate_people,
     },
 };
 
@@ -53,6 +53,7 @@ fn manifest(directory: &Path) -> Manifest {
     let (mut manifest, others) = Manifest::of_directory(directory, &pattern).unwrap();
     assert_eq!((manifest.runs.len(), others.len()), (8, 1));
     manifest.analysis.delay_s = (0.25, 0.32);
+    manifest.analysis.form = "lead".to_owned();
     // What was written is what is read.
     assert_eq!(Manifest::parse(&manifest.text(), "group.toml").unwrap(), manifest);
     manifest
@@ -155,6 +156,30 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
         of("last")
     );
 
+    // The operator of each person: gain and delay within four standard errors; C4 changes.
+    let summary = GroupSummary::read(&manifest, &whole).unwrap();
+    let status: Vec<PersonStatus> = summary.people.iter().map(|p| p.status).collect();
+    let (fitted, changes) = (PersonStatus::Fitted, PersonStatus::Changes);
+    assert_eq!(
+        status.iter().filter(|s| **s == fitted).count(),
+        4,
+        "nothing says that C4 changes"
+    );
+    assert!(!status.contains(&changes) && summary.failures.is_empty());
+    for (who, k_e) in [("A", 0.09), ("B", 0.108)] {
+        let person = summary
+            .people
+            .iter()
+            .find(|p| p.subject == who && p.condition == "C1")
+            .unwrap();
+        assert_eq!((person.form.as_str(), person.runs), ("lead", 2));
+        for (name, truth) in [("K_e", k_e), ("tau_e", 0.28)] {
+            let found = person.parameter(name).unwrap();
+            let error = found.standard_error.unwrap();
+            assert!((found.value - truth).abs() < 4.0 * error, "{who} {name}: {found:?}");
+        }
+    }
+
     // Other data under the same manifest are another group.
     let file = data.path().join("A_C1_1.csv");
     fs::write(&file, fs::read_to_string(&file).unwrap().replacen('1', "2", 1)).unwrap();
@@ -182,6 +207,10 @@ fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
     let estimates = read_table(&out.path().join("g/estimates.parquet")).unwrap();
     assert_eq!(texts(&estimates, "status")[0], "failed");
     assert!(texts(&estimates, "reason")[0].contains("A_C1_1.csv"));
+    let summary = GroupSummary::read(&manifest, &out.path().join("g")).unwrap();
+    assert_eq!((summary.failures.len(), summary.failures[0].run.as_str()), (1, "1"));
+    assert!(summary.verdict.findings().iter().any(|f| f.kind == "run-failed"));
+    assert_eq!(summary.people[0].runs, 1);
     assert!(texts(&estimates, "run").iter().any(|run| run == "2"));
 
     let text = manifest.text();
@@ -190,6 +219,13 @@ fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
         ("subject = \"A\"", "subject = \"\"", "no subject"),
         ("trace_every = 16", "trace_every = 0", "trace_every is 0"),
         ("trace_every = 16", "trace_evry = 16", "unknown field"),
+        ("form = \"lead\"", "form = \"lead9\"", "analysis.form"),
+        ("prior = \"population\"", "prior = \"pilots\"", "analysis.prior"),
+        (
+            "each_run = true",
+            "each_run = true\nindividual = [\"G\"]",
+            "analysis.individual",
+        ),
         (
             "grey_box = false",
             "grey_box = false\n[conditions.C9]",
@@ -400,6 +436,65 @@ run = "2"
     assert!(refused.contains("seam"), "{refused}");
 }
 
+/// A sample of delay more in every file is a sample of nk more, by the operator of the person (C1)
+/// and by the fits to all runs at once (C4, which is said to change).
+#[test]
+fn the_delay_moves_with_the_output() {
+    let data = recorded();
+    let late = tempfile::tempdir().unwrap();
+    let mut manifest = manifest(data.path());
+    manifest.runs.retain(|run| run.subject == "A");
+    manifest.analysis.methods.clear();
+    manifest.analysis.each_run = false;
+    let condition = |excitation: Option<&str>, change_s| ConditionSettings {
+        excitation: excitation.map(str::to_owned),
+        change_s,
+        ..ConditionSettings::default()
+    };
+    manifest
+        .conditions
+        .insert("C1".to_owned(), condition(Some("f_t"), None));
+    manifest
+        .conditions
+        .insert("C4".to_owned(), condition(None, Some(40.96)));
+    for run in &manifest.runs {
+        let record = hoid_io::read(data.path().join(&run.file)).unwrap();
+        let mut u = record.output().to_vec();
+        u.rotate_right(1);
+        u[0] = u[1];
+        let channel = |name: &str, values: &[f64]| hoid_model::Channel::new(name, "", values.to_vec());
+        let shifted = hoid_model::Record::new(record.sample_time(), channel("e", record.input()), channel("u", &u))
+            .unwrap()
+            .with_channel(channel("f_t", record.channel("f_t").unwrap()))
+            .unwrap();
+        write_record(&late.path().join(&run.file), &shifted).unwrap();
+    }
+    let found = |manifest: &Manifest, files: &Path, name: &str| {
+        let out = late.path().join(name);
+        run_group(manifest, files, &out, &RunOptions::default(), &|_| (), &|| true).unwrap();
+        let delays = read_table(&out.join("delays.parquet")).unwrap();
+        let summary = GroupSummary::read(manifest, &out).unwrap();
+        let tau_s = summary.people[0].parameter("tau_e").unwrap().value;
+        (
+            [reals(&delays, "ARX_nk").to_vec(), reals(&delays, "BJ_nk").to_vec()],
+            tau_s,
+        )
+    };
+    let (before, tau_s) = found(&manifest, data.path(), "before");
+    let (after, _) = found(&manifest, late.path(), "after");
+    for (before, after) in before.iter().zip(&after) {
+        for (before, after) in before.iter().zip(after) {
+            assert_eq!(after - before, 1.0, "{before} {after}");
+        }
+    }
+    // Where the manifest says that u is late, the operator is the same, and the orders are not.
+    let mut told = manifest.clone();
+    told.conditions.get_mut("C1").unwrap().offset_samples = 1.0;
+    let (late_nk, told_s) = found(&told, late.path(), "told");
+    assert!((told_s - tau_s).abs() < 1e-3, "{told_s} {tau_s}");
+    assert_eq!(late_nk[1], after[1]);
+}
+
 /// The numbers of the guide: with the delay as a parameter of its own the error bars hold for all
 /// six parameters, ARX takes longer delays than Box-Jenkins.
 #[test]
@@ -420,6 +515,8 @@ fn grey_box_error_bars_hold_in_a_virtual_experiment() {
     let mut manifest = simulate_group(&experiment, &people, &|| ()).unwrap();
     manifest.analysis.methods.clear();
     manifest.analysis.grey_box = true;
+    manifest.analysis.form = "lead".to_owned();
+    manifest.analysis.each_run = false;
     manifest.analysis.delay_s = (0.2, 0.45);
     run_group(&manifest, &people, &out, &RunOptions::default(), &|_| (), &|| true).unwrap();
 
@@ -455,8 +552,18 @@ fn grey_box_error_bars_hold_in_a_virtual_experiment() {
         assert!(rate > 0.95 - 3.0 * 0.028, "{name}: {rate}");
     }
     let delays = read_table(&out.join("delays.parquet")).unwrap();
-    let mean = |name: &str| reals(&delays, name).iter().sum::<f64>() / 30.0;
-    let (arx, bj) = (mean("ARX_nk"), mean("BJ_nk"));
+    let mean = |name: &str, condition: &str| {
+        let of_condition = texts(&delays, "condition").iter().zip(reals(&delays, name));
+        of_condition
+            .filter(|(c, _)| *c == condition)
+            .map(|(_, nk)| nk)
+            .sum::<f64>()
+            / 3.0
+    };
+    // C1 has an operator, whose delay both take; in C4 each structure has what fits it best.
+    assert!((mean("BJ_nk", "C1") - 29.0).abs() < 2.0, "{}", mean("BJ_nk", "C1"));
+    assert_eq!(mean("ARX_nk", "C1"), mean("BJ_nk", "C1"));
+    let (arx, bj) = (mean("ARX_nk", "C4"), mean("BJ_nk", "C4"));
     assert!((bj - 29.0).abs() < 2.0 && arx > bj + 3.0, "ARX {arx}, BJ {bj}");
 }
 

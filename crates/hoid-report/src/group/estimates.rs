@@ -9,9 +9,12 @@ use super::{
 use crate::numbers;
 
 /// Columns of the table of averages: parameter and heading.
-const AVERAGED: [(&str, &str); 7] = [
+const AVERAGED: [(&str, &str); 10] = [
+    ("K_over_T_I", "K/T_I (1/s)"),
+    ("K", "K"),
     ("K_e", "K_e"),
     ("T_L", "T_L (s)"),
+    ("T_I", "T_I (s)"),
     ("K_e_dot", "K_e_dot (s)"),
     ("omega_nm", "omega_nm (rad/s)"),
     ("zeta_nm", "zeta_nm"),
@@ -61,13 +64,13 @@ impl GroupReport<'_> {
 
     pub(super) fn delays(&self) -> Vec<Value> {
         let table = self.tables.delays;
-        let [subject, condition, run] = ["subject", "condition", "run"].map(|name| texts(table, name));
+        let [subject, condition] = ["subject", "condition"].map(|name| texts(table, name));
         let columns = ["ARX_nk", "BJ_nk", "BJ_nd", "BJ_T_n"].map(|name| reals(table, name));
         (0..subject.len())
             .filter(|i| self.shows(&subject[*i]))
             .map(|i| {
                 let cells = columns.map(|column| numbers::plain(column.get(i).copied().unwrap_or(f64::NAN)));
-                context! { subject => &subject[i], condition => &condition[i], run => &run[i], cells => cells.to_vec() }
+                context! { subject => &subject[i], condition => &condition[i], cells => cells.to_vec() }
             })
             .collect()
     }

@@ -1,6 +1,7 @@
 //! Describing functions with the fits over them, and where they agree.
 
-use hoid_model::{Complex64, uncertainty::Estimate};
+use hoid_model::uncertainty::Estimate;
+use hoid_study::group::Person;
 use minijinja::{Value, context};
 
 use super::{
@@ -13,7 +14,13 @@ use crate::{
 };
 
 /// Estimators whose fits are drawn: as everywhere, ARX blue and Box-Jenkins vermillion.
-const FITS: [(&str, usize); 4] = [("ARX", 0), ("BJ", 1), ("grey box", 3), ("BJ, all runs", 4)];
+const FITS: [(&str, usize); 5] = [
+    ("family, all runs", 2),
+    ("ARX", 0),
+    ("BJ", 1),
+    ("grey box", 3),
+    ("BJ, all runs", 4),
+];
 
 impl GroupReport<'_> {
     /// What the describing functions say, with standard errors, a row for each subject and
@@ -22,7 +29,8 @@ impl GroupReport<'_> {
         let Some(table) = self.tables.frequencies.map(|f| f.margins) else {
             return Vec::new();
         };
-        let [subject, condition, reason] = ["subject", "condition", "reason"].map(|name| texts(table, name));
+        let [subject, condition, reason, verdict] =
+            ["subject", "condition", "reason", "verdict"].map(|name| texts(table, name));
         let cell = |name: &str, i: usize| {
             let value = reals(table, name).get(i).copied().filter(|v| v.is_finite());
             let error = reals(table, &format!("{name}_se"))
@@ -44,14 +52,12 @@ impl GroupReport<'_> {
                 let names = [
                     "crossover_rad_s",
                     "phase_margin_deg",
-                    "gain",
-                    "lead_s",
-                    "delay_s",
+                    "gain_margin_db",
                     "coherence",
                     "off_line_share",
                 ];
                 let cells = names.map(|name| cell(name, i)).to_vec();
-                context! { subject => &subject[i], condition => &condition[i], reason => &reason[i], cells }
+                context! { subject => &subject[i], condition => &condition[i], reason => &reason[i], verdict => &verdict[i], cells }
             })
             .collect()
     }
@@ -59,7 +65,7 @@ impl GroupReport<'_> {
     /// Bode points of the describing functions, a figure for each condition with a column for each
     /// subject.
     pub(super) fn describing_functions(&self) -> Vec<Value> {
-        let Some((lines, margins)) = self.tables.frequencies.map(|f| (f.lines, f.margins)) else {
+        let Some(lines) = self.tables.frequencies.map(|f| f.lines) else {
             return Vec::new();
         };
         let (subjects, conditions) = self.names();
@@ -67,26 +73,9 @@ impl GroupReport<'_> {
             let rows = rows_of(lines, subject, condition);
             let pick = |name: &str| rows.iter().map(|i| reals(lines, name)[*i]).collect::<Vec<f64>>();
             let omega = pick("omega_rad_s");
-            let first = rows_of(margins, subject, condition).first().copied();
-            let fit = first.map(|i| ["gain", "lead_s", "delay_s"].map(|name| reals(margins, name)[i]));
             let mut curves = Vec::new();
             if let (Some(low), Some(high)) = (omega.first(), omega.last()) {
                 curves = self.fits(subject, condition, (*low, *high));
-                if let Some([gain, lead_s, delay_s]) = fit {
-                    let w: Vec<f64> = (0..=80).map(|k| low * (high / low).powf(f64::from(k) / 80.0)).collect();
-                    let response: Vec<Complex64> = w
-                        .iter()
-                        .map(|w| gain * Complex64::new(1.0, lead_s * w) * Complex64::from_polar(1.0, -delay_s * w))
-                        .collect();
-                    curves.push(BodeCurve::of_response(
-                        "gain, lead and delay",
-                        LineKind::Dashed,
-                        Shade::of_method(5),
-                        &w,
-                        &response,
-                        delay_s,
-                    ));
-                }
             }
             let estimates = |name: &str| {
                 let errors = pick(&format!("{name}_se"));
@@ -104,7 +93,7 @@ impl GroupReport<'_> {
                 name: "describing function".to_owned(),
                 magnitude_db: estimates("magnitude_db"),
                 phase_deg: estimates("phase_deg"),
-                delay_s: fit.map_or(0.0, |[_, _, delay_s]| delay_s),
+                delay_s: self.delay_s(subject, condition),
                 omega_rad_s: omega,
             };
             curves.push(BodeCurve::of_points(&points, Shade::of_method(5)));
@@ -128,6 +117,15 @@ impl GroupReport<'_> {
                 context! { condition => *condition, figure }
             })
             .collect()
+    }
+
+    /// Delay of a person, s, with which the phase between two lines is followed; 0 where it is not
+    /// known.
+    fn delay_s(&self, subject: &str, condition: &str) -> f64 {
+        let of = |p: &&Person| p.subject == subject && p.condition == condition;
+        let person = self.summary.people.iter().find(of);
+        let delay = person.and_then(|p| p.parameter("tau_e")).map(|tau| tau.value);
+        delay.unwrap_or(0.0)
     }
 
     /// Median responses of the fits over the runs between two frequencies, with the quartiles as

@@ -3,6 +3,7 @@
 //! | module | what it shows |
 //! |---|---|
 //! | `report`, `tables` | what a page is made of |
+//! | `people` | the verdict, what was not read, the operator of each person |
 //! | `estimates` | averages of the fits, chosen delays, what could not be estimated |
 //! | `frequency` | describing functions with the fits over them, and where they agree |
 //! | `over_time` | recursive estimates by condition and subject, and how fast they follow a change |
@@ -14,9 +15,11 @@ mod frequency;
 mod html;
 mod over_time;
 mod pages;
+mod people;
 mod report;
 mod tables;
 
 pub use pages::write_group_pages;
+pub use people::{PeopleTable, people_table};
 pub use report::GroupReport;
 pub use tables::{FrequencyTables, GroupTables};

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use hoid_io::{OutputTable, read_table};
-use hoid_study::group::Manifest;
+use hoid_study::group::{GroupSummary, Manifest};
 
 use super::{
     report::GroupReport,
@@ -18,7 +18,7 @@ const MOST_LISTED: usize = 24;
 /// is where the manifest was read.
 ///
 /// # Errors
-/// [`ReportError::Io`] for tables that are not there and pages that cannot be written;
+/// [`ReportError::Io`], [`ReportError::Study`] for tables that are not there and pages that cannot be written;
 /// [`ReportError::Template`] for a defect of this crate.
 pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let read = |name: &str| read_table(&out.join(format!("{name}.parquet")));
@@ -46,6 +46,7 @@ pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result
             agreement,
         }),
     };
+    let summary = GroupSummary::read(manifest, out)?;
     let counting: Vec<_> = manifest.runs.iter().filter(|run| run.counts).collect();
     let mut subjects: Vec<&str> = Vec::new();
     for run in &counting {
@@ -62,11 +63,15 @@ pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result
             format!("{}, {}", manifest.read.input, manifest.read.output),
         ),
         (
-            "delay searched".to_owned(),
+            "operator".to_owned(),
+            format!("form {}, prior {}", manifest.analysis.form, manifest.analysis.prior),
+        ),
+        (
+            "delay searched (ARX, BJ)".to_owned(),
             format!("{} to {} s", manifest.analysis.delay_s.0, manifest.analysis.delay_s.1),
         ),
         (
-            "nd searched".to_owned(),
+            "nd searched (BJ)".to_owned(),
             format!("{} to {}", manifest.analysis.nd.0, manifest.analysis.nd.1),
         ),
     ];
@@ -75,6 +80,7 @@ pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result
     for subject in std::iter::once(None).chain(subjects.iter().map(|s| Some(*s))) {
         let report = GroupReport {
             manifest,
+            summary: &summary,
             tables,
             settings: settings.clone(),
             subject,

@@ -1,6 +1,6 @@
 //! What a page about a group shows: manifest, tables, and all subjects or one.
 
-use hoid_study::group::Manifest;
+use hoid_study::group::{GroupSummary, Manifest};
 
 use super::tables::GroupTables;
 
@@ -9,6 +9,8 @@ use super::tables::GroupTables;
 pub struct GroupReport<'a> {
     /// What was analysed.
     pub manifest: &'a Manifest,
+    /// What failed, the people, and what all of it is worth.
+    pub summary: &'a GroupSummary,
     /// What came out.
     pub tables: GroupTables<'a>,
     /// What was done and with what, as name and value.

@@ -9,7 +9,7 @@ pub struct GroupTables<'a> {
     pub estimates: &'a OutputTable,
     /// Averages over runs.
     pub averages: &'a OutputTable,
-    /// Delays and T_n that were chosen beforehand.
+    /// Delays and T_n that were chosen beforehand, a row a subject and condition.
     pub delays: &'a OutputTable,
     /// Averages of traces.
     pub traces: &'a OutputTable,
@@ -26,7 +26,7 @@ pub struct GroupTables<'a> {
 pub struct FrequencyTables<'a> {
     /// A row a line.
     pub lines: &'a OutputTable,
-    /// Crossover, margin, gain, lead, delay and noise, a row a subject and condition.
+    /// Crossover, margins, noise and verdict, a row a subject and condition.
     pub margins: &'a OutputTable,
     /// How far each estimator is from it.
     pub agreement: &'a OutputTable,

@@ -1,26 +1,31 @@
-//! What is done with one run.
+//! What is done with the runs of a person in a condition, and with one run.
 //!
-//! nk, and for Box-Jenkins nd and T_n, are chosen beforehand: on each of two sub-batches every
-//! delay in the range is fitted, and nk is the average of the two best, rounded. With these, ARX
-//! and Box-Jenkins models are fitted to the sub-batches and to the whole run, and the recursions
-//! start from the fit of the first sub-batch. A row says what was estimated in which window; what
-//! fails is a row with its reason.
+//! All runs of a person in a condition come first. Where nothing changes within them the family of
+//! operators is fitted to all of them at once ([`hoid_ident::family`]): the operator of the person.
+//! nk, and for Box-Jenkins nd and T_n, are one choice for all of them too (`run_orders`). Beside these
+//! stands a Box-Jenkins model of all runs with initial states of each, the delay that fits best, and
+//! the greatest order of the noise model that the manifest allows. In a closed loop a noise model
+//! that is too small biases the operator, and one run is too short for a great one.
 //!
-//! Beside the fits of single runs stands one of all runs of a person in a condition that does not
-//! change: a Box-Jenkins model with initial states of each run, the delay that fits best, and the
-//! greatest order of the noise model that the manifest allows. In a closed loop a noise model that
-//! is too small biases the operator, and one run is too short for a great one.
+//! With the chosen orders, ARX and Box-Jenkins models are fitted to the sub-batches of each run and
+//! to the whole of it, and the recursions start from the fit of the first sub-batch; the family is
+//! fitted to the whole run with the form of the person. A row says what was estimated in which
+//! window; what fails is a row with its reason.
 
 use std::path::Path;
 
-use hoid_ident::{Estimator, Fit, GreyBox, choose_orders, order_selection::Criterion};
-use hoid_model::{Record, Structure, uncertainty::Estimate};
+use hoid_ident::{Estimator, GreyBox, choose_orders, order_selection::Criterion};
+use hoid_io::OutputTable;
+use hoid_model::{Form, Orders, Record, Structure, uncertainty::Estimate};
 use hoid_track::{StartAt, TrackOptions, track};
 
 use super::{
     analysis_settings::AnalysisSettings,
+    block::Cell,
+    family_fits,
     manifest::{Manifest, RunEntry},
-    reading::{Run, account, read_files, read_run, run_of},
+    person::{ALL, Person, PersonStatus, people_of, people_table},
+    reading::{Pairing, Run, account, read_files, read_run, run_of},
     run_orders::{self, label_of},
     run_rows::{RunRows, RunTables},
     traces,
@@ -28,14 +33,52 @@ use super::{
 };
 use crate::statistics::median;
 
+/// Label of a run that could not be read.
+pub(super) const READ: &str = "read";
+/// Name of the table of people.
+pub(super) const PEOPLE: &str = "people";
+
+/// What all runs of a person in a condition say of each.
+pub(super) struct FromCell {
+    arx: Result<Orders, String>,
+    box_jenkins: Result<Orders, String>,
+    /// The form of the operator, where there is one.
+    form: Option<Form>,
+}
+
+impl FromCell {
+    /// From the parts of the cell: its estimates and its people.
+    pub fn of(estimates: &OutputTable, people: &OutputTable) -> Self {
+        Self {
+            arx: run_orders::chosen(estimates, Structure::Arx),
+            box_jenkins: run_orders::chosen(estimates, Structure::BoxJenkins),
+            form: people_of(people).first().and_then(|person| person.form.parse().ok()),
+        }
+    }
+
+    fn orders(&self, structure: Structure) -> &Result<Orders, String> {
+        if structure == Structure::Arx {
+            &self.arx
+        } else {
+            &self.box_jenkins
+        }
+    }
+}
+
 /// Analyses a run; `base` is the directory of the manifest.
-pub(super) fn analyse(manifest: &Manifest, base: &Path, entry: &RunEntry) -> RunTables {
+pub(super) fn analyse(manifest: &Manifest, base: &Path, entry: &RunEntry, from_cell: &FromCell) -> RunTables {
     let mut analysis = RunAnalysis::new(manifest, entry);
-    let files = read_files(manifest, base, entry);
+    let files = read_files(manifest, base, entry, Pairing::Recorded);
     let account = account(entry, &files);
     match run_of(files) {
-        Ok(run) => analysis.analyse(&run),
-        Err(reason) => analysis.rows.failed(None, "read", &reason),
+        Ok(run) => {
+            analysis.analyse(&run, from_cell);
+            if let Some(form) = from_cell.form.filter(|_| manifest.analysis.each_run) {
+                let paired = read_run(manifest, base, entry, Pairing::InTheLoop);
+                analysis.family_of_run(paired.map(|run| run.record), form);
+            }
+        }
+        Err(reason) => analysis.rows.failed(None, READ, &reason),
     }
     RunTables {
         account: account.into(),
@@ -43,31 +86,53 @@ pub(super) fn analyse(manifest: &Manifest, base: &Path, entry: &RunEntry) -> Run
     }
 }
 
-/// Name of the run that is all of them.
-const ALL: &str = "all";
-
-/// Fits all runs of a person in a condition at once.
-pub(super) fn analyse_together(manifest: &Manifest, base: &Path, entries: &[&RunEntry]) -> RunTables {
-    const LABEL: &str = "BJ, all runs";
+/// Analyses all runs of a person in a condition at once.
+pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>) -> RunTables {
     let all = RunEntry {
         run: ALL.to_owned(),
-        ..entries[0].clone()
+        ..cell.runs[0].clone()
     };
     let mut analysis = RunAnalysis::new(manifest, &all);
-    let records: Vec<Record> = entries
-        .iter()
-        .filter_map(|entry| read_run(manifest, base, entry).ok())
-        .map(|run| run.record)
-        .collect();
-    // The run of a file that cannot be read says so.
+    let read = |pairing| {
+        let one = |run: &'_ RunEntry| read_run(manifest, base, run, pairing).ok();
+        let runs = cell
+            .runs
+            .iter()
+            .filter_map(|&run| Some((run.run.as_str(), one(run)?.record)));
+        runs.unzip()
+    };
+    let (names, records): (Vec<&str>, Vec<Record>) = read(Pairing::Recorded);
+    let late_samples = analysis.rows.condition.offset_samples;
+    let people = match (&cell.changes, records.is_empty()) {
+        (Some(reason), _) => vec![Person::without(cell.key(), PersonStatus::Changes, reason)],
+        // The run of a file that cannot be read says so.
+        (None, true) => vec![Person::without(
+            cell.key(),
+            PersonStatus::Failed,
+            "no run could be read",
+        )],
+        // Only where u is late are there others.
+        (None, false) if late_samples != 0.0 => {
+            let (names, paired) = read(Pairing::InTheLoop);
+            analysis.family_together(cell.key(), &names, &paired)
+        }
+        (None, false) => analysis.family_together(cell.key(), &names, &records),
+    };
     if let Some(first) = records.first() {
-        let window = windows(&manifest.analysis, first)[2];
-        match analysis.together(&records) {
-            Ok(fit) => analysis.rows.fit_rows(window, LABEL, &fit, first),
-            Err(reason) => analysis.rows.failed(Some(window), LABEL, &reason),
+        let tau_s = people[0].parameter("tau_e").map(|tau| tau.value);
+        let nk = tau_s.map(|tau_s| run_orders::nk_of(tau_s, first.sample_time().s(), late_samples));
+        for structure in [Structure::Arx, Structure::BoxJenkins] {
+            if let Err(reason) = run_orders::choose(analysis.settings, &records, structure, nk, &mut analysis.rows) {
+                analysis.rows.failed(None, label_of(structure), &reason);
+            }
+        }
+        if cell.changes.is_none() && records.len() > 1 {
+            analysis.box_jenkins_together(&records);
         }
     }
-    analysis.rows.into_tables()
+    let mut tables = analysis.rows.into_tables();
+    tables.account.push((PEOPLE, people_table(&people)));
+    tables
 }
 
 /// The analysis of a run: how it is done, and what it has found so far.
@@ -84,7 +149,7 @@ impl<'a> RunAnalysis<'a> {
         }
     }
 
-    fn analyse(&mut self, run: &Run) {
+    fn analyse(&mut self, run: &Run, from_cell: &FromCell) {
         let record = &run.record;
         let windows = windows(self.settings, record);
         let change = run.seam_s.or(self.rows.condition.change_s).map(|at| ("change_s", at));
@@ -94,10 +159,10 @@ impl<'a> RunAnalysis<'a> {
         }
         for structure in [Structure::Arx, Structure::BoxJenkins] {
             let label = label_of(structure);
-            let orders = match run_orders::choose(self.settings, record, structure, &windows, &mut self.rows) {
-                Ok(orders) => orders,
+            let orders = match from_cell.orders(structure) {
+                Ok(orders) => *orders,
                 Err(reason) => {
-                    self.rows.failed(None, label, &reason);
+                    self.rows.failed(None, label, reason);
                     continue;
                 }
             };
@@ -148,15 +213,52 @@ impl<'a> RunAnalysis<'a> {
         }
     }
 
-    /// The fit of all runs.
-    fn together(&self, records: &[Record]) -> Result<Fit, String> {
+    /// Box-Jenkins of all runs.
+    fn box_jenkins_together(&mut self, records: &[Record]) {
+        const LABEL: &str = "BJ, all runs";
         let structure = Structure::BoxJenkins;
         let mut ranges = run_orders::ranges(self.settings, &records[0], structure);
         let nd = self.settings.nd.1;
         ranges.nd = nd..=nd;
         let template = Estimator::new(structure, structure.operator_orders(1));
-        let choice = choose_orders(&template, &ranges, Criterion::Bic, records).map_err(|e| e.to_string())?;
-        Ok(choice.fit)
+        let window = windows(self.settings, &records[0])[2];
+        match choose_orders(&template, &ranges, Criterion::Bic, records) {
+            Ok(choice) => self.rows.fit_rows(window, LABEL, &choice.fit, &records[0]),
+            Err(error) => self.rows.failed(Some(window), LABEL, &error.to_string()),
+        }
+    }
+
+    /// The family of all runs: the people that it is of.
+    fn family_together(&mut self, key: (&str, &str), names: &[&str], records: &[Record]) -> Vec<Person> {
+        let fit = family_fits::estimator(self.settings, &self.rows.condition)
+            .and_then(|estimator| estimator.fit(records).map_err(|error| error.to_string()));
+        match fit {
+            Ok(fit) => {
+                let window = windows(self.settings, &records[0])[2];
+                family_fits::rows_of_fit(&mut self.rows, window, family_fits::OF_ALL, &fit, &records[0]);
+                family_fits::people_of_fit(key, names, &fit, self.rows.element())
+            }
+            Err(reason) => {
+                self.rows.failed(None, family_fits::OF_ALL, &reason);
+                vec![Person::without(key, PersonStatus::Failed, &reason)]
+            }
+        }
+    }
+
+    /// The family of one run, in the form of the person.
+    fn family_of_run(&mut self, record: Result<Record, String>, form: Form) {
+        let fit = record.and_then(|record| {
+            let estimator = family_fits::estimator_of_run(self.settings, &self.rows.condition, form)?;
+            let fit = estimator.fit(std::slice::from_ref(&record));
+            Ok((fit.map_err(|error| error.to_string())?, record))
+        });
+        match fit {
+            Ok((fit, record)) => {
+                let window = windows(self.settings, &record)[2];
+                family_fits::rows_of_fit(&mut self.rows, window, family_fits::OF_RUN, &fit, &record);
+            }
+            Err(reason) => self.rows.failed(None, family_fits::OF_RUN, &reason),
+        }
     }
 
     fn grey_box(&mut self, record: &Record, windows: &[Window; 3]) {

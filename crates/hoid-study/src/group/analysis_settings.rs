@@ -1,5 +1,7 @@
 //! What is done with each run: the keys of `[analysis]`.
 
+use hoid_ident::family::{FamilyEstimator, OperatorPrior};
+use hoid_model::{Form, operator_family::Coordinate};
 use hoid_track::Method;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,7 +17,7 @@ pub struct AnalysisSettings {
     /// Least and greatest order of the noise model; BIC chooses on each sub-batch, the greater one
     /// is taken.
     pub nd: (usize, usize),
-    /// Range of the delay, s.
+    /// Range of the delay of ARX and Box-Jenkins models, s.
     pub delay_s: (f64, f64),
     /// Recursions by name, as in `hoid track`. Default: rls, rpem, physical.
     #[schemars(extend("items" = serde_json::json!({ "enum": method_names() })))]
@@ -24,9 +26,45 @@ pub struct AnalysisSettings {
     pub trace_every: usize,
     /// Whether the grey box is fitted too.
     pub grey_box: bool,
+    /// Form of the operator of the family: auto, or the name of one.
+    #[schemars(extend("enum" = serde_json::json!(form_names())))]
+    pub form: String,
+    /// What is known of the operator before the data: population, none, or
+    /// NAME=CENTRE:SPREAD separated by commas.
+    pub prior: String,
+    /// Parameters of the operator that each run has for itself, such as K; all others are common to
+    /// the runs of a person in a condition.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(extend("items" = serde_json::json!({ "enum": INDIVIDUAL.map(|(name, _)| name) })))]
+    pub individual: Vec<String>,
+    /// Whether the operator is fitted to each run too, with the form of all of them.
+    pub each_run: bool,
     /// Frequencies at which the response of the recursions is kept, rad/s.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub response_at_rad_s: Vec<f64>,
+}
+
+/// The form that held-out runs choose.
+const AUTO: &str = "auto";
+
+/// Names of the parameters that a run can have for itself, and their coordinates.
+const INDIVIDUAL: [(&str, Coordinate); 9] = [
+    ("K", Coordinate::Gain),
+    ("T_L", Coordinate::Lead),
+    ("T_I", Coordinate::LagRate),
+    ("c_1", Coordinate::Linear),
+    ("c_2", Coordinate::Quadratic),
+    ("alpha", Coordinate::Droop),
+    ("omega_nm", Coordinate::LogOmega),
+    ("zeta_nm", Coordinate::LogZeta),
+    ("tau_e", Coordinate::Delay),
+];
+
+/// The names of the forms, for the schema.
+fn form_names() -> Vec<&'static str> {
+    std::iter::once(AUTO)
+        .chain(Form::ALL.iter().map(|form| form.name()))
+        .collect()
 }
 
 /// The names of the recursive methods, for the schema.
@@ -43,6 +81,10 @@ impl Default for AnalysisSettings {
             methods: ["rls", "rpem", "physical"].map(str::to_owned).to_vec(),
             trace_every: 16,
             grey_box: false,
+            form: AUTO.to_owned(),
+            prior: OperatorPrior::population().to_string(),
+            individual: Vec::new(),
+            each_run: true,
             response_at_rad_s: Vec::new(),
         }
     }
@@ -61,9 +103,32 @@ impl AnalysisSettings {
         self.methods.iter().map(of).collect()
     }
 
+    /// How the family is fitted, the form left to the data or given.
+    ///
+    /// # Errors
+    /// A form, a prior or a parameter that there is not.
+    pub(super) fn family(&self) -> Result<FamilyEstimator, String> {
+        let mut estimator = FamilyEstimator::default();
+        if self.form != AUTO {
+            let form = self.form.parse::<Form>();
+            estimator.forms = vec![form.map_err(|error| format!("analysis.form: {error}, or {AUTO}"))?];
+        }
+        estimator.prior = self.prior.parse().map_err(|error| format!("analysis.prior: {error}"))?;
+        for name in &self.individual {
+            let known = INDIVIDUAL.iter().find(|(known, _)| known == name);
+            let (_, coordinate) = known.ok_or_else(|| {
+                let names = INDIVIDUAL.map(|(name, _)| name).join(", ");
+                format!("analysis.individual has {name:?}, expected parameters among {names}")
+            })?;
+            estimator.individual.push(*coordinate);
+        }
+        Ok(estimator)
+    }
+
     /// Why the settings have no meaning.
     pub(super) fn check(&self) -> Result<(), String> {
         self.recursions()?;
+        self.family()?;
         if self.nd.0 == 0 || self.nd.0 > self.nd.1 || self.nd.1 > 20 {
             return Err(format!(
                 "analysis.nd is {:?}, expected two orders from 1 to 20, the smaller first",

@@ -65,16 +65,9 @@ impl Averages {
     }
 }
 
-/// Delays and T_n that were chosen beforehand (Table 3): a row for each run, by subject, condition
-/// and place in the manifest.
+/// Delays and T_n that were chosen beforehand (Table 3): a row for each subject and condition.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Delays(BTreeMap<(String, String, usize), DelaysOfRun>);
-
-#[derive(Debug, Clone, Default)]
-struct DelaysOfRun {
-    run: String,
-    values: BTreeMap<&'static str, f64>,
-}
+pub(super) struct Delays(BTreeMap<(String, String), BTreeMap<&'static str, f64>>);
 
 const DELAY_COLUMNS: [(&str, &str, &str); 4] = [
     ("ARX", "nk", "ARX_nk"),
@@ -84,20 +77,18 @@ const DELAY_COLUMNS: [(&str, &str, &str); 4] = [
 ];
 
 impl Delays {
-    /// Adds a run; `place` is its number in the manifest.
-    pub fn add(&mut self, estimates: &OutputTable, place: usize) {
-        let [subject, condition, run, window, estimator, parameter] =
-            ["subject", "condition", "run", "window", "estimator", "parameter"].map(|name| texts(estimates, name));
+    /// Adds the runs of a subject in a condition.
+    pub fn add(&mut self, estimates: &OutputTable) {
+        let [subject, condition, window, estimator, parameter] =
+            ["subject", "condition", "window", "estimator", "parameter"].map(|name| texts(estimates, name));
         let values = numbers(estimates, "value");
         for row in 0..values.len() {
             let column = DELAY_COLUMNS
                 .iter()
                 .find(|(of, name, _)| estimator[row] == *of && parameter[row] == *name && window[row].is_empty());
             if let Some((_, _, column)) = column {
-                let key = (subject[row].clone(), condition[row].clone(), place);
-                let of_run = self.0.entry(key).or_default();
-                of_run.run.clone_from(&run[row]);
-                of_run.values.insert(column, values[row]);
+                let key = (subject[row].clone(), condition[row].clone());
+                self.0.entry(key).or_default().insert(column, values[row]);
             }
         }
     }
@@ -105,12 +96,11 @@ impl Delays {
     /// The table.
     pub fn table(&self) -> OutputTable {
         let columns = DELAY_COLUMNS.map(|(_, _, column)| column);
-        let mut rows = Rows::new(&schema(text(&["subject", "condition", "run"]).chain(real(&columns))));
-        for ((subject, condition, _), DelaysOfRun { run, values }) in &self.0 {
+        let mut rows = Rows::new(&schema(text(&["subject", "condition"]).chain(real(&columns))));
+        for ((subject, condition), values) in &self.0 {
             rows.begin();
             rows.text("subject", subject);
             rows.text("condition", condition);
-            rows.text("run", run);
             for column in columns {
                 rows.real(column, values.get(column).copied().unwrap_or(f64::NAN));
             }

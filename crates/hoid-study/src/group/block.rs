@@ -1,30 +1,51 @@
 //! What is analysed at once and is a part on disk: a run, or all runs of a person in a condition.
 
-use std::collections::BTreeMap;
-
 use super::manifest::{Manifest, RunEntry};
+
+/// All runs of a person in a condition.
+pub(super) struct Cell<'a> {
+    pub runs: Vec<&'a RunEntry>,
+    /// Why it has no operator of its own: what the person does changes within the runs.
+    pub changes: Option<String>,
+}
+
+impl Cell<'_> {
+    /// Subject and condition.
+    pub fn key(&self) -> (&str, &str) {
+        (&self.runs[0].subject, &self.runs[0].condition)
+    }
+}
 
 /// What is analysed at once and is a part on disk.
 pub(super) enum Block<'a> {
     Run(&'a RunEntry),
-    /// All runs of a person in a condition that does not change.
-    Together(Vec<&'a RunEntry>),
+    Cell(Cell<'a>),
 }
 
-/// The runs that count, and then those that are fitted together.
+/// The runs that count, and then the cells that they are of.
 pub(super) fn blocks(manifest: &Manifest) -> Vec<Block<'_>> {
     let runs: Vec<&RunEntry> = manifest.runs.iter().filter(|run| run.counts).collect();
-    let steady = |run: &&&RunEntry| {
-        let facts = manifest.conditions.get(&run.condition);
-        run.then.is_none() && facts.is_none_or(|facts| facts.change_s.is_none())
-    };
-    let mut together: BTreeMap<(&str, &str), Vec<&RunEntry>> = BTreeMap::new();
-    for run in runs.iter().filter(steady) {
-        together.entry((&run.subject, &run.condition)).or_default().push(run);
+    let mut cells: Vec<Cell<'_>> = Vec::new();
+    for &run in &runs {
+        let key = (run.subject.as_str(), run.condition.as_str());
+        match cells.iter_mut().find(|cell| cell.key() == key) {
+            Some(cell) => cell.runs.push(run),
+            None => cells.push(Cell {
+                runs: vec![run],
+                changes: None,
+            }),
+        }
     }
-    let together = together.into_values().filter(|runs| runs.len() > 1);
+    for cell in &mut cells {
+        let change_s = manifest.conditions.get(cell.key().1).and_then(|facts| facts.change_s);
+        cell.changes = match (change_s, cell.runs.iter().any(|run| run.then.is_some())) {
+            (Some(at), _) => Some(format!("the task changes within the runs, at {at} s")),
+            (None, true) => Some("the task changes at the seam of the joined files".to_owned()),
+            (None, false) => None,
+        };
+    }
     runs.into_iter()
         .map(Block::Run)
-        .chain(together.map(Block::Together))
+        .chain(cells.into_iter().map(Block::Cell))
         .collect()
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::preparation_settings::PreparationSettings;
 
 /// What is known of a condition.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ConditionSettings {
     /// Controlled element, as `90/(s(s+6))` or `90/1,6,0` (by descending powers of s).
@@ -22,8 +22,6 @@ pub struct ConditionSettings {
     /// Samples by which u is recorded later than the e that it answers: `e[k]` belongs to
     /// `u[k + offset]`.
     pub offset_samples: f64,
-    /// Whether the describing function is fitted with a lead.
-    pub lead: bool,
     /// Time at which the task changes, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub change_s: Option<f64>,
@@ -31,18 +29,4 @@ pub struct ConditionSettings {
     /// group.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prepare: Option<PreparationSettings>,
-}
-
-impl Default for ConditionSettings {
-    fn default() -> Self {
-        Self {
-            controlled_element: None,
-            excitation: None,
-            period_s: None,
-            offset_samples: 0.0,
-            lead: true,
-            change_s: None,
-            prepare: None,
-        }
-    }
 }

@@ -2,9 +2,9 @@
 //! [`hoid_ident::frequency`]).
 //!
 //! For each subject and each condition whose excitation the manifest names: the describing function
-//! over the runs that can be read, crossover and phase margin with the controlled element, and
-//! gain, lead and delay. They stand beside the parametric fits and assume nothing of their
-//! structure.
+//! over the runs that can be read, its verdict, and crossover and margins with the controlled
+//! element, all as `hoid describe` has them ([`describe_runs`]). They stand beside the parametric
+//! fits and assume nothing of their structure.
 //!
 //! How far a fit is from it: with `H_j` the describing function at line j, `s_j` its standard error
 //! and `F_j` the median response of the fits over the runs, the distance is
@@ -21,18 +21,16 @@
 
 use std::path::Path;
 
-use hoid_ident::frequency::{
-    Averaging, DescribingFunction, DescribingOptions, Excitation, GainLeadDelayOptions, Line, LineSearch, describe,
-};
+use hoid_ident::frequency::{DescribingFunction, DescriptionOptions, Line, describe_runs};
 use hoid_io::OutputTable;
-use hoid_model::{ContinuousTransferFunction, ModelError, Record, uncertainty::Estimate};
+use hoid_model::{ContinuousTransferFunction, Detrend, ModelError, Record, uncertainty::Estimate};
 
 use super::{
     condition_settings::ConditionSettings,
     manifest::Manifest,
-    reading::read_run,
+    reading::{Pairing, read_run},
     responses::{MedianResponse, ResponseAverages},
-    tables::{real, schema, text},
+    tables::{joined, real, schema, text},
 };
 use crate::{columns::Rows, statistics::median};
 
@@ -52,12 +50,11 @@ const LINE: [&str; 7] = [
     "coherence",
     "spread",
 ];
-const MARGINS: [&str; 10] = [
+const MARGINS: [&str; 9] = [
     "crossover_rad_s",
     "phase_margin_deg",
-    "gain",
-    "lead_s",
-    "delay_s",
+    "phase_crossover_rad_s",
+    "gain_margin_db",
     "coherence",
     "off_line_share",
     "noise_ratio",
@@ -98,7 +95,9 @@ pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAvera
     let mut tables = Tables {
         lines: Rows::new(&schema(text(&keys).chain(real(&LINE)))),
         margins: Rows::new(&schema(
-            text(&keys).chain(text(&["status", "reason"])).chain(real(&numbers)),
+            text(&keys)
+                .chain(text(&["status", "reason", "verdict", "reasons"]))
+                .chain(real(&numbers)),
         )),
         agreement: Rows::new(&schema(
             text(&keys)
@@ -125,7 +124,7 @@ pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAvera
             .iter()
             .filter(|r| r.counts && (r.subject.as_str(), r.condition.as_str()) == key);
         let records: Vec<Record> = of_cell
-            .filter_map(|r| read_run(manifest, base, r).ok())
+            .filter_map(|r| read_run(manifest, base, r, Pairing::Recorded).ok())
             .map(|run| run.record)
             .collect();
         let margins = &mut tables.margins;
@@ -160,25 +159,30 @@ fn of_records(
         margins,
         agreement,
     } = tables;
-    let text = |error: hoid_ident::IdentError| error.to_string();
-    let first = records.first().ok_or("no run could be read")?;
-    let channel = facts.excitation.clone().ok_or("no excitation is named")?;
-    let search = LineSearch {
+    if records.is_empty() {
+        return Err("no run could be read".to_owned());
+    }
+    let element = facts.controlled_element.as_deref();
+    let element: Option<ContinuousTransferFunction> = element
+        .map(str::parse)
+        .transpose()
+        .map_err(|error: ModelError| error.to_string())?;
+    let options = DescriptionOptions {
+        excitation: facts.excitation.clone(),
         period_s: facts.period_s,
-        ..LineSearch::default()
-    };
-    let excitation = Excitation::found_in(first, &channel, &search).map_err(text)?;
-    let options = DescribingOptions {
-        averaging: Averaging::Reference { channel },
+        controlled_element: element.clone(),
         offset_samples: facts.offset_samples,
-        ..DescribingOptions::default()
+        // It is part of reading.
+        detrend: Detrend::None,
+        ..DescriptionOptions::default()
     };
-    let found = describe(records, &excitation, &options).map_err(text)?;
-    for line in &found.lines {
+    let description = describe_runs(records, &options).map_err(|error| error.to_string())?;
+    let found = &description.function;
+    for (line, phase) in found.lines.iter().zip(description.phases_deg()) {
         lines.begin();
         lines.text("subject", subject);
         lines.text("condition", condition);
-        let (magnitude, phase) = (line.magnitude_db(), line.phase_deg());
+        let magnitude = line.magnitude_db();
         let values = [
             line.omega_rad_s,
             magnitude.value,
@@ -192,6 +196,8 @@ fn of_records(
             .zip(values)
             .for_each(|(name, value)| lines.real(name, value));
     }
+    margins.text("verdict", description.verdict.level.name());
+    margins.text("reasons", &joined(description.verdict.reasons()));
     let mut put = |name: &str, estimate: Estimate| {
         margins.real(name, estimate.value);
         margins.real(&format!("{name}_se"), estimate.standard_error.unwrap_or(f64::NAN));
@@ -205,34 +211,30 @@ fn of_records(
     put("noise_ratio", found.noise_ratio);
     put("rms_e", found.rms_e);
     put("rms_u", found.rms_u);
-    let lead = GainLeadDelayOptions {
-        lead: facts.lead,
-        ..GainLeadDelayOptions::default()
-    };
-    let fit = found.fit_gain_lead_delay(&lead).map_err(text)?;
-    put("gain", fit.gain);
-    put("lead_s", fit.lead_s);
-    put("delay_s", fit.delay_s);
-    let element = facts.controlled_element.as_deref();
-    let element: Option<ContinuousTransferFunction> = element
-        .map(str::parse)
-        .transpose()
-        .map_err(|error: ModelError| error.to_string())?;
     let mut margins_of_lines = None;
-    if let Some(element) = &element {
-        let at = found.open_loop(element).margins();
-        if let (Some(crossover), Some(margin)) = (at.crossover_rad_s, at.phase_margin_deg) {
-            put("crossover_rad_s", crossover);
-            put("phase_margin_deg", margin);
-            margins_of_lines = Some((crossover.value, margin.value));
+    if let Some(at) = &description.margins {
+        let all = [
+            ("crossover_rad_s", at.crossover_rad_s),
+            ("phase_margin_deg", at.phase_margin_deg),
+            ("phase_crossover_rad_s", at.phase_crossover_rad_s),
+            ("gain_margin_db", at.gain_margin_db),
+        ];
+        for (name, estimate) in all {
+            if let Some(estimate) = estimate {
+                put(name, estimate);
+            }
         }
+        margins_of_lines = at
+            .crossover_rad_s
+            .zip(at.phase_margin_deg)
+            .map(|(c, m)| (c.value, m.value));
     }
     for (estimator, response) in fits.medians(subject, condition) {
         agreement.begin();
         agreement.text("subject", subject);
         agreement.text("condition", condition);
         agreement.text("estimator", estimator);
-        let (distance, in_errors) = distance(&found, &response);
+        let (distance, in_errors) = distance(found, &response);
         agreement.real("distance_percent", distance);
         agreement.real("distance_in_errors", in_errors);
         let mut agrees = distance <= AGREES.2;

@@ -8,10 +8,12 @@ use std::{collections::BTreeMap, path::Path};
 use hoid_io::{OutputTable, TableSchema, TableWriter};
 
 use super::{
+    analysis::PEOPLE,
     averages::{Averages, Delays, TraceAverages},
     block::Block,
     frequency,
     manifest::Manifest,
+    person::{Person, people_of, people_table},
     reading,
     responses::{self, ResponseAverages},
     run_rows::estimates_schema,
@@ -68,7 +70,9 @@ pub(super) fn join(
     for (block, of) in blocks.iter().enumerate() {
         let found = read(block, "estimates")?;
         averages.add(&found);
-        delays.add(&found, block);
+        if matches!(of, Block::Cell(_)) {
+            delays.add(&found);
+        }
         estimates.append(&found)?;
         if let Block::Run(run) = of {
             let cell = cells.entry((&run.subject, &run.condition)).or_default();
@@ -115,6 +119,15 @@ pub(super) fn join(
     }
     for writers in [traces, trace_averages, settlings] {
         writers.finish()?;
+    }
+
+    let mut people: Vec<Person> = Vec::new();
+    for (block, _) in blocks.iter().enumerate().filter(|(_, of)| matches!(of, Block::Cell(_))) {
+        people.extend(people_of(&read(block, PEOPLE)?));
+    }
+    let people = people_table(&people);
+    for csv in [false, true] {
+        hoid_io::write_table(&table_path(directory, PEOPLE, csv), &people)?;
     }
 
     let mut whole = vec![

@@ -7,7 +7,10 @@
 //! | [`Pattern`] | subject, condition and run from names of files |
 //! | [`run_group`] | the analysis in a directory, part by part |
 //! | `reading` | runs from files, and what was done to them |
-//! | `analysis` | what is done with one run, in which `windows`, with which orders (`run_orders`), and the rows of it (`run_rows`) |
+//! | `alignment` | channels that were recorded late, put beside the others within a span |
+//! | `analysis` | what is done with the runs of a person in a condition (`block`) and with one run, in which `windows`, with which orders (`run_orders`), and the rows of it (`run_rows`) |
+//! | `family_fits`, [`Person`] | the operator of a person in a condition, and its row in the table of people |
+//! | [`GroupSummary`] | what failed, the people, and the verdict on the whole group |
 //! | `traces` | its recursive estimates as rows |
 //! | `responses` | frequency responses of the fits |
 //! | [`VirtualExperiment`] | the same from simulated subjects, with the defects of recorded data ([`SamplingDefect`]) |
@@ -17,19 +20,22 @@
 //! | `averages` | means over the runs, chosen delays, averages of traces |
 //! | `join` | the tables of the group from those of its runs |
 //!
-//! Each run is a part on disk, as a block of a study is, and so is the fit of all runs of a person
-//! in a condition: a group that was stopped goes on, and of a run nothing stays in memory but its
+//! Each run is a part on disk, as a block of a study is, and so is what is found in all runs of a
+//! person in a condition, which comes first: a group that was stopped goes on, and of a run nothing stays in memory but its
 //! estimates and responses; traces are averaged for one person in one condition after the other.
 
+mod alignment;
 mod analysis;
 mod analysis_settings;
 mod averages;
 mod block;
 mod condition_settings;
+mod family_fits;
 mod frequency;
 mod join;
 mod manifest;
 mod pattern;
+mod person;
 mod preparation_settings;
 mod read_settings;
 mod reading;
@@ -39,6 +45,7 @@ mod run_orders;
 mod run_rows;
 mod sampling_defects;
 mod settling;
+mod summary;
 mod tables;
 mod traces;
 mod virtual_people;
@@ -49,9 +56,11 @@ pub use analysis_settings::AnalysisSettings;
 pub use condition_settings::ConditionSettings;
 pub use manifest::{MANIFEST, Manifest, RunEntry};
 pub use pattern::{FileNameParts, Pattern};
+pub use person::{Person, PersonStatus};
 pub use preparation_settings::{NumberOrText, PreparationSettings};
 pub use read_settings::{Detrending, ReadSettings};
 pub use run::run_group;
 pub use sampling_defects::SamplingDefect;
+pub use summary::{GroupSummary, RunFailure};
 pub use virtual_people::{PeopleExperiment, simulate_people};
 pub use virtual_subjects::{VirtualExperiment, simulate_group};

@@ -2,19 +2,27 @@
 
 use std::path::Path;
 
-use hoid_io::{
-    ColumnKind, ColumnSchema, OutputTable, Preparation, ReadOptions, ReadRecord, Repair, TableSchema, read_prepared,
-};
+use hoid_io::{ColumnKind, ColumnSchema, OutputTable, Preparation, ReadOptions, ReadRecord, Repair, TableSchema};
 use hoid_model::{Detrend, Record};
 
 use super::{
+    alignment::read_aligned,
     manifest::{Manifest, RunEntry},
     read_settings::Detrending,
 };
 use crate::columns::Rows;
 
+/// How the output is put beside the input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Pairing {
+    /// As recorded, and as `[prepare]` moves channels.
+    Recorded,
+    /// With `offset_samples` of the condition taken back too: u beside the e that it answers.
+    InTheLoop,
+}
+
 /// The record in a file, and what was done to it; the condition may have a preparation of its own.
-fn read_file(manifest: &Manifest, condition: &str, path: &Path) -> Result<ReadRecord, String> {
+fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing) -> Result<ReadRecord, String> {
     let reading = &manifest.read;
     let text = |error: hoid_io::IoError| error.to_string();
     let options = ReadOptions {
@@ -35,7 +43,14 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path) -> Result<ReadRe
         },
         ..manifest.preparation(condition)?
     };
-    read_prepared(path, &options, &preparation).map_err(text)
+    let late_samples = match pairing {
+        Pairing::Recorded => 0.0,
+        Pairing::InTheLoop => manifest
+            .conditions
+            .get(condition)
+            .map_or(0.0, |facts| facts.offset_samples),
+    };
+    read_aligned(path, &options, &preparation, late_samples).map_err(text)
 }
 
 /// The tables of the account: what was done to the runs, one step a row, and what is wrong with
@@ -82,10 +97,18 @@ pub(super) fn schemas() -> [(&'static str, TableSchema); 2] {
 pub(super) type ReadFile<'a> = (&'a Path, Result<ReadRecord, String>);
 
 /// The file of a run, and the one that is joined behind it.
-pub(super) fn read_files<'a>(manifest: &Manifest, base: &Path, entry: &'a RunEntry) -> Vec<ReadFile<'a>> {
+pub(super) fn read_files<'a>(
+    manifest: &Manifest,
+    base: &Path,
+    entry: &'a RunEntry,
+    pairing: Pairing,
+) -> Vec<ReadFile<'a>> {
     let files = std::iter::once(&entry.file).chain(&entry.then);
     files
-        .map(|file| (file.as_path(), read_file(manifest, &entry.condition, &base.join(file))))
+        .map(|file| {
+            let read = read_file(manifest, &entry.condition, &base.join(file), pairing);
+            (file.as_path(), read)
+        })
         .collect()
 }
 
@@ -97,8 +120,8 @@ pub(super) struct Run {
 }
 
 /// Reads a run.
-pub(super) fn read_run(manifest: &Manifest, base: &Path, entry: &RunEntry) -> Result<Run, String> {
-    run_of(read_files(manifest, base, entry))
+pub(super) fn read_run(manifest: &Manifest, base: &Path, entry: &RunEntry, pairing: Pairing) -> Result<Run, String> {
+    run_of(read_files(manifest, base, entry, pairing))
 }
 
 /// The run in one file, or joined of two.

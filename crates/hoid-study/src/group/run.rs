@@ -9,7 +9,7 @@ use std::{
 use sha2::{Digest, Sha256};
 
 use super::{
-    analysis::{analyse, analyse_together},
+    analysis::{FromCell, PEOPLE, analyse, analyse_together},
     block::{Block, blocks},
     join::join,
     manifest::{MANIFEST, Manifest},
@@ -54,17 +54,26 @@ pub fn run_group(
         });
     }
     let total = blocks.len() as u64;
-    let is_there = |i: usize| part(directory, i as u64, "estimates").exists();
-    let open: Vec<usize> = (0..blocks.len()).filter(|i| !is_there(*i)).collect();
-    let known = total - open.len() as u64;
+    let is_there = |i: &usize| part(directory, *i as u64, "estimates").exists();
+    // What is chosen for all runs of a person in a condition comes before each of them.
+    let is_cell = |i: &usize| matches!(blocks[*i], Block::Cell(_));
+    let (cells, runs): (Vec<usize>, Vec<usize>) = (0..blocks.len()).filter(|i| !is_there(i)).partition(is_cell);
+    let known = total - (cells.len() + runs.len()) as u64;
     let done = AtomicU64::new(known);
     let one = |&i: &usize| -> Result<bool, StudyError> {
         if !go_on() {
             return Ok(false);
         }
         let found = match &blocks[i] {
-            Block::Run(run) => analyse(manifest, base, run),
-            Block::Together(runs) => analyse_together(manifest, base, runs),
+            Block::Run(run) => {
+                let key = (run.subject.as_str(), run.condition.as_str());
+                let of_run = |block: &Block<'_>| matches!(block, Block::Cell(cell) if cell.key() == key);
+                let place = blocks.iter().position(of_run).unwrap_or(i) as u64;
+                let read = |table: &str| hoid_io::read_table(&part(directory, place, table));
+                let from_cell = FromCell::of(&read("estimates")?, &read(PEOPLE)?);
+                analyse(manifest, base, run, &from_cell)
+            }
+            Block::Cell(cell) => analyse_together(manifest, base, cell),
         };
         hoid_io::write_table(&part(directory, i as u64, "traces"), &found.traces)?;
         hoid_io::write_table(&part(directory, i as u64, "responses"), &found.responses)?;
@@ -76,7 +85,7 @@ pub fn run_group(
         progress(Progress { done, total, known });
         Ok(true)
     };
-    let finished = on_threads(options.jobs, &open, one)?;
+    let finished = on_threads(options.jobs, &cells, one)? && on_threads(options.jobs, &runs, one)?;
     let estimates = done.load(Ordering::Relaxed) - known;
     if !finished {
         return Ok(Outcome {
@@ -134,7 +143,8 @@ fn prepare(manifest: &Manifest, directory: &Path, record: &RunRecord, resume: bo
     Ok(false)
 }
 
-const TABLES: [&str; 13] = [
+const TABLES: [&str; 14] = [
+    PEOPLE,
     "preparation",
     "trouble",
     "estimates",

@@ -1,40 +1,70 @@
-//! The orders and the delay of the models of a run, chosen beforehand on its sub-batches.
+//! The orders and the delay of the ARX and Box-Jenkins models, chosen beforehand.
+//!
+//! A single run tells the delay of a person badly: the loss of a model of second order is flat over
+//! nk, has several minima, of which a sample more or less takes another, and often falls towards the
+//! end of the range. The delay is therefore one for all runs of a person in a condition, that of
+//! their operator in the family: `nk = round(tau_e/Ts) + 1`, with the samples by which u is recorded
+//! late. Where there is no such operator, every nk in the range is fitted to all runs at once on
+//! each of two sub-batches, and nk is the average of the two best, rounded. nd is the greater of the
+//! orders that BIC prefers on the sub-batches of all runs.
 
 use hoid_ident::{Estimator, OrderRanges, choose_orders, order_selection::Criterion};
+use hoid_io::OutputTable;
 use hoid_model::{Orders, Record, Structure, remnant::RemnantDiscretisation, uncertainty::Estimate};
 
-use super::{analysis_settings::AnalysisSettings, run_rows::RunRows, windows::Window};
+use super::{
+    analysis_settings::AnalysisSettings,
+    run_rows::RunRows,
+    tables::{numbers, texts},
+    windows::windows,
+};
 
 /// Label of a structure in the tables.
 pub(super) fn label_of(structure: Structure) -> &'static str {
     if structure == Structure::Arx { "ARX" } else { "BJ" }
 }
 
-/// The orders of a structure, chosen on the sub-batches; a row has the delay of each.
+/// nk of a delay in s, of u that is recorded late by some samples.
+pub(super) fn nk_of(delay_s: f64, sample_time_s: f64, late_samples: f64) -> usize {
+    (delay_s / sample_time_s + late_samples).round().max(0.0) as usize + 1
+}
+
+/// The orders of a structure for all runs, with the delay that is known or searched; where it is
+/// searched, a row has that of each sub-batch.
 pub(super) fn choose(
     settings: &AnalysisSettings,
-    record: &Record,
+    records: &[Record],
     structure: Structure,
-    windows: &[Window; 3],
+    known_nk: Option<usize>,
     rows: &mut RunRows<'_>,
-) -> Result<Orders, String> {
-    let mut ranges = ranges(settings, record, structure);
+) -> Result<(), String> {
+    let first = records.first().ok_or("no run could be read")?;
+    let mut ranges = ranges(settings, first, structure);
+    if let Some(nk) = known_nk {
+        ranges.nk = nk..=nk;
+    }
     if structure == Structure::BoxJenkins {
         ranges.nd = settings.nd.0..=settings.nd.1;
     }
     let template = Estimator::new(structure, structure.operator_orders(1));
     let mut wanted = Vec::new();
     let mut t_n = Vec::new();
-    for window in &windows[..2] {
-        let part = record.span(window.from_s, window.to_s).map_err(|e| e.to_string())?;
-        let choice = choose_orders(&template, &ranges, Criterion::Bic, &[part]).map_err(|e| e.to_string())?;
+    for which in 0..2 {
+        let part = |record: &Record| {
+            let window = windows(settings, record)[which];
+            record.span(window.from_s, window.to_s).map_err(|e| e.to_string())
+        };
+        let parts: Vec<Record> = records.iter().map(part).collect::<Result<_, _>>()?;
+        let choice = choose_orders(&template, &ranges, Criterion::Bic, &parts).map_err(|e| e.to_string())?;
         let orders = choice.fit.orders();
-        rows.row(
-            Some(*window),
-            label_of(structure),
-            "nk_of_window",
-            Estimate::fixed(orders.nk as f64),
-        );
+        if known_nk.is_none() {
+            rows.row(
+                Some(windows(settings, first)[which]),
+                label_of(structure),
+                "nk_of_window",
+                Estimate::fixed(orders.nk as f64),
+            );
+        }
         if let Ok(remnant) = choice.fit.remnant(RemnantDiscretisation::ZeroOrderHold) {
             t_n.push(remnant.t_n_s.value);
         }
@@ -50,11 +80,7 @@ pub(super) fn choose(
             rows.row(None, label_of(structure), "T_n", Estimate::fixed(mean));
         }
     }
-    Ok(Orders {
-        nk,
-        nd,
-        ..structure.operator_orders(nk)
-    })
+    Ok(())
 }
 
 /// The operator's orders with the delays of the manifest.
@@ -64,4 +90,40 @@ pub(super) fn ranges(settings: &AnalysisSettings, record: &Record, structure: St
     let mut ranges = OrderRanges::from(structure.operator_orders(1));
     ranges.nk = samples(least)..=samples(most);
     ranges
+}
+
+/// The orders that were chosen, from the estimates of a person in a condition; why there are none.
+pub(super) fn chosen(estimates: &OutputTable, structure: Structure) -> Result<Orders, String> {
+    let [window, estimator, parameter, reason] =
+        ["window", "estimator", "parameter", "reason"].map(|name| texts(estimates, name));
+    let values = numbers(estimates, "value");
+    let own = |i: &usize| window[*i].is_empty() && estimator[*i] == label_of(structure);
+    let value = |name: &str| {
+        let row = (0..values.len()).filter(own).find(|i| parameter[*i] == name)?;
+        Some(values[row] as usize)
+    };
+    let Some(nk) = value("nk") else {
+        let row = (0..values.len()).filter(own).find(|i| !reason[*i].is_empty());
+        return Err(row.map_or_else(|| "no delay was chosen".to_owned(), |i| reason[i].clone()));
+    };
+    let usual = structure.operator_orders(nk);
+    Ok(Orders {
+        nd: value("nd").unwrap_or(usual.nd),
+        ..usual
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nk_of;
+
+    #[test]
+    fn a_sample_more_of_delay_is_a_sample_more_of_nk() {
+        // nk = 1 is a delay of zero.
+        assert_eq!(nk_of(0.0, 0.01, 0.0), 1);
+        assert_eq!(nk_of(0.28, 0.01, 0.0), 29);
+        assert_eq!(nk_of(0.28, 0.01, 1.0), 30);
+        assert_eq!(nk_of(0.284, 0.01, -0.5), 29);
+        assert_eq!(nk_of(0.02, 0.01, -9.0), 1);
+    }
 }

@@ -4,7 +4,7 @@
 use hoid_ident::{Fit, frequency::Crossover};
 use hoid_io::{OutputTable, TableSchema};
 use hoid_model::{
-    Complex64, ContinuousTransferFunction, NotConvertible, Record,
+    Complex64, ContinuousTransferFunction, NotConvertible, PolynomialModel, Record,
     uncertainty::{Estimate, OperatorEstimate},
 };
 use hoid_track::Trace;
@@ -24,8 +24,8 @@ pub(super) struct RunTables {
     pub estimates: OutputTable,
     pub responses: OutputTable,
     pub traces: OutputTable,
-    /// What was done to its files and what is wrong with their sampling, by the name of the table;
-    /// none of all runs at once.
+    /// By the name of the table: of a run what was done to its files and what is wrong with their
+    /// sampling; of all runs at once the person.
     pub account: Vec<(&'static str, OutputTable)>,
 }
 
@@ -115,23 +115,8 @@ impl<'a> RunRows<'a> {
         if window.name != WHOLE {
             return;
         }
-        let omega = grid(sample_time_s);
-        let advance = self.condition.offset_samples * sample_time_s;
-        let response: Vec<Complex64> = omega
-            .iter()
-            .map(|w| fit.model().response(*w) * Complex64::from_polar(1.0, w * advance))
-            .collect();
-        for ((w, h), phase_deg) in omega.iter().zip(&response).zip(followed_phases_deg(&response)) {
-            let rows = &mut self.responses;
-            rows.begin();
-            rows.text("subject", &self.entry.subject);
-            rows.text("condition", &self.entry.condition);
-            rows.text("run", &self.entry.run);
-            rows.text("estimator", label);
-            rows.real("omega_rad_s", *w);
-            rows.real("magnitude_db", 20.0 * h.norm().log10());
-            rows.real("phase_deg", phase_deg);
-        }
+        let advance_s = self.condition.offset_samples * sample_time_s;
+        let (omega, response) = self.responses_of(label, fit.model(), sample_time_s, advance_s);
         let Some(element) = &self.element else { return };
         let open_loop: Vec<Complex64> = omega
             .iter()
@@ -152,6 +137,38 @@ impl<'a> RunRows<'a> {
                 Estimate::fixed(found.phase_margin_deg),
             );
         }
+    }
+
+    /// Response of a model of u that is `advance_s` late, on the grid.
+    pub fn responses_of(
+        &mut self,
+        label: &str,
+        model: &PolynomialModel,
+        sample_time_s: f64,
+        advance_s: f64,
+    ) -> (Vec<f64>, Vec<Complex64>) {
+        let omega = grid(sample_time_s);
+        let response: Vec<Complex64> = omega
+            .iter()
+            .map(|w| model.response(*w) * Complex64::from_polar(1.0, w * advance_s))
+            .collect();
+        for ((w, h), phase_deg) in omega.iter().zip(&response).zip(followed_phases_deg(&response)) {
+            let rows = &mut self.responses;
+            rows.begin();
+            rows.text("subject", &self.entry.subject);
+            rows.text("condition", &self.entry.condition);
+            rows.text("run", &self.entry.run);
+            rows.text("estimator", label);
+            rows.real("omega_rad_s", *w);
+            rows.real("magnitude_db", 20.0 * h.norm().log10());
+            rows.real("phase_deg", phase_deg);
+        }
+        (omega, response)
+    }
+
+    /// The controlled element, where it is known.
+    pub fn element(&self) -> Option<&ContinuousTransferFunction> {
+        self.element.as_ref()
     }
 
     /// The moving rows of a trace.

@@ -40,3 +40,19 @@ pub(super) fn numbers<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
         _ => &[],
     }
 }
+
+/// Stands between sentences in one cell.
+const BETWEEN: &str = " | ";
+
+/// Sentences in one cell.
+pub(super) fn joined<'a>(sentences: impl Iterator<Item = &'a str>) -> String {
+    sentences.collect::<Vec<_>>().join(BETWEEN)
+}
+
+/// The sentences of a cell.
+pub(super) fn parted(cell: &str) -> Vec<String> {
+    cell.split(BETWEEN)
+        .filter(|sentence| !sentence.is_empty())
+        .map(str::to_owned)
+        .collect()
+}

@@ -1,27 +1,35 @@
-//! `hoid group`: recorded runs by subject and condition.
+//! `hoid group`: recorded runs by subject and condition. `form` shows what came out, to people and
+//! to programs.
+
+mod form;
 
 use std::{
     path::{Path, PathBuf},
     sync::atomic::Ordering,
 };
 
-use hoid_model::SampleTime;
+use hoid_model::{SampleTime, VerdictLevel};
 use hoid_report::write_group_pages;
 use hoid_sim::people::{Population, Range};
 use hoid_study::{
     RunOptions,
     group::{
-        MANIFEST, Manifest, Pattern, PeopleExperiment, VirtualExperiment, run_group, simulate_group, simulate_people,
+        GroupSummary, MANIFEST, Manifest, Pattern, PeopleExperiment, VirtualExperiment, run_group, simulate_group,
+        simulate_people,
     },
 };
-use serde_json::json;
+
+use form::Finished;
 
 use super::study::stop_at_interrupt;
 use crate::{
     args::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs},
     error::CliError,
-    output,
+    json, output,
 };
+
+/// Reasons in the message of a group that has no result; the page has all of them.
+const REASONS_OF_EXIT: usize = 3;
 
 pub fn run(args: &GroupArgs) -> Result<(), CliError> {
     match (&args.command, &args.run.manifest, &args.run.out) {
@@ -172,21 +180,23 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
             out.display()
         )));
     }
+    let summary = GroupSummary::read(&manifest, out)?;
     let pages = shown(&write_group_pages(&manifest, &path, out)?);
-    let tables = shown(&outcome.tables);
+    let finished = Finished {
+        name: &manifest.name,
+        summary: &summary,
+        tables: shown(&outcome.tables),
+        pages,
+    };
     if args.json {
-        output::print(&format!(
-            "{:#}\n",
-            json!({ "hoid": env!("CARGO_PKG_VERSION"), "group": manifest.name, "runs": runs, "tables": tables, "reports": pages })
-        ));
-        return Ok(());
+        json::print(&finished.to_json());
+    } else {
+        output::print(&finished.page());
     }
-    let listed: String = tables
-        .iter()
-        .chain(&pages)
-        .map(|table| format!("  {table}\n"))
-        .collect();
-    output::print(&format!("{}: {runs} runs\n{listed}", manifest.name));
+    if summary.verdict.level == VerdictLevel::NotDetermined {
+        let reasons: Vec<&str> = summary.verdict.reasons().take(REASONS_OF_EXIT).collect();
+        return Err(CliError::NotDetermined(reasons.join("; ")));
+    }
     Ok(())
 }
 

@@ -1,0 +1,123 @@
+//! A finished group as a page for people and as an object for programs.
+
+use hoid_ident::family::Parameter;
+use hoid_model::VerdictLevel;
+use hoid_report::{PeopleTable, people_table};
+use hoid_study::group::{GroupSummary, Person, RunFailure};
+use serde_json::{Map, Value, json};
+
+use crate::{json, text};
+
+/// A group with its files.
+pub struct Finished<'a> {
+    pub name: &'a str,
+    pub summary: &'a GroupSummary,
+    pub tables: Vec<String>,
+    pub pages: Vec<String>,
+}
+
+impl Finished<'_> {
+    /// The page: what failed and what is doubtful first, then the people.
+    pub fn page(&self) -> String {
+        let GroupSummary {
+            runs,
+            failures,
+            people,
+            verdict,
+        } = self.summary;
+        let read = match failures.len() {
+            0 => "all of them read".to_owned(),
+            n => format!("{n} of them not read"),
+        };
+        let mut page = format!("{verdict}\n\n{}: {runs} runs, {read}\n", self.name);
+        let table = people_table(people.iter());
+        if !table.rows.is_empty() {
+            let last = table.headings.len() - 1;
+            let in_loop: Vec<usize> = (0..table.parameters).chain([last]).collect();
+            let parameters: Vec<usize> = [0, 1].into_iter().chain(table.parameters..last).collect();
+            page.push_str(&format!(
+                "\nOperators, each of all runs of a person in a condition\n{}\n{}\n\
+                 Value \u{b1} standard error by the scatter between runs. What the data do not determine is in \
+                 parentheses, or beyond a bound (> is a limit of 95 %).\n",
+                columns_of(&table, &in_loop),
+                columns_of(&table, &parameters),
+            ));
+        }
+        page.push_str("\nFiles:\n");
+        for file in self.pages.iter().chain(&self.tables) {
+            page.push_str(&format!("  {file}\n"));
+        }
+        page
+    }
+
+    pub fn to_json(&self) -> Value {
+        let failure =
+            |f: &RunFailure| json!({"subject": f.subject, "condition": f.condition, "run": f.run, "reason": f.reason});
+        json!({
+            "hoid": env!("CARGO_PKG_VERSION"),
+            "group": self.name,
+            "verdict": json::verdict(&self.summary.verdict),
+            "runs": self.summary.runs,
+            "failures": self.summary.failures.iter().map(failure).collect::<Vec<_>>(),
+            "people": self.summary.people.iter().map(person).collect::<Vec<_>>(),
+            "tables": self.tables,
+            "reports": self.pages,
+        })
+    }
+}
+
+/// Some columns of the table of people: all of them are too wide for a screen.
+fn columns_of(table: &PeopleTable, columns: &[usize]) -> String {
+    let headings: Vec<&str> = columns.iter().map(|i| table.headings[*i].as_str()).collect();
+    let mut rows = text::table(&headings);
+    for cells in &table.rows {
+        rows.add_row(columns.iter().map(|i| cells[*i].as_str()));
+    }
+    rows.to_string()
+}
+
+fn person(p: &Person) -> Value {
+    let mut map = Map::new();
+    let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
+    set("subject", json!(p.subject));
+    set("condition", json!(p.condition));
+    set("run", json!(p.run));
+    set("runs", json!(p.runs));
+    set("status", json!(p.status.name()));
+    if !p.reason.is_empty() {
+        set("reason", json!(p.reason));
+    }
+    let Some(level) = p.verdict else {
+        return Value::Object(map);
+    };
+    set("form", json!(p.form));
+    let parameters: Map<String, Value> = p.parameters.iter().map(|q| (q.name.clone(), parameter(q))).collect();
+    set("parameters", Value::Object(parameters));
+    if let (Some(crossover), Some(margin)) = (p.crossover_rad_s, p.phase_margin_deg) {
+        set(
+            "open_loop",
+            json!({"crossover_rad_s": json::estimate(&crossover), "phase_margin_deg": json::estimate(&margin)}),
+        );
+    }
+    set("chi2", json::optional(p.chi2.map(|(chi2, _)| chi2)));
+    set("dof", json!(p.chi2.map(|(_, dof)| dof)));
+    set("kappa", json::optional(p.kappa));
+    set("noise_order", json!(p.noise_order));
+    set(
+        "verdict",
+        json!({"level": VerdictLevel::name(level), "reasons": p.reasons, "notes": p.notes}),
+    );
+    Value::Object(map)
+}
+
+/// Ends of an interval that are open are null.
+fn parameter(p: &Parameter) -> Value {
+    json!({
+        "value": json::number(p.value),
+        "standard_error": json::optional(p.standard_error),
+        "unit": p.unit,
+        "interval": p.interval.map(|(low, high)| [json::number(low), json::number(high)]),
+        "determined": p.determined,
+        "prior_share": json::number(p.prior_share),
+    })
+}

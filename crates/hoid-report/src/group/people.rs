@@ -1,0 +1,173 @@
+//! The verdict on a group, what was not read, and the operator of each person in each condition with
+//! its errors.
+//!
+//! A parameter that the data determine is given with its standard error. One that they do not is in
+//! parentheses; where its interval is open above, `> x` says from where on.
+
+use hoid_ident::family::Parameter;
+use hoid_model::{VerdictLevel, uncertainty::Estimate};
+use hoid_study::group::{GroupSummary, Person};
+use minijinja::{Value, context};
+
+use super::report::GroupReport;
+use crate::numbers;
+
+/// Names and headings of the parameters, in the order of the table.
+const COLUMNS: [(&str, &str); 13] = [
+    ("K_over_T_I", "K/T_I (1/s)"),
+    ("K_I", "K_I (1/s)"),
+    ("K_e", "K_e"),
+    ("K", "K"),
+    ("T_L", "T_L (s)"),
+    ("K_e_dot", "K_e_dot (s)"),
+    ("T_I", "T_I (s)"),
+    ("c_1", "c_1 (s)"),
+    ("c_2", "c_2 (s^2)"),
+    ("alpha", "alpha (rad/s)"),
+    ("tau_e", "tau_e (s)"),
+    ("omega_nm", "omega_nm (rad/s)"),
+    ("zeta_nm", "zeta_nm"),
+];
+
+/// The headline table as text: a row for each person and condition.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PeopleTable {
+    /// Headings of its columns.
+    pub headings: Vec<String>,
+    /// Cells of its rows.
+    pub rows: Vec<Vec<String>>,
+    /// Where the columns of parameters begin; the last column is the verdict.
+    pub parameters: usize,
+}
+
+/// The people that there are results of, with columns for what they have.
+pub fn people_table<'a>(people: impl Iterator<Item = &'a Person>) -> PeopleTable {
+    let people: Vec<&Person> = people.filter(|p| p.verdict.is_some()).collect();
+    let columns: Vec<(&str, &str)> = COLUMNS
+        .into_iter()
+        .filter(|(name, _)| people.iter().any(|p| p.parameter(name).is_some()))
+        .collect();
+    let in_loop = people.iter().any(|p| p.crossover_rad_s.is_some());
+    let mut headings: Vec<String> = ["subject", "condition", "runs", "form"].map(str::to_owned).to_vec();
+    if in_loop {
+        headings.extend(["crossover (rad/s)", "phase margin (deg)"].map(str::to_owned));
+    }
+    let parameters = headings.len();
+    headings.extend(columns.iter().map(|(_, heading)| (*heading).to_owned()));
+    headings.push("verdict".to_owned());
+    let row = |p: &&Person| {
+        let runs = match p.run.as_str() {
+            "all" => p.runs.to_string(),
+            run => format!("run {run}"),
+        };
+        let mut cells = vec![p.subject.clone(), p.condition.clone(), runs, p.form.clone()];
+        if in_loop {
+            cells.extend([p.crossover_rad_s, p.phase_margin_deg].map(|e| e.map_or_else(dash, |e| estimate(&e))));
+        }
+        cells.extend(
+            columns
+                .iter()
+                .map(|(name, _)| p.parameter(name).map_or_else(dash, parameter)),
+        );
+        cells.push(p.verdict.map_or("", VerdictLevel::name).to_owned());
+        cells
+    };
+    PeopleTable {
+        headings,
+        rows: people.iter().map(row).collect(),
+        parameters,
+    }
+}
+
+fn dash() -> String {
+    numbers::DASH.to_owned()
+}
+
+fn estimate(e: &Estimate) -> String {
+    match e.standard_error.filter(|s| s.is_finite() && *s > 0.0) {
+        None => numbers::significant(e.value, 3),
+        Some(error) => {
+            let (value, error) = numbers::with_uncertainty(e.value, Some(error));
+            format!("{value} \u{b1} {error}")
+        }
+    }
+}
+
+fn parameter(p: &Parameter) -> String {
+    let known = Estimate {
+        value: p.value,
+        standard_error: p.standard_error,
+    };
+    match p.interval {
+        _ if p.determined => estimate(&known),
+        Some((low, high)) if high.is_infinite() && low.is_finite() => format!("> {}", numbers::significant(low, 2)),
+        _ if !p.value.is_finite() => dash(),
+        _ => format!("({})", numbers::significant(p.value, 2)),
+    }
+}
+
+impl GroupReport<'_> {
+    /// The people of the page.
+    fn shown(&self) -> impl Iterator<Item = &Person> {
+        let GroupSummary { people, .. } = self.summary;
+        people.iter().filter(|p| self.shows(&p.subject))
+    }
+
+    /// The verdict on the group: level, reasons, notes; of one subject the reasons about them are
+    /// with their operators.
+    pub(super) fn verdict(&self) -> Value {
+        if self.subject.is_some() {
+            return Value::UNDEFINED;
+        }
+        let verdict = &self.summary.verdict;
+        context! {
+            level => verdict.level.name(),
+            reasons => verdict.reasons().map(str::to_owned).collect::<Vec<_>>(),
+            notes => verdict.notes().map(str::to_owned).collect::<Vec<_>>(),
+        }
+    }
+
+    pub(super) fn unread(&self) -> Vec<Value> {
+        let failures = self.summary.failures.iter().filter(|f| self.shows(&f.subject));
+        failures
+            .map(|f| context! { subject => &f.subject, condition => &f.condition, run => &f.run, reason => &f.reason })
+            .collect()
+    }
+
+    pub(super) fn people_headings(&self) -> Vec<String> {
+        people_table(self.shown()).headings
+    }
+
+    pub(super) fn people(&self) -> Vec<Value> {
+        let rows = people_table(self.shown()).rows;
+        let people = self.shown().filter(|p| p.verdict.is_some());
+        rows.into_iter()
+            .zip(people)
+            .map(|(cells, p)| context! { cells, reasons => &p.reasons, notes => &p.notes, name => p.name() })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_determined_is_no_number_with_an_error() {
+        let of = |value, standard_error, interval, determined| {
+            parameter(&Parameter {
+                name: "T_I".to_owned(),
+                unit: "s",
+                value,
+                standard_error,
+                interval,
+                prior_share: 0.0,
+                determined,
+            })
+        };
+        assert_eq!(of(2.0, Some(0.125), Some((1.7, 2.4)), true), "2.00 \u{b1} 0.13");
+        assert_eq!(of(20.0, Some(90.0), Some((4.13, f64::INFINITY)), false), "> 4.1");
+        assert_eq!(of(f64::INFINITY, None, None, false), numbers::DASH);
+        assert_eq!(of(0.314, Some(0.2), Some((0.1, 0.8)), false), "(0.31)");
+    }
+}

@@ -1,0 +1,84 @@
+//! The family of operators fitted to the runs of a person in a condition, and to each run with the
+//! form of all of them.
+
+use hoid_ident::family::{FamilyEstimator, FamilyFit};
+use hoid_model::{ContinuousTransferFunction, Form, Record, uncertainty::Estimate};
+
+use super::{
+    analysis_settings::AnalysisSettings,
+    condition_settings::ConditionSettings,
+    person::{ALL, Person},
+    run_rows::RunRows,
+    windows::Window,
+};
+
+/// Label of a fit of one run in the tables.
+pub(super) const OF_RUN: &str = "family";
+/// Label of the fit of all runs.
+pub(super) const OF_ALL: &str = "family, all runs";
+
+/// How the runs of a condition are fitted.
+pub(super) fn estimator(settings: &AnalysisSettings, condition: &ConditionSettings) -> Result<FamilyEstimator, String> {
+    Ok(FamilyEstimator {
+        excitation: condition.excitation.clone(),
+        period_s: condition.period_s,
+        ..settings.family()?
+    })
+}
+
+/// The same for one run of a person whose form is known: nothing is individual in one run.
+pub(super) fn estimator_of_run(
+    settings: &AnalysisSettings,
+    condition: &ConditionSettings,
+    form: Form,
+) -> Result<FamilyEstimator, String> {
+    Ok(FamilyEstimator {
+        forms: vec![form],
+        individual: Vec::new(),
+        ..estimator(settings, condition)?
+    })
+}
+
+/// The people of a fit: one, or one for each run where some parameters are individual.
+pub(super) fn people_of_fit(
+    key: (&str, &str),
+    runs: &[&str],
+    fit: &FamilyFit,
+    element: Option<&ContinuousTransferFunction>,
+) -> Vec<Person> {
+    let person = |run: &str, record| Person::of_fit(key, run, runs.len(), fit, record, element);
+    if fit.operators.len() == 1 {
+        return vec![person(ALL, 0)];
+    }
+    runs.iter()
+        .enumerate()
+        .map(|(record, run)| person(run, record))
+        .collect()
+}
+
+/// Parameters, loop and response of a fit of records that were put beside each other.
+pub(super) fn rows_of_fit(rows: &mut RunRows<'_>, window: Window, label: &str, fit: &FamilyFit, record: &Record) {
+    let of = fit.operator(0);
+    for parameter in of.parameters.iter().filter(|p| p.value.is_finite()) {
+        let estimate = Estimate {
+            value: parameter.value,
+            standard_error: parameter.standard_error,
+        };
+        rows.row(Some(window), label, &parameter.name, estimate);
+    }
+    rows.row(
+        Some(window),
+        label,
+        "innovation_variance",
+        Estimate::fixed(fit.innovation_variance),
+    );
+    if let Ok(simulated) = of.polynomial_fit.simulate(record) {
+        let vaf = hoid_ident::validation::vaf(&record.output()[simulated.first..], &simulated.values);
+        rows.row(Some(window), label, "vaf", Estimate::fixed(vaf));
+    }
+    rows.responses_of(label, of.polynomial_fit.model(), record.sample_time().s(), 0.0);
+    if let Some(measures) = rows.element().and_then(|element| fit.loop_measures(0, element)) {
+        rows.row(Some(window), label, "crossover_rad_s", measures.crossover_rad_s);
+        rows.row(Some(window), label, "phase_margin_deg", measures.phase_margin_deg);
+    }
+}

@@ -1,0 +1,337 @@
+//! The operator of a person in a condition: what the family ([`hoid_ident::family`]) finds in all
+//! their runs together, and its row in the table `people`.
+//!
+//! A row has the form, for each parameter its value, standard error (`_se`), interval of 95 %
+//! (`_low`, `_high`), whether the data determine it (`_determined`) and how much of it is prior
+//! (`_prior_share`), crossover and phase margin with the controlled element, the figures of the fit
+//! and its verdict. Parameters that no person has, have no columns. Where some parameters are
+//! individual, a person has a row for each run.
+
+use hoid_ident::family::{FamilyFit, OperatorOfRecord, Parameter};
+use hoid_io::{ColumnValues, OutputTable, TableSchema};
+use hoid_model::{ContinuousTransferFunction, VerdictLevel, uncertainty::Estimate};
+
+use super::tables::{joined, numbers, parted, real, schema, text, texts};
+use crate::columns::Rows;
+
+/// Name of the run that is all of them.
+pub(super) const ALL: &str = "all";
+
+/// The parameters of all forms with their units, in the order of the columns.
+const PARAMETERS: [(&str, &str); 13] = [
+    ("K", ""),
+    ("K_over_T_I", "1/s"),
+    ("K_I", "1/s"),
+    ("K_e", ""),
+    ("K_e_dot", "s"),
+    ("T_L", "s"),
+    ("T_I", "s"),
+    ("c_1", "s"),
+    ("c_2", "s^2"),
+    ("alpha", "rad/s"),
+    ("omega_nm", "rad/s"),
+    ("zeta_nm", ""),
+    ("tau_e", "s"),
+];
+
+/// What became of a fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PersonStatus {
+    /// It has a result.
+    Fitted,
+    /// It failed.
+    Failed,
+    /// There is none, since what the person does changes within the runs.
+    Changes,
+}
+
+hoid_model::named_choice!(PersonStatus, "status of a person", 3, {
+    Fitted => "ok",
+    Failed => "failed",
+    Changes => "changes",
+});
+
+/// A row of the table `people`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Person {
+    /// Who.
+    pub subject: String,
+    /// In which condition.
+    pub condition: String,
+    /// `all`, or the run whose individual parameters these are.
+    pub run: String,
+    /// How many runs were fitted together.
+    pub runs: usize,
+    /// What became of it.
+    pub status: PersonStatus,
+    /// Why there is no result; empty where there is one.
+    pub reason: String,
+    /// The form of the operator.
+    pub form: String,
+    /// Its parameters.
+    pub parameters: Vec<Parameter>,
+    /// Crossover frequency with the controlled element, rad/s.
+    pub crossover_rad_s: Option<Estimate>,
+    /// Phase margin, deg.
+    pub phase_margin_deg: Option<Estimate>,
+    /// chi^2 at the lines of the excitation, and its degrees of freedom.
+    pub chi2: Option<(f64, usize)>,
+    /// Clustered over model-based variances.
+    pub kappa: Option<f64>,
+    /// Order nd of the noise model.
+    pub noise_order: Option<usize>,
+    /// What the result is worth.
+    pub verdict: Option<VerdictLevel>,
+    /// What speaks against it.
+    pub reasons: Vec<String>,
+    /// What is worth knowing besides.
+    pub notes: Vec<String>,
+}
+
+impl Person {
+    /// A person without a result, and why.
+    pub(super) fn without((subject, condition): (&str, &str), status: PersonStatus, reason: &str) -> Self {
+        Self {
+            subject: subject.to_owned(),
+            condition: condition.to_owned(),
+            run: ALL.to_owned(),
+            runs: 0,
+            status,
+            reason: reason.to_owned(),
+            form: String::new(),
+            parameters: Vec::new(),
+            crossover_rad_s: None,
+            phase_margin_deg: None,
+            chi2: None,
+            kappa: None,
+            noise_order: None,
+            verdict: None,
+            reasons: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    /// A person with one of the operators of a fit.
+    pub(super) fn of_fit(
+        key: (&str, &str),
+        run: &str,
+        runs: usize,
+        fit: &FamilyFit,
+        record: usize,
+        element: Option<&ContinuousTransferFunction>,
+    ) -> Self {
+        let OperatorOfRecord { parameters, .. } = fit.operator(record);
+        let measures = element.and_then(|element| fit.loop_measures(record, element));
+        let strings = |all: &mut dyn Iterator<Item = &str>| all.map(str::to_owned).collect();
+        Self {
+            run: run.to_owned(),
+            runs,
+            form: fit.form.name().to_owned(),
+            parameters: parameters.clone(),
+            crossover_rad_s: measures.map(|m| m.crossover_rad_s),
+            phase_margin_deg: measures.map(|m| m.phase_margin_deg),
+            chi2: fit.lines.as_ref().map(|l| (l.chi_squared, l.degrees_of_freedom)),
+            kappa: Some(fit.inflation),
+            noise_order: Some(fit.noise_orders.1),
+            verdict: Some(fit.verdict.level),
+            reasons: strings(&mut fit.verdict.reasons()),
+            notes: strings(&mut fit.verdict.notes()),
+            ..Self::without(key, PersonStatus::Fitted, "")
+        }
+    }
+
+    /// A parameter by its name.
+    pub fn parameter(&self, name: &str) -> Option<&Parameter> {
+        self.parameters.iter().find(|p| p.name == name)
+    }
+
+    /// Who and where: `P03 in fo`.
+    pub fn name(&self) -> String {
+        let of_run = if self.run == ALL {
+            String::new()
+        } else {
+            format!(", run {}", self.run)
+        };
+        format!("{}{of_run}", cell_name(&self.subject, &self.condition))
+    }
+
+    fn write(&self, rows: &mut Rows) {
+        rows.begin();
+        for (name, value) in [
+            ("subject", self.subject.as_str()),
+            ("condition", &self.condition),
+            ("run", &self.run),
+            ("status", self.status.name()),
+            ("reason", &self.reason),
+            ("form", &self.form),
+            ("verdict", self.verdict.map_or("", VerdictLevel::name)),
+        ] {
+            rows.text(name, value);
+        }
+        rows.text("reasons", &joined(self.reasons.iter().map(String::as_str)));
+        rows.text("notes", &joined(self.notes.iter().map(String::as_str)));
+        rows.real("runs", self.runs as f64);
+        for p in &self.parameters {
+            let name = &p.name;
+            rows.real(name, p.value);
+            rows.real(&format!("{name}_se"), p.standard_error.unwrap_or(f64::NAN));
+            let (low, high) = p.interval.unwrap_or((f64::NAN, f64::NAN));
+            rows.real(&format!("{name}_low"), low);
+            rows.real(&format!("{name}_high"), high);
+            rows.real(&format!("{name}_prior_share"), p.prior_share);
+            let determined = if p.determined { "yes" } else { "no" };
+            rows.text(&format!("{name}_determined"), determined);
+        }
+        for (name, estimate) in [
+            ("crossover_rad_s", self.crossover_rad_s),
+            ("phase_margin_deg", self.phase_margin_deg),
+        ] {
+            if let Some(estimate) = estimate {
+                rows.real(name, estimate.value);
+                rows.real(&format!("{name}_se"), estimate.standard_error.unwrap_or(f64::NAN));
+            }
+        }
+        let (chi2, dof) = self.chi2.map_or((f64::NAN, f64::NAN), |(c, dof)| (c, dof as f64));
+        rows.real("chi2", chi2);
+        rows.real("dof", dof);
+        rows.real("kappa", self.kappa.unwrap_or(f64::NAN));
+        rows.real("noise_order", self.noise_order.map_or(f64::NAN, |nd| nd as f64));
+    }
+
+    fn read(table: &OutputTable, row: usize) -> Option<Self> {
+        let cell = |name: &str| texts(table, name).get(row).cloned().unwrap_or_default();
+        let any = |name: &str| numbers(table, name).get(row).copied().filter(|v| !v.is_nan());
+        let estimate = |name: &str| {
+            any(name).map(|value| Estimate {
+                value,
+                standard_error: any(&format!("{name}_se")),
+            })
+        };
+        let parameter = |&(name, unit): &(&str, &'static str)| {
+            let low_and_high = any(&format!("{name}_low")).zip(any(&format!("{name}_high")));
+            any(name).map(|value| Parameter {
+                name: name.to_owned(),
+                unit,
+                value,
+                standard_error: any(&format!("{name}_se")),
+                interval: low_and_high,
+                prior_share: any(&format!("{name}_prior_share")).unwrap_or(0.0),
+                determined: cell(&format!("{name}_determined")) == "yes",
+            })
+        };
+        Some(Self {
+            subject: cell("subject"),
+            condition: cell("condition"),
+            run: cell("run"),
+            runs: any("runs").unwrap_or(0.0) as usize,
+            status: cell("status").parse().ok()?,
+            reason: cell("reason"),
+            form: cell("form"),
+            parameters: PARAMETERS.iter().filter_map(parameter).collect(),
+            crossover_rad_s: estimate("crossover_rad_s"),
+            phase_margin_deg: estimate("phase_margin_deg"),
+            chi2: any("chi2").zip(any("dof").map(|dof| dof as usize)),
+            kappa: any("kappa"),
+            noise_order: any("noise_order").map(|nd| nd as usize),
+            verdict: cell("verdict").parse().ok(),
+            reasons: parted(&cell("reasons")),
+            notes: parted(&cell("notes")),
+        })
+    }
+}
+
+/// Who and where, in words.
+pub(super) fn cell_name(subject: &str, condition: &str) -> String {
+    if condition.is_empty() {
+        subject.to_owned()
+    } else {
+        format!("{subject} in {condition}")
+    }
+}
+
+/// The table, with columns for the parameters that its people have.
+pub(super) fn people_table(people: &[Person]) -> OutputTable {
+    let used = |name: &&str| people.iter().any(|p| p.parameter(name).is_some());
+    let names = PARAMETERS.map(|(name, _)| name);
+    let names: Vec<&str> = names.iter().copied().filter(|name| used(name)).collect();
+    let mut rows = Rows::new(&people_schema(&names));
+    people.iter().for_each(|person| person.write(&mut rows));
+    rows.into_table(Vec::new())
+}
+
+fn people_schema(parameters: &[&str]) -> TableSchema {
+    let ends = ["crossover_rad_s", "phase_margin_deg"];
+    let of_ends: Vec<String> = ends
+        .iter()
+        .flat_map(|name| ["", "_se"].map(|end| format!("{name}{end}")))
+        .collect();
+    let of_parameters: Vec<String> = parameters
+        .iter()
+        .flat_map(|name| ["", "_se", "_low", "_high", "_prior_share"].map(|end| format!("{name}{end}")))
+        .collect();
+    let determined: Vec<String> = parameters.iter().map(|name| format!("{name}_determined")).collect();
+    schema(
+        text(&["subject", "condition", "run"])
+            .chain(real(&["runs"]))
+            .chain(text(&["status", "reason", "form"]))
+            .chain(real(&of_parameters))
+            .chain(text(&determined))
+            .chain(real(&of_ends))
+            .chain(real(&["chi2", "dof", "kappa", "noise_order"]))
+            .chain(text(&["verdict", "reasons", "notes"])),
+    )
+}
+
+/// The people of a table; a row whose status is unknown is none.
+pub(super) fn people_of(table: &OutputTable) -> Vec<Person> {
+    let rows = match table.column("subject") {
+        Some(ColumnValues::Text(values)) => values.len(),
+        _ => 0,
+    };
+    (0..rows).filter_map(|row| Person::read(table, row)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_gives_the_person_back() {
+        let parameter = |name: &str, unit, interval, determined| Parameter {
+            name: name.to_owned(),
+            unit,
+            value: if determined { 0.2 } else { f64::INFINITY },
+            standard_error: determined.then_some(0.01),
+            interval,
+            prior_share: 0.25,
+            determined,
+        };
+        let mut person = Person {
+            run: "3".to_owned(),
+            runs: 10,
+            form: "lead-lag".to_owned(),
+            parameters: vec![
+                parameter("T_I", "s", Some((4.0, f64::INFINITY)), false),
+                parameter("tau_e", "s", Some((0.18, 0.22)), true),
+            ],
+            crossover_rad_s: Some(Estimate {
+                value: 3.0,
+                standard_error: Some(0.1),
+            }),
+            chi2: Some((12.5, 9)),
+            kappa: Some(2.0),
+            noise_order: Some(7),
+            verdict: Some(VerdictLevel::Doubtful),
+            reasons: vec!["one".to_owned(), "two; three".to_owned()],
+            ..Person::without(("P", "c"), PersonStatus::Fitted, "")
+        };
+        let failed = Person::without(("Q", ""), PersonStatus::Failed, "no file");
+        let table = people_table(&[person.clone(), failed.clone()]);
+        assert_eq!(people_of(&table), [person.clone(), failed.clone()]);
+        assert_eq!((person.name().as_str(), failed.name().as_str()), ("P in c, run 3", "Q"));
+        // Nobody has a lead: no columns of it.
+        assert!(table.column("T_L").is_none() && table.column("T_I_low").is_some());
+        person.parameters.clear();
+        assert!(people_table(&[person]).column("tau_e").is_none());
+    }
+}

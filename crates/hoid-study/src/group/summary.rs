@@ -1,0 +1,189 @@
+//! What a finished group says: what failed, the people, and one verdict on all of it.
+//!
+//! | finding | weight | when |
+//! |---|---|---|
+//! | `nothing-read` | undetermined | no run could be read |
+//! | `nothing-determined` | undetermined | operators were asked for, and of no person there is one that the data determine |
+//! | `run-failed` | doubt | a run could not be read |
+//! | `condition-failed` | doubt | no operator could be fitted to a person in a condition |
+//! | `person-not-determined`, `person-doubtful` | doubt | the verdict on a person |
+//! | `fits-failed` | note | other fits, which are rows with their reasons |
+//! | `condition-changes` | note | a condition that changes within its runs has no operator |
+//!
+//! One person whose data say nothing makes the group doubtful and not undetermined: the others
+//! stand.
+
+use std::path::Path;
+
+use hoid_io::{OutputTable, read_table};
+use hoid_model::{Finding, Verdict, VerdictLevel};
+
+use super::{
+    analysis::{PEOPLE, READ},
+    manifest::Manifest,
+    person::{Person, PersonStatus, cell_name, people_of},
+    tables::texts,
+};
+use crate::{StudyError, directory::table_path};
+
+/// A run that could not be read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunFailure {
+    /// Who.
+    pub subject: String,
+    /// In which condition.
+    pub condition: String,
+    /// Which run.
+    pub run: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// What a finished group says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupSummary {
+    /// Runs that count.
+    pub runs: usize,
+    /// Those of them that could not be read.
+    pub failures: Vec<RunFailure>,
+    /// The people, by their first runs in the manifest.
+    pub people: Vec<Person>,
+    /// What all of it is worth.
+    pub verdict: Verdict,
+}
+
+impl GroupSummary {
+    /// From the tables in the directory of a finished group.
+    ///
+    /// # Errors
+    /// [`StudyError::Io`] for tables that are not there.
+    pub fn read(manifest: &Manifest, directory: &Path) -> Result<Self, StudyError> {
+        let table = |name: &str| read_table(&table_path(directory, name, false));
+        let (people, estimates) = (people_of(&table(PEOPLE)?), table("estimates")?);
+        let (failures, other) = failures(&estimates);
+        let runs = manifest.runs.iter().filter(|run| run.counts).count();
+        let verdict = Verdict::of(findings(runs, &failures, &people, other));
+        Ok(Self {
+            runs,
+            failures,
+            people,
+            verdict,
+        })
+    }
+}
+
+/// The runs that were not read, and how many other estimates failed.
+fn failures(estimates: &OutputTable) -> (Vec<RunFailure>, usize) {
+    let [subject, condition, run, estimator, status, reason] =
+        ["subject", "condition", "run", "estimator", "status", "reason"].map(|name| texts(estimates, name));
+    let failed: Vec<usize> = (0..status.len()).filter(|i| status[*i] == "failed").collect();
+    let (unread, other): (Vec<usize>, Vec<usize>) = failed.into_iter().partition(|i| estimator[*i] == READ);
+    let failure = |i: usize| RunFailure {
+        subject: subject[i].clone(),
+        condition: condition[i].clone(),
+        run: run[i].clone(),
+        reason: reason[i].clone(),
+    };
+    (unread.into_iter().map(failure).collect(), other.len())
+}
+
+fn findings(runs: usize, failures: &[RunFailure], people: &[Person], other: usize) -> Vec<Finding> {
+    let mut all = Vec::new();
+    let sought = || people.iter().filter(|p| p.status != PersonStatus::Changes);
+    let stands = |p: &Person| p.verdict.is_some_and(|level| level != VerdictLevel::NotDetermined);
+    if failures.len() == runs {
+        all.push(Finding::undetermined(
+            "nothing-read",
+            format!("none of the {runs} runs could be read"),
+        ));
+    } else if sought().next().is_some() && !sought().any(stands) {
+        all.push(Finding::undetermined(
+            "nothing-determined",
+            "the data determine the operator of no person",
+        ));
+    }
+    for f in failures {
+        let name = cell_name(&f.subject, &f.condition);
+        all.push(Finding::doubt(
+            "run-failed",
+            format!("run {} of {name} could not be read: {}", f.run, f.reason),
+        ));
+    }
+    for p in people {
+        let name = p.name();
+        let reasons = p.reasons.join("; ");
+        all.extend(match (p.status, p.verdict) {
+            (PersonStatus::Failed, _) => Some(Finding::doubt(
+                "condition-failed",
+                format!("there is no operator of {name}: {}", p.reason),
+            )),
+            (PersonStatus::Changes, _) => Some(Finding::note(
+                "condition-changes",
+                format!("{name} has no operator of the whole run: {}", p.reason),
+            )),
+            (_, Some(VerdictLevel::NotDetermined)) => Some(Finding::doubt(
+                "person-not-determined",
+                format!("the operator of {name} is not determined: {reasons}"),
+            )),
+            (_, Some(VerdictLevel::Doubtful)) => Some(Finding::doubt(
+                "person-doubtful",
+                format!("the operator of {name} is doubtful: {reasons}"),
+            )),
+            _ => None,
+        });
+    }
+    if other > 0 {
+        all.push(Finding::note(
+            "fits-failed",
+            format!("{other} other fits failed; the table estimates has their reasons"),
+        ));
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn person(verdict: VerdictLevel) -> Person {
+        Person {
+            verdict: Some(verdict),
+            reasons: vec!["it is so".to_owned()],
+            ..Person::without(("P", "c"), PersonStatus::Fitted, "")
+        }
+    }
+
+    fn judged(runs: usize, failed: usize, people: &[Person]) -> Verdict {
+        let failure = RunFailure {
+            subject: "P".to_owned(),
+            condition: "c".to_owned(),
+            run: "1".to_owned(),
+            reason: "no such file".to_owned(),
+        };
+        Verdict::of(findings(runs, &vec![failure; failed], people, 0))
+    }
+
+    #[test]
+    fn the_whole_group_has_one_verdict() {
+        use VerdictLevel::{Doubtful, NotDetermined, Trustworthy};
+        assert_eq!(judged(2, 0, &[person(Trustworthy)]).level, Trustworthy);
+        assert_eq!(judged(2, 1, &[person(Trustworthy)]).level, Doubtful);
+        assert_eq!(judged(2, 2, &[]).level, NotDetermined);
+        // One of two people stands.
+        let both = [person(Trustworthy), person(NotDetermined)];
+        let verdict = judged(2, 0, &both);
+        assert_eq!(verdict.level, Doubtful);
+        assert_eq!(verdict.findings()[0].kind, "person-not-determined");
+        assert_eq!(judged(2, 0, &both[1..]).level, NotDetermined);
+        let failed = Person::without(("Q", "d"), PersonStatus::Failed, "too short");
+        assert_eq!(judged(2, 0, std::slice::from_ref(&failed)).level, NotDetermined);
+        let verdict = judged(2, 0, &[failed, person(Trustworthy)]);
+        assert_eq!(
+            (verdict.level, verdict.findings()[0].kind),
+            (Doubtful, "condition-failed")
+        );
+        // Where all conditions change nothing was asked of the family.
+        let changes = Person::without(("Q", "d"), PersonStatus::Changes, "at 40 s");
+        assert_eq!(judged(2, 0, &[changes]).level, Trustworthy);
+    }
+}
