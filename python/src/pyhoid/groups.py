@@ -37,8 +37,8 @@ def group(
     Returns
     -------
     Results
-        ``estimates``, ``averages``, ``delays``, ``trace-averages``, ...; `Results.pages` has the
-        page of the group, ``report.html``, and one for each subject.
+        ``people``, ``estimates``, ``averages``, ``delays``, ``trace-averages``, ...;
+        `Results.pages` has the page of the group, ``report.html``, and one for each subject.
 
     Raises
     ------

@@ -12,7 +12,8 @@ use crate::{Estimator, IdentError};
 
 /// Order of A.
 const POLES: usize = 16;
-const FEWEST_POLES: usize = 1;
+/// Coefficients of A or B below which no other model is tried.
+const FEWEST: usize = 4;
 /// Most coefficients of B.
 const MOST_GAINS: usize = 60;
 /// Frequencies of the response, rad/s, evenly over their logarithm.
@@ -24,7 +25,7 @@ const RESPONSE_S: f64 = 0.7;
 /// The response with its variances.
 ///
 /// # Errors
-/// Those of the regression.
+/// Those of the regression with the fewest coefficients.
 pub(super) fn arx_response(records: &[Record]) -> Result<Vec<MeasuredResponse>, IdentError> {
     let ts = records[0].sample_time();
     let shortest = records.iter().map(Record::len).min().unwrap_or(0);
@@ -34,12 +35,14 @@ pub(super) fn arx_response(records: &[Record]) -> Result<Vec<MeasuredResponse>, 
     let mut orders = Structure::Arx.operator_orders(1);
     orders.na = POLES.min(shortest / 12).max(2);
     orders.nb = gains.max(2);
-    let fit = loop {
-        match Estimator::new(Structure::Arx, orders).fit(records) {
-            Err(IdentError::SingularRegressors { .. }) if orders.na > FEWEST_POLES => orders.na /= 2,
-            other => break other?,
-        }
-    };
+    let mut found = Estimator::new(Structure::Arx, orders).fit(records);
+    // A smooth record does not determine so many coefficients: as many as it does.
+    while found.is_err() && orders.na.max(orders.nb) > FEWEST {
+        orders.na = orders.na.div_ceil(2).max(2);
+        orders.nb = orders.nb.div_ceil(2).max(2);
+        found = Estimator::new(Structure::Arx, orders).fit(records);
+    }
+    let fit = found?;
     let highest = BAND_RAD_S.1.min(0.8 * ts.nyquist_rad_s());
     let omega: Vec<f64> = (0..POINTS)
         .map(|i| BAND_RAD_S.0 * (highest / BAND_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0)))

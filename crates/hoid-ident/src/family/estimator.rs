@@ -148,7 +148,11 @@ impl FamilyEstimator {
             Some(Err(error)) => (None, Some(error.to_string())),
         };
         let lines = describing.as_ref().map(LineData::new);
-        let response = arx_response(&records)?;
+        // It gives starts alone: the lines do as well.
+        let response = match arx_response(&records) {
+            Err(error) if lines.is_none() => return Err(error),
+            found => found.unwrap_or_default(),
+        };
         let prediction = Prediction {
             data: Data::of(&records),
             sample_time,
@@ -303,7 +307,9 @@ impl FamilyEstimator {
             starts.push(found.coordinates);
             fitted = Some(fit);
         }
-        starts.push(of(response).fit(&self.search)?.coordinates);
+        if !response.is_empty() {
+            starts.push(of(response).fit(&self.search)?.coordinates);
+        }
         Ok((fitted, starts))
     }
 

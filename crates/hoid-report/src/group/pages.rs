@@ -94,17 +94,33 @@ pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result
     Ok(pages)
 }
 
-/// What was done to the runs and what is wrong with their sampling, one row a run.
+/// What was done to the runs and what is wrong with their sampling: a row for all files of which the
+/// same is said.
 fn account(preparation: &OutputTable, trouble: &OutputTable) -> Vec<(String, String)> {
     let mut rows: Vec<(String, String)> = Vec::new();
     for (table, what) in [(preparation, "preparation"), (trouble, "sampling trouble")] {
+        let mut files: Vec<(&str, String)> = Vec::new();
         for (file, words) in texts(table, "file").iter().zip(texts(table, "what")) {
-            let name = format!("{what} of {file}");
-            match rows.iter_mut().find(|(known, _)| *known == name) {
+            match files.iter_mut().find(|(known, _)| known == file) {
                 Some((_, all)) => all.push_str(&format!("; {words}")),
-                None => rows.push((name, words.clone())),
+                None => files.push((file, words.clone())),
             }
         }
+        let mut alike: Vec<(Vec<&str>, String)> = Vec::new();
+        for (file, words) in files {
+            match alike.iter_mut().find(|(_, known)| *known == words) {
+                Some((all, _)) => all.push(file),
+                None => alike.push((vec![file], words)),
+            }
+        }
+        rows.extend(alike.into_iter().map(|(files, words)| {
+            let of = match files.as_slice() {
+                [file] => (*file).to_owned(),
+                [first, ..] => format!("{} files, the first {first}", files.len()),
+                [] => String::new(),
+            };
+            (format!("{what} of {of}"), words)
+        }));
     }
     // Long lists are in the tables.
     let more = rows.len().saturating_sub(MOST_LISTED);

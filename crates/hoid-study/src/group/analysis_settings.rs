@@ -1,6 +1,6 @@
 //! What is done with each run: the keys of `[analysis]`.
 
-use hoid_ident::family::{FamilyEstimator, OperatorPrior};
+use hoid_ident::family::FamilyEstimator;
 use hoid_model::{Form, operator_family::Coordinate};
 use hoid_track::Method;
 use schemars::JsonSchema;
@@ -82,7 +82,7 @@ impl Default for AnalysisSettings {
             trace_every: 16,
             grey_box: false,
             form: AUTO.to_owned(),
-            prior: OperatorPrior::population().to_string(),
+            prior: "population".to_owned(),
             individual: Vec::new(),
             each_run: true,
             response_at_rad_s: Vec::new(),
