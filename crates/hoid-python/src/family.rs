@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use hoid_ident::{
-    IdentError,
+    IdentError, SearchOptions,
     family::{
         ClusterKind, FamilyEstimator, FamilyFit, FormFigures, HIGHEST_NOISE_ORDER, LoopMeasures, OperatorPrior,
         Parameter, ParameterPrior,
@@ -63,7 +63,8 @@ impl PriorOfUser {
 }
 
 #[pyfunction]
-#[pyo3(signature = (records, *, form, neuromuscular, prior, excitation, period, controlled_element, individual, delay, nc, nd, run_to_run))]
+#[pyo3(signature = (records, *, form, neuromuscular, prior, excitation, period, controlled_element, individual, delay, nc, nd, run_to_run,
+    initial_state, search_method, max_iterations, tolerance))]
 #[allow(clippy::too_many_arguments)]
 pub fn identify_operator(
     py: Python<'_>,
@@ -79,6 +80,10 @@ pub fn identify_operator(
     nc: (usize, usize),
     nd: Option<(usize, usize)>,
     run_to_run: Option<f64>,
+    initial_state: &str,
+    search_method: &str,
+    max_iterations: usize,
+    tolerance: f64,
 ) -> Outcome<PyOperatorFit> {
     let records = arrays::records(&records, Wanted::All)?;
     let usual = FamilyEstimator::default();
@@ -94,6 +99,12 @@ pub fn identify_operator(
         nc: names::range("nc", nc)?,
         individual: individual.iter().map(|name| coordinate(name)).collect::<Outcome<_>>()?,
         run_to_run: run_to_run.unwrap_or(usual.run_to_run),
+        initial_state: names::initial_state(initial_state)?.unwrap_or_default(),
+        search: SearchOptions {
+            method: names::search_method(search_method)?,
+            max_iterations,
+            tolerance,
+        },
         ..usual
     };
     let element = controlled_element.map(|e| e.transfer_function()).transpose()?;

@@ -408,6 +408,10 @@ def identify_operator(
     nc: _Ends,
     nd: _Ends | None,
     run_to_run: float | None,
+    initial_state: str,
+    search_method: str,
+    max_iterations: int,
+    tolerance: float,
 ) -> OperatorFit: ...
 def info(path: _Path) -> dict[str, Any]: ...
 def margins(

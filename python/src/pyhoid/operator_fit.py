@@ -280,7 +280,11 @@ class OperatorFit:
         """Verdict, parameters, and what they rest on, in plain text."""
         parts = [repr(self.verdict), self._native.title]
         for k, operator in enumerate(self.operators):
-            head = f"{self.records[k].label or f'record {k + 1}'}:\n" if len(self.operators) > 1 else ""
+            head = (
+                f"{self.records[k].label or f'record {k + 1}'}:\n"
+                if len(self.operators) > 1
+                else ""
+            )
             parts.append(head + repr(operator))
         if self.open_loop is not None:
             parts.append(f"Open loop: {_loop(self.open_loop)}")
@@ -293,7 +297,8 @@ class OperatorFit:
 
     def _beside(self, lines: Mapping[str, Any]) -> str:
         rows = [
-            [name, p._shown(), repr(lines["parameters"][name])] for name, p in self.parameters.items()
+            [name, p._shown(), repr(lines["parameters"][name])]
+            for name, p in self.parameters.items()
         ]
         text = _text.plain_table(["parameter", "prediction error", "at the lines"], rows)
         text += (
@@ -354,9 +359,7 @@ def _loop(found: Mapping[str, Estimate | None]) -> str:
     return f"crossover {crossover} rad/s, phase margin {margin} deg"
 
 
-def _of_fit(
-    rows: Sequence[tuple[str, float | None, float | None, bool]], source: str
-) -> _Entries:
+def _of_fit(rows: Sequence[tuple[str, float | None, float | None, bool]], source: str) -> _Entries:
     """The determined parameters of another fit as a prior."""
     entries = [
         (name, value, max(error / value, _LEAST_SPREAD), source)
@@ -436,6 +439,10 @@ def identify_operator(
     nc: Order = 0,
     nd: Order | None = None,
     run_to_run: float | None = None,
+    initial_state: str = "auto",
+    search_method: str = "auto",
+    max_iterations: int = 100,
+    tolerance: float = 1e-9,
 ) -> OperatorFit:
     """The operator of a recorded person: form, parameters with errors that hold, and a verdict.
 
@@ -476,6 +483,11 @@ def identify_operator(
     run_to_run : float, optional
         Variation of a person's gain from one run to the next, as a part of it; it stands in the
         errors of fewer than five records. Default 0.06.
+    initial_state : {"auto", "zero", "estimate", "backcast"}
+    search_method : {"auto", "gn", "lm", "grad"}
+    max_iterations : int
+    tolerance : float
+        Relative decrease of the loss below which the search has converged.
 
     Returns
     -------
@@ -515,5 +527,9 @@ def identify_operator(
         nc=_options.order("nc", nc),
         nd=None if nd is None else _options.order("nd", nd),
         run_to_run=None if run_to_run is None else float(run_to_run),
+        initial_state=initial_state,
+        search_method=search_method,
+        max_iterations=int(max_iterations),
+        tolerance=float(tolerance),
     )
     return OperatorFit(found, several, settings)
