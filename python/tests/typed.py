@@ -19,10 +19,13 @@ def use(e: npt.NDArray[np.float64], u: list[float]) -> float:
     column: npt.NDArray[np.float64] = trace["K_e"]
     tracker = pyhoid.Tracker("rpem", nk=29, sample_time=0.01)
     innovation: float = tracker.step(0.1, 0.2)
+    person = pyhoid.identify_operator([record], prior={"omega_nm": (10.5, 0.3)}, nd=(0, 8))
+    delay: float = person.parameters["tau_e"].value
     change = pyhoid.identify([record], "time-varying", delay=(0.2, 0.3)).change
     return (
         gain
         + innovation
+        + delay
         + float(column[0])
         + float(abs(response[0]))
         + len(change)

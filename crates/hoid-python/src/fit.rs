@@ -105,6 +105,8 @@ impl PyFit {
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         let found = match &self.grey_box {
             Some(grey_box) => grey_box.covariance(),
+            // An operator of the family has its own, of its coordinates.
+            None if self.fit.is_grey_box() => None,
             None => self.fit.covariance(),
         };
         let Some(c) = found else { return Ok(None) };

@@ -32,7 +32,7 @@ enum Found {
 /// Fits a model to records. The package has brought all options into plain form.
 #[pyfunction]
 #[pyo3(signature = (records, structure, *, orders, method, instruments, remnant_order, delay, individual, criterion, initial_state, start, fix,
-    bound, prior, robust, focus, stable, search_method, max_iterations, tolerance, progress))]
+    bound, coefficient_prior, robust, focus, stable, search_method, max_iterations, tolerance, progress))]
 #[allow(clippy::too_many_arguments)]
 pub fn identify<'py>(
     py: Python<'py>,
@@ -49,7 +49,7 @@ pub fn identify<'py>(
     start: Option<BTreeMap<String, f64>>,
     fix: BTreeMap<String, f64>,
     bound: BTreeMap<String, (f64, f64)>,
-    prior: BTreeMap<String, (f64, f64)>,
+    coefficient_prior: BTreeMap<String, (f64, f64)>,
     robust: Option<f64>,
     focus: &str,
     stable: bool,
@@ -86,7 +86,7 @@ pub fn identify<'py>(
                 initial_state,
                 search,
                 constraints,
-                priors: names::priors(prior)?,
+                priors: names::priors(coefficient_prior)?,
                 loss: robust.map_or(Loss::Quadratic, |threshold| Loss::Huber { threshold }),
                 focus: names::focus(focus)?,
                 stable,

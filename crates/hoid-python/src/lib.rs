@@ -10,6 +10,7 @@
 //! | `errors` | errors of the libraries as exceptions, by kind |
 //! | `names`, `recursion` | words and options of Python as those of the libraries |
 //! | `figures` | estimates, operators and tests as dictionaries |
+//! | `family` | the operator of a person |
 //! | `identify`, `fit`, `time_varying` | batch fits |
 //! | `track`, `tracker` | recursive estimates, over a record and live |
 //! | `simulate` | scenarios, margins, conversions |
@@ -26,6 +27,7 @@ mod arrays;
 mod controlled_element;
 mod describing;
 mod errors;
+mod family;
 mod figures;
 mod files;
 mod fit;
@@ -48,6 +50,7 @@ fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<describing::PyDescribingFunction>()?;
     module.add_class::<describing::PyDescription>()?;
+    module.add_class::<family::PyOperatorFit>()?;
     module.add_class::<fit::PyFit>()?;
     module.add_class::<study::PyPlan>()?;
     module.add_class::<time_varying::PyTimeVaryingFit>()?;
@@ -56,6 +59,7 @@ fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
     for function in [
         wrap_pyfunction!(describing::describe, module)?,
         wrap_pyfunction!(describing::describing_function, module)?,
+        wrap_pyfunction!(family::identify_operator, module)?,
         wrap_pyfunction!(files::check_record, module)?,
         wrap_pyfunction!(files::detrended, module)?,
         wrap_pyfunction!(files::read, module)?,

@@ -204,7 +204,7 @@ pub fn priors(guesses: BTreeMap<String, (f64, f64)>) -> Outcome<BTreeMap<String,
             Ok((name, Prior { value, weight }))
         } else {
             Err(bad_option(format!(
-                "prior: {name} is {value} with the weight {weight}, \
+                "coefficient_prior: {name} is {value} with the weight {weight}, \
                  expected finite numbers and a weight of zero or more"
             )))
         }

@@ -36,6 +36,7 @@ from .estimates import Estimate, Operator, Remnant
 from .fit import Fit, FrequencyResponse, Series, Validation
 from .groups import group, group_manifest, simulate_group, simulate_people
 from .identification import identify
+from .operator_fit import OperatorFit, OperatorParameter, identify_operator
 from .reading import info, read, read_segments, write
 from .record import Record
 from .reproduction import Reproduction, reproduce
@@ -67,6 +68,8 @@ __all__ = [
     "FrequencyResponse",
     "NotConvertibleError",
     "Operator",
+    "OperatorFit",
+    "OperatorParameter",
     "OptionError",
     "Plan",
     "Record",
@@ -91,6 +94,7 @@ __all__ = [
     "group",
     "group_manifest",
     "identify",
+    "identify_operator",
     "info",
     "margins",
     "merge",

@@ -17,6 +17,7 @@ _Array = npt.NDArray[np.float64]
 _Path = str | PathLike[str]
 _Pair = tuple[float, float | None]
 _Ends = tuple[int, int]
+_Parameter = tuple[str, str, float, float | None, tuple[float, float] | None, float, bool]
 _Verdict = tuple[str, list[str], list[str]]
 _Progress = Callable[[int, int], object] | None
 _Left = tuple[bool, int, list[Any]]
@@ -25,6 +26,7 @@ __all__ = [
     "DescribingFunction",
     "Description",
     "Fit",
+    "OperatorFit",
     "Plan",
     "TimeVaryingFit",
     "Trace",
@@ -41,6 +43,7 @@ __all__ = [
     "group",
     "group_manifest",
     "identify",
+    "identify_operator",
     "info",
     "margins",
     "merge_shards",
@@ -138,6 +141,45 @@ class Fit:
         settings: list[tuple[str, str]],
         controlled_element: str | tuple[list[float], list[float]] | None,
     ) -> Any: ...
+
+@final
+class OperatorFit:
+    @property
+    def form(self) -> tuple[str, bool]: ...
+    @property
+    def title(self) -> str: ...
+    @property
+    def parameters(self) -> list[list[_Parameter]]: ...
+    @property
+    def coordinates(self) -> list[str]: ...
+    def coordinate_values(self, record: int) -> _Array: ...
+    def covariance(self, record: int) -> _Array | None: ...
+    def model_based_covariance(self, record: int) -> _Array | None: ...
+    @property
+    def verdict(self) -> _Verdict: ...
+    @property
+    def forms(self) -> list[dict[str, Any]]: ...
+    @property
+    def lines(self) -> dict[str, Any] | None: ...
+    @property
+    def no_lines(self) -> str | None: ...
+    @property
+    def agreement(self) -> dict[str, Any] | None: ...
+    @property
+    def open_loop(self) -> dict[str, _Pair] | None: ...
+    @property
+    def box_jenkins(self) -> dict[str, Any] | None: ...
+    @property
+    def noise(self) -> tuple[_Array, _Array]: ...
+    @property
+    def prior(self) -> list[tuple[str, float, float, str]]: ...
+    @property
+    def figures(self) -> dict[str, Any]: ...
+    @property
+    def termination(self) -> dict[str, Any]: ...
+    @property
+    def excitation(self) -> str | None: ...
+    def fit(self, record: int) -> Fit: ...
 
 @final
 class Plan:
@@ -343,7 +385,7 @@ def identify(
     start: dict[str, float] | None,
     fix: dict[str, float],
     bound: dict[str, tuple[float, float]],
-    prior: dict[str, tuple[float, float]],
+    coefficient_prior: dict[str, tuple[float, float]],
     robust: float | None,
     focus: str,
     stable: bool,
@@ -352,6 +394,25 @@ def identify(
     tolerance: float,
     progress: _Progress,
 ) -> Fit | TimeVaryingFit: ...
+def identify_operator(
+    records: Sequence[Record],
+    *,
+    form: str,
+    neuromuscular: bool,
+    prior: str | list[tuple[str, float, float, str]],
+    excitation: str | None,
+    period: float | None,
+    controlled_element: str | tuple[list[float], list[float]] | None,
+    individual: list[str],
+    delay: tuple[float, float] | None,
+    nc: _Ends,
+    nd: _Ends | None,
+    run_to_run: float | None,
+    initial_state: str,
+    search_method: str,
+    max_iterations: int,
+    tolerance: float,
+) -> OperatorFit: ...
 def info(path: _Path) -> dict[str, Any]: ...
 def margins(
     *,

@@ -16,14 +16,17 @@ __all__ = ["identify"]
 
 
 #: The keywords that each batch estimator takes, from the registry of the library.
-_KEYWORDS = {name: set(keywords) for name, _, keywords in _pyhoid.batch_estimators()}
+#: The operator of a person has a function of its own, `identify_operator`.
+_KEYWORDS = {
+    name: set(keywords) for name, _, keywords in _pyhoid.batch_estimators() if name != "family"
+}
 #: Estimators that are named as structures.
 _MODELS = ("grey-box", "time-varying")
 #: The structure of a method that fits no other.
 _OF_METHOD = {
     name: structures[0]
     for name, structures, _ in _pyhoid.batch_estimators()
-    if len(structures) == 1 and name not in _MODELS
+    if name in _KEYWORDS and len(structures) == 1 and name not in _MODELS
 }
 #: What to give in place of a keyword.
 _INSTEAD = {
@@ -71,7 +74,7 @@ if TYPE_CHECKING:
         start: Mapping[str, float] | None
         fix: Mapping[str, float] | None
         bound: Mapping[str, tuple[float | None, float | None]] | None
-        prior: Mapping[str, tuple[float, float]] | None
+        coefficient_prior: Mapping[str, tuple[float, float]] | None
         robust: float | bool | None
         focus: str
         stable: bool
@@ -113,7 +116,7 @@ def identify(
     start: Mapping[str, float] | None = None,
     fix: Mapping[str, float] | None = None,
     bound: Mapping[str, tuple[float | None, float | None]] | None = None,
-    prior: Mapping[str, tuple[float, float]] | None = None,
+    coefficient_prior: Mapping[str, tuple[float, float]] | None = None,
     robust: float | bool | None = None,
     focus: str = "prediction",
     stable: bool = False,
@@ -159,8 +162,8 @@ def identify(
         Coefficients that are held fixed.
     bound : mapping of str to (float or None, float or None), optional
         Lower and upper bounds; None leaves an end open.
-    prior : mapping of str to (float, float), optional
-        Guesses, each with a weight W: the loss grows by W (theta - guess)^2.
+    coefficient_prior : mapping of str to (float, float), optional
+        Guesses of coefficients, each with a weight W: the loss grows by W (theta - guess)^2.
     robust : float or True, optional
         Huber's loss: residuals beyond this many standard deviations count linearly; True is 1.345.
     focus : {"prediction", "simulation"}
@@ -218,7 +221,7 @@ def identify(
         "start": (start, None),
         "fix": (fix, None),
         "bound": (bound, None),
-        "prior": (prior, None),
+        "coefficient_prior": (coefficient_prior, None),
         "robust": (robust, None),
         "stable": (stable, False),
         "focus": (focus, "prediction"),
@@ -242,8 +245,9 @@ def identify(
         start=None if start is None else _options.numbers("start", start),
         fix=_options.numbers("fix", fix or {}),
         bound=_options.bounds(bound or {}),
-        prior={
-            key: (float(value), float(weight)) for key, (value, weight) in (prior or {}).items()
+        coefficient_prior={
+            key: (float(value), float(weight))
+            for key, (value, weight) in (coefficient_prior or {}).items()
         },
         robust=1.345
         if robust is True

@@ -1,6 +1,10 @@
 //! The operator at the lines of the excitation, with its errors by the jackknife over runs.
 
-use hoid_model::{FamilyOperator, Form, SampleTime};
+use hoid_model::{
+    FamilyOperator, Form, SampleTime,
+    operator_family::NamedParameter,
+    uncertainty::{Estimate, variance_along},
+};
 
 use super::{
     lines::LineData,
@@ -38,6 +42,20 @@ impl LineFit {
     /// Sum of chi^2 of the held-out runs.
     pub fn held_out_total(&self) -> Option<f64> {
         self.held_out.as_ref().map(|runs| runs.iter().sum())
+    }
+
+    /// The parameters by name, their errors to first order; without one where they are infinite.
+    pub fn parameters(&self) -> Vec<(&'static str, Estimate)> {
+        let of = |(parameter, gradient): (NamedParameter, Vec<f64>)| {
+            let estimate = match &self.covariance {
+                Some(c) if parameter.value.is_finite() => {
+                    Estimate::with_variance(parameter.value, variance_along(&gradient, c))
+                }
+                _ => Estimate::fixed(parameter.value),
+            };
+            (parameter.name, estimate)
+        };
+        self.operator.named_gradients().into_iter().map(of).collect()
     }
 }
 

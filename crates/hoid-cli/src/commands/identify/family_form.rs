@@ -108,9 +108,10 @@ impl Found<'_> {
         let Some(lines) = &self.fit.lines else {
             return String::new();
         };
-        let of = line_parameters(&lines.operator, lines.covariance.as_deref());
+        let of = lines.parameters();
         let mut rows = text::table(&["parameter", "prediction error", "at the lines"]);
         for (here, (_, there)) in self.fit.operator(0).parameters.iter().zip(of) {
+            let there = with_error(there.value, there.standard_error);
             rows.add_row([named(here), with_error(here.value, here.standard_error), there]);
         }
         let mut page = format!("\n{rows}\n");
@@ -292,7 +293,8 @@ impl Found<'_> {
                 None => Value::Null,
             };
         };
-        let parameters: Vec<Value> = estimates(&lines.operator, lines.covariance.as_deref())
+        let parameters: Vec<Value> = lines
+            .parameters()
             .into_iter()
             .map(|(name, e)| json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)}))
             .collect();
@@ -330,26 +332,6 @@ impl Found<'_> {
             })
         })
     }
-}
-
-/// Named parameters of coordinates with a covariance, errors by the delta method.
-fn estimates(operator: &FamilyOperator, covariance: Option<&[f64]>) -> Vec<(&'static str, Estimate)> {
-    let named = operator.named_gradients();
-    let of = |(parameter, gradient): (hoid_model::operator_family::NamedParameter, Vec<f64>)| {
-        let estimate = match covariance {
-            Some(c) if parameter.value.is_finite() => {
-                Estimate::with_variance(parameter.value, hoid_model::uncertainty::variance_along(&gradient, c))
-            }
-            _ => Estimate::fixed(parameter.value),
-        };
-        (parameter.name, estimate)
-    };
-    named.into_iter().map(of).collect()
-}
-
-fn line_parameters(operator: &FamilyOperator, covariance: Option<&[f64]>) -> Vec<(&'static str, String)> {
-    let text = |(name, e): (&'static str, Estimate)| (name, with_error(e.value, e.standard_error));
-    estimates(operator, covariance).into_iter().map(text).collect()
 }
 
 fn named(p: &Parameter) -> String {

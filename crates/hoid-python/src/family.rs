@@ -1,0 +1,397 @@
+//! `pyhoid.identify_operator`: the operator of a person, of the family of operators.
+
+use std::ops::RangeInclusive;
+
+use hoid_ident::{
+    IdentError, SearchOptions,
+    family::{
+        ClusterKind, FamilyEstimator, FamilyFit, FormFigures, HIGHEST_NOISE_ORDER, LoopMeasures, OperatorPrior,
+        Parameter, ParameterPrior,
+    },
+    frequency::{DescriptionOptions, describe_runs},
+};
+use hoid_model::{ContinuousTransferFunction, Form, operator_family::Coordinate};
+use numpy::{PyArray1, PyArray2};
+use pyo3::{prelude::*, types::PyDict};
+
+use crate::{
+    arrays::{self, Wanted, array, matrix},
+    controlled_element::ControlledElement,
+    errors::{Outcome, bad_option},
+    figures::{Pair, VerdictParts, pair, verdict},
+    fit::PyFit,
+    interrupt, names,
+};
+
+/// Highest order nd that is searched by default beside a search of nc.
+const HIGHEST_BESIDE_NC: usize = 8;
+
+/// The operator of a person; the package wraps it in `pyhoid.OperatorFit`.
+#[pyclass(name = "OperatorFit", module = "pyhoid._pyhoid", frozen)]
+pub struct PyOperatorFit {
+    found: FamilyFit,
+    element: Option<ContinuousTransferFunction>,
+    /// Channel of the excitation.
+    channel: Option<String>,
+    records: usize,
+}
+
+/// A prior as text, or parameter, centre, spread and source of each entry.
+#[derive(FromPyObject)]
+pub enum PriorOfUser {
+    Text(String),
+    Entries(Vec<(String, f64, f64, String)>),
+}
+
+impl PriorOfUser {
+    fn prior(self) -> Outcome<OperatorPrior> {
+        Ok(match self {
+            Self::Text(text) => text.parse()?,
+            Self::Entries(entries) => OperatorPrior::new(
+                entries
+                    .into_iter()
+                    .map(|(parameter, centre, spread, source)| ParameterPrior {
+                        parameter,
+                        centre,
+                        spread,
+                        source,
+                    })
+                    .collect(),
+            )?,
+        })
+    }
+}
+
+#[pyfunction]
+#[pyo3(signature = (records, *, form, neuromuscular, prior, excitation, period, controlled_element, individual, delay, nc, nd, run_to_run,
+    initial_state, search_method, max_iterations, tolerance))]
+#[allow(clippy::too_many_arguments)]
+pub fn identify_operator(
+    py: Python<'_>,
+    records: Vec<Bound<'_, PyAny>>,
+    form: &str,
+    neuromuscular: bool,
+    prior: PriorOfUser,
+    excitation: Option<String>,
+    period: Option<f64>,
+    controlled_element: Option<ControlledElement>,
+    individual: Vec<String>,
+    delay: Option<(f64, f64)>,
+    nc: (usize, usize),
+    nd: Option<(usize, usize)>,
+    run_to_run: Option<f64>,
+    initial_state: &str,
+    search_method: &str,
+    max_iterations: usize,
+    tolerance: f64,
+) -> Outcome<PyOperatorFit> {
+    let records = arrays::records(&records, Wanted::All)?;
+    let usual = FamilyEstimator::default();
+    let estimator = FamilyEstimator {
+        forms: match form {
+            "auto" => usual.forms,
+            name => vec![names::choice::<Form>("form", name)?],
+        },
+        neuromuscular,
+        prior: prior.prior()?,
+        delay_range_s: delay.unwrap_or(usual.delay_range_s),
+        nd: noise_range(nc, nd)?,
+        nc: names::range("nc", nc)?,
+        individual: individual.iter().map(|name| coordinate(name)).collect::<Outcome<_>>()?,
+        run_to_run: run_to_run.unwrap_or(usual.run_to_run),
+        initial_state: names::initial_state(initial_state)?.unwrap_or_default(),
+        search: SearchOptions {
+            method: names::search_method(search_method)?,
+            max_iterations,
+            tolerance,
+        },
+        ..usual
+    };
+    let element = controlled_element.map(|e| e.transfer_function()).transpose()?;
+    let count = records.len();
+    let work = move |_: &interrupt::Standing| {
+        let none = excitation.as_deref() == Some("none");
+        let options = DescriptionOptions {
+            excitation: excitation.clone(),
+            period_s: period,
+            ..DescriptionOptions::default()
+        };
+        let described = (!none).then(|| describe_runs(&records, &options));
+        let channel = match &described {
+            Some(Ok(found)) => found.channel.clone(),
+            _ => None,
+        };
+        let of_lines = match described {
+            Some(Ok(found)) => Some(Ok(found.function)),
+            // What was looked for by name is missed; what was looked for by itself is not.
+            Some(Err(error)) if excitation.is_some() => Some(Err(error)),
+            _ => None,
+        };
+        let found = estimator.fit_beside(&records, of_lines)?;
+        Ok::<_, IdentError>((found, channel))
+    };
+    let (found, channel) = interrupt::run(py, 1, None, false, work)?;
+    Ok(PyOperatorFit {
+        found,
+        element,
+        channel,
+        records: count,
+    })
+}
+
+/// An ARMA model is searched over few autoregressive orders.
+fn noise_range(nc: (usize, usize), nd: Option<(usize, usize)>) -> Outcome<RangeInclusive<usize>> {
+    match nd {
+        Some(ends) => names::range("nd", ends),
+        None if nc.1 > 0 => Ok(0..=HIGHEST_BESIDE_NC),
+        None => Ok(0..=HIGHEST_NOISE_ORDER),
+    }
+}
+
+fn coordinate(name: &str) -> Outcome<Coordinate> {
+    Ok(match name {
+        "K" | "K_over_T_I" | "K_I" | "K_e" => Coordinate::Gain,
+        "T_L" => Coordinate::Lead,
+        "T_I" => Coordinate::LagRate,
+        "c_1" => Coordinate::Linear,
+        "c_2" => Coordinate::Quadratic,
+        "alpha" => Coordinate::Droop,
+        "omega_nm" => Coordinate::LogOmega,
+        "zeta_nm" => Coordinate::LogZeta,
+        "tau_e" => Coordinate::Delay,
+        _ => {
+            return Err(bad_option(format!(
+                "individual: there is no parameter {name}; expected K, T_L, T_I, omega_nm, zeta_nm or tau_e"
+            )));
+        }
+    })
+}
+
+/// Name, unit, value, standard error, interval, share of the prior, whether it is determined.
+type ParameterParts = (String, &'static str, f64, Option<f64>, Option<(f64, f64)>, f64, bool);
+
+fn parameter(p: &Parameter) -> ParameterParts {
+    (
+        p.name.clone(),
+        p.unit,
+        p.value,
+        p.standard_error,
+        p.interval,
+        p.prior_share,
+        p.determined,
+    )
+}
+
+fn loop_parts<'py>(py: Python<'py>, measures: Option<LoopMeasures>) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    all.set_item("crossover_rad_s", measures.map(|m| pair(m.crossover_rad_s)))?;
+    all.set_item("phase_margin_deg", measures.map(|m| pair(m.phase_margin_deg)))?;
+    Ok(all)
+}
+
+fn form_row<'py>(py: Python<'py>, f: &FormFigures) -> PyResult<Bound<'py, PyDict>> {
+    let row = PyDict::new(py);
+    row.set_item("form", f.form.name())?;
+    row.set_item("loss", f.loss)?;
+    row.set_item("criterion", f.criterion)?;
+    row.set_item("held_out", f.held_out)?;
+    row.set_item("chi2", f.chi_squared)?;
+    row.set_item("degrees_of_freedom", f.degrees_of_freedom)?;
+    row.set_item("converged", f.converged)?;
+    Ok(row)
+}
+
+#[pymethods]
+impl PyOperatorFit {
+    /// The form, and whether it has neuromuscular dynamics.
+    #[getter]
+    fn form(&self) -> (&'static str, bool) {
+        (self.found.form.name(), self.found.neuromuscular)
+    }
+
+    #[getter]
+    fn title(&self) -> String {
+        let (nc, nd) = self.found.noise_orders;
+        let muscles = match self.found.neuromuscular {
+            true => " with neuromuscular dynamics",
+            false => "",
+        };
+        format!("Operator: {}{muscles}; noise nc = {nc}, nd = {nd}", self.found.form)
+    }
+
+    /// Those of the common operator, or of the operator of each record.
+    #[getter]
+    fn parameters(&self) -> Vec<Vec<ParameterParts>> {
+        let of = |parameters: &Vec<Parameter>| parameters.iter().map(parameter).collect();
+        self.found.operators.iter().map(|o| of(&o.parameters)).collect()
+    }
+
+    /// Names of the coordinates, in the order of the covariance.
+    #[getter]
+    fn coordinates(&self) -> Vec<&'static str> {
+        let all = self.found.form.coordinates(self.found.neuromuscular);
+        all.iter().map(|c| c.name()).collect()
+    }
+
+    fn coordinate_values<'py>(&self, py: Python<'py>, record: usize) -> Bound<'py, PyArray1<f64>> {
+        array(py, self.found.operator(record).operator.coordinates().to_vec())
+    }
+
+    fn covariance<'py>(&self, py: Python<'py>, record: usize) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        self.square(py, self.found.operator(record).covariance.as_deref())
+    }
+
+    /// As if residuals were white and nothing varied.
+    fn model_based_covariance<'py>(
+        &self,
+        py: Python<'py>,
+        record: usize,
+    ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        self.square(py, self.found.operator(record).model_based.as_deref())
+    }
+
+    #[getter]
+    fn verdict(&self) -> VerdictParts {
+        verdict(&self.found.verdict)
+    }
+
+    #[getter]
+    fn forms<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        self.found.forms.iter().map(|f| form_row(py, f)).collect()
+    }
+
+    #[getter]
+    fn lines<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(lines) = &self.found.lines else {
+            return Ok(None);
+        };
+        let (all, parameters) = (PyDict::new(py), PyDict::new(py));
+        for (name, estimate) in lines.parameters() {
+            parameters.set_item(name, pair(estimate))?;
+        }
+        all.set_item("parameters", parameters)?;
+        all.set_item("chi2", lines.chi_squared)?;
+        all.set_item("degrees_of_freedom", lines.degrees_of_freedom)?;
+        all.set_item("held_out", lines.held_out_total())?;
+        all.set_item("converged", lines.termination.converged())?;
+        if let Some(element) = &self.element {
+            let measures = self.found.loop_measures_at_lines(element);
+            all.set_item("open_loop", loop_parts(py, measures)?)?;
+        }
+        Ok(Some(all))
+    }
+
+    /// Why there is no fit at the lines of an excitation that was named.
+    #[getter]
+    fn no_lines(&self) -> Option<&str> {
+        self.found.no_lines.as_deref()
+    }
+
+    #[getter]
+    fn agreement<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(agreement) = &self.found.agreement else {
+            return Ok(None);
+        };
+        let (all, mut rows) = (PyDict::new(py), Vec::new());
+        for found in &agreement.rows {
+            let with_error = |(value, error): (f64, f64)| -> Pair { (value, Some(error)) };
+            let row = PyDict::new(py);
+            row.set_item("coordinate", found.coordinate.name())?;
+            row.set_item("prediction_error", with_error(found.prediction_error))?;
+            row.set_item("lines", with_error(found.lines))?;
+            row.set_item("difference_in_errors", found.difference_in_errors)?;
+            rows.push(row);
+        }
+        all.set_item("coordinates", rows)?;
+        all.set_item("chi2", agreement.statistic)?;
+        all.set_item("p_value", agreement.p_value)?;
+        Ok(Some(all))
+    }
+
+    /// Crossover and phase margin; none without a controlled element.
+    #[getter]
+    fn open_loop<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let of = |element| loop_parts(py, self.found.loop_measures(0, element));
+        self.element.as_ref().map(of).transpose()
+    }
+
+    #[getter]
+    fn box_jenkins<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(free) = &self.found.free_model else {
+            return Ok(None);
+        };
+        let all = PyDict::new(py);
+        all.set_item("loss", free.loss)?;
+        all.set_item("likelihood_ratio", free.likelihood_ratio)?;
+        all.set_item("degrees_of_freedom", free.degrees_of_freedom)?;
+        all.set_item("p_value", free.p_value)?;
+        Ok(Some(all))
+    }
+
+    /// Coefficients c and d.
+    #[getter]
+    fn noise<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
+        let (c, d) = self.found.noise.clone();
+        (array(py, c), array(py, d))
+    }
+
+    /// Parameter, centre, spread and source of each entry.
+    #[getter]
+    fn prior(&self) -> Vec<(String, f64, f64, String)> {
+        let entries = self.found.prior.entries().iter();
+        entries
+            .map(|e| (e.parameter.clone(), e.centre, e.spread, e.source.clone()))
+            .collect()
+    }
+
+    #[getter]
+    fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (found, all) = (&self.found, PyDict::new(py));
+        let kind = match found.cluster_kind {
+            ClusterKind::Runs => "runs",
+            ClusterKind::Blocks => "blocks",
+        };
+        all.set_item("loss", found.loss)?;
+        all.set_item("innovation_variance", found.innovation_variance)?;
+        all.set_item("residuals", found.residuals)?;
+        all.set_item("coherent_share", found.coherent_share)?;
+        all.set_item("sample_time", found.sample_time.s())?;
+        all.set_item("clusters", found.clusters)?;
+        all.set_item("kind", kind)?;
+        all.set_item("inflation", found.inflation)?;
+        all.set_item("largest_ratio_to_model_based", found.error_ratio)?;
+        Ok(all)
+    }
+
+    #[getter]
+    fn termination<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (found, all) = (self.found.termination, PyDict::new(py));
+        all.set_item("reason", found.reason.to_string())?;
+        all.set_item("converged", found.converged())?;
+        all.set_item("iterations", found.iterations)?;
+        Ok(all)
+    }
+
+    /// Channel of the excitation; none where there was none.
+    #[getter]
+    fn excitation(&self) -> Option<&str> {
+        self.channel.as_deref()
+    }
+
+    /// The model of a record as polynomials.
+    fn fit(&self, record: usize) -> PyFit {
+        PyFit::new(
+            self.found.operator(record).polynomial_fit.clone(),
+            None,
+            None,
+            self.records,
+        )
+    }
+}
+
+impl PyOperatorFit {
+    fn square<'py>(&self, py: Python<'py>, values: Option<&[f64]>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        let columns = self.found.form.coordinates(self.found.neuromuscular).len();
+        values.map(|c| matrix(py, c.to_vec(), columns)).transpose()
+    }
+}

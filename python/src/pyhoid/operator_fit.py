@@ -1,0 +1,535 @@
+"""The operator of a person: which form, its parameters with honest errors, and what it is worth."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from . import _options, _pyhoid, _text
+from ._arrays import FloatArray
+from ._options import Order
+from .errors import FormatError, OptionError
+from .estimates import Estimate, estimates
+from .fit import Fit
+from .record import Record
+from .verdict import Verdict
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["OperatorFit", "OperatorParameter", "OperatorParameters", "identify_operator"]
+
+#: Parameters that a prior can have.
+_OF_PRIOR = ("omega_nm", "zeta_nm", "tau_e", "T_L", "T_I")
+#: Least spread of a prior that is made of another fit.
+_LEAST_SPREAD = 1e-3
+
+_Entries = list[tuple[str, float, float, str]]
+
+
+class OperatorParameter(NamedTuple):
+    """A parameter of an operator, and how much of it the data say.
+
+    Attributes
+    ----------
+    value : float
+        Infinite for the lag of a pure integration.
+    standard_error : float or None
+        To first order; None where there is none, such as at a bound.
+    interval : (float, float) or None
+        Interval of 95 %; an end that is open is infinite.
+    prior_share : float
+        Variance after the data over that before it; 0 without a prior, 1 for the prior alone.
+    determined : bool
+        Whether the data determine the parameter.
+    unit : str
+    """
+
+    value: float
+    standard_error: float | None
+    interval: tuple[float, float] | None
+    prior_share: float
+    determined: bool
+    unit: str
+
+    def __repr__(self) -> str:
+        return " ".join(part for part in (self._shown(), self.unit, self._remark()) if part)
+
+    def __float__(self) -> float:
+        return float(self.value)
+
+    def _remark(self) -> str:
+        if self.determined:
+            return ""
+        return "(the prior alone)" if self.prior_share > 0.5 else "(not determined)"
+
+    def _shown(self) -> str:
+        """Value and error; nothing where the data say nothing, and no prior either."""
+        if not self.determined and self.prior_share <= 0.5:
+            return ""
+        if self.standard_error is not None and self.standard_error > abs(self.value):
+            return "not known"
+        return repr(Estimate(self.value, self.standard_error))
+
+
+class OperatorParameters(Mapping[str, OperatorParameter]):
+    """Parameters of an operator by name; they are also attributes (``parameters.K.value``)."""
+
+    def __init__(self, found: Mapping[str, OperatorParameter]) -> None:
+        self._all = dict(found)
+
+    def __getitem__(self, name: str) -> OperatorParameter:
+        return self._all[name]
+
+    def __getattr__(self, name: str) -> OperatorParameter:
+        if name.startswith("_") or "_all" not in self.__dict__:
+            raise AttributeError(name)
+        try:
+            return self._all[name]
+        except KeyError:
+            raise AttributeError(
+                f"the operator has no parameter {name}; it has {', '.join(self._all)}"
+            ) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._all)
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+    def _rows(self) -> list[list[str]]:
+        rows = []
+        for name, p in self._all.items():
+            low, high = ("", "") if p.interval is None else map(_end, p.interval)
+            share = f"{100 * p.prior_share:.0f} %" if p.prior_share > 0 else ""
+            named = f"{name} ({p.unit})" if p.unit else name
+            rows.append([named, p._shown(), low, high, share, p._remark().strip("()")])
+        return rows
+
+    def __repr__(self) -> str:
+        return _text.plain_table(_HEADER, self._rows())
+
+    def _repr_html_(self) -> str:
+        return _text.html_table("Operator", _HEADER, self._rows())
+
+
+_HEADER = ["parameter", "value", "95 % from", "to", "of it prior", ""]
+
+
+def _end(value: float) -> str:
+    return "open" if value in (float("inf"), float("-inf")) else _text.number(value, 3)
+
+
+class OperatorFit:
+    """The operator of a person. `identify_operator` makes it.
+
+    Attributes
+    ----------
+    form : str
+        The form that was chosen or given.
+    neuromuscular : bool
+        Whether it has neuromuscular dynamics.
+    parameters : OperatorParameters
+        `OperatorParameter` by name: value, standard error, interval, share of the prior, whether
+        the data determine it, unit.
+    operators : tuple of OperatorParameters
+        One for all records; one for each where some parameters are individual. `parameters` is the
+        first.
+    verdict : Verdict
+        What the result is worth: `level`, `reasons`, `notes`.
+    forms : list of dict
+        The forms that were compared, simplest first: form, loss, criterion, held_out, chi2,
+        degrees_of_freedom, converged.
+    lines : dict or None
+        The fit at the lines of the excitation: parameters (an Estimate each), chi2,
+        degrees_of_freedom, held_out, converged, and open_loop with a controlled element.
+    no_lines : str or None
+        Why there is none, where an excitation was named.
+    excitation : str or None
+        Its channel.
+    agreement : dict or None
+        Prediction error method and lines beside each other: coordinates, chi2, p_value.
+    open_loop : dict or None
+        ``crossover_rad_s`` and ``phase_margin_deg``, an Estimate each, or None without a crossover;
+        None without a controlled element.
+    covariance : ndarray or None
+        Covariance of the coordinates, from the scatter of runs or blocks, with what the prior
+        leaves open.
+    coordinates : dict of str to float
+        The coordinates that the operator is fitted in, in the order of the covariance. Estimates
+        are nearly normal in them.
+    noise : dict of str to ndarray
+        Coefficients ``"c"`` and ``"d"`` of the noise model C/D, without their leading 1.
+    box_jenkins : dict or None
+        A free model of the same orders: loss, likelihood_ratio, degrees_of_freedom, p_value.
+    errors : dict
+        What the errors are made from: clusters, kind ("runs" or "blocks"), inflation (clustered
+        over model-based variances), largest_ratio_to_model_based.
+    prior : dict of str to (float, float)
+        Centre, and standard deviation of the logarithm.
+    loss, innovation_variance : float
+    coherent_share : float or None
+        Mean coherence of u with the excitation at its lines.
+    termination : dict
+        reason, converged, iterations.
+    records : tuple of Record
+        The records as they were fitted, without their mean.
+    fits : tuple of Fit
+        The same model as polynomials, one for each of `operators`: prediction, simulation,
+        residuals, frequency response. They take records without their mean, such as `records`.
+    settings : dict
+        The keywords of the call, defaults included.
+    """
+
+    def __init__(
+        self,
+        native: _pyhoid.OperatorFit,
+        records: Sequence[Record],
+        settings: Mapping[str, Any] | None = None,
+    ) -> None:
+        self._native = native
+        self.settings: dict[str, Any] = dict(settings or {})
+        self.records: tuple[Record, ...] = tuple(one.detrended("mean") for one in records)
+        self.form, self.neuromuscular = native.form
+        self.operators: tuple[OperatorParameters, ...] = tuple(
+            OperatorParameters(
+                {
+                    name: OperatorParameter(value, error, interval, share, determined, unit)
+                    for name, unit, value, error, interval, share, determined in of
+                }
+            )
+            for of in native.parameters
+        )
+        self.parameters = self.operators[0]
+        self.verdict = Verdict(*native.verdict)
+        self.forms: list[dict[str, Any]] = native.forms
+        self.lines = native.lines
+        if self.lines is not None:
+            for name in ("parameters", "open_loop"):
+                if name in self.lines:
+                    self.lines[name] = estimates(self.lines[name])
+        self.no_lines = native.no_lines
+        self.excitation = native.excitation
+        self.agreement = native.agreement
+        for row in (self.agreement or {}).get("coordinates", []):
+            for name in ("prediction_error", "lines"):
+                row[name] = Estimate(*row[name])
+        found = native.open_loop
+        self.open_loop: dict[str, Estimate | None] | None = (
+            None if found is None else estimates(found)
+        )
+        self.covariance: FloatArray | None = native.covariance(0)
+        self.coordinates: dict[str, float] = {
+            name: float(value)
+            for name, value in zip(native.coordinates, native.coordinate_values(0))
+        }
+        c, d = native.noise
+        self.noise: dict[str, FloatArray] = {"c": c, "d": d}
+        self.box_jenkins = native.box_jenkins
+        self.prior: dict[str, tuple[float, float]] = {
+            name: (centre, spread) for name, centre, spread, _ in native.prior
+        }
+        figures = native.figures
+        self.loss: float = figures["loss"]
+        self.innovation_variance: float = figures["innovation_variance"]
+        self.coherent_share: float | None = figures["coherent_share"]
+        self.sample_time: float = figures["sample_time"]
+        self.errors: dict[str, Any] = {
+            name: figures[name]
+            for name in ("clusters", "kind", "inflation", "largest_ratio_to_model_based")
+        }
+        self.termination = native.termination
+        several = len(self.operators) > 1
+        self.fits: tuple[Fit, ...] = tuple(
+            Fit(native.fit(k), self.records[k : k + 1] if several else self.records, self.settings)
+            for k in range(len(self.operators))
+        )
+
+    @property
+    def fit(self) -> Fit:
+        """The model of the first operator as polynomials; it predicts, simulates, and so on."""
+        return self.fits[0]
+
+    @property
+    def converged(self) -> bool:
+        """Whether the search converged."""
+        return bool(self.termination["converged"])
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The parameters as a table."""
+        import pandas as pd
+
+        rows = [
+            {
+                "value": p.value,
+                "standard_error": p.standard_error,
+                "low": None if p.interval is None else p.interval[0],
+                "high": None if p.interval is None else p.interval[1],
+                "prior_share": p.prior_share,
+                "determined": p.determined,
+                "unit": p.unit,
+            }
+            for p in self.parameters.values()
+        ]
+        return pd.DataFrame(rows, index=pd.Index(list(self.parameters), name="parameter"))
+
+    def summary(self) -> str:
+        """Verdict, parameters, and what they rest on, in plain text."""
+        parts = [repr(self.verdict), self._native.title]
+        for k, operator in enumerate(self.operators):
+            head = (
+                f"{self.records[k].label or f'record {k + 1}'}:\n"
+                if len(self.operators) > 1
+                else ""
+            )
+            parts.append(head + repr(operator))
+        if self.open_loop is not None:
+            parts.append(f"Open loop: {_loop(self.open_loop)}")
+        if self.lines is not None:
+            parts.append(self._beside(self.lines))
+        if len(self.forms) > 1:
+            parts.append(self._forms())
+        parts.append(self._closing())
+        return "\n\n".join(parts)
+
+    def _beside(self, lines: Mapping[str, Any]) -> str:
+        rows = [
+            [name, p._shown(), repr(lines["parameters"][name])]
+            for name, p in self.parameters.items()
+        ]
+        text = _text.plain_table(["parameter", "prediction error", "at the lines"], rows)
+        text += (
+            f"\nAt the lines: chi2 {lines['chi2']:.1f} with {lines['degrees_of_freedom']}"
+            " degrees of freedom"
+        )
+        if lines.get("open_loop") is not None:
+            text += f"; {_loop(lines['open_loop'])}"
+        if self.agreement is not None:
+            text += (
+                f"\nAgreement of the two methods: chi2 {self.agreement['chi2']:.1f}"
+                f" over {len(self.agreement['coordinates'])} determined coordinates,"
+                f" p = {self.agreement['p_value']:.2f}"
+            )
+        return text
+
+    def _forms(self) -> str:
+        least = min((f["criterion"] for f in self.forms if f["criterion"] is not None), default=0.0)
+        rows = [
+            [
+                f["form"],
+                _text.number(f["loss"]),
+                _text.DASH if f["criterion"] is None else f"+{f['criterion'] - least:.1f}",
+                _text.number(f["held_out"], 4),
+                _text.number(f["chi2"], 4),
+                "chosen" if f["form"] == self.form else "",
+            ]
+            for f in self.forms
+        ]
+        return _text.plain_table(["form", "loss", "criterion", "held out", "chi2", ""], rows)
+
+    def _closing(self) -> str:
+        prior = ", ".join(f"{name} = {c:g}:{s:g}" for name, (c, s) in self.prior.items())
+        return (
+            f"Errors by the scatter of {self.errors['clusters']} {self.errors['kind']}: variances"
+            f" {self.errors['inflation']:.2f} times those of white residuals\n"
+            f"Loss {_text.number(self.loss)}; {self.termination['reason']} after"
+            f" {self.termination['iterations']} steps\n"
+            f"Prior: {prior or 'none'}"
+        )
+
+    def __repr__(self) -> str:
+        return self.summary()
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        parts = [f"<pre>{escape(repr(self.verdict))}</pre>", f"<p>{escape(self._native.title)}</p>"]
+        parts.extend(operator._repr_html_() for operator in self.operators)
+        parts.append(f"<p>{escape(self._closing())}</p>".replace("\n", "<br>"))
+        return "".join(parts)
+
+
+def _loop(found: Mapping[str, Estimate | None]) -> str:
+    crossover, margin = found["crossover_rad_s"], found["phase_margin_deg"]
+    if crossover is None or margin is None:
+        return "no crossover"
+    return f"crossover {crossover} rad/s, phase margin {margin} deg"
+
+
+def _of_fit(rows: Sequence[tuple[str, float | None, float | None, bool]], source: str) -> _Entries:
+    """The determined parameters of another fit as a prior."""
+    entries = [
+        (name, value, max(error / value, _LEAST_SPREAD), source)
+        for name, value, error, determined in rows
+        if name in _OF_PRIOR and determined and value and error and value > 0 and error > 0
+    ]
+    if not entries:
+        raise OptionError(
+            f"prior {source}: no parameter in it is determined and has an error; "
+            'give a fit that determines some, or "population"'
+        )
+    return entries
+
+
+def _of_file(path: str) -> _Entries:
+    """The prior of a file that `hoid identify --json` has written."""
+    try:
+        found = json.loads(Path(path).read_text(encoding="utf-8"))
+        rows = [
+            (p["name"], p["value"], p["standard_error"], bool(p["determined"]))
+            for p in found["parameters"]
+        ]
+    except FileNotFoundError:
+        raise OptionError(f"prior {path}: there is no such file") from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise FormatError(
+            f"prior {path}: {error!r}; give the output of `hoid identify --json`"
+        ) from None
+    return _of_fit(rows, path)
+
+
+def _prior(prior: Any) -> str | _Entries:
+    if prior is None:
+        return "none"
+    if isinstance(prior, OperatorFit):
+        rows = [
+            (name, p.value, p.standard_error, p.determined) for name, p in prior.parameters.items()
+        ]
+        return _of_fit(rows, "an earlier fit")
+    if isinstance(prior, Mapping):
+        try:
+            return [
+                (str(name), float(centre), float(spread), "given by the user")
+                for name, (centre, spread) in prior.items()
+            ]
+        except (TypeError, ValueError):
+            raise OptionError(
+                f"prior is {prior!r}, expected (centre, spread) by name, "
+                'such as {"omega_nm": (10.5, 0.3)}'
+            ) from None
+    if isinstance(prior, (str, PathLike)):
+        path = fspath(prior)
+        if not isinstance(prior, str) or path.lower().endswith(".json"):
+            return _of_file(path)
+        return prior
+    raise OptionError(
+        f'prior is {prior!r}, expected "population", "none", text such as "omega_nm=10.5:0.3", '
+        "(centre, spread) by name, a JSON result, or an OperatorFit"
+    )
+
+
+def identify_operator(
+    records: Record | Sequence[Record],
+    *,
+    form: str = "auto",
+    neuromuscular: bool = True,
+    prior: str
+    | PathLike[str]
+    | Mapping[str, tuple[float, float]]
+    | OperatorFit
+    | None = "population",
+    excitation: str | None = None,
+    period: float | None = None,
+    controlled_element: str | tuple[Sequence[float], Sequence[float]] | None = None,
+    individual: Sequence[str] = (),
+    delay: tuple[float, float] | None = None,
+    nc: Order = 0,
+    nd: Order | None = None,
+    run_to_run: float | None = None,
+    initial_state: str = "auto",
+    search_method: str = "auto",
+    max_iterations: int = 100,
+    tolerance: float = 1e-9,
+) -> OperatorFit:
+    """The operator of a recorded person: form, parameters with errors that hold, and a verdict.
+
+    It is ``hoid identify`` without a structure: a family of operators with a rich noise model,
+    fitted by prediction error and, where the excitation is periodic and recorded, at its lines
+    too. The mean of e and u is taken out of each record.
+
+    Parameters
+    ----------
+    records : Record or sequence of Record
+        Runs of one person in one task.
+    form : str
+        ``"auto"``, the simplest form that the data do not refute, or one of ``"gain"``,
+        ``"lead"``, ``"lead2"``, ``"lag"``, ``"lead-lag"``, ``"lead2-lag"``,
+        ``"quadratic-integral"``, ``"lead-droop"``.
+    neuromuscular : bool
+        With neuromuscular dynamics omega_nm, zeta_nm.
+    prior : str, path, mapping, OperatorFit or None
+        What is known of the person before the data: ``"population"`` (published people),
+        ``"none"``, text such as ``"omega_nm=10.5:0.3"``, ``{"omega_nm": (10.5, 0.3)}`` (centre,
+        and standard deviation of the logarithm) of omega_nm, zeta_nm, tau_e, T_L, T_I, the JSON
+        result of ``hoid identify --json``, or another fit.
+    excitation : str, optional
+        Channel of the recorded disturbance or target; by default the first of the usual names
+        that has lines; ``"none"`` for no fit at lines.
+    period : float, optional
+        Its period in s; by default found from its lines.
+    controlled_element : str or (array_like, array_like), optional
+        As text, such as ``"90/(s(s+6))"``, or numerator and denominator by descending powers of s:
+        adds crossover and phase margin.
+    individual : sequence of str
+        Parameters that each record has for itself.
+    delay : (float, float), optional
+        Shortest and longest tau_e in s; default 0.02 to 0.8.
+    nc, nd : int or (int, int) or range
+        Orders of the noise model, which Akaike's criterion chooses; nd by default from 0 to 24, or
+        to 8 where nc is not 0.
+    run_to_run : float, optional
+        Variation of a person's gain from one run to the next, as a part of it; it stands in the
+        errors of fewer than five records. Default 0.06.
+    initial_state : {"auto", "zero", "estimate", "backcast"}
+    search_method : {"auto", "gn", "lm", "grad"}
+    max_iterations : int
+    tolerance : float
+        Relative decrease of the loss below which the search has converged.
+
+    Returns
+    -------
+    OperatorFit
+
+    Raises
+    ------
+    OptionError
+        For options without meaning (a `ValueError`).
+    DataError
+        For records that cannot give a result (a `ValueError`).
+    EstimationError
+        When no form could be fitted. A result that is doubtful is none: see `OperatorFit.verdict`.
+
+    Examples
+    --------
+    >>> fit = pyhoid.identify_operator(runs, controlled_element="1/s")
+    >>> fit.verdict.level, fit.form
+    ('trustworthy', 'lead-lag')
+    >>> fit.parameters["tau_e"].interval
+    """
+    settings = {name: value for name, value in locals().items() if name != "records"}
+    several = _options.as_records(records)
+    element = None
+    if controlled_element is not None:
+        element = _options.controlled_element(controlled_element)
+    found = _pyhoid.identify_operator(
+        several,
+        form=form,
+        neuromuscular=bool(neuromuscular),
+        prior=_prior(prior),
+        excitation=excitation,
+        period=None if period is None else float(period),
+        controlled_element=element,
+        individual=list(individual),
+        delay=_options.span("delay", delay),
+        nc=_options.order("nc", nc),
+        nd=None if nd is None else _options.order("nd", nd),
+        run_to_run=None if run_to_run is None else float(run_to_run),
+        initial_state=initial_state,
+        search_method=search_method,
+        max_iterations=int(max_iterations),
+        tolerance=float(tolerance),
+    )
+    return OperatorFit(found, several, settings)

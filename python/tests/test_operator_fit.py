@@ -1,0 +1,179 @@
+"""The operator of a person, on simulated people whose parameters are known."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyhoid
+
+#: A single form and few noise orders, where the choice is not what is tested.
+FEW: dict[str, Any] = {"form": "lead-lag", "nd": (0, 6)}
+
+
+@pytest.fixture(scope="session")
+def people(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three runs of a person on an integrator, with disturbance d."""
+    directory = tmp_path_factory.mktemp("people")
+    pyhoid.simulate_people(
+        directory, subjects=1, runs=3, plants=["integrator"], form="lead-lag", seed=3
+    )
+    return directory
+
+
+@pytest.fixture(scope="session")
+def runs(people: Path) -> list[pyhoid.Record]:
+    return [pyhoid.read(people / f"S1_integrator_{run}.csv") for run in (1, 2, 3)]
+
+
+@pytest.fixture(scope="session")
+def truth(people: Path) -> list[dict[str, str]]:
+    with (people / "truth.csv").open() as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+@pytest.fixture(scope="session")
+def found(runs: list[pyhoid.Record]) -> pyhoid.OperatorFit:
+    return pyhoid.identify_operator(runs, controlled_element="1/s")
+
+
+def test_the_parameters_are_those_of_the_person(
+    found: pyhoid.OperatorFit, truth: list[dict[str, str]]
+) -> None:
+    tau = found.parameters["tau_e"]
+    true = float(np.mean([float(row["tau_e"]) for row in truth]))
+    assert tau.determined and tau.unit == "s" and tau.standard_error is not None
+    assert abs(tau.value - true) < 4 * math.hypot(tau.standard_error, 0.1 * true / math.sqrt(3))
+    assert found.parameters.tau_e is tau and len(found.operators) == 1
+    with pytest.raises(AttributeError, match="it has"):
+        found.parameters.nothing  # noqa: B018
+
+
+def test_what_a_fit_holds(found: pyhoid.OperatorFit) -> None:
+    assert found.form in [row["form"] for row in found.forms] and len(found.forms) > 3
+    assert found.excitation == "d" and found.lines is not None and found.no_lines is None
+    assert found.verdict.level in ("trustworthy", "doubtful", "not determined")
+    p = len(found.coordinates)
+    assert found.covariance is not None and found.covariance.shape == (p, p)
+    assert np.array_equal(found.covariance, found.covariance.T)
+    # The error of tau_e is that of its coordinate.
+    place = list(found.coordinates).index("tau_e")
+    error = found.parameters["tau_e"].standard_error
+    assert error == pytest.approx(math.sqrt(found.covariance[place, place]), rel=1e-12)
+    assert found.coordinates["tau_e"] == found.parameters["tau_e"].value
+    assert found.open_loop is not None
+    crossover, margin = found.open_loop["crossover_rad_s"], found.open_loop["phase_margin_deg"]
+    assert crossover is not None and margin is not None and margin.standard_error is not None
+    at_lines = found.lines["open_loop"]["crossover_rad_s"]
+    assert at_lines.value == pytest.approx(crossover.value, rel=0.2)
+    assert found.agreement is not None and 0 <= found.agreement["p_value"] <= 1
+    assert found.prior["omega_nm"] == (10.5, 0.3) and found.settings["form"] == "auto"
+    text = found.summary()
+    for part in (found.verdict.level, found.form, "tau_e (s)", "at the lines", "phase margin"):
+        assert part in text, part
+    assert "tau_e" in found._repr_html_() and repr(found) == text
+    table = found.to_pandas()
+    assert table.loc["tau_e", "value"] == found.parameters["tau_e"].value
+
+
+def test_the_polynomials_are_the_same_model(found: pyhoid.OperatorFit) -> None:
+    """The residuals of the polynomials leave the loss, and their response the crossover."""
+    residuals = np.concatenate([found.fit.residuals(r).values for r in found.records])
+    assert np.mean(residuals**2) == pytest.approx(found.loss, rel=1e-3)
+    assert np.array_equal(found.noise["d"], found.fit.polynomials["D"][1:])
+    crossover = found.open_loop and found.open_loop["crossover_rad_s"]
+    assert crossover
+    response = found.fit.frequency_response([crossover.value]).response[0]
+    assert abs(response) / crossover.value == pytest.approx(1.0, rel=1e-3)
+    assert found.fit.covariance is None and found.fit.quality["vaf_prediction"] > 90
+    assert found.fit.to_xarray()["value"].sizes["parameter"] == len(found.fit.parameters)
+
+
+def test_the_command_line_gives_the_same(
+    found: pyhoid.OperatorFit, runs: list[pyhoid.Record], people: Path, cli: Any
+) -> None:
+    files = [people / f"S1_integrator_{run}.csv" for run in (1, 2, 3)]
+    expected = cli.json("identify", *files, "--controlled-element", "1/s")
+    assert found.form == expected["form"] and list(found.verdict) == [
+        expected["verdict"]["level"],
+        *(expected["verdict"][name] for name in ("reasons", "notes")),
+    ]
+    for p in expected["parameters"]:
+        here = found.parameters[p["name"]]
+        assert (here.value, here.standard_error) == (p["value"], p["standard_error"])
+        assert (here.prior_share, here.determined) == (p["prior_share"], p["determined"])
+    assert found.covariance is not None
+    assert found.covariance.tolist() == expected["covariance"]["matrix"]
+    assert found.forms == expected["forms"] and found.loss == expected["loss"]
+    assert found.lines is not None and found.lines["chi2"] == expected["lines"]["chi2"]
+    # A result of the command line as a prior, and the fit itself.
+    path = people.parent / "result.json"
+    path.write_text(json.dumps(expected))
+    by_file = pyhoid.identify_operator(runs[0], prior=path, **FEW)
+    by_fit = pyhoid.identify_operator(runs[0], prior=found, **FEW)
+    assert by_file.prior == by_fit.prior and "tau_e" in by_file.prior
+    assert by_file.parameters["tau_e"] == by_fit.parameters["tau_e"]
+
+
+def test_options(runs: list[pyhoid.Record]) -> None:
+    one = runs[0]
+    plain = pyhoid.identify_operator(one, excitation="none", prior=None, **FEW)
+    assert plain.lines is None and plain.open_loop is None and plain.prior == {}
+    assert all(p.prior_share == 0 for p in plain.parameters.values())
+    assert plain.form == "lead-lag" and len(plain.forms) == 1 and len(plain.noise["d"]) <= 6
+    by_names = pyhoid.identify_operator(
+        one, excitation="none", prior={"omega_nm": (10.5, 0.3)}, **FEW
+    )
+    by_text = pyhoid.identify_operator(one, excitation="none", prior="omega_nm=10.5:0.3", **FEW)
+    assert by_names.parameters == by_text.parameters and by_names.loss >= plain.loss
+    without = pyhoid.identify_operator(
+        one, form="lead-lag", neuromuscular=False, excitation="none", nd=2, delay=(0.1, 0.4)
+    )
+    assert "omega_nm" not in without.parameters and 0.1 <= without.parameters.tau_e.value <= 0.4
+    # A channel that was named and has no lines is said to be missed.
+    missed = pyhoid.identify_operator(one, excitation="u", **FEW)
+    assert missed.lines is None and missed.no_lines
+
+
+def test_a_gain_for_each_run(runs: list[pyhoid.Record]) -> None:
+    each = pyhoid.identify_operator(runs[:2], individual=["K"], excitation="none", **FEW)
+    first, second = each.operators
+    assert first.K_over_T_I.value != second.K_over_T_I.value
+    assert first.tau_e == second.tau_e and len(each.fits) == 2
+    assert each.fits[1].records == each.records[1:]
+
+
+def test_what_cannot_be(runs: list[pyhoid.Record], tmp_path: Path) -> None:
+    for wrong, word in [
+        ({"form": "integral"}, "lead-lag"),
+        ({"form": "lead", "neuromuscular": False}, "pure derivative"),
+        ({"prior": "K=1:1"}, "omega_nm"),
+        ({"prior": {"omega_nm": 10.0}}, "centre, spread"),
+        ({"prior": {"omega_nm": (-1.0, 0.3)}}, "positive"),
+        ({"prior": tmp_path / "none.json"}, "no such file"),
+        ({"individual": ["gain"]}, "expected K, T_L"),
+        ({"nd": (3, 99)}, "0..24"),
+        ({"run_to_run": -1.0}, "zero or more"),
+    ]:
+        with pytest.raises(pyhoid.OptionError, match=word):
+            pyhoid.identify_operator(runs[0], **wrong)
+    (tmp_path / "other.json").write_text("[]")
+    with pytest.raises(pyhoid.FormatError, match="hoid identify --json"):
+        pyhoid.identify_operator(runs[0], prior=tmp_path / "other.json")
+    with pytest.raises(pyhoid.DataError):
+        pyhoid.identify_operator(runs[0].span(0, 0.5))
+
+
+def test_guesses_of_coefficients_have_their_own_name(c1: pyhoid.Record) -> None:
+    orders = {"nb": 2, "nd": 1, "nf": 2, "nk": 29}
+    free = pyhoid.identify(c1, "bj", **orders)
+    held = pyhoid.identify(c1, "bj", coefficient_prior={"f1": (-1.9, 1e3)}, **orders)
+    assert abs(held.parameters["f1"] + 1.9) < abs(free.parameters["f1"] + 1.9)
+    with pytest.raises(TypeError, match="prior"):
+        pyhoid.identify(c1, "bj", prior={"f1": (-1.9, 1.0)})  # type: ignore[call-overload]
