@@ -7,6 +7,7 @@
 //! | `cargo xtask check` | formatting, lints, documentation of the crates and the book, as continuous integration does |
 //! | `cargo xtask book` | the book in `docs/`, into `docs/book/` (needs mdbook) |
 //! | `cargo xtask bench [OPTION...]` | the tasks of the page "Speed beside others" beside the peers that are installed, or how cost grows (module `bench`) |
+//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage` |
 //!
 //! Little but the standard library: a chore must start at once on a fresh machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
@@ -24,7 +25,7 @@ use std::{
 use counts::Counts;
 use process::{cargo, cargo_command, each_line, run};
 
-const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | book | bench [OPTION...]";
+const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | book | bench [OPTION...] | slow NAME [ARGUMENT...]";
 
 fn main() -> ExitCode {
     let mut arguments = env::args().skip(1);
@@ -34,6 +35,7 @@ fn main() -> ExitCode {
         Some("check") => check(),
         Some("book") => book(),
         Some("bench") => bench::bench(&arguments.collect::<Vec<_>>()),
+        Some("slow") => slow(&arguments.collect::<Vec<_>>()),
         _ => Err(USAGE.to_owned()),
     };
     match outcome {
@@ -65,6 +67,34 @@ fn test(arguments: &[String]) -> Result<(), String> {
         return Err(format!("failed ({status}): {shown}"));
     }
     total.verdict()
+}
+
+/// Studies that take too long for a test, each an example of the crate `hoid`.
+const SLOW: [(&str, &str); 1] = [("people-coverage", "people_coverage")];
+
+/// Runs one of them, with further arguments of its own.
+fn slow(arguments: &[String]) -> Result<(), String> {
+    let names = || SLOW.map(|(name, _)| name).join(", ");
+    let (name, rest) = arguments
+        .split_first()
+        .ok_or_else(|| format!("which study: {}", names()))?;
+    let (_, example) = (SLOW.iter())
+        .find(|(known, _)| known == name)
+        .ok_or_else(|| format!("no study is called {name}; there is {}", names()))?;
+    let mut command = cargo_command();
+    command
+        .args([
+            "run",
+            "--release",
+            "-p",
+            "hoid",
+            "--no-default-features",
+            "--example",
+            example,
+            "--",
+        ])
+        .args(rest);
+    run(&mut command)
 }
 
 fn check() -> Result<(), String> {

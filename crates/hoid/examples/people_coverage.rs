@@ -1,8 +1,9 @@
 //! Do the error bars of operators of people hold? The numbers of the page "Error bars of people".
 //!
-//! `cargo xtask slow people-coverage [PEOPLE] [FIRST] [--given] [--rows FILE]`: 2000 people by
-//! default, from the first number on; `--given` leaves out the fits that choose the form, which take
-//! ten times as long; all fits as rows of a CSV file.
+//! `cargo xtask slow people-coverage [PEOPLE] [FIRST] [--given] [--lines] [--no-lines] [--rows FILE]`:
+//! 2000 people by default, from the first number on. `--given` leaves out the fits that choose the
+//! form, which take some ten times as long, `--lines` and `--no-lines` those without and with the
+//! recorded disturbance; `--rows` writes each quantity of each fit as a row of a CSV file.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 #[path = "../tests/common/people_coverage/mod.rs"]
@@ -27,6 +28,8 @@ fn main() {
         match argument.as_str() {
             "--rows" => rows = arguments.next().map(PathBuf::from),
             "--given" => variants.retain(|v| v.form_given),
+            "--no-lines" => variants.retain(|v| !v.excitation),
+            "--lines" => variants.retain(|v| v.excitation),
             number => numbers.push(number.parse::<u64>().unwrap()),
         }
     }

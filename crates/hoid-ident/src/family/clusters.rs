@@ -123,28 +123,44 @@ pub(super) struct Covariances {
 }
 
 impl Covariances {
-    /// Adds what two methods differ by: the estimate may lie anywhere between, a rectangular
-    /// distribution of half-width d with the variance `d d'/3` (JCGM 100:2008, *Guide to the
-    /// Expression of Uncertainty in Measurement*, 4.3.7). Elements at a bound stay without a
-    /// variance.
-    pub fn add_difference(&mut self, fit: &PredictionFit<'_>, other: &[f64]) {
+    /// Adds the bias that another estimate shows: `d d'`, d the difference to it.
+    ///
+    /// The prediction error fit is biased where its noise model is wrong, by an amount that no
+    /// scatter shows; an estimate that does not rest on that noise model tells of it. What errors
+    /// are made of is then the mean squared error, variance and squared bias, with d for the bias:
+    /// all of it, and not the `d d'/3` of a truth that may lie anywhere between the two, since the
+    /// bias is on one side. Elements at a bound stay without a variance.
+    pub fn add_bias(&mut self, fit: &PredictionFit<'_>, other: &[f64]) {
         let p = fit.parameters();
         let mut difference = vec![0.0; p];
-        let free = fit.free();
-        for (&place, x) in fit.layout().positions(0).iter().zip(other) {
-            if free.contains(&place) {
-                difference[place] = fit.eta()[place] - x;
-            }
+        let elements = fit.layout().operator_elements();
+        for place in fit.free().into_iter().filter(|place| *place < elements) {
+            difference[place] = fit.eta()[place] - other[place];
         }
         for i in 0..p {
             for j in 0..p {
-                self.clustered[i * p + j] += difference[i] * difference[j] / 3.0;
+                self.clustered[i * p + j] += difference[i] * difference[j];
             }
         }
     }
 }
 
 impl Covariances {
+    /// Intervals by profile likelihood know of kappa alone: where variances are larger, their ends
+    /// move out in the ratio of the standard errors.
+    pub fn widen(&self, fit: &PredictionFit<'_>, profiles: &mut [Option<(f64, f64)>]) {
+        let p = fit.parameters();
+        for (i, profile) in profiles.iter_mut().enumerate() {
+            let Some((low, high)) = profile else { continue };
+            let ratio = self.clustered[i * p + i] / (fit.inflation * self.model_based[i * p + i]);
+            if ratio.is_finite() && ratio > 1.0 {
+                let (x, (least, most)) = (fit.eta()[i], fit.criterion.limits[i]);
+                *low = (x - (x - *low) * ratio.sqrt()).max(least);
+                *high = (x + (*high - x) * ratio.sqrt()).min(most);
+            }
+        }
+    }
+
     /// Adds what people's gain varies by from one run to the next, where blocks of few runs cannot
     /// show it: `(share x gain)^2` over the number of records.
     pub fn add_run_to_run(&mut self, fit: &PredictionFit<'_>, share: f64) {

@@ -22,6 +22,7 @@ use super::{
     profile::profile_interval,
     response_fit::{MeasuredResponse, ResponseCriterion},
     result::{FamilyFit, FreeModel, OperatorOfRecord},
+    sensitivity::rivals,
 };
 use crate::{
     Fit, IdentError, InitialState, SearchOptions,
@@ -202,7 +203,7 @@ impl FamilyEstimator {
             no_lines,
             describing.as_ref(),
             figures,
-            &records,
+            &prediction,
             &mut workspace,
         )
     }
@@ -386,7 +387,7 @@ impl FamilyEstimator {
         no_lines: Option<String>,
         describing: Option<&DescribingFunction>,
         forms: Vec<FormFigures>,
-        records: &[Record],
+        prediction: &Prediction<'_>,
         workspace: &mut Workspace,
     ) -> Result<FamilyFit, IdentError> {
         let layout = fit.layout();
@@ -395,19 +396,31 @@ impl FamilyEstimator {
             covariances.add_run_to_run(fit, self.run_to_run);
         }
         let quantile = quantile(fit.clusters.parts.len());
-        let separate = if self.individual.is_empty() { 1 } else { records.len() };
+        let separate = if self.individual.is_empty() {
+            1
+        } else {
+            prediction.data.len()
+        };
         let error_ratio = covariances.as_ref().and_then(|c| largest_error_ratio(fit, c));
-        let profiles = self.profiles(fit, covariances.as_ref(), quantile, workspace);
+        let mut profiles = self.profiles(fit, covariances.as_ref(), quantile, workspace);
         let mut operators = Vec::with_capacity(separate);
         for record in 0..separate {
             operators.push(self.operator_of(fit, covariances.as_ref(), &profiles, quantile, record)?);
         }
         let agreement = lines.as_ref().and_then(|lines| agreement_of(&operators[0], lines));
-        if let (Some(lines), Some(covariances)) = (&lines, covariances.as_mut())
-            && separate == 1
-        {
-            covariances.add_difference(fit, lines.operator.coordinates());
-            operators[0] = self.operator_of(fit, Some(covariances), &profiles, quantile, 0)?;
+        if let Some(covariances) = &mut covariances {
+            match &lines {
+                Some(lines) if separate == 1 => covariances.add_bias(fit, lines.operator.coordinates()),
+                _ => {
+                    for rival in rivals(prediction, fit, *self.nd.end(), workspace) {
+                        covariances.add_bias(fit, &rival);
+                    }
+                }
+            }
+            covariances.widen(fit, &mut profiles);
+            for (record, operator) in operators.iter_mut().enumerate() {
+                *operator = self.operator_of(fit, Some(covariances), &profiles, quantile, record)?;
+            }
         }
         let free_model = free_model(fit, workspace);
         let residuals = residuals(fit, workspace);

@@ -32,6 +32,7 @@
 //! | `noise` | autoregressions: starts and orders of the noise model |
 //! | `prediction` | the prediction error fit of one form |
 //! | `clusters` | covariance by runs or blocks |
+//! | `sensitivity` | what the estimate owes to the choice of a noise model |
 //! | `profile` | intervals by profile likelihood |
 //! | `choice` | which form |
 //! | `agreement` | do two methods agree |
@@ -56,6 +57,7 @@ mod prior;
 mod profile;
 mod response_fit;
 mod result;
+mod sensitivity;
 
 pub use agreement::{Agreement, AgreementRow};
 pub use choice::FormFigures;

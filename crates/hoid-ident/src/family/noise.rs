@@ -8,6 +8,12 @@
 
 use crate::linalg::least_squares::solve_symmetric;
 
+/// Largest modulus of a root of C in a start.
+const LARGEST_ROOT: f64 = 0.999;
+/// By what roots that are larger are drawn in, and how often.
+const DRAWN_BY: f64 = 0.98;
+const MOST_DRAWN: usize = 200;
+
 /// Coefficients d of the order nd, and the loss.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Autoregression {
@@ -90,6 +96,50 @@ impl NoiseProducts {
     }
 }
 
+/// Start of an ARMA noise model, `[c.., d..]`: with the innovations of a long autoregression, v is
+/// regressed on its own past and on theirs (E. J. Hannan and J. Rissanen, *Biometrika* 69 (1982)
+/// 81-94). A C that is not invertible is drawn in, `c_k rho^k`.
+pub(super) fn hannan_rissanen(series: &[Vec<f64>], (nc, nd): (usize, usize), long: usize) -> Option<Vec<f64>> {
+    let d = NoiseProducts::new(series, long).fit(long)?.d;
+    let q = nc + nd;
+    let (mut gram, mut right) = (vec![0.0; q * q], vec![0.0; q]);
+    for v in series {
+        let past = |t: usize| (0..long).map(|k| d[k] * v[t - k - 1]).sum::<f64>();
+        let innovation: Vec<f64> = (0..v.len())
+            .map(|t| if t < long { 0.0 } else { v[t] + past(t) })
+            .collect();
+        for t in long + nc.max(nd)..v.len() {
+            let x: Vec<f64> = (1..=nc)
+                .map(|k| innovation[t - k])
+                .chain((1..=nd).map(|k| -v[t - k]))
+                .collect();
+            for i in 0..q {
+                right[i] += x[i] * v[t];
+                for j in 0..=i {
+                    gram[i * q + j] += x[i] * x[j];
+                }
+            }
+        }
+    }
+    for i in 0..q {
+        for j in i + 1..q {
+            gram[i * q + j] = gram[j * q + i];
+        }
+    }
+    let mut found = solve_symmetric(&gram, &right)?;
+    for _ in 0..MOST_DRAWN {
+        if hoid_core::stability::roots_inside(&found[..nc], LARGEST_ROOT) {
+            return Some(found);
+        }
+        let mut factor = 1.0;
+        for c in &mut found[..nc] {
+            factor *= DRAWN_BY;
+            *c *= factor;
+        }
+    }
+    None
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -124,6 +174,20 @@ mod tests {
         let order = products.best_order(0..=8).unwrap();
         let gained = 1.0 - products.fit(order).unwrap().loss / fit.loss;
         assert!(order >= 2 && gained < 0.003, "{order} {gained}");
+    }
+
+    #[test]
+    fn a_mixed_model_is_found_by_two_regressions() {
+        // The series of above as innovations' response: v = w + 0.6 w(t-1), w the autoregression.
+        let w = series(8000);
+        let v: Vec<f64> = (1..w.len()).map(|t| w[t] + 0.6 * w[t - 1]).collect();
+        let found = hannan_rissanen(&[v], (1, 2), 24).unwrap();
+        // Standard errors of some 0.01.
+        for (value, truth) in found.iter().zip([0.6, -1.5, 0.7]) {
+            assert!((value - truth).abs() < 0.05, "{found:?}");
+        }
+        assert_eq!(hannan_rissanen(&[vec![0.0; 90]], (1, 2), 24), None);
+        assert_eq!(hannan_rissanen(&[vec![1.0; 5]], (1, 2), 24), None);
     }
 
     #[test]

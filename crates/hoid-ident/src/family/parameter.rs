@@ -177,8 +177,11 @@ impl Known<'_> {
         made.standard_error = Some(relative * made.value.abs());
         made.prior_share = self.prior_share[gain].max(self.prior_share[other]);
         made.determined = self.is_determined(gain) && self.is_determined(other);
-        let factor = (self.quantile * relative).exp();
-        let (mut low, mut high) = (made.value / factor, made.value * factor);
+        let Some((low, high)) = self.product_interval(gain, other, sign) else {
+            return made;
+        };
+        let ends = [made.value / low.exp(), made.value * high.exp()];
+        let (mut low, mut high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
         if let Some((rate, _)) = self.interval(other)
             && sign < 0.0
             && rate <= self.limits[other].0
@@ -190,8 +193,38 @@ impl Known<'_> {
                 low = f64::NEG_INFINITY;
             }
         }
-        made.interval = Some((low.min(high), low.max(high)));
+        made.interval = Some((low, high));
         made
+    }
+
+    /// How far `ln|x_g| +- ln x_o` reaches below and above its estimate, from the intervals of
+    /// the two, which need not be symmetric (G. Y. Zou and A. Donner, *Statistics in Medicine* 27
+    /// (2008) 1693-1702): with a below and b above,
+    /// `sqrt(a_g^2 + a_o^2 + 2 r a_g a_o)` for the sum, `sqrt(a_g^2 + b_o^2 - 2 r a_g b_o)` for the
+    /// difference, r their correlation. Infinite where an interval reaches zero.
+    fn product_interval(&self, gain: usize, other: usize, sign: f64) -> Option<(f64, f64)> {
+        let x = self.operator.coordinates();
+        let p = x.len();
+        let c = self.covariance?;
+        let reach = |i: usize| {
+            let (low, high) = self.interval(i)?;
+            let (near, far) = if x[i] > 0.0 { (low, high) } else { (-high, -low) };
+            let size = x[i].abs();
+            let below = if near > 0.0 { (size / near).ln() } else { f64::INFINITY };
+            Some((below, (far / size).ln()))
+        };
+        let (of_gain, of_other) = (reach(gain)?, reach(other)?);
+        let of_other = if sign < 0.0 { (of_other.1, of_other.0) } else { of_other };
+        let scale = (c[gain * p + gain] * c[other * p + other]).sqrt() * x[gain].signum();
+        let r = (sign * c[gain * p + other] / scale).clamp(-1.0, 1.0);
+        let both = |a: f64, b: f64| {
+            if a.is_finite() && b.is_finite() {
+                (a * a + b * b + 2.0 * r * a * b).max(0.0).sqrt()
+            } else {
+                f64::INFINITY
+            }
+        };
+        Some((both(of_gain.0, of_other.0), both(of_gain.1, of_other.1)))
     }
 }
 
@@ -238,6 +271,11 @@ mod tests {
         let k = of(&all, "K");
         assert!(k.determined && (k.value - 25.0).abs() < 1e-12);
         // Relative errors .04 and .1.
+        // Each of the two reaches its own way: K is low where K/T_I is low and 1/T_I is high.
+        let (low, high) = k.interval.unwrap();
+        let below = ((5.0_f64 / 4.6).ln().powi(2) + (0.24_f64 / 0.2).ln().powi(2)).sqrt();
+        let above = ((5.4_f64 / 5.0).ln().powi(2) + (0.2_f64 / 0.16).ln().powi(2)).sqrt();
+        assert!((low - 25.0 * (-below).exp()).abs() < 1e-9 && (high - 25.0 * above.exp()).abs() < 1e-9);
         assert!((k.standard_error.unwrap() - 25.0 * (0.04_f64.powi(2) + 0.01).sqrt()).abs() < 1e-9);
     }
 

@@ -160,6 +160,29 @@ impl<'a> Prediction<'a> {
         found.ok_or(IdentError::NoFiniteLoss)
     }
 
+    /// Where the search ends with another noise model, from the operator of a fit and with its
+    /// weight of the prior; `None` where there is no end.
+    pub fn refit(
+        &self,
+        fit: &PredictionFit<'_>,
+        noise: NoiseOrders,
+        coefficients: &[f64],
+        (max_iterations, tolerance): (usize, f64),
+        workspace: &mut Workspace,
+    ) -> Option<Vec<f64>> {
+        let layout = fit.layout();
+        let mut criterion = self.criterion((layout.form, layout.neuromuscular), noise);
+        criterion.penalty.clone_from(&fit.criterion.penalty);
+        let operators = &fit.eta()[..layout.operator_elements()];
+        let search = SearchOptions {
+            max_iterations,
+            tolerance,
+            ..self.search
+        };
+        let found = criterion.search([operators, coefficients].concat(), &search, None, workspace)?;
+        found.theta.iter().all(|x| x.is_finite()).then_some(found.theta)
+    }
+
     /// The prior for each place in eta, in units of one standard deviation.
     fn penalties(&self, layout: &FamilyLayout) -> Vec<Penalty> {
         let all = layout.form.coordinates(layout.neuromuscular);

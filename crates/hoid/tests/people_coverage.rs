@@ -1,0 +1,68 @@
+//! A small sample of the study of the error bars of people: `cargo xtask slow people-coverage`.
+#![allow(clippy::unwrap_used)]
+
+#[path = "common/people_coverage/mod.rs"]
+mod people_coverage;
+
+use people_coverage::{
+    fits::{Outcome, Variant, outcomes},
+    tables::{QUANTITIES, Share, coverage, median, of_quantity},
+};
+use rayon::prelude::*;
+
+const SEED: u64 = 2026;
+
+fn given(excitation: bool) -> Variant {
+    Variant {
+        excitation,
+        form_given: true,
+    }
+}
+
+fn sample(people: std::ops::Range<u64>, variant: Variant) -> Vec<Outcome> {
+    people
+        .into_par_iter()
+        .flat_map_iter(|number| outcomes(SEED, number, &[variant]).unwrap())
+        .collect()
+}
+
+#[test]
+fn intervals_hold_the_truth_of_virtual_people() {
+    // People 0 to 5 have one or two runs: short enough for a test.
+    let all = sample(0..6, given(true));
+    let of: Vec<&Outcome> = all.iter().collect();
+    let each = QUANTITIES.map(|name| coverage(&of_quantity(&of, name)));
+    let share = Share {
+        of: each.iter().map(|s| s.of).sum(),
+        all: each.iter().map(|s| s.all).sum(),
+    };
+    assert!(all.iter().all(|o| o.found.is_ok()));
+    // 95 % of some fifty intervals, the nine of a person far from independent of each other.
+    assert!(share.all >= 40 && share.percent() >= 80.0, "{}", share.text());
+    let off = median(all.iter().map(|o| o.found.as_ref().unwrap().response_error)).unwrap();
+    assert!(off < 0.3, "{off}");
+}
+
+#[test]
+fn a_sample_is_the_same_on_any_number_of_threads() {
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let found: Vec<_> = pool
+            .install(|| sample(0..3, given(false)))
+            .into_iter()
+            .map(|o| o.found)
+            .collect();
+        format!("{found:?}")
+    };
+    assert_eq!(on(1), on(3));
+}
+
+#[test]
+fn shares_have_errors() {
+    let share = Share::over([true, true, true, false]);
+    assert_eq!((share.of, share.all, share.percent()), (3, 4, 75.0));
+    // All of them: still an error.
+    assert!(Share { of: 100, all: 100 }.error() > 1.0);
+    assert_eq!(Share::default().text(), "–");
+    assert_eq!(median([3.0, f64::NAN, 1.0, 2.0]), Some(2.0));
+}
