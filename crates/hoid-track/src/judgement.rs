@@ -227,8 +227,11 @@ impl Trace {
     }
 }
 
+/// Share of the rows whose operator has a property.
+type ShareOfRows<'a> = dyn Fn(&dyn Fn(&OperatorEstimate) -> bool) -> f64 + 'a;
+
 /// Gains that are open in most rows.
-fn gains_over_rows(rows_with: &dyn Fn(&dyn Fn(&OperatorEstimate) -> bool) -> f64) -> Option<Finding> {
+fn gains_over_rows(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     let both = rows_with(&|o| is_open(&o.k_e) && is_open(&o.k_e_dot));
     if both > MOST {
         return Some(Finding::undetermined(

@@ -2,7 +2,7 @@
 //! they are worth. The steps are those of the [module](super).
 
 use hoid_model::{
-    Complex64, Detrend, Form, NotConvertible, PolynomialModel, Record, SampleTime, Structure, Verdict,
+    Complex64, Detrend, FamilyOperator, Form, NotConvertible, PolynomialModel, Record, SampleTime, Structure, Verdict,
     operator_family::Coordinate, uncertainty::variance_along,
 };
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
@@ -12,7 +12,7 @@ use super::{
     arx_response::arx_response,
     choice::{Candidate, FormFigures, choose},
     clusters::{self, Covariances},
-    judgement::{Judged, findings},
+    judgement::{Judged, MOST_DAMPED, findings},
     line_fit::{LineFit, by_simplicity, line_fit},
     lines::LineData,
     noise::NoiseProducts,
@@ -180,12 +180,16 @@ impl FamilyEstimator {
             });
         }
         let inflation = common_inflation(&tried);
-        let candidates: Vec<(usize, Candidate)> = tried
+        let mut candidates: Vec<(usize, Candidate)> = tried
             .iter()
             .enumerate()
             .filter_map(|(i, t)| Some((i, candidate(t, lines.as_ref(), inflation, &mut workspace)?)))
             .collect();
         let figures: Vec<FormFigures> = tried.iter().map(|t| figures(t, &candidates)).collect();
+        // A form that lacks a lag, where there is one, takes the neuromuscular poles for it.
+        if candidates.iter().any(|(i, _)| !has_lost_its_muscles(&tried[*i])) {
+            candidates.retain(|(i, _)| !has_lost_its_muscles(&tried[*i]));
+        }
         let (places, only): (Vec<usize>, Vec<Candidate>) = candidates.into_iter().unzip();
         let chosen = choose(&only).and_then(|i| places.get(i).copied());
         let Some(chosen) = chosen else {
@@ -732,6 +736,17 @@ fn response_error(of: &OperatorOfRecord) -> Option<f64> {
         .iter()
         .map(|omega| error(*omega))
         .min_by(f64::total_cmp)
+}
+
+/// True where the neuromuscular poles have become two lags, by prediction error or at the lines.
+fn has_lost_its_muscles(tried: &Tried<'_>) -> bool {
+    let lags = |operator: &FamilyOperator| operator.neuromuscular().is_some_and(|(_, zeta)| zeta > MOST_DAMPED);
+    let of_fit = tried
+        .fit
+        .as_ref()
+        .ok()
+        .and_then(|fit| fit.layout().operator(fit.eta(), 0).ok());
+    of_fit.is_some_and(|operator| lags(&operator)) || tried.lines.as_ref().is_some_and(|l| lags(&l.operator))
 }
 
 /// One kappa for all forms, so that their criteria can be compared: the median.

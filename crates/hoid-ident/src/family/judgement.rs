@@ -16,6 +16,9 @@ const LEVEL: f64 = 0.01;
 const LARGEST_EXCESS_LOSS: f64 = 0.01;
 /// Relative error of the response, at its best, beyond which nothing is known of the person.
 const LARGEST_RESPONSE_ERROR: f64 = 0.5;
+/// Damping ratio above which the two neuromuscular poles are lags of their own, far apart: no muscle
+/// is so damped.
+pub(super) const MOST_DAMPED: f64 = 1.5;
 /// Ratio of clustered to model-based standard errors that is worth a note.
 const NOTED_ERROR_RATIO: f64 = 1.5;
 
@@ -81,6 +84,11 @@ pub(super) fn findings(judged: &Judged<'_>) -> Vec<Finding> {
     all
 }
 
+/// True where it rests at the end of what is sought: it has no error of its own.
+fn at_bound(parameter: &Parameter) -> bool {
+    parameter.standard_error.is_none()
+}
+
 fn determined(judged: &Judged<'_>, all: &mut Vec<Finding>) {
     let find = |name: &str| {
         judged
@@ -124,11 +132,23 @@ fn determined(judged: &Judged<'_>, all: &mut Vec<Finding>) {
         };
         all.push(Finding::note("lag", words));
     }
+    if let Some(zeta) = find("zeta_nm").filter(|z| z.value > MOST_DAMPED) {
+        all.push(Finding::doubt(
+            "neuromuscular-lag",
+            format!(
+                "zeta_nm = {:.1}: the neuromuscular poles have become lags and say nothing of muscles; take a form with a lag, or \
+                 --neuromuscular no",
+                zeta.value
+            ),
+        ));
+    }
     let mut prior_alone: Vec<&str> = Vec::new();
     let mut open: Vec<&str> = Vec::new();
     for parameter in judged.parameters.iter().filter(|p| !p.determined) {
         let name = parameter.name.as_str();
-        if matches!(name, "omega_nm" | "zeta_nm") && parameter.prior_share > 0.5 {
+        if matches!(name, "omega_nm" | "zeta_nm") && parameter.value > 0.0 && at_bound(parameter) {
+            open.push(name);
+        } else if matches!(name, "omega_nm" | "zeta_nm") && parameter.prior_share > 0.5 {
             prior_alone.push(name);
         } else if !matches!(name, "K" | "T_I" | "tau_e" | "K_over_T_I" | "K_I" | "K_e") {
             open.push(name);
