@@ -12,7 +12,7 @@ use std::{
 
 use tempfile::TempDir;
 
-use common::{bad, good, json};
+use common::{bad, good, hoid, json};
 
 /// Two people, C1 and C3, two runs each.
 fn experiment() -> TempDir {
@@ -212,9 +212,12 @@ fn a_manifest_is_made_from_names_and_mistakes_are_named() {
     let joined = text.replace("subject = \"anna\"", "then = \"nothing.csv\"\nsubject = \"anna\"");
     fs::write(at.join("joined.toml"), joined).unwrap();
     // All runs failed: no result, and what there is to say is written.
-    let (code, message) = bad(at, &["group", "joined.toml", "--out", "joined", "--csv"]);
+    let output = hoid(at, &["group", "joined.toml", "--out", "joined", "--csv"]);
+    let message = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(
-        code == 1 && message.contains("none of the 1 runs could be read") && message.contains("nothing.csv"),
+        output.status.code() == Some(1)
+            && message.contains("none of the 1 runs could be read")
+            && message.contains("nothing.csv"),
         "{message}"
     );
     let estimates = fs::read_to_string(at.join("joined/estimates.csv")).unwrap();

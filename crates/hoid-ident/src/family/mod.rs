@@ -31,7 +31,8 @@
 //! | `layout` | places of coordinates and noise coefficients |
 //! | `noise` | autoregressions: starts and orders of the noise model |
 //! | `prediction` | the prediction error fit of one form |
-//! | `clusters` | covariance by runs or blocks |
+//! | `prediction_fit` | what its search found |
+//! | `clusters`, `covariances` | runs or blocks; the covariance by them |
 //! | `sensitivity` | what the estimate owes to the choice of a noise model |
 //! | `profile` | intervals by profile likelihood |
 //! | `choice` | which form |
@@ -44,6 +45,7 @@ mod arx_response;
 mod choice;
 mod clusters;
 mod coordinates;
+mod covariances;
 mod estimator;
 mod judgement;
 mod layout;
@@ -53,6 +55,7 @@ mod noise;
 mod open_loop;
 mod parameter;
 mod prediction;
+mod prediction_fit;
 mod prior;
 mod profile;
 mod response_fit;

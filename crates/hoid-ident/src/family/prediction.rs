@@ -15,7 +15,8 @@ use hoid_model::{
 };
 
 use super::{
-    clusters, clusters::Clusters, coordinates, layout::FamilyLayout, noise::NoiseProducts, prior::OperatorPrior,
+    clusters::Clusters, coordinates, covariances::inflation, layout::FamilyLayout, noise::NoiseProducts,
+    prediction_fit::PredictionFit, prior::OperatorPrior,
 };
 use crate::{
     IdentError, InitialState, SearchOptions,
@@ -24,7 +25,6 @@ use crate::{
         objective::{Penalty, PhysicalCriterion},
         parametrisation::Parametrisation,
     },
-    linalg::least_squares::solve_symmetric,
     optimize::{Linearisation, Minimum},
 };
 
@@ -49,22 +49,6 @@ pub(super) struct Prediction<'a> {
 
 /// Orders (nc, nd) of the noise model.
 pub(super) type NoiseOrders = (usize, usize);
-
-/// A fit of one form.
-#[derive(Debug, Clone)]
-pub(super) struct PredictionFit<'a> {
-    pub criterion: PhysicalCriterion<'a, FamilyLayout>,
-    pub minimum: Minimum,
-    /// Loss `sum eps^2/n`, without the prior.
-    pub loss: f64,
-    /// Unbiased innovation variance.
-    pub innovation_variance: f64,
-    pub residuals: usize,
-    pub states: usize,
-    pub clusters: Clusters,
-    /// kappa.
-    pub inflation: f64,
-}
 
 impl<'a> Prediction<'a> {
     /// The least first residual that serves all these forms and orders.
@@ -226,83 +210,8 @@ impl<'a> Prediction<'a> {
             minimum,
             clusters,
         };
-        fit.inflation = clusters::inflation(&fit).unwrap_or(1.0);
+        fit.inflation = inflation(&fit).unwrap_or(1.0);
         Ok(fit)
-    }
-}
-
-impl PredictionFit<'_> {
-    pub fn layout(&self) -> &FamilyLayout {
-        &self.criterion.layout
-    }
-
-    pub fn eta(&self) -> &[f64] {
-        &self.minimum.theta
-    }
-
-    /// What the search minimised: sum of squares with the prior.
-    pub fn objective(&self) -> f64 {
-        self.minimum.at.sum_of_squares
-    }
-
-    /// Residuals of one record.
-    pub fn residuals_of(&self, record: usize, workspace: &mut Workspace) -> Option<Vec<f64>> {
-        let mapped = self.criterion.model_of(self.eta(), record).ok()?;
-        Some(
-            self.of_record(&mapped.orders, record)
-                .residuals_of(&mapped.theta, 0, workspace),
-        )
-    }
-
-    fn of_record(&self, orders: &hoid_model::Orders, record: usize) -> Criterion<'_> {
-        Criterion {
-            orders: *orders,
-            data: vec![self.criterion.data[record]],
-            initial: self.criterion.initial,
-            first: self.criterion.first,
-            weights: None,
-        }
-    }
-
-    /// Number of free parameters.
-    pub fn parameters(&self) -> usize {
-        self.minimum.theta.len()
-    }
-
-    /// Sum of squares of the residuals of one record, at any eta; `None` where there is no model.
-    pub fn squares_of(&self, eta: &[f64], record: usize, workspace: &mut Workspace) -> Option<f64> {
-        let mapped = self.criterion.model_of(eta, record).ok()?;
-        let residuals = self
-            .of_record(&mapped.orders, record)
-            .residuals_of(&mapped.theta, 0, workspace);
-        let squares: f64 = residuals.iter().map(|e| e * e).sum();
-        squares.is_finite().then_some(squares)
-    }
-
-    /// `G + P` less what is taken away, solved for a right-hand side over the free elements.
-    pub fn solve(&self, less: Option<&[f64]>, rhs: &[f64]) -> Option<Vec<f64>> {
-        let p = self.parameters();
-        let free = self.free();
-        let gram = |i: usize, j: usize| self.minimum.at.gram[i * p + j] - less.map_or(0.0, |l| l[i * p + j]);
-        let part: Vec<f64> = free
-            .iter()
-            .flat_map(|&i| free.iter().map(move |&j| (i, j)))
-            .map(|(i, j)| gram(i, j))
-            .collect();
-        let right: Vec<f64> = free.iter().map(|&i| rhs[i]).collect();
-        let solution = solve_symmetric(&part, &right)?;
-        let mut whole = vec![0.0; p];
-        free.iter().zip(solution).for_each(|(&i, v)| whole[i] = v);
-        Some(whole)
-    }
-
-    /// Elements of eta off their bounds.
-    pub fn free(&self) -> Vec<usize> {
-        let limits = &self.criterion.limits;
-        let eta = self.eta();
-        (0..eta.len())
-            .filter(|&i| limits[i].0 < eta[i] && eta[i] < limits[i].1)
-            .collect()
     }
 }
 

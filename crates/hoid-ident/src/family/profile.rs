@@ -6,7 +6,7 @@
 //! Near the estimate it is the interval of the standard error; where the criterion is no parabola
 //! (a lag that is nearly an integration) it is the one that holds.
 
-use super::prediction::PredictionFit;
+use super::prediction_fit::PredictionFit;
 use crate::{SearchOptions, criterion::Workspace};
 
 /// Halvings of the bracket of an end.

@@ -12,7 +12,8 @@
 
 use super::{
     noise::{NoiseProducts, hannan_rissanen},
-    prediction::{NoiseOrders, Prediction, PredictionFit},
+    prediction::{NoiseOrders, Prediction},
+    prediction_fit::PredictionFit,
 };
 use crate::criterion::Workspace;
 

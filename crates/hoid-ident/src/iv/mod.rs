@@ -34,6 +34,7 @@
 //! | `methods` | the methods, a file each, and their list |
 //! | `instruments`, `external_signal` | what the instruments are made of |
 //! | `refined` | the iteration of the refined methods |
+//! | `last_iterate` | where an iteration ended |
 //! | `own_poles` | its nonlinear form, for where it does not settle |
 //! | `refined_system` | that iteration as a start of the prediction error method |
 //! | `simulation_error` | what a system leaves of the output |
@@ -49,6 +50,7 @@ pub(crate) mod equation;
 mod estimator;
 mod external_signal;
 mod instruments;
+mod last_iterate;
 mod methods;
 mod own_poles;
 mod refined;

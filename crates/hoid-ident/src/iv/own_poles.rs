@@ -37,7 +37,7 @@ use super::{
     algorithm::IterationLimits,
     columns::Columns,
     equation::IvProblem,
-    refined::{LastIterate, NoiseModel},
+    last_iterate::{LastIterate, NoiseModel},
 };
 use crate::{
     IdentError, Reason, SearchOptions, Termination,

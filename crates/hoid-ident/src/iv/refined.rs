@@ -18,8 +18,9 @@ use crate::{
 
 use super::{
     algorithm::IterationLimits,
-    equation::{Equation, IvProblem, Prefilter},
+    equation::{IvProblem, Prefilter},
     external_signal::following,
+    last_iterate::{LastIterate, NoiseModel},
     own_poles::solve_for_own_poles,
 };
 
@@ -32,41 +33,6 @@ const FULL_STEPS: usize = 20;
 const FAR: f64 = 1.15;
 /// Steps below this share of the output are rounding.
 const ROUNDING: f64 = 1e-12;
-
-/// Numerator and denominator of the noise model.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct NoiseModel {
-    pub c: Vec<f64>,
-    pub d: Vec<f64>,
-}
-
-impl NoiseModel {
-    /// The filter `D/(C F)` with these poles.
-    pub fn prefilter<'p>(&'p self, f: &'p [f64]) -> Prefilter<'p> {
-        Prefilter {
-            d: &self.d,
-            c: &self.c,
-            f,
-        }
-    }
-}
-
-impl LastIterate {
-    /// Mean square of the filtered residual.
-    fn variance(&self) -> f64 {
-        let residual = self.equation.residual(&self.system);
-        dot(&residual, &residual) / residual.len() as f64
-    }
-}
-
-/// Where the iteration ended.
-pub(super) struct LastIterate {
-    pub system: Vec<f64>,
-    pub noise: NoiseModel,
-    /// The last filtered equation.
-    pub equation: Equation,
-    pub termination: Termination,
-}
 
 /// Iterates, and where that does not settle goes on in the nonlinear form ([`super::own_poles`]);
 /// `noise_of` gives the noise model that belongs to a system.

@@ -8,7 +8,8 @@
 use super::{
     algorithm::IterationLimits,
     equation::{IvProblem, Source},
-    refined::{NoiseModel, plain_iteration},
+    last_iterate::NoiseModel,
+    refined::plain_iteration,
     simulation_error::simulation_error,
 };
 use crate::{criterion::Criterion, noise_model::noise_model};

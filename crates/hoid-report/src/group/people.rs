@@ -165,7 +165,7 @@ mod tests {
                 determined,
             })
         };
-        assert_eq!(of(2.0, Some(0.125), Some((1.7, 2.4)), true), "2.00 \u{b1} 0.13");
+        assert_eq!(of(2.0, Some(0.128), Some((1.7, 2.4)), true), "2.00 \u{b1} 0.13");
         assert_eq!(of(20.0, Some(90.0), Some((4.13, f64::INFINITY)), false), "> 4.1");
         assert_eq!(of(f64::INFINITY, None, None, false), numbers::DASH);
         assert_eq!(of(0.314, Some(0.2), Some((0.1, 0.8)), false), "(0.31)");

@@ -18,7 +18,8 @@ use crate::iv::{
     algorithm::{Algorithm, IterationLimits, IvSolution},
     covariance,
     equation::IvProblem,
-    refined::{self, LastIterate, NoiseModel},
+    last_iterate::{LastIterate, NoiseModel},
+    refined,
     simulation_error::simulation_error,
 };
 use crate::{

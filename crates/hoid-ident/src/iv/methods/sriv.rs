@@ -13,7 +13,8 @@ use crate::iv::{
     columns::cut,
     covariance::covariance,
     equation::IvProblem,
-    refined::{self, NoiseModel},
+    last_iterate::NoiseModel,
+    refined,
 };
 use crate::{IdentError, Reason, criterion::Criterion};
 
