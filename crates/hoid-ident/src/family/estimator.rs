@@ -181,11 +181,11 @@ impl FamilyEstimator {
                 fit,
             });
         }
-        let inflation = common_inflation(&tried);
+        let scale = CommonScale::of(&tried);
         let mut candidates: Vec<(usize, Candidate)> = tried
             .iter()
             .enumerate()
-            .filter_map(|(i, t)| Some((i, candidate(t, lines.as_ref(), inflation, &mut workspace)?)))
+            .filter_map(|(i, t)| Some((i, candidate(t, lines.as_ref(), &scale, &mut workspace)?)))
             .collect();
         let figures: Vec<FormFigures> = tried.iter().map(|t| figures(t, &candidates)).collect();
         // A form that lacks a lag, where there is one, takes the neuromuscular poles for it.
@@ -751,14 +751,23 @@ fn has_lost_its_muscles(tried: &Tried<'_>) -> bool {
     of_fit.is_some_and(|operator| lags(&operator)) || tried.lines.as_ref().is_some_and(|l| lags(&l.operator))
 }
 
-/// One kappa for all forms, so that their criteria can be compared: the median.
-fn common_inflation(tried: &[Tried<'_>]) -> f64 {
-    let mut all: Vec<f64> = tried
-        .iter()
-        .filter_map(|t| Some(t.fit.as_ref().ok()?.inflation))
-        .collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied().unwrap_or(1.0)
+/// One kappa and one innovation variance for all forms, so that their figures can be compared: the
+/// median of the one, the least of the other.
+struct CommonScale {
+    inflation: f64,
+    innovation_variance: f64,
+}
+
+impl CommonScale {
+    fn of(tried: &[Tried<'_>]) -> Self {
+        let fits = || tried.iter().filter_map(|t| t.fit.as_ref().ok());
+        let mut all: Vec<f64> = fits().map(|fit| fit.inflation).collect();
+        all.sort_by(f64::total_cmp);
+        Self {
+            inflation: all.get(all.len() / 2).copied().unwrap_or(1.0),
+            innovation_variance: fits().map(|fit| fit.innovation_variance).fold(f64::INFINITY, f64::min),
+        }
+    }
 }
 
 /// What a parameter costs: Schwarz's `ln n`, and Akaike's 2 where there are too few runs to hold
@@ -770,7 +779,7 @@ fn cost(n: f64, runs: usize) -> f64 {
 fn candidate(
     tried: &Tried<'_>,
     lines: Option<&LineData<'_>>,
-    inflation: f64,
+    scale: &CommonScale,
     workspace: &mut Workspace,
 ) -> Option<Candidate> {
     let fit = tried.fit.as_ref().ok()?;
@@ -785,9 +794,9 @@ fn candidate(
         }
         _ => {
             let n = fit.residuals as f64;
-            let held_out = held_out(fit, workspace);
+            let held_out = held_out(fit, scale, workspace);
             let runs = held_out.as_ref().map_or(1, Vec::len);
-            (held_out, n * fit.loss.ln() / inflation + elements * cost(n, runs))
+            (held_out, n * fit.loss.ln() / scale.inflation + elements * cost(n, runs))
         }
     };
     Some(Candidate {
@@ -799,12 +808,12 @@ fn candidate(
 
 /// Squared prediction errors of each run under the fit without it, in units of the innovation
 /// variance; for clusters that are runs.
-fn held_out(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> Option<Vec<f64>> {
+fn held_out(fit: &PredictionFit<'_>, scale: &CommonScale, workspace: &mut Workspace) -> Option<Vec<f64>> {
     if fit.clusters.kind != ClusterKind::Runs {
         return None;
     }
     let others = covariances::without_each(fit)?;
-    let of = |(run, eta): (usize, &Vec<f64>)| Some(fit.squares_of(eta, run, workspace)? / fit.innovation_variance);
+    let of = |(run, eta): (usize, &Vec<f64>)| Some(fit.squares_of(eta, run, workspace)? / scale.innovation_variance);
     others.iter().enumerate().map(of).collect()
 }
 
