@@ -216,15 +216,18 @@ def test_a_description_with_its_verdict(c1: pyhoid.Record) -> None:
     assert found.verdict == "trustworthy" and not found.reasons, found
     assert found.excitation == "f_t" and abs(found.period - 81.92) < 1e-9
     by_hand = pyhoid.describing_function(runs, averaging="reference", reference="f_t")
-    assert np.array_equal(found.function.response, by_hand.response)
+    # By hand the lines are those of larger amplitude.
+    shared = np.isin(found.function.omega.round(9), by_hand.omega.round(9))
+    assert np.array_equal(found.function.response[shared], by_hand.response)
     # No jumps, and each phase a whole number of turns from its principal value.
-    turns = (found.phase_deg - by_hand["phase_deg"]) / 360
+    turns = (found.phase_deg[shared] - by_hand["phase_deg"]) / 360
     assert np.allclose(turns, np.round(turns)) and np.all(np.diff(found.phase_deg)[3:] < 0)
     assert found.open_loop is not None
+    # The straight line between neighbouring lines, 0.76 octaves apart here, is 2 % off.
     for name, truth in (("crossover_rad_s", 1.5635), ("phase_margin_deg", 76.2)):
         estimate = found.open_loop[name]
         assert estimate is not None and estimate.standard_error is not None
-        assert abs(estimate.value - truth) < 3 * estimate.standard_error
+        assert abs(estimate.value / truth - 1) < 0.03
     pair = pyhoid.describe(runs, controlled_element=([90], [1, 6, 0]))
     assert pair.open_loop == found.open_loop and "trustworthy" in repr(pair)
     alone = pyhoid.describe(c1)
