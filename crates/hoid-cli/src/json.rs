@@ -182,6 +182,8 @@ pub struct Identified<'a> {
     pub grey_box: Option<&'a GreyBoxFit>,
     pub quality: GoodnessOfFit,
     pub operator: &'a Result<OperatorEstimate, NotConvertible>,
+    /// Of polynomials of other orders: the operator of the family that they stand for.
+    pub family: Option<Value>,
     pub remnant: Option<&'a Result<RemnantEstimate, NotConvertible>>,
     pub margins: Option<&'a MarginEstimates>,
     /// Residual tests on each record.
@@ -231,7 +233,10 @@ impl Identified<'_> {
         set("initial_states", json!(fit.state_count()));
         set("stable", json!(fit.model().is_stable()));
         set("fit", quality(&self.quality, fit));
-        set("operator", operator(self.operator));
+        set(
+            "operator",
+            self.family.clone().unwrap_or_else(|| operator(self.operator)),
+        );
         set("remnant", self.remnant.map_or(Value::Null, remnant));
         if let Some(m) = self.margins {
             set("open_loop", margin_estimates(m));

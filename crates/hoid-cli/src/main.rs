@@ -8,6 +8,7 @@
 mod args;
 mod commands;
 mod error;
+mod family_operator;
 mod json;
 mod orders;
 mod output;

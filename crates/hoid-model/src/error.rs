@@ -143,6 +143,12 @@ pub enum NotConvertible {
         /// Name of the form.
         form: String,
     },
+    /// Polynomials of no operator of the family.
+    #[error("the polynomials are those of no operator of the family: {reason}")]
+    NotOfTheFamily {
+        /// What is wrong.
+        reason: String,
+    },
     /// A pole on the closed negative real axis has no real logarithm.
     #[error("the pole z = {pole:.6} lies on the closed negative real axis, so that no real continuous system has it")]
     NegativeRealPole {

@@ -20,20 +20,21 @@ pub struct InfoArgs {
 #[derive(Debug, Args)]
 #[command(group(clap::ArgGroup::new("what").required(true).args(["f", "operator", "transfer_function"])))]
 pub struct ConvertArgs {
-    /// F of the discrete operator: f1,f2
+    /// F of the discrete operator: f1,f2 for a gain with a lead; one or three coefficients for
+    /// another form of the family
     #[arg(
         long,
-        value_name = "F1,F2",
+        value_name = "F1,F2,...",
         value_delimiter = ',',
         num_args = 1,
         allow_hyphen_values = true,
         requires = "b"
     )]
     pub f: Option<Vec<f64>>,
-    /// B of the discrete operator: b0,b1
+    /// B of the discrete operator: b0,b1, or as many as there are
     #[arg(
         long,
-        value_name = "B0,B1",
+        value_name = "B0,B1,...",
         value_delimiter = ',',
         num_args = 1,
         allow_hyphen_values = true,

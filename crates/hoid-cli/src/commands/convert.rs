@@ -1,24 +1,35 @@
 //! `hoid convert`: discrete coefficients to operator parameters, back, and any transfer function to
 //! discrete time.
 
+use hoid_ident::family::family_of_polynomials;
 use hoid_model::{
-    ContinuousTransferFunction, DiscreteOperator, OperatorParameters, SampleTime, discretise::discretise,
-    second_order::HeldSecondOrder, uncertainty::OperatorEstimate,
+    ContinuousTransferFunction, DiscreteOperator, OperatorParameters, Orders, PolynomialModel, SampleTime, Structure,
+    discretise::discretise, second_order::HeldSecondOrder, uncertainty::OperatorEstimate,
 };
 use hoid_report::numbers;
 use serde_json::{Map, Value, json};
 
-use crate::{args::ConvertArgs, error::CliError, json, output, text};
+use crate::{args::ConvertArgs, error::CliError, family_operator, json, output, text};
 
 pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
     let sample_time = SampleTime::new(args.sample_time)?;
     if let Some(h) = &args.transfer_function {
         return discretised(args, h, sample_time);
     }
+    if let (Some(f), Some(b)) = (&args.f, &args.b)
+        && (f.len(), b.len()) != (2, 2)
+    {
+        return to_family(args, f, b, sample_time);
+    }
     let (discrete, operator) = match (&args.f, &args.b, &args.operator) {
         (Some(f), Some(b), _) => {
             let discrete = DiscreteOperator {
-                held: held(f, b)?,
+                held: HeldSecondOrder {
+                    b0: b[0],
+                    b1: b[1],
+                    f1: f[0],
+                    f2: f[1],
+                },
                 nk: args.nk,
                 sample_time,
             };
@@ -82,15 +93,26 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-fn held(f: &[f64], b: &[f64]) -> Result<HeldSecondOrder, CliError> {
-    match (f, b) {
-        (&[f1, f2], &[b0, b1]) => Ok(HeldSecondOrder { b0, b1, f1, f2 }),
-        _ => Err(CliError::Usage(format!(
-            "the operator model has two coefficients in F and in B, found {} and {}; write --f F1,F2 --b B0,B1",
-            f.len(),
-            b.len()
-        ))),
+/// Polynomials of other orders than those of a gain with a lead: the operator of the family.
+fn to_family(args: &ConvertArgs, f: &[f64], b: &[f64], sample_time: SampleTime) -> Result<(), CliError> {
+    let orders = Orders {
+        nb: b.len(),
+        nf: f.len(),
+        nk: args.nk,
+        ..Orders::default()
+    };
+    let model = PolynomialModel::new(Structure::OutputError, orders, sample_time, [b, f].concat())?;
+    let found = family_of_polynomials(&model, None, None);
+    if args.json {
+        json::print(&json!({
+            "sample_time": json::number(sample_time.s()),
+            "discrete": {"f": f, "b": b, "nk": args.nk},
+            "operator": family_operator::to_json(&found),
+        }));
+    } else {
+        output::print(&family_operator::to_text(&found));
     }
+    Ok(())
 }
 
 fn discretised(args: &ConvertArgs, h: &ContinuousTransferFunction, sample_time: SampleTime) -> Result<(), CliError> {

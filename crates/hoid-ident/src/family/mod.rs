@@ -38,6 +38,7 @@
 //! | `choice` | which form |
 //! | `agreement` | do two methods agree |
 //! | `open_loop` | crossover and phase margin |
+//! | `of_polynomials` | polynomials back to an operator |
 //! | `judgement` | what makes a result doubtful |
 
 mod agreement;
@@ -52,6 +53,7 @@ mod layout;
 mod line_fit;
 mod lines;
 mod noise;
+mod of_polynomials;
 mod open_loop;
 mod parameter;
 mod prediction;
@@ -67,6 +69,7 @@ pub use choice::FormFigures;
 pub use clusters::ClusterKind;
 pub use estimator::{FamilyEstimator, HIGHEST_NOISE_ORDER};
 pub use line_fit::LineFit;
+pub use of_polynomials::{FamilyConversion, PoleRole, RealPole, family_of_polynomials};
 pub use open_loop::{LoopMeasures, loop_measures};
 pub use parameter::Parameter;
 pub use prior::{OperatorPrior, ParameterPrior};

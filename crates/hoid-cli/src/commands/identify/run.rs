@@ -4,7 +4,7 @@ use hoid_ident::{
     Fit, MarginEstimates,
     validation::{GoodnessOfFit, nrmse_fit, vaf},
 };
-use hoid_model::{ContinuousTransferFunction, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
+use hoid_model::{ContinuousTransferFunction, NotConvertible, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
 use hoid_report::{ModelSection, Report, known_operator, write_report};
 
 use super::{
@@ -17,6 +17,7 @@ use crate::{
     args::{IdentifyArgs, ModelKind},
     commands::reading::{self, ReadAll},
     error::CliError,
+    family_operator::{self, Converted},
     json::{self, Identified},
     output, text,
 };
@@ -55,6 +56,11 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let mut settings = chosen;
     settings.extend(common_settings(args, with_input));
     let operator = fit.operator();
+    // Three poles or one are no gain with a lead, but may be another form.
+    let family = match &operator {
+        Err(NotConvertible::OtherOrders { poles: 1..=3, .. }) if with_input => Some(fit.family_operator(None)),
+        _ => None,
+    };
     let remnant = (fit.orders().nd > 0).then(|| fit.remnant(args.remnant_discretisation));
     let margins = args
         .controlled_element
@@ -76,6 +82,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         choice: choice.as_ref(),
         grey_box: grey_box.as_ref(),
         operator: &operator,
+        family: family.as_ref().map(family_operator::to_json),
         remnant: remnant.as_ref(),
         margins: margins.as_ref(),
         validations: &validations,
@@ -113,7 +120,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     if args.json {
         json::print(&identified.to_json());
     } else {
-        output::print(&page(&identified));
+        output::print(&page(&identified, family.as_ref()));
     }
     CliError::of_verdict(&verdict)
 }
@@ -136,7 +143,7 @@ fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> MarginEstima
     fit.margins(|omega| element.response(omega), (low, high))
 }
 
-fn page(found: &Identified<'_>) -> String {
+fn page(found: &Identified<'_>, family: Option<&Converted>) -> String {
     let fit = found.fit;
     let mut page = text::verdict(found.verdict);
     page.push_str(&text::records(found.files, found.records, found.accounts));
@@ -152,7 +159,10 @@ fn page(found: &Identified<'_>) -> String {
     page.push_str(&text::quality(fit, &found.quality));
     if fit.model().structure().has_input() {
         page.push('\n');
-        page.push_str(&text::operator(found.operator));
+        page.push_str(&match family {
+            Some(family) => family_operator::to_text(family),
+            None => text::operator(found.operator),
+        });
     }
     if let Some(grey_box) = found.grey_box {
         page.push_str(&text::other_records(grey_box, found.files));

@@ -84,6 +84,7 @@ impl Tracked<'_> {
             grey_box: None,
             quality: validation.quality,
             operator: &operator,
+            family: None,
             remnant: remnant.as_ref(),
             margins: None,
             validations: std::slice::from_ref(&validation),

@@ -1,0 +1,75 @@
+//! An operator of the family that polynomials stand for, shown to people and to programs.
+
+use hoid_ident::family::{FamilyConversion, PoleRole};
+use hoid_model::NotConvertible;
+use serde_json::{Map, Value, json};
+
+use crate::{json, text};
+
+/// A conversion, or why there is none.
+pub type Converted = Result<FamilyConversion, NotConvertible>;
+
+/// As the operator of a fit: form, parameters by name, what the real poles are, how well it is met.
+pub fn to_json(found: &Converted) -> Value {
+    match found {
+        Ok(found) => {
+            let mut map = Map::new();
+            map.insert("convertible".to_owned(), json!(true));
+            map.insert("form".to_owned(), json!(found.operator.form().name()));
+            for (name, unit, e) in found.parameters() {
+                let mut value = json::estimate(&e);
+                if let Some(fields) = value.as_object_mut() {
+                    fields.insert("unit".to_owned(), json!(unit));
+                }
+                map.insert(name.to_owned(), value);
+            }
+            let poles = found.real_poles.iter();
+            map.insert(
+                "real_poles".to_owned(),
+                poles
+                    .map(|p| json!({"rate_rad_s": json::number(p.rate), "role": role(p.role)}))
+                    .collect(),
+            );
+            map.insert("mismatch".to_owned(), json::number(found.mismatch));
+            Value::Object(map)
+        }
+        Err(reason) => json!({"convertible": false, "reason": reason.to_string()}),
+    }
+}
+
+/// The same as a table and sentences.
+pub fn to_text(found: &Converted) -> String {
+    let found = match found {
+        Ok(found) => found,
+        Err(reason) => return format!("Operator parameters: not convertible: {reason}.\n"),
+    };
+    let mut rows = text::table(&["operator", "value", "standard error", "unit"]);
+    for (name, unit, e) in found.parameters() {
+        let (value, error) = text::with_uncertainty(&e);
+        rows.add_row([name.to_owned(), value, error, unit.to_owned()]);
+    }
+    let mut page = format!("Form {}.\n{rows}\n", found.operator.form());
+    for pole in &found.real_poles {
+        let words = match pole.role {
+            PoleRole::Lag => format!("is the lag, T_I = {:.4} s", pole.rate.recip()),
+            PoleRole::Neuromuscular => "belongs to the neuromuscular system, which is overdamped".to_owned(),
+        };
+        page.push_str(&format!("The real pole s = -{:.4} 1/s {words}.\n", pole.rate));
+    }
+    page.push_str(&if found.mismatch < 1e-6 {
+        "The polynomials are the exact model of this operator.\n".to_owned()
+    } else {
+        format!(
+            "The exact model of this operator is off the polynomials by at most {:.1} % of the response.\n",
+            100.0 * found.mismatch
+        )
+    });
+    page
+}
+
+fn role(role: PoleRole) -> &'static str {
+    match role {
+        PoleRole::Lag => "lag",
+        PoleRole::Neuromuscular => "neuromuscular",
+    }
+}

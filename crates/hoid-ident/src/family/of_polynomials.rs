@@ -1,0 +1,638 @@
+//! The operator of the family that polynomials stand for: `q^-nk B/F` (or `B/A`) back to K, T_L,
+//! T_I, omega_nm, zeta_nm and tau_e.
+//!
+//! The poles are `s_i = ln z_i / Ts`: a pair of complex poles is the neuromuscular system, the real
+//! one that is left is the lag. Of three real poles each may be the lag; all three readings are
+//! tried, and what was read is told ([`RealPole`]).
+//!
+//! The exact model of an operator ([`FamilyOperator::hold`]) has fewer parameters than B has
+//! coefficients, so that estimated polynomials lie beside it. The operator is the one whose exact
+//! model M(x) is nearest to the response H of the polynomials over the band of manual control,
+//!
+//! `min_x sum_j |H(omega_j) - M(omega_j, x)|^2 / |H(omega_j)|^2`,
+//!
+//! which gives an operator back from its own exact model. Its covariance follows from that of
+//! theta to first order, `dx = (J'J)^-1 J' dH`, J the derivatives of M over |H| (the implicit
+//! function theorem without the second derivative, which vanishes where M meets H). What the fit
+//! leaves, [`FamilyConversion::mismatch`], says how far the polynomials are from the form; where it
+//! is large they have none.
+
+use hoid_model::{
+    Complex64, FamilyOperator, Form, NotConvertible, PolynomialModel, SampleTime,
+    operator_family::{Coordinate, HeldFamily},
+    polynomial,
+    polynomial_model::monic,
+    uncertainty::Estimate,
+    uncertainty::variance_along,
+};
+
+use super::coordinates;
+use crate::{
+    Fit, SearchOptions,
+    linalg::least_squares::solve_symmetric,
+    optimize::{Linearisation, Minimum, Objective, minimise},
+};
+
+/// The forms that are tried, the simplest first.
+const FORMS: [Form; 6] = [
+    Form::Gain,
+    Form::Lag,
+    Form::Lead,
+    Form::LeadLag,
+    Form::Lead2,
+    Form::Lead2Lag,
+];
+/// Where responses are compared, rad/s, evenly over the logarithm.
+const BAND_RAD_S: (f64, f64) = (0.2, 30.0);
+const POINTS: usize = 30;
+/// Largest part of the response by which an operator may miss its polynomials.
+const LARGEST_MISMATCH: f64 = 0.1;
+/// A form that is met as well as this is met exactly.
+const EXACT: f64 = 1e-6;
+/// Delays from which searches start, in samples beyond those of nk.
+const LATER: [f64; 6] = [0.02, 0.5, 0.98, 2.5, 5.0, 10.0];
+/// Lead times from which searches start, s.
+const LEADS_S: [f64; 3] = [0.1, 0.5, 2.0];
+
+/// What a real pole was read as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PoleRole {
+    /// The lag: `T_I = 1/rate`.
+    Lag,
+    /// One of the two poles of an overdamped neuromuscular system.
+    Neuromuscular,
+}
+
+/// A real pole `s = -rate`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RealPole {
+    /// Its rate, 1/s.
+    pub rate: f64,
+    /// What it is.
+    pub role: PoleRole,
+}
+
+/// An operator of the family that stands for polynomials.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FamilyConversion {
+    /// The operator.
+    pub operator: FamilyOperator,
+    /// Covariance of its coordinates by rows, where that of the coefficients is known.
+    pub covariance: Option<Vec<f64>>,
+    /// The real poles, the slowest first.
+    pub real_poles: Vec<RealPole>,
+    /// Largest `|H - M|/|H|` over .2 to 30 rad/s.
+    pub mismatch: f64,
+}
+
+impl FamilyConversion {
+    /// The parameters with their names, units and errors to first order.
+    pub fn parameters(&self) -> Vec<(&'static str, &'static str, Estimate)> {
+        let of = |(parameter, gradient): (hoid_model::operator_family::NamedParameter, Vec<f64>)| {
+            let estimate = match &self.covariance {
+                Some(c) if parameter.value.is_finite() => {
+                    Estimate::with_variance(parameter.value, variance_along(&gradient, c))
+                }
+                _ => Estimate::fixed(parameter.value),
+            };
+            (parameter.name, parameter.unit, estimate)
+        };
+        self.operator.named_gradients().into_iter().map(of).collect()
+    }
+}
+
+impl Fit {
+    /// The operator of the family that the polynomials of this fit stand for, of this form or, for
+    /// `None`, of the form that is nearest.
+    ///
+    /// # Errors
+    /// As [`family_of_polynomials`].
+    pub fn family_operator(&self, form: Option<Form>) -> Result<FamilyConversion, NotConvertible> {
+        family_of_polynomials(self.model(), self.covariance(), form)
+    }
+}
+
+/// The operator of the family that polynomials stand for, of this form or, for `None`, of the
+/// simplest form that is met exactly, else of the one that is nearest. `covariance` is that of
+/// theta, by rows.
+///
+/// # Errors
+/// [`NotConvertible`]: poles in A and in F; more than three or none of them; an unstable pole; a
+/// pole on the negative real axis of z; nk = 0; no form whose response is within a tenth.
+pub fn family_of_polynomials(
+    model: &PolynomialModel,
+    covariance: Option<&[f64]>,
+    form: Option<Form>,
+) -> Result<FamilyConversion, NotConvertible> {
+    let orders = model.orders();
+    if let Some((i, value)) = model.theta().iter().enumerate().find(|(_, v)| !v.is_finite()) {
+        let name = orders.parameter_names().get(i).cloned().unwrap_or_default();
+        return Err(NotConvertible::NotFinite { name, value: *value });
+    }
+    if orders.na > 0 && orders.nf > 0 {
+        return Err(NotConvertible::PolesInBoth {
+            na: orders.na,
+            nf: orders.nf,
+        });
+    }
+    if orders.nk == 0 {
+        return Err(NotConvertible::NoDelay);
+    }
+    let sample_time = model.sample_time();
+    let readings = readings(if orders.na > 0 { model.a() } else { model.f() }, sample_time)?;
+    let points = points(model);
+    let forms: Vec<Form> = match form {
+        Some(form) => vec![form],
+        None => FORMS.to_vec(),
+    };
+    let mut best: Option<(f64, Minimum, Form, &Reading)> = None;
+    for form in forms {
+        for reading in &readings {
+            let Some((mismatch, found)) = nearest(form, reading, &points, orders.nk, sample_time) else {
+                continue;
+            };
+            // A simpler form that is met exactly is not given up for rounding.
+            if best.as_ref().is_none_or(|known| known.0 > EXACT && mismatch < known.0) {
+                best = Some((mismatch, found, form, reading));
+            }
+        }
+    }
+    let poles = orders.na + orders.nf;
+    let Some((mismatch, found, form, reading)) = best else {
+        return Err(NotConvertible::NotOfTheFamily {
+            reason: match form {
+                Some(form) => format!("the form {form} has another number of poles than the {poles} found"),
+                None => "no operator with these poles was found".to_owned(),
+            },
+        });
+    };
+    if mismatch > LARGEST_MISMATCH {
+        return Err(NotConvertible::NotOfTheFamily {
+            reason: format!(
+                "the nearest operator, of the form {form}, is off by {:.0} % of the response between {} and {} rad/s",
+                100.0 * mismatch,
+                BAND_RAD_S.0,
+                points.last().map_or(BAND_RAD_S.1, |p| p.omega_rad_s).round()
+            ),
+        });
+    }
+    let criterion = Nearest::new(form, reading, &points, orders.nk, sample_time);
+    let operator = FamilyOperator::new(form, reading.neuromuscular.is_some(), &found.theta).map_err(|error| {
+        NotConvertible::NotOfTheFamily {
+            reason: error.to_string(),
+        }
+    })?;
+    Ok(FamilyConversion {
+        covariance: covariance.and_then(|c| criterion.covariance(&found, c)),
+        operator,
+        real_poles: reading.real_poles(),
+        mismatch,
+    })
+}
+
+/// Which pole is which.
+#[derive(Debug, Clone, PartialEq)]
+struct Reading {
+    /// Rate of the lag, 1/s.
+    lag: Option<f64>,
+    /// omega and zeta.
+    neuromuscular: Option<(f64, f64)>,
+    /// Rates of the neuromuscular poles where they are real.
+    real: Vec<f64>,
+}
+
+impl Reading {
+    fn real_poles(&self) -> Vec<RealPole> {
+        let lag = self.lag.iter().map(|&rate| RealPole {
+            rate,
+            role: PoleRole::Lag,
+        });
+        let others = self.real.iter().map(|&rate| RealPole {
+            rate,
+            role: PoleRole::Neuromuscular,
+        });
+        let mut all: Vec<RealPole> = lag.chain(others).collect();
+        all.sort_by(|a, b| a.rate.total_cmp(&b.rate));
+        all
+    }
+}
+
+/// All ways in which the poles of F can be read.
+fn readings(f: &[f64], sample_time: SampleTime) -> Result<Vec<Reading>, NotConvertible> {
+    let other = |reason: String| NotConvertible::NotOfTheFamily { reason };
+    let roots = polynomial::roots(&monic(f)).unwrap_or_default();
+    if roots.len() != f.len() || !(1..=3).contains(&roots.len()) {
+        return Err(other(format!(
+            "operators of the family have one to three poles, found {}",
+            f.len()
+        )));
+    }
+    let (mut rates, mut pair) = (Vec::new(), None);
+    for z in roots {
+        if z.norm() >= 1.0 {
+            return Err(other(format!(
+                "the pole at |z| = {:.6} is no lag and no neuromuscular pole: it is not stable",
+                z.norm()
+            )));
+        }
+        if z.im == 0.0 && z.re <= 0.0 {
+            return Err(NotConvertible::NegativeRealPole { pole: z.re });
+        }
+        let s = z.ln() / sample_time.s();
+        if z.im == 0.0 {
+            rates.push(-s.re);
+        } else {
+            pair = Some((s.norm(), -s.re / s.norm()));
+        }
+    }
+    let overdamped = |a: f64, b: f64| Some(((a * b).sqrt(), 0.5 * (a + b) / (a * b).sqrt()));
+    Ok(match (pair, rates.as_slice()) {
+        (neuromuscular, &[]) => vec![Reading {
+            lag: None,
+            neuromuscular,
+            real: Vec::new(),
+        }],
+        (neuromuscular, &[rate]) => vec![Reading {
+            lag: Some(rate),
+            neuromuscular,
+            real: Vec::new(),
+        }],
+        (_, &[a, b]) => vec![Reading {
+            lag: None,
+            neuromuscular: overdamped(a, b),
+            real: vec![a, b],
+        }],
+        (_, three) => (0..three.len())
+            .map(|i| {
+                let rest: Vec<f64> = (0..three.len()).filter(|j| *j != i).map(|j| three[j]).collect();
+                Reading {
+                    lag: Some(three[i]),
+                    neuromuscular: overdamped(rest[0], rest[1]),
+                    real: rest,
+                }
+            })
+            .collect(),
+    })
+}
+
+/// The response of the polynomials at one frequency.
+struct Point {
+    omega_rad_s: f64,
+    response: Complex64,
+    /// Its derivatives along theta.
+    gradient: Vec<Complex64>,
+}
+
+fn points(model: &PolynomialModel) -> Vec<Point> {
+    let highest = BAND_RAD_S.1.min(0.8 * model.sample_time().nyquist_rad_s());
+    (0..POINTS)
+        .map(|i| {
+            let omega_rad_s = BAND_RAD_S.0 * (highest / BAND_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0));
+            let (response, gradient) = model.response_and_gradient(omega_rad_s);
+            Point {
+                omega_rad_s,
+                response,
+                gradient,
+            }
+        })
+        .collect()
+}
+
+/// The operator of a form with these poles that is nearest, and its mismatch.
+fn nearest(
+    form: Form,
+    reading: &Reading,
+    points: &[Point],
+    nk: usize,
+    sample_time: SampleTime,
+) -> Option<(f64, Minimum)> {
+    let neuromuscular = reading.neuromuscular.is_some();
+    // A form has a pole exactly where the polynomials have one, and no pure derivative.
+    if form.has_pole() != reading.lag.is_some() || !form.is_proper(neuromuscular) {
+        return None;
+    }
+    let criterion = Nearest::new(form, reading, points, nk, sample_time);
+    let found = criterion
+        .starts()
+        .into_iter()
+        .filter_map(|start| minimise(&criterion, start, &SearchOptions::default(), None, &mut ()))
+        .min_by(|a, b| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares))?;
+    Some((criterion.mismatch(&found.theta)?, found))
+}
+
+/// The criterion over the coordinates of a form.
+struct Nearest<'a> {
+    form: Form,
+    reading: &'a Reading,
+    points: &'a [Point],
+    nk: usize,
+    sample_time: SampleTime,
+    limits: Vec<(f64, f64)>,
+}
+
+impl<'a> Nearest<'a> {
+    fn new(form: Form, reading: &'a Reading, points: &'a [Point], nk: usize, sample_time: SampleTime) -> Self {
+        let neuromuscular = reading.neuromuscular.is_some();
+        let ts = sample_time.s();
+        let reach = (nk as f64 + 2.0 * LATER[LATER.len() - 1]) * ts;
+        let mut limits = coordinates::limits(form, neuromuscular, (0.0, reach), sample_time);
+        // The poles are known: they move by what B has to say of them and no further.
+        for (limit, coordinate) in limits.iter_mut().zip(form.coordinates(neuromuscular)) {
+            match coordinate {
+                Coordinate::LagRate | Coordinate::LogOmega | Coordinate::LogZeta => {
+                    let x = of_reading(reading, coordinate);
+                    let reach = if coordinate == Coordinate::LagRate {
+                        x.abs()
+                    } else {
+                        1.0
+                    };
+                    *limit = (x - 0.99 * reach, x + 2.0 * reach);
+                }
+                _ => {}
+            }
+        }
+        Self {
+            form,
+            reading,
+            points,
+            nk,
+            sample_time,
+            limits,
+        }
+    }
+
+    fn starts(&self) -> Vec<Vec<f64>> {
+        let coordinates = self.form.coordinates(self.reading.neuromuscular.is_some());
+        let has_lead = coordinates.contains(&Coordinate::Lead);
+        let leads: &[f64] = if has_lead { &LEADS_S } else { &LEADS_S[..1] };
+        let before = (self.nk as f64 - 1.0) * self.sample_time.s();
+        let each = leads
+            .iter()
+            .flat_map(|&lead| LATER.iter().map(move |&later| (lead, later)));
+        each.filter_map(|(lead, later)| {
+            let mut start: Vec<f64> = coordinates
+                .iter()
+                .map(|c| match c {
+                    Coordinate::Gain => 1.0,
+                    Coordinate::Lead => lead,
+                    Coordinate::Delay => before + later * self.sample_time.s(),
+                    other => of_reading(self.reading, *other),
+                })
+                .collect();
+            // The gain enters linearly: the best one.
+            let (mut cross, mut power) = (0.0, 0.0);
+            for (point, m) in self.points.iter().zip(self.responses(&start)?) {
+                let weight = point.response.norm_sqr().recip();
+                cross += weight * (m.0.conj() * point.response).re;
+                power += weight * m.0.norm_sqr();
+            }
+            start[0] = cross / power;
+            (start[0].is_finite() && start[0] != 0.0).then_some(start)
+        })
+        .collect()
+    }
+
+    /// Responses of the exact model with their derivatives along the coordinates.
+    fn responses(&self, x: &[f64]) -> Option<Vec<(Complex64, Vec<Complex64>)>> {
+        let operator = FamilyOperator::new(self.form, self.reading.neuromuscular.is_some(), x).ok()?;
+        let held = operator.hold(self.sample_time).ok()?;
+        let of = |point: &Point| response(&held, point.omega_rad_s * self.sample_time.s(), x.len());
+        Some(self.points.iter().map(of).collect())
+    }
+
+    fn mismatch(&self, x: &[f64]) -> Option<f64> {
+        let all = self.responses(x)?;
+        let off = |(p, m): (&Point, (Complex64, Vec<Complex64>))| (p.response - m.0).norm() / p.response.norm();
+        Some(self.points.iter().zip(all).map(off).fold(0.0, f64::max))
+    }
+
+    /// `(J'J)^-1 J' dH/dtheta C (...)'`, zero for coordinates at a bound.
+    fn covariance(&self, found: &Minimum, of_theta: &[f64]) -> Option<Vec<f64>> {
+        let p = found.theta.len();
+        let n = self.points.first()?.gradient.len();
+        let free: Vec<usize> = (0..p)
+            .filter(|&i| self.limits[i].0 < found.theta[i] && found.theta[i] < self.limits[i].1)
+            .collect();
+        let gram: Vec<f64> = free
+            .iter()
+            .flat_map(|&i| free.iter().map(move |&j| i * p + j))
+            .map(|at| found.at.gram[at])
+            .collect();
+        let responses = self.responses(&found.theta)?;
+        // dx/dtheta, a column for each coefficient.
+        let mut slopes = vec![0.0; p * n];
+        for k in 0..n {
+            let right: Vec<f64> = free
+                .iter()
+                .map(|&i| {
+                    let each = self.points.iter().zip(&responses);
+                    each.map(|(q, m)| (m.1[i].conj() * q.gradient[k]).re / q.response.norm_sqr())
+                        .sum()
+                })
+                .collect();
+            for (&i, value) in free.iter().zip(solve_symmetric(&gram, &right)?) {
+                slopes[i * n + k] = value;
+            }
+        }
+        let mut covariance = vec![0.0; p * p];
+        for i in 0..p {
+            for j in 0..p {
+                covariance[i * p + j] = (0..n)
+                    .flat_map(|k| (0..n).map(move |l| (k, l)))
+                    .map(|(k, l)| slopes[i * n + k] * of_theta[k * n + l] * slopes[j * n + l])
+                    .sum();
+            }
+        }
+        covariance.iter().all(|c| c.is_finite()).then_some(covariance)
+    }
+}
+
+fn of_reading(reading: &Reading, coordinate: Coordinate) -> f64 {
+    let (omega, zeta) = reading.neuromuscular.unwrap_or((1.0, 1.0));
+    match coordinate {
+        Coordinate::LagRate => reading.lag.unwrap_or(0.0),
+        Coordinate::LogOmega => omega.ln(),
+        Coordinate::LogZeta => zeta.ln(),
+        _ => 0.0,
+    }
+}
+
+/// `z^-nk B/F` at `z = e^{j theta}` and its derivatives along the first `p` coordinates.
+fn response(held: &HeldFamily, angle: f64, p: usize) -> (Complex64, Vec<Complex64>) {
+    let back = |k: usize| Complex64::from_polar(1.0, -angle * k as f64);
+    let (mut b, mut f) = (Complex64::new(0.0, 0.0), Complex64::new(1.0, 0.0));
+    let (mut of_b, mut of_f) = (vec![Complex64::new(0.0, 0.0); p], vec![Complex64::new(0.0, 0.0); p]);
+    for (k, &value) in held.b.iter().enumerate() {
+        let turn = back(held.nk + k);
+        b += turn * value;
+        (0..p).for_each(|i| of_b[i] += turn * held.jacobian[k][i]);
+    }
+    for (k, &value) in held.f.iter().enumerate() {
+        let turn = back(k + 1);
+        f += turn * value;
+        (0..p).for_each(|i| of_f[i] += turn * held.jacobian[held.b.len() + k][i]);
+    }
+    let value = b / f;
+    (
+        value,
+        of_b.iter().zip(of_f).map(|(b, of_f)| (b - value * of_f) / f).collect(),
+    )
+}
+
+impl Objective for Nearest<'_> {
+    type Workspace = ();
+
+    fn is_feasible(&self, x: &[f64]) -> bool {
+        FamilyOperator::new(self.form, self.reading.neuromuscular.is_some(), x).is_ok()
+    }
+
+    fn linearise(&self, x: &[f64], _: &mut ()) -> Linearisation {
+        let p = x.len();
+        let mut total = Linearisation {
+            sum_of_squares: 0.0,
+            descent: vec![0.0; p],
+            gram: vec![0.0; p * p],
+        };
+        let Some(responses) = self.responses(x) else {
+            total.sum_of_squares = f64::NAN;
+            return total;
+        };
+        for (point, (m, slopes)) in self.points.iter().zip(responses) {
+            let weight = point.response.norm_sqr().recip();
+            let off = point.response - m;
+            total.sum_of_squares += weight * off.norm_sqr();
+            for i in 0..p {
+                total.descent[i] += weight * (slopes[i].conj() * off).re;
+                for j in 0..p {
+                    total.gram[i * p + j] += weight * (slopes[i].conj() * slopes[j]).re;
+                }
+            }
+        }
+        total
+    }
+
+    fn output_power(&self) -> f64 {
+        self.points.len() as f64
+    }
+
+    fn limits(&self) -> Option<&[(f64, f64)]> {
+        Some(&self.limits)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hoid_model::{Orders, Structure};
+
+    fn ts() -> SampleTime {
+        SampleTime::new(1.0 / 60.0).unwrap()
+    }
+
+    fn polynomials(nk: usize, b: &[f64], f: &[f64]) -> PolynomialModel {
+        let orders = Orders {
+            nb: b.len(),
+            nf: f.len(),
+            nk,
+            ..Orders::default()
+        };
+        PolynomialModel::new(Structure::OutputError, orders, ts(), [b, f].concat()).unwrap()
+    }
+
+    fn exact(operator: &FamilyOperator) -> PolynomialModel {
+        let held = operator.hold(ts()).unwrap();
+        polynomials(held.nk, &held.b, &held.f)
+    }
+
+    const LEAD_LAG: [f64; 6] = [5.0, 0.6, 0.12, 2.5, -1.4, 0.137];
+
+    fn operators() -> Vec<FamilyOperator> {
+        let of = |form, nm, x: &[f64]| FamilyOperator::new(form, nm, x).unwrap();
+        vec![
+            of(Form::Gain, true, &[2.0, 2.4, -1.2, 0.2]),
+            of(Form::Lead, true, &[1.5, 0.4, 2.4, -1.2, 0.25]),
+            of(Form::Lag, true, &[4.0, 0.3, 2.4, -1.2, 0.21]),
+            of(Form::LeadLag, true, &LEAD_LAG),
+            of(Form::Lead2Lag, true, &[6.0, 0.7, 0.3, 2.4, -1.2, 0.26]),
+            of(Form::Lag, false, &[4.0, 0.3, 0.21]),
+        ]
+    }
+
+    #[test]
+    fn the_exact_model_gives_its_operator_back() {
+        for operator in operators() {
+            let found = family_of_polynomials(&exact(&operator), None, None).unwrap();
+            assert_eq!(found.operator.form(), operator.form());
+            assert!(found.mismatch < 1e-8, "{}: {}", operator.form(), found.mismatch);
+            for (a, b) in found.operator.coordinates().iter().zip(operator.coordinates()) {
+                assert!((a - b).abs() < 1e-6 * (1.0 + b.abs()), "{}: {a} {b}", operator.form());
+            }
+            assert_eq!(found.covariance, None);
+        }
+    }
+
+    #[test]
+    fn the_real_pole_is_the_lag_and_of_three_the_one_that_fits() {
+        let found = family_of_polynomials(&exact(&operators()[3]), None, None).unwrap();
+        assert_eq!(found.real_poles.len(), 1);
+        assert_eq!(found.real_poles[0].role, PoleRole::Lag);
+        assert!((found.real_poles[0].rate - 0.12).abs() < 1e-6);
+        // An overdamped neuromuscular system: three real poles, of which a lead of .6 s beside a
+        // slow lag leaves one reading. Any reading has the same response: the first that is exact.
+        let x = [5.0, 0.6, 0.12, 11.0_f64.ln(), 1.3_f64.ln(), 0.137];
+        let overdamped = FamilyOperator::new(Form::LeadLag, true, &x).unwrap();
+        let found = family_of_polynomials(&exact(&overdamped), None, None).unwrap();
+        assert_eq!(found.real_poles.len(), 3);
+        assert!(found.mismatch < 1e-7);
+        let lags = found.real_poles.iter().filter(|p| p.role == PoleRole::Lag).count();
+        assert_eq!(lags, 1);
+    }
+
+    #[test]
+    fn errors_are_those_of_the_coefficients() {
+        // Each coefficient moved by a small step: the coordinates move as dx/dtheta says.
+        let operator = FamilyOperator::new(Form::LeadLag, true, &LEAD_LAG).unwrap();
+        let model = exact(&operator);
+        let n = model.theta().len();
+        for k in 0..n {
+            let mut covariance = vec![0.0; n * n];
+            covariance[k * n + k] = 1.0;
+            let found = family_of_polynomials(&model, Some(&covariance), Some(Form::LeadLag)).unwrap();
+            let by_covariance = found.covariance.unwrap();
+            let h = 1e-8;
+            let at = |by: f64| {
+                let mut theta = model.theta().to_vec();
+                theta[k] += by;
+                let moved = PolynomialModel::new(model.structure(), model.orders(), ts(), theta).unwrap();
+                family_of_polynomials(&moved, None, Some(Form::LeadLag))
+                    .unwrap()
+                    .operator
+            };
+            let (up, down) = (at(h), at(-h));
+            for i in 0..6 {
+                let slope = (up.coordinates()[i] - down.coordinates()[i]) / (2.0 * h);
+                let expected = by_covariance[i * 6 + i].sqrt();
+                assert!(
+                    (slope.abs() - expected).abs() < 2e-3 * expected.max(1.0),
+                    "theta {k}, coordinate {i}: {slope} {expected}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_operator_is_refused() {
+        let refused = |m: &PolynomialModel, form| family_of_polynomials(m, None, form).unwrap_err().to_string();
+        // Four poles, an unstable one, a negative one, no delay.
+        let four = polynomials(9, &[0.1, 0.1], &[-0.5, 0.2, 0.0, 0.01]);
+        assert!(refused(&four, None).contains("one to three poles, found 4"));
+        assert!(refused(&polynomials(9, &[0.1], &[-1.2]), None).contains("not stable"));
+        assert!(refused(&polynomials(9, &[0.1], &[0.5]), None).contains("negative real axis"));
+        assert!(refused(&polynomials(0, &[0.1], &[-0.5]), None).contains("nk = 0"));
+        // A resonance in B that no form has.
+        let notch = polynomials(9, &[1.0, -1.98, 0.995], &[-1.7, 0.75]);
+        assert!(refused(&notch, None).contains("of the response"));
+        let lead_lag = exact(&operators()[3]);
+        assert!(refused(&lead_lag, Some(Form::Lead)).contains("another number of poles"));
+    }
+}
