@@ -20,7 +20,10 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `estimator` | [`FamilyEstimator`]: options, and the way from records to a result |
+//! | `estimator` | [`FamilyEstimator`]: options, and the searches of all forms |
+//! | `comparison` | what each form is worth beside the others |
+//! | `assembly` | from the search of the chosen form to the result |
+//! | `estimated` | the operator of a record with its errors |
 //! | `result` | [`FamilyFit`] |
 //! | `parameter` | a parameter with its interval, its prior share, and whether it is determined |
 //! | `prior` | what is known before the data |
@@ -42,10 +45,13 @@
 
 mod agreement;
 mod arx_response;
+mod assembly;
 mod choice;
 mod clusters;
+mod comparison;
 mod coordinates;
 mod covariances;
+mod estimated;
 mod estimator;
 mod judgement;
 mod layout;
