@@ -143,13 +143,8 @@ fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[u
     let Some((i, c)) = places.iter().position(|&q| q == place).zip(model_based) else {
         return 1.0;
     };
-    let slope = if penalty.logarithmic {
-        1.0 / fit.eta()[place]
-    } else {
-        1.0
-    };
     // The weight is kappa sigma^2/s^2, the covariance sigma^2 H^-1: both inflated by kappa.
-    let precision = penalty.weight * slope * slope / fit.innovation_variance;
+    let precision = penalty.curvature(fit.eta()) / fit.innovation_variance;
     let variance = c[i * places.len() + i];
     // At a bound nothing is known of it but the bound.
     if variance > 0.0 {
@@ -174,23 +169,8 @@ pub(super) fn operator_of(
     let layout = fit.layout();
     let p = fit.parameters();
     let mapped = fit.criterion.model_of(fit.eta(), record)?;
-    let of_theta = errors.covariances.as_ref().map(|c| {
-        let all = layout.positions(record);
-        let rows = 0..mapped.theta.len();
-        let of = |row: usize, other: usize| -> f64 {
-            let pairs = all.iter().enumerate().flat_map(|(i, &a)| {
-                let columns = &mapped.columns;
-                all.iter()
-                    .enumerate()
-                    .map(move |(j, &b)| columns[i][row] * c.clustered[a * p + b] * columns[j][other])
-            });
-            pairs.sum()
-        };
-        rows.clone()
-            .flat_map(|row| rows.clone().map(move |other| (row, other)))
-            .map(|(r, o)| of(r, o))
-            .collect()
-    });
+    let of_theta =
+        (errors.covariances.as_ref()).map(|c| mapped.covariance_of_theta(&c.clustered, p, layout.positions(record)));
     let estimate = |q: &Parameter| Estimate {
         value: q.value,
         standard_error: q.standard_error,

@@ -36,6 +36,7 @@
 //! | `prediction` | the prediction error fit of one form |
 //! | `prediction_fit` | what its search found |
 //! | `clusters`, `covariances` | runs or blocks; the covariance by them |
+//! | `jackknife` | covariances from estimates without each part, and from a prior |
 //! | `sensitivity` | what the estimate owes to the choice of a noise model |
 //! | `profile` | intervals by profile likelihood |
 //! | `choice` | which form |
@@ -53,6 +54,7 @@ mod coordinates;
 mod covariances;
 mod estimated;
 mod estimator;
+mod jackknife;
 mod judgement;
 mod layout;
 mod line_fit;
