@@ -145,20 +145,11 @@ fn agreement_of(operator: &Estimated, lines: &LineFit) -> Option<Agreement> {
         .operator
         .form()
         .coordinates(operator.operator.has_neuromuscular());
-    let counts = |i: usize| {
-        let of = |name: &str| operator.parameters.iter().any(|p| p.name == name && p.determined);
-        match all[i] {
-            Coordinate::Gain => true,
-            Coordinate::Lead => of("T_L"),
-            Coordinate::LagRate => of("T_I"),
-            Coordinate::LogOmega => of("omega_nm"),
-            Coordinate::LogZeta => of("zeta_nm"),
-            Coordinate::Delay => of("tau_e"),
-            Coordinate::Linear => of("c_1"),
-            Coordinate::Quadratic => of("c_2"),
-            Coordinate::Droop => of("alpha"),
-        }
+    let determined = |wanted: Coordinate| {
+        let mut all = operator.parameters.iter();
+        all.any(|p| p.name == wanted.parameter() && p.determined)
     };
+    let counts = |i: usize| all[i] == Coordinate::Gain || determined(all[i]);
     agreement(
         operator.operator.form(),
         operator.operator.has_neuromuscular(),
