@@ -1,7 +1,7 @@
 //! Results as JSON objects, the contract with other programs.
 
 use hoid_ident::{
-    Choice, Fit, GreyBoxFit, IdentError, MarginEstimates, Root,
+    Choice, Fit, GreyBoxFit, IdentError, MarginEstimates, Root, Termination,
     grey_box::OrderCandidate,
     validation::{GoodnessOfFit, LjungBox, Validation},
 };
@@ -156,19 +156,57 @@ fn residual_tests(v: &Validation) -> Value {
     })
 }
 
-fn quality(q: &GoodnessOfFit, fit: &Fit) -> Value {
+/// How well a model tells the records that it was fitted to, or others.
+pub fn goodness(q: &GoodnessOfFit) -> Map<String, Value> {
+    let rows = [
+        ("vaf_simulation", q.vaf_simulation),
+        ("vaf_prediction", q.vaf_prediction),
+        ("nrmse_simulation", q.nrmse_simulation),
+        ("nrmse_prediction", q.nrmse_prediction),
+    ];
+    rows.into_iter()
+        .map(|(name, value)| (name.to_owned(), number(value)))
+        .collect()
+}
+
+/// The same on another file.
+pub fn validation(file: &str, q: &GoodnessOfFit) -> Value {
+    let file = std::iter::once(("file".to_owned(), json!(file)));
+    Value::Object(file.chain(goodness(q)).collect())
+}
+
+/// How a search ended.
+pub fn termination(t: &Termination) -> Value {
     json!({
-        "vaf_simulation": number(q.vaf_simulation),
-        "vaf_prediction": number(q.vaf_prediction),
-        "nrmse_simulation": number(q.nrmse_simulation),
-        "nrmse_prediction": number(q.nrmse_prediction),
-        "aic": number(fit.aic()),
-        "aicc": number(fit.aicc()),
-        "bic": number(fit.bic()),
-        "fpe": number(fit.fpe()),
-        "mdl": number(fit.mdl()),
-        "yic": optional(fit.yic()),
+        "reason": t.reason.to_string(),
+        "converged": t.converged(),
+        "iterations": t.iterations,
     })
+}
+
+/// What the call was, by name.
+pub fn settings(all: &[(String, String)]) -> Value {
+    Value::Object(all.iter().map(|(k, v)| (k.clone(), json!(v))).collect())
+}
+
+/// A parameter with its name.
+pub fn named(name: &str, e: &Estimate) -> Value {
+    json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)})
+}
+
+fn quality(q: &GoodnessOfFit, fit: &Fit) -> Value {
+    let mut map = goodness(q);
+    for (name, value) in [
+        ("aic", Some(fit.aic())),
+        ("aicc", Some(fit.aicc())),
+        ("bic", Some(fit.bic())),
+        ("fpe", Some(fit.fpe())),
+        ("mdl", Some(fit.mdl())),
+        ("yic", fit.yic()),
+    ] {
+        map.insert(name.to_owned(), optional(value));
+    }
+    Value::Object(map)
 }
 
 /// Everything that `identify` found.
@@ -197,14 +235,7 @@ pub struct Identified<'a> {
 impl Identified<'_> {
     pub fn to_json(&self) -> Value {
         let fit = self.fit;
-        let parameters: Vec<Value> = fit
-            .parameters()
-            .iter()
-            .map(|(name, e)| {
-                json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)})
-            })
-            .collect();
-        let termination = fit.termination();
+        let parameters: Vec<Value> = fit.parameters().iter().map(|(name, e)| named(name, e)).collect();
         let mut map = Map::new();
         let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
         set("hoid", json!(env!("CARGO_PKG_VERSION")));
@@ -220,14 +251,7 @@ impl Identified<'_> {
         set("parameters", Value::Array(parameters));
         set("loss", number(fit.loss()));
         set("innovation_variance", number(fit.innovation_variance()));
-        set(
-            "termination",
-            json!({
-                "reason": termination.reason.to_string(),
-                "converged": termination.converged(),
-                "iterations": termination.iterations,
-            }),
-        );
+        set("termination", termination(&fit.termination()));
         set("start", json!(fit.start()));
         set("residuals", json!(fit.residual_count()));
         set("initial_states", json!(fit.state_count()));
@@ -257,16 +281,7 @@ impl Identified<'_> {
             );
         }
         if let Some((file, q)) = &self.validation {
-            set(
-                "validation",
-                json!({
-                    "file": file,
-                    "vaf_simulation": number(q.vaf_simulation),
-                    "vaf_prediction": number(q.vaf_prediction),
-                    "nrmse_simulation": number(q.nrmse_simulation),
-                    "nrmse_prediction": number(q.nrmse_prediction),
-                }),
-            );
+            set("validation", validation(file, q));
         }
         let interval = self.choice.and_then(Choice::delay_interval);
         set(
@@ -285,8 +300,7 @@ impl Identified<'_> {
             let each = (0..self.records.len()).map(|k| operator(&grey_box.operator(k)));
             set("operators", each.collect());
         }
-        let settings: Map<String, Value> = self.settings.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
-        set("settings", Value::Object(settings));
+        set("settings", settings(self.settings));
         Value::Object(map)
     }
 }

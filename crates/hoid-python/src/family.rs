@@ -10,7 +10,7 @@ use hoid_ident::{
     },
     frequency::{DescriptionOptions, describe_runs},
 };
-use hoid_model::{ContinuousTransferFunction, Form, operator_family::Coordinate};
+use hoid_model::{ContinuousTransferFunction, Form, operator_family::Coordinate, uncertainty::Estimate};
 use numpy::{PyArray1, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
 
@@ -36,11 +36,16 @@ pub struct PyOperatorFit {
     records: usize,
 }
 
-/// A prior as text, or parameter, centre, spread and source of each entry.
+/// Name, value, standard error of a parameter of another fit, and whether it is determined.
+type FoundRow = (String, Option<f64>, Option<f64>, bool);
+
+/// A prior as text; or parameter, centre, spread and source of each entry; or another fit,
+/// its parameters and where they are from.
 #[derive(FromPyObject)]
 pub enum PriorOfUser {
     Text(String),
     Entries(Vec<(String, f64, f64, String)>),
+    Fit((Vec<FoundRow>, String)),
 }
 
 impl PriorOfUser {
@@ -58,6 +63,23 @@ impl PriorOfUser {
                     })
                     .collect(),
             )?,
+            Self::Fit((rows, source)) => {
+                let parameters = rows.iter().filter_map(|(name, value, standard_error, determined)| {
+                    let estimate = Estimate {
+                        value: (*value)?,
+                        standard_error: *standard_error,
+                    };
+                    Some((name.as_str(), estimate, *determined))
+                });
+                let prior = OperatorPrior::of_parameters(parameters, &source)?;
+                if prior.entries().is_empty() {
+                    return Err(bad_option(format!(
+                        "prior {source}: no parameter in it is determined and has an error; give a fit that determines \
+                         some, or \"population\""
+                    )));
+                }
+                prior
+            }
         })
     }
 }
@@ -149,21 +171,10 @@ fn noise_range(nc: (usize, usize), nd: Option<(usize, usize)>) -> Outcome<RangeI
 }
 
 fn coordinate(name: &str) -> Outcome<Coordinate> {
-    Ok(match name {
-        "K" | "K_over_T_I" | "K_I" | "K_e" => Coordinate::Gain,
-        "T_L" => Coordinate::Lead,
-        "T_I" => Coordinate::LagRate,
-        "c_1" => Coordinate::Linear,
-        "c_2" => Coordinate::Quadratic,
-        "alpha" => Coordinate::Droop,
-        "omega_nm" => Coordinate::LogOmega,
-        "zeta_nm" => Coordinate::LogZeta,
-        "tau_e" => Coordinate::Delay,
-        _ => {
-            return Err(bad_option(format!(
-                "individual: there is no parameter {name}; expected K, T_L, T_I, omega_nm, zeta_nm or tau_e"
-            )));
-        }
+    Coordinate::of_parameter(name).ok_or_else(|| {
+        bad_option(format!(
+            "individual: there is no parameter {name}; expected K, T_L, T_I, omega_nm, zeta_nm or tau_e"
+        ))
     })
 }
 

@@ -399,7 +399,9 @@ def identify_operator(
     *,
     form: str,
     neuromuscular: bool,
-    prior: str | list[tuple[str, float, float, str]],
+    prior: str
+    | list[tuple[str, float, float, str]]
+    | tuple[list[tuple[str, float | None, float | None, bool]], str],
     excitation: str | None,
     period: float | None,
     controlled_element: str | tuple[list[float], list[float]] | None,

@@ -22,12 +22,9 @@ if TYPE_CHECKING:
 
 __all__ = ["OperatorFit", "OperatorParameter", "OperatorParameters", "identify_operator"]
 
-#: Parameters that a prior can have.
-_OF_PRIOR = ("omega_nm", "zeta_nm", "tau_e", "T_L", "T_I")
-#: Least spread of a prior that is made of another fit.
-_LEAST_SPREAD = 1e-3
-
 _Entries = list[tuple[str, float, float, str]]
+#: Name, value, standard error, whether it is determined of each parameter of a fit; its source.
+_OfFit = tuple[list[tuple[str, float | None, float | None, bool]], str]
 
 
 class OperatorParameter(NamedTuple):
@@ -359,22 +356,7 @@ def _loop(found: Mapping[str, Estimate | None]) -> str:
     return f"crossover {crossover} rad/s, phase margin {margin} deg"
 
 
-def _of_fit(rows: Sequence[tuple[str, float | None, float | None, bool]], source: str) -> _Entries:
-    """The determined parameters of another fit as a prior."""
-    entries = [
-        (name, value, max(error / value, _LEAST_SPREAD), source)
-        for name, value, error, determined in rows
-        if name in _OF_PRIOR and determined and value and error and value > 0 and error > 0
-    ]
-    if not entries:
-        raise OptionError(
-            f"prior {source}: no parameter in it is determined and has an error; "
-            'give a fit that determines some, or "population"'
-        )
-    return entries
-
-
-def _of_file(path: str) -> _Entries:
+def _of_file(path: str) -> _OfFit:
     """The prior of a file that `hoid identify --json` has written."""
     try:
         found = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -388,17 +370,17 @@ def _of_file(path: str) -> _Entries:
         raise FormatError(
             f"prior {path}: {error!r}; give the output of `hoid identify --json`"
         ) from None
-    return _of_fit(rows, path)
+    return rows, path
 
 
-def _prior(prior: Any) -> str | _Entries:
+def _prior(prior: Any) -> str | _Entries | _OfFit:
     if prior is None:
         return "none"
     if isinstance(prior, OperatorFit):
         rows = [
             (name, p.value, p.standard_error, p.determined) for name, p in prior.parameters.items()
         ]
-        return _of_fit(rows, "an earlier fit")
+        return rows, "an earlier fit"
     if isinstance(prior, Mapping):
         try:
             return [

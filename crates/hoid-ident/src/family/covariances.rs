@@ -16,11 +16,16 @@
 
 use hoid_model::{Complex64, operator_family::Coordinate, uncertainty::variance_along};
 
-use super::{clusters::ClusterKind, prediction_fit::PredictionFit};
+use super::{
+    clusters::ClusterKind,
+    jackknife::{add_open_part, jackknife},
+    prediction_fit::PredictionFit,
+};
 use crate::grey_box::parametrisation::Parametrisation;
 
 /// Frequencies at which the response is judged, rad/s.
 pub(super) const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
+
 /// Covariances of eta: by clusters with the prior's part, and by the model.
 #[derive(Debug, Clone)]
 pub(super) struct Covariances {
@@ -49,9 +54,7 @@ impl Covariances {
             }
         }
     }
-}
 
-impl Covariances {
     /// Intervals by profile likelihood know of kappa alone: where variances are larger, their ends
     /// move out in the ratio of the standard errors.
     pub fn widen(&self, fit: &PredictionFit<'_>, profiles: &mut [Option<(f64, f64)>]) {
@@ -102,38 +105,14 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
     let p = fit.parameters();
     let inverse = inverse(fit)?;
     let model_based: Vec<f64> = inverse.iter().map(|g| g * fit.innovation_variance).collect();
-    let penalties: Vec<(usize, f64)> = fit
-        .criterion
-        .penalty
-        .iter()
-        .map(|penalty| {
-            let x = fit.eta()[penalty.place];
-            let slope = if penalty.logarithmic {
-                1.0 / x.max(f64::MIN_POSITIVE)
-            } else {
-                1.0
-            };
-            (penalty.place, penalty.weight * slope * slope)
-        })
-        .collect();
-    // H^-1 P H^-1: the prior is weighed as the inflated data are.
     let scale = fit.innovation_variance * fit.inflation;
-    let mut of_prior = vec![0.0; p * p];
-    for &(place, weight) in &penalties {
-        for i in 0..p {
-            for j in 0..p {
-                of_prior[i * p + j] += weight * inverse[i * p + place] * inverse[j * p + place];
-            }
-        }
-    }
     let clustered = match fit.clusters.kind {
         ClusterKind::Runs => {
-            let jackknife = jackknife(fit)?;
-            jackknife
-                .iter()
-                .zip(&of_prior)
-                .map(|(j, of_prior)| j + scale * of_prior)
-                .collect()
+            // H^-1 P H^-1: the prior is weighed as the inflated data are.
+            let mut open = vec![0.0; p * p];
+            add_open_part(&mut open, 1.0, &fit.criterion.penalty, fit.eta(), &inverse);
+            let by_runs = over_clusters(fit)?;
+            by_runs.iter().zip(&open).map(|(j, open)| j + scale * open).collect()
         }
         // H^-1 G H^-1 + H^-1 P H^-1 = H^-1, all of it inflated.
         ClusterKind::Blocks => inverse.iter().map(|g| scale * g).collect(),
@@ -142,27 +121,10 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
 }
 
 /// The jackknife over clusters.
-fn jackknife(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
-    let p = fit.parameters();
+fn over_clusters(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
     let parts = &fit.clusters.parts;
-    let n = parts.len();
-    if n < 2 {
-        return None;
-    }
     let steps: Option<Vec<Vec<f64>>> = parts.iter().map(|(g, big)| fit.solve(Some(big), g)).collect();
-    let steps = steps?;
-    let mean: Vec<f64> = (0..p)
-        .map(|i| steps.iter().map(|s| s[i]).sum::<f64>() / n as f64)
-        .collect();
-    let mut covariance = vec![0.0; p * p];
-    for step in &steps {
-        for i in 0..p {
-            for j in 0..p {
-                covariance[i * p + j] += (step[i] - mean[i]) * (step[j] - mean[j]) * (n as f64 - 1.0) / n as f64;
-            }
-        }
-    }
-    Some(covariance)
+    jackknife(&steps?)
 }
 
 /// The estimates without each of the clusters.
@@ -183,23 +145,10 @@ pub(super) fn without_each(fit: &PredictionFit<'_>) -> Option<Vec<Vec<f64>>> {
 /// the data hardly determine; the response is what they do determine.
 pub(super) fn inflation(fit: &PredictionFit<'_>) -> Option<f64> {
     let p = fit.parameters();
-    let (clustered, inverse) = (jackknife(fit)?, inverse(fit)?);
+    let (clustered, inverse) = (over_clusters(fit)?, inverse(fit)?);
     // The model's own variance without what the prior adds to the information: H^-1 G H^-1.
-    let mut by_model: Vec<f64> = inverse.clone();
-    for penalty in &fit.criterion.penalty {
-        let x = fit.eta()[penalty.place];
-        let slope = if penalty.logarithmic {
-            1.0 / x.max(f64::MIN_POSITIVE)
-        } else {
-            1.0
-        };
-        let weight = penalty.weight * slope * slope;
-        for i in 0..p {
-            for j in 0..p {
-                by_model[i * p + j] -= weight * inverse[i * p + penalty.place] * inverse[j * p + penalty.place];
-            }
-        }
-    }
+    let mut by_model = inverse.clone();
+    add_open_part(&mut by_model, -1.0, &fit.criterion.penalty, fit.eta(), &inverse);
     let operator = fit.layout().operator(fit.eta(), 0).ok()?;
     let places = &fit.layout().positions(0)[..fit.layout().coordinates()];
     let mut ratios = Vec::new();

@@ -7,6 +7,7 @@ use hoid_model::{
 };
 
 use super::{
+    jackknife::{add_open_part, jackknife},
     lines::LineData,
     response_fit::{ResponseCriterion, ResponseMinimum},
 };
@@ -84,12 +85,15 @@ pub(super) fn line_fit(
             others.push(without.coordinates);
         }
     }
-    let covariance = criterion.covariance(&found).map(|by_lines| {
-        if runs >= FEWEST_RUNS && others.len() == runs {
-            with_prior(jackknife(&others), &by_lines, criterion, &found.coordinates)
-        } else {
-            by_lines
+    let by_runs = (runs >= FEWEST_RUNS && others.len() == runs)
+        .then(|| jackknife(&others))
+        .flatten();
+    let covariance = criterion.covariance(&found).map(|by_lines| match by_runs {
+        Some(mut covariance) => {
+            add_open_part(&mut covariance, 1.0, &criterion.penalty, &found.coordinates, &by_lines);
+            covariance
         }
+        None => by_lines,
     });
     let free = (found.coordinates.iter().zip(&criterion.limits))
         .filter(|(x, (low, high))| low < *x && *x < high)
@@ -103,46 +107,6 @@ pub(super) fn line_fit(
         termination: found.termination,
     };
     Ok((fit, found))
-}
-
-/// `(n-1)/n sum (x_(i) - mean)(x_(i) - mean)'`.
-fn jackknife(others: &[Vec<f64>]) -> Vec<f64> {
-    let (n, p) = (others.len() as f64, others[0].len());
-    let mean: Vec<f64> = (0..p).map(|i| others.iter().map(|x| x[i]).sum::<f64>() / n).collect();
-    let mut covariance = vec![0.0; p * p];
-    for x in others {
-        for i in 0..p {
-            for j in 0..p {
-                covariance[i * p + j] += (x[i] - mean[i]) * (x[j] - mean[j]) * (n - 1.0) / n;
-            }
-        }
-    }
-    covariance
-}
-
-/// Adds `H^-1 P H^-1`, what the prior leaves open.
-fn with_prior(
-    mut covariance: Vec<f64>,
-    inverse: &[f64],
-    criterion: &ResponseCriterion<'_>,
-    coordinates: &[f64],
-) -> Vec<f64> {
-    let p = coordinates.len();
-    for penalty in &criterion.penalty {
-        let place = penalty.place;
-        let slope = if penalty.logarithmic {
-            1.0 / coordinates[place].max(f64::MIN_POSITIVE)
-        } else {
-            1.0
-        };
-        let weight = penalty.weight * slope * slope;
-        for i in 0..p {
-            for j in 0..p {
-                covariance[i * p + j] += weight * inverse[i * p + place] * inverse[j * p + place];
-            }
-        }
-    }
-    covariance
 }
 
 /// The forms in the order in which they are preferred where they do equally well: fewer

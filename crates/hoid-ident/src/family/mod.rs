@@ -20,7 +20,10 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `estimator` | [`FamilyEstimator`]: options, and the way from records to a result |
+//! | `estimator` | [`FamilyEstimator`]: options, and the searches of all forms |
+//! | `comparison` | what each form is worth beside the others |
+//! | `assembly` | from the search of the chosen form to the result |
+//! | `estimated` | the operator of a record with its errors |
 //! | `result` | [`FamilyFit`] |
 //! | `parameter` | a parameter with its interval, its prior share, and whether it is determined |
 //! | `prior` | what is known before the data |
@@ -33,6 +36,7 @@
 //! | `prediction` | the prediction error fit of one form |
 //! | `prediction_fit` | what its search found |
 //! | `clusters`, `covariances` | runs or blocks; the covariance by them |
+//! | `jackknife` | covariances from estimates without each part, and from a prior |
 //! | `sensitivity` | what the estimate owes to the choice of a noise model |
 //! | `profile` | intervals by profile likelihood |
 //! | `choice` | which form |
@@ -43,11 +47,15 @@
 
 mod agreement;
 mod arx_response;
+mod assembly;
 mod choice;
 mod clusters;
+mod comparison;
 mod coordinates;
 mod covariances;
+mod estimated;
 mod estimator;
+mod jackknife;
 mod judgement;
 mod layout;
 mod line_fit;

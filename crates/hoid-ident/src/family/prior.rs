@@ -12,11 +12,15 @@
 
 use std::{fmt, str::FromStr};
 
-use hoid_model::operator_family::{Coordinate, Form};
+use hoid_model::{
+    operator_family::{Coordinate, Form},
+    uncertainty::Estimate,
+};
 
 use crate::{IdentError, grey_box::objective::Penalty};
 
-/// Spread of a parameter that is in all but name fixed: refused, as `--fix` says so openly.
+/// Spread of a parameter that is in all but name fixed: refused, as `--fix` says so openly. What
+/// another fit knows better is taken to be known so well.
 const LEAST_SPREAD: f64 = 1e-3;
 
 /// What is known of one parameter.
@@ -38,14 +42,19 @@ pub struct OperatorPrior {
     entries: Vec<ParameterPrior>,
 }
 
-/// The parameters that can have a prior, and their coordinates.
-const KNOWN: [(&str, Coordinate); 5] = [
-    ("omega_nm", Coordinate::LogOmega),
-    ("zeta_nm", Coordinate::LogZeta),
-    ("tau_e", Coordinate::Delay),
-    ("T_L", Coordinate::Lead),
-    ("T_I", Coordinate::LagRate),
+/// The coordinates whose parameters can have a prior.
+const KNOWN: [Coordinate; 5] = [
+    Coordinate::LogOmega,
+    Coordinate::LogZeta,
+    Coordinate::Delay,
+    Coordinate::Lead,
+    Coordinate::LagRate,
 ];
+
+/// The coordinate of a parameter that can have a prior.
+fn coordinate_of(parameter: &str) -> Option<Coordinate> {
+    KNOWN.into_iter().find(|c| c.parameter() == parameter)
+}
 
 /// Source of the neuromuscular part of the population.
 const NEUROMUSCULAR: &str = "published pilots: D. T. McRuer et al., IEEE Trans. Man-Machine Systems 9 (1968) 61-71; P. M. T. Zaal et al., \
@@ -89,9 +98,9 @@ impl OperatorPrior {
                     expected: expected.to_owned(),
                 })
             };
-            if !KNOWN.iter().any(|(name, _)| *name == entry.parameter) {
-                let names: Vec<&str> = KNOWN.iter().map(|(name, _)| *name).collect();
-                return refuse(entry.parameter.clone(), &format!("one of {}", names.join(", ")));
+            if coordinate_of(&entry.parameter).is_none() {
+                let names = KNOWN.map(Coordinate::parameter).join(", ");
+                return refuse(entry.parameter.clone(), &format!("one of {names}"));
             }
             if entries[..i].iter().any(|other| other.parameter == entry.parameter) {
                 return refuse(format!("{} twice", entry.parameter), "each parameter once");
@@ -112,6 +121,29 @@ impl OperatorPrior {
         Ok(Self { entries })
     }
 
+    /// What another fit found, from name, estimate, and whether it is determined: of the parameters
+    /// that can have a prior those that are determined and have an error, `standard error/value`
+    /// the spread of the logarithm to first order. It may be that none is left.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] for a parameter that is named twice.
+    pub fn of_parameters<'p>(
+        found: impl IntoIterator<Item = (&'p str, Estimate, bool)>,
+        source: &str,
+    ) -> Result<Self, IdentError> {
+        let entry = |(name, estimate, determined): (&str, Estimate, bool)| {
+            let (value, error) = (estimate.value, estimate.standard_error?);
+            let counts = determined && coordinate_of(name).is_some() && value > 0.0 && error > 0.0;
+            counts.then(|| ParameterPrior {
+                parameter: name.to_owned(),
+                centre: value,
+                spread: (error / value).max(LEAST_SPREAD),
+                source: source.to_owned(),
+            })
+        };
+        Self::new(found.into_iter().filter_map(entry).collect())
+    }
+
     /// What is known of each parameter.
     pub fn entries(&self) -> &[ParameterPrior] {
         &self.entries
@@ -121,9 +153,9 @@ impl OperatorPrior {
     pub(crate) fn penalties(&self, form: Form, neuromuscular: bool) -> Vec<Penalty> {
         let coordinates = form.coordinates(neuromuscular);
         let of = |entry: &ParameterPrior| {
-            let (_, coordinate) = KNOWN.iter().find(|(name, _)| *name == entry.parameter)?;
-            let place = coordinates.iter().position(|c| c == coordinate)?;
-            let sign = if *coordinate == Coordinate::LagRate { -1.0 } else { 1.0 };
+            let coordinate = coordinate_of(&entry.parameter)?;
+            let place = coordinates.iter().position(|c| *c == coordinate)?;
+            let sign = if coordinate == Coordinate::LagRate { -1.0 } else { 1.0 };
             Some(Penalty {
                 place,
                 logarithmic: !matches!(coordinate, Coordinate::LogOmega | Coordinate::LogZeta),
@@ -199,6 +231,25 @@ mod tests {
         ] {
             assert!(bad.parse::<OperatorPrior>().is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn what_another_fit_determined_is_a_prior() {
+        let estimate = |value, standard_error| Estimate { value, standard_error };
+        let found = [
+            ("K", estimate(4.0, Some(0.2)), true),
+            ("T_L", estimate(0.5, Some(0.05)), true),
+            ("T_I", estimate(5.0, Some(4.0)), false),
+            ("omega_nm", estimate(11.0, None), true),
+            ("zeta_nm", estimate(-0.1, Some(0.1)), true),
+            ("tau_e", estimate(0.2, Some(1e-6)), true),
+        ];
+        let prior = OperatorPrior::of_parameters(found, "a fit").unwrap();
+        assert_eq!(prior.to_string(), "T_L=0.5:0.1,tau_e=0.2:0.001");
+        assert!(prior.entries().iter().all(|e| e.source == "a fit"));
+        let none = OperatorPrior::of_parameters(found[2..5].to_vec(), "a fit").unwrap();
+        assert_eq!(none, OperatorPrior::none());
+        assert!(OperatorPrior::of_parameters([found[1], found[1]], "a fit").is_err());
     }
 
     #[test]

@@ -240,23 +240,9 @@ impl GreyBox {
         let mut fits = Vec::with_capacity(criterion.data.len());
         for record in 0..criterion.data.len() {
             let polynomials = criterion.model_of(&eta, record)?;
-            let of_theta = covariance.as_ref().map(|covariance| {
-                let places = layout.positions(record);
-                let columns = &polynomials.columns;
-                let of = |row: usize, other: usize| -> f64 {
-                    let pairs = places.iter().enumerate().flat_map(|(i, &a)| {
-                        places
-                            .iter()
-                            .enumerate()
-                            .map(move |(j, &b)| columns[i][row] * covariance[a * p + b] * columns[j][other])
-                    });
-                    pairs.sum()
-                };
-                let rows = 0..polynomials.theta.len();
-                rows.clone()
-                    .flat_map(|row| rows.clone().map(move |other| of(row, other)))
-                    .collect()
-            });
+            let of_theta = covariance
+                .as_ref()
+                .map(|c| polynomials.covariance_of_theta(c, p, layout.positions(record)));
             let held = vec![false; polynomials.theta.len()];
             fits.push(Fit {
                 model: PolynomialModel::new(

@@ -43,19 +43,31 @@ pub(crate) struct Penalty {
 }
 
 impl Penalty {
+    /// `g(eta_i)` and its derivative.
+    fn value_and_slope(&self, eta: &[f64]) -> (f64, f64) {
+        let x = eta[self.place];
+        if self.logarithmic {
+            let x = x.max(f64::MIN_POSITIVE);
+            (x.ln(), 1.0 / x)
+        } else {
+            (x, 1.0)
+        }
+    }
+
+    /// `weight g'(eta_i)^2`, its element of the matrix P that stands beside `psi' psi`.
+    pub fn curvature(&self, eta: &[f64]) -> f64 {
+        let (_, slope) = self.value_and_slope(eta);
+        self.weight * slope * slope
+    }
+
     /// Adds its square and derivatives to a linearisation of p parameters.
     pub fn add_to(&self, eta: &[f64], total: &mut Linearisation) {
-        let (i, x) = (self.place, eta[self.place]);
-        let (off, slope) = match self.logarithmic {
-            true => (
-                self.mean - x.max(f64::MIN_POSITIVE).ln(),
-                1.0 / x.max(f64::MIN_POSITIVE),
-            ),
-            false => (self.mean - x, 1.0),
-        };
+        let i = self.place;
+        let (value, slope) = self.value_and_slope(eta);
+        let off = self.mean - value;
         total.sum_of_squares += self.weight * off * off;
         total.descent[i] += self.weight * off * slope;
-        total.gram[i * eta.len() + i] += self.weight * slope * slope;
+        total.gram[i * eta.len() + i] += self.curvature(eta);
     }
 }
 

@@ -13,6 +13,28 @@ pub(crate) struct Mapped {
     pub columns: Vec<Vec<f64>>,
 }
 
+impl Mapped {
+    /// Covariance of theta by rows, `J C J'`, from that of eta; the slots of the record stand at
+    /// these places of eta.
+    pub fn covariance_of_theta(&self, of_eta: &[f64], p: usize, places: &[usize]) -> Vec<f64> {
+        let columns = &self.columns;
+        let of = |row: usize, other: usize| -> f64 {
+            let pairs = places.iter().enumerate().flat_map(|(i, &a)| {
+                places
+                    .iter()
+                    .enumerate()
+                    .map(move |(j, &b)| columns[i][row] * of_eta[a * p + b] * columns[j][other])
+            });
+            pairs.sum()
+        };
+        let rows = 0..self.theta.len();
+        rows.clone()
+            .flat_map(|row| rows.clone().map(move |other| (row, other)))
+            .map(|(row, other)| of(row, other))
+            .collect()
+    }
+}
+
 /// Physical parameters eta of one or several records.
 pub(crate) trait Parametrisation: Clone {
     /// Place in eta of each slot of a record.
@@ -35,4 +57,28 @@ pub(crate) trait Parametrisation: Clone {
     /// # Errors
     /// [`ModelError`] for an eta without a model.
     fn map(&self, eta: &[f64], record: usize, sample: Option<usize>) -> Result<Mapped, ModelError>;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_covariance_of_a_linear_map_is_that_of_its_sums() {
+        // theta = [x + 2 y, x - y] of eta = [y, other, x].
+        let mapped = Mapped {
+            orders: Orders::default(),
+            theta: vec![0.0; 2],
+            columns: vec![vec![1.0, 1.0], vec![2.0, -1.0]],
+        };
+        let (xx, yy, xy) = (4.0, 9.0, 1.5);
+        let of_eta = [yy, 7.0, xy, 7.0, 7.0, 7.0, xy, 7.0, xx];
+        let expected = [
+            xx + 4.0 * xy + 4.0 * yy,
+            xx + xy - 2.0 * yy,
+            xx + xy - 2.0 * yy,
+            xx - 2.0 * xy + yy,
+        ];
+        assert_eq!(mapped.covariance_of_theta(&of_eta, 3, &[2, 0]), expected);
+    }
 }

@@ -65,6 +65,44 @@ pub enum Coordinate {
 }
 
 impl Coordinate {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::Gain,
+        Self::Lead,
+        Self::LagRate,
+        Self::Linear,
+        Self::Quadratic,
+        Self::Droop,
+        Self::LogOmega,
+        Self::LogZeta,
+        Self::Delay,
+    ];
+
+    /// The parameter that people name it by: T_I for `1/T_I`, and K for each gain, which is
+    /// `K/T_I`, K_I or K_e in some forms.
+    pub fn parameter(self) -> &'static str {
+        match self {
+            Self::Gain => "K",
+            Self::Lead => "T_L",
+            Self::LagRate => "T_I",
+            Self::Linear => "c_1",
+            Self::Quadratic => "c_2",
+            Self::Droop => "alpha",
+            Self::LogOmega => "omega_nm",
+            Self::LogZeta => "zeta_nm",
+            Self::Delay => "tau_e",
+        }
+    }
+
+    /// The coordinate of a parameter by its name; `None` for K_e_dot, which is a product of two,
+    /// and for what is no parameter.
+    pub fn of_parameter(name: &str) -> Option<Self> {
+        match name {
+            "K_over_T_I" | "K_I" | "K_e" => Some(Self::Gain),
+            _ => Self::ALL.into_iter().find(|coordinate| coordinate.parameter() == name),
+        }
+    }
+
     /// Its name: that of the parameter, or what of it is fitted.
     pub fn name(self) -> &'static str {
         match self {

@@ -190,7 +190,10 @@ mod tests {
     use super::*;
     use crate::{
         delayed_operator::delayed_operator,
-        operator_family::{Coordinate, Form},
+        operator_family::{
+            Form,
+            examples::{operator, operators},
+        },
         polynomial,
     };
     use num_complex::Complex64;
@@ -199,37 +202,8 @@ mod tests {
         SampleTime::new(1.0 / 60.0).unwrap()
     }
 
-    fn operator(form: Form, neuromuscular: bool, tau: f64) -> FamilyOperator {
-        let values: Vec<f64> = form
-            .coordinates(neuromuscular)
-            .iter()
-            .map(|c| match c {
-                Coordinate::Gain => 4.0,
-                Coordinate::Lead => 0.6,
-                Coordinate::LagRate => 0.2,
-                Coordinate::Linear => 0.9,
-                Coordinate::Quadratic => 0.3,
-                Coordinate::Droop => 0.4,
-                Coordinate::LogOmega => 11.0_f64.ln(),
-                Coordinate::LogZeta => 0.25_f64.ln(),
-                Coordinate::Delay => tau,
-            })
-            .collect();
-        FamilyOperator::new(form, neuromuscular, &values).unwrap()
-    }
-
     fn all() -> Vec<FamilyOperator> {
-        let mut operators = Vec::new();
-        for form in Form::ALL {
-            for neuromuscular in [true, false] {
-                for tau in [0.1437, 0.16] {
-                    if form.is_proper(neuromuscular) {
-                        operators.push(operator(form, neuromuscular, tau));
-                    }
-                }
-            }
-        }
-        operators
+        operators(&[0.1437, 0.16])
     }
 
     #[test]

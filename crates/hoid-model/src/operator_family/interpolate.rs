@@ -97,32 +97,12 @@ mod tests {
 
     use super::*;
     use crate::{
-        operator_family::{Coordinate, Form},
+        operator_family::{Form, examples::operators},
         polynomial,
     };
 
-    fn operators() -> Vec<FamilyOperator> {
-        let mut all = Vec::new();
-        for form in Form::ALL {
-            for neuromuscular in [true, false] {
-                for tau in [0.1437, 0.16, 0.002] {
-                    let value = |c: &Coordinate| match c {
-                        Coordinate::Gain => 4.0,
-                        Coordinate::Lead => 0.6,
-                        Coordinate::LagRate => 0.2,
-                        Coordinate::Linear => 0.9,
-                        Coordinate::Quadratic => 0.3,
-                        Coordinate::Droop => 0.4,
-                        Coordinate::LogOmega => 11.0_f64.ln(),
-                        Coordinate::LogZeta => 0.25_f64.ln(),
-                        Coordinate::Delay => tau,
-                    };
-                    let values: Vec<f64> = form.coordinates(neuromuscular).iter().map(value).collect();
-                    all.extend(FamilyOperator::new(form, neuromuscular, &values));
-                }
-            }
-        }
-        all
+    fn all() -> Vec<FamilyOperator> {
+        operators(&[0.1437, 0.16, 0.002])
     }
 
     fn response(model: &HeldFamily, omega: f64, ts: f64) -> Complex64 {
@@ -135,7 +115,7 @@ mod tests {
     fn response_is_that_of_the_operator_half_a_sample_late() {
         for ts in [1e-3, 1.0 / 60.0] {
             let sample_time = SampleTime::new(ts).unwrap();
-            for operator in operators() {
+            for operator in all() {
                 let model = operator.interpolate(sample_time).unwrap();
                 for omega in [0.5, 4.0, 15.0] {
                     let half: f64 = 0.5 * omega * ts;
@@ -157,7 +137,7 @@ mod tests {
     #[test]
     fn jacobian_agrees_with_finite_differences() {
         let ts = SampleTime::new(1.0 / 60.0).unwrap();
-        for operator in operators() {
+        for operator in all() {
             let sample = whole_samples(operator.tau_e_s() + 0.5 * ts.s(), ts).unwrap();
             let exact = operator.interpolate(ts).unwrap();
             for i in 0..operator.coordinates().len() {

@@ -20,6 +20,8 @@
 //! | `dual` | numbers with their derivatives |
 
 mod dual;
+#[cfg(test)]
+mod examples;
 mod form;
 mod hold;
 mod interpolate;
@@ -29,4 +31,4 @@ mod operator;
 pub use dual::PARTIALS;
 pub use form::{Coordinate, Form};
 pub use hold::HeldFamily;
-pub use operator::{FamilyOperator, FamilyResponse, NamedParameter};
+pub use operator::{FamilyOperator, FamilyResponse, NamedParameter, PARAMETERS};

@@ -8,6 +8,23 @@ use super::{
 };
 use crate::{ContinuousTransferFunction, ModelError, polynomial};
 
+/// The parameters of all forms, as [`FamilyOperator::named`] calls them, with their units.
+pub const PARAMETERS: [(&str, &str); 13] = [
+    ("K", ""),
+    ("K_over_T_I", "1/s"),
+    ("K_I", "1/s"),
+    ("K_e", ""),
+    ("K_e_dot", "s"),
+    ("T_L", "s"),
+    ("T_I", "s"),
+    ("c_1", "s"),
+    ("c_2", "s^2"),
+    ("alpha", "rad/s"),
+    ("omega_nm", "rad/s"),
+    ("zeta_nm", ""),
+    ("tau_e", "s"),
+];
+
 /// An operator: its form and the values of its coordinates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FamilyOperator {
@@ -323,19 +340,31 @@ impl FamilyOperator {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::examples::operator, *};
 
     fn usual(form: Form) -> FamilyOperator {
-        let tail = [11.0_f64.ln(), 0.25_f64.ln(), 0.1837];
-        let head: &[f64] = match form {
-            Form::Gain => &[3.0],
-            Form::Lead | Form::Lead2 => &[1.5, 0.5],
-            Form::Lag => &[4.0, 0.2],
-            Form::LeadLag | Form::Lead2Lag => &[4.0, 0.6, 0.2],
-            Form::QuadraticIntegral => &[2.0, 0.9, 0.3],
-            Form::LeadDroop => &[1.5, 0.5, 0.4],
-        };
-        FamilyOperator::new(form, true, &[head, &tail].concat()).unwrap()
+        operator(form, true, 0.1837)
+    }
+
+    #[test]
+    fn the_names_are_those_of_all_forms() {
+        let mut seen = Vec::new();
+        for form in Form::ALL {
+            for named in usual(form).named() {
+                assert!(PARAMETERS.contains(&(named.name, named.unit)), "{form} {}", named.name);
+                seen.push(named.name);
+                // K with a lag is a product, and individual by its gain.
+                if let Some(coordinate) = named.coordinate {
+                    assert_eq!(Coordinate::of_parameter(named.name), Some(coordinate), "{form}");
+                }
+            }
+        }
+        assert!(PARAMETERS.iter().all(|(name, _)| seen.contains(name)));
+        for coordinate in Coordinate::ALL {
+            assert_eq!(Coordinate::of_parameter(coordinate.parameter()), Some(coordinate));
+        }
+        assert_eq!(Coordinate::of_parameter("K_e_dot"), None);
+        assert_eq!(Coordinate::of_parameter("gain"), None);
     }
 
     #[test]

@@ -35,7 +35,7 @@ pub struct AnalysisSettings {
     /// Parameters of the operator that each run has for itself, such as K; all others are common to
     /// the runs of a person in a condition.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schemars(extend("items" = serde_json::json!({ "enum": INDIVIDUAL.map(|(name, _)| name) })))]
+    #[schemars(extend("items" = serde_json::json!({ "enum": Coordinate::ALL.map(Coordinate::parameter) })))]
     pub individual: Vec<String>,
     /// Whether the operator is fitted to each run too, with the form of all of them.
     pub each_run: bool,
@@ -46,19 +46,6 @@ pub struct AnalysisSettings {
 
 /// The form that held-out runs choose.
 const AUTO: &str = "auto";
-
-/// Names of the parameters that a run can have for itself, and their coordinates.
-const INDIVIDUAL: [(&str, Coordinate); 9] = [
-    ("K", Coordinate::Gain),
-    ("T_L", Coordinate::Lead),
-    ("T_I", Coordinate::LagRate),
-    ("c_1", Coordinate::Linear),
-    ("c_2", Coordinate::Quadratic),
-    ("alpha", Coordinate::Droop),
-    ("omega_nm", Coordinate::LogOmega),
-    ("zeta_nm", Coordinate::LogZeta),
-    ("tau_e", Coordinate::Delay),
-];
 
 /// The names of the forms, for the schema.
 fn form_names() -> Vec<&'static str> {
@@ -115,12 +102,11 @@ impl AnalysisSettings {
         }
         estimator.prior = self.prior.parse().map_err(|error| format!("analysis.prior: {error}"))?;
         for name in &self.individual {
-            let known = INDIVIDUAL.iter().find(|(known, _)| known == name);
-            let (_, coordinate) = known.ok_or_else(|| {
-                let names = INDIVIDUAL.map(|(name, _)| name).join(", ");
+            let coordinate = Coordinate::of_parameter(name).ok_or_else(|| {
+                let names = Coordinate::ALL.map(Coordinate::parameter).join(", ");
                 format!("analysis.individual has {name:?}, expected parameters among {names}")
             })?;
-            estimator.individual.push(*coordinate);
+            estimator.individual.push(coordinate);
         }
         Ok(estimator)
     }

@@ -9,30 +9,13 @@
 
 use hoid_ident::family::{FamilyFit, OperatorOfRecord, Parameter};
 use hoid_io::{ColumnValues, OutputTable, TableSchema};
-use hoid_model::{ContinuousTransferFunction, VerdictLevel, uncertainty::Estimate};
+use hoid_model::{ContinuousTransferFunction, VerdictLevel, operator_family::PARAMETERS, uncertainty::Estimate};
 
 use super::tables::{joined, numbers, parted, real, schema, text, texts};
 use crate::columns::Rows;
 
 /// Name of the run that is all of them.
 pub(super) const ALL: &str = "all";
-
-/// The parameters of all forms with their units, in the order of the columns.
-const PARAMETERS: [(&str, &str); 13] = [
-    ("K", ""),
-    ("K_over_T_I", "1/s"),
-    ("K_I", "1/s"),
-    ("K_e", ""),
-    ("K_e_dot", "s"),
-    ("T_L", "s"),
-    ("T_I", "s"),
-    ("c_1", "s"),
-    ("c_2", "s^2"),
-    ("alpha", "rad/s"),
-    ("omega_nm", "rad/s"),
-    ("zeta_nm", ""),
-    ("tau_e", "s"),
-];
 
 /// What became of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -9,7 +9,7 @@
 use std::path::Path;
 
 use hoid_io::{ColumnKind, ColumnSchema, TableSchema};
-use hoid_model::{Form, ModelError, SampleTime};
+use hoid_model::{Form, ModelError, SampleTime, operator_family::PARAMETERS};
 use hoid_sim::{
     RunSeed, SimError,
     people::{Person, PersonRun, Plant, Population, RemnantKind, Task},
@@ -70,22 +70,6 @@ impl Default for PeopleExperiment {
 
 /// Columns of a file besides t.
 const COLUMNS: [&str; 4] = ["e", "u", "d", "y"];
-/// Parameters of all forms, as [`hoid_model::FamilyOperator::named`] calls them.
-const PARAMETERS: [&str; 13] = [
-    "K",
-    "K_over_T_I",
-    "K_I",
-    "K_e",
-    "K_e_dot",
-    "T_L",
-    "T_I",
-    "c_1",
-    "c_2",
-    "alpha",
-    "omega_nm",
-    "zeta_nm",
-    "tau_e",
-];
 /// What else is true.
 const OTHERS: [&str; 7] = [
     "crossover_rad_s",
@@ -237,7 +221,7 @@ fn truth_schema() -> TableSchema {
         comments: Vec::new(),
         columns: [
             of(ColumnKind::Text, &texts),
-            of(ColumnKind::Real, &PARAMETERS),
+            of(ColumnKind::Real, &PARAMETERS.map(|(name, _)| name)),
             of(ColumnKind::Real, &OTHERS),
         ]
         .concat(),

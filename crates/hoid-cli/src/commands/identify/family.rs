@@ -4,11 +4,11 @@ use std::path::Path;
 
 use hoid_ident::{
     IdentError, SearchOptions,
-    family::{FamilyEstimator, HIGHEST_NOISE_ORDER, OperatorPrior, ParameterPrior},
+    family::{FamilyEstimator, HIGHEST_NOISE_ORDER, OperatorPrior},
     frequency::{Description, DescriptionOptions, describe_runs},
 };
 use hoid_io::{read_text, write_atomically};
-use hoid_model::{Detrend, Record, VerdictLevel, operator_family::Coordinate};
+use hoid_model::{Detrend, Record, VerdictLevel, operator_family::Coordinate, uncertainty::Estimate};
 use hoid_report::{
     ModelSection, Report,
     figures::{ModelCurve, describing, with_width_mm},
@@ -193,21 +193,10 @@ fn noise_orders(
 }
 
 fn coordinate(name: &str) -> Result<Coordinate, CliError> {
-    Ok(match name {
-        "K" | "K_over_T_I" | "K_I" | "K_e" => Coordinate::Gain,
-        "T_L" => Coordinate::Lead,
-        "T_I" => Coordinate::LagRate,
-        "c_1" => Coordinate::Linear,
-        "c_2" => Coordinate::Quadratic,
-        "alpha" => Coordinate::Droop,
-        "omega_nm" => Coordinate::LogOmega,
-        "zeta_nm" => Coordinate::LogZeta,
-        "tau_e" => Coordinate::Delay,
-        _ => {
-            return Err(CliError::Usage(format!(
-                "--individual: there is no parameter {name}; expected K, T_L, T_I, omega_nm, zeta_nm or tau_e"
-            )));
-        }
+    Coordinate::of_parameter(name).ok_or_else(|| {
+        CliError::Usage(format!(
+            "--individual: there is no parameter {name}; expected K, T_L, T_I, omega_nm, zeta_nm or tau_e"
+        ))
     })
 }
 
@@ -231,22 +220,20 @@ fn prior(text: &str) -> Result<OperatorPrior, CliError> {
     let parameters = result["parameters"]
         .as_array()
         .ok_or_else(|| wrong("it has no parameters"))?;
-    let entry = |p: &Value| {
-        let name = p["name"].as_str()?;
-        let (value, error) = (p["value"].as_f64()?, p["standard_error"].as_f64()?);
-        let counts = matches!(name, "omega_nm" | "zeta_nm" | "tau_e" | "T_L" | "T_I");
-        (counts && p["determined"].as_bool()? && value > 0.0 && error > 0.0).then(|| ParameterPrior {
-            parameter: name.to_owned(),
-            centre: value,
-            spread: (error / value).max(1e-3),
-            source: text.to_owned(),
-        })
-    };
-    let entries: Vec<ParameterPrior> = parameters.iter().filter_map(entry).collect();
-    if entries.is_empty() {
+    let prior = OperatorPrior::of_parameters(parameters.iter().filter_map(parameter), text)?;
+    if prior.entries().is_empty() {
         return Err(wrong("no parameter in it is determined and has an error"));
     }
-    Ok(OperatorPrior::new(entries)?)
+    Ok(prior)
+}
+
+/// Name, estimate and `determined` of a parameter; `None` without a value.
+fn parameter(p: &Value) -> Option<(&str, Estimate, bool)> {
+    let found = Estimate {
+        value: p["value"].as_f64()?,
+        standard_error: p["standard_error"].as_f64(),
+    };
+    Some((p["name"].as_str()?, found, p["determined"].as_bool()?))
 }
 
 fn settings(args: &IdentifyArgs, estimator: &FamilyEstimator) -> Vec<(String, String)> {

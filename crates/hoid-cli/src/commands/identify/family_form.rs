@@ -208,25 +208,10 @@ impl Found<'_> {
         set("loss", number(fit.loss));
         set("innovation_variance", number(fit.innovation_variance));
         set("residuals", json!(fit.residuals));
-        set(
-            "termination",
-            json!({
-                "reason": fit.termination.reason.to_string(),
-                "converged": fit.termination.converged(),
-                "iterations": fit.termination.iterations,
-            }),
-        );
-        let quality = self.quality()?;
-        set(
-            "fit",
-            json!({
-                "vaf_simulation": number(quality.vaf_simulation),
-                "vaf_prediction": number(quality.vaf_prediction),
-                "nrmse_simulation": number(quality.nrmse_simulation),
-                "nrmse_prediction": number(quality.nrmse_prediction),
-                "coherent_share": optional(fit.coherent_share),
-            }),
-        );
+        set("termination", json::termination(&fit.termination));
+        let mut quality = json::goodness(&self.quality()?);
+        quality.insert("coherent_share".to_owned(), optional(fit.coherent_share));
+        set("fit", Value::Object(quality));
         set("operator", operator(of));
         if fit.operators.len() > 1 {
             set("operators", fit.operators.iter().map(operator).collect());
@@ -269,20 +254,10 @@ impl Found<'_> {
                 .collect(),
         );
         if let Some((file, q)) = &self.validation {
-            set(
-                "validation",
-                json!({
-                    "file": file,
-                    "vaf_simulation": number(q.vaf_simulation),
-                    "vaf_prediction": number(q.vaf_prediction),
-                    "nrmse_simulation": number(q.nrmse_simulation),
-                    "nrmse_prediction": number(q.nrmse_prediction),
-                }),
-            );
+            set("validation", json::validation(file, q));
         }
         set("candidates", json!([]));
-        let settings: Map<String, Value> = self.settings.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
-        set("settings", Value::Object(settings));
+        set("settings", json::settings(self.settings));
         Ok(Value::Object(map))
     }
 
@@ -295,8 +270,8 @@ impl Found<'_> {
         };
         let parameters: Vec<Value> = lines
             .parameters()
-            .into_iter()
-            .map(|(name, e)| json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)}))
+            .iter()
+            .map(|(name, e)| json::named(name, e))
             .collect();
         let mut map = Map::new();
         map.insert("parameters".to_owned(), Value::Array(parameters));

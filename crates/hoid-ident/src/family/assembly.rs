@@ -1,0 +1,227 @@
+//! From the search of the chosen form to the result: operators with their errors, what both methods
+//! say of each other, and the verdict.
+//!
+//! The order matters: both methods are compared with their own errors, and only then does their
+//! difference become a part of the errors of the operator (`Covariances::add_bias`).
+
+use hoid_model::{Complex64, Verdict, operator_family::Coordinate, uncertainty::variance_along};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::{
+    agreement::{Agreement, agreement},
+    choice::FormFigures,
+    covariances::BAND_RAD_S,
+    estimated::{Errors, Estimated, operator_of},
+    judgement::{Judged, findings},
+    line_fit::LineFit,
+    prediction::Prediction,
+    prediction_fit::PredictionFit,
+    result::{FamilyFit, FreeModel, OperatorOfRecord},
+    sensitivity::rivals,
+};
+use crate::{
+    IdentError, SearchOptions,
+    criterion::{Criterion, Workspace},
+    frequency::DescribingFunction,
+    grey_box::parametrisation::Parametrisation,
+    judgement::residuals::ResidualMeasures,
+    optimize::minimise,
+};
+
+/// What the lines of the excitation gave for a form.
+pub(super) struct AtLines<'d> {
+    pub describing: Option<&'d DescribingFunction>,
+    pub fit: Option<LineFit>,
+    /// Why there is no fit, where one was wanted.
+    pub why_none: Option<String>,
+}
+
+/// The search of the chosen form, and what its result is made from beside it.
+pub(super) struct Chosen<'p, 'a> {
+    pub fit: PredictionFit<'a>,
+    pub lines: AtLines<'p>,
+    /// All forms that were compared.
+    pub forms: Vec<FormFigures>,
+    pub prediction: &'p Prediction<'a>,
+    /// Variation of a person's gain from one run to the next, as a part of it.
+    pub run_to_run: f64,
+    /// Highest order of the noise models that the estimate is held against.
+    pub highest_order: usize,
+}
+
+impl Chosen<'_, '_> {
+    /// All that is said of the person.
+    ///
+    /// # Errors
+    /// Those of the model.
+    pub fn result(self, workspace: &mut Workspace) -> Result<FamilyFit, IdentError> {
+        let (fit, layout) = (&self.fit, self.fit.layout());
+        let separate = if self.prediction.individual.is_empty() {
+            1
+        } else {
+            self.prediction.data.len()
+        };
+        let mut errors = Errors::of(fit, self.run_to_run, workspace);
+        let error_ratio = errors.largest_ratio(fit);
+        let agreement = match &self.lines.fit {
+            Some(lines) => agreement_of(&Estimated::of(fit, &errors, 0)?, lines),
+            None => None,
+        };
+        self.add_bias(&mut errors, separate, workspace);
+        let mut operators = Vec::with_capacity(separate);
+        for record in 0..separate {
+            operators.push(operator_of(fit, &errors, record)?);
+        }
+        let free_model = free_model(fit, workspace);
+        let residuals = residuals(fit, workspace);
+        let of_delay = layout.delays().first().copied().unwrap_or(0);
+        let all_parameters: Vec<_> = operators.iter().flat_map(|o| o.parameters.clone()).collect();
+        let verdict = Verdict::of(findings(&Judged {
+            termination: fit.minimum.termination,
+            delay: (fit.eta()[of_delay], layout.limits()[of_delay]),
+            parameters: &all_parameters,
+            residuals,
+            lines: self.lines.fit.as_ref(),
+            no_lines: self.lines.why_none.as_deref(),
+            agreement: agreement.as_ref(),
+            free_model: free_model.as_ref(),
+            loss: fit.loss,
+            error_ratio,
+            cluster_kind: fit.clusters.kind,
+            clusters: fit.clusters.parts.len(),
+            has_covariance: errors.covariances.is_some(),
+            response_error: response_error(&operators[0]),
+        }));
+        let noise = &fit.eta()[layout.operator_elements()..];
+        Ok(FamilyFit {
+            form: layout.form,
+            neuromuscular: layout.neuromuscular,
+            noise_orders: (layout.nc, layout.nd),
+            noise: (noise[..layout.nc].to_vec(), noise[layout.nc..].to_vec()),
+            operators,
+            prior: self.prediction.prior.clone(),
+            forms: self.forms,
+            coherent_share: self.lines.describing.and_then(coherent_share),
+            lines: self.lines.fit,
+            no_lines: self.lines.why_none,
+            agreement,
+            free_model,
+            cluster_kind: fit.clusters.kind,
+            clusters: fit.clusters.parts.len(),
+            inflation: fit.inflation,
+            error_ratio,
+            loss: fit.loss,
+            innovation_variance: fit.innovation_variance,
+            residuals: fit.residuals,
+            termination: fit.minimum.termination,
+            sample_time: layout.sample_time,
+            verdict,
+        })
+    }
+
+    /// The difference to the fit at the lines becomes a part of the errors; without one, those to
+    /// fits with other noise models.
+    fn add_bias(&self, errors: &mut Errors, separate: usize, workspace: &mut Workspace) {
+        let fit = &self.fit;
+        let Some(covariances) = &mut errors.covariances else {
+            return;
+        };
+        match &self.lines.fit {
+            Some(lines) if separate == 1 => covariances.add_bias(fit, lines.operator.coordinates()),
+            _ => {
+                for rival in rivals(self.prediction, fit, self.highest_order, workspace) {
+                    covariances.add_bias(fit, &rival);
+                }
+            }
+        }
+        covariances.widen(fit, &mut errors.profiles);
+    }
+}
+
+/// Both methods beside each other, over the coordinates whose parameters are determined.
+fn agreement_of(operator: &Estimated, lines: &LineFit) -> Option<Agreement> {
+    let (one, other) = (operator.covariance.as_deref()?, lines.covariance.as_deref()?);
+    let all = operator
+        .operator
+        .form()
+        .coordinates(operator.operator.has_neuromuscular());
+    let determined = |wanted: Coordinate| {
+        let mut all = operator.parameters.iter();
+        all.any(|p| p.name == wanted.parameter() && p.determined)
+    };
+    let counts = |i: usize| all[i] == Coordinate::Gain || determined(all[i]);
+    agreement(
+        operator.operator.form(),
+        operator.operator.has_neuromuscular(),
+        (operator.operator.coordinates(), one),
+        (lines.operator.coordinates(), other),
+        counts,
+    )
+}
+
+/// Box-Jenkins of the same orders and delay from the polynomials of the fit, for one operator.
+fn free_model(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> Option<FreeModel> {
+    let layout = fit.layout();
+    if layout.elements.iter().any(|(_, record)| record.is_some()) {
+        return None;
+    }
+    let mapped = fit.criterion.model_of(fit.eta(), 0).ok()?;
+    let criterion = Criterion {
+        orders: mapped.orders,
+        data: fit.criterion.data.clone(),
+        initial: fit.criterion.initial,
+        first: fit.criterion.first,
+        weights: None,
+    };
+    let search = SearchOptions {
+        tolerance: 1e-8,
+        ..SearchOptions::default()
+    };
+    let found = minimise(&criterion, mapped.theta.clone(), &search, None, workspace)?;
+    let n = fit.residuals as f64;
+    let loss = found.at.sum_of_squares / n;
+    let freedom = mapped.theta.len().checked_sub(fit.parameters()).filter(|f| *f > 0)?;
+    let ratio = (n * (fit.loss / loss).ln() / fit.inflation).max(0.0);
+    let distribution = ChiSquared::new(freedom as f64).ok()?;
+    loss.is_finite().then(|| FreeModel {
+        loss,
+        likelihood_ratio: ratio,
+        degrees_of_freedom: freedom,
+        p_value: distribution.sf(ratio),
+    })
+}
+
+fn residuals(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> ResidualMeasures {
+    let data = &fit.criterion.data;
+    let first = fit.criterion.first;
+    let all: Vec<Vec<f64>> = (0..data.len())
+        .map(|record| fit.residuals_of(record, workspace).unwrap_or_default())
+        .collect();
+    let pairs: Vec<(&[f64], &[f64])> = all
+        .iter()
+        .zip(data)
+        .map(|(eps, d)| (eps.as_slice(), &d.e[first..first + eps.len()]))
+        .collect();
+    ResidualMeasures::of(&pairs, fit.layout().sample_time.s())
+}
+
+/// Mean squared coherence of the lines.
+fn coherent_share(describing: &DescribingFunction) -> Option<f64> {
+    let all: Option<Vec<f64>> = describing.lines.iter().map(|line| line.coherence).collect();
+    let all = all.filter(|all| !all.is_empty())?;
+    Some(all.iter().sum::<f64>() / all.len() as f64)
+}
+
+/// Smallest relative standard error of the response over the band of manual control.
+fn response_error(of: &OperatorOfRecord) -> Option<f64> {
+    let covariance = of.covariance.as_deref()?;
+    let error = |omega: f64| {
+        let response = of.operator.response_and_gradient(omega);
+        let along = |part: fn(Complex64) -> f64| -> f64 {
+            let gradient: Vec<f64> = response.gradient.iter().map(|g| part(g / response.value)).collect();
+            variance_along(&gradient, covariance)
+        };
+        (along(|z| z.re) + along(|z| z.im)).sqrt()
+    };
+    BAND_RAD_S.iter().map(|omega| error(*omega)).min_by(f64::total_cmp)
+}

@@ -1,0 +1,208 @@
+//! The operator of a record with its errors, out of eta and what is known of it.
+
+use hoid_model::{
+    FamilyOperator, NotConvertible, PolynomialModel, Structure, operator_family::Coordinate, uncertainty::Estimate,
+};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::{
+    covariances::{self, Covariances},
+    parameter::{Known, Parameter},
+    prediction_fit::PredictionFit,
+    profile::profile_interval,
+    result::OperatorOfRecord,
+};
+use crate::{
+    Fit, IdentError,
+    criterion::{Workspace, output_variance},
+    fit::Physical,
+    grey_box::parametrisation::Parametrisation,
+};
+
+/// How well eta is known.
+pub(super) struct Errors {
+    /// `None` where the information is singular.
+    pub covariances: Option<Covariances>,
+    /// Intervals by profile likelihood, where there are such.
+    pub profiles: Vec<Option<(f64, f64)>>,
+    /// Quantile of Student's distribution for 95 %.
+    quantile: f64,
+}
+
+impl Errors {
+    pub fn of(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace) -> Self {
+        let mut covariances = covariances::covariances(fit);
+        if let Some(covariances) = &mut covariances {
+            covariances.add_run_to_run(fit, run_to_run);
+        }
+        let quantile = quantile(fit.clusters.parts.len());
+        Self {
+            profiles: profiles(fit, covariances.as_ref(), quantile, workspace),
+            covariances,
+            quantile,
+        }
+    }
+
+    /// Largest ratio of a clustered to a model-based standard error.
+    pub fn largest_ratio(&self, fit: &PredictionFit<'_>) -> Option<f64> {
+        let (c, p) = (self.covariances.as_ref()?, fit.parameters());
+        let ratios = (0..fit.layout().operator_elements())
+            .map(|i| (c.clustered[i * p + i] / c.model_based[i * p + i]).sqrt())
+            .filter(|r| r.is_finite());
+        ratios.max_by(f64::total_cmp)
+    }
+}
+
+/// Quantile of Student's distribution for 95 % with n clusters.
+fn quantile(clusters: usize) -> f64 {
+    let freedom = clusters.saturating_sub(1).max(1) as f64;
+    StudentsT::new(0.0, 1.0, freedom).map_or(1.96, |t| t.inverse_cdf(0.975))
+}
+
+/// Intervals by profile likelihood of the elements whose interval reaches the end of what is
+/// sought: there the criterion is no parabola.
+fn profiles(
+    fit: &PredictionFit<'_>,
+    covariances: Option<&Covariances>,
+    quantile: f64,
+    workspace: &mut Workspace,
+) -> Vec<Option<(f64, f64)>> {
+    let p = fit.parameters();
+    let elements = fit.layout().operator_elements();
+    let mut profiles = vec![None; elements];
+    let Some(covariances) = covariances else {
+        return profiles;
+    };
+    for (i, profile) in profiles.iter_mut().enumerate() {
+        let (coordinate, _) = fit.layout().elements[i];
+        if !matches!(coordinate, Coordinate::LagRate | Coordinate::Lead | Coordinate::Droop) {
+            continue;
+        }
+        let (low, _) = fit.criterion.limits[i];
+        let x = fit.eta()[i];
+        let s = covariances.clustered[i * p + i].max(0.0).sqrt();
+        if x - quantile * s <= low {
+            let step = if s > 0.0 { 0.5 * s } else { 0.05 };
+            *profile = profile_interval(fit, i, step, quantile, workspace);
+        }
+    }
+    profiles
+}
+
+/// The operator of a record with its errors, its coordinates taken out of eta.
+pub(super) struct Estimated {
+    pub operator: FamilyOperator,
+    pub covariance: Option<Vec<f64>>,
+    model_based: Option<Vec<f64>>,
+    pub parameters: Vec<Parameter>,
+}
+
+impl Estimated {
+    pub fn of(fit: &PredictionFit<'_>, errors: &Errors, record: usize) -> Result<Self, IdentError> {
+        let layout = fit.layout();
+        let operator = layout.operator(fit.eta(), record)?;
+        let p = fit.parameters();
+        let places = &layout.positions(record)[..layout.coordinates()];
+        let part = |c: &[f64]| -> Vec<f64> {
+            places
+                .iter()
+                .flat_map(|&i| places.iter().map(move |&j| i * p + j))
+                .map(|at| c[at])
+                .collect()
+        };
+        let covariances = errors.covariances.as_ref();
+        let covariance = covariances.map(|c| part(&c.clustered));
+        let model_based = covariances.map(|c| part(&c.model_based));
+        let limits: Vec<(f64, f64)> = places.iter().map(|&i| layout.limits()[i]).collect();
+        let known = Known {
+            operator: &operator,
+            covariance: covariance.as_deref(),
+            prior_share: &places
+                .iter()
+                .map(|&i| prior_share(fit, model_based.as_deref(), places, i))
+                .collect::<Vec<_>>(),
+            limits: &limits,
+            profile: &places.iter().map(|&i| errors.profiles[i]).collect::<Vec<_>>(),
+            quantile: errors.quantile,
+        };
+        let parameters = known.parameters();
+        Ok(Self {
+            operator,
+            covariance,
+            model_based,
+            parameters,
+        })
+    }
+}
+
+/// Variance after the data over that before, of an element of eta.
+fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[usize], place: usize) -> f64 {
+    let Some(penalty) = fit.criterion.penalty.iter().find(|p| p.place == place) else {
+        return 0.0;
+    };
+    let Some((i, c)) = places.iter().position(|&q| q == place).zip(model_based) else {
+        return 1.0;
+    };
+    // The weight is kappa sigma^2/s^2, the covariance sigma^2 H^-1: both inflated by kappa.
+    let precision = penalty.curvature(fit.eta()) / fit.innovation_variance;
+    let variance = c[i * places.len() + i];
+    // At a bound nothing is known of it but the bound.
+    if variance > 0.0 {
+        (variance * precision).min(1.0)
+    } else {
+        1.0
+    }
+}
+
+/// The operator of a record, as one and as polynomials.
+pub(super) fn operator_of(
+    fit: &PredictionFit<'_>,
+    errors: &Errors,
+    record: usize,
+) -> Result<OperatorOfRecord, IdentError> {
+    let Estimated {
+        operator,
+        covariance,
+        model_based,
+        parameters,
+    } = Estimated::of(fit, errors, record)?;
+    let layout = fit.layout();
+    let p = fit.parameters();
+    let mapped = fit.criterion.model_of(fit.eta(), record)?;
+    let of_theta =
+        (errors.covariances.as_ref()).map(|c| mapped.covariance_of_theta(&c.clustered, p, layout.positions(record)));
+    let estimate = |q: &Parameter| Estimate {
+        value: q.value,
+        standard_error: q.standard_error,
+    };
+    let polynomial_fit = Fit {
+        held: vec![false; mapped.theta.len()],
+        model: PolynomialModel::new(Structure::BoxJenkins, mapped.orders, layout.sample_time, mapped.theta)?,
+        covariance: of_theta,
+        loss: fit.loss,
+        innovation_variance: fit.innovation_variance,
+        residuals: fit.residuals,
+        states: fit.states,
+        initial_state: fit.criterion.initial,
+        termination: fit.minimum.termination,
+        start: "own".to_owned(),
+        output_variance: output_variance(&fit.criterion.data, fit.criterion.first),
+        robust: false,
+        instrumented: false,
+        physical: Some(Box::new(Physical {
+            parameters: parameters.iter().map(|q| (q.name.clone(), estimate(q))).collect(),
+            free: p,
+            operator: Err(NotConvertible::OtherForm {
+                form: operator.form().to_string(),
+            }),
+            remnant: None,
+        })),
+    };
+    Ok(OperatorOfRecord {
+        operator,
+        covariance,
+        model_based,
+        parameters,
+        polynomial_fit,
+    })
+}

@@ -1,0 +1,89 @@
+//! Covariances from what an estimate is without each of several parts, and from a prior.
+//!
+//! **The jackknife** over n estimates `x_(i)`, each without one part of the data, is
+//! `(n-1)/n sum (x_(i) - mean)(x_(i) - mean)'` (B. Efron and C. Stein, *Annals of Statistics* 9
+//! (1981) 586-596). It is the same for their differences to any one point.
+//!
+//! **A prior** is a measurement that no part of the data holds. With P its curvature and H that of
+//! the whole criterion, what it leaves open is `H^-1 P H^-1`, in units of the variance of the
+//! residuals.
+
+use crate::grey_box::objective::Penalty;
+
+/// The jackknife by rows; `None` for fewer than two estimates.
+pub(super) fn jackknife(others: &[Vec<f64>]) -> Option<Vec<f64>> {
+    if others.len() < 2 {
+        return None;
+    }
+    let (n, p) = (others.len() as f64, others[0].len());
+    let mean: Vec<f64> = (0..p).map(|i| others.iter().map(|x| x[i]).sum::<f64>() / n).collect();
+    let mut covariance = vec![0.0; p * p];
+    for x in others {
+        for i in 0..p {
+            for j in 0..p {
+                covariance[i * p + j] += (x[i] - mean[i]) * (x[j] - mean[j]) * (n - 1.0) / n;
+            }
+        }
+    }
+    Some(covariance)
+}
+
+/// Adds `factor H^-1 P H^-1` at x; `inverse` is `H^-1` by rows.
+pub(super) fn add_open_part(covariance: &mut [f64], factor: f64, prior: &[Penalty], x: &[f64], inverse: &[f64]) {
+    let p = x.len();
+    for penalty in prior {
+        let (place, weight) = (penalty.place, factor * penalty.curvature(x));
+        for i in 0..p {
+            for j in 0..p {
+                covariance[i * p + j] += weight * inverse[i * p + place] * inverse[j * p + place];
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_jackknife_of_a_mean_is_the_variance_over_n() {
+        let x = [3.0, -1.0, 4.0, 1.5, 9.0];
+        let (n, sum) = (x.len() as f64, x.iter().sum::<f64>());
+        let others: Vec<Vec<f64>> = x.iter().map(|one| vec![(sum - one) / (n - 1.0), -2.0]).collect();
+        let variance = x.iter().map(|one| (one - sum / n).powi(2)).sum::<f64>() / (n - 1.0);
+        let found = jackknife(&others).unwrap();
+        assert!((found[0] - variance / n).abs() < 1e-14 * variance, "{found:?}");
+        assert_eq!(found[1..], [0.0; 3]);
+        assert_eq!(jackknife(&others[..1]), None);
+        assert_eq!(jackknife(&[]), None);
+    }
+
+    #[test]
+    fn data_and_prior_together_leave_the_inverse_open() {
+        // H = G + P: H^-1 G H^-1 + H^-1 P H^-1 = H^-1.
+        let penalty = |place, logarithmic, weight| Penalty {
+            place,
+            logarithmic,
+            mean: 0.3,
+            weight,
+        };
+        let (x, prior) = ([0.5, -2.0], [penalty(0, true, 0.75), penalty(1, false, 2.0)]);
+        // The logarithm has the slope 2 at 0.5: P = diag(3, 2).
+        let (g, h) = ([4.0, 1.0, 1.0, 5.0], [7.0, 1.0, 1.0, 7.0]);
+        let inverse: Vec<f64> = [h[3], -h[1], -h[2], h[0]].iter().map(|v| v / 48.0).collect();
+        let product = |a: &[f64], b: &[f64]| -> Vec<f64> {
+            let of = |i: usize, j: usize| a[2 * i] * b[j] + a[2 * i + 1] * b[2 + j];
+            vec![of(0, 0), of(0, 1), of(1, 0), of(1, 1)]
+        };
+        let mut total = product(&product(&inverse, &g), &inverse);
+        let of_data = total.clone();
+        add_open_part(&mut total, 1.0, &prior, &x, &inverse);
+        for (a, b) in total.iter().zip(&inverse) {
+            assert!((a - b).abs() < 1e-15, "{total:?}");
+        }
+        add_open_part(&mut total, -1.0, &prior, &x, &inverse);
+        for (a, b) in total.iter().zip(&of_data) {
+            assert!((a - b).abs() < 1e-15, "{total:?}");
+        }
+    }
+}

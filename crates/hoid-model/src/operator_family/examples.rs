@@ -1,0 +1,31 @@
+//! Operators that the tests of the family take.
+
+use super::{Coordinate, FamilyOperator, Form};
+
+/// An operator of each form as a person may have it.
+pub(super) fn operator(form: Form, neuromuscular: bool, tau_e_s: f64) -> FamilyOperator {
+    let value = |coordinate: &Coordinate| match coordinate {
+        Coordinate::Gain => 4.0,
+        Coordinate::Lead => 0.6,
+        Coordinate::LagRate => 0.2,
+        Coordinate::Linear => 0.9,
+        Coordinate::Quadratic => 0.3,
+        Coordinate::Droop => 0.4,
+        Coordinate::LogOmega => 11.0_f64.ln(),
+        Coordinate::LogZeta => 0.25_f64.ln(),
+        Coordinate::Delay => tau_e_s,
+    };
+    let values: Vec<f64> = form.coordinates(neuromuscular).iter().map(value).collect();
+    FamilyOperator::new(form, neuromuscular, &values).unwrap()
+}
+
+/// All forms that are proper, with and without the neuromuscular part, with each of these delays.
+pub(super) fn operators(delays_s: &[f64]) -> Vec<FamilyOperator> {
+    let mut all = Vec::new();
+    for form in Form::ALL {
+        for neuromuscular in [true, false].into_iter().filter(|nm| form.is_proper(*nm)) {
+            all.extend(delays_s.iter().map(|tau| operator(form, neuromuscular, *tau)));
+        }
+    }
+    all
+}
