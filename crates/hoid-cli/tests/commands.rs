@@ -406,6 +406,48 @@ fn convert_goes_both_ways_and_says_what_does_not_convert() {
 }
 
 #[test]
+fn convert_gives_the_operator_behind_three_poles_and_says_which_is_the_lag() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    // 25 (.6 s + 1)/(5 s + 1) with omega_nm = 12 rad/s, zeta_nm = .25, tau_e = .137 s.
+    let family = hoid_model::FamilyOperator::of_names(
+        hoid_model::Form::LeadLag,
+        &[
+            ("K", 25.0),
+            ("T_L", 0.6),
+            ("T_I", 5.0),
+            ("omega_nm", 12.0),
+            ("zeta_nm", 0.25),
+            ("tau_e", 0.137),
+        ]
+        .map(|(name, value)| (name.to_owned(), value)),
+    )
+    .unwrap();
+    let held = family.hold(hoid_model::SampleTime::HUNDREDTH).unwrap();
+    let list = |c: &[f64]| c.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    let (f, b, nk) = (list(&held.f), list(&held.b), held.nk.to_string());
+    let arguments = ["convert", "--f", &f, "--b", &b, "--nk", &nk, "--sample-time", "0.01"];
+    let found = json(d, &[&arguments[..], &["--json"]].concat());
+    let operator = &found["operator"];
+    assert_eq!(operator["form"], "lead-lag");
+    for (name, value) in [("K_over_T_I", 5.0), ("T_L", 0.6), ("T_I", 5.0), ("tau_e", 0.137)] {
+        let off = operator[name]["value"].as_f64().unwrap() - value;
+        assert!(off.abs() < 1e-4 * value, "{name} {off}");
+    }
+    assert_eq!(operator["real_poles"][0]["role"], "lag");
+    let page = good(d, &arguments);
+    assert!(page.contains("is the lag, T_I = 5.0"), "{page}");
+    assert!(page.contains("Form lead-lag"), "{page}");
+    let none = json(d, &["convert", "--f", "-0.5,0.1,0,0.01", "--b", "1", "--json"]);
+    assert!(
+        none["operator"]["reason"]
+            .as_str()
+            .unwrap()
+            .contains("one to three poles")
+    );
+}
+
+#[test]
 fn info_shows_what_is_inside() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();

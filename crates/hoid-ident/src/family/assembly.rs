@@ -17,7 +17,7 @@ use super::{
     prediction::Prediction,
     prediction_fit::PredictionFit,
     result::{FamilyFit, FreeModel, OperatorOfRecord},
-    sensitivity::rivals,
+    sensitivity::{LARGEST_SHARE_AT_LINES, MORE_WITHOUT_LINES, UNSEEN_WITHOUT_LINES, rivals},
 };
 use crate::{
     IdentError, SearchOptions,
@@ -119,18 +119,35 @@ impl Chosen<'_, '_> {
         })
     }
 
-    /// The difference to the fit at the lines becomes a part of the errors; without one, those to
-    /// fits with other noise models.
+    /// What the fit may be off by becomes a part of its errors: its difference to the fit at the
+    /// lines, and, for what the lines leave to the prior or without lines, its differences to fits
+    /// with other noise models ([`super::sensitivity`]).
     fn add_bias(&self, errors: &mut Errors, separate: usize, workspace: &mut Workspace) {
         let fit = &self.fit;
         let Some(covariances) = &mut errors.covariances else {
             return;
         };
+        let mut others = || rivals(self.prediction, fit, self.highest_order, workspace);
         match &self.lines.fit {
-            Some(lines) if separate == 1 => covariances.add_bias(fit, lines.operator.coordinates()),
+            Some(lines) if separate == 1 => {
+                let owes: Vec<bool> = (lines.prior_shares.iter())
+                    .map(|share| *share > LARGEST_SHARE_AT_LINES)
+                    .collect();
+                covariances.add_bias(fit, lines.operator.coordinates());
+                if owes.contains(&true) {
+                    for other in others() {
+                        covariances.add_besides(fit, &other, 1.0, |place| owes[place]);
+                    }
+                }
+            }
             _ => {
-                for rival in rivals(self.prediction, fit, self.highest_order, workspace) {
-                    covariances.add_bias(fit, &rival);
+                for other in others() {
+                    covariances.add_bias(fit, &other);
+                    covariances.add_besides(fit, &other, MORE_WITHOUT_LINES, |_| true);
+                }
+                for (place, (coordinate, _)) in fit.layout().elements.iter().enumerate() {
+                    let unseen = UNSEEN_WITHOUT_LINES.iter().find(|(of, _)| of == coordinate);
+                    covariances.besides[place] += unseen.map_or(0.0, |(_, deviation)| deviation * deviation);
                 }
             }
         }

@@ -9,6 +9,8 @@
 //! the next cannot be seen in one run: the variation of people's gain is added as it was seen in
 //! others (`covariances`).
 
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
 use super::layout::FamilyLayout;
 use crate::{
     IdentError,
@@ -23,6 +25,12 @@ const FEWEST_RECORDS: usize = 5;
 const BLOCKS: usize = 8;
 /// Shortest block, s.
 const SHORTEST_BLOCK_S: f64 = 4.0;
+
+/// Quantile of Student's distribution for 95 % with n clusters.
+pub(super) fn quantile(clusters: usize) -> f64 {
+    let freedom = clusters.saturating_sub(1).max(1) as f64;
+    StudentsT::new(0.0, 1.0, freedom).map_or(1.96, |t| t.inverse_cdf(0.975))
+}
 
 /// What the clusters are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -31,6 +31,9 @@ pub(super) const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
 pub(super) struct Covariances {
     pub clustered: Vec<f64>,
     pub model_based: Vec<f64>,
+    /// Variances that single elements have besides. They are no part of the covariance: the
+    /// response is known better than they are, since the elements err together.
+    pub besides: Vec<f64>,
 }
 
 impl Covariances {
@@ -40,17 +43,25 @@ impl Covariances {
     /// scatter shows; an estimate that does not rest on that noise model tells of it. What errors
     /// are made of is then the mean squared error, variance and squared bias, with d for the bias:
     /// all of it, and not the `d d'/3` of a truth that may lie anywhere between the two, since the
-    /// bias is on one side. Elements at a bound stay without a variance.
+    /// bias is on one side. Elements at a bound stay as they are.
     pub fn add_bias(&mut self, fit: &PredictionFit<'_>, other: &[f64]) {
         let p = fit.parameters();
         let mut difference = vec![0.0; p];
-        let elements = fit.layout().operator_elements();
-        for place in fit.free().into_iter().filter(|place| *place < elements) {
-            difference[place] = fit.eta()[place] - other[place];
+        for (place, d) in differences(fit, other) {
+            difference[place] = d;
         }
         for i in 0..p {
             for j in 0..p {
                 self.clustered[i * p + j] += difference[i] * difference[j];
+            }
+        }
+    }
+
+    /// Adds `weight d^2` to the variances of single elements, of those that it counts for.
+    pub fn add_besides(&mut self, fit: &PredictionFit<'_>, other: &[f64], weight: f64, counts: impl Fn(usize) -> bool) {
+        for (place, d) in differences(fit, other) {
+            if counts(place) {
+                self.besides[place] += weight * d * d;
             }
         }
     }
@@ -61,7 +72,7 @@ impl Covariances {
         let p = fit.parameters();
         for (i, profile) in profiles.iter_mut().enumerate() {
             let Some((low, high)) = profile else { continue };
-            let ratio = self.clustered[i * p + i] / (fit.inflation * self.model_based[i * p + i]);
+            let ratio = (self.clustered[i * p + i] + self.besides[i]) / (fit.inflation * self.model_based[i * p + i]);
             if ratio.is_finite() && ratio > 1.0 {
                 let (x, (least, most)) = (fit.eta()[i], fit.criterion.limits[i]);
                 *low = (x - (x - *low) * ratio.sqrt()).max(least);
@@ -87,14 +98,25 @@ impl Covariances {
     }
 }
 
-/// Inverse of `G + P` by rows, zero for elements at a bound.
+/// What the operator's elements off their bounds differ by from another estimate.
+fn differences(fit: &PredictionFit<'_>, other: &[f64]) -> Vec<(usize, f64)> {
+    let elements = fit.layout().operator_elements();
+    let free = fit.free().into_iter().filter(|place| *place < elements);
+    free.map(|place| (place, fit.eta()[place] - other[place])).collect()
+}
+
+/// Inverse of `G + P` by rows, over all elements that were sought.
+///
+/// Where one rests at its bound, as `1/T_I = 0`, the others would look better known than they are
+/// if it were held there: the truth may lie off the bound, and a lead and a gain move with it.
 fn inverse(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
     let p = fit.parameters();
+    let sought = fit.sought();
     let mut inverse = vec![0.0; p * p];
-    for i in fit.free() {
+    for &i in &sought {
         let mut unit = vec![0.0; p];
         unit[i] = 1.0;
-        let column = fit.solve(None, &unit)?;
+        let column = fit.solve(&sought, None, &unit)?;
         (0..p).for_each(|j| inverse[j * p + i] = column[j]);
     }
     Some(inverse)
@@ -117,21 +139,27 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
         // H^-1 G H^-1 + H^-1 P H^-1 = H^-1, all of it inflated.
         ClusterKind::Blocks => inverse.iter().map(|g| scale * g).collect(),
     };
-    Some(Covariances { clustered, model_based })
+    Some(Covariances {
+        clustered,
+        model_based,
+        besides: vec![0.0; p],
+    })
 }
 
 /// The jackknife over clusters.
 fn over_clusters(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
-    let parts = &fit.clusters.parts;
-    let steps: Option<Vec<Vec<f64>>> = parts.iter().map(|(g, big)| fit.solve(Some(big), g)).collect();
+    let (parts, sought) = (&fit.clusters.parts, fit.sought());
+    let steps: Option<Vec<Vec<f64>>> = (parts.iter())
+        .map(|(g, big)| fit.solve(&sought, Some(big), g))
+        .collect();
     jackknife(&steps?)
 }
 
 /// The estimates without each of the clusters.
 pub(super) fn without_each(fit: &PredictionFit<'_>) -> Option<Vec<Vec<f64>>> {
-    let limits = &fit.criterion.limits;
+    let (limits, free) = (&fit.criterion.limits, fit.free());
     let of = |(g, big): &(Vec<f64>, Vec<f64>)| {
-        let step = fit.solve(Some(big), g)?;
+        let step = fit.solve(&free, Some(big), g)?;
         let moved = fit.eta().iter().zip(step).zip(limits);
         Some(moved.map(|((x, s), (low, high))| (x - s).clamp(*low, *high)).collect())
     };

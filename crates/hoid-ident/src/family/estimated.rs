@@ -3,9 +3,9 @@
 use hoid_model::{
     FamilyOperator, NotConvertible, PolynomialModel, Structure, operator_family::Coordinate, uncertainty::Estimate,
 };
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::{
+    clusters::quantile,
     covariances::{self, Covariances},
     parameter::{Known, Parameter},
     prediction_fit::PredictionFit,
@@ -51,12 +51,6 @@ impl Errors {
             .filter(|r| r.is_finite());
         ratios.max_by(f64::total_cmp)
     }
-}
-
-/// Quantile of Student's distribution for 95 % with n clusters.
-fn quantile(clusters: usize) -> f64 {
-    let freedom = clusters.saturating_sub(1).max(1) as f64;
-    StudentsT::new(0.0, 1.0, freedom).map_or(1.96, |t| t.inverse_cdf(0.975))
 }
 
 /// Intervals by profile likelihood of the elements whose interval reaches the end of what is
@@ -113,10 +107,17 @@ impl Estimated {
         let covariances = errors.covariances.as_ref();
         let covariance = covariances.map(|c| part(&c.clustered));
         let model_based = covariances.map(|c| part(&c.model_based));
+        // Of single parameters: with what they are uncertain by besides.
+        let of_parameters = covariances.zip(covariance.clone()).map(|(c, mut of_all)| {
+            for (i, &place) in places.iter().enumerate() {
+                of_all[i * places.len() + i] += c.besides[place];
+            }
+            of_all
+        });
         let limits: Vec<(f64, f64)> = places.iter().map(|&i| layout.limits()[i]).collect();
         let known = Known {
             operator: &operator,
-            covariance: covariance.as_deref(),
+            covariance: of_parameters.as_deref(),
             prior_share: &places
                 .iter()
                 .map(|&i| prior_share(fit, model_based.as_deref(), places, i))
@@ -146,8 +147,9 @@ fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[u
     // The weight is kappa sigma^2/s^2, the covariance sigma^2 H^-1: both inflated by kappa.
     let precision = penalty.curvature(fit.eta()) / fit.innovation_variance;
     let variance = c[i * places.len() + i];
+    let ((low, high), x) = (fit.criterion.limits[place], fit.eta()[place]);
     // At a bound nothing is known of it but the bound.
-    if variance > 0.0 {
+    if variance > 0.0 && low < x && x < high {
         (variance * precision).min(1.0)
     } else {
         1.0

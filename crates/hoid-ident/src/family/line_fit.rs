@@ -24,6 +24,9 @@ pub struct LineFit {
     /// Covariance of its coordinates by rows: by the jackknife over five or more runs, else from
     /// the variances of the lines; with the part that the prior leaves open.
     pub covariance: Option<Vec<f64>>,
+    /// Variance after the lines over that before, for each coordinate: 0 without a prior, 1 at a
+    /// bound.
+    pub prior_shares: Vec<f64>,
     /// chi^2 of the lines.
     pub chi_squared: f64,
     /// Real equations (two a line) less free parameters.
@@ -85,6 +88,7 @@ pub(super) fn line_fit(
             others.push(without.coordinates);
         }
     }
+    let prior_shares = criterion.prior_shares(&found);
     let by_runs = (runs >= FEWEST_RUNS && others.len() == runs)
         .then(|| jackknife(&others))
         .flatten();
@@ -101,6 +105,7 @@ pub(super) fn line_fit(
     let fit = LineFit {
         operator: operator_of(&found.coordinates)?,
         covariance,
+        prior_shares,
         chi_squared: found.chi_squared,
         degrees_of_freedom: (2 * lines.points.len()).saturating_sub(free),
         held_out: (held_out.len() == runs && runs >= 3).then_some(held_out),

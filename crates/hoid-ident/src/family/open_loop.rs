@@ -17,6 +17,8 @@ use super::response_fit::hold;
 
 /// Where crossovers are looked for, rad/s.
 const RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
+/// Quantile of the normal distribution for 95 %.
+const NORMAL: f64 = 1.959_963_984_540_054;
 /// Points of the scan.
 const POINTS: usize = 400;
 
@@ -27,6 +29,25 @@ pub struct LoopMeasures {
     pub crossover_rad_s: Estimate,
     /// Phase margin phi_m, deg, between -180 and 180.
     pub phase_margin_deg: Estimate,
+    /// Quantile for the intervals of 95 %: Student's where the errors rest on few clusters.
+    pub quantile: f64,
+}
+
+impl LoopMeasures {
+    /// Interval of 95 % of the crossover frequency, rad/s.
+    pub fn crossover_interval(&self) -> Option<(f64, f64)> {
+        self.interval(self.crossover_rad_s)
+    }
+
+    /// Interval of 95 % of the phase margin, deg.
+    pub fn phase_margin_interval(&self) -> Option<(f64, f64)> {
+        self.interval(self.phase_margin_deg)
+    }
+
+    fn interval(&self, of: Estimate) -> Option<(f64, f64)> {
+        let reach = self.quantile * of.standard_error?;
+        Some((of.value - reach, of.value + reach))
+    }
 }
 
 /// The measures of an operator whose coordinates have this covariance; `None` where `|L|` does not
@@ -71,6 +92,7 @@ pub fn loop_measures(
     Some(LoopMeasures {
         crossover_rad_s: estimate(omega, &by_crossover),
         phase_margin_deg: estimate(margin, &by_margin),
+        quantile: NORMAL,
     })
 }
 

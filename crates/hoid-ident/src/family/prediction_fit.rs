@@ -72,10 +72,10 @@ impl PredictionFit<'_> {
         squares.is_finite().then_some(squares)
     }
 
-    /// `G + P` less what is taken away, solved for a right-hand side over the free elements.
-    pub fn solve(&self, less: Option<&[f64]>, rhs: &[f64]) -> Option<Vec<f64>> {
+    /// `G + P` less what is taken away, solved for a right-hand side over these elements; zero for
+    /// the others.
+    pub fn solve(&self, free: &[usize], less: Option<&[f64]>, rhs: &[f64]) -> Option<Vec<f64>> {
         let p = self.parameters();
-        let free = self.free();
         let gram = |i: usize, j: usize| self.minimum.at.gram[i * p + j] - less.map_or(0.0, |l| l[i * p + j]);
         let part: Vec<f64> = free
             .iter()
@@ -96,5 +96,12 @@ impl PredictionFit<'_> {
         (0..eta.len())
             .filter(|&i| limits[i].0 < eta[i] && eta[i] < limits[i].1)
             .collect()
+    }
+
+    /// Elements of eta that were sought, at a bound or off it: what others are uncertain by because
+    /// of one that rests at its bound, where the truth need not be.
+    pub fn sought(&self) -> Vec<usize> {
+        let limits = &self.criterion.limits;
+        (0..limits.len()).filter(|&i| limits[i].0 < limits[i].1).collect()
     }
 }

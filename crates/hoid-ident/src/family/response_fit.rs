@@ -145,6 +145,22 @@ impl<'p> ResponseCriterion<'p> {
         Some(covariance)
     }
 
+    /// Variance of each coordinate with the points over that of its prior: 0 without a prior, 1 at a
+    /// bound or where there is no covariance.
+    pub fn prior_shares(&self, minimum: &ResponseMinimum) -> Vec<f64> {
+        let x = &minimum.coordinates;
+        let (p, inner, covariance) = (x.len(), self.inner(x), self.covariance(minimum));
+        let mut shares = vec![0.0; p];
+        for penalty in &self.penalty {
+            let i = penalty.place;
+            shares[i] = match &covariance {
+                Some(c) if inner.contains(&i) => (c[i * p + i] * penalty.curvature(x)).min(1.0),
+                _ => 1.0,
+            };
+        }
+        shares
+    }
+
     /// Coordinates off their bounds.
     fn inner(&self, x: &[f64]) -> Vec<usize> {
         (0..x.len())

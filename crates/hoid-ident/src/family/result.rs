@@ -8,7 +8,7 @@ use hoid_model::{
 use super::{
     agreement::Agreement,
     choice::FormFigures,
-    clusters::ClusterKind,
+    clusters::{ClusterKind, quantile},
     line_fit::LineFit,
     open_loop::{LoopMeasures, loop_measures},
     parameter::Parameter,
@@ -104,13 +104,26 @@ impl FamilyFit {
     /// the loop has no crossover.
     pub fn loop_measures(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let of = self.operator(record);
-        loop_measures(&of.operator, of.covariance.as_deref(), element, self.sample_time)
+        self.measured(&of.operator, of.covariance.as_deref(), element)
     }
 
     /// Crossover frequency and phase margin of the fit at the lines.
     pub fn loop_measures_at_lines(&self, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let lines = self.lines.as_ref()?;
-        loop_measures(&lines.operator, lines.covariance.as_deref(), element, self.sample_time)
+        self.measured(&lines.operator, lines.covariance.as_deref(), element)
+    }
+
+    fn measured(
+        &self,
+        operator: &FamilyOperator,
+        covariance: Option<&[f64]>,
+        element: &ContinuousTransferFunction,
+    ) -> Option<LoopMeasures> {
+        let measures = loop_measures(operator, covariance, element, self.sample_time)?;
+        Some(LoopMeasures {
+            quantile: quantile(self.clusters),
+            ..measures
+        })
     }
 
     /// A coordinate of a record with its standard error.

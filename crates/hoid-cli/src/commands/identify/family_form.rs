@@ -374,10 +374,16 @@ fn measures(found: Option<&LoopMeasures>) -> String {
     let Some(m) = found else {
         return "no crossover".to_owned();
     };
+    let interval = |of: Option<(f64, f64)>| match of {
+        Some((low, high)) => format!(" (95 %: {} to {})", numbers::plain(low), numbers::plain(high)),
+        None => String::new(),
+    };
     format!(
-        "crossover {} rad/s, phase margin {} deg",
+        "crossover {} rad/s{}, phase margin {} deg{}",
         with_error(m.crossover_rad_s.value, m.crossover_rad_s.standard_error),
-        with_error(m.phase_margin_deg.value, m.phase_margin_deg.standard_error)
+        interval(m.crossover_interval()),
+        with_error(m.phase_margin_deg.value, m.phase_margin_deg.standard_error),
+        interval(m.phase_margin_interval()),
     )
 }
 
@@ -428,10 +434,15 @@ fn operator(of: &OperatorOfRecord) -> Value {
 }
 
 fn open_loop(found: Option<&LoopMeasures>) -> Value {
-    let estimate = |e: Option<Estimate>| e.as_ref().map_or(Value::Null, json::estimate);
+    let estimate = |e: Option<Estimate>, interval: Option<(f64, f64)>| {
+        let mut value = json::estimate(&e?);
+        let ends = interval.map_or(Value::Null, |(low, high)| json!([number(low), number(high)]));
+        value.as_object_mut()?.insert("interval".to_owned(), ends);
+        Some(value)
+    };
     json!({
-        "crossover_rad_s": estimate(found.map(|m| m.crossover_rad_s)),
-        "phase_margin_deg": estimate(found.map(|m| m.phase_margin_deg)),
+        "crossover_rad_s": estimate(found.map(|m| m.crossover_rad_s), found.and_then(|m| m.crossover_interval())),
+        "phase_margin_deg": estimate(found.map(|m| m.phase_margin_deg), found.and_then(|m| m.phase_margin_interval())),
     })
 }
 

@@ -138,9 +138,9 @@ fn found(fit: &FamilyFit, person: &Person) -> Found {
         .collect();
     let element = &person.state.controlled_element;
     let true_loop = loop_measures(truth, None, element, fit.sample_time);
-    if let (Some(true_loop), Some(own)) = (true_loop, fit.loop_measures(0, element)) {
+    if let (Some(true_loop), Some(own_loop)) = (true_loop, fit.loop_measures(0, element)) {
         let mut put = |name: &str, truth: Estimate, own: Estimate| {
-            for (suffix, quantile) in [("", student(fit.clusters)), (" (1.96)", 1.96)] {
+            for (suffix, quantile) in [("", own_loop.quantile), (" (1.96)", 1.96)] {
                 quantities.push(Quantity {
                     name: format!("{name}{suffix}"),
                     truth: truth.value,
@@ -154,8 +154,8 @@ fn found(fit: &FamilyFit, person: &Person) -> Found {
                 });
             }
         };
-        put("crossover", true_loop.crossover_rad_s, own.crossover_rad_s);
-        put("phase margin", true_loop.phase_margin_deg, own.phase_margin_deg);
+        put("crossover", true_loop.crossover_rad_s, own_loop.crossover_rad_s);
+        put("phase margin", true_loop.phase_margin_deg, own_loop.phase_margin_deg);
     }
     Found {
         form: fit.form,
@@ -166,12 +166,6 @@ fn found(fit: &FamilyFit, person: &Person) -> Found {
         noise_order: fit.noise_orders.1,
         quantities,
     }
-}
-
-/// Student's quantile for 95 % with n clusters, as the intervals of parameters have it.
-fn student(clusters: usize) -> f64 {
-    const QUANTILES: [f64; 9] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262];
-    QUANTILES[clusters.saturating_sub(2).min(QUANTILES.len() - 1)]
 }
 
 fn response_error(found: &FamilyOperator, truth: &FamilyOperator) -> f64 {
