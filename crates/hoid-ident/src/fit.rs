@@ -40,6 +40,8 @@ pub struct Fit {
 /// What a grey box fitted: theta is a function of these.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Physical {
+    /// What was fitted, in a line.
+    pub title: String,
     /// Name and estimate of each parameter.
     pub parameters: Vec<(String, Estimate)>,
     /// Number of parameters that were free.
@@ -239,10 +241,11 @@ impl Fit {
         self.physical.is_some()
     }
 
-    /// Structure and orders as in print.
+    /// Structure and orders as in print; of a grey box or an operator of the family, what its
+    /// parameters are.
     pub fn title(&self) -> String {
         match &self.physical {
-            Some(_) => format!("Grey box with a remnant of order m = {}", self.orders().nd),
+            Some(physical) => physical.title.clone(),
             None => format!("{}({})", self.model.structure().label(), self.orders()),
         }
     }

@@ -222,12 +222,7 @@ impl PyOperatorFit {
 
     #[getter]
     fn title(&self) -> String {
-        let (nc, nd) = self.found.noise_orders;
-        let muscles = match self.found.neuromuscular {
-            true => " with neuromuscular dynamics",
-            false => "",
-        };
-        format!("Operator: {}{muscles}; noise nc = {nc}, nd = {nd}", self.found.form)
+        self.found.title()
     }
 
     /// Those of the common operator, or of the operator of each record.

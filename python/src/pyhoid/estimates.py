@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from . import _text
 from .errors import NotConvertibleError
 
 __all__ = ["Estimate", "Operator", "Remnant"]
+
+_T = TypeVar("_T")
 
 #: Units of parameters that have one.
 UNITS: Mapping[str, str] = {
@@ -49,7 +51,34 @@ def estimates(found: Mapping[str, Any]) -> dict[str, Estimate | None]:
     return {name: None if pair is None else Estimate(*pair) for name, pair in found.items()}
 
 
-class _Converted(Mapping[str, Estimate]):
+class Named(Mapping[str, _T]):
+    """Values by name, which are also attributes."""
+
+    #: What has them, in messages.
+    _owner = "it"
+    _all: dict[str, _T]
+
+    def __getitem__(self, name: str) -> _T:
+        return self._all[name]
+
+    def __getattr__(self, name: str) -> _T:
+        if name.startswith("_") or "_all" not in self.__dict__:
+            raise AttributeError(name)
+        try:
+            return self._all[name]
+        except KeyError:
+            raise AttributeError(
+                f"{self._owner} has no parameter {name}; it has {', '.join(self._all)}"
+            ) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._all)
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+
+class _Converted(Named[Estimate]):
     """Estimates by name, or the reason why there are none."""
 
     _what = "the model"
@@ -67,25 +96,12 @@ class _Converted(Mapping[str, Estimate]):
 
     def __getitem__(self, name: str) -> Estimate:
         self._need()
-        return self._all[name]
+        return super().__getitem__(name)
 
     def __getattr__(self, name: str) -> Estimate:
-        if name.startswith("_") or "_all" not in self.__dict__:
-            raise AttributeError(name)
-        if name in UNITS and not self.convertible:
+        if name in UNITS and "_all" in self.__dict__ and not self.convertible:
             self._need()
-        try:
-            return self._all[name]
-        except KeyError:
-            raise AttributeError(
-                f"{type(self).__name__} has no parameter {name}; it has {', '.join(self._all)}"
-            ) from None
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._all)
-
-    def __len__(self) -> int:
-        return len(self._all)
+        return super().__getattr__(name)
 
     def _rows(self) -> list[list[str]]:
         return [
@@ -130,6 +146,7 @@ class Operator(_Converted):
     """
 
     _what = "the operator"
+    _owner = "Operator"
 
     def __init__(self, found: Mapping[str, Any]) -> None:
         super().__init__(found)
@@ -147,6 +164,7 @@ class Remnant(_Converted):
     """
 
     _what = "the remnant"
+    _owner = "Remnant"
 
     def __init__(self, found: Mapping[str, Any]) -> None:
         super().__init__(found)

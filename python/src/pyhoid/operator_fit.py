@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,7 +12,7 @@ from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
 from ._options import Order
 from .errors import FormatError, OptionError
-from .estimates import Estimate, estimates
+from .estimates import Estimate, Named, estimates
 from .fit import Fit
 from .record import Record
 from .verdict import Verdict
@@ -72,30 +72,13 @@ class OperatorParameter(NamedTuple):
         return repr(Estimate(self.value, self.standard_error))
 
 
-class OperatorParameters(Mapping[str, OperatorParameter]):
+class OperatorParameters(Named[OperatorParameter]):
     """Parameters of an operator by name; they are also attributes (``parameters.K.value``)."""
+
+    _owner = "the operator"
 
     def __init__(self, found: Mapping[str, OperatorParameter]) -> None:
         self._all = dict(found)
-
-    def __getitem__(self, name: str) -> OperatorParameter:
-        return self._all[name]
-
-    def __getattr__(self, name: str) -> OperatorParameter:
-        if name.startswith("_") or "_all" not in self.__dict__:
-            raise AttributeError(name)
-        try:
-            return self._all[name]
-        except KeyError:
-            raise AttributeError(
-                f"the operator has no parameter {name}; it has {', '.join(self._all)}"
-            ) from None
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._all)
-
-    def __len__(self) -> int:
-        return len(self._all)
 
     def _rows(self) -> list[list[str]]:
         rows = []

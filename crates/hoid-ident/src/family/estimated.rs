@@ -10,7 +10,7 @@ use super::{
     parameter::{Known, Parameter},
     prediction_fit::PredictionFit,
     profile::profile_interval,
-    result::OperatorOfRecord,
+    result::{OperatorOfRecord, title},
 };
 use crate::{
     Fit, IdentError,
@@ -192,6 +192,7 @@ pub(super) fn operator_of(
         robust: false,
         instrumented: false,
         physical: Some(Box::new(Physical {
+            title: title(layout.form, layout.neuromuscular, (layout.nc, layout.nd)),
             parameters: parameters.iter().map(|q| (q.name.clone(), estimate(q))).collect(),
             free: p,
             operator: Err(NotConvertible::OtherForm {

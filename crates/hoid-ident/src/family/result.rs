@@ -94,7 +94,22 @@ pub struct FamilyFit {
     pub verdict: Verdict,
 }
 
+/// An operator with its noise model, in a line.
+pub(super) fn title(form: Form, neuromuscular: bool, (nc, nd): (usize, usize)) -> String {
+    let muscles = if neuromuscular {
+        " with neuromuscular dynamics"
+    } else {
+        ""
+    };
+    format!("Operator: {form}{muscles}; noise nc = {nc}, nd = {nd}")
+}
+
 impl FamilyFit {
+    /// Form and noise model in a line; [`Fit::title`] of its polynomials says the same.
+    pub fn title(&self) -> String {
+        title(self.form, self.neuromuscular, self.noise_orders)
+    }
+
     /// The operator of a record; of records beyond them, the last.
     pub fn operator(&self, record: usize) -> &OperatorOfRecord {
         &self.operators[record.min(self.operators.len() - 1)]
@@ -136,5 +151,33 @@ impl FamilyFit {
             Some(c) => Estimate::with_variance(x[i], c[i * x.len() + i]),
             None => Estimate::fixed(x[i]),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::{
+        Form,
+        scenario::{Condition, Scenario},
+    };
+    use hoid_sim::{RunSeed, Simulator};
+
+    use crate::family::FamilyEstimator;
+
+    #[test]
+    fn the_polynomials_have_the_title_of_the_operator() {
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        let record = simulator.run(RunSeed::default(), false).unwrap();
+        let estimator = FamilyEstimator {
+            forms: vec![Form::Lead],
+            nd: 1..=1,
+            ..FamilyEstimator::default()
+        };
+        let fit = estimator.fit(&[record]).unwrap();
+        assert_eq!(
+            fit.title(),
+            "Operator: lead with neuromuscular dynamics; noise nc = 0, nd = 1"
+        );
+        assert_eq!(fit.operator(0).polynomial_fit.title(), fit.title());
     }
 }

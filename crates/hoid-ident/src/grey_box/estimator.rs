@@ -277,6 +277,7 @@ impl GreyBox {
         };
         for record in 0..fit.fits.len() {
             let physical = Physical {
+                title: format!("Grey box with a remnant of order m = {}", layout.order),
                 parameters: fit.parameters(),
                 free: fit.parameters,
                 operator: fit.operator(record),

@@ -84,12 +84,11 @@ impl GreyBoxFit {
             .enumerate()
             .map(|(k, record)| self.polynomial_fit(k).residuals(record))
             .collect::<Result<Vec<_>, _>>()?;
-        let pairs: Vec<(&[f64], &[f64])> = found
-            .iter()
-            .zip(records)
-            .map(|(eps, record)| (eps.values.as_slice(), &record.input()[eps.first..]))
-            .collect();
-        Ok(ResidualMeasures::of(&pairs, self.layout.sample_time.s()))
+        Ok(ResidualMeasures::of_series(
+            &found,
+            records,
+            self.layout.sample_time.s(),
+        ))
     }
 }
 

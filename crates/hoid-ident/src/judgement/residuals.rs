@@ -13,7 +13,9 @@
 //! errors `1/sqrt(n)` of a correlation of white noise, and 20/n of the sum of squares, which one
 //! of n normal residuals exceeds with the probability 8e-6 n.
 
-use hoid_model::Finding;
+use hoid_model::{Finding, Record};
+
+use crate::fit::Series;
 
 /// Autocorrelation of the residuals beyond which the noise model is too poor.
 const LARGEST_AUTOCORRELATION: f64 = 0.1;
@@ -47,6 +49,16 @@ pub(crate) struct ResidualMeasures {
 }
 
 impl ResidualMeasures {
+    /// Measures of residuals as series of their records.
+    pub fn of_series(found: &[Series], records: &[Record], sample_time_s: f64) -> Self {
+        let pairs: Vec<(&[f64], &[f64])> = found
+            .iter()
+            .zip(records)
+            .map(|(eps, record)| (eps.values.as_slice(), &record.input()[eps.first..]))
+            .collect();
+        Self::of(&pairs, sample_time_s)
+    }
+
     /// Measures of the residuals of all records, with the error that belongs to each residual (none
     /// for a model without an input).
     pub fn of(records: &[(&[f64], &[f64])], sample_time_s: f64) -> Self {

@@ -75,13 +75,8 @@ impl SigmoidFit {
             .iter()
             .map(|record| self.residuals(record))
             .collect::<Result<Vec<_>, _>>()?;
-        let pairs: Vec<(&[f64], &[f64])> = found
-            .iter()
-            .zip(records)
-            .map(|(eps, record)| (eps.values.as_slice(), &record.input()[eps.first..]))
-            .collect();
         let ts = records.first().map_or(1.0, |record| record.sample_time().s());
-        Ok(ResidualMeasures::of(&pairs, ts))
+        Ok(ResidualMeasures::of_series(&found, records, ts))
     }
 }
 

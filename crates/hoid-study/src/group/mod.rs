@@ -15,6 +15,7 @@
 //! | `responses` | frequency responses of the fits |
 //! | [`VirtualExperiment`] | the same from simulated subjects, with the defects of recorded data ([`SamplingDefect`]) |
 //! | [`PeopleExperiment`] | the same from persons drawn over the family of operators |
+//! | `virtual_files` | the files of either |
 //! | `frequency` | describing functions by subject and condition, and how far the fits are from them |
 //! | `settling` | how fast the recursions follow a change at a known instant, and how noisy they are |
 //! | `averages` | means over the runs, chosen delays, averages of traces |
@@ -48,6 +49,7 @@ mod settling;
 mod summary;
 mod tables;
 mod traces;
+mod virtual_files;
 mod virtual_people;
 mod virtual_subjects;
 mod windows;

@@ -16,12 +16,8 @@ use hoid_sim::{
 };
 
 use super::{
-    analysis_settings::AnalysisSettings,
-    condition_settings::ConditionSettings,
-    manifest::{MANIFEST, Manifest, RunEntry},
-    preparation_settings::PreparationSettings,
-    read_settings::ReadSettings,
-    sampling_defects::{SamplingDefect, recorded},
+    analysis_settings::AnalysisSettings, condition_settings::ConditionSettings, manifest::Manifest,
+    sampling_defects::SamplingDefect, virtual_files::VirtualFiles,
 };
 use crate::{StudyError, columns::Rows};
 
@@ -94,11 +90,7 @@ pub fn simulate_people(
     each: &dyn Fn(),
 ) -> Result<Manifest, StudyError> {
     experiment.check()?;
-    if directory.join(MANIFEST).exists() {
-        return Err(StudyError::ExperimentThere {
-            directory: directory.display().to_string(),
-        });
-    }
+    VirtualFiles::refuse_another(directory)?;
     // Nobody is written before everybody is found.
     let mut people = Vec::new();
     for subject in 1..=experiment.subjects {
@@ -106,34 +98,21 @@ pub fn simulate_people(
             people.push((subject, experiment.person(subject, place, *plant)?));
         }
     }
-    hoid_io::make_directory(directory)?;
-    let mut runs = Vec::new();
+    let mut files = VirtualFiles::new(directory, &COLUMNS, &experiment.defects)?;
     let mut truth = Rows::new(&truth_schema());
     for (subject, person) in &people {
         for run in 1..=experiment.runs {
             let found = person.run(run).map_err(|error| virtual_error(&error))?;
-            let condition = person.plant.to_string();
-            let file = format!("S{subject}_{condition}_{run}.csv");
             let noise = RunSeed {
                 cell: DEFECTS - person.run_seed(run).cell,
                 ..person.run_seed(run)
             }
             .white_noise(found.record.len());
-            let table = recorded(&found.record, &COLUMNS, &experiment.defects, &noise);
-            hoid_io::write_table(&directory.join(&file), &table)?;
+            files.run((*subject, person.plant.to_string(), run), &found.record, &noise)?;
             truth_row(&mut truth, *subject, run, person, &found)?;
-            runs.push(RunEntry {
-                then: None,
-                file: file.into(),
-                subject: format!("S{subject}"),
-                condition,
-                run: run.to_string(),
-                counts: true,
-            });
             each();
         }
     }
-    hoid_io::write_table(&directory.join("truth.csv"), &truth.into_table(Vec::new()))?;
     let facts = |plant: &Plant| {
         let facts = ConditionSettings {
             controlled_element: Some(plant.text().to_owned()),
@@ -143,24 +122,12 @@ pub fn simulate_people(
         };
         (plant.to_string(), facts)
     };
-    let manifest = Manifest {
-        name: "virtual-people".to_owned(),
-        read: ReadSettings {
-            resample: experiment.defects.iter().any(|defect| defect.is_uneven()),
-            ..ReadSettings::default()
-        },
-        prepare: PreparationSettings::default(),
-        analysis: AnalysisSettings {
-            // Remnants like people's are no lag of first order.
-            nd: (1, 6),
-            ..AnalysisSettings::default()
-        },
-        conditions: experiment.plants.iter().map(facts).collect(),
-        runs,
+    let analysis = AnalysisSettings {
+        // Remnants like people's are no lag of first order.
+        nd: (1, 6),
+        ..AnalysisSettings::default()
     };
-    let text = manifest.text();
-    hoid_io::write_atomically(&directory.join(MANIFEST), |file| file.write_all(text.as_bytes()))?;
-    Ok(manifest)
+    files.finish("virtual-people", truth, analysis, experiment.plants.iter().map(facts))
 }
 
 impl PeopleExperiment {

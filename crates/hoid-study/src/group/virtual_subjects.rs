@@ -20,12 +20,8 @@ use hoid_model::{
 use hoid_sim::{RunSeed, Simulator};
 
 use super::{
-    analysis_settings::AnalysisSettings,
-    condition_settings::ConditionSettings,
-    manifest::{MANIFEST, Manifest, RunEntry},
-    preparation_settings::PreparationSettings,
-    read_settings::ReadSettings,
-    sampling_defects::{SamplingDefect, recorded},
+    analysis_settings::AnalysisSettings, condition_settings::ConditionSettings, manifest::Manifest,
+    sampling_defects::SamplingDefect, virtual_files::VirtualFiles,
 };
 use crate::{
     StudyError,
@@ -71,36 +67,20 @@ pub fn simulate_group(
     each: &dyn Fn(),
 ) -> Result<Manifest, StudyError> {
     experiment.check()?;
-    if directory.join(MANIFEST).exists() {
-        return Err(StudyError::ExperimentThere {
-            directory: directory.display().to_string(),
-        });
-    }
-    hoid_io::make_directory(directory)?;
-    let mut runs = Vec::new();
+    VirtualFiles::refuse_another(directory)?;
+    let mut files = VirtualFiles::new(directory, &["f_t", "e", "u", "x"], &experiment.defects)?;
     let mut truth = Rows::new(&truth_schema());
     for subject in 1..=experiment.subjects {
         for (cell, condition) in experiment.conditions.iter().enumerate() {
             for run in 1..=experiment.runs {
                 let (scenario, record) = experiment.run(subject, cell as u64, *condition, run)?;
-                let file = format!("S{subject}_{condition}_{run}.csv");
                 let noise = experiment.sampling_noise(subject, cell as u64, run, record.len());
-                let table = recorded(&record, &["f_t", "e", "u", "x"], &experiment.defects, &noise);
-                hoid_io::write_table(&directory.join(&file), &table)?;
+                files.run((subject, condition.to_string(), run), &record, &noise)?;
                 truth_row(&mut truth, subject, *condition, run, &scenario);
-                runs.push(RunEntry {
-                    then: None,
-                    file: file.into(),
-                    subject: format!("S{subject}"),
-                    condition: condition.to_string(),
-                    run: run.to_string(),
-                    counts: true,
-                });
                 each();
             }
         }
     }
-    hoid_io::write_table(&directory.join("truth.csv"), &truth.into_table(Vec::new()))?;
     let facts = |condition: &Condition| {
         let scenario = Scenario::condition(*condition);
         let change_s = scenario.schedule.change_s();
@@ -116,23 +96,16 @@ pub fn simulate_group(
         };
         (condition.to_string(), facts)
     };
-    let manifest = Manifest {
-        name: "virtual-experiment".to_owned(),
-        read: ReadSettings {
-            resample: experiment.defects.iter().any(|defect| defect.is_uneven()),
-            ..ReadSettings::default()
-        },
-        prepare: PreparationSettings::default(),
-        analysis: AnalysisSettings {
-            windows_s: Some([(0.0, 30.72), (51.2, 81.91)]),
-            ..AnalysisSettings::default()
-        },
-        conditions: experiment.conditions.iter().map(facts).collect(),
-        runs,
+    let analysis = AnalysisSettings {
+        windows_s: Some([(0.0, 30.72), (51.2, 81.91)]),
+        ..AnalysisSettings::default()
     };
-    let text = manifest.text();
-    hoid_io::write_atomically(&directory.join(MANIFEST), |file| file.write_all(text.as_bytes()))?;
-    Ok(manifest)
+    files.finish(
+        "virtual-experiment",
+        truth,
+        analysis,
+        experiment.conditions.iter().map(facts),
+    )
 }
 
 impl VirtualExperiment {

@@ -307,7 +307,7 @@ fn report(found: &Found<'_>, directory: &Path) -> Result<(), CliError> {
         title,
         settings: facts,
         models: vec![ModelSection {
-            name: found.title(),
+            name: found.fit.title(),
             fit,
             records: found.records,
             candidates: None,

@@ -29,16 +29,6 @@ pub struct Found<'a> {
 }
 
 impl Found<'_> {
-    /// The fit in a line.
-    pub fn title(&self) -> String {
-        let (nc, nd) = self.fit.noise_orders;
-        let muscles = match self.fit.neuromuscular {
-            true => " with neuromuscular dynamics",
-            false => "",
-        };
-        format!("Operator: {}{muscles}; noise nc = {nc}, nd = {nd}", self.fit.form)
-    }
-
     /// The verdict and its reasons, a remark each.
     pub fn notes(&self) -> Vec<String> {
         let verdict = &self.fit.verdict;
@@ -69,7 +59,7 @@ impl Found<'_> {
     pub fn page(&self) -> Result<String, CliError> {
         let fit = self.fit;
         let mut page = format!("{}\n\n", fit.verdict);
-        page.push_str(&self.title());
+        page.push_str(&self.fit.title());
         page.push('\n');
         for (k, of) in fit.operators.iter().enumerate() {
             if fit.operators.len() > 1 {

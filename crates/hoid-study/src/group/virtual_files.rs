@@ -1,0 +1,106 @@
+//! The files of a virtual experiment: a table a run, `truth.csv`, and `group.toml` last, so that a
+//! directory with it is whole.
+
+use std::path::Path;
+
+use hoid_model::Record;
+
+use super::{
+    analysis_settings::AnalysisSettings,
+    condition_settings::ConditionSettings,
+    manifest::{MANIFEST, Manifest, RunEntry},
+    preparation_settings::PreparationSettings,
+    read_settings::ReadSettings,
+    sampling_defects::{SamplingDefect, recorded},
+};
+use crate::{StudyError, columns::Rows};
+
+/// An experiment that is being written.
+pub(super) struct VirtualFiles<'a> {
+    directory: &'a Path,
+    /// Columns of a run besides t.
+    columns: &'a [&'a str],
+    defects: &'a [SamplingDefect],
+    runs: Vec<RunEntry>,
+}
+
+impl<'a> VirtualFiles<'a> {
+    /// Refuses a directory that holds an experiment.
+    ///
+    /// # Errors
+    /// [`StudyError::ExperimentThere`].
+    pub fn refuse_another(directory: &Path) -> Result<(), StudyError> {
+        if directory.join(MANIFEST).exists() {
+            return Err(StudyError::ExperimentThere {
+                directory: directory.display().to_string(),
+            });
+        }
+        Ok(())
+    }
+
+    /// Makes the directory.
+    ///
+    /// # Errors
+    /// [`StudyError::Io`].
+    pub fn new(directory: &'a Path, columns: &'a [&'a str], defects: &'a [SamplingDefect]) -> Result<Self, StudyError> {
+        hoid_io::make_directory(directory)?;
+        Ok(Self {
+            directory,
+            columns,
+            defects,
+            runs: Vec::new(),
+        })
+    }
+
+    /// Writes a run of a subject in a condition, sampled with the defects.
+    ///
+    /// # Errors
+    /// [`StudyError::Io`].
+    pub fn run(
+        &mut self,
+        (subject, condition, run): (u64, String, u64),
+        record: &Record,
+        noise: &[f64],
+    ) -> Result<(), StudyError> {
+        let file = format!("S{subject}_{condition}_{run}.csv");
+        let table = recorded(record, self.columns, self.defects, noise);
+        hoid_io::write_table(&self.directory.join(&file), &table)?;
+        self.runs.push(RunEntry {
+            then: None,
+            file: file.into(),
+            subject: format!("S{subject}"),
+            condition,
+            run: run.to_string(),
+            counts: true,
+        });
+        Ok(())
+    }
+
+    /// Writes the truth and the manifest.
+    ///
+    /// # Errors
+    /// [`StudyError::Io`].
+    pub fn finish(
+        self,
+        name: &str,
+        truth: Rows,
+        analysis: AnalysisSettings,
+        conditions: impl Iterator<Item = (String, ConditionSettings)>,
+    ) -> Result<Manifest, StudyError> {
+        hoid_io::write_table(&self.directory.join("truth.csv"), &truth.into_table(Vec::new()))?;
+        let manifest = Manifest {
+            name: name.to_owned(),
+            read: ReadSettings {
+                resample: self.defects.iter().any(|defect| defect.is_uneven()),
+                ..ReadSettings::default()
+            },
+            prepare: PreparationSettings::default(),
+            analysis,
+            conditions: conditions.collect(),
+            runs: self.runs,
+        };
+        let text = manifest.text();
+        hoid_io::write_atomically(&self.directory.join(MANIFEST), |file| file.write_all(text.as_bytes()))?;
+        Ok(manifest)
+    }
+}
