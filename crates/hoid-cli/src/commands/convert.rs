@@ -53,7 +53,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
             "sample_time": json::number(sample_time.s()),
             "discrete": {"f": [held.f1, held.f2], "b": [held.b0, held.b1], "nk": discrete.nk},
             "operator": operator,
-        }));
+        }))?;
         return Ok(());
     }
     let mut text = format!(
@@ -78,7 +78,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
         }
         Err(reason) => text.push_str(&format!("Operator parameters: not convertible: {reason}.\n")),
     }
-    output::print(&text);
+    output::print(&text)?;
     Ok(())
 }
 
@@ -99,7 +99,7 @@ fn discretised(args: &ConvertArgs, h: &ContinuousTransferFunction, sample_time: 
         json::print(&json!({
             "sample_time": json::number(sample_time.s()),
             "transfer_function": {"num": discrete.num(), "den": discrete.den()},
-        }));
+        }))?;
         return Ok(());
     }
     let row = |c: &[f64]| c.iter().map(|v| format!("{v:.10}")).collect::<Vec<_>>().join(", ");
@@ -108,6 +108,6 @@ fn discretised(args: &ConvertArgs, h: &ContinuousTransferFunction, sample_time: 
         sample_time.s(),
         row(discrete.num()),
         row(discrete.den())
-    ));
+    ))?;
     Ok(())
 }
