@@ -9,6 +9,8 @@ use hoid_study::StudyError;
 use hoid_thesis::ThesisError;
 use thiserror::Error;
 
+use crate::interrupt;
+
 /// Everything that a command can run into.
 #[derive(Debug, Error)]
 pub enum CliError {
@@ -18,6 +20,9 @@ pub enum CliError {
     /// A stream that cannot be read, understood or written.
     #[error("{0}")]
     Stream(String),
+    /// A result that was made and could not be printed.
+    #[error("standard output cannot be written: {0}; what was asked is not there, or is cut: make room for it")]
+    Output(std::io::Error),
     /// A result that was printed, and says that the data do not determine what was asked.
     #[error("the data do not determine what was asked: {0}")]
     NotDetermined(String),
@@ -58,12 +63,15 @@ impl CliError {
         }
     }
 
-    /// 2 for wrong usage, 1 for data and tasks that give no result.
+    /// 2 for wrong usage, 1 for data and tasks that give no result, 128 and its number for what a signal
+    /// stopped.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_)
+            | Self::Io(IoError::OutputIsInput { .. } | IoError::OutputAmongInputs { .. })
+            | Self::Study(StudyError::Io(IoError::OutputIsInput { .. } | IoError::OutputAmongInputs { .. }))
             | Self::Study(StudyError::Plan { .. } | StudyError::BadShard { .. } | StudyError::Pattern { .. }) => 2,
-            Self::Stopped(_) => 130,
+            Self::Stopped(_) => u8::try_from(interrupt::exit_code()).unwrap_or(1),
             _ => 1,
         }
     }

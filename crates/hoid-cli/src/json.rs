@@ -14,7 +14,7 @@ use hoid_track::Change;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::{commands::reading::Account, output};
+use crate::{commands::reading::Account, error::CliError, output};
 
 /// A number, or null where there is none: JSON has no NaN.
 pub fn number(value: f64) -> Value {
@@ -32,13 +32,17 @@ pub fn estimate(e: &Estimate) -> Value {
 /// What a result is worth: the level, what speaks against it, what is worth knowing besides, and
 /// all of it with its names for programs.
 pub fn verdict(v: &Verdict) -> Value {
-    let finding = |f: &Finding| json!({"kind": f.kind, "severity": f.severity.name(), "words": f.words});
     json!({
         "level": v.level.name(),
         "reasons": v.reasons().collect::<Vec<_>>(),
         "notes": v.notes().collect::<Vec<_>>(),
         "findings": v.findings().iter().map(finding).collect::<Vec<_>>(),
     })
+}
+
+/// What makes a result doubtful, or is worth knowing.
+pub fn finding(f: &Finding) -> Value {
+    json!({"kind": f.kind, "severity": f.severity.name(), "words": f.words})
 }
 
 /// A change of the person, declared at a time in s.
@@ -371,6 +375,9 @@ fn candidates(choice: &Choice) -> Value {
 }
 
 /// Prints one object, indented, and nothing else.
-pub fn print(value: &Value) {
-    output::print(&format!("{value:#}\n"));
+///
+/// # Errors
+/// Those of [`output::print`].
+pub fn print(value: &Value) -> Result<(), CliError> {
+    output::print(&format!("{value:#}\n"))
 }

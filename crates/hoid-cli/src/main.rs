@@ -1,7 +1,8 @@
 //! The command line `hoid`. Only this crate prints: results to standard output, everything else to
 //! standard error.
 //!
-//! Exit code 0: done; 1: the data or the task cannot give a result; 2: wrong usage. `args` says
+//! Exit code 0: done; 1: the data or the task cannot give a result, or it cannot be written; 2: wrong
+//! usage; 128 and its number for a signal. `args` says
 //! what can be typed, `commands` what it does, one file a command; `json` and `text` are the two
 //! forms of a result.
 
@@ -9,6 +10,7 @@ mod args;
 mod commands;
 mod error;
 mod family_operator;
+mod interrupt;
 mod json;
 mod orders;
 mod output;
@@ -21,10 +23,19 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use crate::args::{Cli, Command};
+use crate::{
+    args::{Cli, Command},
+    error::CliError,
+};
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    interrupt::catch();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        // Help and version are results as well.
+        Err(said) if !said.use_stderr() => return exit(output::printed(said.print())),
+        Err(wrong) => wrong.exit(),
+    };
     let outcome = match cli.command {
         Command::Demo(args) => commands::demo::run(&args),
         Command::Simulate(args) => commands::simulate::run(&args),
@@ -40,6 +51,10 @@ fn main() -> ExitCode {
         Command::Reproduce(args) => commands::reproduce::run(&args),
         Command::Study(command) => commands::study::run_command(&command),
     };
+    exit(outcome)
+}
+
+fn exit(outcome: Result<(), CliError>) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -1,17 +1,29 @@
-//! Standard output and standard error. A reader that closes the pipe early (`hoid ... | head`) ends
-//! the program quietly.
+//! Standard output and standard error. A reader that closes the pipe early (`hoid ... | head`) has
+//! what it wanted: the command goes on with its files, and nothing is said. Any other output that
+//! cannot be written, such as a full disk, is an error.
 
-use std::io::{self, Write};
+use std::io::{self, ErrorKind, Write};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::error::CliError;
+
 /// Writes a result to standard output.
-pub fn print(text: &str) {
-    let mut out = io::stdout().lock();
-    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
-    if written.is_err() {
-        // The reader has closed the pipe.
-        std::process::exit(0);
+///
+/// # Errors
+/// [`CliError::Output`] for what the system says, but not for a pipe that its reader has closed.
+pub fn print(text: &str) -> Result<(), CliError> {
+    printed(io::stdout().lock().write_all(text.as_bytes()))
+}
+
+/// What became of something that was written to standard output.
+///
+/// # Errors
+/// As [`print`].
+pub fn printed(written: io::Result<()>) -> Result<(), CliError> {
+    match written.and_then(|()| io::stdout().flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(CliError::Output(error)),
+        _ => Ok(()),
     }
 }
 

@@ -5,6 +5,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use crate::IoError;
+use crate::part_file::Part;
 
 /// Writes a file through `write`. A file that exists is replaced only when everything is written
 /// and on the disk; on an error it stays as it was and nothing else is left behind. A pipe or a
@@ -88,7 +89,7 @@ pub(crate) struct WholeFile {
 }
 
 struct Beside {
-    part: tempfile::TempPath,
+    part: Part,
     place: PathBuf,
     permissions: Option<fs::Permissions>,
 }
@@ -139,23 +140,12 @@ impl WholeFile {
 impl Beside {
     fn persist(self, file: fs::File) -> io::Result<()> {
         file.sync_all()?;
-        let part = tempfile::NamedTempFile::from_parts(file, self.part);
-        if let Some(permissions) = self.permissions {
-            fs::set_permissions(part.path(), permissions)?;
-        }
-        part.persist(self.place).map(drop).map_err(|error| error.error)
+        self.part.persist(file, &self.place, self.permissions)
     }
 }
 
 fn part(place: PathBuf, permissions: Option<fs::Permissions>) -> io::Result<(fs::File, Beside)> {
-    if place.file_name().is_none() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"));
-    }
-    let parent = match place.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
-        _ => PathBuf::from("."),
-    };
-    let (file, part) = beside().tempfile_in(parent)?.into_parts();
+    let (file, part) = Part::create_in(&directory_of(&place)?)?;
     Ok((
         file,
         Beside {
@@ -166,17 +156,15 @@ fn part(place: PathBuf, permissions: Option<fs::Permissions>) -> io::Result<(fs:
     ))
 }
 
-/// A file of the usual permissions (those of the umask), where temporary files are otherwise closed
-/// to all others.
-fn beside() -> tempfile::Builder<'static, 'static> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".hoid-").suffix(".part");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(fs::Permissions::from_mode(0o666));
+/// The directory in which a file is to be.
+pub(crate) fn directory_of(place: &Path) -> io::Result<PathBuf> {
+    if place.file_name().is_none() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"));
     }
-    builder
+    Ok(match place.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+        _ => PathBuf::from("."),
+    })
 }
 
 #[cfg(test)]

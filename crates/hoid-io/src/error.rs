@@ -18,12 +18,38 @@ pub enum IoError {
         source: std::io::Error,
     },
     /// A file that the system does not take.
-    #[error("{file} cannot be written: {source}; check that the directory exists and that you may write there")]
+    #[error("{file} cannot be written: {source}; {}", remedy_of_writing(source))]
     Unwritable {
         /// The file.
         file: String,
         /// What the system says.
         source: std::io::Error,
+    },
+    /// A result in the place of what it is made of.
+    #[error(
+        "{file} is {input}, which is read by the same command and would be lost; name another place for the result"
+    )]
+    OutputIsInput {
+        /// The place of the result.
+        file: String,
+        /// What is read.
+        input: String,
+    },
+    /// Results among what they are made of.
+    #[error(
+        "{directory} holds {input}, which is read by the same command and may be lost; take another directory for the results"
+    )]
+    OutputAmongInputs {
+        /// The directory of the results.
+        directory: String,
+        /// What is read.
+        input: String,
+    },
+    /// A second process on one directory.
+    #[error("another process works on {directory}: wait for its end, or take another directory")]
+    InUse {
+        /// The directory.
+        directory: String,
     },
     /// A directory in the place of a file.
     #[error("{file} is a directory, expected a file; name the file in it")]
@@ -447,4 +473,21 @@ pub enum IoError {
         /// Why.
         source: ModelError,
     },
+}
+
+/// What helps where a file cannot be written.
+fn remedy_of_writing(source: &std::io::Error) -> &'static str {
+    use std::io::ErrorKind;
+    // What the writer of CSV wraps.
+    let wrapped = source.get_ref().and_then(|inner| inner.downcast_ref::<csv::Error>());
+    let kind = match wrapped.map(csv::Error::kind) {
+        Some(csv::ErrorKind::Io(inner)) => inner.kind(),
+        _ => source.kind(),
+    };
+    match kind {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "make room there, or name a place on another disk",
+        ErrorKind::FileTooLarge => "raise the limit of the size of files (ulimit -f), or write less",
+        ErrorKind::ReadOnlyFilesystem => "name a place on a disk that can be written",
+        _ => "check that the directory exists and that you may write there",
+    }
 }

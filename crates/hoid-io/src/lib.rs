@@ -40,18 +40,22 @@
 //! | `output_table` | [`OutputTable`]: columns of results |
 //! | `wording` | numbers and names in messages |
 //! | `guarded` | panics of foreign readers as errors |
-//! | `atomic` | [`write_atomically`]: files that are whole or not there |
+//! | `atomic`, `part_file` | [`write_atomically`]: files that are whole or not there; what dead processes left |
+//! | `output_place`, `directory_lock` | [`check_output`]: no result in the place of an input; [`DirectoryLock`] |
 //! | `error` | [`IoError`] |
 
 mod arrays;
 mod atomic;
 mod column_expression;
 mod data_quality;
+mod directory_lock;
 mod error;
 mod format;
 mod formats;
 mod guarded;
+mod output_place;
 mod output_table;
+mod part_file;
 mod preparation;
 mod read_options;
 mod record_columns;
@@ -72,9 +76,12 @@ mod wording;
 pub use atomic::{file_names, make_directory, read_bytes, read_text, write_atomically};
 pub use column_expression::ColumnExpression;
 pub use data_quality::{Place, QualityIssue, QualityIssueKind};
+pub use directory_lock::DirectoryLock;
 pub use error::IoError;
 pub use formats::{readable_endings, writable_endings};
+pub use output_place::{check_output, check_output_directory, is_same_file};
 pub use output_table::{ColumnKind, ColumnSchema, ColumnValues, OutputColumn, OutputTable, TableSchema};
+pub use part_file::remove_unfinished_files;
 pub use preparation::{NewRate, Offset, Preparation, Scaling, Step};
 pub use read_options::{ReadOptions, Repair};
 pub use record_file::{read, read_prepared, read_record, write_record, write_record_csv};

@@ -1,11 +1,11 @@
 //! `pyhoid.study` and `pyhoid.reproduce`: plans, shards, merged tables.
 
-use std::path::PathBuf;
+use std::{ffi::CString, path::PathBuf};
 
 use hoid_study::{NamedPlan, Outcome as StudyOutcome, Plan, RunOptions, StudyError, merge, run};
 use hoid_thesis::plans::{find as find_plan, named_plans};
 use hoid_thesis::reproduction::{Reproduction, ReproductionEvent, reproduce as reproduce_into};
-use pyo3::{prelude::*, types::PyDict};
+use pyo3::{exceptions::PyUserWarning, prelude::*, types::PyDict};
 
 use crate::{
     errors::{Outcome, bad_option},
@@ -15,8 +15,18 @@ use crate::{
 /// Finished, estimates made, and the tables.
 type Left = (bool, u64, Vec<PathBuf>);
 
-fn left(outcome: StudyOutcome) -> Left {
-    (outcome.finished, outcome.estimates, outcome.tables)
+fn left(py: Python<'_>, outcome: StudyOutcome) -> Outcome<Left> {
+    warn(py, &outcome.notes)?;
+    Ok((outcome.finished, outcome.estimates, outcome.tables))
+}
+
+/// What the user should know, as warnings of Python.
+pub fn warn(py: Python<'_>, notes: &[String]) -> PyResult<()> {
+    for note in notes {
+        let text = CString::new(note.replace('\0', " "))?;
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
+    }
+    Ok(())
 }
 
 /// A plan of Monte Carlo runs.
@@ -151,7 +161,7 @@ impl PyPlan {
                 standing.goes_on()
             })
         })?;
-        Ok(left(outcome))
+        left(py, outcome)
     }
 }
 
@@ -168,7 +178,8 @@ pub fn plan_names() -> Outcome<Vec<(String, String)>> {
 #[pyfunction]
 #[pyo3(signature = (shards, directory, csv))]
 pub fn merge_shards(py: Python<'_>, shards: Vec<PathBuf>, directory: PathBuf, csv: bool) -> Outcome<Left> {
-    Ok(left(py.detach(|| merge(&shards, &directory, csv))?))
+    let outcome = py.detach(|| merge(&shards, &directory, csv))?;
+    left(py, outcome)
 }
 
 /// Index page, number of tables and figures, tally of the claims.

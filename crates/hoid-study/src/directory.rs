@@ -16,12 +16,27 @@ pub(crate) fn part(directory: &Path, block: u64, table: &str) -> PathBuf {
     directory.join("parts").join(format!("{block:06}-{table}.parquet"))
 }
 
+/// Where the seal of a block stands.
+pub(crate) fn seal_path(directory: &Path, block: u64) -> PathBuf {
+    directory.join("parts").join(format!("{block:06}-seal.json"))
+}
+
 /// Writes the plan beside the results.
 pub(crate) fn write_plan(plan: &Plan, directory: &Path) -> Result<(), StudyError> {
-    let text = plan.text();
-    Ok(hoid_io::write_atomically(&directory.join(PLAN), |file| {
-        file.write_all(text.as_bytes())
-    })?)
+    write_source(&directory.join(PLAN), plan.text())
+}
+
+/// Writes what the results are made of beside them, never over something else of the same name.
+pub(crate) fn write_source(path: &Path, text: &str) -> Result<(), StudyError> {
+    if path.exists() {
+        if hoid_io::read_bytes(path)? == text.as_bytes() {
+            return Ok(());
+        }
+        return Err(StudyError::SourceThere {
+            file: path.display().to_string(),
+        });
+    }
+    Ok(hoid_io::write_atomically(path, |file| file.write_all(text.as_bytes()))?)
 }
 
 /// Removes what a killed run was writing: everything in `parts` that has not got its name yet.
@@ -33,7 +48,10 @@ pub(crate) fn sweep(parts: &Path) -> Result<(), StudyError> {
     };
     for entry in fs::read_dir(parts).map_err(unwritable)? {
         let path = entry.map_err(unwritable)?.path();
-        if path.extension().is_none_or(|extension| extension != "parquet") || is_hidden(&path) {
+        let is_part = path
+            .extension()
+            .is_some_and(|ending| ending == "parquet" || ending == "json");
+        if !is_part || is_hidden(&path) {
             fs::remove_file(&path).map_err(unwritable)?;
         }
     }
@@ -48,6 +66,9 @@ fn is_hidden(path: &Path) -> bool {
 /// Removes the parts of a study that has its tables.
 pub(crate) fn remove_parts(directory: &Path) -> Result<(), StudyError> {
     let parts = directory.join("parts");
+    if !parts.exists() {
+        return Ok(());
+    }
     fs::remove_dir_all(&parts).map_err(|source| {
         StudyError::Io(IoError::Unwritable {
             file: parts.display().to_string(),

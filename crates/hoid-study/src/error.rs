@@ -43,6 +43,20 @@ pub enum StudyError {
         /// The directory.
         directory: String,
     },
+    /// A plan or manifest of the user in the place of the copy beside the results.
+    #[error("{file} is there already and would be replaced by what is run now; take another directory for the results")]
+    SourceThere {
+        /// The file.
+        file: String,
+    },
+    /// Parts without checksums.
+    #[error(
+        "the blocks of {directory} carry no checksums, an earlier hoid wrote them: run that shard again with --resume, which computes them anew"
+    )]
+    Unsealed {
+        /// The directory.
+        directory: String,
+    },
     /// Results that do not belong together.
     #[error("{directory} holds another study: {reason}; take another directory")]
     OtherStudy {

@@ -52,6 +52,7 @@
 //! | [`plans`] | plans that come with the program |
 //! | `run`, `merge`, `join` | [`run`]: blocks over threads, parts on disk; [`merge`]: shards; the tables from the parts |
 //! | `directory`, `run_record`, `shard` | what is where in the directory of a study, `study.json`, [`Shard`] |
+//! | `seal` | checksums of the blocks, and which are damaged |
 //! | `block`, `batch_fits`, `prepared` | the estimators of one cell on its replications |
 //! | `estimate_rows`, `error_measures` | the rows of an estimate, and its errors against the truth |
 //! | `columns`, `truth`, `true_value` | the tables of a study: fits, traces, cells; what the truth of each column is |
@@ -76,6 +77,7 @@ mod query;
 mod results;
 mod run;
 mod run_record;
+mod seal;
 mod shard;
 pub mod statistics;
 mod summary;

@@ -1,18 +1,21 @@
-//! Joining the shards of a study.
+//! Joining the shards of a study. A block that is damaged is computed again.
 
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
 };
 
+use hoid_io::DirectoryLock;
+
 use crate::{
     Plan, StudyError,
-    block::blocks,
+    block::{blocks, run_block},
     columns::Schemas,
-    directory::{PLAN, part, tables, write_plan},
+    directory::{PLAN, remove_parts, tables, write_plan},
     join::join,
-    run::Outcome,
+    run::{Outcome, write_tables},
     run_record::RunRecord,
+    seal::{OnDisk, notes_on, on_disk},
 };
 
 /// Joins the shards of a study.
@@ -20,14 +23,21 @@ use crate::{
 /// # Errors
 /// [`StudyError::OtherStudy`] for shards of different plans, seeds or versions,
 /// [`StudyError::Overlap`] and [`StudyError::Gap`] when blocks are there twice or not at all,
-/// [`StudyError::NoStudy`] for a directory without one.
+/// [`StudyError::NoStudy`] for a directory without one, [`StudyError::Unsealed`] for one whose blocks
+/// have no checksums.
 pub fn merge(shards: &[PathBuf], directory: &Path, csv: bool) -> Result<Outcome, StudyError> {
     let mut plan: Option<(Plan, RunRecord)> = None;
     let mut owners: BTreeMap<u64, &Path> = BTreeMap::new();
+    let mut damaged: Vec<(u64, String)> = Vec::new();
     for shard in shards {
         let manifest = RunRecord::read(shard)?.ok_or_else(|| StudyError::NoStudy {
             directory: shard.display().to_string(),
         })?;
+        if !manifest.complete && !manifest.sealed {
+            return Err(StudyError::Unsealed {
+                directory: shard.display().to_string(),
+            });
+        }
         if manifest.complete {
             return Err(StudyError::Whole {
                 directory: shard.display().to_string(),
@@ -47,8 +57,10 @@ pub fn merge(shards: &[PathBuf], directory: &Path, csv: bool) -> Result<Outcome,
             });
         }
         for block in 0..manifest.blocks {
-            if !part(shard, block, "fits").exists() {
-                continue;
+            match on_disk(shard, &manifest.plan_sha256, block) {
+                OnDisk::Missing => continue,
+                OnDisk::Whole => {}
+                OnDisk::Damaged(why) => damaged.push((block, why)),
             }
             if let Some(other) = owners.insert(block, shard) {
                 return Err(StudyError::Overlap {
@@ -64,8 +76,9 @@ pub fn merge(shards: &[PathBuf], directory: &Path, csv: bool) -> Result<Outcome,
             directory: String::new(),
         });
     };
+    let all = blocks(&plan);
     if manifest
-        .differs(&RunRecord::of(&plan, blocks(&plan).len() as u64, None))
+        .differs(&RunRecord::of(&plan, all.len() as u64, None))
         .is_some()
     {
         return Err(StudyError::OtherStudy {
@@ -88,15 +101,28 @@ pub fn merge(shards: &[PathBuf], directory: &Path, csv: bool) -> Result<Outcome,
             plan: plan.name,
         });
     }
+    hoid_io::make_directory(directory)?;
+    let _lock = DirectoryLock::take(directory)?;
     if RunRecord::read(directory)?.is_some() {
         return Err(StudyError::Occupied {
             directory: directory.display().to_string(),
         });
     }
-    hoid_io::make_directory(directory)?;
     write_plan(&plan, directory)?;
+    let schemas = Schemas::of(&plan);
+    if !damaged.is_empty() {
+        hoid_io::make_directory(&directory.join("parts"))?;
+    }
+    for (block, _) in &damaged {
+        let block = &all[*block as usize];
+        if let Some(tables) = run_block(&plan, &schemas, block, &|_| (), &|| true) {
+            write_tables(directory, &manifest.plan_sha256, block, &tables)?;
+        }
+        owners.insert(block.index, directory);
+    }
     let parts: Vec<(&Path, u64)> = owners.iter().map(|(block, shard)| (*shard, *block)).collect();
-    join(&plan, &Schemas::of(&plan), &parts, directory, csv)?;
+    join(&plan, &schemas, &parts, directory, csv)?;
+    remove_parts(directory)?;
     RunRecord {
         complete: true,
         shard: None,
@@ -107,5 +133,6 @@ pub fn merge(shards: &[PathBuf], directory: &Path, csv: bool) -> Result<Outcome,
         finished: true,
         estimates: plan.estimates(),
         tables: tables(directory),
+        notes: notes_on(&damaged),
     })
 }

@@ -1,24 +1,27 @@
 //! Running a study: blocks over threads, parts on disk, resume.
 //!
 //! A block is written as one file a table when it is finished, traces first, beside its place and
-//! then renamed. A study that was killed therefore has whole blocks and nothing else, and goes on
-//! with the blocks that have no file of fits. When all blocks are there, the parts are joined in
+//! then renamed, and at last its seal (`seal`). A study that was killed therefore has whole blocks
+//! and nothing else, and goes on with the blocks that have no seal or do not agree with it. When all blocks are there, the parts are joined in
 //! the order of the plan; which thread or machine made a part does not show.
 
 use std::{
     path::{Path, PathBuf},
-    sync::atomic::{AtomicU64, Ordering},
+    sync::atomic::{AtomicBool, AtomicU64, Ordering},
 };
 
+use hoid_io::DirectoryLock;
 use rayon::prelude::*;
 
 use crate::{
     Plan, StudyError,
     block::{Block, blocks, run_block},
     columns::Schemas,
-    directory::{part, remove_parts, sweep, tables, write_plan},
+    directory::{remove_parts, sweep, tables, write_plan},
+    estimate_rows::BlockTables,
     join::join,
     run_record::RunRecord,
+    seal::{OnDisk, notes_on, on_disk, write_block},
     shard::Shard,
 };
 
@@ -55,6 +58,8 @@ pub struct Outcome {
     pub estimates: u64,
     /// The tables; empty for a shard, which waits to be merged.
     pub tables: Vec<PathBuf>,
+    /// What the user should know of the directory: damaged blocks that were computed again.
+    pub notes: Vec<String>,
 }
 
 /// Runs a study into a directory. `progress` is called from any thread after each estimate; `go_on`
@@ -62,8 +67,9 @@ pub struct Outcome {
 ///
 /// # Errors
 /// [`StudyError::Occupied`] when the directory holds a study without `resume`,
-/// [`StudyError::OtherStudy`] when it is another one, [`StudyError::Io`] when a file cannot be
-/// written.
+/// [`StudyError::OtherStudy`] when it is another one, [`StudyError::SourceThere`] where a plan stands
+/// that is another, [`StudyError::Io`] when a file cannot be written or another process works on the
+/// directory.
 pub fn run(
     plan: &Plan,
     directory: &Path,
@@ -71,6 +77,8 @@ pub fn run(
     progress: &(dyn Fn(Progress) + Sync),
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Outcome, StudyError> {
+    hoid_io::make_directory(directory)?;
+    let _lock = DirectoryLock::take(directory)?;
     let all = blocks(plan);
     let manifest = RunRecord::of(plan, all.len() as u64, options.shard);
     let known = prepare(plan, directory, &manifest, options.resume)?;
@@ -79,6 +87,7 @@ pub fn run(
             finished: true,
             estimates: 0,
             tables: tables(directory),
+            notes: Vec::new(),
         });
     }
     let schemas = Schemas::of(plan);
@@ -88,10 +97,9 @@ pub fn run(
         .copied()
         .filter(|block| options.shard.is_none_or(|shard| shard.has(block.index)))
         .collect();
-    let (there, open): (Vec<Block>, Vec<Block>) = mine
-        .iter()
-        .copied()
-        .partition(|block| part(directory, block.index, "fits").exists());
+    let mut notes: Vec<String> = known.note_on_seals().into_iter().collect();
+    let (there, open, damaged) = sorted(directory, &manifest.plan_sha256, &mine);
+    notes.extend(notes_on(&damaged));
     let known: u64 = there.iter().map(estimates).sum();
     let total: u64 = mine.iter().map(estimates).sum();
     let done = AtomicU64::new(known);
@@ -99,14 +107,17 @@ pub fn run(
         let done = done.fetch_add(n, Ordering::Relaxed) + n;
         progress(Progress { done, total, known });
     };
+    // Once one block was stopped, the next do not begin with simulating their runs.
+    let stopped = AtomicBool::new(false);
     let one = |block: &Block| -> Result<bool, StudyError> {
+        if stopped.load(Ordering::Relaxed) {
+            return Ok(false);
+        }
         let Some(tables) = run_block(plan, &schemas, block, &tell, go_on) else {
+            stopped.store(true, Ordering::Relaxed);
             return Ok(false);
         };
-        if let Some(traces) = &tables.traces {
-            hoid_io::write_table(&part(directory, block.index, "traces"), traces)?;
-        }
-        hoid_io::write_table(&part(directory, block.index, "fits"), &tables.fits)?;
+        write_tables(directory, &manifest.plan_sha256, block, &tables)?;
         Ok(true)
     };
     let finished = on_threads(options.jobs, &open, one)?;
@@ -116,6 +127,7 @@ pub fn run(
             finished,
             estimates,
             tables: Vec::new(),
+            notes,
         });
     }
     let parts: Vec<(&Path, u64)> = all.iter().map(|block| (directory, block.index)).collect();
@@ -130,7 +142,36 @@ pub fn run(
         finished: true,
         estimates,
         tables: tables(directory),
+        notes,
     })
+}
+
+/// Writes what came out of a block.
+pub(crate) fn write_tables(
+    directory: &Path,
+    plan_sha256: &str,
+    block: &Block,
+    tables: &BlockTables,
+) -> Result<(), StudyError> {
+    let mut all = vec![("fits", &tables.fits)];
+    all.extend(tables.traces.as_ref().map(|traces| ("traces", traces)));
+    write_block(directory, plan_sha256, block.index, &all)
+}
+
+/// Blocks that are whole, those that are to be computed, and why some of these are damaged.
+fn sorted(directory: &Path, plan_sha256: &str, mine: &[Block]) -> (Vec<Block>, Vec<Block>, Vec<(u64, String)>) {
+    let (mut there, mut open, mut damaged) = (Vec::new(), Vec::new(), Vec::new());
+    for block in mine {
+        match on_disk(directory, plan_sha256, block.index) {
+            OnDisk::Whole => there.push(*block),
+            OnDisk::Missing => open.push(*block),
+            OnDisk::Damaged(why) => {
+                damaged.push((block.index, why));
+                open.push(*block);
+            }
+        }
+    }
+    (there, open, damaged)
 }
 
 /// Makes the directory ready, or finds what it holds.
@@ -150,13 +191,26 @@ fn prepare(plan: &Plan, directory: &Path, manifest: &RunRecord, resume: bool) ->
                 reason,
             });
         }
-        sweep(&directory.join("parts"))?;
+        ready(directory, &found, manifest)?;
         return Ok(found);
     }
     hoid_io::make_directory(&directory.join("parts"))?;
     write_plan(plan, directory)?;
     manifest.write(directory)?;
     Ok(manifest.clone())
+}
+
+/// Makes a directory that is known ready to go on: what was on its way is removed, and what an
+/// earlier program left without seals is named as sealed from here on, for it has no block yet.
+pub(crate) fn ready(directory: &Path, found: &RunRecord, record: &RunRecord) -> Result<(), StudyError> {
+    if found.complete {
+        return remove_parts(directory);
+    }
+    sweep(&directory.join("parts"))?;
+    if !found.sealed {
+        record.write(directory)?;
+    }
+    Ok(())
 }
 
 /// Does the open blocks on `jobs` threads, or one a core; true when each was finished.

@@ -24,6 +24,9 @@ pub(crate) struct RunRecord {
     pub shard: Option<Shard>,
     /// True once the tables are there.
     pub complete: bool,
+    /// True where blocks have seals; an earlier program wrote none.
+    #[serde(default)]
+    pub sealed: bool,
 }
 
 const NAME: &str = "study.json";
@@ -39,7 +42,15 @@ impl RunRecord {
             blocks,
             shard,
             complete: false,
+            sealed: true,
         }
+    }
+
+    /// What is said of a directory whose blocks have no seals.
+    pub fn note_on_seals(&self) -> Option<String> {
+        let unsealed = !self.sealed && !self.complete;
+        unsealed
+            .then(|| "its blocks carry no checksums, an earlier hoid wrote them: all were computed again".to_owned())
     }
 
     /// The manifest of a directory; none where it holds no study.

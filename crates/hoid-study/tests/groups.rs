@@ -111,6 +111,35 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
     }
     assert!(content(&whole) == content(&pieces));
 
+    // A group that was stopped, with a table of each kind of block damaged.
+    let damaged = out.path().join("damaged");
+    let left = AtomicU64::new(6);
+    let go_on = || {
+        left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1))
+            .is_ok()
+    };
+    run_group(&manifest, data.path(), &damaged, &options(1, false), &|_| (), &go_on).unwrap();
+    for name in ["000000-traces.parquet", "000008-estimates.parquet"] {
+        let path = damaged.join("parts").join(name);
+        let mut bytes = fs::read(&path).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        fs::write(&path, bytes).unwrap();
+    }
+    let outcome = run_group(&manifest, data.path(), &damaged, &options(2, true), &|_| (), &|| true).unwrap();
+    assert_eq!(outcome.notes.len(), 2, "{:?}", outcome.notes);
+    assert!(content(&whole) == content(&damaged));
+    // Nothing is written among the recordings.
+    let among = run_group(
+        &manifest,
+        data.path(),
+        data.path(),
+        &options(1, false),
+        &|_| (),
+        &|| true,
+    );
+    assert!(among.unwrap_err().to_string().contains("read by the same command"));
+
     // Delay and gain of each person: nk = 29, K_e = 0.09 and 0.108 in C1 within four standard
     // errors of the mean of two runs.
     let delays = read_table(&whole.join("delays.parquet")).unwrap();

@@ -321,3 +321,169 @@ fn failures_are_rows() {
         );
     }
 }
+
+/// A study that was stopped after some of its blocks.
+fn stopped(directory: &Path) {
+    let left = AtomicU64::new(40);
+    let go_on = || {
+        left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1))
+            .is_ok()
+    };
+    let options = RunOptions {
+        jobs: Some(1),
+        ..RunOptions::default()
+    };
+    assert!(!run(&plan(), directory, &options, &|_| (), &go_on).unwrap().finished);
+}
+
+fn parts(directory: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(directory.join("parts")).unwrap();
+    let mut all: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn damaged_blocks_are_computed_again() {
+    let out = tempfile::tempdir().unwrap();
+    let (whole, again) = (out.path().join("whole"), out.path().join("again"));
+    quiet(&plan(), &whole, RunOptions::default()).unwrap();
+    let resumed = RunOptions {
+        resume: true,
+        ..RunOptions::default()
+    };
+    let damages: [&dyn Fn(&Path); 4] = [
+        // A bit.
+        &|path| {
+            let mut bytes = fs::read(path).unwrap();
+            let middle = bytes.len() / 2;
+            bytes[middle] ^= 4;
+            fs::write(path, bytes).unwrap();
+        },
+        // Cut short.
+        &|path| {
+            let bytes = fs::read(path).unwrap();
+            fs::write(path, &bytes[..bytes.len() / 2]).unwrap();
+        },
+        &|path| fs::write(path, "").unwrap(),
+        &|path| fs::remove_file(path).unwrap(),
+    ];
+    for (kind, damage) in damages.iter().enumerate() {
+        let _ = fs::remove_dir_all(&again);
+        stopped(&again);
+        let fits = parts(&again)
+            .into_iter()
+            .find(|path| path.to_string_lossy().contains("fits"))
+            .unwrap();
+        damage(&fits);
+        let outcome = run(&plan(), &again, &resumed, &|_| (), &|| true).unwrap();
+        assert!(outcome.finished);
+        assert_eq!(outcome.notes.len(), 1, "{kind}: {:?}", outcome.notes);
+        assert!(outcome.notes[0].contains("was computed again"), "{:?}", outcome.notes);
+        assert!(content(&whole) == content(&again), "{kind}");
+    }
+    // Block 1 replaced by block 0, with all that belongs to it.
+    fs::remove_dir_all(&again).unwrap();
+    stopped(&again);
+    for path in parts(&again) {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if let Some(rest) = name.strip_prefix("000000") {
+            fs::copy(&path, path.with_file_name(format!("000001{rest}"))).unwrap();
+        }
+    }
+    let outcome = run(&plan(), &again, &resumed, &|_| (), &|| true).unwrap();
+    assert!(
+        outcome.notes[0].contains("block 1 is damaged (it is block 0)"),
+        "{:?}",
+        outcome.notes
+    );
+    assert!(content(&whole) == content(&again));
+}
+
+#[test]
+fn a_damaged_block_of_a_shard_is_found_by_merge() {
+    let out = tempfile::tempdir().unwrap();
+    let place = |name: &str| out.path().join(name);
+    quiet(&plan(), &place("whole"), RunOptions::default()).unwrap();
+    for index in [1, 2] {
+        let options = RunOptions {
+            shard: Some(Shard { index, of: 2 }),
+            ..RunOptions::default()
+        };
+        quiet(&plan(), &place(&format!("s{index}")), options).unwrap();
+    }
+    let fits = parts(&place("s2"))
+        .into_iter()
+        .find(|path| path.to_string_lossy().contains("fits"))
+        .unwrap();
+    let mut bytes = fs::read(&fits).unwrap();
+    bytes[40] ^= 1;
+    fs::write(&fits, bytes).unwrap();
+    let shards = [place("s1"), place("s2")];
+    let outcome = merge(&shards, &place("merged"), false).unwrap();
+    assert_eq!(outcome.notes.len(), 1, "{:?}", outcome.notes);
+    assert!(content(&place("whole")) == content(&place("merged")));
+    assert!(!place("merged").join("parts").exists());
+}
+
+#[test]
+fn blocks_of_an_earlier_program_are_computed_again_or_refused() {
+    let out = tempfile::tempdir().unwrap();
+    let (whole, old) = (out.path().join("whole"), out.path().join("old"));
+    quiet(&plan(), &whole, RunOptions::default()).unwrap();
+    stopped(&old);
+    for seal in parts(&old)
+        .iter()
+        .filter(|path| path.extension().is_some_and(|e| e == "json"))
+    {
+        fs::remove_file(seal).unwrap();
+    }
+    let record = fs::read_to_string(old.join("study.json")).unwrap();
+    let unsealed = record.replace(",\n  \"sealed\": true", "");
+    assert_ne!(record, unsealed);
+    fs::write(old.join("study.json"), unsealed).unwrap();
+    let refused = merge(std::slice::from_ref(&old), &out.path().join("merged"), false).unwrap_err();
+    assert!(matches!(refused, StudyError::Unsealed { .. }), "{refused}");
+    let resumed = RunOptions {
+        resume: true,
+        ..RunOptions::default()
+    };
+    let outcome = run(&plan(), &old, &resumed, &|_| (), &|| true).unwrap();
+    assert!(outcome.notes[0].contains("carry no checksums"), "{:?}", outcome.notes);
+    assert!(content(&whole) == content(&old));
+}
+
+#[test]
+fn two_runs_do_not_share_a_directory_and_no_plan_is_written_over() {
+    let out = tempfile::tempdir().unwrap();
+    let directory = out.path().join("study");
+    let second = std::sync::Mutex::new(None);
+    let go_on = || {
+        let mut second = second.lock().unwrap();
+        if second.is_none() {
+            *second = Some(quiet(
+                &plan(),
+                &directory,
+                RunOptions {
+                    resume: true,
+                    ..RunOptions::default()
+                },
+            ));
+        }
+        true
+    };
+    assert!(
+        run(&plan(), &directory, &RunOptions::default(), &|_| (), &go_on)
+            .unwrap()
+            .finished
+    );
+    let message = second.into_inner().unwrap().unwrap().unwrap_err().to_string();
+    assert!(message.contains("another process works on"), "{message}");
+
+    let own = out.path().join("own");
+    fs::create_dir(&own).unwrap();
+    fs::write(own.join("plan.toml"), "# mine\n").unwrap();
+    let error = quiet(&plan(), &own, RunOptions::default()).unwrap_err();
+    assert!(matches!(error, StudyError::SourceThere { .. }), "{error}");
+    assert_eq!(fs::read_to_string(own.join("plan.toml")).unwrap(), "# mine\n");
+}

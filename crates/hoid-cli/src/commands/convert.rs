@@ -64,7 +64,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
             "sample_time": json::number(sample_time.s()),
             "discrete": {"f": [held.f1, held.f2], "b": [held.b0, held.b1], "nk": discrete.nk},
             "operator": operator,
-        }));
+        }))?;
         return Ok(());
     }
     let mut text = format!(
@@ -89,7 +89,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
         }
         Err(reason) => text.push_str(&format!("Operator parameters: not convertible: {reason}.\n")),
     }
-    output::print(&text);
+    output::print(&text)?;
     Ok(())
 }
 
@@ -108,9 +108,9 @@ fn to_family(args: &ConvertArgs, f: &[f64], b: &[f64], sample_time: SampleTime) 
             "sample_time": json::number(sample_time.s()),
             "discrete": {"f": f, "b": b, "nk": args.nk},
             "operator": family_operator::to_json(&found),
-        }));
+        }))?;
     } else {
-        output::print(&family_operator::to_text(&found));
+        output::print(&family_operator::to_text(&found))?;
     }
     Ok(())
 }
@@ -121,7 +121,7 @@ fn discretised(args: &ConvertArgs, h: &ContinuousTransferFunction, sample_time: 
         json::print(&json!({
             "sample_time": json::number(sample_time.s()),
             "transfer_function": {"num": discrete.num(), "den": discrete.den()},
-        }));
+        }))?;
         return Ok(());
     }
     let row = |c: &[f64]| c.iter().map(|v| format!("{v:.10}")).collect::<Vec<_>>().join(", ");
@@ -130,6 +130,6 @@ fn discretised(args: &ConvertArgs, h: &ContinuousTransferFunction, sample_time: 
         sample_time.s(),
         row(discrete.num()),
         row(discrete.den())
-    ));
+    ))?;
     Ok(())
 }

@@ -43,21 +43,21 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
         record.len(),
         record.sample_time().s(),
         path.display()
-    ));
+    ))?;
     let stages = SPANS
         .into_iter()
         .map(|(name, from, to)| identify(name, record.span(from, to)?))
         .collect::<Result<Vec<Stage>, CliError>>()?;
-    output::print(&table(&stages));
+    output::print(&table(&stages))?;
     let traces = tracked(&record, &stages)?;
-    output::print(&errors_over_time(&record, &traces));
+    output::print(&errors_over_time(&record, &traces))?;
     let page = report(args, &stages)?;
     let page_of_traces = report_of_traces(args, &record, &stages, &traces)?;
     output::print(&format!(
         "Report: {}\nTracking: {}\n",
         page.display(),
         page_of_traces.display()
-    ));
+    ))?;
     Ok(())
 }
 

@@ -9,9 +9,9 @@ use crate::{args::InfoArgs, error::CliError, json, output, text};
 pub fn run(args: &InfoArgs) -> Result<(), CliError> {
     let found = survey(&args.file)?;
     if args.json {
-        json::print(&object(&found));
+        json::print(&object(&found))?;
     } else {
-        output::print(&words(&args.file.display().to_string(), &found));
+        output::print(&words(&args.file.display().to_string(), &found))?;
     }
     Ok(())
 }

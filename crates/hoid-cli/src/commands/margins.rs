@@ -68,7 +68,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
             })
             .collect();
         object.insert("remnant_gain".to_owned(), Value::Array(rows));
-        json::print(&Value::Object(object));
+        json::print(&Value::Object(object))?;
         return Ok(());
     }
     let mut header = vec!["K_n of order".to_owned()];
@@ -93,7 +93,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
         text::margins(&found.into()),
         scenario.remnant.time_constant_s,
         scenario.sample_time.s(),
-    ));
+    ))?;
     Ok(())
 }
 
@@ -115,7 +115,7 @@ fn of_family(scenario: &FamilyScenario, args: &MarginsArgs) -> Result<(), CliErr
             .map(|(gain, share)| json!({"share": share, "gain": json::number(*gain)}))
             .collect();
         object.insert("remnant_gain".to_owned(), Value::Array(rows));
-        json::print(&Value::Object(object));
+        json::print(&Value::Object(object))?;
         return Ok(());
     }
     let mut table = text::table(&["part of the remnant", "share of var(u)", "gain"]);
@@ -133,7 +133,7 @@ fn of_family(scenario: &FamilyScenario, args: &MarginsArgs) -> Result<(), CliErr
         scenario.name,
         name_of(args.state),
         text::margins(&found.into()),
-    ));
+    ))?;
     Ok(())
 }
 

@@ -7,6 +7,7 @@ pub mod group;
 pub mod identify;
 pub mod info;
 pub mod margins;
+mod places;
 pub mod reading;
 pub mod reproduce;
 mod scenario;

@@ -20,7 +20,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
         let lines = items
             .chain([claims])
             .map(|(name, title)| format!("{name:26} {title}\n"));
-        output::print(&lines.collect::<String>());
+        output::print(&lines.collect::<String>())?;
         return Ok(());
     }
     let wanted = Reproduction {
@@ -40,6 +40,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
             bar.suspend(|| output::message(&format!("{:22} {} estimates, {took}", study.name, study.estimates)));
             bar.reset();
         }
+        ReproductionEvent::Note(note) => bar.suspend(|| output::message(&format!("warning: {note}"))),
     };
     let found = reproduce(&wanted, &args.out, &tell, &|| !stopped.load(Ordering::Relaxed));
     bar.finish_and_clear();
@@ -59,7 +60,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
         output::print(&format!(
             "{} claims: {hold} hold, {in_part} in part, {not} do not, {untestable} cannot be tested\n",
             hold + in_part + not + untestable
-        ));
+        ))?;
     }
     let (simulated_s, drawn_s) = (found.simulated_s, found.drawn_s);
     output::print(&format!(
@@ -67,6 +68,6 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
         found.items,
         simulated_s + drawn_s,
         found.index.display()
-    ));
+    ))?;
     Ok(())
 }

@@ -1,14 +1,18 @@
 //! `hoid simulate`: one closed-loop run into a file.
 
+use std::path::Path;
+
 use hoid_io::{AnyScenario, write_record, write_record_csv};
 use hoid_model::{FamilyScenario, Record, SampleTime, scenario::Scenario};
 use hoid_report::numbers;
 use hoid_sim::{FamilySimulator, RunSeed, Simulator};
 
-use super::scenario::chosen_scenario;
+use super::{places, scenario::chosen_scenario};
 use crate::{args::SimulateArgs, error::CliError, output};
 
 pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
+    let inputs: Vec<&Path> = args.base.scenario.as_deref().into_iter().collect();
+    places::check(&inputs, &[Some(&args.out)], &[])?;
     let run_seed = RunSeed {
         seed: args.seed,
         cell: args.cell,
@@ -47,7 +51,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
     if piped {
         output::message(summary.trim_end());
     } else {
-        output::print(&summary);
+        output::print(&summary)?;
     }
     Ok(())
 }
@@ -56,7 +60,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
 fn write_out(record: &Record) -> Result<(), CliError> {
     let mut text = Vec::new();
     write_record_csv(&mut text, "standard output", record)?;
-    output::print(&String::from_utf8_lossy(&text));
+    output::print(&String::from_utf8_lossy(&text))?;
     Ok(())
 }
 

@@ -15,7 +15,7 @@ use serde_json::json;
 use crate::{
     args::{StudyCommand, StudyMergeArgs, StudyRunArgs},
     error::CliError,
-    output,
+    interrupt, output,
 };
 
 pub fn run_command(command: &StudyCommand) -> Result<(), CliError> {
@@ -23,12 +23,12 @@ pub fn run_command(command: &StudyCommand) -> Result<(), CliError> {
         StudyCommand::Run(args) => run_plan(args),
         StudyCommand::Merge(args) => merge_shards(args),
         StudyCommand::Check(args) => {
-            output::print(&description(&plan_of(&args.plan)?));
+            output::print(&description(&plan_of(&args.plan)?))?;
             Ok(())
         }
         StudyCommand::Plans(args) => list(args.name.as_deref()),
         StudyCommand::Schema => {
-            output::print(&plan_schema());
+            output::print(&plan_schema())?;
             Ok(())
         }
     }
@@ -57,7 +57,7 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
     };
     let outcome = run_with_progress(&plan, &args.out, &options)?;
     if args.json {
-        output::print(&format!("{:#}\n", outcome_json(&plan, &outcome)));
+        output::print(&format!("{:#}\n", outcome_json(&plan, &outcome)))?;
         return Ok(());
     }
     let mut text = format!("{}: {} estimates made\n", plan.name, outcome.estimates);
@@ -69,7 +69,7 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
         ));
     }
     text.push_str(&tables_text(&outcome));
-    output::print(&text);
+    output::print(&text)?;
     Ok(())
 }
 
@@ -89,6 +89,7 @@ pub fn run_with_progress(plan: &Plan, directory: &Path, options: &RunOptions) ->
     );
     bar.finish_and_clear();
     let outcome = outcome?;
+    say(directory, &outcome.notes);
     if outcome.finished {
         Ok(outcome)
     } else {
@@ -100,16 +101,21 @@ pub fn run_with_progress(plan: &Plan, directory: &Path, options: &RunOptions) ->
     }
 }
 
+/// What the user should know of a directory, as warnings.
+pub fn say(directory: &Path, notes: &[String]) {
+    for note in notes {
+        output::message(&format!("warning: {}: {note}", directory.display()));
+    }
+}
+
 /// A flag that an interrupt sets; a second interrupt ends the program at once, with nothing lost
 /// but the blocks on their way.
 pub fn stop_at_interrupt() -> Arc<AtomicBool> {
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);
-    // Studies run one after the other set it anew; without a handler an interrupt ends the program,
-    // which can be resumed as well.
-    let _ = ctrlc::set_handler(move || {
+    interrupt::on_interrupt(move |_| {
         if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
+            interrupt::end(interrupt::exit_code());
         }
     });
     stopped
@@ -117,15 +123,16 @@ pub fn stop_at_interrupt() -> Arc<AtomicBool> {
 
 fn merge_shards(args: &StudyMergeArgs) -> Result<(), CliError> {
     let outcome = merge(&args.shards, &args.out, args.csv)?;
+    say(&args.out, &outcome.notes);
     if args.json {
         let tables: Vec<String> = outcome.tables.iter().map(|t| t.display().to_string()).collect();
         output::print(&format!(
             "{:#}\n",
             json!({ "hoid": env!("CARGO_PKG_VERSION"), "estimates": outcome.estimates, "tables": tables })
-        ));
+        ))?;
         return Ok(());
     }
-    output::print(&format!("{} estimates\n{}", outcome.estimates, tables_text(&outcome)));
+    output::print(&format!("{} estimates\n{}", outcome.estimates, tables_text(&outcome)))?;
     Ok(())
 }
 
@@ -199,7 +206,7 @@ fn list(name: Option<&str>) -> Result<(), CliError> {
                 plan.estimates()
             ));
         }
-        output::print(&text);
+        output::print(&text)?;
         return Ok(());
     };
     let named = find_plan(name).ok_or_else(|| {
@@ -209,6 +216,6 @@ fn list(name: Option<&str>) -> Result<(), CliError> {
             known.join(", ")
         ))
     })?;
-    output::print(named.text);
+    output::print(named.text)?;
     Ok(())
 }

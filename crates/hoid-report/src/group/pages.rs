@@ -1,6 +1,9 @@
 //! The pages of a finished group, made of the tables in its directory and written beside them.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use hoid_io::{OutputTable, read_table};
 use hoid_study::group::{GroupSummary, Manifest};
@@ -76,8 +79,10 @@ pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result
         ),
     ];
     settings.extend(account(&read("preparation")?, &read("trouble")?));
+    let names = page_names(&subjects);
     let mut pages = Vec::new();
-    for subject in std::iter::once(None).chain(subjects.iter().map(|s| Some(*s))) {
+    let of_subjects = subjects.iter().zip(names).map(|(subject, name)| (Some(*subject), name));
+    for (subject, name) in std::iter::once((None, "report.html".to_owned())).chain(of_subjects) {
         let report = GroupReport {
             manifest,
             summary: &summary,
@@ -85,13 +90,32 @@ pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result
             settings: settings.clone(),
             subject,
         };
-        let plain = |name: &str| name.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
-        let name = subject.map_or("report.html".to_owned(), |subject| {
-            format!("subject-{}.html", plain(subject))
-        });
         pages.push(page::write_page(out, &name, &report.to_html()?)?);
     }
     Ok(pages)
+}
+
+/// Characters of a subject in the name of a page: with a number behind them a name that every file
+/// system takes.
+const LONGEST_NAME: usize = 80;
+
+/// The name of the page of each subject: letters and digits, a number behind it where another
+/// subject has the name already. File systems that do not tell S1 from s1 are counted as well.
+fn page_names(subjects: &[&str]) -> Vec<String> {
+    let mut taken = BTreeSet::new();
+    let name_of = |subject: &&str| {
+        let cut: String = subject.chars().take(LONGEST_NAME).collect();
+        let plain = cut.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
+        let numbered = (1_u64..).map(|n| match n {
+            1 => format!("subject-{plain}.html"),
+            n => format!("subject-{plain}-{n}.html"),
+        });
+        let free = numbered
+            .into_iter()
+            .find(|name| taken.insert(name.to_ascii_lowercase()));
+        free.unwrap_or_default()
+    };
+    subjects.iter().map(name_of).collect()
 }
 
 /// What was done to the runs and what is wrong with their sampling: a row for all files of which the
@@ -132,4 +156,34 @@ fn account(preparation: &OutputTable, trouble: &OutputTable) -> Vec<(String, Str
         ));
     }
     rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_subjects_never_share_a_page() {
+        let long = "x".repeat(300);
+        let subjects = [
+            "S1",
+            "s1",
+            "S 1",
+            "S-1",
+            "S-1-2",
+            "S_1",
+            "Åsa",
+            "Ása",
+            "",
+            &long,
+            &format!("{long}y"),
+        ];
+        let names = page_names(&subjects);
+        assert_eq!(names[0], "subject-S1.html");
+        assert_eq!(names[1], "subject-s1-2.html");
+        assert_eq!(names[2], "subject-S-1.html");
+        let distinct: BTreeSet<String> = names.iter().map(|name| name.to_ascii_lowercase()).collect();
+        assert_eq!(distinct.len(), subjects.len(), "{names:?}");
+        assert!(names.iter().all(|name| name.len() < 120 && name.is_ascii()));
+    }
 }

@@ -6,6 +6,7 @@ use std::{
     sync::atomic::{AtomicU64, Ordering},
 };
 
+use hoid_io::DirectoryLock;
 use sha2::{Digest, Sha256};
 
 use super::{
@@ -16,9 +17,10 @@ use super::{
 };
 use crate::{
     RunOptions, StudyError,
-    directory::{part, remove_parts, sweep, table_path},
-    run::{Outcome, Progress, on_threads},
+    directory::{part, remove_parts, table_path, write_source},
+    run::{Outcome, Progress, on_threads, ready},
     run_record::RunRecord,
+    seal::{OnDisk, notes_on, on_disk, write_block},
 };
 
 /// Analyses the runs that count. `base` is the directory from which the files are named.
@@ -43,21 +45,35 @@ pub fn run_group(
         blocks: blocks.len() as u64,
         shard: None,
         complete: false,
+        sealed: true,
     };
-    let complete = prepare(manifest, directory, &record, options.resume)?;
+    check_directory(manifest, base, directory)?;
+    hoid_io::make_directory(directory)?;
+    let _lock = DirectoryLock::take(directory)?;
+    let found = prepare(manifest, directory, &record, options.resume)?;
     let tables = || tables(directory);
-    if complete {
+    if found.complete {
         return Ok(Outcome {
             finished: true,
             estimates: 0,
             tables: tables(),
+            notes: Vec::new(),
         });
     }
     let total = blocks.len() as u64;
-    let is_there = |i: &usize| part(directory, *i as u64, "estimates").exists();
+    let mut damaged = Vec::new();
+    let open = (0..blocks.len()).filter(|i| match on_disk(directory, &record.plan_sha256, *i as u64) {
+        OnDisk::Whole => false,
+        OnDisk::Missing => true,
+        OnDisk::Damaged(why) => {
+            damaged.push((*i as u64, why));
+            true
+        }
+    });
     // What is chosen for all runs of a person in a condition comes before each of them.
     let is_cell = |i: &usize| matches!(blocks[*i], Block::Cell(_));
-    let (cells, runs): (Vec<usize>, Vec<usize>) = (0..blocks.len()).filter(|i| !is_there(i)).partition(is_cell);
+    let (cells, runs): (Vec<usize>, Vec<usize>) = open.partition(is_cell);
+    let notes: Vec<String> = found.note_on_seals().into_iter().chain(notes_on(&damaged)).collect();
     let known = total - (cells.len() + runs.len()) as u64;
     let done = AtomicU64::new(known);
     let one = |&i: &usize| -> Result<bool, StudyError> {
@@ -75,12 +91,13 @@ pub fn run_group(
             }
             Block::Cell(cell) => analyse_together(manifest, base, cell),
         };
-        hoid_io::write_table(&part(directory, i as u64, "traces"), &found.traces)?;
-        hoid_io::write_table(&part(directory, i as u64, "responses"), &found.responses)?;
-        for (table, rows) in &found.account {
-            hoid_io::write_table(&part(directory, i as u64, table), rows)?;
-        }
-        hoid_io::write_table(&part(directory, i as u64, "estimates"), &found.estimates)?;
+        let mut all = vec![
+            ("estimates", &found.estimates),
+            ("traces", &found.traces),
+            ("responses", &found.responses),
+        ];
+        all.extend(found.account.iter().map(|(table, rows)| (*table, rows)));
+        write_block(directory, &record.plan_sha256, i as u64, &all)?;
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         progress(Progress { done, total, known });
         Ok(true)
@@ -92,12 +109,13 @@ pub fn run_group(
             finished,
             estimates,
             tables: Vec::new(),
+            notes,
         });
     }
     join(manifest, base, &blocks, directory, options.csv)?;
     RunRecord {
         complete: true,
-        ..record
+        ..record.clone()
     }
     .write(directory)?;
     remove_parts(directory)?;
@@ -105,7 +123,22 @@ pub fn run_group(
         finished: true,
         estimates,
         tables: tables(),
+        notes,
     })
+}
+
+/// No recording lies where the tables and parts are written.
+fn check_directory(manifest: &Manifest, base: &Path, directory: &Path) -> Result<(), StudyError> {
+    let files = manifest
+        .runs
+        .iter()
+        .flat_map(|run| std::iter::once(&run.file).chain(&run.then));
+    let files: Vec<PathBuf> = files.map(|file| base.join(file)).collect();
+    let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+    for place in [directory.to_owned(), directory.join("parts")] {
+        hoid_io::check_output_directory(&place, &files)?;
+    }
+    Ok(())
 }
 
 /// SHA-256 of the manifest and of the files that count; the run of one that cannot be read says so.
@@ -120,8 +153,8 @@ fn hash(manifest: &Manifest, base: &Path) -> String {
     hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Makes the directory ready; true when it holds the finished group.
-fn prepare(manifest: &Manifest, directory: &Path, record: &RunRecord, resume: bool) -> Result<bool, StudyError> {
+/// Makes the directory ready, or finds what it holds.
+fn prepare(manifest: &Manifest, directory: &Path, record: &RunRecord, resume: bool) -> Result<RunRecord, StudyError> {
     let shown = || directory.display().to_string();
     if let Some(found) = RunRecord::read(directory)? {
         if !resume {
@@ -133,14 +166,13 @@ fn prepare(manifest: &Manifest, directory: &Path, record: &RunRecord, resume: bo
                 reason: format!("{reason} (the sum covers the manifest and its files)"),
             });
         }
-        sweep(&directory.join("parts"))?;
-        return Ok(found.complete);
+        ready(directory, &found, record)?;
+        return Ok(found);
     }
     hoid_io::make_directory(&directory.join("parts"))?;
-    let text = manifest.text();
-    hoid_io::write_atomically(&directory.join(MANIFEST), |file| file.write_all(text.as_bytes()))?;
+    write_source(&directory.join(MANIFEST), &manifest.text())?;
     record.write(directory)?;
-    Ok(false)
+    Ok(record.clone())
 }
 
 const TABLES: [&str; 14] = [

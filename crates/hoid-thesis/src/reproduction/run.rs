@@ -10,7 +10,7 @@ use std::{
     time::Instant,
 };
 
-use hoid_io::{OutputTable, make_directory, write_atomically, write_table};
+use hoid_io::{DirectoryLock, OutputTable, make_directory, write_atomically, write_table};
 use hoid_study::{NamedPlan, Progress, Results, RunOptions, run};
 use rayon::prelude::*;
 
@@ -55,6 +55,8 @@ pub enum ReproductionEvent<'a> {
     Progress(Progress),
     /// A study has its results.
     Study(&'a StudyEntry),
+    /// What the user should know of a study: damaged blocks that were computed again.
+    Note(&'a str),
 }
 
 /// What has been reproduced.
@@ -87,6 +89,8 @@ pub fn reproduce(
 ) -> Result<Option<ReproductionSummary>, ThesisError> {
     let begin = Instant::now();
     let (chosen, with_claims) = chosen(items(), &wanted.only)?;
+    make_directory(directory)?;
+    let _lock = DirectoryLock::take(directory)?;
     let mut plans: BTreeSet<&str> = chosen.iter().filter_map(|item| item.plan).collect();
     if with_claims {
         plans.extend(claims().iter().flat_map(|claim| claim.plans.iter().copied()));
@@ -204,6 +208,9 @@ fn study(
         &|progress| notify(ReproductionEvent::Progress(progress)),
         goes_on,
     )?;
+    for note in &outcome.notes {
+        notify(ReproductionEvent::Note(&format!("{}: {note}", plan.name)));
+    }
     if !outcome.finished {
         return Ok(None);
     }

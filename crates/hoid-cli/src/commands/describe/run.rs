@@ -1,6 +1,6 @@
 //! From records to a describing function: read, describe, draw.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use hoid_ident::frequency::{Description, DescriptionOptions, describe_runs};
 use hoid_io::{Offset, write_atomically};
@@ -10,7 +10,10 @@ use hoid_report::figures::{describing, with_width_mm};
 use super::form::Described;
 use crate::{
     args::{DescribeArgs, ReadArgs},
-    commands::reading::{self, ReadAll},
+    commands::{
+        places,
+        reading::{self, ReadAll},
+    },
     error::CliError,
     json, output,
 };
@@ -19,6 +22,8 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
     if let Some(path) = &args.figure {
         check_figure(path)?;
     }
+    let inputs: Vec<&Path> = args.records.iter().map(PathBuf::as_path).collect();
+    places::check(&inputs, &[args.figure.as_deref()], &[])?;
     let (read, offsets) = without_offsets(&args.read);
     let ReadAll {
         files,
@@ -55,9 +60,9 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
         output::message(&format!("figure: {}", path.display()));
     }
     if args.json {
-        json::print(&described.to_json());
+        json::print(&described.to_json())?;
     } else {
-        output::print(&described.page());
+        output::print(&described.page())?;
     }
     CliError::of_verdict(&found.verdict)
 }

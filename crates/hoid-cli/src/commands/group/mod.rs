@@ -21,7 +21,7 @@ use hoid_study::{
 
 use form::Finished;
 
-use super::study::stop_at_interrupt;
+use super::study::{say, stop_at_interrupt};
 use crate::{
     args::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs},
     error::CliError,
@@ -63,7 +63,7 @@ pub fn simulate(args: &SimulateGroupArgs) -> Result<(), CliError> {
         manifest?.runs.len(),
         args.out.display(),
         args.out.display()
-    ));
+    ))?;
     Ok(())
 }
 
@@ -114,7 +114,7 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
     let text = manifest.text();
     let path = args.out.clone().unwrap_or_else(|| args.directory.join(MANIFEST));
     if path.as_os_str() == "-" {
-        output::print(&text);
+        output::print(&text)?;
         return Ok(());
     }
     if path.exists() {
@@ -133,7 +133,7 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
             others[0]
         ));
     }
-    output::print(&said);
+    output::print(&said)?;
     Ok(())
 }
 
@@ -150,6 +150,10 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
         )));
     }
     let manifest = Manifest::read(&path)?;
+    // What goes on writes no manifest.
+    if !args.resume {
+        hoid_io::check_output_directory(out, &[&path])?;
+    }
     let base = path.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
     let stopped = stop_at_interrupt();
     let runs = manifest.runs.iter().filter(|run| run.counts).count();
@@ -173,6 +177,7 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     );
     bar.finish_and_clear();
     let outcome = outcome?;
+    say(out, &outcome.notes);
     if !outcome.finished {
         return Err(CliError::Stopped(format!(
             "{} was stopped; what is done is in {}, go on with --resume",
@@ -189,9 +194,9 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
         pages,
     };
     if args.json {
-        json::print(&finished.to_json());
+        json::print(&finished.to_json())?;
     } else {
-        output::print(&finished.page());
+        output::print(&finished.page())?;
     }
     if summary.verdict.level == VerdictLevel::NotDetermined {
         let reasons: Vec<&str> = summary.verdict.reasons().take(REASONS_OF_EXIT).collect();

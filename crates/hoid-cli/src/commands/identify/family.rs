@@ -90,9 +90,9 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
         report(&found, directory)?;
     }
     if args.json {
-        json::print(&found.to_json()?);
+        json::print(&found.to_json()?)?;
     } else {
-        output::print(&found.page()?);
+        output::print(&found.page()?)?;
     }
     if fit.verdict.level == VerdictLevel::NotDetermined {
         let reasons: Vec<&str> = fit.verdict.reasons().collect();

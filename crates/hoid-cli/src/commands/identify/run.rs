@@ -1,5 +1,7 @@
 //! From records to a model: read, fit, judge, write.
 
+use std::path::{Path, PathBuf};
+
 use hoid_ident::{
     Fit, MarginEstimates,
     validation::{GoodnessOfFit, nrmse_fit, vaf},
@@ -15,7 +17,10 @@ use super::{
 };
 use crate::{
     args::{IdentifyArgs, ModelKind},
-    commands::reading::{self, ReadAll},
+    commands::{
+        places,
+        reading::{self, ReadAll},
+    },
     error::CliError,
     family_operator::{self, Converted},
     json::{self, Identified},
@@ -24,6 +29,7 @@ use crate::{
 
 pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let kind = estimate::kind(args)?;
+    check_places(args)?;
     let with_input = match kind {
         ModelKind::Polynomial(structure) => structure.has_input(),
         ModelKind::Family | ModelKind::GreyBox | ModelKind::TimeVarying => true,
@@ -118,11 +124,23 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         output::message(&format!("report: {}", page.display()));
     }
     if args.json {
-        json::print(&identified.to_json());
+        json::print(&identified.to_json())?;
     } else {
-        output::print(&page(&identified, family.as_ref()));
+        output::print(&page(&identified, family.as_ref()))?;
     }
     CliError::of_verdict(&verdict)
+}
+
+/// What is written takes the place of nothing that is read; `--prior` may name a file.
+fn check_places(args: &IdentifyArgs) -> Result<(), CliError> {
+    let mut inputs: Vec<&Path> = args.records.iter().map(PathBuf::as_path).collect();
+    inputs.extend(args.validate.as_deref());
+    inputs.extend(args.prior.as_deref().map(Path::new));
+    places::check(
+        &inputs,
+        &[args.figure.as_deref(), args.trace.as_deref()],
+        &[args.report.as_deref()],
+    )
 }
 
 /// VAF and NRMSE of the prediction k samples ahead, over all records together.

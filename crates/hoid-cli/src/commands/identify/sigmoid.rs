@@ -61,9 +61,9 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
         settings: &settings,
     };
     if args.json {
-        json::print(&found.to_json());
+        json::print(&found.to_json())?;
     } else {
-        output::print(&found.page());
+        output::print(&found.page())?;
     }
     CliError::of_verdict(&verdict)
 }

@@ -15,6 +15,11 @@ const SET_BACK: usize = 10;
 /// Samples by which the grid may run ahead of the times before that is said.
 const AHEAD: f64 = 2.0;
 
+/// Lines over which the rate of the times is judged.
+const JUDGED: usize = 128;
+/// Share by which the rate may differ from `--fs`.
+const OFF: f64 = 0.05;
+
 /// What the time of a line says.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Arrival {
@@ -34,6 +39,8 @@ pub struct Clock {
     /// Last line behind, and how many in a row.
     behind: Option<(f64, usize)>,
     hurried: bool,
+    /// Differences of the times that are judged next, s.
+    steps: Vec<f64>,
 }
 
 impl Clock {
@@ -43,6 +50,7 @@ impl Clock {
             last: None,
             behind: None,
             hurried: false,
+            steps: Vec::with_capacity(JUDGED),
         }
     }
 
@@ -84,12 +92,28 @@ impl Clock {
             };
         }
         let expected = place + steps * ts;
+        self.steps.push(t - last_s);
         self.hurried |= expected - t > AHEAD * ts;
         self.last = Some((expected + GAIN * (t - expected), t));
         Arrival::Sample {
             missing: steps as usize - 1,
             left_out: false,
         }
+    }
+
+    /// The rate of the times in Hz, where it is another than `--fs`: asked after each line, it answers
+    /// once in [`JUDGED`] lines. The median of the differences stands against single gaps, their
+    /// mean against times that are rounded; both have to be off.
+    pub fn other_rate(&mut self) -> Option<f64> {
+        if self.steps.len() < JUDGED {
+            return None;
+        }
+        let mut steps = std::mem::take(&mut self.steps);
+        steps.sort_unstable_by(f64::total_cmp);
+        let median = steps[JUDGED / 2];
+        let mean = steps.iter().sum::<f64>() / steps.len() as f64;
+        let is_off = |step: f64| (step / self.sample_time_s - 1.0).abs() > OFF;
+        (is_off(median) && is_off(mean)).then_some(1.0 / median)
     }
 
     /// True once when the lines have come faster than the sampling frequency says.
@@ -148,6 +172,29 @@ mod tests {
         }
         assert_eq!(missing(&mut clock, 1.11), 9);
         assert_eq!(missing(&mut clock, 1.12), 0);
+    }
+
+    #[test]
+    fn another_rate_is_told_from_gaps_and_rounding() {
+        let rates = |t: &dyn Fn(f64) -> f64| -> Vec<f64> {
+            let mut clock = Clock::new(0.01);
+            let take = |k: u32| {
+                missing(&mut clock, t(f64::from(k)));
+                clock.other_rate()
+            };
+            (0..600).filter_map(take).collect()
+        };
+        for hz in [50.0, 80.0, 110.0, 200.0] {
+            let found = rates(&|k| k / hz);
+            assert_eq!(found.len(), 4, "{hz}");
+            assert!(
+                found.iter().all(|rate| (rate / hz - 1.0).abs() < 1e-9),
+                "{hz}: {found:?}"
+            );
+        }
+        // One sample of ten is missing; then times in steps of 8 ms.
+        assert!(rates(&|k| 0.01 * (k + (k / 9.0).floor())).is_empty());
+        assert!(rates(&|k| (0.01 * k / 0.008).floor() * 0.008 + 1e-6 * k).is_empty());
     }
 
     #[test]

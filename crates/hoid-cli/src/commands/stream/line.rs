@@ -1,7 +1,7 @@
 //! One line of the output.
 
 use hoid_model::{
-    NotConvertible, VerdictLevel,
+    Finding, NotConvertible, VerdictLevel,
     uncertainty::{Estimate, OperatorEstimate},
 };
 use hoid_track::{Change, Live, Tracker};
@@ -40,6 +40,8 @@ struct Line<'a> {
     counts: Counts,
     #[serde(skip_serializing_if = "Option::is_none")]
     fault: Option<&'a str>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    findings: Vec<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     warm_up: Option<WarmUp<'a>>,
 }
@@ -123,6 +125,8 @@ pub struct Standing<'a> {
     pub counts: Counts,
     /// Faults since the last line.
     pub fault: Option<String>,
+    /// What makes the whole stream doubtful.
+    pub finding: Option<&'a Finding>,
 }
 
 impl Standing<'_> {
@@ -138,7 +142,13 @@ impl Standing<'_> {
         let operator = tracker.map(Tracker::operator);
         let level = tracker.zip(operator.as_ref()).map(|(t, o)| t.level(o));
         let line = Line {
-            level: level.unwrap_or(VerdictLevel::NotDetermined).name(),
+            level: level
+                .unwrap_or(VerdictLevel::NotDetermined)
+                .max(
+                    self.finding
+                        .map_or(VerdictLevel::Trustworthy, |_| VerdictLevel::Doubtful),
+                )
+                .name(),
             t: self.t,
             parameters: tracker.map(|t| Parameters {
                 names: self.names,
@@ -157,6 +167,7 @@ impl Standing<'_> {
             }),
             counts: self.counts,
             fault: self.fault.as_deref(),
+            findings: self.finding.map(json::finding).into_iter().collect(),
             warm_up: match self.live {
                 Live::Collecting(warm_up) => Some(WarmUp {
                     collected: warm_up.collected,

@@ -15,13 +15,13 @@ use std::{
 };
 
 use hoid_ident::Choice;
-use hoid_model::SampleTime;
+use hoid_model::{Finding, SampleTime};
 use hoid_track::{Change, Live, LiveOutcome, Sample, TrackOptions};
 
 use crate::{
     args::StreamArgs,
     error::CliError,
-    output,
+    interrupt, output,
     recursion::{self, Plan},
 };
 use clock::{Arrival, Clock, LONGEST_GAP_S};
@@ -51,7 +51,7 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
         ));
     }
     let session = Arc::new(Mutex::new(Session::new(args, plan, sample_time)?));
-    end_on_interrupt(&session)?;
+    end_on_interrupt(&session);
     let mut input = Lines::new(io::stdin().lock());
     let mut buffer = Vec::new();
     let broken = |e: io::Error| CliError::Stream(format!("standard input cannot be read: {e}"));
@@ -94,6 +94,10 @@ struct Session {
     change: Option<(Option<f64>, Change)>,
     names: Vec<String>,
     faults: VecDeque<String>,
+    /// That the times go at another rate has been said.
+    rate_told: bool,
+    /// What they go at.
+    rate: Option<Finding>,
 }
 
 impl Session {
@@ -122,6 +126,8 @@ impl Session {
             change: None,
             names: Vec::new(),
             faults: VecDeque::new(),
+            rate_told: false,
+            rate: None,
         };
         if matches!(session.live, Live::Tracking(_)) {
             let options = session.plan.options().clone();
@@ -189,18 +195,37 @@ impl Session {
                     self.t = Some(t);
                 }
             }
-            if self.clock.hurried() {
-                output::message(&format!(
-                    "warning: at t = {t} s the lines run ahead of --fs {}: t advances by less than {} s a line",
-                    1.0 / self.sample_time.s(),
-                    self.sample_time.s()
-                ));
-            }
+            self.judge_rate(t);
         }
         if let Some(fault) = read.fault {
             self.fault(fault);
         }
         self.sample(self.scale.0 * read.e, self.scale.1 * read.u, read.reference);
+    }
+
+    /// Says once that the times go at another rate than `--fs`; from there on every line carries the
+    /// finding.
+    fn judge_rate(&mut self, t: f64) {
+        let fs = 1.0 / self.sample_time.s();
+        let (hurried, other) = (self.clock.hurried(), self.clock.other_rate());
+        let mut warn = |words: &str| {
+            if !std::mem::replace(&mut self.rate_told, true) {
+                output::message(&format!("warning: {words}"));
+            }
+        };
+        if let Some(hz) = other.filter(|_| self.rate.is_none()) {
+            let words = format!(
+                "up to t = {t} s the times go at {hz:.4} Hz and --fs says {fs} Hz: delay, lead and frequency of the estimate \
+                 are scaled by that; give the rate of the times to --fs, or correct t"
+            );
+            warn(&words);
+            self.rate = Some(Finding::doubt("sampling-rate", words));
+        } else if hurried {
+            warn(&format!(
+                "at t = {t} s the lines run ahead of --fs {fs}: t advances by less than {} s a line",
+                self.sample_time.s()
+            ));
+        }
     }
 
     fn sample(&mut self, e: f64, u: f64, reference: Option<f64>) {
@@ -251,6 +276,7 @@ impl Session {
             change: self.change.take(),
             counts: self.counts,
             fault,
+            finding: self.rate.as_ref(),
         };
         let unwritable = |e| CliError::Stream(format!("a line of the output cannot be made: {e}"));
         standing.write(buffer).map_err(unwritable)
@@ -304,9 +330,9 @@ fn lock(session: &Mutex<Session>) -> MutexGuard<'_, Session> {
 
 /// Ends with a summary at an interrupt, with exit code 0 where there is an estimate; a line that is being written is finished
 /// before.
-fn end_on_interrupt(session: &Arc<Mutex<Session>>) -> Result<(), CliError> {
+fn end_on_interrupt(session: &Arc<Mutex<Session>>) {
     let session = Arc::clone(session);
-    ctrlc::set_handler(move || {
+    interrupt::on_interrupt(move |_| {
         let asked = Instant::now();
         loop {
             if let Ok(session) = session.try_lock() {
@@ -320,6 +346,5 @@ fn end_on_interrupt(session: &Arc<Mutex<Session>>) -> Result<(), CliError> {
             }
             thread::sleep(Duration::from_millis(1));
         }
-    })
-    .map_err(|e| CliError::Stream(format!("interrupts cannot be caught: {e}")))
+    });
 }

@@ -5,13 +5,20 @@ use hoid_model::Record;
 use hoid_track::{StartAt, TrackOptions, track};
 
 use super::{report, result::Tracked};
-use crate::{args::TrackArgs, commands::reading, error::CliError, json, output, recursion, recursion::Plan};
+use crate::{
+    args::TrackArgs,
+    commands::{places, reading},
+    error::CliError,
+    json, output, recursion,
+    recursion::Plan,
+};
 
 pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     check_table_path(&args.out)?;
     if !args.batch.is_empty() && args.report.is_none() {
         return Err(CliError::Usage("--batch belongs to --report".to_owned()));
     }
+    places::check(&[&args.record], &[Some(&args.out)], &[args.report.as_deref()])?;
     let with_input = recursion::structure(&args.recursion)?.has_input();
     let (record, account) = reading::read(&args.record, &args.read, with_input)?;
     let plan = Plan::new(&args.recursion, record.sample_time())?;
@@ -79,9 +86,9 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         output::message(&format!("report: {}", page.display()));
     }
     if args.json {
-        json::print(&tracked.to_json()?);
+        json::print(&tracked.to_json()?)?;
     } else {
-        output::print(&tracked.page()?);
+        output::print(&tracked.page()?)?;
     }
     CliError::of_verdict(&verdict)
 }

@@ -1,0 +1,323 @@
+//! Where results go: never over what they are made of, never half, never silently nowhere.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Stdio},
+};
+
+use tempfile::TempDir;
+
+use common::{bad, good, hoid};
+
+/// A simulated run `in.csv`, a group `g` of two runs, a plan.
+fn workplace() -> TempDir {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    good(d, &["simulate", "--condition", "C1", "--seed", "1", "--out", "in.csv"]);
+    good(
+        d,
+        &[
+            "simulate-group",
+            "--out",
+            "g",
+            "--subjects",
+            "1",
+            "--conditions",
+            "C1",
+            "--runs",
+            "1",
+        ],
+    );
+    directory
+}
+
+const SETTLED: [&str; 8] = [
+    "--structure",
+    "bj",
+    "--nk",
+    "29",
+    "--orders",
+    "nd=1",
+    "--initial-state",
+    "zero",
+];
+
+#[test]
+fn an_output_that_is_an_input_is_refused() {
+    let directory = workplace();
+    let d = directory.path();
+    let kept = fs::read(d.join("in.csv")).unwrap();
+    fs::hard_link(d.join("in.csv"), d.join("hard.csv")).unwrap();
+    let mut names = vec!["in.csv", "g/../in.csv", "hard.csv"];
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(d.join("in.csv"), d.join("soft.csv")).unwrap();
+        names.push("soft.csv");
+    }
+    for name in names {
+        let (code, message) = bad(d, &["track", "in.csv", "--method", "rls", "--nk", "29", "--out", name]);
+        assert_eq!(code, 2, "{message}");
+        assert!(message.contains("which is read by the same command"), "{message}");
+    }
+    fs::write(d.join("page.csv"), "").unwrap();
+    let mut all: Vec<Vec<&str>> = vec![vec!["simulate", "--scenario", "page.csv", "--out", "page.csv"]];
+    let figure = ["describe", "in.svg", "--excitation", "f_t", "--figure", "in.svg"];
+    fs::copy(d.join("in.csv"), d.join("in.svg")).unwrap();
+    all.push(figure.to_vec());
+    fs::create_dir(d.join("pages")).unwrap();
+    fs::copy(d.join("in.csv"), d.join("pages/report.html")).unwrap();
+    let mut report = vec!["identify", "pages/report.html", "--report", "pages"];
+    report.extend(SETTLED);
+    all.push(report);
+    all.push(vec!["group", "g", "--out", "g"]);
+    all.push(vec!["group", "g/group.toml", "--out", "g"]);
+    for arguments in all {
+        let (code, message) = bad(d, &arguments);
+        assert_eq!(code, 2, "{arguments:?}: {message}");
+        assert!(message.contains("read by the same command"), "{arguments:?}: {message}");
+    }
+    assert_eq!(fs::read(d.join("in.csv")).unwrap(), kept);
+    assert_eq!(fs::read(d.join("pages/report.html")).unwrap(), kept);
+}
+
+#[test]
+fn places_that_take_nothing_are_known_before_the_work() {
+    let directory = workplace();
+    let d = directory.path();
+    for arguments in [
+        &["track", "in.csv", "--out", "no/such/trace.csv"][..],
+        &["identify", "in.csv", "--report", "in.csv/below"],
+        &["simulate", "--condition", "C1", "--out", "no/run.csv"],
+    ] {
+        let (code, message) = bad(d, arguments);
+        assert_eq!(code, 1, "{message}");
+        assert!(message.contains("cannot be written"), "{message}");
+    }
+}
+
+/// Each command that prints, quick.
+fn printing() -> Vec<Vec<&'static str>> {
+    let mut identify = vec!["identify", "in.csv"];
+    identify.extend(SETTLED);
+    let mut as_json = identify.clone();
+    as_json.push("--json");
+    vec![
+        identify,
+        as_json,
+        vec![
+            "identify",
+            "in.csv",
+            "--structure",
+            "time-varying",
+            "--delay",
+            "0.28..0.3",
+        ],
+        vec!["identify", "in.csv", "--form", "lead-lag"],
+        vec!["describe", "in.csv", "--excitation", "f_t"],
+        vec!["track", "in.csv", "--method", "rls", "--nk", "29", "--out", "trace.csv"],
+        vec![
+            "track",
+            "in.csv",
+            "--method",
+            "rls",
+            "--nk",
+            "29",
+            "--out",
+            "trace.csv",
+            "--json",
+        ],
+        vec!["info", "in.csv"],
+        vec!["info", "in.csv", "--json"],
+        vec!["convert", "--f=-1.9,.92", "--b", ".04,-.04", "--nk", "29"],
+        vec!["convert", "--transfer-function", "90/(s(s+6))", "--json"],
+        vec!["margins", "--condition", "C1"],
+        vec!["simulate", "--condition", "C1", "--out", "run.csv"],
+        vec!["simulate", "--condition", "C1", "--out", "-"],
+        vec![
+            "simulate-group",
+            "--out",
+            "h",
+            "--subjects",
+            "1",
+            "--conditions",
+            "C1",
+            "--runs",
+            "1",
+        ],
+        vec![
+            "group",
+            "init",
+            "g",
+            "--pattern",
+            "{subject}_{condition}_{run}.csv",
+            "--out",
+            "-",
+        ],
+        vec!["study", "plans"],
+        vec!["study", "schema"],
+        vec!["reproduce", "--list"],
+        vec!["--help"],
+        vec!["--version"],
+        vec!["identify", "--help"],
+    ]
+}
+
+/// Exit code and standard error of a command whose output goes elsewhere.
+fn printed_into(directory: &Path, arguments: &[&str], out: Stdio) -> (Option<i32>, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
+        .args(arguments)
+        .current_dir(directory)
+        .stdin(Stdio::null())
+        .stdout(out)
+        .output()
+        .unwrap();
+    (output.status.code(), String::from_utf8(output.stderr).unwrap())
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_output_is_an_error_of_every_command() {
+    let directory = workplace();
+    for arguments in printing() {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let (code, message) = printed_into(directory.path(), &arguments, full.into());
+        assert_eq!(code, Some(1), "{arguments:?}: {message}");
+        assert!(
+            message.contains("standard output cannot be written: No space left"),
+            "{arguments:?}: {message}"
+        );
+        let _ = fs::remove_dir_all(directory.path().join("h"));
+    }
+    std::os::unix::fs::symlink("/dev/full", directory.path().join("full.csv")).unwrap();
+    let to_file = hoid(
+        directory.path(),
+        &["simulate", "--condition", "C1", "--out", "full.csv"],
+    );
+    assert_eq!(to_file.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&to_file.stderr).contains("make room"));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_leaves_early_ends_nothing_else() {
+    let directory = workplace();
+    for arguments in printing() {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let (code, message) = printed_into(directory.path(), &arguments, writer.into());
+        assert!(
+            !message.contains("panicked") && !message.contains("pipe"),
+            "{arguments:?}: {message}"
+        );
+        assert!(matches!(code, Some(0 | 1)), "{arguments:?}: {code:?} {message}");
+        assert!(
+            code == Some(0) || message.contains("not determine"),
+            "{arguments:?}: {message}"
+        );
+        let _ = fs::remove_dir_all(directory.path().join("h"));
+    }
+    // The trace is there, whole, though nobody read the page.
+    let rows = fs::read_to_string(directory.path().join("trace.csv")).unwrap();
+    assert!(rows.lines().count() > 8192);
+}
+
+/// A limit of the size of files, set by the shell of the test.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_limit_of_the_size_of_files_leaves_them_whole() {
+    let directory = workplace();
+    let d = directory.path();
+    let limited = |command: &str| {
+        let script = format!("ulimit -f 8; exec \"{}\" {command}", env!("CARGO_BIN_EXE_hoid"));
+        let output = Command::new("bash")
+            .args(["-c", &script])
+            .current_dir(d)
+            .output()
+            .unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    let kept = fs::read(d.join("in.csv")).unwrap();
+    let before = fs::read_dir(d).unwrap().count();
+    for command in [
+        "simulate --condition C1 --out in.csv",
+        "simulate --condition C1 --out - > in2.csv",
+    ] {
+        let (code, message) = limited(command);
+        assert_eq!(code, Some(1), "{command}: {message}");
+        assert!(message.contains("File too large"), "{command}: {message}");
+    }
+    assert_eq!(fs::read(d.join("in.csv")).unwrap(), kept);
+    // What the shell made is there, and no part.
+    assert_eq!(fs::read_dir(d).unwrap().count(), before + 1);
+}
+
+#[test]
+fn parts_of_dead_processes_are_removed() {
+    let directory = workplace();
+    let d = directory.path();
+    fs::write(d.join(".hoid-Xy12ab.part"), "half a file").unwrap();
+    good(d, &["simulate", "--condition", "C1", "--out", "run.csv"]);
+    assert!(!d.join(".hoid-Xy12ab.part").exists());
+}
+
+#[cfg(unix)]
+const LONG: &str = r#"
+name = "long"
+seed = 1
+replications = 100000
+block = 2
+
+[[scenarios]]
+name = "short"
+condition = "C1"
+measurement_s = 10.24
+remnant.noise_level = 0.1
+
+[[estimators]]
+name = "ARX"
+method = "fit"
+structure = "arx"
+orders.nk = 29
+"#;
+
+/// Each signal that ends a program, while it writes: nothing of it is left.
+#[cfg(unix)]
+#[test]
+fn signals_end_with_their_code_and_leave_nothing() {
+    let directory = workplace();
+    let d = directory.path();
+    fs::write(d.join("long.toml"), LONG).unwrap();
+    for (name, number) in [("INT", 2), ("TERM", 15), ("HUP", 1)] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))
+            .args(["study", "run", "long.toml", "--jobs", "1", "--out"])
+            .arg(format!("s-{name}"))
+            .current_dir(d)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        // The plan is written before the first block.
+        for _ in 0..2000 {
+            if d.join(format!("s-{name}/study.json")).exists() {
+                break;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        let sent = Command::new("kill")
+            .args([&format!("-{name}"), &child.id().to_string()])
+            .status()
+            .unwrap();
+        assert!(sent.success());
+        assert_eq!(child.wait().unwrap().code(), Some(128 + number), "{name}");
+        let parts = fs::read_dir(d.join(format!("s-{name}/parts"))).unwrap();
+        assert!(
+            parts
+                .flatten()
+                .all(|p| !p.file_name().to_string_lossy().ends_with(".part"))
+        );
+    }
+}

@@ -1,0 +1,58 @@
+//! One process a directory of results.
+//!
+//! The lock is that of the system on the directory itself (on a file `.hoid-lock` in it where
+//! directories cannot be opened), so that nothing is left of a process that was killed. A file
+//! system without locks has none here either.
+
+use std::fs::{File, TryLockError};
+use std::path::Path;
+
+use crate::IoError;
+
+/// A directory that no other process works on, until this is dropped.
+#[derive(Debug)]
+pub struct DirectoryLock(#[allow(dead_code)] Option<File>);
+
+impl DirectoryLock {
+    /// Locks a directory that exists.
+    ///
+    /// # Errors
+    /// [`IoError::InUse`] where another process, or another run in this one, has it.
+    pub fn take(directory: &Path) -> Result<Self, IoError> {
+        #[cfg(unix)]
+        let opened = File::open(directory);
+        #[cfg(not(unix))]
+        let opened = File::options()
+            .create(true)
+            .truncate(false)
+            .write(true)
+            .open(directory.join(".hoid-lock"));
+        let file = opened.map_err(|source| IoError::Unwritable {
+            file: directory.display().to_string(),
+            source,
+        })?;
+        match file.try_lock() {
+            Ok(()) => Ok(Self(Some(file))),
+            Err(TryLockError::WouldBlock) => Err(IoError::InUse {
+                directory: directory.display().to_string(),
+            }),
+            Err(TryLockError::Error(_)) => Ok(Self(None)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_directory_has_one_worker_at_a_time() {
+        let dir = tempfile::tempdir().unwrap();
+        let first = DirectoryLock::take(dir.path()).unwrap();
+        let message = DirectoryLock::take(dir.path()).unwrap_err().to_string();
+        assert!(message.contains("another process works on"), "{message}");
+        drop(first);
+        DirectoryLock::take(dir.path()).unwrap();
+        assert!(DirectoryLock::take(&dir.path().join("none")).is_err());
+    }
+}

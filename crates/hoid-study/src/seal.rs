@@ -1,0 +1,167 @@
+//! What a block on disk is: its plan, its number, and the checksum of each of its tables.
+//!
+//! The seal of a block is written after its tables. A block is whole when its seal names this plan
+//! and this block and each table has the bytes that the seal says; a damaged disk, a cut file and a
+//! block in the place of another are found so, and the block is computed again. A block without a
+//! seal was on its way when its process was stopped.
+
+use std::{collections::BTreeMap, path::Path};
+
+use hoid_io::OutputTable;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::{
+    StudyError,
+    directory::{part, seal_path},
+};
+
+/// The content of the file of a seal.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct Seal {
+    plan_sha256: String,
+    block: u64,
+    /// SHA-256 of the file of each table, by its name.
+    tables: BTreeMap<String, String>,
+}
+
+/// A block on disk.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum OnDisk {
+    Whole,
+    Missing,
+    /// Why it is not what it says.
+    Damaged(String),
+}
+
+/// Writes the tables of a block, and its seal.
+pub(crate) fn write_block(
+    directory: &Path,
+    plan_sha256: &str,
+    block: u64,
+    tables: &[(&str, &OutputTable)],
+) -> Result<(), StudyError> {
+    let mut sums = BTreeMap::new();
+    for (name, table) in tables {
+        let path = part(directory, block, name);
+        hoid_io::write_table(&path, table)?;
+        sums.insert((*name).to_owned(), sha256(&hoid_io::read_bytes(&path)?));
+    }
+    let seal = Seal {
+        plan_sha256: plan_sha256.to_owned(),
+        block,
+        tables: sums,
+    };
+    let text = serde_json::to_string_pretty(&seal).unwrap_or_default();
+    Ok(hoid_io::write_atomically(&seal_path(directory, block), |file| {
+        writeln!(file, "{text}")
+    })?)
+}
+
+/// What stands on disk of a block.
+pub(crate) fn on_disk(directory: &Path, plan_sha256: &str, block: u64) -> OnDisk {
+    let path = seal_path(directory, block);
+    if !path.exists() {
+        return OnDisk::Missing;
+    }
+    let read = hoid_io::read_text(&path).ok();
+    let Some(seal) = read.and_then(|text| serde_json::from_str::<Seal>(&text).ok()) else {
+        return OnDisk::Damaged("its seal cannot be read".to_owned());
+    };
+    if seal.block != block {
+        return OnDisk::Damaged(format!("it is block {}", seal.block));
+    }
+    if seal.plan_sha256 != plan_sha256 {
+        return OnDisk::Damaged("it is of another plan".to_owned());
+    }
+    for (table, sum) in &seal.tables {
+        match hoid_io::read_bytes(&part(directory, block, table)) {
+            Ok(bytes) if sha256(&bytes) == *sum => {}
+            Ok(_) => return OnDisk::Damaged(format!("its table {table} is not what was written")),
+            Err(_) => return OnDisk::Damaged(format!("its table {table} cannot be read")),
+        }
+    }
+    OnDisk::Whole
+}
+
+/// SHA-256 in hexadecimal digits.
+pub(crate) fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Damaged blocks that are named one by one.
+const MOST_NAMED: usize = 5;
+
+/// What is said of blocks that are computed again.
+pub(crate) fn notes_on(damaged: &[(u64, String)]) -> Vec<String> {
+    let mut notes: Vec<String> = damaged
+        .iter()
+        .take(MOST_NAMED)
+        .map(|(block, why)| format!("block {block} is damaged ({why}) and was computed again"))
+        .collect();
+    if damaged.len() > MOST_NAMED {
+        notes.push(format!(
+            "{} more blocks are damaged and were computed again",
+            damaged.len() - MOST_NAMED
+        ));
+    }
+    notes
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use hoid_io::{ColumnValues, OutputColumn};
+
+    use super::*;
+
+    #[test]
+    fn every_byte_of_a_block_counts() {
+        let dir = tempfile::tempdir().unwrap();
+        let d = dir.path();
+        fs::create_dir(d.join("parts")).unwrap();
+        let table = |value: f64| OutputTable {
+            comments: Vec::new(),
+            columns: vec![OutputColumn {
+                name: "x".into(),
+                values: ColumnValues::Real(vec![value; 3]),
+            }],
+        };
+        assert_eq!(on_disk(d, "plan", 0), OnDisk::Missing);
+        write_block(d, "plan", 0, &[("fits", &table(1.0)), ("traces", &table(2.0))]).unwrap();
+        write_block(d, "plan", 1, &[("fits", &table(3.0))]).unwrap();
+        assert_eq!(on_disk(d, "plan", 0), OnDisk::Whole);
+        assert_eq!(on_disk(d, "plan", 1), OnDisk::Whole);
+        assert_eq!(on_disk(d, "other", 1), OnDisk::Damaged("it is of another plan".into()));
+        let path = part(d, 0, "fits");
+        let good = fs::read(&path).unwrap();
+        for at in 0..good.len() {
+            let mut bad = good.clone();
+            bad[at] ^= 1;
+            fs::write(&path, bad).unwrap();
+            assert!(matches!(on_disk(d, "plan", 0), OnDisk::Damaged(_)), "{at}");
+        }
+        fs::write(&path, &good[..good.len() - 1]).unwrap();
+        assert!(matches!(on_disk(d, "plan", 0), OnDisk::Damaged(_)));
+        fs::remove_file(&path).unwrap();
+        assert!(matches!(on_disk(d, "plan", 0), OnDisk::Damaged(_)));
+        fs::write(&path, good).unwrap();
+        assert_eq!(on_disk(d, "plan", 0), OnDisk::Whole);
+        // Block 1 replaced by block 0, its seal too.
+        for (from, to) in [
+            (part(d, 0, "fits"), part(d, 1, "fits")),
+            (seal_path(d, 0), seal_path(d, 1)),
+        ] {
+            fs::copy(from, to).unwrap();
+        }
+        assert_eq!(on_disk(d, "plan", 1), OnDisk::Damaged("it is block 0".into()));
+    }
+
+    #[test]
+    fn many_damaged_blocks_are_counted() {
+        let all: Vec<(u64, String)> = (0..9).map(|block| (block, "cut".to_owned())).collect();
+        assert_eq!(notes_on(&all).len(), MOST_NAMED + 1);
+        assert!(notes_on(&[]).is_empty());
+    }
+}
