@@ -306,6 +306,7 @@ impl PyFit {
                     margins,
                 }],
                 notes: Vec::new(),
+                pictures: Vec::new(),
             };
             write_report(&directory, &report.to_html()?)
         })?;

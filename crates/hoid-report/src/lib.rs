@@ -26,6 +26,7 @@
 //!         margins: None,
 //!     }],
 //!     notes: Vec::new(),
+//!     pictures: Vec::new(),
 //! };
 //! let page = report.to_html()?;
 //! assert!(page.contains("<svg"));
@@ -59,5 +60,5 @@ pub use group::{FrequencyTables, GroupReport, GroupTables, PeopleTable, people_t
 pub use hoid_model::numbers;
 pub use model_section::{ModelSection, known_operator};
 pub use page::{render_with, write_page, write_report};
-pub use report::Report;
+pub use report::{Picture, Report};
 pub use track::{BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, default_batch_fits};

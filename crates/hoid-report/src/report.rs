@@ -28,6 +28,17 @@ pub struct Report<'a> {
     pub models: Vec<ModelSection<'a>>,
     /// Remarks for the reader, such as warnings of the command.
     pub notes: Vec<String>,
+    /// Figures that answer what was asked, before all others.
+    pub pictures: Vec<Picture>,
+}
+
+/// A figure with its caption.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// The figure, as SVG text.
+    pub svg: String,
+    /// What is seen, in a sentence.
+    pub caption: String,
 }
 
 impl<'a> Report<'a> {
@@ -48,6 +59,7 @@ impl<'a> Report<'a> {
                 margins: None,
             }],
             notes: Vec::new(),
+            pictures: Vec::new(),
         }
     }
 }
@@ -81,6 +93,7 @@ impl Report<'_> {
             title => self.title.clone(),
             settings => page::facts(&self.settings),
             notes => self.notes.clone(),
+            pictures => self.pictures.iter().map(Picture::to_value).collect::<Vec<Value>>(),
             comparison => tables::comparison(&self.models, &qualities),
             bode => Value::from_safe_string(self.bode()),
             models => sections,
@@ -111,6 +124,12 @@ impl Report<'_> {
             }
         }
         figures::bode("bode", &models, &truths)
+    }
+}
+
+impl Picture {
+    fn to_value(&self) -> Value {
+        context! { svg => Value::from_safe_string(self.svg.clone()), caption => self.caption.clone() }
     }
 }
 

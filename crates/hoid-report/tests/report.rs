@@ -59,6 +59,7 @@ fn page<'a>(models: Vec<ModelSection<'a>>) -> String {
         settings: vec![("seed".to_owned(), "5".to_owned())],
         models,
         notes: Vec::new(),
+        pictures: Vec::new(),
     };
     report.to_html().unwrap()
 }
@@ -166,6 +167,7 @@ fn text_of_the_user_is_escaped() {
         settings: vec![(hostile.to_owned(), hostile.to_owned())],
         models: vec![section(hostile, &fit, &records)],
         notes: vec![hostile.to_owned()],
+        pictures: Vec::new(),
     };
     let html = report.to_html().unwrap();
     check_page(&html);
@@ -299,6 +301,7 @@ fn a_report_without_models_is_an_error() {
         settings: Vec::new(),
         models: Vec::new(),
         notes: Vec::new(),
+        pictures: Vec::new(),
     };
     assert!(matches!(report.to_html(), Err(ReportError::NoModels)));
 }

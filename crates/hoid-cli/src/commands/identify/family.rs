@@ -10,7 +10,7 @@ use hoid_ident::{
 use hoid_io::{read_text, write_atomically};
 use hoid_model::{Detrend, Record, VerdictLevel, operator_family::Coordinate, uncertainty::Estimate};
 use hoid_report::{
-    ModelSection, Report,
+    ModelSection, Picture, Report,
     figures::{ModelCurve, describing, with_width_mm},
     write_report,
 };
@@ -76,18 +76,13 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
                     .to_owned(),
             ));
         };
-        let svg = describing(
-            "describing",
-            &format!("{} through the describing function", fit.form),
-            described,
-            &curves(&found, described),
-        );
+        let svg = picture(&found, described);
         let svg = args.width.map_or(svg.clone(), |mm| with_width_mm(&svg, mm));
         write_atomically(path, |file| file.write_all(svg.as_bytes()))?;
         output::message(&format!("figure: {}", path.display()));
     }
     if let Some(directory) = &args.report {
-        report(&found, directory)?;
+        report(&found, described.as_ref(), directory)?;
     }
     if args.json {
         json::print(&found.to_json()?)?;
@@ -291,7 +286,23 @@ fn curves(found: &Found<'_>, described: &Description) -> Vec<ModelCurve> {
     all
 }
 
-fn report(found: &Found<'_>, directory: &Path) -> Result<(), CliError> {
+fn through_describing_function(found: &Found<'_>, described: &Description) -> Picture {
+    Picture {
+        svg: picture(found, described),
+        caption:
+            "The describing function at the lines of the excitation, with 95 % by its scatter, and the operator of the \
+                  chosen form: by prediction error, and fitted at the lines."
+                .to_owned(),
+    }
+}
+
+/// The operator through the describing function.
+fn picture(found: &Found<'_>, described: &Description) -> String {
+    let title = format!("{} through the describing function", found.fit.form);
+    describing("describing", &title, described, &curves(found, described))
+}
+
+fn report(found: &Found<'_>, described: Option<&Description>, directory: &Path) -> Result<(), CliError> {
     let fit = &found.fit.operator(0).polynomial_fit;
     let title = match found.records {
         [only] => format!("Identification of {}", only.label()),
@@ -315,6 +326,10 @@ fn report(found: &Found<'_>, directory: &Path) -> Result<(), CliError> {
             margins: found.margins(),
         }],
         notes: found.notes(),
+        pictures: described
+            .map(|d| through_describing_function(found, d))
+            .into_iter()
+            .collect(),
     };
     let page = write_report(directory, &report.to_html()?)?;
     output::message(&format!("report: {}", page.display()));

@@ -119,6 +119,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
                 margins,
             }],
             notes: Vec::new(),
+            pictures: Vec::new(),
         };
         let page = write_report(directory, &report.to_html()?)?;
         output::message(&format!("report: {}", page.display()));
