@@ -10,7 +10,10 @@ use hoid_report::figures::{describing, with_width_mm};
 use super::form::Described;
 use crate::{
     args::{DescribeArgs, ReadArgs},
-    commands::reading::{self, ReadAll},
+    commands::{
+        faults,
+        reading::{self, ReadAll},
+    },
     error::CliError,
     json, output,
 };
@@ -24,7 +27,10 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
         files,
         records,
         accounts,
-    } = reading::read_all(&args.records, &read, &args.mask, true)?;
+    } = faults::mended(
+        reading::read_all(&args.records, &read, &args.mask, true)?,
+        args.faults.faults,
+    )?;
     let offset_samples = match records.first() {
         Some(record) => offset_of_output(record, &offsets)?,
         None => 0.0,
@@ -39,7 +45,8 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
         detrend: Detrend::None,
         ..DescriptionOptions::default()
     };
-    let found = describe_runs(&records, &options)?;
+    let mut found = describe_runs(&records, &options)?;
+    found.verdict = faults::judged(found.verdict, &files, &accounts);
     let described = Described {
         files: &files,
         records: &records,
@@ -126,6 +133,7 @@ fn settings(args: &DescribeArgs, options: &DescriptionOptions, found: &Descripti
             format!("{} samples, as a phase", options.offset_samples),
         ));
     }
+    list.push(("faults".to_owned(), args.faults.faults.to_string()));
     if !args.mask.mask.is_empty() {
         let kinds: Vec<&str> = args.mask.mask.iter().map(|kind| kind.name()).collect();
         list.push(("masked".to_owned(), kinds.join(", ")));
