@@ -14,7 +14,11 @@ use hoid_track::Change;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::{commands::reading::Account, error::CliError, output};
+use crate::{
+    commands::{faults, reading::Account},
+    error::CliError,
+    output,
+};
 
 /// A number, or null where there is none: JSON has no NaN.
 pub fn number(value: f64) -> Value {
@@ -245,6 +249,7 @@ impl Identified<'_> {
         set("hoid", json!(env!("CARGO_PKG_VERSION")));
         set("records", records(self.files, self.records, self.accounts));
         set("warnings", warnings(self.files, self.accounts));
+        set("faults", faults::to_json(self.files, self.accounts));
         set("verdict", verdict(self.verdict));
         let structure = fit.model().structure().name();
         set(

@@ -16,6 +16,8 @@ use crate::commands::reading::Account;
 
 /// Rows of a search that are printed; all of them are in the JSON.
 const CANDIDATES_SHOWN: usize = 8;
+/// Faults of a record that are shown one by one.
+const FAULTS_SHOWN: usize = 10;
 
 /// Three rules, as in print.
 const STYLE: TableStyle = {
@@ -58,6 +60,12 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> St
         );
         for step in &account.steps {
             lines.push_str(&format!("  {step}\n"));
+        }
+        for fault in account.faults.iter().take(FAULTS_SHOWN) {
+            lines.push_str(&format!("  {fault}\n"));
+        }
+        if account.faults.len() > FAULTS_SHOWN {
+            lines.push_str(&format!("  and {} more faults\n", account.faults.len() - FAULTS_SHOWN));
         }
         lines
     };

@@ -62,6 +62,7 @@
 //! | [`family`] | operators of recorded people: form, parameters, errors that hold, a verdict |
 //! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
 //! | [`SigmoidChange`] | gains that follow a sigmoid, with the time and the rate of the change |
+//! | [`faults`] | faults of recorded data, found and mended before a fit |
 //! | [`frequency`] | describing function, coherence, remnant spectrum and margins by Fourier coefficients |
 //! | [`judgement`] | what speaks for and against a fit: [`Fit::verdict`] |
 //! | [`linalg`] | sums of products, least squares by QR, the inverse of an information matrix |
@@ -83,6 +84,7 @@ mod derived;
 mod error;
 mod estimator;
 pub mod family;
+pub mod faults;
 mod fit;
 pub mod frequency;
 pub mod grey_box;

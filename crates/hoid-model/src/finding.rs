@@ -105,6 +105,11 @@ impl Verdict {
         Self { level, findings }
     }
 
+    /// The verdict of these findings and more.
+    pub fn and(self, more: impl IntoIterator<Item = Finding>) -> Self {
+        Self::of(self.findings.into_iter().chain(more).collect())
+    }
+
     /// All findings, the gravest first.
     pub fn findings(&self) -> &[Finding] {
         &self.findings
@@ -154,7 +159,8 @@ mod tests {
         let doubtful = Verdict::of(vec![note.clone(), doubt.clone()]);
         assert_eq!(doubtful.level, VerdictLevel::Doubtful);
         assert_eq!(doubtful.reasons().collect::<Vec<_>>(), ["the search did not converge"]);
-        let all = Verdict::of(vec![note, doubt, open]);
+        let all = Verdict::of(vec![note.clone(), doubt.clone(), open.clone()]);
+        assert_eq!(Verdict::of(vec![note]).and([doubt, open]), all);
         assert_eq!(all.level, VerdictLevel::NotDetermined);
         assert_eq!(
             all.to_string(),

@@ -62,6 +62,7 @@
 
 mod error;
 mod estimate;
+mod fault;
 mod finding;
 mod named_choice;
 
@@ -93,6 +94,7 @@ pub mod uncertainty;
 pub use delayed_operator::{DelayedOperator, delayed_operator, delayed_operator_jacobian};
 pub use error::{ModelError, NotConvertible};
 pub use family_scenario::{FamilyScenario, FamilyState};
+pub use fault::{Fault, FaultAction, FaultHandling, FaultKind, MOST_MENDED, fault_findings};
 pub use finding::{Finding, Severity, Verdict, VerdictLevel};
 pub use named_choice::{NamedChoice, UnknownName};
 pub use num_complex::Complex64;

@@ -9,7 +9,7 @@ use hoid_model::ContinuousTransferFunction;
 
 use super::{
     parse::parse_width,
-    reading::{MaskArgs, ReadArgs},
+    reading::{FaultArgs, MaskArgs, ReadArgs},
 };
 
 #[derive(Debug, Args)]
@@ -23,6 +23,8 @@ pub struct DescribeArgs {
     pub read: ReadArgs,
     #[command(flatten)]
     pub mask: MaskArgs,
+    #[command(flatten)]
+    pub faults: FaultArgs,
     #[arg(long, value_name = "COLUMN", help = format!(
         "Column of the recorded disturbance or target. Its lines are found in it; the span must be whole periods \
          [default: the first of {} that there is with lines]",

@@ -14,7 +14,7 @@ use hoid_model::{ContinuousTransferFunction, Form, Structure, remnant::RemnantDi
 use super::{
     choices::{by_name, choice_of},
     parse::{parse_span, parse_width},
-    reading::{MaskArgs, ReadArgs},
+    reading::{FaultArgs, MaskArgs, ReadArgs},
 };
 use crate::orders::parse_range;
 
@@ -29,6 +29,8 @@ pub struct IdentifyArgs {
     pub read: ReadArgs,
     #[command(flatten)]
     pub mask: MaskArgs,
+    #[command(flatten)]
+    pub faults: FaultArgs,
     /// What is fitted: grey-box (the operator in physical parameters: the family of operators of
     /// people, or with --remnant-order the operator of a gain and a lead), a polynomial structure, or
     /// time-varying (the operator's gains change once, by a sigmoid) [default: grey-box; that of

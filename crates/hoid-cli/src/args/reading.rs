@@ -2,7 +2,7 @@
 
 use clap::Args;
 use hoid_io::{Offset, QualityIssueKind, Scaling};
-use hoid_model::Detrend;
+use hoid_model::{Detrend, FaultHandling};
 
 use super::choices::choice_of;
 
@@ -74,6 +74,23 @@ pub struct MaskArgs {
     /// Shortest segment between masked samples that is used, s
     #[arg(long, value_name = "S", default_value_t = 2.0)]
     pub shortest: f64,
+}
+
+/// What is done about faults of a recording.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct FaultArgs {
+    /// Faults of the recording (spikes, dropouts, frozen and idle stretches, wraps, steps): bridge what
+    /// lasts up to 0.1 s and cut the record at what is longer, cut all, report and leave the data as
+    /// they are, or keep: look for none
+    #[arg(long, value_name = "WHAT", default_value = "bridge", value_parser = choice_of(&FaultHandling::ALL))]
+    pub faults: FaultHandling,
+}
+
+impl FaultArgs {
+    /// Whether faults are looked for.
+    pub fn looks(self) -> bool {
+        self.faults != FaultHandling::Keep
+    }
 }
 
 /// `NAME=VALUE`; the name may hold `=` no more than a column may.

@@ -1,19 +1,44 @@
 //! `hoid info`: what is inside of a file, before anything is identified.
 
-use hoid_io::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey, survey};
+use std::path::Path;
+
+use hoid_ident::faults::mend;
+use hoid_io::{ColumnSurvey, FileSurvey, ReadOptions, SamplingSurvey, ValueSurvey, read_record, survey};
+use hoid_model::{Fault, FaultHandling};
 use hoid_report::numbers;
 use serde_json::{Value, json};
 
+use super::faults::of_fault;
 use crate::{args::InfoArgs, error::CliError, json, output, text};
 
 pub fn run(args: &InfoArgs) -> Result<(), CliError> {
     let found = survey(&args.file)?;
+    let file = args.file.display().to_string();
+    let faults = faults_of(&args.file);
     if args.json {
-        json::print(&object(&found))?;
+        let mut object = object(&found);
+        object["faults"] = faults.iter().map(|fault| of_fault(&file, fault)).collect();
+        json::print(&object)?;
     } else {
-        output::print(&words(&args.file.display().to_string(), &found))?;
+        let mut text = words(&file, &found);
+        if !faults.is_empty() {
+            text.push_str("\nFaults of e and u:\n");
+        }
+        for fault in &faults {
+            text.push_str(&format!("  {fault}\n"));
+        }
+        output::print(&text)?;
     }
     Ok(())
+}
+
+/// The faults of e and u, where the file has columns of these names that make a record.
+fn faults_of(file: &Path) -> Vec<Fault> {
+    let found = read_record(file, &ReadOptions::default()).map(|read| mend(&read.record, FaultHandling::Report));
+    found
+        .ok()
+        .and_then(Result::ok)
+        .map_or_else(Vec::new, |mended| mended.faults)
 }
 
 fn words(file: &str, found: &FileSurvey) -> String {

@@ -3,6 +3,7 @@
 pub mod convert;
 pub mod demo;
 pub mod describe;
+pub mod faults;
 pub mod group;
 pub mod identify;
 pub mod info;

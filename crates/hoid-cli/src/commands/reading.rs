@@ -8,7 +8,7 @@ use std::{
 use hoid_io::{
     NewRate, Preparation, QualityIssue, ReadOptions, ReadRecord, Repair, Step, read_prepared, read_segments,
 };
-use hoid_model::Record;
+use hoid_model::{Fault, Finding, Record};
 
 use crate::{
     args::{MaskArgs, ReadArgs},
@@ -21,6 +21,10 @@ use crate::{
 pub struct Account {
     pub steps: Vec<Step>,
     pub quality_issues: Vec<QualityIssue>,
+    /// Faults that were looked for, and what was done about them.
+    pub faults: Vec<Fault>,
+    /// What they say of any result.
+    pub findings: Vec<Finding>,
 }
 
 /// Records with the files that they come from; a file that is cut gives several.
@@ -90,6 +94,7 @@ fn with_account(path: &Path, read: ReadRecord) -> (Record, Account) {
     let account = Account {
         steps: read.steps,
         quality_issues: read.quality_issues,
+        ..Account::default()
     };
     (read.record, account)
 }
@@ -177,7 +182,8 @@ pub fn accounts(files: &[String], accounts: &[Account]) -> Vec<(String, String)>
     for (file, account) in files.iter().zip(accounts) {
         let steps: Vec<String> = account.steps.iter().map(Step::to_string).collect();
         let issues: Vec<String> = account.quality_issues.iter().map(QualityIssue::to_string).collect();
-        for (what, parts) in [("preparation", steps), ("sampling trouble", issues)] {
+        let faults: Vec<String> = account.faults.iter().map(Fault::to_string).collect();
+        for (what, parts) in [("preparation", steps), ("sampling trouble", issues), ("faults", faults)] {
             if !parts.is_empty() {
                 rows.push((name(what, file), parts.join("; ")));
             }

@@ -14,6 +14,8 @@ use super::{
 };
 use crate::{Choice, Fit, IdentError};
 
+/// Residuals for each unknown below which the numbers of a fit mean nothing.
+const FEWEST_RESIDUALS: usize = 5;
 /// Level at which b differs from zero.
 const LEVEL: f64 = 0.05;
 
@@ -26,12 +28,28 @@ impl Fit {
     pub fn verdict(&self, records: &[Record], choice: Option<&Choice>) -> Result<Verdict, IdentError> {
         let mut all: Vec<Finding> = search_finding(self.termination).into_iter().collect();
         all.extend(choice.and_then(delay_at_end));
+        all.extend(self.too_few());
         all.extend(self.system_findings());
         // Residuals that are rounding say nothing.
         if self.covariance.is_some() {
             all.extend(self.residual_findings(&self.residual_measures(records)?));
         }
         Ok(Verdict::of(all))
+    }
+
+    /// Fewer residuals than the unknowns need.
+    fn too_few(&self) -> Option<Finding> {
+        let unknowns = self.model.theta().len() + self.states;
+        (self.covariance.is_some() && self.residuals < FEWEST_RESIDUALS * unknowns).then(|| {
+            Finding::undetermined(
+                "too-few",
+                format!(
+                    "{} residuals for {unknowns} unknowns: the record is too short for these orders and nk = {}",
+                    self.residuals,
+                    self.orders().nk
+                ),
+            )
+        })
     }
 
     /// What the system from e to u says, without a record.

@@ -60,7 +60,7 @@ pub use manifest::{MANIFEST, Manifest, RunEntry};
 pub use pattern::{FileNameParts, Pattern};
 pub use person::{Person, PersonStatus};
 pub use preparation_settings::{NumberOrText, PreparationSettings};
-pub use read_settings::{Detrending, ReadSettings};
+pub use read_settings::{Detrending, FaultTreatment, ReadSettings};
 pub use run::run_group;
 pub use sampling_defects::SamplingDefect;
 pub use summary::{GroupSummary, RunFailure};

@@ -26,6 +26,22 @@ pub struct ReadSettings {
     pub fill: bool,
     /// What is taken out of e and u: none, mean or linear.
     pub detrend: Detrending,
+    /// Faults of the recordings: bridge, report or keep. Runs are not cut inside: where a fault is too
+    /// long to be bridged, the longest part without it counts.
+    pub faults: FaultTreatment,
+}
+
+/// What is done about faults of a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum FaultTreatment {
+    /// Short ones are bridged; of a run with long ones the longest part without them counts.
+    #[default]
+    Bridge,
+    /// They are told.
+    Report,
+    /// They are not looked for.
+    Keep,
 }
 
 /// What is taken out of e and u.
@@ -52,6 +68,7 @@ impl Default for ReadSettings {
             resample: false,
             fill: false,
             detrend: Detrending::None,
+            faults: FaultTreatment::Bridge,
         }
     }
 }

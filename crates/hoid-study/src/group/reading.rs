@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
+use hoid_ident::faults::{Mended, mend};
 use hoid_io::{ColumnKind, ColumnSchema, OutputTable, Preparation, ReadOptions, ReadRecord, Repair, TableSchema};
-use hoid_model::{Detrend, Record};
+use hoid_model::{Detrend, Fault, FaultHandling, Record};
 
 use super::{
     alignment::read_aligned,
     manifest::{Manifest, RunEntry},
-    read_settings::Detrending,
+    read_settings::{Detrending, FaultTreatment},
 };
 use crate::columns::Rows;
 
@@ -22,7 +23,7 @@ pub(super) enum Pairing {
 }
 
 /// The record in a file, and what was done to it; the condition may have a preparation of its own.
-fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing) -> Result<ReadRecord, String> {
+fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing) -> Result<Looked, String> {
     let reading = &manifest.read;
     let text = |error: hoid_io::IoError| error.to_string();
     let options = ReadOptions {
@@ -50,7 +51,27 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
             .get(condition)
             .map_or(0.0, |facts| facts.offset_samples),
     };
-    read_aligned(path, &options, &preparation, late_samples).map_err(text)
+    let read = read_aligned(path, &options, &preparation, late_samples).map_err(text)?;
+    let handling = match reading.faults {
+        FaultTreatment::Bridge => FaultHandling::Bridge,
+        FaultTreatment::Report => FaultHandling::Report,
+        FaultTreatment::Keep => FaultHandling::Keep,
+    };
+    let Mended { segments, faults, .. } = mend(&read.record, handling).map_err(|error| error.to_string())?;
+    let longest = segments.into_iter().max_by_key(Record::len);
+    Ok(Looked {
+        read: ReadRecord {
+            record: longest.unwrap_or_else(|| read.record.clone()),
+            ..read
+        },
+        faults,
+    })
+}
+
+/// What was read, without its faults, and which there were.
+pub(super) struct Looked {
+    read: ReadRecord,
+    faults: Vec<Fault>,
 }
 
 /// The tables of the account: what was done to the runs, one step a row, and what is wrong with
@@ -94,7 +115,7 @@ pub(super) fn schemas() -> [(&'static str, TableSchema); 2] {
 }
 
 /// A file by its name in the manifest, and what was read of it.
-pub(super) type ReadFile<'a> = (&'a Path, Result<ReadRecord, String>);
+pub(super) type ReadFile<'a> = (&'a Path, Result<Looked, String>);
 
 /// The file of a run, and the one that is joined behind it.
 pub(super) fn read_files<'a>(
@@ -128,7 +149,7 @@ pub(super) fn read_run(manifest: &Manifest, base: &Path, entry: &RunEntry, pairi
 pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
     let mut run: Option<Run> = None;
     for (_, read) in files {
-        let record = read?.record;
+        let record = read?.read.record;
         run = Some(match run {
             None => Run { record, seam_s: None },
             Some(first) => Run {
@@ -146,7 +167,19 @@ pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static st
     let [(steps_name, steps), (trouble_name, trouble)] = schemas();
     let (mut steps, mut trouble) = (Rows::new(&steps), Rows::new(&trouble));
     for (file, read) in files {
-        let Ok(read) = read else { continue };
+        let Ok(Looked { read, faults }) = read else { continue };
+        for fault in faults {
+            begin(&mut trouble, entry, file);
+            trouble.text("kind", fault.kind.name());
+            trouble.text("channel", &fault.channel);
+            trouble.whole("rows", fault.samples as u64);
+            trouble.real("share", fault.samples as f64 / read.record.len() as f64);
+            trouble.whole("places", 1);
+            trouble.real("from_s", fault.from_s);
+            trouble.real("size", fault.size);
+            trouble.text("what", &fault.to_string());
+            trouble.text("remedy", fault.remedy());
+        }
         for step in &read.steps {
             begin(&mut steps, entry, file);
             steps.text("step", step.name());

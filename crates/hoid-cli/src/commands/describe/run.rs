@@ -11,7 +11,7 @@ use super::form::Described;
 use crate::{
     args::{DescribeArgs, ReadArgs},
     commands::{
-        places,
+        faults, places,
         reading::{self, ReadAll},
     },
     error::CliError,
@@ -29,7 +29,10 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
         files,
         records,
         accounts,
-    } = reading::read_all(&args.records, &read, &args.mask, true)?;
+    } = faults::mended(
+        reading::read_all(&args.records, &read, &args.mask, true)?,
+        args.faults.faults,
+    )?;
     let offset_samples = match records.first() {
         Some(record) => offset_of_output(record, &offsets)?,
         None => 0.0,
@@ -44,7 +47,8 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
         detrend: Detrend::None,
         ..DescriptionOptions::default()
     };
-    let found = describe_runs(&records, &options)?;
+    let mut found = describe_runs(&records, &options)?;
+    found.verdict = faults::judged(found.verdict, &files, &accounts);
     let described = Described {
         files: &files,
         records: &records,
@@ -131,6 +135,7 @@ fn settings(args: &DescribeArgs, options: &DescriptionOptions, found: &Descripti
             format!("{} samples, as a phase", options.offset_samples),
         ));
     }
+    list.push(("faults".to_owned(), args.faults.faults.to_string()));
     if !args.mask.mask.is_empty() {
         let kinds: Vec<&str> = args.mask.mask.iter().map(|kind| kind.name()).collect();
         list.push(("masked".to_owned(), kinds.join(", ")));

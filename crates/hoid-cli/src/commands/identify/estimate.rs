@@ -18,6 +18,8 @@ pub struct Estimated {
     pub fit: Fit,
     pub choice: Option<Choice>,
     pub grey_box: Option<GreyBoxFit>,
+    /// What fitted it by the prediction error, with the loss of squares.
+    pub estimator: Option<Estimator>,
     pub settings: Vec<(String, String)>,
 }
 
@@ -200,7 +202,8 @@ fn polynomial(args: &IdentifyArgs, structure: Structure, records: &[Record]) -> 
     if args.stable {
         settings.push(("stable models only".to_owned(), "yes".to_owned()));
     }
-    let (mut fit, choice) = prediction_error(args, structure, &ranges, records)?;
+    let (mut fit, choice, estimator) = prediction_error(args, structure, &ranges, records)?;
+    let estimator = (args.method.is_none() && args.robust.is_none()).then_some(estimator);
     if let Some(method) = args.method {
         let instruments = instruments(args, records);
         settings.push(("method".to_owned(), format!("{method}, {instruments}")));
@@ -218,6 +221,7 @@ fn polynomial(args: &IdentifyArgs, structure: Structure, records: &[Record]) -> 
         fit,
         choice,
         grey_box: None,
+        estimator,
         settings,
     })
 }
@@ -235,7 +239,7 @@ fn prediction_error(
     structure: Structure,
     ranges: &OrderRanges,
     records: &[Record],
-) -> Result<(Fit, Option<Choice>), CliError> {
+) -> Result<(Fit, Option<Choice>, Estimator), CliError> {
     let combinations = ranges.combinations()?;
     let mut estimator = Estimator {
         initial_state: args.initial_state,
@@ -255,7 +259,7 @@ fn prediction_error(
             .as_deref()
             .map(|text| orders::theta(orders, text))
             .transpose()?;
-        return Ok((estimator.fit(records)?, None));
+        return Ok((estimator.fit(records)?, None, estimator));
     }
     if args.start.is_some() {
         return Err(CliError::Usage(
@@ -267,7 +271,8 @@ fn prediction_error(
     let bar = output::progress(combinations.len(), "candidates");
     let found = fit_or_choose(&estimator, ranges, args.criterion, records, &|| bar.inc(1));
     bar.finish_and_clear();
-    Ok(found?)
+    let (fit, choice) = found?;
+    Ok((fit, choice, estimator))
 }
 
 fn grey_box(args: &IdentifyArgs, records: &[Record]) -> Result<Estimated, CliError> {
@@ -303,6 +308,7 @@ fn grey_box(args: &IdentifyArgs, records: &[Record]) -> Result<Estimated, CliErr
         fit: found.polynomial_fit(0).clone(),
         choice: None,
         grey_box: Some(found),
+        estimator: None,
         settings,
     })
 }

@@ -16,11 +16,12 @@ use hoid_report::{
 };
 use serde_json::Value;
 
-use super::{family_form::Found, settings::common_settings};
+use super::{family_form::Found, second_opinion, settings::common_settings};
 use crate::{
     args::IdentifyArgs,
     commands::{
         describe::{check_figure, offset_of_output, without_offsets},
+        faults,
         reading::{self, Account},
     },
     error::CliError,
@@ -41,7 +42,13 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
         }
         Err(_) => None,
     };
-    let fit = estimator.fit_beside(records, of_lines)?;
+    let mut fit = estimator.fit_beside(records, of_lines)?;
+    let opinion = args
+        .faults
+        .looks()
+        .then(|| second_opinion::of_family(&estimator, &fit, records))
+        .flatten();
+    fit.verdict = faults::judged(fit.verdict, files, accounts).and(opinion);
     let described = described.ok();
     let validation = match &args.validate {
         Some(path) => {
@@ -104,7 +111,8 @@ fn description(args: &IdentifyArgs, records: &[Record]) -> Result<Description, C
     let (records, offset_samples) = if offsets.is_empty() {
         (records, 0.0)
     } else {
-        unmoved = reading::read_again(&args.records, &read, &args.mask)?;
+        let again = reading::read_again(&args.records, &read, &args.mask)?;
+        unmoved = faults::mended_again(again, args.faults.faults)?;
         let late = unmoved.first().map_or(Ok(0.0), |r| offset_of_output(r, &offsets))?;
         (unmoved.as_slice(), late)
     };

@@ -4,6 +4,7 @@ mod estimate;
 mod family;
 mod family_form;
 mod run;
+mod second_opinion;
 mod settings;
 mod sigmoid;
 

@@ -11,14 +11,14 @@ use hoid_report::{ModelSection, Report, known_operator, write_report};
 
 use super::{
     estimate::{self, Estimated},
-    family,
+    family, second_opinion,
     settings::common_settings,
     sigmoid,
 };
 use crate::{
     args::{IdentifyArgs, ModelKind},
     commands::{
-        places,
+        faults, places,
         reading::{self, ReadAll},
     },
     error::CliError,
@@ -38,7 +38,10 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         files,
         records,
         accounts,
-    } = reading::read_all(&args.records, &args.read, &args.mask, with_input)?;
+    } = faults::mended(
+        reading::read_all(&args.records, &args.read, &args.mask, with_input)?,
+        args.faults.faults,
+    )?;
     if kind == ModelKind::TimeVarying {
         return sigmoid::run(args, &files, &records, &accounts);
     }
@@ -49,6 +52,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         fit,
         choice,
         grey_box,
+        estimator,
         settings: chosen,
     } = estimate::fit(args, kind, &records)?;
     // Read before anything is written: a bad validation file leaves nothing behind.
@@ -78,6 +82,9 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         Some(found) => found.verdict(&records)?,
         None => fit.verdict(&records, choice.as_ref())?,
     };
+    let opinion = estimator.as_ref().filter(|_| args.faults.looks());
+    let opinion = opinion.and_then(|e| second_opinion::of_polynomials(e, &fit, &records));
+    let verdict = faults::judged(verdict, &files, &accounts).and(opinion);
     let identified = Identified {
         verdict: &verdict,
         files: &files,

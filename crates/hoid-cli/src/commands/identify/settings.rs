@@ -11,6 +11,7 @@ pub fn common_settings(args: &IdentifyArgs, with_input: bool) -> Vec<(String, St
             .to_owned(),
     )];
     list.extend(reading::settings(&args.read, with_input));
+    list.push(("faults".to_owned(), args.faults.faults.to_string()));
     if !args.mask.mask.is_empty() {
         let kinds: Vec<String> = args
             .mask

@@ -12,7 +12,7 @@ use serde_json::{Map, Value, json};
 use super::{estimate::search, settings::common_settings};
 use crate::{
     args::IdentifyArgs,
-    commands::reading::Account,
+    commands::{faults, reading::Account},
     error::CliError,
     json::{self, number},
     orders, output, text,
@@ -50,7 +50,7 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
         .iter()
         .map(test)
         .collect::<Result<Vec<Option<LjungBox>>, CliError>>()?;
-    let verdict = fit.verdict(records)?;
+    let verdict = faults::judged(fit.verdict(records)?, files, accounts);
     let found = Found {
         fit: &fit,
         verdict: &verdict,
@@ -221,6 +221,7 @@ impl Found<'_> {
             "hoid": env!("CARGO_PKG_VERSION"),
             "records": json::records(files, records, accounts),
             "warnings": json::warnings(files, accounts),
+            "faults": faults::to_json(files, accounts),
             "verdict": json::verdict(verdict),
             "structure": "time-varying",
             "parameters": parameters,

@@ -1,0 +1,110 @@
+//! Faults of recorded data, looked for and mended before a fit: what was done stands in the account
+//! of each record, on its page, in its JSON and in its report.
+
+use hoid_ident::faults::mend;
+use hoid_model::{Fault, FaultHandling, Finding, Record, Verdict};
+use serde_json::{Value, json};
+
+use super::reading::{Account, ReadAll};
+use crate::{
+    error::CliError,
+    json::{number, optional},
+};
+
+/// The records without their faults; one that is cut gives several.
+pub fn mended(read: ReadAll, handling: FaultHandling) -> Result<ReadAll, CliError> {
+    let mut all = ReadAll::default();
+    let one = read.files.into_iter().zip(read.records).zip(read.accounts);
+    for ((file, record), account) in one {
+        let found = mend(&record, handling)?;
+        let whole = found.segments.len() == 1 && found.segments[0].len() == record.len();
+        let mut account = Account {
+            faults: found.faults,
+            findings: found.findings,
+            ..account
+        };
+        for segment in found.segments {
+            let span = format!(" ({:.3} to {:.3} s)", segment.time_s(0), segment.time_s(segment.len()));
+            all.files
+                .push(if whole { file.clone() } else { format!("{file}{span}") });
+            let label = format!("{}{span}", segment.label());
+            all.records.push(if whole { segment } else { segment.labelled(label) });
+            // What was found is told once.
+            all.accounts.push(std::mem::take(&mut account));
+        }
+    }
+    Ok(all)
+}
+
+/// The same records read another way, mended alike.
+pub fn mended_again(records: Vec<Record>, handling: FaultHandling) -> Result<Vec<Record>, CliError> {
+    let mut all = Vec::with_capacity(records.len());
+    for record in records {
+        all.extend(mend(&record, handling)?.segments);
+    }
+    Ok(all)
+}
+
+/// What was found in all records, for the verdict of a result of them.
+pub fn findings(files: &[String], accounts: &[Account]) -> Vec<Finding> {
+    let several = files.len() > 1;
+    let all = files.iter().zip(accounts);
+    all.flat_map(|(file, account)| {
+        account.findings.iter().map(move |finding| Finding {
+            words: if several {
+                format!("{file}: {}", finding.words)
+            } else {
+                finding.words.clone()
+            },
+            ..finding.clone()
+        })
+    })
+    .collect()
+}
+
+/// A verdict with what the faults of the records say.
+pub fn judged(verdict: Verdict, files: &[String], accounts: &[Account]) -> Verdict {
+    let more = findings(files, accounts);
+    if more.is_empty() { verdict } else { verdict.and(more) }
+}
+
+/// All faults of the records, and what is wrong with their files, one object each.
+pub fn to_json(files: &[String], accounts: &[Account]) -> Value {
+    let all = files.iter().zip(accounts);
+    all.flat_map(|(file, account)| {
+        let faults = account.faults.iter().map(move |fault| of_fault(file, fault));
+        let issues = account.quality_issues.iter().map(move |issue| {
+            let (first, last) = (issue.places.first(), issue.places.last());
+            json!({
+                "record": file,
+                "kind": issue.kind.name(),
+                "channel": issue.channel,
+                "from": optional(first.and_then(|place| place.from_s)),
+                "to": optional(last.and_then(|place| place.to_s)),
+                "samples": issue.rows,
+                "size": number(issue.size),
+                "deviations": Value::Null,
+                "action": "reported",
+                "words": issue.text,
+            })
+        });
+        faults.chain(issues)
+    })
+    .collect()
+}
+
+/// One fault as an object.
+pub fn of_fault(record: &str, fault: &Fault) -> Value {
+    json!({
+        "record": record,
+        "kind": fault.kind.name(),
+        "channel": fault.channel,
+        "from": number(fault.from_s),
+        "to": number(fault.to_s),
+        "samples": fault.samples,
+        "size": number(fault.size),
+        "deviations": optional(fault.deviations),
+        "action": fault.action.name(),
+        "words": fault.to_string(),
+    })
+}

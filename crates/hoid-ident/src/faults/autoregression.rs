@@ -1,0 +1,138 @@
+//! What a channel says of its own next sample, by a fit that faults cannot carry.
+//!
+//! `x(t) = -a_1 x(t-1) - ... - a_p x(t-p) + eps(t)` by least squares with bounded influence: a row
+//! counts only where neither x(t) nor any of its p past values lies beyond [`FAR`] robust deviations
+//! (the weights of Mallows on the regressors), and, in the rounds that follow, where eps lies within
+//! [`BEYOND`] of its robust scale (R. A. Maronna, R. D. Martin, V. J. Yohai, *Robust Statistics*,
+//! 2006, sections 5.11 and 8.4). A small white part is added to x, of [`FLOOR`] of its deviation: it
+//! keeps the normal equations of a smooth channel regular, and what is smaller is no fault.
+
+use super::robust::quantile;
+use crate::linalg::least_squares::solve_symmetric;
+
+/// Order of the autoregression.
+pub(super) const ORDER: usize = 16;
+/// Deviations of the channel beyond which a row does not count.
+const FAR: f64 = 6.0;
+/// Deviations of the residuals beyond which a row does not count.
+const BEYOND: f64 = 4.0;
+/// White part, of the deviation of the channel.
+pub(super) const FLOOR: f64 = 1e-3;
+const ROUNDS: usize = 3;
+/// Rows that are enough for the coefficients.
+const MOST_ROWS: usize = 40_000;
+
+/// `1, a_1 .. a_p`.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Autoregression {
+    pub a: Vec<f64>,
+}
+
+impl Autoregression {
+    /// The fit to a centred channel of this deviation; `None` where it is too short or constant.
+    pub fn of(x: &[f64], deviation: f64) -> Option<Self> {
+        let p = ORDER.min(x.len() / 20);
+        if p == 0 || deviation <= 0.0 {
+            return None;
+        }
+        let stride = (x.len() / MOST_ROWS).max(1);
+        let mut near = 0;
+        let mut rows: Vec<usize> = Vec::with_capacity(x.len() / stride);
+        for (t, v) in x.iter().enumerate() {
+            near = if v.abs() > FAR * deviation { 0 } else { near + 1 };
+            if near > p && t % stride == 0 {
+                rows.push(t);
+            }
+        }
+        if rows.len() < 5 * p {
+            rows = (p..x.len()).step_by(stride).collect();
+        }
+        let mut found = Self {
+            a: least_squares(x, &rows, p, FLOOR * deviation)?,
+        };
+        for _ in 1..ROUNDS {
+            let all: Vec<f64> = rows.iter().map(|t| found.residual(x, *t)).collect();
+            let scale = quantile(&mut all.iter().map(|e| e.abs()).collect::<Vec<_>>(), 0.5) / 0.674_489_75;
+            let scale = scale.max(FLOOR * deviation);
+            let kept = rows.iter().zip(&all).filter(|(_, e)| e.abs() <= BEYOND * scale);
+            let kept: Vec<usize> = kept.map(|(t, _)| *t).collect();
+            if kept.len() < 5 * p {
+                break;
+            }
+            found.a = least_squares(x, &kept, p, FLOOR * deviation)?;
+        }
+        Some(found)
+    }
+
+    pub fn order(&self) -> usize {
+        self.a.len() - 1
+    }
+
+    /// `|a|`.
+    pub fn norm(&self) -> f64 {
+        self.a.iter().map(|a| a * a).sum::<f64>().sqrt()
+    }
+
+    /// eps(t), t at least the order.
+    pub fn residual(&self, x: &[f64], t: usize) -> f64 {
+        self.a.iter().enumerate().map(|(i, a)| a * x[t - i]).sum()
+    }
+
+    /// eps over the channel, zero before the order.
+    pub fn residuals(&self, x: &[f64]) -> Vec<f64> {
+        (0..x.len())
+            .map(|t| if t < self.order() { 0.0 } else { self.residual(x, t) })
+            .collect()
+    }
+}
+
+fn least_squares(x: &[f64], rows: &[usize], p: usize, floor: f64) -> Option<Vec<f64>> {
+    let size = p + 1;
+    let mut products = vec![0.0; size * size];
+    for &t in rows {
+        let row = &x[t - p..=t];
+        for i in 0..size {
+            let v = row[p - i];
+            for j in 0..=i {
+                products[i * size + j] += v * row[p - j];
+            }
+        }
+    }
+    let white = floor * floor * rows.len() as f64;
+    let at = |i: usize, j: usize| products[i.max(j) * size + i.min(j)] + if i == j { white } else { 0.0 };
+    let gram: Vec<f64> = (1..=p)
+        .flat_map(|i| (1..=p).map(move |j| (i, j)))
+        .map(|(i, j)| at(i, j))
+        .collect();
+    let past: Vec<f64> = (1..=p).map(|i| -at(i, 0)).collect();
+    let mut a = vec![1.0];
+    a.extend(solve_symmetric(&gram, &past)?);
+    a.iter().all(|v| v.is_finite()).then_some(a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::test_signals::autoregressive, *};
+
+    #[test]
+    fn outliers_do_not_carry_the_fit() {
+        let clean = autoregressive(4000, 3);
+        let fit = |x: &[f64]| Autoregression::of(x, 3.0).unwrap().a;
+        let good = fit(&clean);
+        assert!((good[1] + 1.6).abs() < 0.05 && (good[2] - 0.8).abs() < 0.08, "{good:?}");
+        let mut bad = clean;
+        for t in [100, 700, 1500, 3100] {
+            bad[t] += 500.0;
+        }
+        let found = fit(&bad);
+        for (g, f) in good.iter().zip(&found) {
+            assert!((g - f).abs() < 0.03, "{good:?} {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_short_or_constant_channel_has_none() {
+        assert!(Autoregression::of(&[1.0; 10], 1.0).is_none());
+        assert!(Autoregression::of(&[0.0; 400], 0.0).is_none());
+    }
+}

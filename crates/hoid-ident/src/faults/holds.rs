@@ -1,0 +1,211 @@
+//! Stretches in which a channel does not move: frozen, dropped out, idle.
+//!
+//! A *hold* is a run of equal values. A channel in full precision has none, but where it stays at its
+//! largest or smallest value (a rail, which is another matter): [`FROZEN`] equal samples are frozen. A
+//! channel in steps, or a hand that rests, holds by its nature: there a hold is frozen where it is
+//! longer than [`LONGER`] times the length that nine of ten holds do not exceed, [`RESTING_S`] at
+//! least, and e moves meanwhile by half of its deviation or more. A hold that the channel jumps to and
+//! back from, by more than it moves from one sample to the next in 999 of 1000, is a dropout.
+//!
+//! *Idle* is a stretch of [`IDLE_S`] or more in which e and u stay both within [`QUIET`] of their
+//! deviations, in each half second: before a run begins, or behind its end. Nobody who tracks can do
+//! that: e is never at rest.
+
+use std::ops::Range;
+
+use super::robust::{level_and_deviation, quantile, quantum};
+
+/// Equal samples that are frozen, in full precision.
+const FROZEN: usize = 6;
+/// Times the usual hold of a channel in steps.
+const LONGER: f64 = 20.0;
+/// Shortest hold of a channel in steps that is frozen, s.
+const RESTING_S: f64 = 3.0;
+/// Shortest idle stretch, s.
+const IDLE_S: f64 = 1.5;
+/// Time in which the range of an idle channel is looked at, s.
+const BLOCK_S: f64 = 0.5;
+/// Range of an idle channel, of its deviation.
+const QUIET: f64 = 0.05;
+
+/// A hold of a channel.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Hold {
+    pub samples: Range<usize>,
+    /// Whether the channel jumps there and back, and by how much.
+    pub jump: Option<f64>,
+}
+
+/// Holds of one channel that are faults, by what the other does meanwhile.
+pub(super) fn frozen(values: &[f64], other: Option<&[f64]>, sample_time_s: f64) -> Vec<Hold> {
+    let n = values.len();
+    let (low, high) = values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    if n < 20 || low >= high {
+        return Vec::new();
+    }
+    let runs = runs(values);
+    let in_steps = quantum(values) > 0.0;
+    let mut lengths: Vec<f64> = runs.iter().map(|r| r.len() as f64).collect();
+    let usual = quantile(&mut lengths, 0.9);
+    let mut changes: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+    let large = 2.0 * quantile(&mut changes, 0.999);
+    let deviation_of_other = other.map(|o| level_and_deviation(o).1);
+    let least = if in_steps {
+        ((RESTING_S / sample_time_s) as usize).max((LONGER * usual) as usize)
+    } else {
+        FROZEN
+    };
+    let is_fault = |run: &Range<usize>| -> Option<Hold> {
+        if run.len() < least.min(FROZEN) {
+            return None;
+        }
+        let held = values[run.start];
+        let step = |t: usize| (values[t] - values[t - 1]).abs();
+        let inside = run.start > 0 && run.end < n;
+        let jump = (inside && step(run.start) > large && step(run.end) > large)
+            .then(|| held - 0.5 * (values[run.start - 1] + values[run.end]));
+        let at_rail = held == low || held == high;
+        let moves = match (other, deviation_of_other) {
+            (Some(other), Some(deviation)) => range_of(&other[run.clone()]) > 0.5 * deviation,
+            _ => true,
+        };
+        let long = run.len() >= least && (!in_steps || moves);
+        (jump.is_some() || long && (in_steps || !at_rail)).then(|| Hold {
+            samples: run.clone(),
+            jump,
+        })
+    };
+    runs.iter().filter_map(is_fault).collect()
+}
+
+/// Runs of equal values, those of one value too.
+fn runs(values: &[f64]) -> Vec<Range<usize>> {
+    let mut all: Vec<Range<usize>> = Vec::new();
+    for (t, v) in values.iter().enumerate() {
+        match all.last_mut() {
+            Some(run) if values[run.start] == *v => run.end = t + 1,
+            _ => all.push(t..t + 1),
+        }
+    }
+    all
+}
+
+fn range_of(values: &[f64]) -> f64 {
+    let (low, high) = values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    high - low
+}
+
+/// Stretches in which all channels are idle, beside what is `out` of use.
+pub(super) fn idle(channels: &[&[f64]], out: &[bool], sample_time_s: f64) -> Vec<Range<usize>> {
+    let n = channels.first().map_or(0, |c| c.len());
+    let block = ((BLOCK_S / sample_time_s).round() as usize).max(5);
+    let used = |c: &&[f64]| -> Vec<f64> { c.iter().zip(out).filter(|(_, out)| !**out).map(|(v, _)| *v).collect() };
+    let scales: Vec<f64> = channels.iter().map(|c| level_and_deviation(&used(c)).1).collect();
+    if n < 4 * block || scales.iter().any(|s| *s <= 0.0) {
+        return Vec::new();
+    }
+    let quiet = |rows: Range<usize>| {
+        let one = |(channel, scale): (&&[f64], &f64)| range_of(&channel[rows.clone()]) <= QUIET * scale;
+        channels.iter().zip(&scales).all(one)
+    };
+    let mut all: Vec<Range<usize>> = Vec::new();
+    for start in (0..n).step_by(block) {
+        let rows = start..(start + block).min(n);
+        if rows.len() < 5 || out[rows.clone()].contains(&true) || !quiet(rows.clone()) {
+            continue;
+        }
+        match all.last_mut() {
+            Some(last) if last.end == rows.start => last.end = rows.end,
+            _ => all.push(rows),
+        }
+    }
+    let least = ((IDLE_S / sample_time_s).ceil() as usize).max(2 * block);
+    let whole = |stretch: Range<usize>| {
+        // To the sample: as long as nothing leaves what the stretch is within.
+        let stays = |t: usize, stretch: &Range<usize>| {
+            channels.iter().zip(&scales).all(|(channel, scale)| {
+                let inside = &channel[stretch.clone()];
+                let middle = inside[inside.len() / 2];
+                (channel[t] - middle).abs() <= QUIET * scale
+            })
+        };
+        let (mut start, mut end) = (stretch.start, stretch.end);
+        while start > 0 && stays(start - 1, &stretch) {
+            start -= 1;
+        }
+        while end < n && stays(end, &stretch) {
+            end += 1;
+        }
+        start..end
+    };
+    all.into_iter().map(whole).filter(|s| s.len() >= least).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::test_signals::autoregressive, *};
+
+    #[test]
+    fn a_frozen_channel_in_full_precision_and_in_steps() {
+        let (e, u) = (autoregressive(4000, 1), autoregressive(4000, 2));
+        assert!(frozen(&u, Some(&e), 0.01).is_empty());
+        let mut held = u.clone();
+        let value = held[1000];
+        held[1000..1050].fill(value);
+        let found = frozen(&held, Some(&e), 0.01);
+        assert_eq!(
+            (found.len(), found[0].samples.clone(), found[0].jump),
+            (1, 1000..1050, None)
+        );
+        let steps: Vec<f64> = u.iter().map(|v| v.round()).collect();
+        assert!(frozen(&steps, Some(&e), 0.01).is_empty());
+        let mut held = steps;
+        held[2000..2900].fill(2.0);
+        let found = frozen(&held, Some(&e), 0.01);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].samples.len() >= 900);
+    }
+
+    #[test]
+    fn a_dropout_is_a_hold_with_jumps() {
+        let mut u: Vec<f64> = autoregressive(4000, 2).iter().map(|v| v + 40.0).collect();
+        u[700..740].fill(0.0);
+        let found = frozen(&u, None, 0.01);
+        assert_eq!((found.len(), found[0].samples.clone()), (1, 700..740));
+        assert!((found[0].jump.unwrap() + 40.0).abs() < 12.0, "{found:?}");
+    }
+
+    #[test]
+    fn a_rail_is_another_matter() {
+        let u: Vec<f64> = autoregressive(4000, 2).iter().map(|v| v.clamp(-3.0, 3.0)).collect();
+        assert!(frozen(&u, None, 0.01).is_empty());
+    }
+
+    #[test]
+    fn what_comes_before_a_run() {
+        let mut state = 5_u64;
+        let mut small = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            0.02 * ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5)
+        };
+        let before: Vec<f64> = (0..1500).map(|_| small()).collect();
+        let with = |seed| [before.clone(), autoregressive(6000, seed)].concat();
+        let (e, u) = (with(1), with(2));
+        let used = vec![false; 7500];
+        let found = idle(&[&e, &u], &used, 0.01);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].start == 0 && (1500..1510).contains(&found[0].end), "{found:?}");
+        assert!(idle(&[&e[1500..], &u[1500..]], &used[1500..], 0.01).is_empty());
+        assert!(
+            idle(&[&e[1500..], &u[..6000]], &used[1500..], 0.01).is_empty(),
+            "one of them moves"
+        );
+        assert!(idle(&[], &[], 0.01).is_empty() && idle(&[&[1.0; 500]], &used[..500], 0.01).is_empty());
+    }
+}

@@ -1,0 +1,245 @@
+//! Jumps of a level: wraps, steps, and stretches in other units.
+//!
+//! A *large* change from one sample to the next is beyond [`LARGE`] times the 99 % quantile of all
+//! changes.
+//!
+//! **Wrap.** A channel that is kept within a range of the modulus M leaves it at one end and comes in
+//! at the other: large changes that are all M within that quantile, which taken out leave no large
+//! change. M is 360, 2 pi, 180, pi or 65536 (or one less, or 4096), or what four changes or more
+//! agree in. Of these a pair of changes less than [`BRIDGED_S`](super::BRIDGED_S) apart is a spike; of
+//! a known modulus it is a turn there and back, and unwrapping mends either.
+//!
+//! **Step.** At one large change the median of [`BESIDE_S`] before and behind differ by more than
+//! [`STEPPED`] times the deviation within each of the two, and by four fifths of the change: the
+//! person has not answered it away, as they do with a step of the target.
+//!
+//! **Scale.** The deviation from the level in each second, over its median over all seconds, beyond
+//! [`UNITS`]: no person grows by that much from one second to the next. Edges are those samples beyond
+//! [`OUTSIDE`] deviations of the rest.
+
+use std::{f64::consts::PI, ops::Range};
+
+use super::robust::{level_and_deviation, median, quantile};
+
+const LARGE: f64 = 6.0;
+/// Span beside a step, s.
+const BESIDE_S: f64 = 5.0;
+/// Least step, in deviations beside it.
+const STEPPED: f64 = 6.0;
+/// Ratio of the deviations of seconds that is another unit.
+const UNITS: f64 = 100.0;
+/// Deviations of the rest beyond which a sample belongs to such a stretch.
+const OUTSIDE: f64 = 15.0;
+const MODULI: [f64; 7] = [360.0, 2.0 * PI, 180.0, PI, 65_536.0, 65_535.0, 4096.0];
+/// Changes that agree in a modulus of their own.
+const AGREE: usize = 4;
+
+/// A channel that wraps around.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Wrap {
+    pub modulus: f64,
+    /// Samples between the first and the last turn.
+    pub samples: Range<usize>,
+    pub unwrapped: Vec<f64>,
+}
+
+fn usual_change(values: &[f64]) -> f64 {
+    quantile(
+        &mut values.windows(2).map(|w| (w[1] - w[0]).abs()).collect::<Vec<_>>(),
+        0.99,
+    )
+}
+
+/// The wraps of a channel.
+pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
+    let usual = usual_change(values);
+    if values.len() < 100 || usual <= 0.0 {
+        return None;
+    }
+    let jumps: Vec<(usize, f64)> = values
+        .windows(2)
+        .enumerate()
+        .map(|(t, w)| (t + 1, w[1] - w[0]))
+        .filter(|(_, change)| change.abs() > LARGE * usual)
+        .collect();
+    if jumps.is_empty() || 20 * jumps.len() > values.len() {
+        return None;
+    }
+    let near = |modulus: f64| {
+        jumps
+            .iter()
+            .all(|(_, change)| (change.abs() - modulus).abs() <= 2.0 * usual)
+    };
+    let known = MODULI.iter().copied().find(|m| near(*m));
+    let own = || {
+        let size = median(&jumps.iter().map(|(_, c)| c.abs()).collect::<Vec<_>>());
+        let apart = jumps.windows(2).map(|w| (w[1].0 - w[0].0) as f64 * sample_time_s);
+        let spike = apart.fold(f64::INFINITY, f64::min) <= super::BRIDGED_S;
+        (jumps.len() >= AGREE && near(size) && !spike).then_some(size)
+    };
+    let modulus = known.or_else(own)?;
+    let mut turns = 0.0;
+    let mut unwrapped = values.to_vec();
+    let mut next = jumps.iter().peekable();
+    for (t, v) in unwrapped.iter_mut().enumerate() {
+        if let Some((_, change)) = next.next_if(|(at, _)| *at == t) {
+            turns -= change.signum();
+        }
+        *v += turns * modulus;
+    }
+    let (first, last) = (jumps[0].0, jumps[jumps.len() - 1].0);
+    Some(Wrap {
+        modulus,
+        samples: first..last + 1,
+        unwrapped,
+    })
+}
+
+/// Steps of the level: the first sample behind each, and by how much.
+pub(super) fn steps(values: &[f64], sample_time_s: f64) -> Vec<(usize, f64, f64)> {
+    let beside = (BESIDE_S / sample_time_s) as usize;
+    let usual = usual_change(values);
+    let n = values.len();
+    if beside < 10 || n < 2 * beside || usual <= 0.0 {
+        return Vec::new();
+    }
+    let mut found: Vec<(usize, f64, f64)> = Vec::new();
+    for t in beside..n - beside {
+        let change = values[t] - values[t - 1];
+        if change.abs() <= LARGE * usual || found.last().is_some_and(|(last, ..)| t - last < beside) {
+            continue;
+        }
+        let (before, one) = level_and_deviation(&values[t - beside..t]);
+        let (behind, other) = level_and_deviation(&values[t..t + beside]);
+        let (shift, noise) = (behind - before, one.max(other));
+        if shift * change > 0.0 && shift.abs() > STEPPED * noise && shift.abs() > 0.8 * change.abs() {
+            found.push((t, shift, shift.abs() / noise.max(f64::MIN_POSITIVE)));
+        }
+    }
+    found
+}
+
+/// Stretches in which a channel is larger by orders of magnitude, and by how much.
+pub(super) fn scales(values: &[f64], sample_time_s: f64) -> Vec<(Range<usize>, f64)> {
+    let block = ((1.0 / sample_time_s) as usize).max(10);
+    let n = values.len();
+    if n < 5 * block {
+        return Vec::new();
+    }
+    let level = median(values);
+    let sizes: Vec<f64> = values
+        .chunks(block)
+        .map(|part| median(&part.iter().map(|v| (v - level).abs()).collect::<Vec<_>>()))
+        .collect();
+    let usual = median(&sizes);
+    if usual <= 0.0 {
+        return Vec::new();
+    }
+    let mut all: Vec<(Range<usize>, f64)> = Vec::new();
+    for (k, size) in sizes.iter().enumerate() {
+        if *size <= UNITS * usual {
+            continue;
+        }
+        let rows = k * block..((k + 1) * block).min(n);
+        match all.last_mut() {
+            Some((last, factor)) if last.end == rows.start => {
+                last.end = rows.end;
+                *factor = factor.max(size / usual);
+            }
+            _ => all.push((rows, size / usual)),
+        }
+    }
+    let inside = |t: usize| all.iter().any(|(rows, _)| rows.contains(&t));
+    let rest: Vec<f64> = (0..n).filter(|t| !inside(*t)).map(|t| values[t]).collect();
+    let limit = OUTSIDE * level_and_deviation(&rest).1;
+    let outside = |t: usize| (values[t] - level).abs() > limit;
+    // A sample of the stretch may be small, ten in a row are not.
+    let last_outside = |mut rows: Box<dyn Iterator<Item = usize>>| {
+        let (mut last, mut calm) = (None, 0);
+        while calm < 10 {
+            let Some(t) = rows.next() else { break };
+            if outside(t) {
+                (last, calm) = (Some(t), 0);
+            } else {
+                calm += 1;
+            }
+        }
+        last
+    };
+    for (rows, _) in &mut all {
+        let first = (rows.start..rows.end).find(|t| outside(*t)).unwrap_or(rows.start);
+        let end = (rows.start..rows.end)
+            .rev()
+            .find(|t| outside(*t))
+            .map_or(rows.end, |t| t + 1);
+        rows.start = last_outside(Box::new((0..first).rev())).unwrap_or(first);
+        rows.end = last_outside(Box::new(end..n)).map_or(end, |t| t + 1);
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::test_signals::autoregressive, *};
+
+    fn channel(seed: u64) -> Vec<f64> {
+        autoregressive(6000, seed)
+    }
+
+    #[test]
+    fn a_good_channel_has_none_of_them() {
+        for seed in 1..8 {
+            let x = channel(seed);
+            assert!(wrap(&x, 0.01).is_none() && steps(&x, 0.01).is_empty() && scales(&x, 0.01).is_empty());
+        }
+        assert!(
+            wrap(&[1.0; 300], 0.01).is_none() && steps(&[], 0.01).is_empty() && scales(&[0.0; 999], 0.01).is_empty()
+        );
+    }
+
+    #[test]
+    fn an_angle_is_unwrapped() {
+        let x: Vec<f64> = channel(4).iter().map(|v| 5.0 * v + 132.0).collect();
+        let wrapped: Vec<f64> = x.iter().map(|v| (v + 180.0).rem_euclid(360.0) - 180.0).collect();
+        let found = wrap(&wrapped, 0.01).unwrap();
+        assert_eq!(found.modulus, 360.0);
+        let offset = found.unwrapped[0] - x[0];
+        assert!(
+            found
+                .unwrapped
+                .iter()
+                .zip(&x)
+                .all(|(u, x)| (u - x - offset).abs() < 1e-9)
+        );
+        let mut spiky = x;
+        spiky[3000] += 250.0;
+        spiky[900] -= 230.0;
+        assert!(wrap(&spiky, 0.01).is_none());
+    }
+
+    #[test]
+    fn a_level_that_stays_and_a_pulse() {
+        let mut x = channel(3);
+        x[3000..].iter_mut().for_each(|v| *v += 80.0);
+        let found = steps(&x, 0.01);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].0 == 3000 && (found[0].1 - 80.0).abs() < 8.0, "{found:?}");
+        let mut x = channel(3);
+        x[3000..3050].iter_mut().for_each(|v| *v += 80.0);
+        assert!(steps(&x, 0.01).is_empty());
+    }
+
+    #[test]
+    fn another_unit_for_a_while() {
+        let mut x = channel(6);
+        x[2030..4777].iter_mut().for_each(|v| *v *= 1e6);
+        let found = scales(&x, 0.01);
+        assert_eq!(found.len(), 1, "{found:?}");
+        let (rows, factor) = &found[0];
+        assert!(
+            rows.start.abs_diff(2030) < 5 && rows.end.abs_diff(4777) < 5,
+            "{found:?}"
+        );
+        assert!((1e5..1e7).contains(factor));
+    }
+}

@@ -1,0 +1,164 @@
+//! The order in which faults are looked for, and what becomes of each.
+//!
+//! Wraps first, since a channel without them has no jumps; then what lasts: stretches in other units,
+//! idle and frozen ones. Between these, on what is left, spikes and steps: an autoregression of a
+//! record with an idle half is one of neither half.
+
+use std::ops::Range;
+
+use hoid_model::{FaultAction, FaultKind};
+
+use super::{BRIDGED_S, MOST_SPIKES, holds, levels, spikes};
+
+/// Samples between longer faults below which no spike is looked for.
+const FEWEST: usize = 100;
+
+/// A fault by its samples.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Place {
+    pub kind: FaultKind,
+    /// e or u by its place; none for both.
+    pub channel: Option<usize>,
+    pub samples: Range<usize>,
+    pub size: f64,
+    pub deviations: Option<f64>,
+}
+
+/// The faults of channels of one record in the order of time, with what is to be done; the channels
+/// are unwrapped, and bridged where that is to be done and not all `cut`.
+pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(Place, FaultAction)> {
+    let n = values.first().map_or(0, Vec::len);
+    let long = |samples: &Range<usize>| samples.len() as f64 * ts > BRIDGED_S * (1.0 + 1e-9);
+    let mended = |samples: &Range<usize>| {
+        if cut || long(samples) {
+            FaultAction::Cut
+        } else {
+            FaultAction::Bridged
+        }
+    };
+    let mut found: Vec<(Place, FaultAction)> = Vec::new();
+    for (channel, values) in values.iter_mut().enumerate() {
+        if let Some(wrap) = levels::wrap(values, ts) {
+            *values = wrap.unwrapped;
+            let place = Place {
+                kind: FaultKind::Wrap,
+                channel: Some(channel),
+                samples: wrap.samples,
+                size: wrap.modulus,
+                deviations: None,
+            };
+            found.push((place, FaultAction::Bridged));
+        }
+    }
+    let mut out = vec![false; n];
+    for place in lasting(values, ts) {
+        let action = mended(&place.samples);
+        match (action, place.channel) {
+            (FaultAction::Bridged, Some(channel)) => spikes::bridge(&mut values[channel], place.samples.clone()),
+            _ => out[place.samples.clone()].fill(true),
+        }
+        found.push((place, action));
+    }
+    for (channel, values) in values.iter_mut().enumerate() {
+        let before = values.clone();
+        let mut of_channel: Vec<Place> = Vec::new();
+        for stretch in stretches(&out) {
+            let part = &mut values[stretch.clone()];
+            for (at, size, deviations) in levels::steps(part, ts) {
+                let place = Place {
+                    kind: FaultKind::Step,
+                    channel: Some(channel),
+                    samples: stretch.start + at..stretch.start + at + 1,
+                    size,
+                    deviations: Some(deviations),
+                };
+                found.push((place, FaultAction::Cut));
+            }
+            of_channel.extend(spikes::find(part, ts).into_iter().map(|spike| Place {
+                kind: FaultKind::Spike,
+                channel: Some(channel),
+                samples: stretch.start + spike.samples.start..stretch.start + spike.samples.end,
+                size: spike.size,
+                deviations: Some(spike.deviations),
+            }));
+        }
+        let total: usize = of_channel.iter().map(|place| place.samples.len()).sum();
+        let too_many = total as f64 > (MOST_SPIKES * n as f64).max(3.0);
+        if cut || too_many {
+            *values = before;
+        }
+        for place in of_channel {
+            let action = if too_many {
+                FaultAction::Reported
+            } else {
+                mended(&place.samples)
+            };
+            found.push((place, action));
+        }
+    }
+    found.sort_by_key(|(place, _)| (place.samples.start, place.channel));
+    found
+}
+
+/// Stretches in other units, idle and frozen ones.
+fn lasting(values: &[Vec<f64>], ts: f64) -> Vec<Place> {
+    let mut all: Vec<Place> = Vec::new();
+    for (channel, values) in values.iter().enumerate() {
+        all.extend(levels::scales(values, ts).into_iter().map(|(samples, factor)| Place {
+            kind: FaultKind::Scale,
+            channel: Some(channel),
+            samples,
+            size: factor,
+            deviations: None,
+        }));
+    }
+    let both: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+    if both.len() > 1 {
+        let mut out = vec![false; both[0].len()];
+        all.iter().for_each(|place| out[place.samples.clone()].fill(true));
+        all.extend(holds::idle(&both, &out, ts).into_iter().map(|samples| Place {
+            kind: FaultKind::Idle,
+            channel: None,
+            size: samples.len() as f64 * ts,
+            samples,
+            deviations: None,
+        }));
+    }
+    let known: Vec<Range<usize>> = all.iter().map(|place| place.samples.clone()).collect();
+    for (channel, values) in values.iter().enumerate() {
+        let other = both.iter().enumerate().find(|(c, _)| *c != channel).map(|(_, v)| *v);
+        for hold in holds::frozen(values, other, ts) {
+            if known
+                .iter()
+                .any(|k| k.start < hold.samples.end && hold.samples.start < k.end)
+            {
+                continue;
+            }
+            all.push(Place {
+                kind: if hold.jump.is_some() {
+                    FaultKind::Dropout
+                } else {
+                    FaultKind::Frozen
+                },
+                channel: Some(channel),
+                size: hold.jump.unwrap_or(hold.samples.len() as f64 * ts),
+                samples: hold.samples,
+                deviations: None,
+            });
+        }
+    }
+    all
+}
+
+/// Runs of samples that are in use, long enough to look at.
+fn stretches(out: &[bool]) -> Vec<Range<usize>> {
+    let mut all: Vec<Range<usize>> = Vec::new();
+    for t in (0..out.len()).filter(|t| !out[*t]) {
+        match all.last_mut() {
+            Some(last) if last.end == t => last.end = t + 1,
+            _ => all.push(t..t + 1),
+        }
+    }
+    all.retain(|stretch| stretch.len() >= FEWEST);
+    all
+}

@@ -1,0 +1,343 @@
+//! One or few samples that those before and behind them rule out.
+//!
+//! Two explanations of a large innovation stand against each other (A. J. Fox, *J. Royal Statistical
+//! Society B* 34 (1972) 350-363; I. Chang, G. C. Tiao and C. Chen, *Technometrics* 30 (1988) 193-204).
+//! A *push* of the person enters the innovations: it moves the channel, which then goes on as it always
+//! does. A *fault* is added to the samples alone: each innovation behind it is off by a coefficient of
+//! A, and the channel goes on as if nothing had been. For m samples from s on,
+//!
+//! | explanation | what it leaves of `S = sum eps^2/sigma^2` |
+//! |---|---|
+//! | m pushes | `S` without the m largest terms |
+//! | m faulty samples | `S` behind the [interpolation](super::interpolation) of them |
+//!
+//! Both have m unknowns. The fewest samples are a fault where their interpolation
+//!
+//! 1. takes more than [`LARGE`]^2 away: for normal innovations once in 1e15 samples;
+//! 2. leaves less than m pushes do, by [`BETTER`]^2 and by [`PART`] of what it takes away;
+//! 3. leaves nothing beyond [`CLEAN`] sigma (or a twentieth of S);
+//! 4. moves a sample by more than [`SMALLEST`] of the deviation of the channel, and by two of its steps.
+//!
+//! The first samples of a record are looked at backwards, where they are last: a normal autoregression
+//! is the same in both directions.
+//!
+//! A channel without memory, and the last sample of a record, tell the two apart: there a sample beyond [`WILD`] deviations is a
+//! fault. sigma is the median absolute innovation over 0.6745, of the record or of the second around
+//! the sample, whichever is larger: remnants come and go, and follow u. Found faults are bridged, the
+//! autoregression is fitted again, and the search repeats (C. Chen and L. M. Liu, *J. American
+//! Statistical Association* 88 (1993) 284-297).
+
+use std::ops::Range;
+
+use super::{
+    autoregression::{Autoregression, FLOOR},
+    interpolation::{Interpolation, apply},
+    robust::{level_and_deviation, median, quantum},
+};
+
+/// Least fall of the sum of squares, as sigma.
+const LARGE: f64 = 8.0;
+/// How much better faults are than pushes, as sigma.
+const BETTER: f64 = 5.0;
+/// The same as a part of the fall.
+const PART: f64 = 0.2;
+/// Largest innovation that is left, as sigma.
+const CLEAN: f64 = 5.0;
+/// Innovation that a search begins at, as sigma.
+const SEED: f64 = 4.0;
+/// Least change of a sample, of the deviation of the channel.
+const SMALLEST: f64 = 1.5;
+/// Deviations of the channel that nobody moves by in a few samples.
+const WILD: f64 = 20.0;
+const ROUNDS: usize = 4;
+
+/// Samples that are no part of the channel.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Spike {
+    pub samples: Range<usize>,
+    /// By how much the worst of them is off.
+    pub size: f64,
+    /// Square root of the fall of the sum of squares.
+    pub deviations: f64,
+}
+
+/// The spikes of a channel, which is bridged at them.
+pub(super) fn find(values: &mut [f64], sample_time_s: f64) -> Vec<Spike> {
+    let (level, deviation) = level_and_deviation(values);
+    let mut x: Vec<f64> = values.iter().map(|v| v - level).collect();
+    let step = quantum(values);
+    let window = ((1.0 / sample_time_s) as usize).clamp(64, 4096);
+    // At least three: a hand that trembles is never one sample.
+    let longest = ((super::BRIDGED_S / sample_time_s).round() as usize).clamp(1, 12);
+    let mut found: Vec<Spike> = Vec::new();
+    for _ in 0..ROUNDS {
+        let Some(ar) = Autoregression::of(&x, deviation) else {
+            break;
+        };
+        let mut eps = ar.residuals(&x);
+        let sigma = scales(&eps, window, (FLOOR * deviation).max(step) * ar.norm());
+        let search = Search {
+            ar: &ar,
+            sigma: &sigma,
+            smallest: (SMALLEST * deviation).max(2.0 * step),
+            deviation,
+            longest,
+            reach: reach(&ar),
+        };
+        let mut new = search.round(&mut x, &mut eps);
+        new.extend(search.beginning(&mut x));
+        if new.is_empty() {
+            break;
+        }
+        found.extend(new);
+    }
+    for spike in &found {
+        for t in spike.samples.clone() {
+            values[t] = level + x[t];
+        }
+    }
+    joined(found)
+}
+
+/// Samples that are to be replaced, by what stands around them.
+pub(super) fn bridge(values: &mut [f64], samples: Range<usize>) {
+    let (level, deviation) = level_and_deviation(values);
+    let x: Vec<f64> = values.iter().map(|v| v - level).collect();
+    let Some(ar) = Autoregression::of(&x, deviation) else {
+        return;
+    };
+    let eps = ar.residuals(&x);
+    let found = Interpolation::new(&ar, &eps, samples.start, samples.len());
+    let m = found.most();
+    for (t, change) in samples.zip(found.change(m)) {
+        values[t] += change;
+    }
+}
+
+/// Lags that hold 95 % of `|a|^2`.
+fn reach(ar: &Autoregression) -> usize {
+    let total = ar.norm().powi(2);
+    let mut sum = 0.0;
+    let held = ar.a.iter().position(|a| {
+        sum += a * a;
+        sum >= 0.95 * total
+    });
+    held.unwrap_or(ar.order())
+}
+
+/// Scale of the innovations around each window.
+pub(super) fn scales(eps: &[f64], window: usize, least: f64) -> Scales {
+    let sizes: Vec<f64> = eps.iter().map(|e| e.abs()).collect();
+    let of = |part: &[f64]| median(part) / 0.674_489_75;
+    let all = of(&sizes).max(least);
+    let local: Vec<f64> = sizes.chunks(window).map(of).collect();
+    let around = |k: usize| {
+        let near = &local[k.saturating_sub(1)..(k + 2).min(local.len())];
+        near.iter().copied().fold(all, f64::max)
+    };
+    Scales {
+        of_window: (0..local.len()).map(around).collect(),
+        window,
+    }
+}
+
+pub(super) struct Scales {
+    of_window: Vec<f64>,
+    window: usize,
+}
+
+impl Scales {
+    pub(super) fn at(&self, t: usize) -> f64 {
+        self.of_window[t / self.window]
+    }
+}
+
+struct Search<'a> {
+    ar: &'a Autoregression,
+    sigma: &'a Scales,
+    smallest: f64,
+    deviation: f64,
+    longest: usize,
+    reach: usize,
+}
+
+impl Search<'_> {
+    /// The first samples, backwards.
+    fn beginning(&self, x: &mut [f64]) -> Vec<Spike> {
+        let p = self.ar.order();
+        let length = x.len().min(8 * p);
+        let mut backwards: Vec<f64> = x[..length].iter().rev().copied().collect();
+        let mut eps = self.ar.residuals(&backwards);
+        let found = self.round(&mut backwards, &mut eps);
+        let mut kept = Vec::new();
+        for spike in found.into_iter().filter(|spike| spike.samples.start >= length - p) {
+            let samples = length - spike.samples.end..length - spike.samples.start;
+            for t in samples.clone() {
+                x[t] = backwards[length - 1 - t];
+            }
+            kept.push(Spike { samples, ..spike });
+        }
+        kept
+    }
+
+    fn round(&self, x: &mut [f64], eps: &mut [f64]) -> Vec<Spike> {
+        let mut found = Vec::new();
+        let mut t = self.ar.order();
+        while t < x.len() {
+            if eps[t].abs() <= SEED * self.sigma.at(t) {
+                t += 1;
+                continue;
+            }
+            match self.at(x, eps, t) {
+                Some((spike, delta)) => {
+                    apply(self.ar, eps, t, &delta);
+                    for (k, change) in spike.samples.clone().zip(&delta) {
+                        x[k] += change;
+                    }
+                    t = spike.samples.end;
+                    found.push(spike);
+                }
+                None => t += 1,
+            }
+        }
+        found
+    }
+
+    /// The fault that begins at this sample, and how its samples change.
+    fn at(&self, x: &[f64], eps: &[f64], start: usize) -> Option<(Spike, Vec<f64>)> {
+        let sigma = self.sigma.at(start);
+        let all = Interpolation::new(self.ar, eps, start, self.longest);
+        for m in 1..=all.most() {
+            let fall = all.fall(m) / (sigma * sigma);
+            if fall < LARGE * LARGE {
+                continue;
+            }
+            let rows = start..(start + m + self.reach).min(eps.len());
+            let delta = all.change(m);
+            let size = delta
+                .iter()
+                .copied()
+                .fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+            if size.abs() < self.smallest {
+                continue;
+            }
+            let mut after = eps[rows.start..(start + m + self.ar.order()).min(eps.len())].to_vec();
+            self.apply_from(&mut after, rows.start, start, &delta);
+            let left: Vec<f64> = after[..rows.len()].iter().map(|e| (e / sigma).powi(2)).collect();
+            let mut before: Vec<f64> = eps[rows].iter().map(|e| (e / sigma).powi(2)).collect();
+            let total: f64 = before.iter().sum();
+            let left_by_faults: f64 = left.iter().sum();
+            before.sort_unstable_by(|a, b| b.total_cmp(a));
+            let left_by_pushes: f64 = before.iter().skip(m).sum();
+            let better = left_by_pushes - left_by_faults;
+            let largest = left.iter().copied().fold(0.0, f64::max);
+            let clean = largest <= CLEAN * CLEAN || left_by_faults <= 0.05 * total;
+            let is_fault = better > (BETTER * BETTER).max(PART * fall) && clean;
+            let worst = |k: usize| x[start + k].abs();
+            let is_wild = m <= 3
+                && (0..m).all(|k| worst(k) > WILD * self.deviation)
+                && size.abs() > WILD * self.deviation
+                && left_by_faults <= 0.5 * total;
+            if is_fault || is_wild {
+                let spike = Spike {
+                    samples: start..start + m,
+                    size: -size,
+                    deviations: fall.sqrt(),
+                };
+                return Some((spike, delta));
+            }
+        }
+        None
+    }
+
+    /// As [`apply`], on rows from `first` on.
+    fn apply_from(&self, eps: &mut [f64], first: usize, start: usize, delta: &[f64]) {
+        for (i, change) in delta.iter().enumerate() {
+            for (lag, a) in self.ar.a.iter().enumerate() {
+                let row = (start + i + lag).checked_sub(first);
+                if let Some(e) = row.and_then(|row| eps.get_mut(row)) {
+                    *e += a * change;
+                }
+            }
+        }
+    }
+}
+
+/// Spikes that touch, as one.
+fn joined(mut all: Vec<Spike>) -> Vec<Spike> {
+    all.sort_by_key(|spike| spike.samples.start);
+    let mut joined: Vec<Spike> = Vec::new();
+    for spike in all {
+        match joined.last_mut() {
+            Some(last) if spike.samples.start <= last.samples.end => {
+                last.samples.end = last.samples.end.max(spike.samples.end);
+                last.deviations = last.deviations.max(spike.deviations);
+                if spike.size.abs() > last.size.abs() {
+                    last.size = spike.size;
+                }
+            }
+            _ => joined.push(spike),
+        }
+    }
+    joined
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::test_signals::autoregressive, *};
+
+    #[test]
+    fn a_fault_is_found_and_a_push_is_not() {
+        let clean = autoregressive(4000, 11);
+        assert!(find(&mut clean.clone(), 0.01).is_empty());
+        let mut faulty = clean.clone();
+        faulty[2000] += 30.0;
+        let found = find(&mut faulty, 0.01);
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].samples, 2000..2001);
+        assert!((found[0].size - 30.0).abs() < 3.0, "{found:?}");
+        // The bridge is the sample within what one innovation does.
+        assert!((faulty[2000] - clean[2000]).abs() < 2.0);
+        // The same through the dynamics of the channel: a push.
+        let mut pushed = clean;
+        let (mut one, mut two) = (30.0, 0.0);
+        for v in &mut pushed[2000..] {
+            *v += one;
+            (one, two) = (1.6 * one - 0.8 * two, one);
+        }
+        assert!(find(&mut pushed, 0.01).is_empty());
+    }
+
+    #[test]
+    fn patches_ends_and_neighbours() {
+        let clean = autoregressive(3000, 2);
+        for places in [&[5_usize, 6, 7][..], &[2999], &[0], &[1000, 1004], &[1500, 1514, 1530]] {
+            let mut faulty = clean.clone();
+            places.iter().for_each(|t| faulty[*t] += 150.0);
+            let found = find(&mut faulty, 0.01);
+            for t in places {
+                assert!(found.iter().any(|s| s.samples.contains(t)), "{places:?} {found:?}");
+            }
+            let length: usize = found.iter().map(|s| s.samples.len()).sum();
+            assert!(length <= places.len() + 3, "{places:?} {found:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_to_look_at_is_no_fault() {
+        assert!(find(&mut [], 0.01).is_empty());
+        assert!(find(&mut [1.0; 500], 0.01).is_empty());
+        assert!(find(&mut [1.0, 2.0, 3.0], 0.01).is_empty());
+    }
+
+    #[test]
+    fn a_bridge_is_what_the_others_say() {
+        let clean = autoregressive(2000, 8);
+        let mut broken = clean.clone();
+        broken[700..705].fill(1e3);
+        bridge(&mut broken, 700..705);
+        for t in 700..705 {
+            assert!((broken[t] - clean[t]).abs() < 6.0, "{t} {} {}", broken[t], clean[t]);
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! Injected faults in simulated runs, and runs without any.
+
+use hoid_model::{
+    Channel, Fault, FaultAction, FaultHandling, FaultKind, Record, SampleTime, Severity,
+    scenario::{Condition, Scenario},
+};
+use hoid_sim::{
+    RunSeed, Simulator,
+    people::{Person, Plant, Population, RemnantKind, Task},
+};
+
+use super::{Mended, mend};
+
+fn run(condition: Condition, seed: u64) -> Record {
+    let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
+    let seed = RunSeed {
+        seed,
+        ..RunSeed::default()
+    };
+    simulator.run(seed, false).unwrap()
+}
+
+/// The same record with other signals.
+fn with(record: &Record, change: impl FnOnce(&mut Vec<f64>, &mut Vec<f64>)) -> Record {
+    let (mut e, mut u) = (record.input().to_vec(), record.output().to_vec());
+    change(&mut e, &mut u);
+    Record::new(record.sample_time(), Channel::new("e", "", e), Channel::new("u", "", u)).unwrap()
+}
+
+fn mended(record: &Record) -> Mended {
+    mend(record, FaultHandling::Bridge).unwrap()
+}
+
+fn kinds(found: &[Fault]) -> Vec<FaultKind> {
+    found.iter().map(|f| f.kind).collect()
+}
+
+#[test]
+fn clean_runs_have_no_faults_and_stay_as_they_are() {
+    for condition in Condition::ALL {
+        let record = run(condition, 17);
+        let found = mended(&record);
+        assert!(
+            found.faults.is_empty() && found.findings.is_empty(),
+            "{condition:?} {:?}",
+            found.faults
+        );
+        assert_eq!(found.segments.len(), 1);
+        assert_eq!(found.segments[0].output(), record.output());
+    }
+    let (population, task) = (Population::default(), Task::default());
+    for (k, remnant) in RemnantKind::ALL.into_iter().enumerate() {
+        for plant in Plant::ALL {
+            let person = Person::draw(&population, &task, plant, None, remnant, 40 + k as u64, 0).unwrap();
+            let record = person.run(1).unwrap().record;
+            assert!(
+                mended(&record).faults.is_empty(),
+                "{remnant} {plant:?} {:?}",
+                mended(&record).faults
+            );
+        }
+    }
+}
+
+#[test]
+fn one_sample_of_the_error_is_found_and_bridged() {
+    for (condition, place) in [(Condition::C1, 4000), (Condition::C3, 700), (Condition::C6, 7000)] {
+        let clean = run(condition, 5);
+        let record = with(&clean, |e, _| e[place] = 30.0);
+        let found = mended(&record);
+        assert_eq!(kinds(&found.faults), [FaultKind::Spike], "{:?}", found.faults);
+        let fault = &found.faults[0];
+        assert_eq!((fault.channel.as_str(), fault.action), ("e", FaultAction::Bridged));
+        assert_eq!(fault.from_s, record.time_s(place));
+        assert!((fault.size - (30.0 - clean.input()[place])).abs() < 0.1, "{fault}");
+        assert!((found.segments[0].input()[place] - clean.input()[place]).abs() < 0.05);
+        assert_eq!(found.findings[0].severity, Severity::Note);
+        // Told and not mended.
+        let told = mend(&record, FaultHandling::Report).unwrap();
+        assert_eq!(told.segments[0].input(), record.input());
+        assert_eq!(told.findings[0].severity, Severity::Doubt);
+        assert!(mend(&record, FaultHandling::Keep).unwrap().faults.is_empty());
+        let cut = mend(&record, FaultHandling::Cut).unwrap();
+        assert_eq!((cut.segments.len(), cut.faults[0].action), (2, FaultAction::Cut));
+        assert_eq!(cut.segments[1].time_s(0), record.time_s(place + 1));
+    }
+}
+
+#[test]
+fn a_spike_of_the_output_too() {
+    let clean = run(Condition::C1, 9);
+    let deviation = (clean.output().iter().map(|u| u * u).sum::<f64>() / clean.len() as f64).sqrt();
+    let found = mended(&with(&clean, |_, u| u[3000] += 10.0 * deviation));
+    assert_eq!(kinds(&found.faults), [FaultKind::Spike], "{:?}", found.faults);
+    assert_eq!(found.faults[0].channel, "u");
+}
+
+#[test]
+fn rest_before_a_run_is_cut() {
+    let clean = run(Condition::C1, 3);
+    let record = with(&clean, |e, u| {
+        e.splice(0..0, vec![0.0; 1500]);
+        u.splice(0..0, vec![0.0; 1500]);
+    });
+    let found = mended(&record);
+    assert_eq!(kinds(&found.faults), [FaultKind::Idle], "{:?}", found.faults);
+    assert_eq!((found.faults[0].action, found.segments.len()), (FaultAction::Cut, 1));
+    assert!((found.segments[0].time_s(0) - 15.0).abs() < 0.1);
+    assert_eq!(found.findings[0].severity, Severity::Note);
+}
+
+#[test]
+fn a_frozen_output_other_units_and_a_step_cut_the_record() {
+    let clean = run(Condition::C1, 4);
+    let frozen = mended(&with(&clean, |_, u| {
+        let held = u[2000];
+        u[2000..2400].fill(held);
+    }));
+    assert_eq!(kinds(&frozen.faults), [FaultKind::Frozen], "{:?}", frozen.faults);
+    assert_eq!((frozen.faults[0].samples, frozen.segments.len()), (400, 2));
+    let scaled = mended(&with(&clean, |e, u| {
+        e[1000..3000].iter_mut().for_each(|v| *v *= 1e6);
+        u[1000..3000].iter_mut().for_each(|v| *v *= 1e6);
+    }));
+    assert!(
+        kinds(&scaled.faults).iter().all(|k| *k == FaultKind::Scale),
+        "{:?}",
+        scaled.faults
+    );
+    let largest = |r: &Record| r.input().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    assert!(scaled.segments.iter().all(|r| largest(r) < 100.0));
+    let stepped = mended(&with(&clean, |e, _| e[4000..].iter_mut().for_each(|v| *v += 40.0)));
+    assert_eq!(kinds(&stepped.faults), [FaultKind::Step], "{:?}", stepped.faults);
+    assert_eq!(stepped.segments.iter().map(Record::len).sum::<usize>(), clean.len());
+}
+
+#[test]
+fn time_in_milliseconds_is_not_determined() {
+    let clean = run(Condition::C1, 6);
+    let record = Record::new(
+        SampleTime::new(10.0).unwrap(),
+        Channel::new("e", "", clean.input().to_vec()),
+        Channel::new("u", "", clean.output().to_vec()),
+    )
+    .unwrap();
+    let found = mended(&record);
+    assert_eq!(kinds(&found.faults), [FaultKind::TimeUnit]);
+    assert_eq!(found.findings[0].severity, Severity::Undetermined);
+}
+
+#[test]
+fn nothing_usable_is_said() {
+    let ts = SampleTime::new(0.01).unwrap();
+    let active = |t: usize| t % 300 < 100;
+    let bursts = |seed| -> Vec<f64> {
+        let all = super::test_signals::autoregressive(3000, seed);
+        all.iter()
+            .enumerate()
+            .map(|(t, v)| if active(t) { *v } else { 0.0 })
+            .collect()
+    };
+    let record = Record::new(ts, Channel::new("e", "", bursts(3)), Channel::new("u", "", bursts(4))).unwrap();
+    let found = mended(&record);
+    assert_eq!(found.findings[0].severity, Severity::Doubt, "{:?}", found.findings);
+    assert_eq!(
+        found.findings.last().unwrap().severity,
+        Severity::Undetermined,
+        "{:?}",
+        found.findings
+    );
+    assert_eq!(found.segments[0].output(), record.output());
+}
+
+#[test]
+fn an_output_alone_and_a_record_too_short() {
+    let ts = SampleTime::new(0.01).unwrap();
+    let mut u = super::test_signals::autoregressive(3000, 3);
+    u[1000] += 50.0;
+    let record = Record::of_output(ts, Channel::new("u", "", u)).unwrap();
+    assert_eq!(kinds(&mended(&record).faults), [FaultKind::Spike]);
+    let short = Record::of_output(ts, Channel::new("u", "", vec![1.0, 5.0, 2.0])).unwrap();
+    assert!(mended(&short).faults.is_empty());
+}
+
+#[test]
+fn exchanged_channels_and_a_wrong_sign() {
+    let exchanged = |r: &Record| with(r, |e, u| std::mem::swap(e, u));
+    let turned = |r: &Record| with(r, |_, u| u.iter_mut().for_each(|v| *v = -*v));
+    let (population, task) = (Population::default(), Task::default());
+    let people = Plant::ALL.map(|plant| {
+        let person = Person::draw(&population, &task, plant, None, RemnantKind::BroadBand, 7, 0).unwrap();
+        person.run(1).unwrap().record
+    });
+    let runs = [Condition::C1, Condition::C2].map(|c| run(c, 8));
+    for record in runs.iter().chain(&people) {
+        assert_eq!(kinds(&mended(&exchanged(record)).faults), [FaultKind::Exchanged]);
+        let found = mended(&turned(record));
+        assert_eq!(kinds(&found.faults), [FaultKind::Sign]);
+        assert_eq!(found.findings[0].severity, Severity::Doubt);
+    }
+}

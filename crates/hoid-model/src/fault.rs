@@ -1,0 +1,293 @@
+//! A fault of recorded data: what it is, where, how large, and what was done about it.
+//!
+//! A [`Fault`] is a place in one channel of a record (or in all of them) where the numbers cannot be
+//! what the channel did. How faults are found is told where that is done; here stands what is said of
+//! one, so that a file, a fit and a stream say it alike. [`fault_findings`] turns faults into what a
+//! [`Verdict`](crate::Verdict) is made of: a fault that was mended is worth a note, one that is still
+//! in the data a doubt.
+
+use std::fmt;
+
+use crate::Finding;
+
+/// What is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum FaultKind {
+    /// One or few samples that those before and behind them rule out.
+    Spike,
+    /// A constant that the channel jumps to and back from.
+    Dropout,
+    /// A channel that holds its value while the others go on.
+    Frozen,
+    /// A stretch in which nothing happens in any channel.
+    Idle,
+    /// A value that left one end of its range and came in at the other.
+    Wrap,
+    /// A level that changes from one sample to the next, and stays.
+    Step,
+    /// A stretch in other units, larger by orders of magnitude.
+    Scale,
+    /// A time that cannot be in seconds.
+    TimeUnit,
+    /// Input and output that look exchanged.
+    Exchanged,
+    /// An output that answers with the wrong sign.
+    Sign,
+}
+
+crate::named_choice!(FaultKind, "kind of fault", 10, {
+    Spike => "spike",
+    Dropout => "dropout",
+    Frozen => "frozen",
+    Idle => "idle",
+    Wrap => "wrap",
+    Step => "step",
+    Scale => "scale",
+    TimeUnit => "time-unit",
+    Exchanged => "exchanged",
+    Sign => "sign",
+});
+
+/// What is to be done about faults.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum FaultHandling {
+    /// They are told, and the data stay as they are.
+    Report,
+    /// Short ones are bridged, the record is cut at long ones.
+    #[default]
+    Bridge,
+    /// The record is cut at all of them.
+    Cut,
+    /// They are not looked for.
+    Keep,
+}
+
+crate::named_choice!(FaultHandling, "handling of faults", 4, {
+    Report => "report",
+    Bridge => "bridge",
+    Cut => "cut",
+    Keep => "keep",
+});
+
+/// What was done about a fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FaultAction {
+    /// It is told; the data are as they were.
+    Reported,
+    /// Its samples were replaced by what those around them say; a wrap was unwrapped.
+    Bridged,
+    /// The record ends before it and another begins behind it.
+    Cut,
+}
+
+crate::named_choice!(FaultAction, "action on a fault", 3, {
+    Reported => "reported",
+    Bridged => "bridged",
+    Cut => "cut",
+});
+
+/// One fault.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fault {
+    /// What it is.
+    pub kind: FaultKind,
+    /// The channel; empty for all channels and for the time.
+    pub channel: String,
+    /// Time of its first sample, s.
+    pub from_s: f64,
+    /// Time of the sample behind its last, s.
+    pub to_s: f64,
+    /// How many samples.
+    pub samples: usize,
+    /// How large, in the unit of the channel: by how much a spike or a step is off, the modulus of a
+    /// wrap, the length of what is frozen or idle in s, the factor of a scale, the sample time in s.
+    pub size: f64,
+    /// The size in robust standard deviations of what the statistic of this kind leaves of good data;
+    /// none where the kind has no such statistic.
+    pub deviations: Option<f64>,
+    /// What was done.
+    pub action: FaultAction,
+}
+
+impl Fault {
+    /// What can be done about it by hand.
+    pub fn remedy(&self) -> &'static str {
+        match self.kind {
+            FaultKind::TimeUnit => "t must be in s: divide a t in ms by 1000, or give the sampling frequency with --fs",
+            FaultKind::Exchanged => "exchange them: --input and --output",
+            FaultKind::Sign => "turn one of them: --output=-u, or --input=-e",
+            FaultKind::Step => "cut there with --from and --to, or --faults cut",
+            _ => "look at the recording there; cut it out with --from and --to or --faults cut",
+        }
+    }
+}
+
+impl fmt::Display for Fault {
+    /// A sentence without a full stop: "spike in e at 41.2 s, off by 30 (210 robust standard
+    /// deviations): bridged".
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let time = |s: f64| short(s, 6);
+        let size = short(self.size, 3);
+        let span = format!("{} to {} s", time(self.from_s), time(self.to_s));
+        let channel = &self.channel;
+        match self.kind {
+            FaultKind::Spike if self.samples == 1 => {
+                write!(f, "spike in {channel} at {} s, off by {size}", time(self.from_s))?;
+            }
+            FaultKind::Spike => write!(
+                f,
+                "spike of {} samples in {channel}, {span}, off by {size}",
+                self.samples
+            )?,
+            FaultKind::Dropout => write!(f, "{channel} drops out, {span}")?,
+            FaultKind::Frozen => write!(f, "{channel} is frozen, {span} ({size} s)")?,
+            FaultKind::Idle if channel.is_empty() => write!(f, "nothing happens, {span} ({size} s)")?,
+            FaultKind::Idle => write!(f, "{channel} is idle, {span} ({size} s)")?,
+            FaultKind::Wrap => write!(f, "{channel} wraps around by {size}, {span}")?,
+            FaultKind::Step => write!(f, "the level of {channel} steps by {size} at {} s", time(self.from_s))?,
+            FaultKind::Scale => write!(f, "{channel} is {size} times larger than elsewhere, {span}")?,
+            FaultKind::TimeUnit => write!(f, "a sample time of {size} s: no person is recorded so")?,
+            FaultKind::Exchanged => {
+                f.write_str("input and output look exchanged: the output answers at once, and is answered late")?;
+            }
+            FaultKind::Sign => f.write_str("the output answers the input with the wrong sign")?,
+        }
+        if let Some(deviations) = self.deviations {
+            write!(f, " ({} robust standard deviations)", short(deviations, 3))?;
+        }
+        match self.action {
+            FaultAction::Reported => write!(f, "; {}", self.remedy()),
+            FaultAction::Bridged if self.kind == FaultKind::Wrap => f.write_str(": unwrapped"),
+            action => write!(f, ": {action}"),
+        }
+    }
+}
+
+/// A number of so many significant digits, without trailing zeros.
+fn short(value: f64, digits: usize) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    let size = value.abs().log10().floor() as i32;
+    if !(-4..9).contains(&size) {
+        return format!("{value:.*e}", digits - 1);
+    }
+    let decimals = (digits as i32 - 1 - size).max(0) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
+/// Faults of one kind that are told one by one; more are counted.
+const TOLD: usize = 3;
+/// Share of the samples that may be mended before the rest is doubted.
+pub const MOST_MENDED: f64 = 0.2;
+
+/// What faults say of a result: a note where all of a kind were mended, a doubt where they were not,
+/// and a doubt where more than [`MOST_MENDED`] of the samples are gone.
+pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
+    let mut all = Vec::new();
+    for kind in FaultKind::ALL {
+        for left in [true, false] {
+            let of: Vec<&Fault> = faults
+                .iter()
+                .filter(|fault| fault.kind == kind && (fault.action == FaultAction::Reported) == left)
+                .collect();
+            if of.is_empty() {
+                continue;
+            }
+            let mut words: Vec<String> = of.iter().take(TOLD).map(|fault| fault.to_string()).collect();
+            if of.len() > TOLD {
+                words.push(format!("and {} more of this kind", of.len() - TOLD));
+            }
+            let words = words.join("; ");
+            all.push(match (left, kind) {
+                (false, _) => Finding::note("faults", words),
+                // In wrong seconds no parameter means what it says.
+                (true, FaultKind::TimeUnit) => Finding::undetermined("faults", words),
+                (true, _) => Finding::doubt("faults", words),
+            });
+        }
+    }
+    let mended: usize = faults
+        .iter()
+        .filter(|fault| fault.action != FaultAction::Reported && fault.kind != FaultKind::Wrap)
+        .map(|fault| fault.samples)
+        .sum();
+    // What is idle is no part of the run.
+    let idle: usize = (faults.iter())
+        .filter(|fault| fault.action == FaultAction::Cut && fault.kind == FaultKind::Idle)
+        .map(|fault| fault.samples)
+        .sum();
+    let share = (mended - idle) as f64 / samples.saturating_sub(idle).max(1) as f64;
+    if share > MOST_MENDED {
+        all.push(Finding::doubt(
+            "faults",
+            format!(
+                "{:.0} % of the samples are faults; look at the recording",
+                100.0 * share
+            ),
+        ));
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Severity;
+
+    fn spike(action: FaultAction) -> Fault {
+        Fault {
+            kind: FaultKind::Spike,
+            channel: "e".to_owned(),
+            from_s: 41.2,
+            to_s: 41.21,
+            samples: 1,
+            size: 30.0,
+            deviations: Some(212.4),
+            action,
+        }
+    }
+
+    #[test]
+    fn a_fault_is_a_sentence() {
+        assert_eq!(
+            spike(FaultAction::Bridged).to_string(),
+            "spike in e at 41.2 s, off by 30 (212 robust standard deviations): bridged"
+        );
+        assert!(spike(FaultAction::Reported).to_string().contains("--faults cut"));
+        assert_eq!(
+            (short(0.0123456, 3), short(1234.4, 3)),
+            ("0.0123".to_owned(), "1234".to_owned())
+        );
+        assert_eq!((short(1e12, 3), short(0.0, 3)), ("1.00e12".to_owned(), "0".to_owned()));
+    }
+
+    #[test]
+    fn what_is_mended_is_a_note_and_what_is_left_a_doubt() {
+        let of = |action| fault_findings(&[spike(action)], 1000)[0].severity;
+        assert_eq!(of(FaultAction::Bridged), Severity::Note);
+        assert_eq!(of(FaultAction::Cut), Severity::Note);
+        assert_eq!(of(FaultAction::Reported), Severity::Doubt);
+        assert!(fault_findings(&[], 0).is_empty());
+        let many = vec![spike(FaultAction::Bridged); 300];
+        let found = fault_findings(&many, 1000);
+        assert!(
+            found[0].words.ends_with("and 297 more of this kind"),
+            "{}",
+            found[0].words
+        );
+        assert_eq!(found[1].severity, Severity::Doubt);
+        let idle = Fault {
+            kind: FaultKind::Idle,
+            samples: 900,
+            ..spike(FaultAction::Cut)
+        };
+        assert_eq!(fault_findings(&[idle], 1000).len(), 1);
+    }
+}
