@@ -70,7 +70,10 @@ fn test(arguments: &[String]) -> Result<(), String> {
 }
 
 /// Studies that take too long for a test, each an example of the crate `hoid`.
-const SLOW: [(&str, &str); 1] = [("people-coverage", "people_coverage")];
+const SLOW: [(&str, &str); 2] = [
+    ("people-coverage", "people_coverage"),
+    ("tracker-faults", "tracker_faults"),
+];
 
 /// Runs one of them, with further arguments of its own.
 fn slow(arguments: &[String]) -> Result<(), String> {

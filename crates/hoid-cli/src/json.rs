@@ -10,7 +10,7 @@ use hoid_model::{
     margins::Margins,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
-use hoid_track::Change;
+use hoid_track::{Change, TrackFault};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -38,6 +38,18 @@ pub fn verdict(v: &Verdict) -> Value {
         "reasons": v.reasons().collect::<Vec<_>>(),
         "notes": v.notes().collect::<Vec<_>>(),
         "findings": v.findings().iter().map(finding).collect::<Vec<_>>(),
+    })
+}
+
+/// A span that the guard of a recursion found.
+pub fn track_fault(fault: &TrackFault) -> Value {
+    json!({
+        "kind": fault.kind.name(),
+        "channel": fault.channel.name(),
+        "from": number(fault.from_s),
+        "to": number(fault.to_s),
+        "size": number(fault.size),
+        "action": fault.action.name(),
     })
 }
 
