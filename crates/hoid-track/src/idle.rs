@@ -33,7 +33,11 @@ pub fn idle_head(record: &Record) -> usize {
         // Noise has no resolution: its differences are no multiples of the smallest.
         let multiple = |d: f64| (d / step - (d / step).round()).abs() < 1e-3;
         let coarse = step <= COARSE * size && steps().all(multiple);
-        let room = if coarse { (STEPS * step).max(SHARE * size) } else { SHARE * size };
+        let room = if coarse {
+            (STEPS * step).max(SHARE * size)
+        } else {
+            SHARE * size
+        };
         let first = quantile(signal[..second.min(signal.len())].to_vec(), 0.5);
         signal.iter().take_while(|x| (*x - first).abs() <= room).count()
     };
@@ -44,7 +48,11 @@ pub fn idle_head(record: &Record) -> usize {
         [] => still(record.output()),
         input => still(input).min(still(record.output())),
     };
-    if head as f64 * record.sample_time().s() < LEAST_S { 0 } else { head }
+    if head as f64 * record.sample_time().s() < LEAST_S {
+        0
+    } else {
+        head
+    }
 }
 
 /// The span of a record that gives the start fit when none is named, s: the first third behind the
@@ -55,13 +63,19 @@ pub fn usual_start_span(record: &Record) -> (f64, f64) {
         head => head,
     };
     let begin = record.time_s(head);
-    (begin, begin + (record.len() - head) as f64 * record.sample_time().s() / 3.0)
+    (
+        begin,
+        begin + (record.len() - head) as f64 * record.sample_time().s() / 3.0,
+    )
 }
 
 fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let place = (share * values.len() as f64) as usize;
-    values.get(place.min(values.len().saturating_sub(1))).copied().unwrap_or(0.0)
+    values
+        .get(place.min(values.len().saturating_sub(1)))
+        .copied()
+        .unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -109,8 +123,8 @@ mod tests {
 
     #[test]
     fn what_never_moves_is_idle_throughout() {
-        let still = |x: f64| Channel::new("x", "", vec![x; 500]);
-        let record = Record::new(hoid_model::SampleTime::HUNDREDTH, still(0.0), still(2.0)).unwrap();
+        let still = |name: &str, x: f64| Channel::new(name, "", vec![x; 500]);
+        let record = Record::new(hoid_model::SampleTime::HUNDREDTH, still("e", 0.0), still("u", 2.0)).unwrap();
         assert_eq!(idle_head(&record), 500);
         assert_eq!(usual_start_span(&record).0, 0.0);
     }

@@ -254,7 +254,10 @@ impl Trace {
             self.faults().iter().filter(|fault| is(fault)).copied().collect()
         };
         let samples = |faults: &[TrackFault]| -> f64 {
-            faults.iter().map(|f| ((f.to_s - f.from_s) / self.sample_time().s()).round()).sum()
+            faults
+                .iter()
+                .map(|f| ((f.to_s - f.from_s) / self.sample_time().s()).round())
+                .sum()
         };
         let held = of(&|f| f.kind == GuardKind::Outlier);
         if !held.is_empty() {
@@ -267,7 +270,11 @@ impl Trace {
         }
         let steps = of(&|f| f.kind == GuardKind::Step);
         if !steps.is_empty() {
-            let words = format!("{} jumps that stayed, taken as they came ({})", steps.len(), named(&steps));
+            let words = format!(
+                "{} jumps that stayed, taken as they came ({})",
+                steps.len(),
+                named(&steps)
+            );
             all.push(Finding::note("steps-in-signals", words));
         }
         let spans = of(&|f| !matches!(f.kind, GuardKind::Outlier | GuardKind::Step));
@@ -303,7 +310,10 @@ impl Trace {
         Some(if left_out {
             Finding::note("idle-head", format!("{words}: left out of the start fit"))
         } else {
-            Finding::doubt("idle-head", format!("{words}, which are in the start fit; begin it after them"))
+            Finding::doubt(
+                "idle-head",
+                format!("{words}, which are in the start fit; begin it after them"),
+            )
         })
     }
 }
@@ -379,7 +389,11 @@ impl Tracker {
         }
         let unsettled = self.is_paused() || self.since_restart_s().is_some_and(|s| s < UNSETTLED_S);
         let level = self.level_of_estimate(operator);
-        if unsettled { level.max(VerdictLevel::Doubtful) } else { level }
+        if unsettled {
+            level.max(VerdictLevel::Doubtful)
+        } else {
+            level
+        }
     }
 
     fn level_of_estimate(&self, operator: &Result<OperatorEstimate, NotConvertible>) -> VerdictLevel {

@@ -37,8 +37,6 @@ const LIMIT: f64 = 2.5;
 pub const SLOPE_S: f64 = 0.1;
 /// Quantile over mean magnitude of Gaussian errors: what the first quantiles are made of.
 pub const QUANTILE_OVER_MEAN: f64 = 3.228;
-/// The prediction chooses its order anew after so many samples.
-const CHOOSE_EVERY: u32 = 64;
 
 /// One signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +50,6 @@ pub struct ChannelGuard {
     quantiles: [f64; ORDERS],
     /// Order less one that is used.
     order: usize,
-    until_choice: u32,
     /// Least limit.
     floor: f64,
     /// Samples that are being held back, the largest error among them, the sample before them, and
@@ -65,7 +62,7 @@ pub struct ChannelGuard {
 }
 
 crate::state!([] ChannelGuard {
-    last, differences, known, quantiles, order, until_choice, floor, held, size, base, slope, damping,
+    last, differences, known, quantiles, order, floor, held, size, base, slope, damping,
 });
 
 impl ChannelGuard {
@@ -77,7 +74,6 @@ impl ChannelGuard {
             known: 0,
             quantiles: [0.0; ORDERS],
             order: 0,
-            until_choice: CHOOSE_EVERY,
             floor: 0.0,
             held: 0,
             size: 0.0,
@@ -106,7 +102,11 @@ impl ChannelGuard {
 
     /// The last difference where the signal is foretold by more than its last value, else zero.
     pub fn slope(&self) -> f64 {
-        if self.order_in_use() > 0 { self.differences[0] } else { 0.0 }
+        if self.order_in_use() > 0 {
+            self.differences[0]
+        } else {
+            0.0
+        }
     }
 
     /// True where the signal is foretold by more than its last value.
@@ -156,11 +156,11 @@ impl ChannelGuard {
     #[inline(always)]
     pub fn accept(&mut self, x: f64, errors: &[f64; ORDERS]) {
         for (q, r) in self.quantiles.iter_mut().zip(errors) {
-            *q *= if r.abs() > *q { 1.0 + GAIN * (1.0 - BEYOND) } else { 1.0 - GAIN * BEYOND };
-        }
-        self.until_choice -= 1;
-        if self.until_choice == 0 {
-            self.choose();
+            *q *= if r.abs() > *q {
+                1.0 + GAIN * (1.0 - BEYOND)
+            } else {
+                1.0 - GAIN * BEYOND
+            };
         }
         self.follow(x, errors);
     }
@@ -173,9 +173,8 @@ impl ChannelGuard {
         self.known = if self.known < ORDERS { self.known + 1 } else { ORDERS };
     }
 
-    #[cold]
-    fn choose(&mut self) {
-        self.until_choice = CHOOSE_EVERY;
+    /// Chooses the order of the prediction anew, from time to time.
+    pub fn choose(&mut self) {
         for (order, q) in self.quantiles.iter().enumerate() {
             if *q < self.quantiles[self.order] {
                 self.order = order;
@@ -279,7 +278,9 @@ mod tests {
     fn noise(state: &mut u64) -> f64 {
         // Sum of twelve uniform numbers: standard deviation 1.
         (0..12).fold(-6.0, |sum, _| {
-            *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            *state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             sum + (*state >> 11) as f64 / (1_u64 << 53) as f64
         })
     }

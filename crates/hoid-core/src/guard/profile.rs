@@ -136,7 +136,9 @@ impl Block {
 
     /// The least mean of the differences of u: what its own past leaves open.
     fn least_of_u(&self) -> f64 {
-        self.differences[1].iter().fold(f64::INFINITY, |least, a| if *a < least { *a } else { least })
+        self.differences[1]
+            .iter()
+            .fold(f64::INFINITY, |least, a| if *a < least { *a } else { least })
     }
 }
 
@@ -233,9 +235,13 @@ impl Profile {
 
     /// True where the last blocks gave no reason to suspect anything.
     pub fn is_calm(&self) -> bool {
-        self.is_known() && self.frozen_u == 0 && self.idle == 0 && self.larger == 0
+        self.is_known()
+            && self.frozen_u == 0
+            && self.idle == 0
+            && self.larger == 0
             && self.rescaled == [0; CHANNELS]
-            && self.swapped == 0.0 && self.misfits == 0
+            && self.swapped == 0.0
+            && self.misfits == 0
     }
 
     /// True for the means of a block unlike those that are usual: by a factor of e in the mean of the
@@ -273,7 +279,11 @@ impl Profile {
             let known = self.ratios >= LEARNT;
             self.ratios = self.ratios.saturating_add(1);
             let weight = if known { WEIGHT } else { 1.0 / f64::from(self.ratios) };
-            let bounded = if known { ratio.clamp(0.5 * self.ratio, 2.0 * self.ratio) } else { ratio };
+            let bounded = if known {
+                ratio.clamp(0.5 * self.ratio, 2.0 * self.ratio)
+            } else {
+                ratio
+            };
             self.ratio += weight * (bounded - self.ratio);
         }
         for c in 0..CHANNELS {
@@ -356,7 +366,11 @@ impl Profile {
             for j in [0, 2] {
                 let (found, usual) = (block.differences[c][j], self.usual.differences[usual][j]);
                 // Zero against zero is no difference.
-                let log = if found == usual { 0.0 } else { libm::log(found / usual).abs() };
+                let log = if found == usual {
+                    0.0
+                } else {
+                    libm::log(found / usual).abs()
+                };
                 sum += if log < LARGEST_LOG { log } else { LARGEST_LOG };
             }
         }

@@ -12,7 +12,7 @@ use hoid_core::{
 };
 
 /// Blocks of a round, and how many of them are compared.
-const EVERY: u32 = 32;
+const EVERY: u32 = 44;
 const COMPARED: u32 = 11;
 const SETTLING: u32 = 3;
 /// Blocks that are compared after something unusual.

@@ -29,6 +29,8 @@ mod event;
 mod options;
 mod prime;
 mod snapshot;
+#[cfg(test)]
+mod tests;
 
 use hoid_core::{
     guard::{
@@ -42,9 +44,9 @@ use hoid_model::{Record, SampleTime};
 
 use crate::recursion::{Recursion, Sample, StepOutcome};
 
+use compared::Reference;
 pub use event::{GuardAction, GuardChannel, GuardEvent, GuardKind, TrackFault};
 pub use options::{GuardChoice, GuardOptions};
-use compared::Reference;
 use snapshot::Snapshot;
 
 /// Longest run of samples that is held back, s.
@@ -63,7 +65,6 @@ const LARGEST: f64 = 30.0;
 const FLOOR: [f64; CHANNELS] = [0.3, 1e-3];
 /// A misfit or swapped channels of so long are the new usual, s.
 const GIVEN_UP_S: f64 = 120.0;
-
 
 /// What the guard made of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -232,7 +233,11 @@ impl Guard {
             self.channels[0].accept(x[0], &errors[0]);
             self.channels[1].accept(x[1], &errors[1]);
             self.block.add(&errors, x, self.centre);
-            let outcome = if moves { recursion.step(sample) } else { recursion.follow(sample) };
+            let outcome = if moves {
+                recursion.step(sample)
+            } else {
+                recursion.follow(sample)
+            };
             self.block.add_innovation(outcome.innovation);
             if let Some(reference) = &mut self.reference {
                 reference.take(x);
@@ -327,8 +332,16 @@ impl Guard {
                     let s = (i + 1) as f64;
                     self.ring[k + i].values[c] = last + slope * s + rest * s * s;
                 }
-                let before = if run > 0 { self.ring[k + run - 1].values[c] } else { last };
-                slope = if self.channels_before[c].has_slope() { next - before } else { 0.0 };
+                let before = if run > 0 {
+                    self.ring[k + run - 1].values[c]
+                } else {
+                    last
+                };
+                slope = if self.channels_before[c].has_slope() {
+                    next - before
+                } else {
+                    0.0
+                };
                 last = next;
                 k += run + 1;
             }
@@ -464,7 +477,11 @@ impl Guard {
             self.learn_anew(recursion);
             return Guarded { outcome, held: true };
         }
-        self.pause.good = if good == [true; CHANNELS] { self.pause.good + 1 } else { 0 };
+        self.pause.good = if good == [true; CHANNELS] {
+            self.pause.good + 1
+        } else {
+            0
+        };
         if self.pause.good >= self.settle && !self.pause.bad_block {
             let action = match self.pause.kind() {
                 GuardKind::Missing => GuardAction::Resumed,
@@ -494,6 +511,7 @@ impl Guard {
     /// A second is over.
     #[cold]
     fn end_block(&mut self, recursion: &mut dyn Recursion) {
+        self.channels.iter_mut().for_each(ChannelGuard::choose);
         let block = self.block.means();
         let enough = 2 * block.samples >= self.block_length;
         self.block = Block::default();
@@ -529,7 +547,11 @@ impl Guard {
             None if self.in_ring == 0 => {
                 self.profile.learn(&block);
                 self.set_limits();
-                self.sound_blocks = if self.profile.is_calm() { self.sound_blocks + 1 } else { 0 };
+                self.sound_blocks = if self.profile.is_calm() {
+                    self.sound_blocks + 1
+                } else {
+                    0
+                };
                 if self.sound_blocks >= SOUND_EVERY {
                     self.sound_blocks = 0;
                     let older = usize::from(self.sound_at[1] < self.sound_at[0]);

@@ -87,7 +87,10 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.retain(|v| v.is_finite());
     values.sort_by(f64::total_cmp);
     let place = (share * values.len() as f64) as usize;
-    values.get(place.min(values.len().saturating_sub(1))).copied().unwrap_or(0.0)
+    values
+        .get(place.min(values.len().saturating_sub(1)))
+        .copied()
+        .unwrap_or(0.0)
 }
 
 /// The 99 % quantile of the magnitudes, by its own count or by those further in.

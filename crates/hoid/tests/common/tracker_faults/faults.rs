@@ -55,13 +55,16 @@ impl Fault {
         let end = |seconds: f64| at + ((seconds * per_second).round() as usize).max(1);
         let mut noise = 7_u64;
         let mut draw = || {
-            noise = noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            noise = noise
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (noise >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
-        let pick = |signal: Signal, e: &mut Vec<f64>, u: &mut Vec<f64>, each: &mut dyn FnMut(usize, &mut f64), to: usize| {
-            let x = if signal == Signal::E { e } else { u };
-            (at..to.min(x.len())).for_each(|k| each(k, &mut x[k]));
-        };
+        let pick =
+            |signal: Signal, e: &mut Vec<f64>, u: &mut Vec<f64>, each: &mut dyn FnMut(usize, &mut f64), to: usize| {
+                let x = if signal == Signal::E { e } else { u };
+                (at..to.min(x.len())).for_each(|k| each(k, &mut x[k]));
+            };
         let to = match *self {
             Self::Outlier { seconds, .. } | Self::Crackle { seconds, .. } => end(seconds),
             Self::Innovations { .. } => at + 1,
@@ -85,7 +88,13 @@ impl Fault {
             Self::Innovations { size } => u[at] += size * innovation,
             Self::Crackle { signal, size, .. } => {
                 let size = size * size_of(signal);
-                pick(signal, e, u, &mut |k, x| *x += if k % 2 == 0 { size } else { -size }, to);
+                pick(
+                    signal,
+                    e,
+                    u,
+                    &mut |k, x| *x += if k % 2 == 0 { size } else { -size },
+                    to,
+                );
             }
             Self::Scaled { factor, .. } => {
                 pick(Signal::E, e, u, &mut |_, x| *x *= factor, to);
@@ -154,6 +163,7 @@ impl fmt::Display for Fault {
 }
 
 /// All faults of the study.
+#[allow(dead_code)]
 pub fn faults() -> Vec<Fault> {
     use Signal::{E, U};
     let mut all = Vec::new();

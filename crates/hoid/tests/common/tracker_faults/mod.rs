@@ -4,5 +4,7 @@
 mod faults;
 mod tracked;
 
-pub use faults::faults;
+#[allow(unused_imports)]
+pub use faults::{Fault, Signal, faults};
+#[allow(unused_imports)]
 pub use tracked::{Effect, Reference, Run};

@@ -150,7 +150,9 @@ impl Reference {
             if k < end {
                 continue;
             }
-            let clean = k.checked_sub(inserted).and_then(|k| self.estimates[(k + 1) / EVERY - 1]);
+            let clean = k
+                .checked_sub(inserted)
+                .and_then(|k| self.estimates[(k + 1) / EVERY - 1]);
             let Some(clean) = clean else { continue };
             let mut far = found.is_none();
             lately.rotate_left(1);
