@@ -70,9 +70,10 @@ fn test(arguments: &[String]) -> Result<(), String> {
 }
 
 /// Studies that take too long for a test, each an example of a crate.
-const SLOW: [(&str, &str, &str); 2] = [
+const SLOW: [(&str, &str, &str); 3] = [
     ("people-coverage", "hoid", "people_coverage"),
     ("faults-clean", "hoid-ident", "faults_clean"),
+    ("tracker-faults", "hoid", "tracker_faults"),
 ];
 
 /// Runs one of them, with further arguments of its own.

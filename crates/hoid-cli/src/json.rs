@@ -10,7 +10,7 @@ use hoid_model::{
     margins::Margins,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
-use hoid_track::Change;
+use hoid_track::{Change, TrackFault};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -47,6 +47,18 @@ pub fn verdict(v: &Verdict) -> Value {
 /// What makes a result doubtful, or is worth knowing.
 pub fn finding(f: &Finding) -> Value {
     json!({"kind": f.kind, "severity": f.severity.name(), "words": f.words})
+}
+
+/// A span that the guard of a recursion found.
+pub fn track_fault(fault: &TrackFault) -> Value {
+    json!({
+        "kind": fault.kind.name(),
+        "channel": fault.channel.name(),
+        "from": number(fault.from_s),
+        "to": number(fault.to_s),
+        "size": number(fault.size),
+        "action": fault.action.name(),
+    })
 }
 
 /// A change of the person, declared at a time in s.

@@ -254,6 +254,78 @@ fn hostile_lines_are_told_and_counted_and_poison_nothing() {
 }
 
 #[test]
+fn a_wild_value_and_a_hostile_span_are_told_in_their_lines() {
+    let directory = TempDir::new().unwrap();
+    let text = simulated(directory.path(), "5");
+    let mut lines: Vec<String> = Vec::new();
+    for (k, row) in text.lines().filter(|l| !l.starts_with(['#', 't'])).enumerate() {
+        let cells: Vec<f64> = row.split(',').map(|c| c.parse().unwrap()).collect();
+        let (e, u) = (cells[2], cells[3]);
+        let (e, u) = match k {
+            2500 => (100.0, u),
+            3000..4000 => (1e6 * e, 1e6 * u),
+            _ => (e, u),
+        };
+        lines.push(format!("{e},{u}"));
+    }
+    let arguments = ["--nk", "29", "--orders", "nd=1", "--largest", "1e300"];
+    let (answers, said) = answers(&arguments, &(lines.join("\n") + "\n"));
+    let events: Vec<(usize, &Value)> = answers
+        .iter()
+        .enumerate()
+        .filter_map(|(k, a)| Some((k, a.get("event")?)))
+        .collect();
+    let of = |kind: &str, action: &str| {
+        let found = events.iter().find(|(_, e)| e["kind"] == kind && e["action"] == action);
+        found.unwrap_or_else(|| panic!("{kind} {action}: {events:?}"))
+    };
+    let (at, held) = of("outlier", "held");
+    assert_eq!(
+        (*at, &held["from"], &held["channel"]),
+        (2501, &25.0.into(), &"e".into())
+    );
+    let (paused, _) = of("level", "paused");
+    let (restarted, span) = of("level", "restarted");
+    assert!(
+        (3000..3030).contains(paused) && (4200..4500).contains(restarted),
+        "{events:?}"
+    );
+    assert!((span["from"].as_f64().unwrap() - 30.0).abs() < 0.2, "{span}");
+    // In the pause the estimate stands still, and is no more than doubtful.
+    assert!((paused + 1..*restarted).all(|k| answers[k]["level"] != "trustworthy"));
+    assert_eq!(answers[paused + 1]["parameters"], answers[restarted - 1]["parameters"]);
+    let last = answers.last().unwrap();
+    assert_eq!(
+        (&last["restarts"], &last["level"]),
+        (&1.into(), &"trustworthy".into()),
+        "{last}"
+    );
+    assert!(said.contains("begun again 1 times"), "{said}");
+}
+
+#[test]
+fn an_idle_head_prolongs_the_warm_up() {
+    let directory = TempDir::new().unwrap();
+    let text = simulated(directory.path(), "6");
+    let rows = text.lines().filter(|l| !l.starts_with(['#', 't']));
+    let run: Vec<String> = rows
+        .map(|row| row.split(',').skip(2).take(2).collect::<Vec<_>>().join(","))
+        .collect();
+    let all = vec!["0,0".to_owned(); 1500]
+        .into_iter()
+        .chain(run)
+        .collect::<Vec<_>>()
+        .join("\n")
+        + "\n";
+    let (answers, said) = answers(&["--orders", "nd=1"], &all);
+    assert!(said.contains("nk=29"), "{said}");
+    let told = answers[2100]["warm_up"]["reason"].as_str().unwrap();
+    assert!(told.contains("neither e nor u moved for 15."), "{told}");
+    let began = answers.iter().position(|a| a.get("warm_up").is_none()).unwrap();
+    assert!((3490..3560).contains(&began), "{began}");
+}
+
+#[test]
 fn late_lines_are_bridged_and_lines_behind_are_dropped() {
     let mut stream = Stream::new(&AT_ONCE);
     stream.write("t;e;u;f_t\n");

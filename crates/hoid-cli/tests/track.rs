@@ -71,7 +71,7 @@ fn defaults_find_the_operator_and_its_change() {
     assert_eq!(
         trace.0.join(","),
         "t,b0,b0_se,b1,b1_se,d1,d1_se,f1,f1_se,f2,f2_se,K_e,K_e_se,T_L,T_L_se,K_e_dot,K_e_dot_se,\
-         omega_nm,omega_nm_se,zeta_nm,zeta_nm_se,convertible,innovation,steps_shortened"
+         omega_nm,omega_nm_se,zeta_nm,zeta_nm_se,convertible,innovation,held,steps_shortened"
     );
     assert_eq!(trace.1.len(), 8192);
     // Until the end of the start span the estimate stays.
@@ -87,6 +87,81 @@ fn defaults_find_the_operator_and_its_change() {
     assert_eq!(of(&found["last"]["parameters"]["b0"]), last[1]);
     assert_eq!(of(&found["last"]["operator"]["K_e"]), last[11]);
     assert_eq!(found["last"]["t"].as_f64().unwrap(), last[0]);
+}
+
+/// The run with its rows changed, in `c.csv`.
+fn changed(directory: &Path, change: &mut dyn FnMut(Vec<String>) -> Vec<String>) {
+    let file = directory.join("c.csv");
+    let text = fs::read_to_string(&file).unwrap();
+    let (head, rows): (Vec<&str>, Vec<&str>) = text.lines().partition(|l| l.starts_with('#') || l.starts_with('t'));
+    let rows = change(rows.iter().map(|r| (*r).to_owned()).collect());
+    fs::write(file, format!("{}\n{}\n", head.join("\n"), rows.join("\n"))).unwrap();
+}
+
+#[test]
+fn one_wild_sample_is_held_back_and_told() {
+    let directory = simulated("C1");
+    let d = directory.path();
+    let mut arguments = KNOWN_ORDERS.to_vec();
+    let clean = tracked(d, &arguments);
+    assert_eq!(clean["faults"], serde_json::json!([]));
+    assert_eq!((&clean["held"], &clean["restarts"]), (&0.into(), &0.into()));
+    changed(d, &mut |mut rows| {
+        let mut cells: Vec<&str> = rows[5000].split(',').collect();
+        cells[2] = "100";
+        rows[5000] = cells.join(",");
+        rows
+    });
+    let found = tracked(d, &arguments);
+    let fault = &found["faults"][0];
+    assert_eq!((&fault["kind"], &fault["channel"]), (&"outlier".into(), &"e".into()));
+    assert_eq!(
+        (&fault["from"], &fault["action"]),
+        (&50.0.into(), &"held".into()),
+        "{fault}"
+    );
+    assert!((fault["size"].as_f64().unwrap() - 100.0).abs() < 5.0, "{fault}");
+    assert_eq!(found["held"], 1);
+    let last = |all: &Value, name: &str, what: &str| all["last"]["operator"][name][what].as_f64().unwrap();
+    for name in ["K_e", "K_e_dot", "omega_nm", "zeta_nm"] {
+        let moved = (last(&found, name, "value") - last(&clean, name, "value")).abs();
+        assert!(moved < 0.1 * last(&clean, name, "standard_error"), "{name}: {moved}");
+    }
+    // Without the guard the estimate is somewhere else.
+    arguments.extend(["--guard", "no"]);
+    let bare = tracked(d, &arguments);
+    assert_eq!((&bare["held"], &bare["faults"]), (&0.into(), &serde_json::json!([])));
+    let moved = (last(&bare, "omega_nm", "value") - last(&clean, "omega_nm", "value")).abs();
+    assert!(moved > 3.0 * last(&clean, "omega_nm", "standard_error"), "{moved}");
+    assert!(!trace(d).0.contains(&"held".to_owned()));
+}
+
+#[test]
+fn an_idle_head_is_left_out_of_the_start_and_told() {
+    let directory = simulated("C1");
+    let d = directory.path();
+    changed(d, &mut |rows| {
+        let columns = rows[0].split(',').count();
+        let idle = (0..1500).map(|k| {
+            let rest = vec!["0"; columns - 1].join(",");
+            format!("{},{rest}", f64::from(k) / 100.0)
+        });
+        let later = rows.iter().map(|row| {
+            let (t, rest) = row.split_once(',').unwrap();
+            format!(
+                "{},{rest}",
+                ((t.parse::<f64>().unwrap() + 15.0) * 100.0).round() / 100.0
+            )
+        });
+        idle.chain(later).collect()
+    });
+    let found = tracked(d, &["--orders", "nd=1"]);
+    assert_eq!(found["orders"]["nk"], 29);
+    assert!((found["idle_head"].as_f64().unwrap() - 15.0).abs() < 0.5);
+    let updated = found["updated_from"].as_f64().unwrap();
+    assert!((updated - 15.0 - 27.31).abs() < 0.7, "{updated}");
+    let notes = found["verdict"].to_string();
+    assert!(notes.contains("left out of the start fit"), "{notes}");
 }
 
 #[test]

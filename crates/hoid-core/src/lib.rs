@@ -73,6 +73,7 @@
 //! | [`ud_covariance`] | the covariance `U D U'` |
 //! | [`error_bars`], [`sensitivities`], [`innovation_variance`] | covariance of the estimate whatever the gain, errors in the filters, sigma^2 |
 //! | [`recursion`] | outcome of a step, polynomials that are kept stable |
+//! | [`guard`] | samples and spans that no tracking signal makes, before a recursion sees them |
 //! | [`held_operator`], [`divided_differences`] | exact zero-order hold of the operator with any delay, and its Jacobian; the functions that it is made of |
 //! | [`filter`], [`delay`], [`stability`] | rational filters over slices, a delay line, the Schur-Cohn test |
 //! | [`mod@state`] | the numbers that change, to save a recursion and go on elsewhere |
@@ -91,6 +92,7 @@ pub mod delay;
 pub mod divided_differences;
 pub mod error_bars;
 pub mod filter;
+pub mod guard;
 pub mod held_operator;
 pub mod innovation_variance;
 pub mod physical;

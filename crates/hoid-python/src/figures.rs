@@ -11,6 +11,18 @@ use hoid_model::{
 };
 use pyo3::{prelude::*, types::PyDict};
 
+/// A span that the guard of a recursion found.
+pub fn track_fault<'py>(py: Python<'py>, fault: &hoid_track::TrackFault) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    all.set_item("kind", fault.kind.name())?;
+    all.set_item("channel", fault.channel.name())?;
+    all.set_item("from", fault.from_s)?;
+    all.set_item("to", fault.to_s)?;
+    all.set_item("size", fault.size)?;
+    all.set_item("action", fault.action.name())?;
+    Ok(all)
+}
+
 /// Value and standard error.
 pub type Pair = (f64, Option<f64>);
 

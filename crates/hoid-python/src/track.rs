@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use hoid_ident::{Choice, IdentError};
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 use hoid_report::{BatchLine, TraceSection, TrackReport, default_batch_fits, write_report};
-use hoid_track::{StartAt, Trace, TrackOptions, track as track_record};
+use hoid_track::{StartAt, Trace, TrackOptions, track as track_record, usual_start_span};
 use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyDict};
 
@@ -33,9 +33,7 @@ pub fn track<'py>(
 ) -> Outcome<PyTrace> {
     let record = arrays::record(record, Wanted::Only(&["f_t"]))?;
     let plan = recursion::plan(options, record.sample_time())?;
-    let begin = record.time_s(0);
-    let third = begin + record.len() as f64 * record.sample_time().s() / 3.0;
-    let span_s = start_span.unwrap_or((begin, third));
+    let span_s = start_span.unwrap_or_else(|| usual_start_span(&record));
     let candidates = plan.ranges().combinations()?.len() as u64;
     let (trace, choice) = interrupt::run(py, candidates, progress.as_ref(), false, move |standing| {
         let (options, choice) = if plan.is_settled() {
@@ -105,8 +103,20 @@ impl PyTrace {
         let (counts, all) = (self.trace.counts(), PyDict::new(py));
         all.set_item("samples", counts.samples)?;
         all.set_item("skipped", counts.skipped)?;
+        all.set_item("held", counts.held)?;
+        all.set_item("restarts", counts.restarts)?;
         all.set_item("steps_shortened", counts.shortened)?;
         Ok(all)
+    }
+
+    /// What the guard found, and what it did.
+    #[getter]
+    fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        self.trace
+            .faults()
+            .iter()
+            .map(|f| figures::track_fault(py, f))
+            .collect()
     }
 
     /// The changes that were declared, for the method adaptive.
@@ -243,6 +253,9 @@ impl PyTrace {
             if !trace.change_odds().is_empty() {
                 let odds = trace.change_odds().to_vec();
                 columns.push(column("change_log_odds", ColumnValues::Real(odds)));
+            }
+            if trace.is_guarded() {
+                columns.push(column("held", ColumnValues::Whole(trace.held().to_vec())));
             }
             let shortened = trace.steps_shortened().to_vec();
             columns.push(column("steps_shortened", ColumnValues::Whole(shortened)));

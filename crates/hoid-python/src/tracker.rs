@@ -2,7 +2,7 @@
 
 use hoid_ident::{Choice, IdentError};
 use hoid_model::{Record, SampleTime};
-use hoid_track::{Live, Sample, TrackPlan, Tracker, WarmUp};
+use hoid_track::{Counts, Live, Sample, TrackPlan, Tracker, WarmUp};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
 
@@ -243,17 +243,35 @@ impl PyTracker {
     #[getter]
     fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
-        let (samples, skipped, shortened) = match &self.live {
-            Live::Tracking(tracker) => {
-                let c = tracker.counts();
-                (c.samples, c.skipped, c.shortened)
-            }
-            Live::Collecting(warm_up) => (warm_up.collected as u64, 0, 0),
+        let counts = match &self.live {
+            Live::Tracking(tracker) => tracker.counts(),
+            Live::Collecting(warm_up) => Counts {
+                samples: warm_up.collected as u64,
+                ..Counts::default()
+            },
         };
-        all.set_item("samples", samples)?;
-        all.set_item("skipped", skipped)?;
-        all.set_item("steps_shortened", shortened)?;
+        all.set_item("samples", counts.samples)?;
+        all.set_item("skipped", counts.skipped)?;
+        all.set_item("held", counts.held)?;
+        all.set_item("restarts", counts.restarts)?;
+        all.set_item("steps_shortened", counts.shortened)?;
         Ok(all)
+    }
+
+    /// What the guard found or did at the last sample, its times in s before that sample.
+    #[getter]
+    fn event<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Live::Tracking(tracker) = &self.live else {
+            return Ok(None);
+        };
+        let event = tracker.event().map(|event| event.at(0.0, self.sample_time));
+        event.map(|fault| figures::track_fault(py, &fault)).transpose()
+    }
+
+    /// True while the guard lets the estimate stand still.
+    #[getter]
+    fn paused(&self) -> bool {
+        matches!(&self.live, Live::Tracking(tracker) if tracker.is_paused())
     }
 
     /// The batch fit that the tracker started from; None with a given start, or from a pickle.

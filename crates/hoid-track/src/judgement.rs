@@ -15,6 +15,12 @@
 //! | `covariance-blown-up` | a standard error 30 times its median: the data say too little to forget |
 //! | `steps-shortened` | more than 5 % of the steps made shorter by stability or a bound |
 //! | `faults` | more than 10 % of the samples were faults |
+//! | `held-back` | outliers that the guard held back (a note), in more than 1 % of the samples (a doubt) |
+//! | `hostile-span` | spans that no tracking makes, at which the estimate stood still |
+//! | `restarted` | the guard began the estimate again |
+//! | `steps-in-signals` | jumps of e or u that stayed (a note) |
+//! | `gain-sign` | K_e is significantly positive in some rows and negative in others |
+//! | `idle-head` | a head in which neither e nor u moves: left out of the start span (a note), or in it (a doubt) |
 //! | `not-finite` | an estimate that is no number |
 
 use hoid_ident::{
@@ -26,7 +32,11 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate},
 };
 
-use crate::{trace::Trace, tracker::Tracker};
+use crate::{
+    guard::{GuardAction, GuardKind, TrackFault},
+    trace::Trace,
+    tracker::Tracker,
+};
 
 /// Rows that are looked at.
 const ROWS: usize = 400;
@@ -38,6 +48,12 @@ const MOST: f64 = 0.5;
 const QUARTER: f64 = 0.25;
 const SHORTENED: f64 = 0.05;
 const FAULTS: f64 = 0.1;
+const HELD: f64 = 0.01;
+const SIGN: f64 = 0.02;
+/// Spans that are named one by one.
+const NAMED: usize = 3;
+/// After a restart the estimate is doubtful for so long, s.
+const UNSETTLED_S: f64 = 10.0;
 /// Standard error over its median beyond which the covariance has blown up.
 const BLOWN_UP: f64 = 30.0;
 /// Upper bound of omega_nm of the physical recursions as a share of the Nyquist frequency, less
@@ -74,6 +90,8 @@ impl Trace {
         all.extend(self.operator_findings(&operators));
         all.extend(self.covariance_finding(&rows));
         all.extend(self.count_findings());
+        all.extend(self.guard_findings());
+        all.extend(self.idle_finding(record));
         Ok(Verdict::of(all))
     }
 
@@ -134,6 +152,7 @@ impl Trace {
         let rows_with =
             |is: &dyn Fn(&OperatorEstimate) -> bool| share(found.iter().filter(|o| is(o)).count(), found.len());
         all.extend(gains_over_rows(&rows_with));
+        all.extend(sign_finding(&rows_with));
         let nyquist = self.sample_time().nyquist_rad_s();
         let bounded = self.options().method.is_physical();
         let senseless = rows_with(&|o| {
@@ -227,6 +246,105 @@ impl Trace {
     }
 }
 
+impl Trace {
+    /// What the guard did.
+    fn guard_findings(&self) -> Vec<Finding> {
+        let mut all = Vec::new();
+        let of = |is: &dyn Fn(&TrackFault) -> bool| -> Vec<TrackFault> {
+            self.faults().iter().filter(|fault| is(fault)).copied().collect()
+        };
+        let samples = |faults: &[TrackFault]| -> f64 {
+            faults
+                .iter()
+                .map(|f| ((f.to_s - f.from_s) / self.sample_time().s()).round())
+                .sum()
+        };
+        let held = of(&|f| f.kind == GuardKind::Outlier);
+        if !held.is_empty() {
+            let count = samples(&held);
+            let words = format!("{count} samples held back as outliers ({})", named(&held));
+            all.push(match count > HELD * self.counts().samples as f64 {
+                true => Finding::doubt("held-back", words),
+                false => Finding::note("held-back", words),
+            });
+        }
+        let steps = of(&|f| f.kind == GuardKind::Step);
+        if !steps.is_empty() {
+            let words = format!(
+                "{} jumps that stayed, taken as they came ({})",
+                steps.len(),
+                named(&steps)
+            );
+            all.push(Finding::note("steps-in-signals", words));
+        }
+        let spans = of(&|f| !matches!(f.kind, GuardKind::Outlier | GuardKind::Step));
+        if !spans.is_empty() {
+            all.push(Finding::doubt(
+                "hostile-span",
+                format!(
+                    "the estimate stands still in {} spans in which e and u are no tracking ({})",
+                    spans.len(),
+                    named(&spans)
+                ),
+            ));
+        }
+        let again = of(&|f| matches!(f.action, GuardAction::Restarted | GuardAction::Relearnt));
+        if !again.is_empty() {
+            all.push(Finding::doubt(
+                "restarted",
+                format!("the estimate was begun again after {} of them", again.len()),
+            ));
+        }
+        all
+    }
+
+    /// An idle head of the record.
+    fn idle_finding(&self, record: &Record) -> Option<Finding> {
+        let idle_s = self.idle_s();
+        let (from, _) = self.options().start_span(record)?;
+        if idle_s <= 0.0 {
+            return None;
+        }
+        let left_out = from - record.time_s(0) >= idle_s - 0.5 * self.sample_time().s();
+        let words = format!("neither e nor u moves in the first {idle_s:.1} s");
+        Some(if left_out {
+            Finding::note("idle-head", format!("{words}: left out of the start fit"))
+        } else {
+            Finding::doubt(
+                "idle-head",
+                format!("{words}, which are in the start fit; begin it after them"),
+            )
+        })
+    }
+}
+
+/// The first spans in words.
+fn named(faults: &[TrackFault]) -> String {
+    let one = |f: &TrackFault| format!("{} in {} at {:.2} to {:.2} s", f.kind, f.channel, f.from_s, f.to_s);
+    let mut text = faults.iter().take(NAMED).map(one).collect::<Vec<_>>().join("; ");
+    if faults.len() > NAMED {
+        text.push_str("; ...");
+    }
+    text
+}
+
+/// A gain that changes its sign: nobody does, a channel that was turned over does.
+fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
+    let beyond = |e: &Estimate, sign: f64| e.standard_error.is_some_and(|s| sign * e.value > 3.0 * s);
+    let positive = rows_with(&|o| beyond(&o.k_e, 1.0));
+    let negative = rows_with(&|o| beyond(&o.k_e, -1.0));
+    (positive > SIGN && negative > SIGN).then(|| {
+        Finding::doubt(
+            "gain-sign",
+            format!(
+                "K_e is positive in {:.0} % of the rows and negative in {:.0} %: look whether the sign of e or u changes",
+                100.0 * positive,
+                100.0 * negative
+            ),
+        )
+    })
+}
+
 /// Share of the rows whose operator has a property.
 type ShareOfRows<'a> = dyn Fn(&dyn Fn(&OperatorEstimate) -> bool) -> f64 + 'a;
 
@@ -269,6 +387,16 @@ impl Tracker {
         if self.theta().iter().any(|v| !v.is_finite()) {
             return VerdictLevel::NotDetermined;
         }
+        let unsettled = self.is_paused() || self.since_restart_s().is_some_and(|s| s < UNSETTLED_S);
+        let level = self.level_of_estimate(operator);
+        if unsettled {
+            level.max(VerdictLevel::Doubtful)
+        } else {
+            level
+        }
+    }
+
+    fn level_of_estimate(&self, operator: &Result<OperatorEstimate, NotConvertible>) -> VerdictLevel {
         // Without an error of any of them, nothing says that they are known.
         let known = |e: &Estimate| e.standard_error.is_some_and(|s| s > 0.0);
         if !self.parameters().iter().any(known) {

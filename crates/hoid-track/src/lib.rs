@@ -34,6 +34,8 @@
 //! | `predictor`, `past`, `reported` | signals and reports for methods that are not of the kernel |
 //! | `tracker`, `outcome`, `saved` | [`Tracker`]: one sample at a time; a tracker as numbers, to go on elsewhere |
 //! | `live` | [`Live`]: the warm-up of a stream, then its tracker |
+//! | `guard` | samples and spans that no tracking makes, kept from the recursion |
+//! | `idle` | what was recorded before a run began |
 //! | `over_record`, `smoother` | [`track()`]: a record; the two-sided estimate of a recorded run |
 //! | `trace`, `columns`, `summary`, `in_words` | [`Trace`]: the estimate at every sample, as columns and in words |
 //! | `judgement` | what a trace, and the estimate of a moment, is worth: [`Trace::verdict`] |
@@ -47,12 +49,15 @@
 //! **Samples that are not as they should be** never reach the filters. A value is a fault when it
 //! is not a finite number or larger than [`TrackOptions::largest`]. An error e is then replaced by
 //! the last good one, an output u by the one-step prediction, and the estimate stays at that
-//! sample. Each is counted.
+//! sample. Each is counted. Behind a guard (`guard`; by default for `physical` and `adaptive`) so are
+//! outliers and spans that no tracking makes.
 
 mod change;
 mod columns;
 mod forgetting;
 mod gain;
+mod guard;
+mod idle;
 mod in_words;
 mod judgement;
 mod kernel;
@@ -80,6 +85,8 @@ mod tracker;
 pub use change::{Change, ErrorThreshold};
 pub use columns::{Columns, value_of};
 pub use forgetting::ForgettingRule;
+pub use guard::{GuardAction, GuardChannel, GuardChoice, GuardEvent, GuardKind, GuardOptions, TrackFault};
+pub use idle::{idle_head, usual_start_span};
 pub use live::{Choose, Live, LiveOutcome, WarmUp};
 pub use memory::{CommonMemory, Memory, MemoryOptions};
 pub use methods::*;

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use hoid_core::state::{State, visit_all};
 use hoid_model::{Channel, Record, SampleTime};
 
-use crate::{Outcome, Sample, StartAt, TrackOptions, Tracker};
+use crate::{Outcome, Sample, StartAt, TrackOptions, Tracker, idle::idle_head};
 use hoid_ident::{Choice, IdentError};
 
 /// What makes the options of a record of the warm-up, with what was searched for them.
@@ -63,6 +63,9 @@ impl Live {
         };
         warm_up.collect(sample);
         if warm_up.collected < warm_up.needed {
+            return LiveOutcome::default();
+        }
+        if warm_up.leave_out_idle() {
             return LiveOutcome::default();
         }
         match warm_up.start(choose) {
@@ -179,6 +182,23 @@ impl WarmUp {
         }
         self.samples.push_back(sample);
         self.collected += 1;
+    }
+
+    /// Leaves out what came before the run began, and collects as much in its place; false where
+    /// there is nothing of the kind.
+    fn leave_out_idle(&mut self) -> bool {
+        let Ok(record) = self.record() else { return false };
+        let idle = idle_head(&record);
+        if idle == 0 {
+            return false;
+        }
+        self.samples.drain(..idle.min(self.samples.len()));
+        self.needed = self.collected + idle;
+        self.trouble = Some(format!(
+            "neither e nor u moved for {:.1} s: left out, the warm-up goes on",
+            idle as f64 * self.sample_time.s()
+        ));
+        true
     }
 
     /// The tracker with the batch fit of what was collected, its filters warm.

@@ -108,6 +108,11 @@ pub(crate) trait RecursiveMethod: Settings {
         f64::INFINITY
     }
 
+    /// True where a guard stands in front of it.
+    fn is_guarded(&self) -> bool {
+        false
+    }
+
     /// Polynomials that are kept stable.
     fn stable(&self) -> Stable {
         Stable::Predictor

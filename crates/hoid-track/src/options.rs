@@ -4,6 +4,7 @@ use hoid_ident::{Estimator, IdentError, SearchOptions};
 use hoid_model::{Orders, Record, Structure};
 
 use crate::{
+    idle::usual_start_span,
     memory::Memory,
     method::bad,
     methods::Method,
@@ -74,9 +75,7 @@ impl TrackOptions {
     /// The span of a record that gives the start fit, s; none where there is no such fit.
     pub fn start_span(&self, record: &Record) -> Option<(f64, f64)> {
         let StartAt::Span(span) = self.start else { return None };
-        let begin = record.time_s(0);
-        let third = begin + record.len() as f64 * record.sample_time().s() / 3.0;
-        Some(span.unwrap_or((begin, third)))
+        Some(span.unwrap_or_else(|| usual_start_span(record)))
     }
 
     /// Range of tau_e in s where it is one of the parameters that the recursion moves.

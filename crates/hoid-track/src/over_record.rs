@@ -4,6 +4,7 @@ use hoid_ident::{Fit, IdentError};
 use hoid_model::Record;
 
 use crate::{
+    idle::idle_head,
     options::TrackOptions,
     recursion::Sample,
     smoother,
@@ -73,6 +74,9 @@ pub fn track_from(
         if let Some(change) = tracker.change() {
             trace.changes.push((t, change));
         }
+        if let Some(event) = tracker.event() {
+            event.at(t, sample_time).put(&mut trace.faults);
+        }
         if (k + 1) % every != 0 && k + 1 != record.len() {
             continue;
         }
@@ -86,9 +90,15 @@ pub fn track_from(
         trace.innovation.push(outcome.innovation.unwrap_or(f64::NAN));
         trace.innovation_variance.push(tracker.innovation_variance());
         trace.shortened.push(tracker.counts.shortened);
+        trace.held.push(tracker.counts.held);
         trace.change_odds.extend(tracker.change_odds());
     }
     trace.counts = tracker.counts;
+    trace.guarded = tracker.guard.is_some();
+    if let Some(last) = trace.faults.last_mut().filter(|last| last.is_open()) {
+        last.to_s = record.time_s(record.len());
+    }
+    trace.idle_s = idle_head(record) as f64 * sample_time.s();
     trace.failures = tracker.failures();
     if options.method.inner().smooths() {
         smoother::smooth(record, &mut trace, &tracker.start)?;

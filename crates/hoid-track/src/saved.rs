@@ -7,7 +7,7 @@
 use hoid_core::state::{State, visit_all};
 use hoid_model::SampleTime;
 
-use crate::{Counts, Tracker, options::TrackOptions, start::StartState};
+use crate::{Counts, Tracker, options::TrackOptions, start::StartState, tracker::guard_of};
 use hoid_ident::IdentError;
 
 impl State for Tracker {
@@ -22,6 +22,17 @@ impl State for Tracker {
             ],
             each,
         );
+        if let Some(guard) = &mut self.guard {
+            visit_all(
+                &mut [
+                    &mut self.counts.held,
+                    &mut self.counts.restarts,
+                    &mut self.moved,
+                    &mut **guard,
+                ],
+                each,
+            );
+        }
     }
 }
 
@@ -77,8 +88,11 @@ impl Tracker {
             None => lacking = true,
         };
         start.visit(&mut restore);
+        let mut recursion = options.method.inner().build(&options.setup()?, &start, sample_time)?;
         let mut tracker = Self {
-            recursion: options.method.inner().build(&options.setup()?, &start, sample_time)?,
+            guard: guard_of(options, &mut *recursion, None, sample_time),
+            moved: false,
+            recursion,
             options: options.clone(),
             sample_time,
             last_e: 0.0,

@@ -5,7 +5,7 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate, operator_estimate},
 };
 
-use crate::{Change, Counts, options::TrackOptions};
+use crate::{Change, Counts, TrackFault, options::TrackOptions};
 use hoid_ident::{Fit, IdentError};
 
 /// The estimate at every sample that was kept, with its uncertainty.
@@ -29,6 +29,14 @@ pub struct Trace {
     /// Times at which changes were declared, s, with the changes.
     pub(crate) changes: Vec<(f64, Change)>,
     pub(crate) counts: Counts,
+    /// What the guard found.
+    pub(crate) faults: Vec<TrackFault>,
+    /// Samples held back up to each row.
+    pub(crate) held: Vec<u64>,
+    /// True with a guard.
+    pub(crate) guarded: bool,
+    /// Length of the idle head of the record, s.
+    pub(crate) idle_s: f64,
     /// The batch fit that the recursion started from.
     pub(crate) start: Option<Fit>,
     pub(crate) failures: Option<(usize, String)>,
@@ -60,6 +68,10 @@ impl Trace {
             change_odds: Vec::new(),
             changes: Vec::new(),
             counts: Counts::default(),
+            faults: Vec::new(),
+            held: Vec::with_capacity(rows),
+            guarded: false,
+            idle_s: 0.0,
             start: None,
             failures: None,
             every,
@@ -206,6 +218,27 @@ impl Trace {
     /// Samples that were not as they should be.
     pub fn counts(&self) -> Counts {
         self.counts
+    }
+
+    /// What the guard found, and what it did.
+    pub fn faults(&self) -> &[TrackFault] {
+        &self.faults
+    }
+
+    /// Samples that the guard had held back, or during which it let the estimate stand still, up to
+    /// each row.
+    pub fn held(&self) -> &[u64] {
+        &self.held
+    }
+
+    /// True where a guard stood in front of the recursion.
+    pub fn is_guarded(&self) -> bool {
+        self.guarded
+    }
+
+    /// Length of the idle head of the record, which the usual start span leaves out, s.
+    pub fn idle_s(&self) -> f64 {
+        self.idle_s
     }
 
     /// The batch fit that the recursion started from.

@@ -1,5 +1,6 @@
 //! A recursive estimate that takes one sample at a time.
 
+use hoid_core::guard::reference::ReferenceModel;
 use hoid_ident::{Fit, IdentError};
 use hoid_model::{
     NotConvertible, Record, SampleTime,
@@ -8,9 +9,11 @@ use hoid_model::{
 
 use crate::{
     change::Change,
+    guard::{Guard, GuardEvent, Guarded},
     options::TrackOptions,
     outcome::{Counts, Outcome},
     recursion::{Recursion, Sample},
+    setup::StartAt,
     start::StartState,
     trace::operator_of,
 };
@@ -20,6 +23,9 @@ pub struct Tracker {
     pub(crate) options: TrackOptions,
     pub(crate) sample_time: SampleTime,
     pub(crate) recursion: Box<dyn Recursion>,
+    pub(crate) guard: Option<Box<Guard>>,
+    /// True where the last sample moved the estimate.
+    pub(crate) moved: bool,
     pub(crate) last_e: f64,
     pub(crate) counts: Counts,
     pub(crate) start: StartState,
@@ -55,8 +61,11 @@ impl Tracker {
         options.check()?;
         let setup = options.setup()?;
         let start = StartState::new(&setup, span, known, sample_time)?;
+        let mut recursion = options.method.inner().build(&setup, &start, sample_time)?;
         Ok(Self {
-            recursion: options.method.inner().build(&setup, &start, sample_time)?,
+            guard: guard_of(options, &mut *recursion, span, sample_time),
+            moved: false,
+            recursion,
             options: options.clone(),
             sample_time,
             last_e: 0.0,
@@ -76,6 +85,16 @@ impl Tracker {
         self.counts.samples += 1;
         let sound = |v: f64| v.abs() <= self.options.largest;
         let (e_sound, u_sound) = (sound(sample.e), sound(sample.u));
+        if let Some(guard) = &mut self.guard {
+            let sample = Sample {
+                e: if e_sound { sample.e } else { f64::NAN },
+                u: if u_sound { sample.u } else { f64::NAN },
+                reference: sample.reference.filter(|r| sound(*r)),
+            };
+            let guarded = guard.take(&mut *self.recursion, sample, moves);
+            self.counts.restarts = guard.restarts();
+            return self.guarded(guarded, !(e_sound && u_sound));
+        }
         let sample = Sample {
             e: if e_sound { sample.e } else { self.last_e },
             reference: sample.reference.filter(|r| sound(*r)),
@@ -89,6 +108,7 @@ impl Tracker {
             return Outcome {
                 innovation: None,
                 skipped,
+                held: false,
                 shortened: false,
             };
         }
@@ -102,8 +122,41 @@ impl Tracker {
         Outcome {
             innovation: (!skipped).then_some(taken.innovation),
             skipped,
+            held: false,
             shortened: taken.shortened,
         }
+    }
+
+    /// What became of a sample behind a guard.
+    #[inline]
+    fn guarded(&mut self, guarded: Guarded, skipped: bool) -> Outcome {
+        let taken = guarded.outcome.filter(|_| !guarded.held);
+        let shortened = taken.is_some_and(|taken| taken.shortened);
+        self.moved = taken.is_some();
+        self.counts.skipped += u64::from(skipped);
+        self.counts.held += u64::from(guarded.held && !skipped);
+        self.counts.shortened += u64::from(shortened);
+        Outcome {
+            innovation: taken.map(|taken| taken.innovation),
+            skipped,
+            held: guarded.held && !skipped,
+            shortened,
+        }
+    }
+
+    /// What the guard found or did at the last sample.
+    pub fn event(&self) -> Option<GuardEvent> {
+        self.guard.as_ref()?.event()
+    }
+
+    /// True while the guard lets the estimate stand still.
+    pub fn is_paused(&self) -> bool {
+        self.guard.as_ref().is_some_and(|guard| guard.is_paused())
+    }
+
+    /// Seconds since the guard began the estimate again, where it has.
+    pub fn since_restart_s(&self) -> Option<f64> {
+        self.guard.as_ref()?.since_restart_s()
     }
 
     /// theta in the order of [`Tracker::parameter_names`].
@@ -160,6 +213,9 @@ impl Tracker {
 
     /// The change that was declared at the last sample, if one was.
     pub fn change(&self) -> Option<Change> {
+        if self.guard.is_some() && !self.moved {
+            return None;
+        }
         self.recursion.change()
     }
 
@@ -187,4 +243,28 @@ impl Tracker {
     pub fn options(&self) -> &TrackOptions {
         &self.options
     }
+}
+
+/// The guard of a recursion at its start, where the options ask for one.
+pub(crate) fn guard_of(
+    options: &TrackOptions,
+    recursion: &mut dyn Recursion,
+    span: Option<&Record>,
+    sample_time: SampleTime,
+) -> Option<Box<Guard>> {
+    let method = options.method.inner();
+    let latest = method.track_delay_s().map_or(0.0, |(_, high)| high / sample_time.s());
+    let nk = options.orders.nk.max(latest.ceil() as usize + 1);
+    if !method.is_guarded() {
+        return None;
+    }
+    let mut guard = Guard::new(recursion, nk, span, sample_time);
+    let o = options.orders;
+    if matches!(options.start, StartAt::Span(_))
+        && method.track_delay_s().is_none()
+        && let Some(model) = ReferenceModel::new([o.na, o.nb, o.nc, o.nd, o.nf], recursion.theta())
+    {
+        guard.compare_with(model, o.nk);
+    }
+    Some(Box::new(guard))
 }

@@ -107,8 +107,16 @@ class Trace:
 
     @property
     def counts(self) -> dict[str, int]:
-        """samples, skipped, steps_shortened."""
+        """samples, skipped, held, restarts, steps_shortened."""
         return self._native.counts
+
+    @property
+    def faults(self) -> list[dict[str, Any]]:
+        """What the guard found in e and u, and what it did.
+
+        Each has its kind, its channel, the times `from` and `to` in s, its size and the action.
+        """
+        return self._native.faults
 
     @property
     def verdict(self) -> Verdict:

@@ -28,6 +28,7 @@ use hoid_ident::{Constraint, IdentError, settings, settings::Bounds};
 
 use crate::{
     change::Change,
+    guard::GuardOptions,
     memory::Memory,
     method::{About, RecursiveMethod, bad as bad_option, check_delay, check_operator_orders},
     recursion::{Recursion, Sample, StepOutcome},
@@ -105,6 +106,8 @@ settings! {
         pub bounds: BoundOptions,
         /// A delay that is followed.
         pub delay: DelayOptions,
+        /// The guard.
+        pub guard: GuardOptions,
     }
 }
 
@@ -179,6 +182,10 @@ impl RecursiveMethod for AdaptiveOptions {
 
     fn smooths(&self) -> bool {
         self.smooth
+    }
+
+    fn is_guarded(&self) -> bool {
+        self.guard.is_on(true)
     }
 
     fn limit(&self) -> f64 {

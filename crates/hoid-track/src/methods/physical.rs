@@ -10,6 +10,7 @@ use hoid_model::{SampleTime, Structure};
 use super::rpem::LIMIT;
 use crate::{
     forgetting::ForgettingRule,
+    guard::GuardOptions,
     kernel::{Kernel, Plan},
     memory::{Memory, MemoryOptions},
     method::{About, RecursiveMethod, check_delay, check_operator_orders},
@@ -31,6 +32,8 @@ settings! {
         pub bounds: BoundOptions,
         /// A delay that is followed.
         pub delay: DelayOptions,
+        /// The guard.
+        pub guard: GuardOptions,
     }
 }
 
@@ -85,6 +88,10 @@ impl RecursiveMethod for PhysicalOptions {
 
     fn covariance(&self) -> Option<f64> {
         self.gain.covariance
+    }
+
+    fn is_guarded(&self) -> bool {
+        self.guard.is_on(true)
     }
 
     fn limit(&self) -> f64 {

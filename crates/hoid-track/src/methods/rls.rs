@@ -6,6 +6,7 @@ use hoid_model::{SampleTime, Structure};
 
 use crate::{
     forgetting::ForgettingRule,
+    guard::GuardOptions,
     kernel::{Kernel, Plan},
     memory::{Memory, MemoryOptions},
     method::{About, RecursiveMethod, bad},
@@ -21,6 +22,8 @@ settings! {
     groups {
         /// The gain.
         pub gain: GainOptions,
+        /// The guard.
+        pub guard: GuardOptions,
     }
 }
 
@@ -31,7 +34,7 @@ impl RecursiveMethod for RlsOptions {
             help: "recursive least squares",
             source: "Ljung 1999, section 11.2; the reference text, section III",
             structures: &[Structure::Arx, Structure::Fir],
-            defaults: &[("memory", "2.56s"), ("limit", "inf")],
+            defaults: &[("memory", "2.56s"), ("limit", "inf"), ("guard", "no")],
         }
     }
 
@@ -71,6 +74,10 @@ impl RecursiveMethod for RlsOptions {
 
     fn covariance(&self) -> Option<f64> {
         self.gain.covariance
+    }
+
+    fn is_guarded(&self) -> bool {
+        self.guard.is_on(false)
     }
 
     /// None, as in the text.

@@ -7,6 +7,7 @@ use hoid_model::{SampleTime, Structure};
 
 use crate::{
     forgetting::ForgettingRule,
+    guard::GuardOptions,
     kernel::{Kernel, Plan},
     memory::{Memory, MemoryOptions},
     method::{About, RecursiveMethod},
@@ -27,6 +28,8 @@ settings! {
         pub gain: GainOptions,
         /// Stability.
         pub stability: StabilityOptions,
+        /// The guard.
+        pub guard: GuardOptions,
     }
 }
 
@@ -40,7 +43,11 @@ impl RecursiveMethod for RpemOptions {
             help: "recursive prediction-error method, for every structure",
             source: "Ljung 1999, section 11.5; the reference text, section III",
             structures: &Structure::ALL,
-            defaults: &[("memory", "2.56s for b, 20.48s for the others"), ("limit", "5")],
+            defaults: &[
+                ("memory", "2.56s for b, 20.48s for the others"),
+                ("limit", "5"),
+                ("guard", "no"),
+            ],
         }
     }
 
@@ -76,6 +83,10 @@ impl RecursiveMethod for RpemOptions {
 
     fn covariance(&self) -> Option<f64> {
         self.gain.covariance
+    }
+
+    fn is_guarded(&self) -> bool {
+        self.guard.is_on(false)
     }
 
     fn limit(&self) -> f64 {

@@ -4,7 +4,7 @@ use hoid_model::{
     Finding, NotConvertible, VerdictLevel,
     uncertainty::{Estimate, OperatorEstimate},
 };
-use hoid_track::{Change, Live, Tracker};
+use hoid_track::{Change, Live, TrackFault, Tracker};
 use serde::{Serialize, Serializer, ser::SerializeMap};
 use serde_json::Value;
 
@@ -18,6 +18,10 @@ pub struct Counts {
     pub samples: u64,
     /// Samples with a fault in e or u, missing ones included.
     pub skipped: u64,
+    /// Samples that the guard held back, or during which it let the estimate stand still.
+    pub held: u64,
+    /// How often the guard began the estimate again.
+    pub restarts: u64,
     /// Of these, samples that were missing by the column t.
     #[serde(skip)]
     pub bridged: u64,
@@ -38,6 +42,9 @@ struct Line<'a> {
     change: Option<ChangeLine>,
     #[serde(flatten)]
     counts: Counts,
+    /// What the guard found since the last line, the last where there is more.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    event: Option<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     fault: Option<&'a str>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -123,6 +130,8 @@ pub struct Standing<'a> {
     /// The last change since the last line, with the time at which it was declared, s.
     pub change: Option<(Option<f64>, Change)>,
     pub counts: Counts,
+    /// What the guard found last since the last line.
+    pub event: Option<TrackFault>,
     /// Faults since the last line.
     pub fault: Option<String>,
     /// What makes the whole stream doubtful.
@@ -166,6 +175,7 @@ impl Standing<'_> {
                 declared: self.change.as_ref().map(|(t, change)| json::change(*t, change)),
             }),
             counts: self.counts,
+            event: self.event.as_ref().map(json::track_fault),
             fault: self.fault.as_deref(),
             findings: self.finding.map(json::finding).into_iter().collect(),
             warm_up: match self.live {

@@ -16,7 +16,7 @@ use std::{
 
 use hoid_ident::Choice;
 use hoid_model::{Finding, SampleTime};
-use hoid_track::{Change, Live, LiveOutcome, Sample, TrackOptions};
+use hoid_track::{Change, Live, LiveOutcome, Sample, TrackFault, TrackOptions};
 
 use crate::{
     args::StreamArgs,
@@ -92,6 +92,8 @@ struct Session {
     innovation: Option<f64>,
     /// A change that no line has reported yet, and when it was declared, s.
     change: Option<(Option<f64>, Change)>,
+    /// What the guard found and no line has reported yet.
+    event: Option<TrackFault>,
     names: Vec<String>,
     faults: VecDeque<String>,
     /// That the times go at another rate has been said.
@@ -124,6 +126,7 @@ impl Session {
             t: None,
             innovation: None,
             change: None,
+            event: None,
             names: Vec::new(),
             faults: VecDeque::new(),
             rate_told: false,
@@ -240,6 +243,12 @@ impl Session {
         if let Some(outcome) = outcome {
             self.innovation = outcome.innovation;
             self.counts.shortened += u64::from(outcome.shortened);
+            if let Live::Tracking(tracker) = &self.live {
+                (self.counts.held, self.counts.restarts) = (tracker.counts().held, tracker.counts().restarts);
+                if let Some(event) = tracker.event() {
+                    self.event = Some(event.at(self.t.unwrap_or(f64::NAN), self.sample_time));
+                }
+            }
             if let Live::Tracking(tracker) = &self.live
                 && let Some(change) = tracker.change()
             {
@@ -274,6 +283,7 @@ impl Session {
             names: &self.names,
             innovation: self.innovation,
             change: self.change.take(),
+            event: self.event.take(),
             counts: self.counts,
             fault,
             finding: self.rate.as_ref(),
@@ -299,6 +309,12 @@ impl Session {
             "{} samples: {} skipped for a fault in e or u ({} of them missing), {} steps made shorter; {} lines dropped.",
             c.samples, c.skipped, c.bridged, c.shortened, c.dropped
         );
+        if c.held > 0 || c.restarts > 0 {
+            text.push_str(&format!(
+                " {} samples held back by the guard; the estimate was begun again {} times.",
+                c.held, c.restarts
+            ));
+        }
         if let Live::Collecting(warm_up) = &self.live {
             text.push_str(&format!(
                 " The warm-up did not end: {} of {} samples{}.",

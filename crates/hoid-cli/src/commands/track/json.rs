@@ -46,6 +46,11 @@ impl Tracked<'_> {
         set("last", self.last_json());
         set("samples", json!(counts.samples));
         set("skipped", json!(counts.skipped));
+        set("held", json!(counts.held));
+        set("restarts", json!(counts.restarts));
+        let faults = trace.faults().iter().map(json::track_fault);
+        set("faults", Value::Array(faults.collect()));
+        set("idle_head", number(trace.idle_s()));
         set("steps_shortened", json!(counts.shortened));
         if !trace.change_odds().is_empty() {
             let each = trace.changes().iter().map(|(t, c)| json::change(Some(*t), c));

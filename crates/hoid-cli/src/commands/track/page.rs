@@ -140,6 +140,12 @@ impl Tracked<'_> {
             c.skipped,
             text::steps(usize::try_from(c.shortened).unwrap_or(usize::MAX))
         );
+        if c.held > 0 || c.restarts > 0 {
+            text.push_str(&format!(
+                "{} samples held back by the guard; the estimate was begun again {} times.\n",
+                c.held, c.restarts
+            ));
+        }
         if self.has_operator() {
             let none = self.not_converted();
             text.push_str(&format!("{} of {} rows have no operator", none.rows, self.trace.len()));

@@ -51,6 +51,9 @@ impl Tracked<'_> {
                 ColumnValues::Real(trace.change_odds().to_vec()),
             );
         }
+        if trace.is_guarded() {
+            add("held".to_owned(), ColumnValues::Whole(trace.held().to_vec()));
+        }
         add(
             "steps_shortened".to_owned(),
             ColumnValues::Whole(trace.steps_shortened().to_vec()),
@@ -67,6 +70,12 @@ impl Tracked<'_> {
                 .map(|one| format!("sampling trouble: {one}")),
         );
         comments.extend(self.account.steps.iter().map(|step| format!("preparation: {step}")));
+        comments.extend(trace.faults().iter().map(|fault| {
+            format!(
+                "fault: {} in {}, {} to {} s, {}",
+                fault.kind, fault.channel, fault.from_s, fault.to_s, fault.action
+            )
+        }));
         if let Some(fit) = trace.start() {
             comments.push(format!("start fit: {}", coefficients_text(fit)));
         }

@@ -2,7 +2,7 @@
 
 use hoid_io::{check_table_path, write_table};
 use hoid_model::Record;
-use hoid_track::{StartAt, TrackOptions, track};
+use hoid_track::{StartAt, TrackOptions, track, usual_start_span};
 
 use super::{report, result::Tracked};
 use crate::{
@@ -52,6 +52,10 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
             StartAt::Nothing => "nothing".to_owned(),
         },
     ));
+    if trace.idle_s() > 0.0 {
+        let words = format!("{:.2} s, in which neither e nor u moves", trace.idle_s());
+        settings.push(("idle head".to_owned(), words));
+    }
     if options.method.smooths() {
         settings.push(("estimate".to_owned(), "two-sided, of the whole record".to_owned()));
     } else {
@@ -93,16 +97,14 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     CliError::of_verdict(&verdict)
 }
 
-/// The span of the start fit and of the search: as typed, else the first third.
+/// The span of the start fit and of the search: as typed, else the first third behind the idle head.
 fn start_span(args: &TrackArgs, plan: &Plan, record: &Record) -> Result<(f64, f64), CliError> {
     if args.start_span.is_some() && matches!(plan.options().start, StartAt::Theta(_)) {
         return Err(CliError::Usage(
             "--start-span is the span of the start fit, and --start gives the start itself; drop one".to_owned(),
         ));
     }
-    let begin = record.time_s(0);
-    let third = begin + record.len() as f64 * record.sample_time().s() / 3.0;
-    Ok(args.start_span.unwrap_or((begin, third)))
+    Ok(args.start_span.unwrap_or_else(|| usual_start_span(record)))
 }
 
 fn update_from(args: &TrackArgs, record: &Record) -> Result<Option<f64>, CliError> {

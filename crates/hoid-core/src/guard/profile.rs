@@ -1,0 +1,461 @@
+//! Both signals over a second, against what they were before.
+//!
+//! Of each block of a second the mean magnitudes of e and u about their long-run means are kept,
+//! `m_c`, of their backward differences of order 1 to 4, `a_cj`, and of the innovations of the
+//! recursion, `a_eps`. Their long-run means M_c and A_cj follow with a time constant of 60 blocks; a
+//! block enters with no less than half and no more than twice the long-run value, so that no block
+//! moves them by more than 1/60. Blocks that are not as they should be do not enter.
+//!
+//! | what | rule | why |
+//! |---|---|---|
+//! | frozen e | `a_e1 <= A_e1/1000` in a block | the error of somebody who tracks never stands still |
+//! | frozen u | `a_u1 <= A_u1/1000` in three blocks in a row | a hand may rest |
+//! | idle | e and u each within a range of `M_c/20` in two blocks in a row | silence, with noise |
+//! | larger | `a_c1 > 5 A_c1` and `a_c3 > 5 A_c3` for e and u in two blocks in a row | both signals are what they were, times a factor |
+//! | rescaled | all four `a_cj/A_cj` of one channel above 3.5 and within a factor of 1.5 of each other, those of the other below 2, in two blocks in a row | another unit, a gain that was turned |
+//! | swapped | the sum over blocks of `d(own) - d(other) - 1`, at most 4 a block and never below 0, reaches 6 | e is as u was and u as e was; d is the sum over both channels of `\|log a_1/A_1\| + \|log a_3/A_3\|` |
+//! | misfit | `R = a_eps/min_j a_uj` is above 4 times its long-run value, and above 1.5, in two blocks in a row | what u has been for the last samples foretells it better than the model does, which knows e too, and did not before |
+//!
+//! The sum for swapped channels is a one-sided CUSUM (E. S. Page, *Biometrika* 41 (1954) 100-115) of
+//! a difference that is negative for channels as they were and at most the distance of the two
+//! profiles for swapped ones: channels that are alike are never called swapped.
+
+use super::channel::ORDERS;
+
+/// e and u.
+pub const CHANNELS: usize = 2;
+/// Blocks after which the long-run values are known.
+const LEARNT: u32 = 10;
+/// Weight of a block thereafter.
+const WEIGHT: f64 = 1.0 / 60.0;
+/// Limits of the rules.
+const FROZEN: f64 = 1e-3;
+const FROZEN_U_BLOCKS: u32 = 3;
+const IDLE: f64 = 0.05;
+const IDLE_BLOCKS: u32 = 2;
+const LARGER: f64 = 5.0;
+const RESCALED: f64 = 3.5;
+const ALL_ORDERS: f64 = 1.5;
+const OTHER: f64 = 2.0;
+const LARGER_BLOCKS: u32 = 2;
+const SWAPPED_DRIFT: f64 = 1.0;
+const SWAPPED: f64 = 6.0;
+/// What one block says at most.
+const MOST_EVIDENCE: f64 = 4.0;
+const MISFIT: f64 = 4.0;
+/// R below which no model foretells too little.
+const LEAST_RATIO: f64 = 1.5;
+const MISFIT_BLOCKS: u32 = 2;
+/// Distance of a block that is as usual: four logarithms of four.
+const ALIKE: f64 = 4.0 * 1.386;
+/// And of one that is not.
+const UNLIKE: f64 = 4.0;
+/// Logarithms of features stay within this of each other.
+const LARGEST_LOG: f64 = 10.0;
+
+/// Sums over a block, and means of one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Block {
+    /// Magnitudes of the backward differences of order 1 to 4.
+    pub differences: [[f64; ORDERS]; CHANNELS],
+    /// Magnitudes about the long-run means.
+    pub magnitude: [f64; CHANNELS],
+    /// Smallest and largest value.
+    pub range: [[f64; 2]; CHANNELS],
+    /// Values.
+    pub mean: [f64; CHANNELS],
+    /// Magnitudes of innovations.
+    pub innovation: f64,
+    /// Samples, and innovations.
+    pub samples: u32,
+    /// Innovations among them.
+    pub innovations: u32,
+}
+
+crate::state!([] Block { differences, magnitude, range, mean, innovation, samples, innovations });
+
+impl Default for Block {
+    fn default() -> Self {
+        Self {
+            differences: [[0.0; ORDERS]; CHANNELS],
+            magnitude: [0.0; CHANNELS],
+            range: [[f64::INFINITY, f64::NEG_INFINITY]; CHANNELS],
+            mean: [0.0; CHANNELS],
+            innovation: 0.0,
+            samples: 0,
+            innovations: 0,
+        }
+    }
+}
+
+impl Block {
+    /// Adds the samples of both channels: differences, values, and the long-run means.
+    #[inline(always)]
+    pub fn add(&mut self, differences: &[[f64; ORDERS]; CHANNELS], values: [f64; CHANNELS], centre: [f64; CHANNELS]) {
+        for c in 0..CHANNELS {
+            for j in 0..ORDERS {
+                self.differences[c][j] += differences[c][j].abs();
+            }
+            self.magnitude[c] += (values[c] - centre[c]).abs();
+            self.mean[c] += values[c];
+            let [low, high] = self.range[c];
+            self.range[c] = [
+                if values[c] < low { values[c] } else { low },
+                if values[c] > high { values[c] } else { high },
+            ];
+        }
+        self.samples += 1;
+    }
+
+    /// Adds an innovation.
+    #[inline(always)]
+    pub fn add_innovation(&mut self, innovation: f64) {
+        self.innovation += innovation.abs();
+        self.innovations += 1;
+    }
+
+    /// The means.
+    #[must_use]
+    pub fn means(&self) -> Self {
+        let over = |sum: f64, count: u32| if count > 0 { sum / f64::from(count) } else { 0.0 };
+        let n = self.samples;
+        Self {
+            differences: self.differences.map(|all| all.map(|sum| over(sum, n))),
+            magnitude: self.magnitude.map(|sum| over(sum, n)),
+            mean: self.mean.map(|sum| over(sum, n)),
+            innovation: over(self.innovation, self.innovations),
+            ..*self
+        }
+    }
+
+    /// R: the mean innovation over what the past of u leaves open; none without either.
+    fn ratio(&self) -> Option<f64> {
+        let least = self.least_of_u();
+        (self.innovations > 0 && least > 0.0).then(|| self.innovation / least)
+    }
+
+    /// The least mean of the differences of u: what its own past leaves open.
+    fn least_of_u(&self) -> f64 {
+        self.differences[1]
+            .iter()
+            .fold(f64::INFINITY, |least, a| if *a < least { *a } else { least })
+    }
+}
+
+/// What is wrong with a block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Trouble {
+    /// e stands still.
+    FrozenInput,
+    /// u stands still.
+    FrozenOutput,
+    /// e and u are nearly silent.
+    Idle,
+    /// Both are larger by a factor.
+    Larger,
+    /// e is larger by a factor.
+    RescaledInput,
+    /// u is larger by a factor.
+    RescaledOutput,
+    /// e is as u was, and u as e was.
+    Swapped,
+    /// The model foretells u worse than the past of u does.
+    Misfit,
+}
+
+impl Trouble {
+    /// True for what may have become usual; nobody tracks in silence.
+    pub fn may_be_the_new_usual(self) -> bool {
+        !matches!(self, Self::FrozenInput | Self::FrozenOutput | Self::Idle)
+    }
+
+    /// Blocks that it has lasted for at least when it is first told.
+    pub fn blocks(self) -> u32 {
+        match self {
+            Self::FrozenInput => 1,
+            Self::FrozenOutput => FROZEN_U_BLOCKS,
+            Self::Idle => IDLE_BLOCKS,
+            Self::Larger | Self::RescaledInput | Self::RescaledOutput => LARGER_BLOCKS,
+            Self::Swapped => 2,
+            Self::Misfit => MISFIT_BLOCKS,
+        }
+    }
+}
+
+/// The long-run values, and how long something has been wrong.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Profile {
+    usual: Block,
+    /// Blocks that it was learnt from.
+    blocks: u32,
+    frozen_u: u32,
+    idle: u32,
+    larger: u32,
+    rescaled: [u32; CHANNELS],
+    swapped: f64,
+    misfits: u32,
+    /// Long-run value of R, and the blocks that it was learnt from.
+    ratio: f64,
+    ratios: u32,
+}
+
+crate::state!([] Profile { usual, blocks, frozen_u, idle, larger, rescaled, swapped, misfits, ratio, ratios });
+
+impl Default for Profile {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Profile {
+    /// Nothing is known.
+    pub fn new() -> Self {
+        Self {
+            usual: Block::default(),
+            blocks: 0,
+            frozen_u: 0,
+            idle: 0,
+            larger: 0,
+            rescaled: [0; CHANNELS],
+            swapped: 0.0,
+            misfits: 0,
+            ratio: 0.0,
+            ratios: 0,
+        }
+    }
+
+    /// With long-run values that are known.
+    pub fn of(usual: &Block) -> Self {
+        Self {
+            usual: *usual,
+            blocks: LEARNT,
+            ..Self::new()
+        }
+    }
+
+    /// True where the last blocks gave no reason to suspect anything.
+    pub fn is_calm(&self) -> bool {
+        self.is_known()
+            && self.frozen_u == 0
+            && self.idle == 0
+            && self.larger == 0
+            && self.rescaled == [0; CHANNELS]
+            && self.swapped == 0.0
+            && self.misfits == 0
+    }
+
+    /// True for the means of a block unlike those that are usual: by a factor of e in the mean of the
+    /// logarithms.
+    pub fn is_unusual(&self, block: &Block) -> bool {
+        self.is_known() && self.distance(block, [0, 1]) > UNLIKE
+    }
+
+    /// True for the means of a block like those that are usual: within a factor of four in the mean
+    /// of the logarithms.
+    pub fn resembles(&self, block: &Block) -> bool {
+        self.is_known() && self.distance(block, [0, 1]) < ALIKE
+    }
+
+    /// True once there are long-run values.
+    pub fn is_known(&self) -> bool {
+        self.blocks >= LEARNT
+    }
+
+    /// The long-run values.
+    pub fn usual(&self) -> &Block {
+        &self.usual
+    }
+
+    /// Lets the means of a sound block enter the long-run values.
+    pub fn learn(&mut self, block: &Block) {
+        let known = self.is_known();
+        self.blocks = self.blocks.saturating_add(1);
+        let weight = if known { WEIGHT } else { 1.0 / f64::from(self.blocks) };
+        let toward = |usual: &mut f64, found: f64, least: f64, most: f64| {
+            let bounded = if known { found.clamp(least, most) } else { found };
+            *usual += weight * (bounded - *usual);
+        };
+        if let Some(ratio) = block.ratio() {
+            let known = self.ratios >= LEARNT;
+            self.ratios = self.ratios.saturating_add(1);
+            let weight = if known { WEIGHT } else { 1.0 / f64::from(self.ratios) };
+            let bounded = if known {
+                ratio.clamp(0.5 * self.ratio, 2.0 * self.ratio)
+            } else {
+                ratio
+            };
+            self.ratio += weight * (bounded - self.ratio);
+        }
+        for c in 0..CHANNELS {
+            for (usual, found) in self.usual.differences[c].iter_mut().zip(block.differences[c]) {
+                let now = *usual;
+                toward(usual, found, 0.5 * now, 2.0 * now);
+            }
+            let size = self.usual.magnitude[c];
+            toward(&mut self.usual.magnitude[c], block.magnitude[c], 0.5 * size, 2.0 * size);
+            let mean = self.usual.mean[c];
+            toward(&mut self.usual.mean[c], block.mean[c], mean - size, mean + size);
+        }
+    }
+
+    /// What is wrong with the means of a block, in the light of those before it.
+    pub fn judge(&mut self, block: &Block) -> Option<Trouble> {
+        if !self.is_known() {
+            return None;
+        }
+        // A channel that never moved (there is no input, or it was never recorded) is not frozen.
+        let below = |found: f64, share: f64, usual: f64| usual > 0.0 && found <= share * usual;
+        let still = |c: usize| below(block.differences[c][0], FROZEN, self.usual.differences[c][0]);
+        let silent = |c: usize| below(block.range[c][1] - block.range[c][0], IDLE, self.usual.magnitude[c]);
+        let count = |run: u32, is: bool| if is { run.saturating_add(1) } else { 0 };
+        let frozen_e = still(0);
+        self.frozen_u = count(self.frozen_u, still(1));
+        self.idle = count(self.idle, silent(0) && silent(1));
+        let grown = |c: usize, j: usize| {
+            let usual = self.usual.differences[c][j];
+            usual > 0.0 && block.differences[c][j] > LARGER * usual
+        };
+        self.larger = count(self.larger, [0, 2].iter().all(|j| grown(0, *j) && grown(1, *j)));
+        let ratios = [0, 1].map(|c| self.ratios_of(block, c));
+        for (c, run) in self.rescaled.iter_mut().enumerate() {
+            let [least, most] = ratios[c];
+            let other = ratios[1 - c][1];
+            *run = count(*run, least > RESCALED && most < ALL_ORDERS * least && other < OTHER);
+        }
+        let evidence = self.distance(block, [0, 1]) - self.distance(block, [1, 0]) - SWAPPED_DRIFT;
+        let evidence = evidence.clamp(-MOST_EVIDENCE, MOST_EVIDENCE);
+        self.swapped = (self.swapped + evidence).clamp(0.0, 2.0 * SWAPPED);
+        let limit = (MISFIT * self.ratio).max(LEAST_RATIO);
+        let misfit = self.ratios >= LEARNT && block.ratio().is_some_and(|ratio| ratio > limit);
+        self.misfits = count(self.misfits, misfit);
+        if frozen_e {
+            Some(Trouble::FrozenInput)
+        } else if self.idle >= IDLE_BLOCKS {
+            Some(Trouble::Idle)
+        } else if self.frozen_u >= FROZEN_U_BLOCKS {
+            Some(Trouble::FrozenOutput)
+        } else if self.larger >= LARGER_BLOCKS {
+            Some(Trouble::Larger)
+        } else if self.rescaled[0] >= LARGER_BLOCKS {
+            Some(Trouble::RescaledInput)
+        } else if self.rescaled[1] >= LARGER_BLOCKS {
+            Some(Trouble::RescaledOutput)
+        } else if self.swapped >= SWAPPED {
+            Some(Trouble::Swapped)
+        } else if self.misfits >= MISFIT_BLOCKS {
+            Some(Trouble::Misfit)
+        } else {
+            None
+        }
+    }
+
+    /// The least and the largest ratio of the differences of a channel to what is usual.
+    fn ratios_of(&self, block: &Block, c: usize) -> [f64; 2] {
+        let mut ends = [f64::INFINITY, 0.0];
+        for (found, usual) in block.differences[c].iter().zip(&self.usual.differences[c]) {
+            let ratio = if found == usual { 1.0 } else { found / usual };
+            ends = [ends[0].min(ratio), ends[1].max(ratio)];
+        }
+        ends
+    }
+
+    /// Distance of a block from the long-run values, those of `of[c]` for channel c.
+    fn distance(&self, block: &Block, of: [usize; CHANNELS]) -> f64 {
+        let mut sum = 0.0;
+        for (c, usual) in of.into_iter().enumerate() {
+            for j in [0, 2] {
+                let (found, usual) = (block.differences[c][j], self.usual.differences[usual][j]);
+                // Zero against zero is no difference.
+                let log = if found == usual {
+                    0.0
+                } else {
+                    libm::log(found / usual).abs()
+                };
+                sum += if log < LARGEST_LOG { log } else { LARGEST_LOG };
+            }
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn block(size: [f64; 2], smooth: [f64; 2]) -> Block {
+        let differences = [0, 1].map(|c| [0, 1, 2, 3].map(|j| size[c] * libm::pow(smooth[c], f64::from(j))));
+        Block {
+            differences,
+            magnitude: [10.0 * size[0], 5.0 * size[1]],
+            range: [[0.0, 40.0 * size[0]], [0.0, 20.0 * size[1]]],
+            mean: [0.0; 2],
+            innovation: size[1],
+            samples: 100,
+            innovations: 100,
+        }
+    }
+
+    fn known() -> Profile {
+        let mut profile = Profile::new();
+        for _ in 0..20 {
+            let usual = block([0.02, 0.1], [0.1, 1.1]);
+            assert_eq!(profile.judge(&usual), None);
+            profile.learn(&usual);
+        }
+        profile
+    }
+
+    #[test]
+    fn each_trouble_has_its_name_and_ends() {
+        let usual = block([0.02, 0.1], [0.1, 1.1]);
+        let cases = [
+            (block([0.0, 0.1], [0.1, 1.1]), Trouble::FrozenInput, 1),
+            (block([0.02, 0.0], [0.1, 1.1]), Trouble::FrozenOutput, 3),
+            (block([1e-4, 1e-4], [0.1, 1.1]), Trouble::Idle, 2),
+            (block([0.2, 1.0], [0.1, 1.1]), Trouble::Larger, 2),
+            (block([0.1, 0.1], [0.1, 1.1]), Trouble::RescaledInput, 2),
+            (block([0.02, 0.45], [0.1, 1.1]), Trouble::RescaledOutput, 2),
+            (block([0.1, 0.02], [1.1, 0.1]), Trouble::Swapped, 2),
+            (
+                Block {
+                    innovation: 1.0,
+                    ..usual
+                },
+                Trouble::Misfit,
+                2,
+            ),
+        ];
+        for (bad, trouble, after) in cases {
+            let mut profile = known();
+            for n in 1..=5 {
+                let found = profile.judge(&bad);
+                assert_eq!(found, (n >= after).then_some(trouble), "{n} {trouble:?}");
+            }
+            let left = (0..30).find(|_| profile.judge(&usual).is_none());
+            assert!(left.is_some_and(|n| n <= 12), "{trouble:?}: {left:?}");
+        }
+    }
+
+    #[test]
+    fn a_block_moves_the_long_run_values_by_a_sixtieth() {
+        let mut profile = known();
+        let before = *profile.usual();
+        profile.learn(&block([20.0, 100.0], [0.1, 1.1]));
+        for c in 0..CHANNELS {
+            let ratio = profile.usual().differences[c][0] / before.differences[c][0];
+            assert!((1.0..1.02).contains(&ratio), "{ratio}");
+        }
+    }
+
+    #[test]
+    fn channels_that_are_alike_are_never_swapped() {
+        let mut profile = Profile::new();
+        let mut size = 0.1;
+        for n in 0..200 {
+            let found = block([size, size], [0.9, 0.9]);
+            assert_eq!(profile.judge(&found), None, "{n}");
+            profile.learn(&found);
+            size *= if n % 7 < 4 { 1.5 } else { 0.6 };
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! The option of the guard.
+
+use hoid_ident::{
+    settings,
+    settings::{Kind, Value},
+};
+
+/// Whether a guard stands in front of a recursion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GuardChoice {
+    /// It does.
+    Yes,
+    /// The samples reach the recursion as they come.
+    No,
+}
+
+hoid_model::named_choice!(GuardChoice, "choice", 2, { Yes => "yes", No => "no" });
+
+impl Value for GuardChoice {
+    const KIND: Kind = Kind::Choice(&["yes", "no"]);
+
+    fn read(text: &str) -> Result<Self, String> {
+        match text.trim().to_ascii_lowercase().as_str() {
+            "yes" | "true" => Ok(Self::Yes),
+            "no" | "false" => Ok(Self::No),
+            _ => Err("yes or no".to_owned()),
+        }
+    }
+
+    fn text(&self) -> Option<String> {
+        Some(self.name().to_owned())
+    }
+}
+
+settings! {
+    /// Whether samples and spans that no tracking makes are kept from the recursion.
+    pub struct GuardOptions {
+        /// Guard: outliers of e and u are held back, spans that no tracking makes are left out, and the estimate
+        /// begins again after them
+        #[setting(default("yes"))]
+        pub guard: Option<GuardChoice> = None,
+    }
+}
+
+impl GuardOptions {
+    /// Whether there is one, with the method's own default.
+    pub(crate) fn is_on(&self, usual: bool) -> bool {
+        self.guard.map_or(usual, |choice| choice == GuardChoice::Yes)
+    }
+}

@@ -1,0 +1,102 @@
+//! What is usual, from the record of the start span.
+//!
+//! Of each mean of a block ([`hoid_core::guard::profile`]) the median over all blocks is taken, and
+//! of each difference the largest of three estimates of its 99 % quantile: itself, and those that
+//! follow from the 50 and 95 % quantiles of Gaussian errors. A few outliers in the span change
+//! neither; heavy tails count.
+
+use hoid_core::guard::{
+    channel::ORDERS,
+    profile::{Block, CHANNELS, Profile},
+};
+use hoid_model::Record;
+
+use super::Guard;
+
+/// Quantiles of the magnitude of a Gaussian number, in standard deviations.
+const QUANTILES: [(f64, f64); 3] = [(0.5, 0.6745), (0.95, 1.96), (0.99, 2.5758)];
+/// Least blocks of a record that says what is usual.
+const LEAST: usize = 5;
+
+impl Guard {
+    /// Learns what is usual from a record.
+    pub(super) fn prime(&mut self, record: &Record) {
+        let output = record.output();
+        let silent;
+        let input = match record.input() {
+            [] => {
+                silent = vec![0.0; output.len()];
+                &silent
+            }
+            input => input,
+        };
+        let signals = [input, output];
+        let mut quantiles = [[0.0; ORDERS]; CHANNELS];
+        for (c, signal) in signals.iter().enumerate() {
+            let mut differences = signal.to_vec();
+            for quantile in &mut quantiles[c] {
+                differences = differences.windows(2).map(|w| w[1] - w[0]).collect();
+                *quantile = tail(&differences);
+            }
+        }
+        let length = self.block_length as usize;
+        if output.len() < LEAST * length {
+            return;
+        }
+        let centre = signals.map(|signal| middle(signal.to_vec()));
+        let blocks: Vec<Block> = (1..output.len() / length)
+            .map(|n| {
+                let mut block = Block::default();
+                for k in n * length..(n + 1) * length {
+                    let past = |c: usize, back: usize| signals[c][k - back];
+                    let differences = [0, 1].map(|c| {
+                        let x: [f64; 5] = std::array::from_fn(|back| past(c, back));
+                        [
+                            x[0] - x[1],
+                            x[0] - 2.0 * x[1] + x[2],
+                            x[0] - 3.0 * x[1] + 3.0 * x[2] - x[3],
+                            x[0] - 4.0 * x[1] + 6.0 * x[2] - 4.0 * x[3] + x[4],
+                        ]
+                    });
+                    block.add(&differences, [past(0, 0), past(1, 0)], centre);
+                }
+                block.means()
+            })
+            .collect();
+        let over = |of: &dyn Fn(&Block) -> f64| middle(blocks.iter().map(of).collect());
+        let usual = Block {
+            differences: std::array::from_fn(|c| std::array::from_fn(|j| over(&|b| b.differences[c][j]))),
+            magnitude: std::array::from_fn(|c| over(&|b| b.magnitude[c])),
+            mean: centre,
+            ..Block::default()
+        };
+        self.profile = Profile::of(&usual);
+        for (channel, quantiles) in self.channels.iter_mut().zip(quantiles) {
+            channel.set_quantiles(quantiles);
+        }
+        self.set_limits();
+    }
+}
+
+/// The median; zero of nothing.
+fn middle(values: Vec<f64>) -> f64 {
+    quantile(values, 0.5)
+}
+
+fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
+    values.retain(|v| v.is_finite());
+    values.sort_by(f64::total_cmp);
+    let place = (share * values.len() as f64) as usize;
+    values
+        .get(place.min(values.len().saturating_sub(1)))
+        .copied()
+        .unwrap_or(0.0)
+}
+
+/// The 99 % quantile of the magnitudes, by its own count or by those further in.
+fn tail(values: &[f64]) -> f64 {
+    let magnitudes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
+    let scale = QUANTILES.map(|(share, deviations)| quantile(magnitudes.clone(), share) / deviations);
+    let [.., (_, deviations)] = QUANTILES;
+    deviations * scale.into_iter().fold(0.0, f64::max)
+}

@@ -1,0 +1,42 @@
+//! The numbers of a recursion, kept to go back to them.
+
+use hoid_core::state::State;
+
+use crate::recursion::Recursion;
+
+/// Longest snapshot that saved numbers may ask for.
+const LONGEST: usize = 1 << 20;
+
+/// The numbers of a recursion. Their memory grows to the largest that was taken, and is kept.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Snapshot {
+    numbers: Vec<f64>,
+}
+
+impl State for Snapshot {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        let mut length = self.numbers.len();
+        length.visit(each);
+        self.numbers.resize(length.min(LONGEST), 0.0);
+        self.numbers.as_mut_slice().visit(each);
+    }
+}
+
+impl Snapshot {
+    /// Keeps the numbers as they are.
+    pub fn take(&mut self, recursion: &mut dyn Recursion) {
+        self.numbers.clear();
+        recursion.visit(&mut |number| self.numbers.push(*number));
+    }
+
+    /// Puts them back; false where nothing was kept.
+    pub fn restore(&self, recursion: &mut dyn Recursion) -> bool {
+        let mut kept = self.numbers.iter();
+        recursion.visit(&mut |number| {
+            if let Some(value) = kept.next() {
+                *number = *value;
+            }
+        });
+        !self.numbers.is_empty()
+    }
+}

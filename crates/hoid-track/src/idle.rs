@@ -1,0 +1,131 @@
+//! The idle head of a record: what was recorded before the run began.
+//!
+//! Somebody who waits for the run to begin is not tracking. A fit of such samples takes a delay and
+//! poles from nothing, and gives them small standard errors. The head is the longest run of first
+//! samples in which both e and u stay within [`SHARE`] of their later size about their first second,
+//! or within a step of their resolution; the size is the 90 % quantile of the distance from the
+//! median in the second half of the record. A head shorter than [`LEAST_S`] is none: signals begin
+//! near zero.
+
+use hoid_model::Record;
+
+/// Share of the later size within which a signal is idle.
+const SHARE: f64 = 0.02;
+/// Shortest head, s.
+const LEAST_S: f64 = 1.0;
+/// Quantile that is the size of a signal.
+const SIZE: f64 = 0.9;
+/// Steps of the resolution that are nothing.
+const STEPS: f64 = 1.01;
+/// Largest step of a resolution, as a share of the size.
+const COARSE: f64 = 0.2;
+
+/// Samples at the beginning of a record in which neither e nor u moves; 0 where there are few, all
+/// where neither ever moves.
+pub fn idle_head(record: &Record) -> usize {
+    let second = (1.0 / record.sample_time().s()).round().max(1.0) as usize;
+    let still = |signal: &[f64]| {
+        let later = &signal[signal.len() / 2..];
+        let centre = quantile(later.to_vec(), 0.5);
+        let size = quantile(later.iter().map(|x| (x - centre).abs()).collect(), SIZE);
+        let steps = || later.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 0.0);
+        let step = steps().fold(f64::INFINITY, f64::min);
+        // Noise has no resolution: its differences are no multiples of the smallest.
+        let multiple = |d: f64| (d / step - (d / step).round()).abs() < 1e-3;
+        let coarse = step <= COARSE * size && steps().all(multiple);
+        let room = if coarse {
+            (STEPS * step).max(SHARE * size)
+        } else {
+            SHARE * size
+        };
+        let first = quantile(signal[..second.min(signal.len())].to_vec(), 0.5);
+        signal.iter().take_while(|x| (*x - first).abs() <= room).count()
+    };
+    if record.is_empty() {
+        return 0;
+    }
+    let head = match record.input() {
+        [] => still(record.output()),
+        input => still(input).min(still(record.output())),
+    };
+    if head as f64 * record.sample_time().s() < LEAST_S {
+        0
+    } else {
+        head
+    }
+}
+
+/// The span of a record that gives the start fit when none is named, s: the first third behind the
+/// idle head.
+pub fn usual_start_span(record: &Record) -> (f64, f64) {
+    let head = match idle_head(record) {
+        all if all >= record.len() => 0,
+        head => head,
+    };
+    let begin = record.time_s(head);
+    (
+        begin,
+        begin + (record.len() - head) as f64 * record.sample_time().s() / 3.0,
+    )
+}
+
+fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let place = (share * values.len() as f64) as usize;
+    values
+        .get(place.min(values.len().saturating_sub(1)))
+        .copied()
+        .unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::{
+        Channel,
+        scenario::{Condition, Scenario},
+    };
+    use hoid_sim::{RunSeed, Simulator};
+
+    use super::*;
+
+    fn with_head(record: &Record, e: &[f64], u: &[f64]) -> Record {
+        let joined = |name: &str, head: &[f64], rest: &[f64]| Channel::new(name, "", [head, rest].concat());
+        let input = joined("e", e, record.input());
+        Record::new(record.sample_time(), input, joined("u", u, record.output())).unwrap()
+    }
+
+    #[test]
+    fn the_head_ends_where_the_run_begins_and_runs_have_none() {
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        for seed in 0..20 {
+            let seed = RunSeed {
+                seed,
+                ..RunSeed::default()
+            };
+            let record = simulator.run(seed, false).unwrap();
+            assert_eq!(idle_head(&record), 0);
+            let third = record.len() as f64 * 0.01 / 3.0;
+            assert_eq!(usual_start_span(&record), (0.0, third));
+            let noise: Vec<f64> = (0..1500).map(|k| 1e-3 * (f64::from(k) * 12.9898).sin()).collect();
+            let offset: Vec<f64> = noise.iter().map(|n| 0.3 + n * 0.1).collect();
+            let idle = with_head(&record, &noise, &offset);
+            let head = idle_head(&idle);
+            assert!((1490..1540).contains(&head), "{head}");
+            let (from, to) = usual_start_span(&idle);
+            assert!((from - 15.0).abs() < 0.5 && (to - from - third).abs() < 0.2);
+            // Half a second is not worth a word, and e alone no rest.
+            assert_eq!(idle_head(&with_head(&record, &noise[..50], &offset[..50])), 0);
+            let moving: Vec<f64> = (0..1500).map(|k| (f64::from(k) * 0.02).sin()).collect();
+            assert_eq!(idle_head(&with_head(&record, &moving, &offset)), 0);
+        }
+    }
+
+    #[test]
+    fn what_never_moves_is_idle_throughout() {
+        let still = |name: &str, x: f64| Channel::new(name, "", vec![x; 500]);
+        let record = Record::new(hoid_model::SampleTime::HUNDREDTH, still("e", 0.0), still("u", 2.0)).unwrap();
+        assert_eq!(idle_head(&record), 500);
+        assert_eq!(usual_start_span(&record).0, 0.0);
+    }
+}

@@ -1,0 +1,10 @@
+//! Faults in streams, and what they do to a tracker: for the test and for the slow study
+//! `tracker-faults`.
+
+mod faults;
+mod tracked;
+
+#[allow(unused_imports)]
+pub use faults::{Fault, Signal, faults};
+#[allow(unused_imports)]
+pub use tracked::{Effect, Reference, Run};

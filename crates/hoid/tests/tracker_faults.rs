@@ -1,0 +1,103 @@
+//! Faults in streams: a seeded sample of the study `cargo xtask slow tracker-faults`, on other seeds
+//! than those on which the limits of the guard were set.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+#[path = "common/tracker_faults/mod.rs"]
+mod tracker_faults;
+
+use hoid::{
+    prelude::*,
+    track::{Method, TrackOptions},
+};
+use tracker_faults::{Effect, Fault, Reference, Run, Signal};
+
+/// A run in which the person stays as they are, and the tracker over it.
+fn references(method: &Method, seeds: std::ops::Range<u64>, seconds: f64) -> Vec<(Run, Reference)> {
+    seeds
+        .map(|seed| {
+            let remnant_order = 1 + (seed % 3) as usize;
+            let run = Run::new(Condition::C1, remnant_order, seed, seconds);
+            let orders = method.usual_orders(29);
+            let nd = orders.nd.max(remnant_order);
+            let options = TrackOptions::new(method.clone(), method.usual_structure(), Orders { nd, ..orders });
+            let reference = Reference::new(&run, &options.with(&[("guard", "yes")]).unwrap());
+            (run, reference)
+        })
+        .collect()
+}
+
+fn effects(references: &[(Run, Reference)], fault: &Fault, at_s: f64) -> Vec<Effect> {
+    let of = |(run, reference): &(Run, Reference)| reference.effect(run, fault, at_s);
+    references.iter().map(of).collect()
+}
+
+/// Half a standard error is what is promised.
+#[test]
+fn an_outlier_moves_no_parameter_by_half_a_standard_error_for_a_second() {
+    use Signal::{E, U};
+    for method in [Method::physical(), Method::adaptive(), Method::rpem()] {
+        let references = references(&method, 70..73, 120.0);
+        for (signal, size, seconds, at_s) in [
+            (E, 7.0, 0.0, 61.37),
+            (E, 70.0, 0.05, 47.11),
+            (E, -700.0, 0.1, 83.92),
+            (U, -6.0, 0.0, 52.49),
+            (U, 60.0, 0.05, 77.73),
+            (U, -3000.0, 0.1, 44.04),
+        ] {
+            let fault = Fault::Outlier { signal, size, seconds };
+            for effect in effects(&references, &fault, at_s) {
+                println!("{method}: {fault}: {effect:?}");
+                assert!(
+                    effect.shift < 0.5 && effect.told && effect.held > 0,
+                    "{method}: {fault}: {effect:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn after_a_hostile_span_the_estimate_comes_back_by_itself() {
+    for method in [Method::physical(), Method::adaptive()] {
+        let references = references(&method, 80..82, 200.0);
+        for (fault, at_s) in [
+            (
+                Fault::Scaled {
+                    factor: 1e6,
+                    seconds: 50.0,
+                },
+                71.3,
+            ),
+            (Fault::Swapped { seconds: 80.0 }, 66.6),
+            (Fault::Silence { seconds: 300.0 }, 93.1),
+            (Fault::NoisySilence { seconds: 300.0 }, 93.1),
+            (Fault::FrozenBoth { seconds: 30.0 }, 88.8),
+            (Fault::MissingBoth { seconds: 40.0 }, 59.0),
+        ] {
+            for effect in effects(&references, &fault, at_s) {
+                println!("{method}: {fault}: {effect:?}");
+                let soon = effect.recovery_s.is_some_and(|s| s < 15.0);
+                assert!(soon && effect.told, "{method}: {fault}: {effect:?}");
+                assert!(
+                    effect.restarts > 0 || effect.skipped > 0,
+                    "{method}: {fault}: {effect:?}"
+                );
+            }
+        }
+    }
+}
+
+/// One sample in 1e5 at most.
+#[test]
+fn nothing_is_held_back_where_nothing_is_wrong() {
+    let (mut held, mut samples) = (0, 0);
+    for (run, reference) in references(&Method::physical(), 90..99, 300.0) {
+        assert_eq!(reference.restarts, 0, "{:?}", reference.events);
+        held += reference.held;
+        samples += run.e.len() as u64;
+    }
+    println!("{held} of {samples}");
+    assert!(held * 100_000 <= samples, "{held} of {samples}");
+}
