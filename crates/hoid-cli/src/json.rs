@@ -14,11 +14,7 @@ use hoid_track::{Change, TrackFault};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::{
-    commands::{faults, reading::Account},
-    error::CliError,
-    output,
-};
+use crate::{commands::reading::Account, error::CliError, output};
 
 /// A number, or null where there is none: JSON has no NaN.
 pub fn number(value: f64) -> Value {
@@ -235,6 +231,8 @@ pub struct Identified<'a> {
     pub files: &'a [String],
     pub records: &'a [Record],
     pub accounts: &'a [Account],
+    /// What was wrong with the data, and what was done.
+    pub faults: Value,
     pub fit: &'a Fit,
     pub choice: Option<&'a Choice>,
     pub grey_box: Option<&'a GreyBoxFit>,
@@ -261,7 +259,7 @@ impl Identified<'_> {
         set("hoid", json!(env!("CARGO_PKG_VERSION")));
         set("records", records(self.files, self.records, self.accounts));
         set("warnings", warnings(self.files, self.accounts));
-        set("faults", faults::to_json(self.files, self.accounts));
+        set("faults", self.faults.clone());
         set("verdict", verdict(self.verdict));
         let structure = fit.model().structure().name();
         set(

@@ -90,6 +90,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         files: &files,
         records: &records,
         accounts: &accounts,
+        faults: faults::to_json(&files, &accounts),
         quality: GoodnessOfFit::pooled(records.iter().zip(&validations)),
         fit: &fit,
         choice: choice.as_ref(),
