@@ -22,6 +22,7 @@ use super::{
     preparation_settings::PreparationSettings,
     read_settings::ReadSettings,
     sampling_defects::{SamplingDefect, recorded},
+    virtual_subjects::check_number,
 };
 use crate::{StudyError, columns::Rows};
 
@@ -191,6 +192,7 @@ impl PeopleExperiment {
         if least.contains(&0) {
             return bad("there are no subjects, runs, plants or remnants, expected at least one of each".to_owned());
         }
+        check_number(&[self.subjects, self.runs, self.plants.len() as u64])?;
         for (i, plant) in self.plants.iter().enumerate() {
             if self.plants[..i].contains(plant) {
                 return bad(format!("the plant {plant} is named twice; name each once"));
