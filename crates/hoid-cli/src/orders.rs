@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
 use hoid_ident::{Constraint, OrderRanges, Prior};
-use hoid_model::{Orders, SampleTime, Structure};
+use hoid_model::{MAX_DELAY, MAX_ORDER, Orders, SampleTime, Structure};
 
 use crate::error::CliError;
 
@@ -26,6 +26,15 @@ pub fn parse_range(text: &str) -> Result<RangeInclusive<usize>, String> {
             Ok(low..=high)
         }
     }
+}
+
+/// Most samples ahead of a prediction that is judged.
+const MOST_AHEAD: usize = 1_000_000;
+
+/// A number of samples ahead.
+pub fn parse_horizon(text: &str) -> Result<usize, String> {
+    let samples = text.trim().parse().ok().filter(|k| (1..=MOST_AHEAD).contains(k));
+    samples.ok_or_else(|| format!("{text:?} is no number of samples ahead; write 1 to {MOST_AHEAD}"))
 }
 
 /// `name=value,name=value`.
@@ -86,6 +95,25 @@ pub fn ranges(
     if let Some(nk) = nk {
         ranges.nk = nk.clone();
     }
+    let orders = [
+        ("na", &ranges.na),
+        ("nb", &ranges.nb),
+        ("nc", &ranges.nc),
+        ("nd", &ranges.nd),
+        ("nf", &ranges.nf),
+    ];
+    let of_delay = std::iter::once(("nk", &ranges.nk, MAX_DELAY));
+    for (name, range, most) in orders.into_iter().map(|(n, r)| (n, r, MAX_ORDER)).chain(of_delay) {
+        if *range.end() > most {
+            return Err(CliError::Usage(format!(
+                "{name} = {}: at most {most} is possible; give a smaller number or range",
+                range.end()
+            )));
+        }
+    }
+    ranges
+        .candidates()
+        .map_err(|error| CliError::Usage(error.to_string()))?;
     Ok(ranges)
 }
 

@@ -2,7 +2,10 @@
 //! what it wanted: the command goes on with its files, and nothing is said. Any other output that
 //! cannot be written, such as a full disk, is an error.
 
-use std::io::{self, ErrorKind, Write};
+use std::{
+    io::{self, ErrorKind, Write},
+    sync::atomic::{AtomicBool, Ordering},
+};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -22,9 +25,20 @@ pub fn print(text: &str) -> Result<(), CliError> {
 /// As [`print`].
 pub fn printed(written: io::Result<()>) -> Result<(), CliError> {
     match written.and_then(|()| io::stdout().flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(CliError::Output(error)),
-        _ => Ok(()),
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => {
+            READER_LEFT.store(true, Ordering::Relaxed);
+            Ok(())
+        }
+        Err(error) => Err(CliError::Output(error)),
+        Ok(()) => Ok(()),
     }
+}
+
+static READER_LEFT: AtomicBool = AtomicBool::new(false);
+
+/// Whether the reader of standard output has closed the pipe.
+pub fn reader_left() -> bool {
+    READER_LEFT.load(Ordering::Relaxed)
 }
 
 /// Writes a warning, a note or an error to standard error.

@@ -12,6 +12,9 @@ use rayon::prelude::*;
 
 use crate::{Estimator, Fit, IdentError, SearchOptions, criterion::first_residual};
 
+/// Most candidates of a search: each is a fit of some milliseconds.
+pub const MOST_CANDIDATES: usize = 100_000;
+
 /// A range for each order and for the delay.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OrderRanges {
@@ -70,16 +73,36 @@ impl OrderRanges {
         ]
     }
 
-    /// All combinations, the delay running fastest.
+    /// Number of all combinations.
     ///
     /// # Errors
-    /// [`IdentError::EmptyRange`].
-    pub fn combinations(&self) -> Result<Vec<Orders>, IdentError> {
+    /// [`IdentError::EmptyRange`]; [`IdentError::BadOption`] for more than [`MOST_CANDIDATES`].
+    pub fn candidates(&self) -> Result<usize, IdentError> {
         if let Some((name, range)) = self.named().into_iter().find(|(_, r)| r.is_empty()) {
             return Err(IdentError::EmptyRange {
                 range: format!("{name}={}..{}", range.start(), range.end()),
             });
         }
+        let numbers = self
+            .named()
+            .map(|(_, range)| *range.end() as f64 - *range.start() as f64 + 1.0);
+        let all: f64 = numbers.iter().product();
+        if all > MOST_CANDIDATES as f64 {
+            return Err(IdentError::BadOption {
+                option: "the search of orders and delay".to_owned(),
+                found: format!("{all} candidates ({self})"),
+                expected: format!("at most {MOST_CANDIDATES}: narrow --nk and --orders"),
+            });
+        }
+        Ok(all as usize)
+    }
+
+    /// All combinations, the delay running fastest.
+    ///
+    /// # Errors
+    /// As [`OrderRanges::candidates`].
+    pub fn combinations(&self) -> Result<Vec<Orders>, IdentError> {
+        self.candidates()?;
         let mut all = vec![Orders::default()];
         let mut vary = |range: &RangeInclusive<usize>, set: fn(&mut Orders, usize)| {
             all = all
@@ -429,6 +452,30 @@ mod tests {
     use hoid_model::SampleTime;
 
     use super::*;
+
+    #[test]
+    fn searches_have_an_end() {
+        let one = OrderRanges::from(Structure::BoxJenkins.operator_orders(29));
+        for ranges in [
+            OrderRanges {
+                nk: 0..=usize::MAX,
+                ..one.clone()
+            },
+            OrderRanges {
+                na: 0..=64,
+                nb: 0..=64,
+                nc: 0..=64,
+                nd: 0..=64,
+                nf: 0..=64,
+                nk: 0..=64,
+            },
+        ] {
+            let message = ranges.combinations().unwrap_err().to_string();
+            assert!(message.contains("at most 100000"), "{message}");
+        }
+        let most = OrderRanges { nk: 1..=100_000, ..one };
+        assert_eq!(most.candidates(), Ok(100_000));
+    }
 
     #[test]
     fn combinations_run_through_all_and_empty_ranges_are_refused() {

@@ -101,6 +101,18 @@ pub enum IoError {
         /// The first cells.
         found: String,
     },
+    /// A table without end to the side.
+    #[error(
+        "{file} has {found} columns, expected at most {most}; save the columns that are needed alone, or look for lost line ends"
+    )]
+    TooManyColumns {
+        /// The file.
+        file: String,
+        /// Columns of the file.
+        found: usize,
+        /// The limit.
+        most: usize,
+    },
     /// One name for two columns.
     #[error("{file}: columns {first} and {second} are both named \"{name}\"; give each column a name of its own")]
     DuplicateColumn {

@@ -115,7 +115,8 @@ fn sweep(directory: &Path) {
     for entry in entries {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        if !(name.starts_with(PREFIX) && name.ends_with(SUFFIX)) || !entry.file_type().is_ok_and(|t| t.is_file()) {
+        let is_part = name.starts_with(PREFIX) && name.ends_with(SUFFIX);
+        if !is_part || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
             continue;
         }
         let path = entry.path();

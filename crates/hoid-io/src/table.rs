@@ -4,6 +4,7 @@
 //! same for all formats. A value that is missing or no number is NaN here; the file is asked again
 //! what stood there only when an error has to say so, which keeps a million rows cheap.
 
+use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::IoError;
@@ -177,10 +178,12 @@ impl Table<'_> {
 
 /// Checks that the names differ, and notes the columns without one.
 pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>) -> Result<(), IoError> {
+    check_number(names.len(), file)?;
+    let mut known: HashMap<&str, usize> = HashMap::new();
     for (second, name) in names.iter().enumerate() {
         if name.is_empty() {
             notes.push(format!("column {} has no name and is left out", second + 1));
-        } else if let Some(first) = names[..second].iter().position(|other| other == name) {
+        } else if let Some(first) = known.insert(name, second) {
             return Err(IoError::DuplicateColumn {
                 file: file.to_owned(),
                 name: shown(name),
@@ -192,13 +195,29 @@ pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>)
     Ok(())
 }
 
+/// Most columns of a table: a recording has some tens.
+const MOST_COLUMNS: usize = 10_000;
+
+/// Checks the number of columns, before anything is made of them.
+pub(crate) fn check_number(columns: usize, file: &str) -> Result<(), IoError> {
+    if columns <= MOST_COLUMNS {
+        return Ok(());
+    }
+    Err(IoError::TooManyColumns {
+        file: file.to_owned(),
+        found: columns,
+        most: MOST_COLUMNS,
+    })
+}
+
 /// Takes the units from the comments above a table, and gives the sample time that they state.
 pub(crate) fn asides<'a>(comments: impl Iterator<Item = &'a str>, columns: &mut [Column]) -> Option<f64> {
     let mut sample_time_s = None;
     for line in comments {
         let line = line.trim_start_matches('#').trim();
         if let Some(units) = line.strip_prefix("units:") {
-            for part in units.split(',').map(str::trim) {
+            // Of more parts than columns the rest names nothing.
+            for part in units.split(',').take(columns.len()).map(str::trim) {
                 // A name or a unit may hold blanks: the column that fits with the longest name is
                 // the one.
                 let unit_of = |column: &Column| {

@@ -103,5 +103,5 @@ pub use operator_family::{FamilyOperator, Form};
 pub use polynomial_model::PolynomialModel;
 pub use record::{Channel, Detrend, Record};
 pub use sample_time::SampleTime;
-pub use structure::{Orders, Structure};
+pub use structure::{MAX_DELAY, MAX_ORDER, Orders, Structure};
 pub use transfer_function::{ContinuousTransferFunction, DiscreteTransferFunction};

@@ -19,7 +19,7 @@
 
 use std::fmt;
 
-use hoid_core::stability::MAX_ORDER;
+pub use hoid_core::stability::MAX_ORDER;
 
 use crate::ModelError;
 
@@ -144,6 +144,9 @@ crate::named_choice!(Structure, "structure", 11, {
     General => "general",
 });
 
+/// Longest delay of a model, samples: a hundred seconds at 10 kHz.
+pub const MAX_DELAY: usize = 1_000_000;
+
 /// Numbers of coefficients and the delay.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Orders {
@@ -181,7 +184,7 @@ impl Orders {
     /// First sample at which the undisturbed part can be computed without any input or output from
     /// before the record: `max(na, nk + nb - 1)`.
     pub fn first_regressed_sample(&self) -> usize {
-        self.na.max(self.nk + self.nb.saturating_sub(1))
+        self.na.max(self.nk.saturating_add(self.nb.saturating_sub(1)))
     }
 
     /// Checks the orders against the structure.
@@ -211,6 +214,9 @@ impl Orders {
             if n > MAX_ORDER {
                 return refuse(format!("n{letter} must not exceed {MAX_ORDER}"));
             }
+        }
+        if self.nk > MAX_DELAY {
+            return refuse(format!("nk must not exceed {MAX_DELAY} samples"));
         }
         if structure.has_input() && self.nb == 0 {
             return refuse(

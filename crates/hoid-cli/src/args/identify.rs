@@ -16,7 +16,7 @@ use super::{
     parse::{parse_span, parse_width},
     reading::{FaultArgs, MaskArgs, ReadArgs},
 };
-use crate::orders::parse_range;
+use crate::orders::{parse_horizon, parse_range};
 
 #[derive(Debug, Args)]
 pub struct IdentifyArgs {
@@ -109,7 +109,7 @@ pub struct IdentifyArgs {
     #[arg(long, value_name = "WIDTH", value_parser = parse_width, requires = "figure")]
     pub width: Option<f64>,
     /// Also judge the prediction K samples ahead
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", value_parser = parse_horizon)]
     pub horizon: Option<usize>,
     /// Another record to judge the model on
     #[arg(long, value_name = "FILE")]

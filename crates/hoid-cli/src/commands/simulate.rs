@@ -29,6 +29,9 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
     let piped = args.out.as_os_str() == "-";
     if piped {
         write_out(&record)?;
+        if output::reader_left() {
+            return Ok(());
+        }
     } else {
         write_record(&args.out, &record)?;
     }

@@ -188,7 +188,8 @@ impl Fit {
         let eps = self.residuals(record)?;
         let m = self.model();
         let mut h = monic(m.c());
-        h.resize(k, 0.0);
+        // Beyond the record nothing is multiplied.
+        h.resize(k.min(eps.values.len().max(1)), 0.0);
         let poles = product(&monic(m.a()), &monic(m.d()));
         hoid_core::filter::divide_in_place(&poles[1..], &mut h);
         let mut errors = vec![0.0; eps.values.len()];

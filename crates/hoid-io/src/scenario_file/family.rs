@@ -16,7 +16,8 @@ use toml::Spanned;
 use super::error::ScenarioFileError;
 use super::family_keys::{ExcitationTable, FamilyFile, FamilyStateTable, FollowsKey, PartTable, ShapeKey};
 use super::keys::RealisationKey;
-use super::values::Source;
+use super::scenario::MOST_LINES;
+use super::values::{Limits, Source};
 
 impl Source<'_> {
     pub(super) fn family_scenario(&self, file: FamilyFile, name: &str) -> Result<FamilyScenario, ScenarioFileError> {
@@ -24,8 +25,11 @@ impl Source<'_> {
             let expected = error.to_string();
             self.value("form", file.form.span().start, file.form.get_ref(), &expected)
         })?;
-        let rate = self.positive("sampling_rate_hz", file.sampling_rate_hz)?;
-        let sample_time = match (self.positive("sample_time_s", file.sample_time_s)?, rate) {
+        let rate = self.limited("sampling_rate_hz", file.sampling_rate_hz, Limits::RATE_HZ)?;
+        let sample_time = match (
+            self.limited("sample_time_s", file.sample_time_s, Limits::SAMPLE_TIME_S)?,
+            rate,
+        ) {
             (None, None) => SampleTime::SIXTIETH,
             (Some(ts), None) => SampleTime::new(ts).map_err(|error| self.model(error))?,
             (None, Some(rate)) => SampleTime::new(1.0 / rate).map_err(|error| self.model(error))?,
@@ -86,6 +90,12 @@ impl Source<'_> {
         table: &str,
         given: &FamilyStateTable,
     ) -> Result<FamilyState, ScenarioFileError> {
+        for (key, value) in given.numbers() {
+            // An infinite lag is an integrator.
+            if let Some(value) = value.filter(|value| !(key == "T_I_s" && value.is_infinite())) {
+                self.checked(&format!("{table}.{key}"), value, limits_of(key))?;
+            }
+        }
         let need = |key: &str, value: Option<f64>| {
             value.ok_or_else(|| self.keys(&format!("[{table}] lacks {key} for the form {form}")))
         };
@@ -159,12 +169,28 @@ impl Source<'_> {
             let expected = "NUM/DEN by falling powers of s, such as 1/1,1,0";
             return Err(self.value(key, given.span().start, given.get_ref(), expected));
         };
+        if let Some(value) = num.iter().chain(&den).find(|value| !Limits::ANY.hold(**value)) {
+            return Err(self.value(
+                key,
+                given.span().start,
+                value,
+                &format!("{} in each coefficient", Limits::ANY),
+            ));
+        }
         ContinuousTransferFunction::new(&num, &den)
             .map_err(|error| self.value(key, given.span().start, given.get_ref(), &error.to_string()))
     }
 
     fn excitation(&self, name: &str, given: ExcitationTable) -> Result<Excitation, ScenarioFileError> {
         let Some(lines) = given.lines else {
+            for (key, value, limits) in [
+                ("period_s", given.period_s, Limits::INTERVAL_S),
+                ("rms", given.rms, Limits::NOISE_GAIN),
+            ] {
+                if let Some(value) = value {
+                    self.checked(&format!("{name}.{key}"), value, limits)?;
+                }
+            }
             let usual = MultiSine::default();
             let sum = MultiSine {
                 period_s: given.period_s.unwrap_or(usual.period_s),
@@ -180,6 +206,21 @@ impl Source<'_> {
                 "[{name}] has lines of its own and keys of a multi-sine: give one of both"
             )));
         }
+        if lines.len() > MOST_LINES {
+            return Err(self.keys(&format!(
+                "[{name}] has {} lines, expected at most {MOST_LINES}",
+                lines.len()
+            )));
+        }
+        for line in &lines {
+            self.checked(&format!("{name}.lines.amplitude"), line.amplitude, Limits::GAIN)?;
+            self.checked(
+                &format!("{name}.lines.omega_rad_s"),
+                line.omega_rad_s,
+                Limits::FREQUENCY_RAD_S,
+            )?;
+            self.checked(&format!("{name}.lines.phase_rad"), line.phase_rad, Limits::PHASE_RAD)?;
+        }
         let line = |line: &super::family_keys::LineTable| Sinusoid {
             amplitude_deg: line.amplitude,
             omega_rad_s: line.omega_rad_s,
@@ -193,6 +234,29 @@ impl Source<'_> {
 
     fn part(&self, k: usize, given: PartTable) -> Result<RemnantPart, ScenarioFileError> {
         let refuse = |reason: String| Err(self.keys(&format!("[[remnant]] number {k}: {reason}")));
+        let numbers = [
+            given.share,
+            given.gain,
+            given.gain_last,
+            given.t_n_s,
+            given.omega_rad_s,
+            given.zeta,
+            given.follows_part,
+            given.follows_memory_s,
+            given.pulses_per_s,
+            given.pulses_part,
+            given.on_s,
+            given.off_s,
+        ];
+        let coefficients = given.coefficients.iter().flatten().copied();
+        if let Some(value) = numbers
+            .into_iter()
+            .flatten()
+            .chain(coefficients)
+            .find(|v| !Limits::GAIN.hold(*v))
+        {
+            return refuse(format!("it has {value}, expected {}", Limits::GAIN));
+        }
         let strength = match (given.share, given.gain) {
             (Some(share), None) if given.gain_last.is_none() => PartStrength::Share(share),
             (None, Some(initial)) => PartStrength::Gain {
@@ -276,6 +340,16 @@ impl Source<'_> {
                 .zip(given.off_s)
                 .map(|(on_s, off_s)| Intermittence { on_s, off_s }),
         })
+    }
+}
+
+/// What a number of an operator may be.
+fn limits_of(key: &str) -> Limits {
+    match key {
+        "T_L_s" | "T_I_s" | "c_1_s" | "c_2_s2" | "tau_e_s" => Limits::LEAD_S,
+        "omega_nm_rad_s" => Limits::FREQUENCY_RAD_S,
+        "zeta_nm" => Limits::DAMPING,
+        _ => Limits::GAIN,
     }
 }
 

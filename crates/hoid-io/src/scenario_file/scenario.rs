@@ -12,7 +12,10 @@ use hoid_model::{
 
 use super::error::ScenarioFileError;
 use super::keys::{DefinitionKey, File, RealisationKey, RemnantTable, ScheduleTable, SinusoidTable, StateTable};
-use super::values::Source;
+use super::values::{Limits, Source};
+
+/// Most lines of a forcing function.
+pub(super) const MOST_LINES: usize = 10_000;
 
 impl Source<'_> {
     pub(super) fn scenario(&self, file: File, name: &str) -> Result<Scenario, ScenarioFileError> {
@@ -32,7 +35,7 @@ impl Source<'_> {
         }
         let mut scenario = Scenario::condition(condition.unwrap_or(Condition::C1));
         scenario.name = file.name.unwrap_or_else(|| name.to_owned());
-        if let Some(ts) = self.positive("sample_time_s", file.sample_time_s)? {
+        if let Some(ts) = self.limited("sample_time_s", file.sample_time_s, Limits::SAMPLE_TIME_S)? {
             scenario.sample_time = SampleTime::new(ts).map_err(|error| self.model(error))?;
         }
         let ts = scenario.sample_time;
@@ -109,26 +112,25 @@ impl Source<'_> {
         } = state;
         operator.tau_e_s = self.whole(&key("tau_e_s"), given.tau_e_s, operator.tau_e_s, sample_time, 0.0)?;
         let any = [
-            ("K_e", given.k_e, &mut operator.k_e),
-            ("T_L_s", given.t_l_s, &mut operator.t_l_s),
-            ("K_c", given.k_c, &mut controlled_element.k_c),
+            ("K_e", given.k_e, &mut operator.k_e, Limits::GAIN),
+            ("T_L_s", given.t_l_s, &mut operator.t_l_s, Limits::LEAD_S),
+            ("K_c", given.k_c, &mut controlled_element.k_c, Limits::GAIN),
             (
                 "omega_b_rad_s",
                 given.omega_b_rad_s,
                 &mut controlled_element.omega_b_rad_s,
+                Limits::BREAK_RAD_S,
             ),
+            (
+                "omega_nm_rad_s",
+                given.omega_nm_rad_s,
+                &mut operator.omega_nm_rad_s,
+                Limits::FREQUENCY_RAD_S,
+            ),
+            ("zeta_nm", given.zeta_nm, &mut operator.zeta_nm, Limits::DAMPING),
         ];
-        for (name, value, target) in any {
-            if let Some(value) = self.finite(&key(name), value)? {
-                *target = value;
-            }
-        }
-        let positive = [
-            ("omega_nm_rad_s", given.omega_nm_rad_s, &mut operator.omega_nm_rad_s),
-            ("zeta_nm", given.zeta_nm, &mut operator.zeta_nm),
-        ];
-        for (name, value, target) in positive {
-            if let Some(value) = self.positive(&key(name), value)? {
+        for (name, value, target, limits) in any {
+            if let Some(value) = self.limited(&key(name), value, limits)? {
                 *target = value;
             }
         }
@@ -137,20 +139,22 @@ impl Source<'_> {
 
     pub(super) fn schedule(&self, given: Option<ScheduleTable>, base: Schedule) -> Result<Schedule, ScenarioFileError> {
         let Some(given) = given else { return Ok(base) };
-        let rate = self.positive("schedule.rate_per_s", given.rate_per_s)?;
-        let midpoint = self.finite("schedule.midpoint_s", given.midpoint_s)?;
+        let rate = self.limited("schedule.rate_per_s", given.rate_per_s, Limits::CHANGE_PER_S)?;
+        let midpoint = self.limited("schedule.midpoint_s", given.midpoint_s, Limits::INSTANT_S)?;
         let (of_base, at_base) = (base.rate_per_s(), base.change_s());
         let missing = |key: &str| self.keys(&format!("[schedule] lacks {key}: there is no change to take it from"));
         let rate_per_s = rate.or(of_base).ok_or_else(|| missing("rate_per_s"))?;
         let midpoint_s = midpoint.or(at_base).ok_or_else(|| missing("midpoint_s"))?;
-        Ok(match self.positive("schedule.interval_s", given.interval_s)? {
-            Some(interval_s) => Schedule::Alternating {
-                rate_per_s,
-                midpoint_s,
-                interval_s,
+        Ok(
+            match self.limited("schedule.interval_s", given.interval_s, Limits::INTERVAL_S)? {
+                Some(interval_s) => Schedule::Alternating {
+                    rate_per_s,
+                    midpoint_s,
+                    interval_s,
+                },
+                None => Schedule::Sigmoid { rate_per_s, midpoint_s },
             },
-            None => Schedule::Sigmoid { rate_per_s, midpoint_s },
-        })
+        )
     }
 
     fn remnant(&self, scenario: &mut Scenario, given: RemnantTable) -> Result<(), ScenarioFileError> {
@@ -160,17 +164,17 @@ impl Source<'_> {
                 _ => return Err(self.value("remnant.order", order.span().start, order.get_ref(), "1, 2, 3 or 4")),
             };
         }
-        if let Some(t_n_s) = self.positive("remnant.T_n_s", given.t_n_s)? {
+        if let Some(t_n_s) = self.limited("remnant.T_n_s", given.t_n_s, Limits::TIME_CONSTANT_S)? {
             scenario.remnant.time_constant_s = t_n_s;
         }
-        let level = self.not_negative("remnant.noise_level", given.noise_level)?;
+        let level = self.limited("remnant.noise_level", given.noise_level, Limits::NOISE_LEVEL)?;
         let definition = given.noise_definition.map(|key| match key {
             DefinitionKey::Response => NoiseDefinition::Response,
             DefinitionKey::Remnant => NoiseDefinition::Remnant,
         });
         let gains = [
-            self.not_negative("remnant.K_n_initial_deg", given.k_n_initial_deg)?,
-            self.not_negative("remnant.K_n_last_deg", given.k_n_last_deg)?,
+            self.limited("remnant.K_n_initial_deg", given.k_n_initial_deg, Limits::NOISE_GAIN)?,
+            self.limited("remnant.K_n_last_deg", given.k_n_last_deg, Limits::NOISE_GAIN)?,
         ];
         match (gains, &mut scenario.remnant.strength) {
             (
@@ -206,10 +210,16 @@ impl Source<'_> {
     }
 
     fn forcing(&self, tables: Vec<SinusoidTable>, measurement_s: f64) -> Result<ForcingFunction, ScenarioFileError> {
+        if tables.len() > MOST_LINES {
+            return Err(self.keys(&format!(
+                "{} tables [[forcing]], expected at most {MOST_LINES}",
+                tables.len()
+            )));
+        }
         let mut sinusoids = Vec::with_capacity(tables.len());
         for (k, table) in (1..).zip(tables) {
-            let omega = self.positive("forcing.omega_rad_s", table.omega_rad_s)?;
-            let cycles = self.positive("forcing.cycles", table.cycles)?;
+            let omega = self.limited("forcing.omega_rad_s", table.omega_rad_s, Limits::FREQUENCY_RAD_S)?;
+            let cycles = self.limited("forcing.cycles", table.cycles, Limits::CYCLES)?;
             let omega_rad_s = match (omega, cycles) {
                 (Some(omega), None) => omega,
                 (None, Some(cycles)) => cycles * TAU / measurement_s,
@@ -220,9 +230,9 @@ impl Source<'_> {
                 }
             };
             sinusoids.push(Sinusoid {
-                amplitude_deg: self.number("forcing.amplitude_deg", &table.amplitude_deg)?,
+                amplitude_deg: self.number("forcing.amplitude_deg", &table.amplitude_deg, Limits::GAIN)?,
                 omega_rad_s,
-                phase_rad: self.number("forcing.phase_rad", &table.phase_rad)?,
+                phase_rad: self.number("forcing.phase_rad", &table.phase_rad, Limits::PHASE_RAD)?,
             });
         }
         ForcingFunction::new(sinusoids).map_err(|error| self.model(error))

@@ -1,13 +1,74 @@
 //! The numbers of a file, traced back to their lines.
 
 use hoid_model::{ModelError, SampleTime};
-use toml::Spanned;
 
 use super::error::ScenarioFileError;
 use super::keys::Number;
 
 /// Most samples of a run, so that a slip of the unit does not ask for all memory.
 const MOST_SAMPLES: f64 = 1e7;
+
+/// What a number of a scenario may be, so that a slip of the unit is told and not simulated.
+#[derive(Clone, Copy)]
+pub(super) struct Limits(f64, f64);
+
+impl Limits {
+    /// Sample times: a second of a recording at 1 MHz down to one sample in ten seconds.
+    pub(super) const SAMPLE_TIME_S: Self = Self(1e-6, 10.0);
+    pub(super) const RATE_HZ: Self = Self(0.1, 1e6);
+    /// Gains of a person, an element or a remnant, and amplitudes.
+    pub(super) const GAIN: Self = Self(-1e6, 1e6);
+    pub(super) const NOISE_GAIN: Self = Self(0.0, 1e6);
+    /// Leads and other times of a person.
+    pub(super) const LEAD_S: Self = Self(-1e3, 1e3);
+    /// Break frequencies of an element; below zero it is unstable.
+    pub(super) const BREAK_RAD_S: Self = Self(-1e4, 1e4);
+    /// Frequencies of a person and of forcing functions.
+    pub(super) const FREQUENCY_RAD_S: Self = Self(1e-6, 1e4);
+    pub(super) const DAMPING: Self = Self(1e-6, 1e3);
+    pub(super) const CYCLES: Self = Self(1e-6, 1e6);
+    /// Time constants of a remnant.
+    pub(super) const TIME_CONSTANT_S: Self = Self(1e-6, 1e4);
+    /// Var(u_n)/var(u), or var(n)/var(u).
+    pub(super) const NOISE_LEVEL: Self = Self(0.0, 100.0);
+    pub(super) const PHASE_RAD: Self = Self(-1e6, 1e6);
+    /// Rate of a change; 1e6 in 1/s is a step.
+    pub(super) const CHANGE_PER_S: Self = Self(1e-6, 1e9);
+    pub(super) const INSTANT_S: Self = Self(-1e9, 1e9);
+    pub(super) const INTERVAL_S: Self = Self(1e-6, 1e9);
+    /// A coefficient of a transfer function, and anything else.
+    pub(super) const ANY: Self = Self(-1e12, 1e12);
+
+    pub(super) fn hold(self, value: f64) -> bool {
+        (self.0..=self.1).contains(&value)
+    }
+}
+
+impl std::fmt::Display for Limits {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let shown = |v: f64| {
+            if v == 0.0 || (0.01..1e5).contains(&v.abs()) {
+                v.to_string()
+            } else {
+                format!("{v:e}")
+            }
+        };
+        if self.0 == 0.0 {
+            return write!(f, "a finite number, zero or more, up to {}", shown(self.1));
+        }
+        let sign = if self.0 > 0.0 { "positive" } else { "finite" };
+        write!(f, "a {sign} number from {} to {}", shown(self.0), shown(self.1))
+    }
+}
+
+/// A number with an exponent where its digits would fill the line.
+fn in_short(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() || (1e-5..1e16).contains(&value.abs()) {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
+}
 
 /// Line of a byte of a text, from 1.
 pub(super) fn line_of(text: &str, offset: usize) -> usize {
@@ -41,46 +102,37 @@ impl Source<'_> {
             sample_time.s()
         );
         Err(match given {
-            Some(given) => self.value(key, given.span().start, &time_s, &expected),
+            Some(given) => self.value(key, given.span().start, &in_short(time_s), &expected),
             None => self.keys(&format!(
                 "{key} is {time_s} where the file does not give it, expected {expected}"
             )),
         })
     }
 
-    pub(super) fn positive(&self, key: &str, given: Option<Number>) -> Result<Option<f64>, ScenarioFileError> {
-        self.within(key, given, |v| v > 0.0, "a positive finite number")
-    }
-
-    pub(super) fn not_negative(&self, key: &str, given: Option<Number>) -> Result<Option<f64>, ScenarioFileError> {
-        self.within(key, given, |v| v >= 0.0, "a finite number, zero or more")
-    }
-
-    pub(super) fn finite(&self, key: &str, given: Option<Number>) -> Result<Option<f64>, ScenarioFileError> {
-        self.within(key, given, |_| true, "a finite number")
-    }
-
-    pub(super) fn number(&self, key: &str, given: &Number) -> Result<f64, ScenarioFileError> {
-        let value = *given.get_ref();
-        if value.is_finite() {
-            return Ok(value);
-        }
-        Err(self.value(key, given.span().start, &value, "a finite number"))
-    }
-
-    pub(super) fn within(
+    /// A number that the file may give.
+    pub(super) fn limited(
         &self,
         key: &str,
         given: Option<Number>,
-        has_meaning: impl Fn(f64) -> bool,
-        expected: &str,
+        limits: Limits,
     ) -> Result<Option<f64>, ScenarioFileError> {
-        match given {
-            Some(n) if !(n.get_ref().is_finite() && has_meaning(*n.get_ref())) => {
-                Err(self.value(key, n.span().start, n.get_ref(), expected))
-            }
-            given => Ok(given.map(Spanned::into_inner)),
+        given.map(|given| self.number(key, &given, limits)).transpose()
+    }
+
+    pub(super) fn number(&self, key: &str, given: &Number, limits: Limits) -> Result<f64, ScenarioFileError> {
+        let value = *given.get_ref();
+        if limits.hold(value) {
+            return Ok(value);
         }
+        Err(self.value(key, given.span().start, &in_short(value), &limits.to_string()))
+    }
+
+    /// A number whose line is not known.
+    pub(super) fn checked(&self, key: &str, value: f64, limits: Limits) -> Result<(), ScenarioFileError> {
+        if limits.hold(value) {
+            return Ok(());
+        }
+        Err(self.keys(&format!("{key} is {}, expected {limits}", in_short(value))))
     }
 
     pub(super) fn value(

@@ -17,7 +17,7 @@ use hoid_sim::{
 
 use super::{
     analysis_settings::AnalysisSettings, condition_settings::ConditionSettings, manifest::Manifest,
-    sampling_defects::SamplingDefect, virtual_files::VirtualFiles,
+    sampling_defects::SamplingDefect, virtual_files::VirtualFiles, virtual_subjects::check_number,
 };
 use crate::{StudyError, columns::Rows};
 
@@ -142,6 +142,7 @@ impl PeopleExperiment {
         if least.contains(&0) {
             return bad("there are no subjects, runs, plants or remnants, expected at least one of each".to_owned());
         }
+        check_number(&[self.subjects, self.runs, self.plants.len() as u64])?;
         for (i, plant) in self.plants.iter().enumerate() {
             if self.plants[..i].contains(plant) {
                 return bad(format!("the plant {plant} is named twice; name each once"));

@@ -108,12 +108,32 @@ pub fn simulate_group(
     )
 }
 
+/// Most runs of a virtual experiment: a file each.
+const MOST_RUNS: u64 = 100_000;
+
+/// Checks the number of files that an experiment would write.
+pub(super) fn check_number(factors: &[u64]) -> Result<(), StudyError> {
+    let runs = factors.iter().try_fold(1_u64, |all, n| all.checked_mul(*n));
+    if runs.is_some_and(|runs| runs <= MOST_RUNS) {
+        return Ok(());
+    }
+    let found: Vec<String> = factors.iter().map(u64::to_string).collect();
+    Err(StudyError::Virtual {
+        reason: format!(
+            "subjects times runs times conditions are {}, expected at most {MOST_RUNS} runs in all: ask for fewer, or \
+             make several experiments with other seeds",
+            found.join(" x ")
+        ),
+    })
+}
+
 impl VirtualExperiment {
     fn check(&self) -> Result<(), StudyError> {
         let bad = |reason: String| Err(StudyError::Virtual { reason });
         if self.subjects == 0 || self.runs == 0 || self.conditions.is_empty() {
             return bad("there are no subjects, runs or conditions, expected at least one of each".to_owned());
         }
+        check_number(&[self.subjects, self.runs, self.conditions.len() as u64])?;
         for (name, spread) in [("subjects", self.between_subjects), ("runs", self.between_runs)] {
             if !(0.0..=1.0).contains(&spread) {
                 return bad(format!("the spread between {name} is {spread}, expected 0 to 1"));

@@ -80,6 +80,12 @@ struct OwnKeys {
 /// Most replications of a cell.
 const MOST_REPLICATIONS: u64 = 100_000_000;
 
+/// Most estimates of a study.
+const MOST_ESTIMATES: u128 = 10_000_000_000;
+
+/// Most blocks of a study: a few files each.
+const MOST_BLOCKS: u128 = 1_000_000;
+
 impl Plan {
     /// Reads and checks a plan.
     ///
@@ -203,6 +209,7 @@ impl Plan {
                 });
             }
         }
+        plan.check_size().map_err(|reason| PlanProblem { line: None, reason })?;
         Ok(plan)
     }
 
@@ -226,7 +233,31 @@ impl Plan {
             };
         }
         self.replications = replications;
+        self.check_size().map_err(|reason| StudyError::Plan {
+            path: self.name.clone(),
+            line: None,
+            reason,
+        })?;
         Ok(self)
+    }
+
+    /// Whether the study has an end, and its parts a place.
+    fn check_size(&self) -> Result<(), String> {
+        let estimates = |cell: &Cell| u128::from(cell.replications) * self.estimators_of(cell).count() as u128;
+        let estimates: u128 = self.cells.iter().map(estimates).sum();
+        if estimates > MOST_ESTIMATES {
+            return Err(format!(
+                "it asks for {estimates} estimates, expected at most {MOST_ESTIMATES}: lower replications, or split the plan"
+            ));
+        }
+        let blocks = |cell: &Cell| u128::from(cell.replications.div_ceil(self.block.max(1)));
+        let blocks: u128 = self.cells.iter().map(blocks).sum();
+        if blocks > MOST_BLOCKS {
+            return Err(format!(
+                "it has {blocks} blocks, expected at most {MOST_BLOCKS}: raise block, or split the plan"
+            ));
+        }
+        Ok(())
     }
 
     /// The text of the plan as it was read.

@@ -12,7 +12,7 @@
 
 use super::text::{comments, is_aside, place, reader, row_start, separator, text};
 use crate::IoError;
-use crate::table::{Cell, Column, Source, Table, asides, check_names};
+use crate::table::{Cell, Column, Source, Table, asides, check_names, check_number};
 use crate::wording::shown;
 
 /// The text of the file, asked again when an error needs a line or a cell.
@@ -134,6 +134,7 @@ fn header(
     place: &mut dyn FnMut() -> String,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Column>, IoError> {
+    check_number(record.len(), file)?;
     let names: Vec<String> = record
         .iter()
         .map(|name| String::from_utf8_lossy(name).trim().to_owned())

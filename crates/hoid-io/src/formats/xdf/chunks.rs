@@ -6,13 +6,14 @@
 
 use std::collections::HashMap;
 
-use super::header::{self, Header};
+use super::header::{self, Footer, Header};
 use crate::arrays::Kind;
 use crate::wording::shown;
 
 const STREAM_HEADER: u16 = 2;
 const SAMPLES: u16 = 3;
 const CLOCK_OFFSET: u16 = 4;
+const STREAM_FOOTER: u16 = 6;
 
 /// One stream as it stands in the file.
 #[derive(Debug)]
@@ -24,6 +25,8 @@ pub(super) struct Stream {
     pub(super) samples: Samples,
     /// When the offset to the clock of the recorder was measured, and the offset, s.
     pub(super) offsets: Vec<(f64, f64)>,
+    /// None where the recorder has not closed the file, or its end is lost.
+    pub(super) footer: Option<Footer>,
 }
 
 /// The values of all channels, sample by sample.
@@ -79,7 +82,7 @@ pub(super) fn streams(bytes: &[u8]) -> Result<Vec<Stream>, String> {
             rest: rest.take(length).ok_or_else(ends)?,
         };
         let tag = content.array().map(u16::from_le_bytes).ok_or_else(ends)?;
-        if !matches!(tag, STREAM_HEADER | SAMPLES | CLOCK_OFFSET) {
+        if !matches!(tag, STREAM_HEADER | SAMPLES | CLOCK_OFFSET | STREAM_FOOTER) {
             continue;
         }
         let id = content.array().map(u32::from_le_bytes).ok_or_else(ends)?;
@@ -97,11 +100,16 @@ pub(super) fn streams(bytes: &[u8]) -> Result<Vec<Stream>, String> {
                 stamps: Vec::new(),
                 samples,
                 offsets: Vec::new(),
+                footer: None,
             });
             continue;
         }
         let stream = known.get(&id).and_then(|at| streams.get_mut(*at));
         let stream = stream.ok_or_else(|| damaged(String::from("its header is missing")))?;
+        if tag == STREAM_FOOTER {
+            stream.footer = Some(header::footer(content.rest).map_err(damaged)?);
+            continue;
+        }
         let read = if tag == SAMPLES {
             stream.samples(&mut content)
         } else {
@@ -130,6 +138,41 @@ fn empty(format: &str) -> Option<Samples> {
 }
 
 impl Stream {
+    /// What the footer says against what was read.
+    ///
+    /// # Errors
+    /// What is not there.
+    pub(super) fn check_footer(&self) -> Result<(), String> {
+        let Some(footer) = self.footer else { return Ok(()) };
+        let read = self.stamps.len();
+        if let Some(stated) = footer.samples.filter(|n| *n != read as u64) {
+            return Err(format!(
+                "stream {} ({}): its footer counts {stated} samples and {read} are there: the file lost a part",
+                self.id,
+                shown(&self.header.name)
+            ));
+        }
+        let ends = self.stamps.first().zip(self.stamps.last());
+        for (what, stated, found) in footer
+            .span_s
+            .zip(ends)
+            .into_iter()
+            .flat_map(|((from, to), (first, last))| [("first", from, *first), ("last", to, *last)])
+        {
+            // Recorders print them with six digits, and may leave out what a sample time says.
+            let slack_s = self.nominal_step_s().max(1e-5 * stated.abs()).max(1e-6);
+            if (stated - found).abs() > slack_s {
+                return Err(format!(
+                    "stream {} ({}): its footer says that the {what} sample stands at {stated} s, and it stands at {found} s: \
+                     the file lost a part",
+                    self.id,
+                    shown(&self.header.name)
+                ));
+            }
+        }
+        Ok(())
+    }
+
     fn samples(&mut self, content: &mut Bytes<'_>) -> Option<()> {
         // Nothing is reserved for the promised count; each sample takes one byte at least.
         for _ in 0..content.length()? {

@@ -8,6 +8,11 @@
 //! busy network counts little. Then `t <- t + b_0 + b_1 t`. Where the clock was set anew, each part
 //! has a line of its own. At last, of a stream with a nominal rate, the time stamps between two
 //! breaks are replaced by their least-squares line over the number of the sample.
+//!
+//! Beyond pyxdf, lost samples are a break as well: a step of more than [`LOST_SAMPLES`] nominal
+//! sample times `T` behind which the time stamps stay late, even after as many samples as are late,
+//! by the medians of `t_k - k T` on both sides. Samples that are late and then catch up are jitter. Without this a second that is lost
+//! would be spread over the recording, as a lower rate without a gap.
 
 use super::chunks::Stream;
 use crate::wording::shown;
@@ -22,6 +27,13 @@ const RESET_VALUE: (f64, f64) = (10.0, 1.0);
 /// A break: the longer of so many s and so many samples.
 const BREAK_S: f64 = 1.0;
 const BREAK_SAMPLES: f64 = 500.0;
+
+/// Lost samples: a step, and then a lateness, of so many sample times.
+const LOST_SAMPLES: f64 = 4.0;
+/// Samples on each side whose median says how late they are.
+const BESIDE: usize = 25;
+/// Share by which the rate may be off the stated one before that is said.
+const OFF: f64 = 0.02;
 
 /// The times of the samples, s.
 pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
@@ -47,7 +59,13 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
         return times;
     }
     let longest = BREAK_S.max(BREAK_SAMPLES * stream.nominal_step_s());
-    let (parts, effective_hz) = straighten(&mut times, longest);
+    let (parts, effective_hz) = straighten(&mut times, longest, stream.nominal_step_s());
+    if let Some(hz) = effective_hz.filter(|hz| (hz / nominal_hz - 1.0).abs() > OFF) {
+        notes.push(format!(
+            "stream {name}: its time stamps go at {hz:.4} Hz where {nominal_hz} Hz are stated: samples are lost evenly, or \
+             the stated rate is wrong"
+        ));
+    }
     let found = effective_hz.map_or_else(String::new, |hz| format!(", {hz:.4} Hz found"));
     let breaks = if parts > 1 {
         format!(" in {parts} parts")
@@ -165,11 +183,30 @@ fn line(offsets: &[(f64, f64)]) -> (f64, f64) {
     (UNIT_S * (x.0 - x.1 * start), x.1)
 }
 
+/// Whether samples were lost before the k-th: a long step, and then all are late by it.
+fn lost(times: &[f64], k: usize, nominal_s: f64) -> bool {
+    let late_s = times[k] - times[k - 1] - nominal_s;
+    if nominal_s.is_nan() || nominal_s <= 0.0 || late_s.is_nan() || late_s <= LOST_SAMPLES * nominal_s {
+        return false;
+    }
+    let lateness = |from: usize, to: usize| {
+        let of: Vec<f64> = (from..to)
+            .map(|j| times[j] - (j as f64 - k as f64) * nominal_s)
+            .collect();
+        median(&of)
+    };
+    // Once those that are late together have come.
+    let come = k.saturating_add((late_s / nominal_s).ceil() as usize);
+    let from = come.min(times.len().saturating_sub(BESIDE)).max(k);
+    let shift_s = lateness(from, (from + BESIDE).min(times.len())) - lateness(k.saturating_sub(BESIDE), k);
+    shift_s > LOST_SAMPLES * nominal_s && shift_s > 0.5 * late_s
+}
+
 /// Replaces the time stamps between two breaks by their line; the number of parts, and the mean
 /// rate in Hz.
-fn straighten(times: &mut [f64], longest_s: f64) -> (usize, Option<f64>) {
+fn straighten(times: &mut [f64], longest_s: f64, nominal_s: f64) -> (usize, Option<f64>) {
     let breaks: Vec<usize> = (1..times.len())
-        .filter(|k| (times[*k] - times[k - 1]).abs() > longest_s)
+        .filter(|k| (times[*k] - times[k - 1]).abs() > longest_s || lost(times, *k, nominal_s))
         .map(|k| k - 1)
         .collect();
     let parts = parts(breaks.into_iter(), times.len());
@@ -238,7 +275,7 @@ mod tests {
         let mut times: Vec<f64> = (0..100)
             .map(|k| 0.01 * f64::from(k) + if k >= 60 { 3.0 } else { 0.0 } + 1e-4 * f64::from(k % 2))
             .collect();
-        let (parts, hz) = straighten(&mut times, 1.0);
+        let (parts, hz) = straighten(&mut times, 1.0, 0.01);
         assert_eq!(parts, 2);
         assert!((hz.unwrap() - 100.0).abs() < 0.1);
         // Alternating jitter of 1e-4 s tilts a line over 40 samples by less than 1e-6 s a sample.
@@ -248,6 +285,35 @@ mod tests {
                 .enumerate()
                 .all(|(k, pair)| k == 59 || (pair[1] - pair[0] - 0.01).abs() < 1e-6)
         );
-        assert_eq!(straighten(&mut [5.0], 1.0), (1, None));
+        assert_eq!(straighten(&mut [5.0], 1.0, 0.0), (1, None));
+    }
+
+    #[test]
+    fn lost_samples_are_a_break_and_late_ones_are_not() {
+        // 12 s at 100 Hz with network jitter, of which 0.2 to 4 s are lost.
+        for lost in [20_u32, 100, 200, 400] {
+            let mut times: Vec<f64> = (0..1200)
+                .filter(|k| !(500..500 + lost).contains(k))
+                .map(|k| 0.01 * f64::from(k) + 0.002 * (f64::from(k) * 1.7).sin())
+                .collect();
+            let (parts, hz) = straighten(&mut times, 5.0, 0.01);
+            assert_eq!(parts, 2, "{lost}");
+            assert!((hz.unwrap() - 100.0).abs() < 0.1, "{lost}: {hz:?}");
+            assert!(
+                (times[500] - times[499] - 0.01 * f64::from(lost + 1)).abs() < 2e-3,
+                "{lost}"
+            );
+        }
+        // Half a second that arrives at once, stamped on arrival, is no loss.
+        let mut times: Vec<f64> = (0..1200)
+            .map(|k| {
+                if (500..550).contains(&k) {
+                    5.5 + 1e-5 * f64::from(k)
+                } else {
+                    0.01 * f64::from(k)
+                }
+            })
+            .collect();
+        assert_eq!(straighten(&mut times, 5.0, 0.01).0, 1);
     }
 }

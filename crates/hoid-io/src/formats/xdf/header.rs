@@ -71,6 +71,34 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, String> {
     })
 }
 
+/// What a recorder says of a stream when it closes the file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Footer {
+    pub(super) samples: Option<u64>,
+    /// First and last time stamp on the clock of the stream, s.
+    pub(super) span_s: Option<(f64, f64)>,
+}
+
+/// The footer in the bytes of a chunk.
+pub(super) fn footer(bytes: &[u8]) -> Result<Footer, String> {
+    let text = String::from_utf8_lossy(bytes);
+    let document = Document::parse(text.trim_start_matches('\u{feff}'))
+        .map_err(|error| format!("its footer: {}", told(&error.to_string())))?;
+    let info = document.root_element();
+    let number = |name: &str| {
+        child(info, name)?
+            .text()?
+            .trim()
+            .parse::<f64>()
+            .ok()
+            .filter(|v| v.is_finite())
+    };
+    Ok(Footer {
+        samples: number("sample_count").filter(|n| *n >= 0.0).map(|n| n as u64),
+        span_s: number("first_timestamp").zip(number("last_timestamp")),
+    })
+}
+
 fn child<'a, 'input>(node: Node<'a, 'input>, name: &str) -> Option<Node<'a, 'input>> {
     node.children().find(|child| child.has_tag_name(name))
 }

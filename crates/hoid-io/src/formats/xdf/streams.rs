@@ -1,12 +1,13 @@
 //! The streams of a file as arrays: a path for each channel and for the times of each stream.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
 use super::chunks::{self, Samples, Stream};
 use super::clock;
 use crate::IoError;
 use crate::arrays::{Array, Budget, Contents, Entry, Indexing, Numbers, Value};
+use crate::wording::shown;
 
 /// What an entry takes, bytes, about.
 const ENTRY: u64 = 512;
@@ -28,6 +29,22 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
         found,
     })?;
     let mut notes = Vec::new();
+    for stream in &streams {
+        stream.check_footer().map_err(|found| IoError::Damaged {
+            file: file.to_owned(),
+            found,
+        })?;
+        if stream.footer.is_none() && !stream.stamps.is_empty() {
+            let (first, last) = (stream.stamps[0], stream.stamps[stream.stamps.len() - 1]);
+            notes.push(format!(
+                "stream {} has no footer: the file was cut short, or its recorder never closed it; {} samples over {:.3} s \
+                 are there, and what came behind them is lost",
+                shown(&stream.header.name),
+                stream.stamps.len(),
+                last - first
+            ));
+        }
+    }
     let times: Vec<Vec<f64>> = streams.iter().map(|stream| clock::times(stream, &mut notes)).collect();
     let first = times
         .iter()
@@ -106,15 +123,17 @@ fn entries_of(stream: Stream, parent: &str, times: &[f64]) -> Vec<Entry> {
 #[derive(Default)]
 struct Names {
     known: HashSet<String>,
+    /// The number that the next of a name tries first.
+    next: HashMap<String, usize>,
 }
 
 impl Names {
     fn unique(&mut self, name: &str) -> String {
         let mut unique = name.to_owned();
-        let mut number = 2;
+        let number = self.next.entry(unique.clone()).or_insert(2);
         while !self.known.insert(unique.clone()) {
             unique = format!("{name}({number})");
-            number += 1;
+            *number += 1;
         }
         unique
     }
@@ -143,6 +162,84 @@ mod tests {
             }
         }
         assert!(compared > 50, "{compared}");
+    }
+
+    /// A file of one stream at 100 Hz with these times, and a footer.
+    fn file_of(times: &[f64], footer: Option<&str>) -> Vec<u8> {
+        let chunk = |tag: u16, content: &[u8]| {
+            let mut bytes = vec![4];
+            bytes.extend((content.len() as u32 + 2).to_le_bytes());
+            bytes.extend(tag.to_le_bytes());
+            bytes.extend(content);
+            bytes
+        };
+        let of_stream = |text: &str| [&1_u32.to_le_bytes(), text.as_bytes()].concat();
+        let header = "<info><name>s</name><channel_count>2</channel_count><nominal_srate>100</nominal_srate>\
+                      <channel_format>double64</channel_format></info>";
+        let mut samples = 1_u32.to_le_bytes().to_vec();
+        samples.push(4);
+        samples.extend((times.len() as u32).to_le_bytes());
+        for t in times {
+            samples.push(8);
+            for value in [*t, t.sin(), t.cos()] {
+                samples.extend(value.to_le_bytes());
+            }
+        }
+        let mut file = b"XDF:".to_vec();
+        file.extend(chunk(2, &of_stream(header)));
+        file.extend(chunk(3, &samples));
+        file.extend(footer.map(|text| chunk(6, &of_stream(text))).unwrap_or_default());
+        file
+    }
+
+    #[test]
+    fn footers_are_held_against_what_is_there() {
+        let times: Vec<f64> = (0..1000).map(|k| 50.0 + 0.01 * f64::from(k)).collect();
+        let footer = |first: f64, last: f64, count: u32| {
+            format!(
+                "<info><first_timestamp>{first}</first_timestamp><last_timestamp>{last}</last_timestamp>\
+                 <sample_count>{count}</sample_count></info>"
+            )
+        };
+        let good = file_of(&times, Some(&footer(50.0, 59.99, 1000)));
+        let notes = read(&good, "a.xdf").unwrap().notes;
+        assert!(!notes.iter().any(|note| note.contains("footer")), "{notes:?}");
+        for (bad, said) in [
+            (
+                footer(50.0, 59.99, 1001),
+                "its footer counts 1001 samples and 1000 are there",
+            ),
+            (footer(49.0, 59.99, 1000), "the first sample stands at 49 s"),
+            (footer(50.0, 61.0, 1000), "the last sample stands at 61 s"),
+        ] {
+            let message = read(&file_of(&times, Some(&bad)), "a.xdf").unwrap_err().to_string();
+            assert!(
+                message.contains("a.xdf is damaged") && message.contains(said),
+                "{message}"
+            );
+        }
+        // The end of the file is lost between two chunks: nothing contradicts itself, but it is told.
+        let notes = read(&file_of(&times, None), "a.xdf").unwrap().notes;
+        assert!(
+            notes
+                .iter()
+                .any(|n| n.contains("cut short") && n.contains("1000 samples over 9.990 s")),
+            "{notes:?}"
+        );
+    }
+
+    #[test]
+    fn a_lost_second_is_a_gap_at_the_stated_rate() {
+        let times: Vec<f64> = (0..1200)
+            .filter(|k| !(300..430).contains(k) && !(900..960).contains(k))
+            .map(|k| 0.01 * f64::from(k))
+            .collect();
+        let contents = read(&file_of(&times, None), "a.xdf").unwrap();
+        let note = contents.notes.iter().find(|note| note.contains("Hz found")).unwrap();
+        assert!(
+            note.contains("100.0000 Hz found") && note.contains("in 3 parts"),
+            "{note}"
+        );
     }
 
     #[test]

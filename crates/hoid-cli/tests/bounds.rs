@@ -1,0 +1,130 @@
+//! Numbers that no work could meet are told at once, with their limit.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::fs;
+
+use tempfile::TempDir;
+
+use common::{bad, good};
+
+const HUGE: &str = "18446744073709551615";
+
+#[test]
+fn limits_are_named_at_once() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    good(d, &["simulate", "--condition", "C1", "--out", "c1.csv"]);
+    let (delays, all) = (
+        format!("0..{HUGE}"),
+        "na=0..64,nb=1..64,nc=0..64,nd=0..64,nf=0..64".to_owned(),
+    );
+    let identify = ["identify", "c1.csv", "--structure", "bj"];
+    let track = ["track", "c1.csv", "--out", "t.csv"];
+    for (command, options, said) in [
+        (&identify[..], vec!["--nk", &delays], "at most 1000000 is possible"),
+        (&identify, vec!["--nk", HUGE], "at most 1000000 is possible"),
+        (&identify, vec!["--nk", "0..1000000"], "at most 100000"),
+        (&identify, vec!["--orders", "nd=0..65"], "at most 64 is possible"),
+        (&identify, vec!["--nk", "29", "--horizon", HUGE], "write 1 to 1000000"),
+        (&identify, vec!["--nk", "29", "--horizon", "0"], "write 1 to 1000000"),
+        (
+            &[
+                "identify",
+                "c1.csv",
+                "--structure",
+                "general",
+                "--nk",
+                "0..64",
+                "--orders",
+            ],
+            vec![&all],
+            "at most 100000: narrow --nk and --orders",
+        ),
+        (
+            &track,
+            vec!["--method", "rls", "--nk", &delays],
+            "at most 1000000 is possible",
+        ),
+    ] {
+        let arguments: Vec<&str> = command.iter().copied().chain(options).collect();
+        let (code, message) = bad(d, &arguments);
+        assert_eq!(code, 2, "{arguments:?}: {message}");
+        assert!(message.contains(said), "{arguments:?}: {message}");
+    }
+    // A horizon beyond the record is no more than the record.
+    good(
+        d,
+        &[
+            "identify",
+            "c1.csv",
+            "--structure",
+            "bj",
+            "--nk",
+            "29",
+            "--orders",
+            "nd=1",
+            "--horizon",
+            "1000",
+        ],
+    );
+    for options in [["--subjects", "100000000"], ["--runs", HUGE], ["--subjects", HUGE]] {
+        for kind in [&["--conditions", "C1"][..], &["--people"]] {
+            let mut arguments = vec!["simulate-group", "--out", "g"];
+            arguments.extend(options);
+            arguments.extend(kind);
+            let (_, message) = bad(d, &arguments);
+            assert!(message.contains("at most 100000 runs"), "{message}");
+        }
+    }
+}
+
+#[test]
+fn scenarios_beyond_sense_name_the_key_and_its_limits() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    for (line, said) in [
+        ("initial.omega_b_rad_s = 1e300", "initial.omega_b_rad_s is 1e300"),
+        ("initial.K_e = -1e300", "initial.K_e is -1e300"),
+        ("initial.T_L_s = 1e9", "initial.T_L_s"),
+        ("initial.zeta_nm = 1e-300", "initial.zeta_nm"),
+        ("initial.omega_nm_rad_s = 1e9", "initial.omega_nm_rad_s"),
+        ("sample_time_s = 1e-300", "sample_time_s"),
+        ("measurement_s = 1e300", "measurement_s"),
+        ("run_in_s = 1e9", "run_in_s"),
+        ("tau_e_s = 1e300", "tau_e_s"),
+        ("remnant.noise_level = 1e300", "remnant.noise_level"),
+        ("remnant.T_n_s = 1e300", "remnant.T_n_s"),
+    ] {
+        fs::write(d.join("s.toml"), format!("condition = \"C1\"\n{line}\n")).unwrap();
+        for command in [
+            &["simulate", "--scenario", "s.toml", "--out", "s.csv"][..],
+            &["margins", "--scenario", "s.toml"],
+        ] {
+            let (code, message) = bad(d, command);
+            assert_eq!(code, 1, "{message}");
+            assert!(message.contains(said) && message.contains(" to 1"), "{line}: {message}");
+        }
+    }
+}
+
+#[test]
+fn a_table_without_end_to_the_side_is_answered() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    let names: Vec<String> = (0..1_000_000).map(|k| format!("c{k}")).collect();
+    fs::write(
+        d.join("wide.csv"),
+        format!("{}\n{}\n", names.join(","), "1,".repeat(999_999) + "1"),
+    )
+    .unwrap();
+    for command in [&["info", "wide.csv"][..], &["identify", "wide.csv"]] {
+        let (code, message) = bad(d, command);
+        assert_eq!(code, 1, "{message}");
+        assert!(
+            message.contains("has 1000000 columns, expected at most 10000"),
+            "{message}"
+        );
+    }
+}
