@@ -14,7 +14,7 @@
 //! | larger | `a_c1 > 5 A_c1` and `a_c3 > 5 A_c3` for e and u in two blocks in a row | both signals are what they were, times a factor |
 //! | rescaled | all four `a_cj/A_cj` of one channel above 3.5 and within a factor of 1.5 of each other, those of the other below 2, in two blocks in a row | another unit, a gain that was turned |
 //! | swapped | the sum over blocks of `d(own) - d(other) - 1`, at most 4 a block and never below 0, reaches 6 | e is as u was and u as e was; d is the sum over both channels of `\|log a_1/A_1\| + \|log a_3/A_3\|` |
-//! | misfit | `R = a_eps/min_j a_uj` is above 4 times its long-run value, and above 1.5, in two blocks in a row | what u has been for the last samples foretells it better than the model does, which knows e too, and did not before |
+//! | misfit | `R = a_eps/min_j a_uj` is above 4 times its long-run value, and above 1.5, and a_eps above twice its own, in two blocks in a row | what u has been for the last samples foretells it better than the model does, which knows e too, and did not before |
 //!
 //! The sum for swapped channels is a one-sided CUSUM (E. S. Page, *Biometrika* 41 (1954) 100-115) of
 //! a difference that is negative for channels as they were and at most the distance of the two
@@ -45,6 +45,8 @@ const MOST_EVIDENCE: f64 = 4.0;
 const MISFIT: f64 = 4.0;
 /// R below which no model foretells too little.
 const LEAST_RATIO: f64 = 1.5;
+/// Growth of the innovations without which it is no misfit.
+const LEAST_GROWTH: f64 = 2.0;
 const MISFIT_BLOCKS: u32 = 2;
 /// Distance of a block that is as usual: four logarithms of four.
 const ALIKE: f64 = 4.0 * 1.386;
@@ -197,9 +199,11 @@ pub struct Profile {
     /// Long-run value of R, and the blocks that it was learnt from.
     ratio: f64,
     ratios: u32,
+    /// Long-run value of a_eps.
+    innovation: f64,
 }
 
-crate::state!([] Profile { usual, blocks, frozen_u, idle, larger, rescaled, swapped, misfits, ratio, ratios });
+crate::state!([] Profile { usual, blocks, frozen_u, idle, larger, rescaled, swapped, misfits, ratio, ratios, innovation });
 
 impl Default for Profile {
     fn default() -> Self {
@@ -221,6 +225,7 @@ impl Profile {
             misfits: 0,
             ratio: 0.0,
             ratios: 0,
+            innovation: 0.0,
         }
     }
 
@@ -285,6 +290,13 @@ impl Profile {
                 ratio
             };
             self.ratio += weight * (bounded - self.ratio);
+            let size = block.innovation;
+            let bounded = if known {
+                size.clamp(0.5 * self.innovation, 2.0 * self.innovation)
+            } else {
+                size
+            };
+            self.innovation += weight * (bounded - self.innovation);
         }
         for c in 0..CHANNELS {
             for (usual, found) in self.usual.differences[c].iter_mut().zip(block.differences[c]) {
@@ -327,6 +339,8 @@ impl Profile {
         self.swapped = (self.swapped + evidence).clamp(0.0, 2.0 * SWAPPED);
         let limit = (MISFIT * self.ratio).max(LEAST_RATIO);
         let misfit = self.ratios >= LEARNT && block.ratio().is_some_and(|ratio| ratio > limit);
+        // Of somebody who rests the past foretells all, and the model need not be wrong.
+        let misfit = misfit && block.innovation > LEAST_GROWTH * self.innovation;
         self.misfits = count(self.misfits, misfit);
         if frozen_e {
             Some(Trouble::FrozenInput)

@@ -10,7 +10,7 @@
 //! every shape of the distribution, and a few outliers weigh little. The innovations of a sound
 //! recursion are larger than those of a fixed model by half of its effective number of parameters
 //! over its memory: .2 % for memories of 2 to 5 s and white innovations, several per cent for seconds
-//! where its noise model is too small for the remnant. What a block says beyond [`DRIFT`] counts. The
+//! where its noise model is too small for the remnant, and more for a person who is not steady. What a block says beyond [`DRIFT`] counts. The
 //! one-sided cumulative sum (E. S. Page, *Biometrika* 41 (1954) 100-115) tells of an estimate that
 //! has gone astray when it reaches [`ASTRAY`].
 //!
@@ -20,7 +20,7 @@
 /// Largest order of a polynomial.
 pub const ROOM: usize = 16;
 /// Share by which the innovations must be larger to count.
-pub const DRIFT: f64 = 0.06;
+pub const DRIFT: f64 = 0.2;
 /// Sum at which the estimate is astray.
 pub const ASTRAY: f64 = 40.0;
 /// What one block says at most.
@@ -162,10 +162,10 @@ mod tests {
                 model.end_block(worse)
             })
         };
-        assert_eq!(blocks(1.05, 1000), None);
+        assert_eq!(blocks(1.15, 1000), None);
         assert_eq!(blocks(0.5, 1000), None);
-        // 100 (log 1.2 - .06) = 12.2 a block.
-        assert_eq!(blocks(1.2, 1000), Some(3));
+        // 100 (log 1.4 - .2) = 13.6 a block.
+        assert_eq!(blocks(1.4, 1000), Some(2));
         assert_eq!(blocks(1e9, 1000), Some(2));
         assert_eq!(blocks(f64::NAN, 10), None);
     }
