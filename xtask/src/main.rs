@@ -7,7 +7,7 @@
 //! | `cargo xtask check` | formatting, lints, documentation of the crates and the book, as continuous integration does |
 //! | `cargo xtask book` | the book in `docs/`, into `docs/book/` (needs mdbook) |
 //! | `cargo xtask bench [OPTION...]` | the tasks of the page "Speed beside others" beside the peers that are installed, or how cost grows (module `bench`) |
-//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage` |
+//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults` |
 //!
 //! Little but the standard library: a chore must start at once on a fresh machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
@@ -69,18 +69,25 @@ fn test(arguments: &[String]) -> Result<(), String> {
     total.verdict()
 }
 
-/// Studies that take too long for a test, each an example of the crate `hoid`.
-const SLOW: [(&str, &str); 1] = [("people-coverage", "people_coverage")];
+/// Studies that take too long for a test, each an example of the crate `hoid`, and the package whose
+/// program one of them runs.
+const SLOW: [(&str, &str, Option<&str>); 2] = [
+    ("people-coverage", "people_coverage", None),
+    ("faults", "faults", Some("hoid-cli")),
+];
 
 /// Runs one of them, with further arguments of its own.
 fn slow(arguments: &[String]) -> Result<(), String> {
-    let names = || SLOW.map(|(name, _)| name).join(", ");
+    let names = || SLOW.map(|(name, ..)| name).join(", ");
     let (name, rest) = arguments
         .split_first()
         .ok_or_else(|| format!("which study: {}", names()))?;
-    let (_, example) = (SLOW.iter())
-        .find(|(known, _)| known == name)
+    let (_, example, program) = (SLOW.iter())
+        .find(|(known, ..)| known == name)
         .ok_or_else(|| format!("no study is called {name}; there is {}", names()))?;
+    if let Some(package) = program {
+        cargo(&["build", "--release", "-p", package], &[])?;
+    }
     let mut command = cargo_command();
     command
         .args([
