@@ -7,7 +7,7 @@
 //! | `cargo xtask check` | formatting, lints, documentation of the crates and the book, as continuous integration does |
 //! | `cargo xtask book` | the book in `docs/`, into `docs/book/` (needs mdbook) |
 //! | `cargo xtask bench [OPTION...]` | the tasks of the page "Speed beside others" beside the peers that are installed, or how cost grows (module `bench`) |
-//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults-clean` |
+//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults` |
 //!
 //! Little but the standard library: a chore must start at once on a fresh machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
@@ -69,11 +69,13 @@ fn test(arguments: &[String]) -> Result<(), String> {
     total.verdict()
 }
 
-/// Studies that take too long for a test, each an example of a crate.
-const SLOW: [(&str, &str, &str); 3] = [
-    ("people-coverage", "hoid", "people_coverage"),
-    ("faults-clean", "hoid-ident", "faults_clean"),
-    ("tracker-faults", "hoid", "tracker_faults"),
+/// Studies that take too long for a test: name, package and example, and the package whose program
+/// one of them runs.
+const SLOW: [(&str, &str, &str, Option<&str>); 4] = [
+    ("people-coverage", "hoid", "people_coverage", None),
+    ("faults", "hoid", "faults", Some("hoid-cli")),
+    ("faults-clean", "hoid-ident", "faults_clean", None),
+    ("tracker-faults", "hoid", "tracker_faults", None),
 ];
 
 /// Runs one of them, with further arguments of its own.
@@ -82,9 +84,12 @@ fn slow(arguments: &[String]) -> Result<(), String> {
     let (name, rest) = arguments
         .split_first()
         .ok_or_else(|| format!("which study: {}", names()))?;
-    let (_, package, example) = (SLOW.iter())
+    let (_, package, example, program) = (SLOW.iter())
         .find(|(known, ..)| known == name)
         .ok_or_else(|| format!("no study is called {name}; there is {}", names()))?;
+    if let Some(program) = program {
+        cargo(&["build", "--release", "-p", program], &[])?;
+    }
     let mut command = cargo_command();
     command
         .args([

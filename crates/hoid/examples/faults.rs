@@ -1,0 +1,105 @@
+//! What does a fault of a recording do to a result, and does the result say so? The numbers of the
+//! page "Faults: what a result says of them".
+//!
+//! `cargo xtask slow faults [--part N] [--clean N] [--only METHOD] [--rows FILE] [--program FILE]
+//! [--seed N]`: all faults in runs of C1, of C2 and of a virtual person, then clean runs (1000 in
+//! all by default, evaluated in batch and by one tracker each). `--part` takes every N-th case and
+//! clean run, `--rows` writes a row of CSV for each result, `--program` is the program that is judged
+//! (by default the one that is built beside this example).
+#![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
+
+#[allow(dead_code)]
+#[path = "../tests/common/fault_corpus/mod.rs"]
+mod fault_corpus;
+
+use std::{path::PathBuf, time::Instant};
+
+use fault_corpus::{
+    bases::Who,
+    kinds::{Fault, faults},
+    program::{Outcome, Way, outcomes},
+    summary::{by_fault, by_way, clean, recovery, to_csv},
+};
+use rayon::prelude::*;
+
+/// That of the page; the tests have others.
+const SEED: u64 = 2121;
+/// Numbers of clean runs begin here, so that none is the run of a fault.
+const FIRST_CLEAN: u64 = 100_000;
+
+fn main() {
+    let (mut part, mut number, mut rows, mut program, mut seed) = (1, 1000, None, beside_this(), SEED);
+    let mut ways = Way::ALL.to_vec();
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        let mut value = || arguments.next().unwrap();
+        match argument.as_str() {
+            "--part" => part = value().parse::<usize>().unwrap(),
+            "--clean" => number = value().parse::<u64>().unwrap(),
+            "--rows" => rows = Some(PathBuf::from(value())),
+            "--program" => program = PathBuf::from(value()),
+            "--seed" => seed = value().parse().unwrap(),
+            "--only" => {
+                let wanted = value();
+                ways.retain(|way| way.name() == wanted);
+            }
+            other => panic!("{other}: there is --part, --clean, --rows, --program, --seed and --only"),
+        }
+    }
+    let begun = Instant::now();
+    let cases: Vec<(u64, Fault, Who)> = (0..)
+        .zip(faults())
+        .step_by(part)
+        .flat_map(|(case, fault)| Who::ALL.map(|who| (case, fault, who)))
+        .collect();
+    let faulty: Vec<Outcome> = cases
+        .into_par_iter()
+        .flat_map_iter(|(case, fault, who)| outcomes(&program, seed, case, fault, who, &ways).unwrap())
+        .collect();
+    // A half of them people, a quarter each of C1 and C2.
+    let sound: Vec<Outcome> = (0..number)
+        .step_by(part)
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .flat_map_iter(|i| {
+            let i = i / part as u64;
+            let who = [Who::C1, Who::Person, Who::C2, Who::Person][i as usize % 4];
+            // The case decides what kind of person: each in turn.
+            let case = FIRST_CLEAN + i / 2;
+            let tracker = [Way::Adaptive, Way::Physical, Way::Rpem, Way::Rls][i as usize / 4 % 4];
+            let batch = [Way::GreyBox, Way::BoxJenkins][i as usize / 4 % 2];
+            let such: Vec<Way> = ways
+                .iter()
+                .copied()
+                .filter(|way| who == Who::Person || [tracker, batch].contains(way))
+                .collect();
+            outcomes(&program, seed, case, Fault::NONE, who, &such).unwrap()
+        })
+        .collect();
+    if let Some(file) = rows {
+        let all: Vec<Outcome> = faulty.iter().chain(&sound).cloned().collect();
+        std::fs::write(file, to_csv(&all)).unwrap();
+    }
+    println!("## With a fault\n\n{}", by_way(&faulty));
+    println!(
+        "Wrong, wrong and not flagged, right and flagged, of how many:\n\n{}",
+        by_fault(&faulty)
+    );
+    println!("## How long trackers take\n\n{}", recovery(&faulty));
+    println!("## Clean runs\n\n{}", clean(&sound));
+    let longest = faulty.iter().chain(&sound).map(|o| o.seconds).fold(0.0, f64::max);
+    println!(
+        "{} faults, {} results with a fault, {} without; {:.0} s in all, {longest:.1} s the longest",
+        faults().len(),
+        faulty.len(),
+        sound.len(),
+        begun.elapsed().as_secs_f64()
+    );
+}
+
+/// The program in the folder of builds that this example is in.
+fn beside_this() -> PathBuf {
+    let here = std::env::current_exe().unwrap();
+    let folder = here.parent().unwrap().parent().unwrap();
+    folder.join("hoid").with_extension(std::env::consts::EXE_EXTENSION)
+}

@@ -1,0 +1,152 @@
+//! The runs without faults, and their truth.
+//!
+//! Each case has a run of condition C1 and one of C2 of the reference text, and a virtual person of
+//! one to three runs: their form, remnant, plant, rate and whether their disturbance was recorded
+//! follow from the number of the case. Who changes (C3 to C6) is left out: their truth is not one
+//! number.
+
+use hoid::{
+    model::{FamilyOperator, Form},
+    prelude::*,
+    sim::{
+        SimError,
+        people::{Person, Plant, Population, RemnantKind, Task},
+    },
+};
+
+use super::table::Table;
+
+/// True values by name.
+pub type Truth = Vec<(String, f64)>;
+
+/// Who acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Who {
+    C1,
+    C2,
+    Person,
+}
+
+impl Who {
+    pub const ALL: [Self; 3] = [Self::C1, Self::C2, Self::Person];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::C1 => "C1",
+            Self::C2 => "C2",
+            Self::Person => "person",
+        }
+    }
+}
+
+/// Runs of one operator, and one run of another for the fault that needs them.
+#[derive(Debug, Clone)]
+pub struct Base {
+    pub who: Who,
+    /// What kind of run: `C1`, or `person, pulsed`.
+    pub label: String,
+    pub form: Form,
+    pub runs: Vec<Table>,
+    pub truth: Truth,
+    pub second: Table,
+    pub second_truth: Truth,
+}
+
+impl Base {
+    /// The run that gets the fault.
+    pub fn faulty(&self) -> usize {
+        self.runs.len() / 2
+    }
+}
+
+/// The runs of a case.
+///
+/// # Errors
+/// Those of the simulation.
+pub fn base(who: Who, seed: u64, case: u64) -> Result<Base, SimError> {
+    match who {
+        Who::C1 | Who::C2 => of_text(who, seed, case),
+        Who::Person => of_person(seed, case),
+    }
+}
+
+fn of_text(who: Who, seed: u64, case: u64) -> Result<Base, SimError> {
+    let run = |condition: Condition, replication: u64| -> Result<(Table, Truth), SimError> {
+        let scenario = Scenario::condition(condition);
+        let streams = RunSeed {
+            seed,
+            cell: case,
+            replication,
+        };
+        let record = Simulator::new(&scenario)?.run(streams, false)?;
+        let own = scenario.initial.operator;
+        let truth = [
+            ("K_e", own.k_e),
+            ("T_L", own.t_l_s),
+            ("K_e_dot", own.k_e * own.t_l_s),
+            ("omega_nm", own.omega_nm_rad_s),
+            ("zeta_nm", own.zeta_nm),
+            ("tau_e", own.tau_e_s),
+        ];
+        let truth = truth.map(|(name, value)| (name.to_owned(), value)).to_vec();
+        Ok((Table::of(&record, false), truth))
+    };
+    let (first, other) = match who {
+        Who::C2 => (Condition::C2, Condition::C1),
+        _ => (Condition::C1, Condition::C2),
+    };
+    let (table, truth) = run(first, 1)?;
+    let (second, second_truth) = run(other, 2)?;
+    Ok(Base {
+        who,
+        label: who.name().to_owned(),
+        form: Form::Lead,
+        runs: vec![table],
+        truth,
+        second,
+        second_truth,
+    })
+}
+
+fn of_person(seed: u64, case: u64) -> Result<Base, SimError> {
+    let i = case as usize;
+    let task = Task {
+        sample_time: SampleTime::new([1.0 / 60.0, 0.01][i / 2 % 2])?,
+        ..Task::default()
+    };
+    let kind = RemnantKind::ALL[i % 5];
+    // Every other has a lead, which the trackers and polynomials know; an integrator has none.
+    let lead = i.is_multiple_of(2);
+    let plant = if lead {
+        Plant::ALL[1 + i / 2 % 2]
+    } else {
+        Plant::ALL[i % 3]
+    };
+    let form = lead.then_some(Form::Lead);
+    let draw =
+        |form: Option<Form>, number: u64| Person::draw(&Population::default(), &task, plant, form, kind, seed, number);
+    let person = draw(form, case)?;
+    let form = person.state.operator.form();
+    let other = draw(Some(form), case + 1_000_000)?;
+    let with_disturbance = (i / 4).is_multiple_of(2);
+    let runs = (0..=case / 2 % 3)
+        .map(|run| Ok(Table::of(&person.run(run)?.record, with_disturbance)))
+        .collect::<Result<Vec<_>, SimError>>()?;
+    Ok(Base {
+        who: Who::Person,
+        label: format!("person, {kind}"),
+        form,
+        runs,
+        truth: named(&person.state.operator),
+        second: Table::of(&other.run(0)?.record, with_disturbance),
+        second_truth: named(&other.state.operator),
+    })
+}
+
+fn named(operator: &FamilyOperator) -> Truth {
+    let all = operator.named().into_iter();
+    // An infinite T_I is no number to be off from.
+    all.filter(|p| p.value.is_finite())
+        .map(|p| (p.name.to_owned(), p.value))
+        .collect()
+}

@@ -1,0 +1,208 @@
+//! How each fault comes into a recording.
+
+use hoid::prelude::RunSeed;
+
+use super::{
+    kinds::{Fault, On, Place, WHOLE, What},
+    table::{Table, spread},
+};
+
+/// A recording with its fault.
+#[derive(Debug, Clone)]
+pub struct Injected {
+    pub table: Table,
+    /// Where the fault shows, s from the first sample; of what stays, the moment it begins.
+    pub from_s: f64,
+    pub to_s: f64,
+    /// The first row that is another and the first behind the last such, by the rows of the recording
+    /// without the fault.
+    pub rows: (usize, usize),
+}
+
+/// Numbers in [0, 1) of a case, by SplitMix64 (G. L. Steele et al., OOPSLA 2014).
+pub fn uniform(seed: u64, case: u64, draw: u64) -> f64 {
+    let mut z = seed
+        .wrapping_mul(0x9e37_79b9_7f4a_7c15)
+        .wrapping_add(case.wrapping_mul(0xd1b5_4a32_d192_ed03))
+        .wrapping_add((draw + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// Puts a fault into a recording. `second` is that of another person.
+pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64) -> Injected {
+    let mut table = clean.clone();
+    let n = clean.len();
+    let (of_e, of_u) = (spread(&clean.e), spread(&clean.u));
+    let draw = |i: u64| uniform(seed, case, i);
+    let sign = |i: u64| if draw(i) < 0.5 { -1.0 } else { 1.0 };
+    let near = |share: f64| ((share + 0.02 * (draw(0) - 0.5)) * n as f64) as usize;
+    let at = match fault.place {
+        Place::Start => near(0.06),
+        Place::Middle => near(0.5),
+        Place::End => near(0.9),
+        Place::Whole => 0,
+    };
+    let samples = |seconds: f64| ((seconds / clean.h).round() as usize).max(1);
+    let until = |length: usize| at.saturating_add(length).min(n);
+    let (on, size) = (fault.kind.on, fault.size);
+    let seconds = if size == WHOLE { n } else { samples(size) };
+    // Rows that differ; what shows is the same but for what stays.
+    let mut rows = (at, n);
+    let mut stays = false;
+    match fault.kind.what {
+        What::Nothing => rows = (0, 0),
+        What::Spike => {
+            rows = (at, at + 1);
+            each(&mut table, on, rows, |x, k, e| {
+                x + sign(1 + k as u64) * size * if e { of_e } else { of_u }
+            });
+        }
+        What::Burst => {
+            rows = (at, until(size as usize));
+            each(&mut table, on, rows, |x, k, e| {
+                x + sign(1 + 2 * k as u64 + u64::from(e)) * 10.0 * if e { of_e } else { of_u }
+            });
+        }
+        What::Missing => {
+            rows = (at, until(size as usize));
+            each(&mut table, on, rows, |_, _, _| f64::NAN);
+        }
+        What::Wrap => {
+            rows = (at, until(seconds));
+            each(&mut table, on, rows, |x, _, _| x + 360.0);
+        }
+        What::Step | What::Offset => {
+            stays = fault.kind.what == What::Step;
+            let by = sign(1) * size / 100.0;
+            each(&mut table, on, rows, |x, _, e| x + by * if e { of_e } else { of_u });
+        }
+        What::Drift => {
+            let by = sign(1) * size / n as f64;
+            each(&mut table, on, rows, |x, k, e| {
+                x + by * k as f64 * if e { of_e } else { of_u }
+            });
+        }
+        What::Frozen => {
+            rows = (at, until(seconds));
+            let (e, u) = (clean.e[at], clean.u[at]);
+            each(&mut table, on, rows, |_, _, is_e| if is_e { e } else { u });
+        }
+        What::Idle | What::IdleNoisy => {
+            // Before the run, inside it, behind it.
+            let at = match fault.place {
+                Place::Start => 0,
+                Place::End => n,
+                Place::Middle | Place::Whole => at,
+            };
+            let small = if fault.kind.what == What::Idle { 0.0 } else { 1e-3 };
+            let length = samples(size);
+            for (i, column) in table.columns_mut().enumerate() {
+                let noise = RunSeed {
+                    seed,
+                    cell: case,
+                    replication: 1 + i as u64,
+                }
+                .white_noise(length);
+                let sigma = spread(column);
+                column.splice(at..at, noise.into_iter().map(|z| small * sigma * z));
+            }
+            table.renumber();
+            return Injected {
+                from_s: at as f64 * clean.h,
+                to_s: (at + length) as f64 * clean.h,
+                table,
+                rows: (at, at),
+            };
+        }
+        What::Dropout => {
+            rows = (at, until(seconds));
+            each(&mut table, on, rows, |_, _, _| 0.0);
+        }
+        What::Scaled | What::ScaledLong => {
+            let length = match fault.kind.what {
+                What::Scaled => samples(10.0),
+                _ => samples(50.0).min(2 * n / 5),
+            };
+            rows = (at, until(length));
+            each(&mut table, on, rows, |x, _, _| x * size);
+        }
+        What::Milliseconds => table.t.iter_mut().for_each(|t| *t *= size),
+        What::Swapped => {
+            rows = (at, until(seconds));
+            table.e[at..rows.1].swap_with_slice(&mut table.u[at..rows.1]);
+        }
+        What::Flipped => {
+            rows = (at, until(seconds));
+            each(&mut table, on, rows, |x, _, _| -x);
+        }
+        What::Saturated => each(&mut table, on, rows, |x, _, e| {
+            let most = size * if e { of_e } else { of_u };
+            x.clamp(-most, most)
+        }),
+        What::Quantised => each(&mut table, on, rows, |x, _, e| {
+            let step = size * if e { of_e } else { of_u };
+            (x / step).round() * step
+        }),
+        What::Lost | What::Duplicated => {
+            stays = true;
+            rows = (at, until(seconds));
+            for column in table.columns_mut() {
+                if fault.kind.what == What::Lost {
+                    column.drain(at..rows.1);
+                } else {
+                    let again = column[at..rows.1].to_vec();
+                    column.splice(rows.1..rows.1, again);
+                }
+            }
+            table.renumber();
+        }
+        What::Late => {
+            stays = true;
+            let by = size as usize;
+            for k in at..n {
+                table.u[k] = clean.u[if k < at + by { at } else { k - by }];
+            }
+        }
+        What::Short => {
+            rows = (size as usize, n);
+            for column in table.columns_mut() {
+                column.truncate(rows.0);
+            }
+            table.renumber();
+            return Injected {
+                from_s: 0.0,
+                to_s: table.seconds(),
+                table,
+                rows,
+            };
+        }
+        What::SecondOperator => {
+            stays = true;
+            let third = 2 * n / 3;
+            rows = (third, n);
+            table.e[third..].copy_from_slice(&second.e[third..n]);
+            table.u[third..].copy_from_slice(&second.u[third..n]);
+        }
+    }
+    let last = if stays { rows.0 } else { rows.1 };
+    Injected {
+        from_s: rows.0 as f64 * clean.h,
+        to_s: last as f64 * clean.h,
+        table,
+        rows,
+    }
+}
+
+/// Changes the values of the channels in some rows: of a value, its row and whether it is of e.
+fn each(table: &mut Table, on: On, rows: (usize, usize), change: impl Fn(f64, usize, bool) -> f64) {
+    for k in rows.0..rows.1 {
+        if on.e() {
+            table.e[k] = change(table.e[k], k, true);
+        }
+        if on.u() {
+            table.u[k] = change(table.u[k], k, false);
+        }
+    }
+}

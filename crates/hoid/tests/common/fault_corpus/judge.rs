@@ -1,0 +1,218 @@
+//! What a result is worth, against the truth.
+//!
+//! The error of a parameter is its distance from the truth in its own standard errors; a delay that
+//! is found on the grid of samples alone has one sample for an error. A parameter that is reported as
+//! not determined, or has no error at all, claims nothing.
+//!
+//! A trace is wrong where it is at its last row or [`LATER_S`] behind the fault. Its recovery is the
+//! time from the end of the fault to the last row at which a parameter is off by more than
+//! [`NEAR_ERRORS`] of its errors and by more than [`NEAR_SHARE`] of its truth. Its lasting error is
+//! the largest that it had for [`LASTING_S`] on end.
+
+use serde_json::Value;
+
+use super::bases::Truth;
+
+/// Standard errors from which a number is wrong.
+pub const WRONG: f64 = 4.0;
+/// How near a report must be to its fault, s.
+pub const NEAR_S: f64 = 1.0;
+/// When a trace is looked at once more, s behind the fault.
+pub const LATER_S: f64 = 20.0;
+const NEAR_ERRORS: f64 = 2.5;
+const NEAR_SHARE: f64 = 0.1;
+const LASTING_S: f64 = 5.0;
+/// Findings that tell of faults of the recording, and of nothing else.
+const OF_FAULTS: [&str; 4] = ["faults", "held-back", "hostile-span", "restarted"];
+
+/// What is known of a case.
+#[derive(Debug, Clone)]
+pub struct Known {
+    pub truth: Truth,
+    /// The truth behind the fault, where that is another person.
+    pub then: Option<Truth>,
+    /// Where the fault shows, s; `None` in a clean run.
+    pub span_s: Option<(f64, f64)>,
+    /// Name of the file that has it.
+    pub file: String,
+    pub sample_time: f64,
+}
+
+/// The judgement of one result.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Judged {
+    /// The parameter that is off most, and by how many standard errors.
+    pub worst: Option<(String, f64)>,
+    pub wrong: bool,
+    /// The verdict in a word; "refused" where there is no result.
+    pub level: String,
+    /// What speaks against the result, by kinds.
+    pub kinds: Vec<String>,
+    /// Whether a finding that is more than a note tells of faults.
+    pub of_faults: bool,
+    /// Faults that are reported, and whether one is at the right place.
+    pub told: usize,
+    pub placed: bool,
+    /// Of traces: seconds until it was near the truth for good; infinite where it never was.
+    pub recovery_s: Option<f64>,
+    /// Of traces: the largest error that lasted, in standard errors.
+    pub lasting: Option<f64>,
+}
+
+impl Judged {
+    /// A record that the program refuses.
+    pub fn refused() -> Self {
+        Self {
+            level: "refused".to_owned(),
+            ..Self::default()
+        }
+    }
+
+    /// Whether the user is told that something is amiss.
+    pub fn flagged(&self) -> bool {
+        self.level != "trustworthy" || self.placed
+    }
+
+    /// What must not be.
+    pub fn silently_wrong(&self) -> bool {
+        self.wrong && !self.flagged()
+    }
+}
+
+/// One parameter: its value, and its standard error where it claims one.
+pub type Claim = (String, f64, f64);
+
+/// A row of a trace.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    pub t: f64,
+    pub claims: Vec<Claim>,
+}
+
+/// Judges a fit by what the program printed.
+pub fn of_fit(json: &Value, known: &Known) -> Judged {
+    let claims = claims_of(json, known);
+    let worst = worst_of(&claims, &known.truth);
+    Judged {
+        wrong: worst.as_ref().is_some_and(|(_, z)| *z > WRONG),
+        worst,
+        ..reported(json, known)
+    }
+}
+
+/// Judges a trace.
+pub fn of_trace(json: &Value, rows: &[Row], known: &Known) -> Judged {
+    let truth_at = |t: f64| match (&known.then, known.span_s) {
+        (Some(then), Some((from, _))) if t >= from => then,
+        _ => &known.truth,
+    };
+    let worst_at = |row: &Row| worst_of(&row.claims, truth_at(row.t));
+    let behind = known.span_s.map_or(0.0, |(_, to)| to);
+    let later = rows
+        .iter()
+        .find(|row| known.span_s.is_some() && row.t >= behind + LATER_S);
+    let looked_at = [rows.last(), later].into_iter().flatten();
+    let worst = looked_at.filter_map(worst_at).max_by(|a, b| a.1.total_cmp(&b.1));
+    let begun = known.span_s.map_or(0.0, |(from, _)| from);
+    let errors: Vec<(f64, f64)> = rows
+        .iter()
+        .filter(|row| row.t >= begun)
+        .map(|row| (row.t, worst_at(row).map_or(0.0, |(_, z)| z)))
+        .collect();
+    let recovery_s = known.span_s.and_then(|_| {
+        let after: Vec<&Row> = rows.iter().filter(|row| row.t >= behind).collect();
+        let far = |row: &&&Row| !is_near(&row.claims, truth_at(row.t));
+        let last = after.last()?.t;
+        // A trace that ends with the fault, or so soon after that nothing can be said.
+        (last - behind > 1.0).then(|| match after.iter().rfind(far) {
+            Some(row) if row.t >= last => f64::INFINITY,
+            Some(row) => row.t - behind,
+            None => 0.0,
+        })
+    });
+    Judged {
+        wrong: worst.as_ref().is_some_and(|(_, z)| *z > WRONG),
+        worst,
+        recovery_s,
+        lasting: lasting(&errors),
+        ..reported(json, known)
+    }
+}
+
+/// Verdict and reported faults of any result.
+fn reported(json: &Value, known: &Known) -> Judged {
+    let verdict = &json["verdict"];
+    let findings = verdict["findings"].as_array().map_or(&[][..], Vec::as_slice);
+    let graver = findings.iter().filter(|f| f["severity"] != "note");
+    let kinds: Vec<String> = graver.filter_map(|f| Some(f["kind"].as_str()?.to_owned())).collect();
+    let faults = json["faults"].as_array().map_or(&[][..], Vec::as_slice);
+    let of_file = |fault: &&Value| match fault["record"].as_str() {
+        Some(record) => record.ends_with(&known.file),
+        None => true,
+    };
+    let meets = |fault: &Value| {
+        let Some((from, to)) = known.span_s else { return false };
+        // A fault of the whole file, as its unit of time, has no place.
+        let begins = fault["from"].as_f64().unwrap_or(0.0);
+        let ends = fault["to"].as_f64().unwrap_or(f64::INFINITY);
+        begins <= to + NEAR_S && ends >= from - NEAR_S
+    };
+    Judged {
+        level: verdict["level"].as_str().unwrap_or("none").to_owned(),
+        of_faults: kinds.iter().any(|kind| OF_FAULTS.contains(&kind.as_str())),
+        kinds,
+        told: faults.len(),
+        placed: faults.iter().filter(of_file).any(meets),
+        ..Judged::default()
+    }
+}
+
+fn claims_of(json: &Value, known: &Known) -> Vec<Claim> {
+    let named = |name: &str| {
+        let listed = json["parameters"]
+            .as_array()
+            .and_then(|all| all.iter().find(|p| p["name"] == name));
+        let of = if json["operator"][name].is_object() {
+            &json["operator"][name]
+        } else {
+            listed?
+        };
+        if of["determined"] == Value::Bool(false) {
+            return None;
+        }
+        let grid = (name == "tau_e").then_some(known.sample_time);
+        let error = of["standard_error"].as_f64().filter(|s| *s > 0.0).or(grid)?;
+        Some((name.to_owned(), of["value"].as_f64()?, error))
+    };
+    known.truth.iter().filter_map(|(name, _)| named(name)).collect()
+}
+
+fn worst_of(claims: &[Claim], truth: &Truth) -> Option<(String, f64)> {
+    let off = |(name, value, error): &Claim| {
+        let (_, own) = truth.iter().find(|(known, _)| known == name)?;
+        Some((name.clone(), (value - own).abs() / error))
+    };
+    claims.iter().filter_map(off).max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+fn is_near(claims: &[Claim], truth: &Truth) -> bool {
+    let near = |(name, value, error): &Claim| {
+        truth.iter().find(|(known, _)| known == name).is_none_or(|(_, own)| {
+            let off = (value - own).abs();
+            off <= NEAR_ERRORS * error || off <= NEAR_SHARE * own.abs()
+        })
+    };
+    !claims.is_empty() && claims.iter().all(near)
+}
+
+/// The largest error that was there for [`LASTING_S`] on end, of (t, error).
+fn lasting(errors: &[(f64, f64)]) -> Option<f64> {
+    let (first, last) = (errors.first()?.0, errors.last()?.0);
+    if last - first < LASTING_S {
+        return None;
+    }
+    let step = (last - first) / (errors.len() - 1) as f64;
+    let rows = ((LASTING_S / step).round() as usize).max(1);
+    let least = |window: &[(f64, f64)]| window.iter().map(|(_, z)| *z).fold(f64::INFINITY, f64::min);
+    errors.windows(rows).map(least).max_by(f64::total_cmp)
+}

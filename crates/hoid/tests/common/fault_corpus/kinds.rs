@@ -1,0 +1,238 @@
+//! The faults: kinds, sizes, places, and the cases in their order.
+
+/// In which channel a fault is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum On {
+    E,
+    U,
+    Both,
+}
+
+impl On {
+    pub fn e(self) -> bool {
+        self != Self::U
+    }
+
+    pub fn u(self) -> bool {
+        self != Self::E
+    }
+}
+
+/// What happens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum What {
+    /// Nothing: a clean run.
+    Nothing,
+    /// One sample off, by standard deviations of its channel.
+    Spike,
+    /// Samples off by 10 standard deviations, of either sign; their number.
+    Burst,
+    /// Cells that are empty; their number.
+    Missing,
+    /// 360 deg added for some seconds.
+    Wrap,
+    /// A level that changes and stays, by percent of the standard deviation.
+    Step,
+    /// A level of the whole record, by percent of the standard deviation.
+    Offset,
+    /// A straight line over the whole record, by standard deviations at its end.
+    Drift,
+    /// A value that is held for some seconds.
+    Frozen,
+    /// Some seconds of zeros put in before, inside or behind the run.
+    Idle,
+    /// The same with a trace of noise: 0.001 standard deviations.
+    IdleNoisy,
+    /// Zeros in place of the signal for some seconds.
+    Dropout,
+    /// Both channels times a factor for 10 s.
+    Scaled,
+    /// The same for 50 s, or 40 % of a shorter record.
+    ScaledLong,
+    /// The time in ms.
+    Milliseconds,
+    /// e and u exchanged for some seconds, or wholly.
+    Swapped,
+    /// The sign turned for some seconds, or wholly.
+    Flipped,
+    /// Values held at some standard deviations from the mean.
+    Saturated,
+    /// Values rounded to steps of some standard deviations.
+    Quantised,
+    /// Rows that are gone for some seconds, the time counted as if nothing were.
+    Lost,
+    /// Rows that are there twice for some seconds, the time counted on.
+    Duplicated,
+    /// u later by some samples from here on.
+    Late,
+    /// A record of so many samples.
+    Short,
+    /// Another person from two thirds of the record on.
+    SecondOperator,
+}
+
+/// A kind of fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Kind {
+    pub what: What,
+    pub on: On,
+}
+
+/// Where in the record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// At 6 % of its length.
+    Start,
+    /// At a half.
+    Middle,
+    /// At 90 %.
+    End,
+    /// All of it, or where the kind says.
+    Whole,
+}
+
+/// One fault.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fault {
+    pub kind: Kind,
+    pub size: f64,
+    pub place: Place,
+}
+
+const CHANNELS: &[On] = &[On::E, On::U, On::Both];
+const EACH: &[On] = &[On::E, On::U];
+const TOGETHER: &[On] = &[On::Both];
+const ONE: &[On] = &[On::U];
+const PLACES: &[Place] = &[Place::Start, Place::Middle, Place::End];
+const ALL: &[Place] = &[Place::Whole];
+/// The whole record.
+pub const WHOLE: f64 = f64::INFINITY;
+
+/// A line for each kind: name, unit of its size, channels, sizes, places.
+type Line = (
+    What,
+    &'static str,
+    &'static str,
+    &'static [On],
+    &'static [f64],
+    &'static [Place],
+);
+
+const LINES: [Line; 23] = [
+    (
+        What::Spike,
+        "spike",
+        "sigma",
+        CHANNELS,
+        &[5.0, 10.0, 30.0, 100.0, 1000.0],
+        PLACES,
+    ),
+    (What::Burst, "burst", "samples", CHANNELS, &[2.0, 5.0, 10.0], PLACES),
+    (
+        What::Missing,
+        "missing",
+        "samples",
+        CHANNELS,
+        &[1.0, 10.0, 100.0],
+        PLACES,
+    ),
+    (What::Wrap, "wrap", "s", EACH, &[0.1, 2.0, WHOLE], PLACES),
+    (What::Step, "step", "%", EACH, &[2.0, 10.0, 50.0, 200.0], PLACES),
+    (What::Offset, "offset", "%", EACH, &[3.0, 10.0, 50.0], ALL),
+    (What::Drift, "drift", "sigma", EACH, &[0.2, 1.0, 5.0], ALL),
+    (What::Frozen, "frozen", "s", CHANNELS, &[0.1, 1.0, 10.0], PLACES),
+    (What::Idle, "idle", "s", TOGETHER, &[5.0, 15.0, 30.0], PLACES),
+    (
+        What::IdleNoisy,
+        "idle with noise",
+        "s",
+        TOGETHER,
+        &[5.0, 15.0, 30.0],
+        PLACES,
+    ),
+    (What::Dropout, "dropout", "s", CHANNELS, &[0.05, 0.5, 5.0], PLACES),
+    (What::Scaled, "scaled for 10 s", "times", TOGETHER, &[10.0, 1e6], PLACES),
+    (
+        What::ScaledLong,
+        "scaled for 50 s",
+        "times",
+        TOGETHER,
+        &[10.0, 1e6],
+        &[Place::Start, Place::Middle],
+    ),
+    (What::Milliseconds, "t in ms", "", TOGETHER, &[1000.0], ALL),
+    (What::Swapped, "swapped", "s", TOGETHER, &[10.0, 30.0, WHOLE], PLACES),
+    (What::Flipped, "flipped", "s", EACH, &[1.0, 10.0, WHOLE], PLACES),
+    (What::Saturated, "saturated", "sigma", EACH, &[2.0, 1.0, 0.5], ALL),
+    (What::Quantised, "quantised", "sigma", EACH, &[0.05, 0.3, 1.0], ALL),
+    (What::Lost, "lost", "s", TOGETHER, &[0.1, 1.0, 4.0], PLACES),
+    (What::Duplicated, "duplicated", "s", TOGETHER, &[0.1, 1.0], PLACES),
+    (What::Late, "late", "samples", ONE, &[1.0, 5.0, 20.0], PLACES),
+    (What::Short, "short", "samples", TOGETHER, &[60.0, 200.0, 500.0], ALL),
+    (What::SecondOperator, "second operator", "", TOGETHER, &[1.0], ALL),
+];
+
+impl Kind {
+    pub const NOTHING: Self = Self {
+        what: What::Nothing,
+        on: On::Both,
+    };
+
+    /// As tables have it: `spike, e`.
+    pub fn name(self) -> String {
+        let Some((_, name, _, channels, ..)) = LINES.iter().find(|line| line.0 == self.what) else {
+            return "none".to_owned();
+        };
+        match self.on {
+            _ if channels.len() == 1 => (*name).to_owned(),
+            On::E => format!("{name} e"),
+            On::U => format!("{name} u"),
+            On::Both => format!("{name} both"),
+        }
+    }
+}
+
+impl Fault {
+    pub const NONE: Self = Self {
+        kind: Kind::NOTHING,
+        size: 0.0,
+        place: Place::Whole,
+    };
+
+    /// Size with its unit: `30 sigma`.
+    pub fn size_text(&self) -> String {
+        let unit = LINES
+            .iter()
+            .find(|line| line.0 == self.kind.what)
+            .map_or("", |line| line.2);
+        match self.size {
+            _ if unit.is_empty() => String::new(),
+            WHOLE if self.kind.what == What::Wrap => "to the end".to_owned(),
+            WHOLE => "whole".to_owned(),
+            size => format!("{size} {unit}"),
+        }
+    }
+}
+
+/// All faults, in the order of the tables.
+pub fn faults() -> Vec<Fault> {
+    let mut all = Vec::new();
+    for (what, _, _, channels, sizes, places) in LINES {
+        for &on in channels {
+            for &size in sizes {
+                // What has the whole record has no place in it; a wrap begins somewhere.
+                let places = if size == WHOLE && what != What::Wrap {
+                    ALL
+                } else {
+                    places
+                };
+                all.extend(places.iter().map(|&place| Fault {
+                    kind: Kind { what, on },
+                    size,
+                    place,
+                }));
+            }
+        }
+    }
+    all
+}

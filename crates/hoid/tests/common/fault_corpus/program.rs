@@ -1,0 +1,236 @@
+//! The program, run on a case: what the user gets is what is judged.
+
+use std::{
+    fs::{self, File},
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+    time::{Duration, Instant},
+};
+
+use serde_json::Value;
+
+use super::{
+    bases::{Base, Who, base},
+    inject::inject,
+    judge::{self, Judged, Known, Row},
+    kinds::{Fault, What},
+};
+
+/// A run of the program that takes longer is ended, s.
+const LONGEST_S: u64 = 120;
+/// Every so many samples a row of a trace.
+const EVERY: &str = "10";
+
+/// How a record is evaluated, with default options.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// `identify --form` the true one: the grey box.
+    GreyBox,
+    /// `identify --structure bj`.
+    BoxJenkins,
+    Adaptive,
+    Physical,
+    Rls,
+    Rpem,
+}
+
+impl Way {
+    pub const ALL: [Self; 6] = [
+        Self::GreyBox,
+        Self::BoxJenkins,
+        Self::Adaptive,
+        Self::Physical,
+        Self::Rls,
+        Self::Rpem,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::GreyBox => "grey-box",
+            Self::BoxJenkins => "bj",
+            Self::Adaptive => "adaptive",
+            Self::Physical => "physical",
+            Self::Rls => "rls",
+            Self::Rpem => "rpem",
+        }
+    }
+
+    pub fn tracks(self) -> bool {
+        !matches!(self, Self::GreyBox | Self::BoxJenkins)
+    }
+
+    /// Those that a run is evaluated by: the grey box knows all operators, the others a gain with a
+    /// lead; of people, by the two that are meant for them.
+    pub fn of(base: &Base) -> &'static [Self] {
+        const LEAD: [Way; 3] = [Way::GreyBox, Way::Adaptive, Way::Physical];
+        match (base.who, base.form) {
+            (Who::C1 | Who::C2, _) => &Self::ALL,
+            (Who::Person, hoid::model::Form::Lead) => &LEAD,
+            (Who::Person, _) => &LEAD[..1],
+        }
+    }
+}
+
+/// A fault in a run, evaluated in one way.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    pub case: u64,
+    pub fault: Fault,
+    pub who: Who,
+    pub label: String,
+    pub way: Way,
+    pub seconds: f64,
+    pub judged: Judged,
+    /// What the program said when it gave no result.
+    pub refusal: Option<String>,
+}
+
+/// Evaluates a fault in the runs of `who` in each of the ways that are asked for and fit.
+///
+/// # Errors
+/// What the simulation or the file system says.
+pub fn outcomes(
+    program: &Path,
+    seed: u64,
+    case: u64,
+    fault: Fault,
+    who: Who,
+    ways: &[Way],
+) -> Result<Vec<Outcome>, String> {
+    let base = base(who, seed, case).map_err(|e| e.to_string())?;
+    let folder = std::env::temp_dir().join(format!("hoid-faults-{}-{case}-{}", std::process::id(), who.name()));
+    fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let (files, known) = write(&base, &fault, &folder, seed, case)?;
+    let evaluated = |way: &Way| {
+        let begun = Instant::now();
+        let found = run(program, *way, &base, &files, &known, &folder)?;
+        let (judged, refusal) = match found {
+            Ok(judged) => (judged, None),
+            Err(said) => (Judged::refused(), Some(said)),
+        };
+        Ok(Outcome {
+            case,
+            fault,
+            who,
+            label: base.label.clone(),
+            way: *way,
+            seconds: begun.elapsed().as_secs_f64(),
+            judged,
+            refusal,
+        })
+    };
+    let all = Way::of(&base).iter().filter(|way| ways.contains(way));
+    let all: Result<Vec<Outcome>, String> = all.map(evaluated).collect();
+    fs::remove_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    all
+}
+
+/// The files of a case, the one with the fault last, and what is known of it.
+fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Result<(Vec<PathBuf>, Known), String> {
+    let injected = inject(fault, &base.runs[base.faulty()], &base.second, seed, case);
+    let mut files = Vec::new();
+    for (i, run) in base.runs.iter().enumerate() {
+        if i != base.faulty() {
+            files.push((folder.join(format!("run{i}.csv")), run.to_csv()));
+        }
+    }
+    files.push((folder.join("faulty.csv"), injected.table.to_csv()));
+    for (file, text) in &files {
+        fs::write(file, text).map_err(|e| format!("{}: {e}", file.display()))?;
+    }
+    let known = Known {
+        truth: base.truth.clone(),
+        then: (fault.kind.what == What::SecondOperator).then(|| base.second_truth.clone()),
+        span_s: (fault.kind.what != What::Nothing).then_some((injected.from_s, injected.to_s)),
+        file: "faulty.csv".to_owned(),
+        sample_time: injected.table.h,
+    };
+    Ok((files.into_iter().map(|(file, _)| file).collect(), known))
+}
+
+/// The judgement, or what the program said instead of a result.
+fn run(
+    program: &Path,
+    way: Way,
+    base: &Base,
+    files: &[PathBuf],
+    known: &Known,
+    folder: &Path,
+) -> Result<Result<Judged, String>, String> {
+    let trace = folder.join(format!("trace-{}.csv", way.name()));
+    let mut command = Command::new(program);
+    command.env("RAYON_NUM_THREADS", "1");
+    match way {
+        Way::GreyBox => command.arg("identify").args(files).args(["--form", base.form.name()]),
+        Way::BoxJenkins => command.arg("identify").args(files).args(["--structure", "bj"]),
+        _ => command
+            .arg("track")
+            .args(files.last())
+            .args(["--method", way.name(), "--every", EVERY, "--out"])
+            .arg(&trace),
+    };
+    command.arg("--json");
+    let (said, printed) = finished(&mut command, folder)?;
+    let Ok(json) = serde_json::from_str::<Value>(&printed) else {
+        return Ok(Err(said));
+    };
+    if !way.tracks() {
+        return Ok(Ok(judge::of_fit(&json, known)));
+    }
+    let text = fs::read_to_string(&trace).map_err(|e| format!("{}: {e}", trace.display()))?;
+    Ok(Ok(judge::of_trace(&json, &rows(&text), known)))
+}
+
+/// What a command wrote to its error stream and its output; nothing of one that failed.
+fn finished(command: &mut Command, folder: &Path) -> Result<(String, String), String> {
+    let (output, errors) = (folder.join("output"), folder.join("errors"));
+    let create = |path: &Path| File::create(path).map_err(|e| format!("{}: {e}", path.display()));
+    command
+        .stdin(Stdio::null())
+        .stdout(create(&output)?)
+        .stderr(create(&errors)?);
+    let mut child = command
+        .spawn()
+        .map_err(|e| format!("{}: {e}", command.get_program().display()))?;
+    let begun = Instant::now();
+    let status = loop {
+        if let Some(status) = child.try_wait().map_err(|e| e.to_string())? {
+            break status;
+        }
+        if begun.elapsed() > Duration::from_secs(LONGEST_S) {
+            child.kill().map_err(|e| e.to_string())?;
+            child.wait().map_err(|e| e.to_string())?;
+            return Ok((format!("took longer than {LONGEST_S} s"), String::new()));
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    };
+    let read = |path: &Path| fs::read(path).map_err(|e| format!("{}: {e}", path.display()));
+    let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
+    let (said, printed) = (text(read(&errors)?), text(read(&output)?));
+    let said = format!("{status}: {}", said.trim());
+    Ok((said, if status.success() { printed } else { String::new() }))
+}
+
+/// The rows of a trace file: time, and each column that has one of the same name with `_se`.
+pub fn rows(text: &str) -> Vec<Row> {
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let names: Vec<&str> = lines.next().unwrap_or("").split(',').collect();
+    let place = |name: &str| names.iter().position(|n| *n == name);
+    let pairs: Vec<(&str, usize, usize)> = names
+        .iter()
+        .enumerate()
+        .filter_map(|(i, name)| Some((*name, i, place(&format!("{name}_se"))?)))
+        .collect();
+    let row = |line: &str| {
+        let cells: Vec<Option<f64>> = line.split(',').map(|cell| cell.parse().ok()).collect();
+        let cell = |i: usize| cells.get(i).copied().flatten().filter(|x: &f64| x.is_finite());
+        let claim = |(name, value, error): &(&str, usize, usize)| {
+            Some(((*name).to_owned(), cell(*value)?, cell(*error).filter(|s| *s > 0.0)?))
+        };
+        Some(Row {
+            t: cell(place("t")?)?,
+            claims: pairs.iter().filter_map(claim).collect(),
+        })
+    };
+    lines.filter_map(row).collect()
+}

@@ -1,0 +1,218 @@
+//! Shares over cases, as tables.
+
+use std::fmt::Write as _;
+
+use super::{
+    kinds::{Kind, What},
+    program::{Outcome, Way},
+};
+
+/// Numbers of some cases.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Numbers {
+    pub all: usize,
+    pub wrong: usize,
+    /// Wrong and not flagged.
+    pub silent: usize,
+    /// Right and flagged all the same.
+    pub useless: usize,
+    pub refused: usize,
+    /// With a fault reported at the right place.
+    pub placed: usize,
+}
+
+impl Numbers {
+    pub fn of<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>) -> Self {
+        let mut n = Self::default();
+        for o in outcomes {
+            let j = &o.judged;
+            n.all += 1;
+            n.wrong += usize::from(j.wrong);
+            n.silent += usize::from(j.silently_wrong());
+            n.useless += usize::from(!j.wrong && j.flagged());
+            n.refused += usize::from(o.refusal.is_some());
+            n.placed += usize::from(j.placed);
+        }
+        n
+    }
+
+    fn cell(self) -> String {
+        match self.all {
+            0 => "–".to_owned(),
+            all => format!("{}, {}, {} of {all}", self.wrong, self.silent, self.useless),
+        }
+    }
+}
+
+fn percent(of: usize, all: usize) -> String {
+    match all {
+        0 => "–".to_owned(),
+        _ => format!("{:.1} %", 100.0 * of as f64 / all as f64),
+    }
+}
+
+/// The middle one; `None` of none.
+pub fn median(mut all: Vec<f64>) -> Option<f64> {
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied()
+}
+
+/// By method: the gate.
+pub fn by_way(all: &[Outcome]) -> String {
+    let mut text = "| method | cases | wrong | wrong and not flagged | flagged, of those right | refused | fault reported at its place |\n|---|---|---|---|---|---|---|\n".to_owned();
+    let mut put = |name: &str, n: Numbers| {
+        let _ = writeln!(
+            text,
+            "| {name} | {} | {} | {} ({}) | {} | {} | {} |",
+            n.all,
+            percent(n.wrong, n.all),
+            n.silent,
+            percent(n.silent, n.all),
+            percent(n.useless, n.all - n.wrong),
+            n.refused,
+            percent(n.placed, n.all)
+        );
+    };
+    for way in Way::ALL {
+        put(way.name(), Numbers::of(all.iter().filter(|o| o.way == way)));
+    }
+    put("all", Numbers::of(all));
+    text
+}
+
+/// By kind and size, a column for each method.
+pub fn by_fault(all: &[Outcome]) -> String {
+    let mut text = format!(
+        "| fault | size | {} |\n|---|---|{}\n",
+        Way::ALL.map(Way::name).join(" | "),
+        "---|".repeat(Way::ALL.len())
+    );
+    for (kind, size) in kinds_and_sizes(all) {
+        let such = |o: &&Outcome| o.fault.kind == kind && o.fault.size == size;
+        let first = all.iter().find(such).map(|o| o.fault.size_text()).unwrap_or_default();
+        let cells = Way::ALL.map(|way| Numbers::of(all.iter().filter(such).filter(|o| o.way == way)).cell());
+        let _ = writeln!(text, "| {} | {first} | {} |", kind.name(), cells.join(" | "));
+    }
+    text
+}
+
+/// Of trackers by kind and size: the median recovery time in s and how many never recover.
+pub fn recovery(all: &[Outcome]) -> String {
+    let trackers: Vec<Way> = Way::ALL.into_iter().filter(|way| way.tracks()).collect();
+    let names: Vec<&str> = trackers.iter().map(|way| way.name()).collect();
+    let mut text = format!(
+        "| fault | size | {} |\n|---|---|{}\n",
+        names.join(" | "),
+        "---|".repeat(names.len())
+    );
+    for (kind, size) in kinds_and_sizes(all) {
+        let such = |o: &&Outcome| o.fault.kind == kind && o.fault.size == size;
+        let cells: Vec<String> = trackers
+            .iter()
+            .map(|way| {
+                let times = all
+                    .iter()
+                    .filter(such)
+                    .filter(|o| o.way == *way)
+                    .filter_map(|o| o.judged.recovery_s);
+                let times: Vec<f64> = times.collect();
+                let never = times.iter().filter(|t| t.is_infinite()).count();
+                let n = times.len();
+                match median(times) {
+                    None => "–".to_owned(),
+                    Some(t) if t.is_infinite() => format!("never; {never} of {n}"),
+                    Some(t) => format!("{t:.1} s; {never} of {n}"),
+                }
+            })
+            .collect();
+        if cells.iter().any(|cell| cell != "–") {
+            let first = all.iter().find(such).map(|o| o.fault.size_text()).unwrap_or_default();
+            let _ = writeln!(text, "| {} | {first} | {} |", kind.name(), cells.join(" | "));
+        }
+    }
+    text
+}
+
+/// Of clean runs: false flags, by kind of run and method.
+pub fn clean(all: &[Outcome]) -> String {
+    let mut text = "| runs | method | number | flagged by a fault | a fault reported | not trustworthy | wrong | wrong and not flagged |\n|---|---|---|---|---|---|---|---|\n".to_owned();
+    let mut labels: Vec<&str> = all.iter().map(|o| o.label.as_str()).collect();
+    labels.sort_unstable();
+    labels.dedup();
+    for label in labels.into_iter().map(Some).chain([None]) {
+        let of = |way: Option<Way>| {
+            let such = |o: &&Outcome| label.is_none_or(|l| o.label == l) && way.is_none_or(|w| o.way == w);
+            all.iter().filter(such).collect::<Vec<_>>()
+        };
+        for way in Way::ALL.map(Some).into_iter().chain([None]) {
+            let such = of(way);
+            if such.is_empty() || (way.is_none() && label.is_some()) {
+                continue;
+            }
+            let share = |yes: fn(&Outcome) -> bool| percent(such.iter().filter(|o| yes(o)).count(), such.len());
+            let _ = writeln!(
+                text,
+                "| {} | {} | {} | {} | {} | {} | {} | {} |",
+                label.unwrap_or("all"),
+                way.map_or("all", Way::name),
+                such.len(),
+                share(|o| o.judged.of_faults),
+                share(|o| o.judged.told > 0),
+                share(|o| o.judged.level != "trustworthy"),
+                share(|o| o.judged.wrong),
+                share(|o| o.judged.silently_wrong()),
+            );
+        }
+    }
+    text
+}
+
+/// What there is, in the order of the cases.
+fn kinds_and_sizes(all: &[Outcome]) -> Vec<(Kind, f64)> {
+    let mut found = Vec::new();
+    for o in all {
+        let key = (o.fault.kind, o.fault.size);
+        if !found.contains(&key) {
+            found.push(key);
+        }
+    }
+    found
+}
+
+/// One row for each result.
+pub fn to_csv(all: &[Outcome]) -> String {
+    let mut text = "case,kind,size,place,run,method,wrong,flagged,silent,level,kinds,of_faults,told,placed,worst,errors,recovery_s,lasting,seconds,refusal\n".to_owned();
+    for o in all {
+        let j = &o.judged;
+        let place = if o.fault.kind.what == What::Nothing {
+            String::new()
+        } else {
+            format!("{:?}", o.fault.place).to_lowercase()
+        };
+        let (worst, errors) = j.worst.clone().unwrap_or_default();
+        let optional = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.2}"));
+        let refusal = o.refusal.as_deref().unwrap_or("").replace(['\n', ',', '"'], " ");
+        let _ = writeln!(
+            text,
+            "{},{},{},{place},{},{},{},{},{},{},{},{},{},{},{worst},{errors:.2},{},{},{:.2},{}",
+            o.case,
+            o.fault.kind.name(),
+            o.fault.size_text(),
+            o.label.replace(", ", " "),
+            o.way.name(),
+            j.wrong,
+            j.flagged(),
+            j.silently_wrong(),
+            j.level,
+            j.kinds.join(" "),
+            j.of_faults,
+            j.told,
+            j.placed,
+            optional(j.recovery_s),
+            optional(j.lasting),
+            o.seconds,
+            refusal.chars().take(200).collect::<String>()
+        );
+    }
+    text
+}

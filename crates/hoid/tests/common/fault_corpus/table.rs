@@ -1,0 +1,74 @@
+//! A recording as the columns of a file.
+
+use std::fmt::Write as _;
+
+use hoid::model::Record;
+
+/// Columns over time: e, u, and where it was recorded the disturbance d.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// Time between two samples, s.
+    pub h: f64,
+    /// Time as the file has it, s but for a fault of its unit.
+    pub t: Vec<f64>,
+    pub e: Vec<f64>,
+    pub u: Vec<f64>,
+    pub d: Option<Vec<f64>>,
+}
+
+impl Table {
+    /// e and u of a record, with the disturbance where it is asked for and there.
+    pub fn of(record: &Record, with_disturbance: bool) -> Self {
+        let h = record.sample_time().s();
+        Self {
+            h,
+            t: (0..record.len()).map(|k| k as f64 * h).collect(),
+            e: record.input().to_vec(),
+            u: record.output().to_vec(),
+            d: with_disturbance
+                .then(|| record.channel("d").map(<[f64]>::to_vec))
+                .flatten(),
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.t.len()
+    }
+
+    /// Seconds from the first sample to behind the last.
+    pub fn seconds(&self) -> f64 {
+        self.len() as f64 * self.h
+    }
+
+    /// All columns but the time.
+    pub fn columns_mut(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
+        [&mut self.e, &mut self.u].into_iter().chain(self.d.as_mut())
+    }
+
+    /// Counts the time anew, as a recorder does that knows nothing of rows that are gone or twice.
+    pub fn renumber(&mut self) {
+        let (n, h) = (self.e.len(), self.h);
+        self.t = (0..n).map(|k| k as f64 * h).collect();
+    }
+
+    /// As CSV; what is not there is an empty cell.
+    pub fn to_csv(&self) -> String {
+        let mut text = String::from(if self.d.is_some() { "t,e,u,d\n" } else { "t,e,u\n" });
+        let cell = |x: f64| if x.is_nan() { String::new() } else { x.to_string() };
+        for k in 0..self.len() {
+            let _ = write!(text, "{},{},{}", self.t[k], cell(self.e[k]), cell(self.u[k]));
+            if let Some(d) = &self.d {
+                let _ = write!(text, ",{}", cell(d[k]));
+            }
+            text.push('\n');
+        }
+        text
+    }
+}
+
+/// Standard deviation.
+pub fn spread(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt()
+}

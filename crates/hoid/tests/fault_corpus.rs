@@ -1,0 +1,309 @@
+//! The corpus of faults keeps what it promises: `cargo xtask slow faults` is the whole of it.
+#![allow(clippy::unwrap_used)]
+
+// The study uses the rest of it.
+#[allow(dead_code)]
+#[path = "common/fault_corpus/mod.rs"]
+mod fault_corpus;
+
+use fault_corpus::{
+    bases::{Truth, Who, base},
+    inject::inject,
+    judge::{Judged, Known, Row, of_fit, of_trace},
+    kinds::{Fault, Kind, On, Place, WHOLE, What, faults},
+    program::{Way, outcomes, rows},
+    summary::{Numbers, by_way, median},
+    table::{Table, spread},
+};
+use serde_json::json;
+
+/// Not that of the page.
+const SEED: u64 = 77;
+
+fn two_runs() -> (Table, Table) {
+    let base = base(Who::C1, SEED, 1).unwrap();
+    (base.runs[0].clone(), base.second)
+}
+
+fn fault(what: What, on: On, size: f64, place: Place) -> Fault {
+    Fault {
+        kind: Kind { what, on },
+        size,
+        place,
+    }
+}
+
+#[test]
+fn there_are_hundreds_and_no_two_are_alike() {
+    let all = faults();
+    assert!(all.len() > 250, "{}", all.len());
+    for (i, one) in all.iter().enumerate() {
+        assert!(!all[..i].contains(one), "{one:?} is there twice");
+        assert!(one.kind.name() != "none");
+    }
+}
+
+#[test]
+fn runs_and_faults_are_the_same_each_time() {
+    let (clean, second) = two_runs();
+    assert_eq!((clean.clone(), second.clone()), two_runs());
+    for (case, fault) in (0..).zip(faults()).step_by(7) {
+        let text = |seed: u64| inject(&fault, &clean, &second, seed, case).table.to_csv();
+        assert_eq!(text(3), text(3), "{fault:?}");
+    }
+    let spike = fault(What::Spike, On::E, 10.0, Place::Middle);
+    let at = |seed| inject(&spike, &clean, &second, seed, 5).from_s;
+    assert_ne!(at(3), at(4));
+    let person = |case| base(Who::Person, SEED, case).unwrap();
+    assert_eq!(person(3).truth, person(3).truth);
+    assert_ne!(person(3).truth, person(4).truth);
+}
+
+/// Outside its rows a recording is what it was, inside it is not; what the fault does not touch stays.
+#[test]
+fn each_fault_is_where_it_says_and_nowhere_else() {
+    let (clean, second) = two_runs();
+    for (case, fault) in (0..).zip(faults()) {
+        let found = inject(&fault, &clean, &second, SEED, case);
+        let (from, to) = found.rows;
+        let (on, table) = (fault.kind.on, &found.table);
+        let added = table.len() as isize - clean.len() as isize;
+        let behind = table.len() - (clean.len() - to);
+        assert!(
+            found.from_s <= found.to_s && found.to_s <= table.seconds() + 1e-9,
+            "{fault:?}"
+        );
+        assert_eq!(table.e.len(), table.t.len());
+        assert_eq!(table.u.len(), table.t.len());
+        for (own, was, touched) in [(&table.e, &clean.e, on.e()), (&table.u, &clean.u, on.u())] {
+            assert_eq!(own[..from], was[..from], "{fault:?}");
+            if fault.kind.what != What::Short {
+                assert_eq!(own[behind..], was[to..], "{fault:?}");
+            }
+            let inside = |k: usize| own[k].to_bits() != was[k].to_bits();
+            let others = (from..to.min(own.len())).filter(|&k| inside(k)).count();
+            if !touched {
+                assert_eq!(others, 0, "{fault:?}");
+            } else if added == 0 && fault.kind.what != What::Milliseconds {
+                // A value that is frozen, held or rounded may be what it was.
+                assert!(others * 50 > to - from, "{fault:?}: {others} of {}", to - from);
+            }
+        }
+        let expected = match fault.kind.what {
+            What::Idle | What::IdleNoisy | What::Duplicated => (fault.size / clean.h).round() as isize,
+            What::Lost => -((fault.size / clean.h).round() as isize),
+            What::Short => fault.size as isize - clean.len() as isize,
+            _ => 0,
+        };
+        assert_eq!(added, expected, "{fault:?}");
+        let share = found.from_s / table.seconds();
+        match fault.place {
+            Place::Start => assert!(share < 0.08, "{fault:?}: {share}"),
+            Place::Middle => assert!((0.3..0.6).contains(&share), "{fault:?}: {share}"),
+            Place::End => assert!((0.7..1.0).contains(&share), "{fault:?}: {share}"),
+            Place::Whole => {}
+        }
+    }
+}
+
+#[test]
+fn faults_have_their_size() {
+    let (clean, second) = two_runs();
+    let with = |what, on, size| inject(&fault(what, on, size, Place::Middle), &clean, &second, SEED, 9);
+    let (of_e, of_u) = (spread(&clean.e), spread(&clean.u));
+
+    let spike = with(What::Spike, On::Both, 30.0);
+    let k = spike.rows.0;
+    assert!(((spike.table.e[k] - clean.e[k]).abs() / of_e - 30.0).abs() < 1e-9);
+    assert!(((spike.table.u[k] - clean.u[k]).abs() / of_u - 30.0).abs() < 1e-9);
+
+    let step = with(What::Step, On::U, 50.0);
+    let off: Vec<f64> = (step.rows.0..clean.len())
+        .map(|k| step.table.u[k] - clean.u[k])
+        .collect();
+    assert!(off.iter().all(|d| (d.abs() / of_u - 0.5).abs() < 1e-9));
+    assert_eq!(step.from_s, step.to_s);
+
+    let wrap = with(What::Wrap, On::E, 2.0);
+    assert_eq!(wrap.rows.1 - wrap.rows.0, 200);
+    assert!((wrap.table.e[wrap.rows.0] - clean.e[wrap.rows.0] - 360.0).abs() < 1e-9);
+
+    let missing = with(What::Missing, On::E, 10.0);
+    assert_eq!(missing.table.e.iter().filter(|x| x.is_nan()).count(), 10);
+    assert_eq!(
+        missing
+            .table
+            .to_csv()
+            .lines()
+            .filter(|line| line.contains(",,"))
+            .count(),
+        10
+    );
+
+    let late = with(What::Late, On::U, 5.0);
+    let last = clean.len() - 1;
+    assert_eq!(late.table.u[last], clean.u[last - 5]);
+    let lost = with(What::Lost, On::Both, 1.0);
+    assert_eq!(lost.table.e[lost.rows.0], clean.e[lost.rows.0 + 100]);
+    assert_eq!(lost.table.t, clean.t[..clean.len() - 100]);
+
+    let swapped = inject(
+        &fault(What::Swapped, On::Both, WHOLE, Place::Whole),
+        &clean,
+        &second,
+        SEED,
+        9,
+    );
+    assert_eq!((&swapped.table.e, &swapped.table.u), (&clean.u, &clean.e));
+    let held = with(What::Frozen, On::U, 1.0);
+    assert!((held.rows.0..held.rows.1).all(|k| held.table.u[k] == clean.u[held.rows.0]));
+    let coarse = fault(What::Quantised, On::U, 1.0, Place::Whole);
+    let coarse = inject(&coarse, &clean, &second, SEED, 9);
+    assert!(
+        coarse
+            .table
+            .u
+            .iter()
+            .all(|x| (x / of_u - (x / of_u).round()).abs() < 1e-9)
+    );
+}
+
+fn known(span_s: Option<(f64, f64)>) -> Known {
+    let truth: Truth = vec![("K_e".to_owned(), 1.0), ("tau_e".to_owned(), 0.2)];
+    Known {
+        truth,
+        then: None,
+        span_s,
+        file: "faulty.csv".to_owned(),
+        sample_time: 0.01,
+    }
+}
+
+fn fit(value: f64, error: Option<f64>, level: &str) -> serde_json::Value {
+    json!({
+        "verdict": {"level": level, "findings": []},
+        "operator": {"K_e": {"value": value, "standard_error": error}, "tau_e": {"value": 0.21, "standard_error": null}},
+    })
+}
+
+#[test]
+fn fits_are_judged() {
+    let judged = |json: &serde_json::Value| of_fit(json, &known(Some((10.0, 11.0))));
+    let silent = judged(&fit(1.5, Some(0.1), "trustworthy"));
+    assert!(silent.wrong && !silent.flagged() && silent.silently_wrong());
+    assert!(matches!(&silent.worst, Some((name, z)) if name == "K_e" && (z - 5.0).abs() < 1e-9));
+    let told = judged(&fit(1.5, Some(0.1), "doubtful"));
+    assert!(told.wrong && told.flagged() && !told.silently_wrong());
+    assert!(!judged(&fit(1.39, Some(0.1), "trustworthy")).wrong);
+    // What has no standard error claims nothing, but for a delay on the grid.
+    let open = judged(&fit(9.0, None, "trustworthy"));
+    assert!(!open.wrong && matches!(&open.worst, Some((name, z)) if name == "tau_e" && (z - 1.0).abs() < 1e-9));
+    let mut late = fit(1.0, Some(0.1), "trustworthy");
+    late["operator"]["tau_e"]["value"] = json!(0.05);
+    assert!(judged(&late).silently_wrong());
+    let mut undetermined = fit(9.0, Some(0.1), "trustworthy");
+    undetermined["operator"]["K_e"]["determined"] = json!(false);
+    assert!(!judged(&undetermined).wrong);
+    let refused = Judged::refused();
+    assert!(refused.flagged() && !refused.wrong);
+}
+
+#[test]
+fn a_fault_counts_at_its_place_alone() {
+    let with = |from: f64, to: f64, record: &str| {
+        let mut json = fit(1.5, Some(0.1), "trustworthy");
+        json["faults"] = json!([{"kind": "spike", "from": from, "to": to, "record": record}]);
+        of_fit(&json, &known(Some((10.0, 11.0))))
+    };
+    assert!(with(11.9, 12.0, "/a/faulty.csv").flagged());
+    assert!(with(2.0, 9.1, "faulty.csv").placed);
+    assert!(!with(12.1, 13.0, "faulty.csv").flagged());
+    assert!(!with(10.0, 11.0, "run0.csv").flagged());
+    let mut json = fit(1.0, Some(0.1), "doubtful");
+    json["verdict"]["findings"] = json!([{"kind": "faults", "severity": "doubt", "words": ""}]);
+    let clean = of_fit(&json, &known(None));
+    assert!(clean.of_faults && !clean.placed && clean.kinds == ["faults"]);
+    json["verdict"]["findings"][0]["severity"] = json!("note");
+    assert!(!of_fit(&json, &known(None)).of_faults);
+}
+
+#[test]
+fn traces_are_judged_at_the_end_and_on_the_way() {
+    let json = json!({"verdict": {"level": "trustworthy", "findings": []}});
+    // Off by ten errors for 8 s behind a fault of 1 s, then near.
+    let off_until = |end: f64| -> Vec<Row> {
+        let row = |i: u32| {
+            let t = f64::from(i) * 0.1;
+            let value = if (10.0..end).contains(&t) { 2.0 } else { 1.1 };
+            Row {
+                t,
+                claims: vec![("K_e".to_owned(), value, 0.1)],
+            }
+        };
+        (0..600).map(row).collect()
+    };
+    let known = known(Some((10.0, 11.0)));
+    let back = of_trace(&json, &off_until(19.0), &known);
+    assert!(!back.wrong);
+    assert!((back.recovery_s.unwrap() - 7.9).abs() < 0.11, "{back:?}");
+    assert!((back.lasting.unwrap() - 10.0).abs() < 1e-6);
+    let slow = of_trace(&json, &off_until(40.0), &known);
+    assert!(slow.silently_wrong() && slow.recovery_s.unwrap() > 28.0);
+    let never = of_trace(&json, &off_until(100.0), &known);
+    assert!(never.wrong && never.recovery_s.unwrap().is_infinite());
+    let short = of_trace(&json, &off_until(13.0), &known);
+    assert!(short.lasting.unwrap() < 2.0, "{short:?}");
+    // Another person from 10 s on: the trace that follows them is right.
+    let other = Known {
+        then: Some(vec![("K_e".to_owned(), 2.0)]),
+        span_s: Some((10.0, 10.0)),
+        ..known
+    };
+    assert!(!of_trace(&json, &off_until(100.0), &other).wrong);
+    assert!(of_trace(&json, &off_until(12.0), &other).wrong);
+}
+
+#[test]
+fn traces_are_read() {
+    let text = "# of hoid\nt,b0,b0_se,K_e,K_e_se,convertible\n0.1,1,0.5,2,0.25,1\n0.2,1,0.5,,,0\n";
+    let found = rows(text);
+    assert_eq!(found.len(), 2);
+    assert_eq!(found[0].t, 0.1);
+    assert_eq!(found[0].claims[1], ("K_e".to_owned(), 2.0, 0.25));
+    assert_eq!(found[1].claims.len(), 1);
+}
+
+#[test]
+fn tables_count() {
+    assert_eq!(median(vec![3.0, f64::INFINITY, 1.0]), Some(3.0));
+    assert_eq!(median(Vec::new()), None);
+    assert_eq!(Numbers::of(&[]), Numbers::default());
+    assert!(by_way(&[]).contains("| grey-box | 0 | – |"));
+}
+
+/// The gate: no number that is wrong goes unflagged.
+#[test]
+#[ignore = "not all faults are found yet; it runs the program `hoid`, which must be built beside this test"]
+fn nothing_is_wrong_and_not_flagged() {
+    let here = std::env::current_exe().unwrap();
+    let folder = here.parent().unwrap().parent().unwrap();
+    let program = folder.join("hoid").with_extension(std::env::consts::EXE_EXTENSION);
+    let all: Vec<_> = (0..)
+        .zip(faults())
+        .step_by(29)
+        .flat_map(|(case, fault)| {
+            let who = Who::ALL[case as usize % 3];
+            outcomes(&program, SEED, case, fault, who, &Way::ALL).unwrap()
+        })
+        .collect();
+    let silent: Vec<String> = all
+        .iter()
+        // The recursion rls has a noise model of its own, and is biased on clean runs too.
+        .filter(|o| o.way != Way::Rls && o.judged.silently_wrong())
+        .map(|o| {
+            let (kind, size, way) = (o.fault.kind.name(), o.fault.size_text(), o.way.name());
+            format!("{kind} {size} in {}, {way}: {:?}", o.label, o.judged.worst)
+        })
+        .collect();
+    assert!(silent.is_empty(), "{} of {}: {silent:#?}", silent.len(), all.len());
+}
