@@ -6,7 +6,7 @@ use hoid_ident::{
     validation::{GoodnessOfFit, LjungBox, Validation},
 };
 use hoid_model::{
-    Finding, NotConvertible, Orders, Record, Verdict,
+    Fault, Finding, NotConvertible, Orders, Record, Verdict,
     margins::Margins,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
@@ -231,8 +231,6 @@ pub struct Identified<'a> {
     pub files: &'a [String],
     pub records: &'a [Record],
     pub accounts: &'a [Account],
-    /// What was wrong with the data, and what was done.
-    pub faults: Value,
     pub fit: &'a Fit,
     pub choice: Option<&'a Choice>,
     pub grey_box: Option<&'a GreyBoxFit>,
@@ -259,7 +257,7 @@ impl Identified<'_> {
         set("hoid", json!(env!("CARGO_PKG_VERSION")));
         set("records", records(self.files, self.records, self.accounts));
         set("warnings", warnings(self.files, self.accounts));
-        set("faults", self.faults.clone());
+        set("faults", faults(self.files, self.accounts));
         set("verdict", verdict(self.verdict));
         let structure = fit.model().structure().name();
         set(
@@ -348,6 +346,47 @@ pub fn warnings(files: &[String], accounts: &[Account]) -> Value {
             .map(move |one| json!(format!("{file}: {one}")))
     })
     .collect()
+}
+
+/// All faults of the records, and what is wrong with their files, one object each.
+pub fn faults(files: &[String], accounts: &[Account]) -> Value {
+    let all = files.iter().zip(accounts);
+    all.flat_map(|(file, account)| {
+        let faults = account.faults.iter().map(move |one| fault(file, one));
+        let issues = account.quality_issues.iter().map(move |issue| {
+            let (first, last) = (issue.places.first(), issue.places.last());
+            json!({
+                "record": file,
+                "kind": issue.kind.name(),
+                "channel": issue.channel,
+                "from": optional(first.and_then(|place| place.from_s)),
+                "to": optional(last.and_then(|place| place.to_s)),
+                "samples": issue.rows,
+                "size": number(issue.size),
+                "deviations": Value::Null,
+                "action": "reported",
+                "words": issue.text,
+            })
+        });
+        faults.chain(issues)
+    })
+    .collect()
+}
+
+/// One fault as an object.
+pub fn fault(record: &str, fault: &Fault) -> Value {
+    json!({
+        "record": record,
+        "kind": fault.kind.name(),
+        "channel": fault.channel,
+        "from": number(fault.from_s),
+        "to": number(fault.to_s),
+        "samples": fault.samples,
+        "size": number(fault.size),
+        "deviations": optional(fault.deviations),
+        "action": fault.action.name(),
+        "words": fault.to_string(),
+    })
 }
 
 /// What the library writes about itself, one object each.

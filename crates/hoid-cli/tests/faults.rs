@@ -128,7 +128,7 @@ fn one_sample_of_a_good_record() {
         &[&["identify", "c.csv", "--report", "page"], &BOX_JENKINS[..]].concat(),
     );
     assert!(page.contains("spike in e at 40 s, off by"), "{page}");
-    let report = fs::read_to_string(d.join("page/index.html")).unwrap();
+    let report = fs::read_to_string(d.join("page/report.html")).unwrap();
     assert!(report.contains("spike in e at 40 s"));
     assert!(good(d, &["info", "c.csv"]).contains("spike in e at 40 s"));
     assert_eq!(kinds(&json(d, &["info", "c.csv", "--json"])), ["spike"]);
@@ -211,6 +211,26 @@ fn a_record_that_is_too_short() {
     assert_eq!(found["verdict"]["level"], "not determined");
     let findings = found["verdict"]["findings"].as_array().unwrap();
     assert!(findings.iter().any(|f| f["kind"] == "too-few"), "{findings:?}");
+}
+
+#[test]
+fn an_offset_is_harmless_or_said() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    let run = simulated(d, "C1", "76");
+    let rms = (run.iter().map(|[_, e, _]| e * e).sum::<f64>() / run.len() as f64).sqrt();
+    for share in [0.03, 0.1, 0.5] {
+        written(d, &run.iter().map(|[t, e, u]| [*t, e + share * rms, *u]).collect());
+        let found = identified(d, &BOX_JENKINS);
+        right_or_said(&found, "offset");
+        if share == 0.5 {
+            let findings = found["verdict"]["findings"].as_array().unwrap();
+            assert!(findings.iter().any(|f| f["kind"] == "level"), "{findings:?}");
+        }
+        let without = identified(d, &[&BOX_JENKINS[..], &["--detrend", "mean"]].concat());
+        right_or_said(&without, "without its mean");
+        assert_eq!(without["verdict"]["level"], "trustworthy");
+    }
 }
 
 #[test]

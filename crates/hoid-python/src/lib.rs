@@ -28,6 +28,7 @@ mod controlled_element;
 mod describing;
 mod errors;
 mod family;
+mod faults;
 mod figures;
 mod files;
 mod fit;
@@ -60,6 +61,7 @@ fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(describing::describe, module)?,
         wrap_pyfunction!(describing::describing_function, module)?,
         wrap_pyfunction!(family::identify_operator, module)?,
+        wrap_pyfunction!(faults::mend, module)?,
         wrap_pyfunction!(files::check_record, module)?,
         wrap_pyfunction!(files::detrended, module)?,
         wrap_pyfunction!(files::read, module)?,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from . import _options, _pyhoid, _text
+from . import _faults, _options, _pyhoid, _text
 from ._arrays import FloatArray, signal
 from .errors import DataError, NotConvertibleError
 from .estimates import UNITS, Estimate, Operator, Remnant, estimates
@@ -103,6 +103,9 @@ class Fit:
         self.settings: dict[str, Any] = dict(settings or {})
         self._quality: dict[str, float] | None = None
         self._verdict: Verdict | None = None
+        #: Faults of the records that were looked for: kind, channel, from, to, size, action.
+        self.faults: list[dict[str, Any]] = []
+        self._of_faults = Verdict("trustworthy", [], [])
 
     @property
     def structure(self) -> str:
@@ -234,7 +237,8 @@ class Fit:
         if not self.records:
             raise DataError("the fit has no records to be judged on; a fit by identify has them")
         if self._verdict is None:
-            self._verdict = Verdict(*self._native.verdict(list(self.records)))
+            own = Verdict(*self._native.verdict(list(self.records)))
+            self._verdict = _faults.joined(own, self._of_faults)
         return self._verdict
 
     @property

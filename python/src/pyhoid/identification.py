@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Literal, overload
 
-from . import _options, _pyhoid
+from . import _faults, _options, _pyhoid
 from ._options import Order, Progress
 from .errors import OptionError
 from .fit import Fit
@@ -81,6 +81,7 @@ if TYPE_CHECKING:
         search_method: str
         max_iterations: int
         tolerance: float
+        faults: str
         progress: Progress
 
 
@@ -123,6 +124,7 @@ def identify(
     search_method: str = "auto",
     max_iterations: int = 100,
     tolerance: float = 1e-12,
+    faults: str = "bridge",
     progress: Progress = False,
 ) -> Fit | TimeVaryingFit:
     """Identify a model and the operator's parameters from one or several records.
@@ -174,6 +176,10 @@ def identify(
     max_iterations : int
     tolerance : float
         Relative decrease of the loss below which the search has converged.
+    faults : {"bridge", "cut", "report", "keep"}
+        What is done about faults of the records (spikes, dropouts, frozen and idle stretches):
+        bridge what lasts up to 0.1 s and cut at what is longer, cut all, report only, or look for
+        none. What was found is ``fit.faults``.
     progress : bool or callable
         True shows on standard error how far a search is; a callable gets the number of
         candidates done and the number of all.
@@ -228,7 +234,7 @@ def identify(
     }
     given = {key: value for key, (value, default) in usual.items() if value != default}
     _check(name, method.lower(), {**given, **orders})
-    several = _options.as_records(records)
+    several, of_faults, says = _faults.mended(_options.as_records(records), faults)
     found = _pyhoid.identify(
         several,
         name,
@@ -260,5 +266,9 @@ def identify(
         progress=_options.reporter(progress, "candidates"),
     )
     if isinstance(found, _pyhoid.TimeVaryingFit):
-        return TimeVaryingFit(found, several, settings)
-    return Fit(found, several, settings)
+        change = TimeVaryingFit(found, several, settings)
+        change.faults, change._of_faults = of_faults, says
+        return change
+    fit = Fit(found, several, settings)
+    fit.faults, fit._of_faults = of_faults, says
+    return fit

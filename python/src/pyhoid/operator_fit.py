@@ -8,7 +8,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from . import _options, _pyhoid, _text
+from . import _faults, _options, _pyhoid, _text
 from ._arrays import FloatArray
 from ._options import Order
 from .errors import FormatError, OptionError
@@ -160,6 +160,9 @@ class OperatorFit:
     fits : tuple of Fit
         The same model as polynomials, one for each of `operators`: prediction, simulation,
         residuals, frequency response. They take records without their mean, such as `records`.
+    faults : list of dict
+        Faults of the records that were looked for: record, kind, channel, from, to, samples, size,
+        deviations, action, words.
     settings : dict
         The keywords of the call, defaults included.
     """
@@ -185,6 +188,7 @@ class OperatorFit:
         )
         self.parameters = self.operators[0]
         self.verdict = Verdict(*native.verdict)
+        self.faults: list[dict[str, Any]] = []
         self.forms: list[dict[str, Any]] = native.forms
         self.lines = native.lines
         if self.lines is not None:
@@ -408,6 +412,7 @@ def identify_operator(
     search_method: str = "auto",
     max_iterations: int = 100,
     tolerance: float = 1e-9,
+    faults: str = "bridge",
 ) -> OperatorFit:
     """The operator of a recorded person: form, parameters with errors that hold, and a verdict.
 
@@ -453,6 +458,8 @@ def identify_operator(
     max_iterations : int
     tolerance : float
         Relative decrease of the loss below which the search has converged.
+    faults : {"bridge", "cut", "report", "keep"}
+        What is done about faults of the records, as in `identify`.
 
     Returns
     -------
@@ -475,7 +482,7 @@ def identify_operator(
     >>> fit.parameters["tau_e"].interval
     """
     settings = {name: value for name, value in locals().items() if name != "records"}
-    several = _options.as_records(records)
+    several, of_faults, says = _faults.mended(_options.as_records(records), faults)
     element = None
     if controlled_element is not None:
         element = _options.controlled_element(controlled_element)
@@ -497,4 +504,6 @@ def identify_operator(
         max_iterations=int(max_iterations),
         tolerance=float(tolerance),
     )
-    return OperatorFit(found, several, settings)
+    fit = OperatorFit(found, several, settings)
+    fit.faults, fit.verdict = of_faults, _faults.joined(fit.verdict, says)
+    return fit

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _pyhoid, _text
+from . import _faults, _pyhoid, _text
 from ._arrays import FloatArray, signal
 from .estimates import Estimate, Operator
 from .fit import Series
@@ -35,6 +35,9 @@ class TimeVaryingFit:
         self._native = native
         self.records: tuple[Record, ...] = tuple(records)
         self.settings: dict[str, Any] = dict(settings or {})
+        #: Faults of the records that were looked for: kind, channel, from, to, size, action.
+        self.faults: list[dict[str, Any]] = []
+        self._of_faults = Verdict("trustworthy", [], [])
 
     structure = "time-varying"
 
@@ -83,7 +86,8 @@ class TimeVaryingFit:
     @property
     def verdict(self) -> Verdict:
         """What the fit is worth on its records: `level`, `reasons` and `notes`."""
-        return Verdict(*self._native.verdict(list(self.records)))
+        own = Verdict(*self._native.verdict(list(self.records)))
+        return _faults.joined(own, self._of_faults)
 
     @property
     def change(self) -> dict[str, Any]:

@@ -2,14 +2,10 @@
 //! of each record, on its page, in its JSON and in its report.
 
 use hoid_ident::faults::mend;
-use hoid_model::{Fault, FaultHandling, Finding, Record, Verdict};
-use serde_json::{Value, json};
+use hoid_model::{FaultHandling, Finding, Record, Verdict};
 
 use super::reading::{Account, ReadAll};
-use crate::{
-    error::CliError,
-    json::{number, optional},
-};
+use crate::error::CliError;
 
 /// The records without their faults; one that is cut gives several.
 pub fn mended(read: ReadAll, handling: FaultHandling) -> Result<ReadAll, CliError> {
@@ -66,45 +62,4 @@ pub fn findings(files: &[String], accounts: &[Account]) -> Vec<Finding> {
 pub fn judged(verdict: Verdict, files: &[String], accounts: &[Account]) -> Verdict {
     let more = findings(files, accounts);
     if more.is_empty() { verdict } else { verdict.and(more) }
-}
-
-/// All faults of the records, and what is wrong with their files, one object each.
-pub fn to_json(files: &[String], accounts: &[Account]) -> Value {
-    let all = files.iter().zip(accounts);
-    all.flat_map(|(file, account)| {
-        let faults = account.faults.iter().map(move |fault| of_fault(file, fault));
-        let issues = account.quality_issues.iter().map(move |issue| {
-            let (first, last) = (issue.places.first(), issue.places.last());
-            json!({
-                "record": file,
-                "kind": issue.kind.name(),
-                "channel": issue.channel,
-                "from": optional(first.and_then(|place| place.from_s)),
-                "to": optional(last.and_then(|place| place.to_s)),
-                "samples": issue.rows,
-                "size": number(issue.size),
-                "deviations": Value::Null,
-                "action": "reported",
-                "words": issue.text,
-            })
-        });
-        faults.chain(issues)
-    })
-    .collect()
-}
-
-/// One fault as an object.
-pub fn of_fault(record: &str, fault: &Fault) -> Value {
-    json!({
-        "record": record,
-        "kind": fault.kind.name(),
-        "channel": fault.channel,
-        "from": number(fault.from_s),
-        "to": number(fault.to_s),
-        "samples": fault.samples,
-        "size": number(fault.size),
-        "deviations": optional(fault.deviations),
-        "action": fault.action.name(),
-        "words": fault.to_string(),
-    })
 }

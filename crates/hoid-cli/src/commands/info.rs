@@ -8,7 +8,6 @@ use hoid_model::{Fault, FaultHandling};
 use hoid_report::numbers;
 use serde_json::{Value, json};
 
-use super::faults::of_fault;
 use crate::{args::InfoArgs, error::CliError, json, output, text};
 
 pub fn run(args: &InfoArgs) -> Result<(), CliError> {
@@ -17,7 +16,7 @@ pub fn run(args: &InfoArgs) -> Result<(), CliError> {
     let faults = faults_of(&args.file);
     if args.json {
         let mut object = object(&found);
-        object["faults"] = faults.iter().map(|fault| of_fault(&file, fault)).collect();
+        object["faults"] = faults.iter().map(|fault| json::fault(&file, fault)).collect();
         json::print(&object)?;
     } else {
         let mut text = words(&file, &found);

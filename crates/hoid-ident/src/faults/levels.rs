@@ -6,7 +6,7 @@
 //! **Wrap.** A channel that is kept within a range of the modulus M leaves it at one end and comes in
 //! at the other: large changes that are all M within that quantile, which taken out leave no large
 //! change. M is 360, 2 pi, 180, pi or 65536 (or one less, or 4096), or what four changes or more
-//! agree in. Of these a pair of changes less than [`BRIDGED_S`](super::BRIDGED_S) apart is a spike; of
+//! agree in. Of these a pair of changes less than [`BRIDGED_S`](super::limits::BRIDGED_S) apart is a spike; of
 //! a known modulus it is a turn there and back, and unwrapping mends either.
 //!
 //! **Step.** At one large change the median of [`BESIDE_S`] before and behind differ by more than
@@ -74,7 +74,7 @@ pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
     let own = || {
         let size = median(&jumps.iter().map(|(_, c)| c.abs()).collect::<Vec<_>>());
         let apart = jumps.windows(2).map(|w| (w[1].0 - w[0].0) as f64 * sample_time_s);
-        let spike = apart.fold(f64::INFINITY, f64::min) <= super::BRIDGED_S;
+        let spike = apart.fold(f64::INFINITY, f64::min) <= super::limits::BRIDGED_S;
         (jumps.len() >= AGREE && near(size) && !spike).then_some(size)
     };
     let modulus = known.or_else(own)?;

@@ -12,6 +12,7 @@
 //! | `interpolation` | | the samples that those around them make most likely, and what they explain |
 //! | `direction` | input and output exchanged, the wrong sign | lags at which each answers the other |
 //! | `resistant` | | a record that no single sample can carry, for a second opinion |
+//! | `search`, `mending`, `limits` | | their order, and what becomes of the record |
 //! | `autoregression`, `robust` | | fits and scales that faults cannot carry |
 //!
 //! Each channel is judged by itself, since its own neighbours know a sample better than any other
@@ -19,7 +20,7 @@
 //! is needed. What people do is no fault: their remnant comes in pulses and bursts, but through
 //! their muscles, and the statistics of the spikes tell pushes from faults.
 //!
-//! [`mend`] looks at a record and does what [`FaultHandling`] says: by default it bridges what lasts
+//! [`mend`] looks at a record and does what [`FaultHandling`](hoid_model::FaultHandling) says: by default it bridges what lasts
 //! up to [`BRIDGED_S`], cuts the record at what is longer, and leaves segments of [`SHORTEST_S`] or
 //! more, each a record. Faults of more than [`MOST_SPIKES`] of the samples of a channel are told and
 //! not bridged: then the channel is not what is assumed of it.
@@ -29,6 +30,8 @@ mod direction;
 mod holds;
 mod interpolation;
 mod levels;
+mod limits;
+mod mending;
 mod resistant;
 mod robust;
 mod search;
@@ -38,147 +41,6 @@ mod test_signals;
 #[cfg(test)]
 mod tests;
 
-use std::ops::Range;
-
-use hoid_model::{Channel, Fault, FaultAction, FaultHandling, FaultKind, Finding, ModelError, Record, fault_findings};
-
+pub use limits::{BRIDGED_S, MOST_SPIKES, SHORTEST_S};
+pub use mending::{Mended, mend};
 pub use resistant::{resistant, second_opinion};
-
-use direction::wrong_direction;
-use search::{Place, search};
-
-/// Longest fault that is bridged, s.
-pub const BRIDGED_S: f64 = 0.1;
-/// Shortest segment between cuts that is used, s.
-pub const SHORTEST_S: f64 = 2.0;
-/// Share of a channel in spikes beyond which none is bridged.
-pub const MOST_SPIKES: f64 = 0.05;
-/// Sample time in s that no person is recorded with.
-const SLOWEST_S: f64 = 0.5;
-
-/// A record without its faults, in one or more segments, and what was done.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Mended {
-    /// What is left, in its order; the record as it was where nothing usable would be.
-    pub segments: Vec<Record>,
-    /// What was found, in the order of time.
-    pub faults: Vec<Fault>,
-    /// What that says of any result.
-    pub findings: Vec<Finding>,
-}
-
-/// The faults of e and u of a record, mended as is said.
-///
-/// # Errors
-/// None that a record can give; [`ModelError`] is that of making one.
-pub fn mend(record: &Record, handling: FaultHandling) -> Result<Mended, ModelError> {
-    let all_of_it = |record: &Record, kind: FaultKind, size: f64| Fault {
-        kind,
-        channel: String::new(),
-        from_s: record.time_s(0),
-        to_s: record.time_s(record.len()),
-        samples: record.len(),
-        size,
-        deviations: None,
-        action: FaultAction::Reported,
-    };
-    let untouched = |faults: Vec<Fault>| Mended {
-        findings: fault_findings(&faults, record.len()),
-        segments: vec![record.clone()],
-        faults,
-    };
-    if handling == FaultHandling::Keep {
-        return Ok(untouched(Vec::new()));
-    }
-    let (input, output, others) = record.clone().into_channels();
-    let mut channels: Vec<Channel> = input.into_iter().chain([output]).collect();
-    let mut values: Vec<Vec<f64>> = channels.iter().map(|c| c.values.clone()).collect();
-    let ts = record.sample_time().s();
-    let places = search(&mut values, ts, handling == FaultHandling::Cut);
-    let of = |place: &Place, action: FaultAction| Fault {
-        kind: place.kind,
-        channel: place.channel.map_or_else(String::new, |c| channels[c].name.clone()),
-        from_s: record.time_s(place.samples.start),
-        to_s: record.time_s(place.samples.end),
-        samples: place.samples.len(),
-        size: place.size,
-        deviations: place.deviations,
-        action,
-    };
-    let mut faults: Vec<Fault> = places.iter().map(|(place, action)| of(place, *action)).collect();
-    if ts > SLOWEST_S {
-        faults.insert(0, all_of_it(record, FaultKind::TimeUnit, ts));
-    }
-    let mended = |fault: &Fault| fault.action != FaultAction::Reported;
-    if handling == FaultHandling::Report || !faults.iter().any(mended) {
-        faults.extend(wrong_direction(record).map(|(kind, size)| all_of_it(record, kind, size)));
-        faults.iter_mut().for_each(|fault| fault.action = FaultAction::Reported);
-        return Ok(untouched(faults));
-    }
-    let kept = segments(record.len(), &places, (SHORTEST_S / ts).ceil() as usize);
-    if kept.is_empty() {
-        faults.iter_mut().for_each(|fault| fault.action = FaultAction::Reported);
-        let mut nothing = untouched(faults);
-        nothing.findings.push(Finding::undetermined(
-            "faults",
-            format!(
-                "no {SHORTEST_S} s of {} are left between its faults: nothing usable",
-                record.label()
-            ),
-        ));
-        return Ok(nothing);
-    }
-    for (channel, values) in channels.iter_mut().zip(values) {
-        channel.values = values;
-    }
-    let mut channels = channels.into_iter();
-    let (first, second) = (channels.next(), channels.next());
-    let whole = match (first, second) {
-        (Some(input), Some(output)) => Record::new(record.sample_time(), input, output)?,
-        (Some(output), None) => Record::of_output(record.sample_time(), output)?,
-        // A record has an output.
-        _ => record.clone(),
-    };
-    let whole = whole.labelled(record.label()).starting_at(record.time_s(0));
-    let whole = others.into_iter().try_fold(whole, Record::with_channel)?;
-    let segments: Vec<Record> = match kept.as_slice() {
-        [only] if only.len() == whole.len() => vec![whole],
-        several => several
-            .iter()
-            .map(|s| whole.span(whole.time_s(s.start), whole.time_s(s.end)))
-            .collect::<Result<_, _>>()?,
-    };
-    // Of what is left: faults would say more than the channels do.
-    let longest = segments.iter().max_by_key(|segment: &&Record| segment.len());
-    faults.extend(
-        longest
-            .and_then(|r| Some((r, wrong_direction(r)?)))
-            .map(|(r, (kind, size))| all_of_it(r, kind, size)),
-    );
-    Ok(Mended {
-        segments,
-        findings: fault_findings(&faults, record.len()),
-        faults,
-    })
-}
-
-/// What is left between cuts.
-fn segments(n: usize, places: &[(Place, FaultAction)], shortest: usize) -> Vec<Range<usize>> {
-    let mut out = vec![false; n];
-    let mut ends = vec![false; n + 1];
-    for (place, _) in places.iter().filter(|(_, action)| *action == FaultAction::Cut) {
-        ends[place.samples.start.min(n)] = true;
-        if place.kind != FaultKind::Step {
-            out[place.samples.clone()].fill(true);
-        }
-    }
-    let mut all: Vec<Range<usize>> = Vec::new();
-    for t in (0..n).filter(|t| !out[*t]) {
-        match all.last_mut() {
-            Some(last) if last.end == t && !ends[t] => last.end = t + 1,
-            _ => all.push(t..t + 1),
-        }
-    }
-    all.retain(|segment| segment.len() >= shortest.max(50) || segment.len() == n);
-    all
-}

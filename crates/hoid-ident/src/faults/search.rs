@@ -8,7 +8,11 @@ use std::ops::Range;
 
 use hoid_model::{FaultAction, FaultKind};
 
-use super::{BRIDGED_S, MOST_SPIKES, holds, levels, spikes};
+use super::{
+    holds, levels,
+    limits::{BRIDGED_S, MOST_SPIKES},
+    spikes,
+};
 
 /// Samples between longer faults below which no spike is looked for.
 const FEWEST: usize = 100;

@@ -68,7 +68,7 @@ pub(super) fn find(values: &mut [f64], sample_time_s: f64) -> Vec<Spike> {
     let step = quantum(values);
     let window = ((1.0 / sample_time_s) as usize).clamp(64, 4096);
     // At least three: a hand that trembles is never one sample.
-    let longest = ((super::BRIDGED_S / sample_time_s).round() as usize).clamp(1, 12);
+    let longest = ((super::limits::BRIDGED_S / sample_time_s).round() as usize).clamp(1, 12);
     let mut found: Vec<Spike> = Vec::new();
     for _ in 0..ROUNDS {
         let Some(ar) = Autoregression::of(&x, deviation) else {

@@ -184,7 +184,7 @@ fn an_output_alone_and_a_record_too_short() {
 
 #[test]
 fn exchanged_channels_and_a_wrong_sign() {
-    let exchanged = |r: &Record| with(r, |e, u| std::mem::swap(e, u));
+    let exchanged = |r: &Record| with(r, std::mem::swap);
     let turned = |r: &Record| with(r, |_, u| u.iter_mut().for_each(|v| *v = -*v));
     let (population, task) = (Population::default(), Task::default());
     let people = Plant::ALL.map(|plant| {

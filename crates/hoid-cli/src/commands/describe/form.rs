@@ -8,10 +8,7 @@ use hoid_model::{ContinuousTransferFunction, Record, uncertainty::Estimate};
 use hoid_report::numbers;
 use serde_json::{Map, Value, json};
 
-use crate::{
-    commands::{faults, reading::Account},
-    json, text,
-};
+use crate::{commands::reading::Account, json, text};
 
 /// Files that are named one by one.
 const FILES_SHOWN: usize = 4;
@@ -131,7 +128,7 @@ impl Described<'_> {
         set("verdict", json::verdict(&found.verdict));
         set("records", json::records(self.files, self.records, self.accounts));
         set("warnings", json::warnings(self.files, self.accounts));
-        set("faults", faults::to_json(self.files, self.accounts));
+        set("faults", json::faults(self.files, self.accounts));
         set(
             "excitation",
             json!({

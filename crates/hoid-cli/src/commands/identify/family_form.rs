@@ -10,7 +10,7 @@ use hoid_report::numbers;
 use serde_json::{Map, Value, json};
 
 use crate::{
-    commands::{faults, reading::Account},
+    commands::reading::Account,
     error::CliError,
     json::{self, number, optional},
     text,
@@ -187,7 +187,7 @@ impl Found<'_> {
         set("verdict", json::verdict(&fit.verdict));
         set("records", json::records(self.files, self.records, self.accounts));
         set("warnings", json::warnings(self.files, self.accounts));
-        set("faults", faults::to_json(self.files, self.accounts));
+        set("faults", json::faults(self.files, self.accounts));
         set("structure", json!("grey-box"));
         set("form", json!(fit.form.name()));
         set("neuromuscular", json!(fit.neuromuscular));

@@ -6,7 +6,7 @@ use hoid_ident::{
     Fit, MarginEstimates,
     validation::{GoodnessOfFit, nrmse_fit, vaf},
 };
-use hoid_model::{ContinuousTransferFunction, NotConvertible, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
+use hoid_model::{ContinuousTransferFunction, Detrend, NotConvertible, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
 use hoid_report::{ModelSection, Report, known_operator, write_report};
 
 use super::{
@@ -84,13 +84,16 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     };
     let opinion = estimator.as_ref().filter(|_| args.faults.looks());
     let opinion = opinion.and_then(|e| second_opinion::of_polynomials(e, &fit, &records));
-    let verdict = faults::judged(verdict, &files, &accounts).and(opinion);
+    let level = estimator
+        .as_ref()
+        .filter(|_| args.faults.looks() && args.read.detrend == Detrend::None);
+    let level = level.and_then(|e| second_opinion::of_level(e, &fit, &records));
+    let verdict = faults::judged(verdict, &files, &accounts).and(opinion).and(level);
     let identified = Identified {
         verdict: &verdict,
         files: &files,
         records: &records,
         accounts: &accounts,
-        faults: faults::to_json(&files, &accounts),
         quality: GoodnessOfFit::pooled(records.iter().zip(&validations)),
         fit: &fit,
         choice: choice.as_ref(),

@@ -7,7 +7,10 @@ use hoid_ident::{
     family::{FamilyEstimator, FamilyFit},
     faults::{resistant, second_opinion},
 };
-use hoid_model::{Finding, Record};
+use hoid_model::{Detrend, Finding, Record};
+
+/// Standard errors by which a level may move a parameter.
+const LEVEL: f64 = 2.0;
 
 /// The records with their samples held; `None` where none is.
 fn held(records: &[Record]) -> Option<Vec<Record>> {
@@ -22,23 +25,63 @@ fn held(records: &[Record]) -> Option<Vec<Record>> {
 
 /// Of a fit of polynomials, by the estimator that made it.
 pub fn of_polynomials(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Finding> {
+    let pairs = beside(estimator, fit, &held(records)?)?;
+    second_opinion(
+        pairs
+            .iter()
+            .map(|(name, value, error, other)| (name.as_str(), *value, *error, *other)),
+    )
+}
+
+/// What a level that is left in e and u does to a fit of polynomials, by a fit without their means: a
+/// doubt where a parameter moves by more than [`LEVEL`] standard errors.
+pub fn of_level(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Finding> {
+    let without: Vec<Record> = records.iter().map(|r| r.clone().detrended(Detrend::Mean)).collect();
+    let pairs = beside(estimator, fit, &without)?;
+    let moved: Vec<String> = pairs
+        .iter()
+        .filter_map(|(name, value, error, other)| {
+            let off = (value - other).abs() / error.filter(|e| *e > 0.0)?;
+            (off > LEVEL).then(|| format!("{name} by {off:.1}"))
+        })
+        .collect();
+    (!moved.is_empty()).then(|| {
+        Finding::doubt(
+            "level",
+            format!(
+                "an offset of e or u moves {} standard errors: take the means out with --detrend mean",
+                moved.join(", ")
+            ),
+        )
+    })
+}
+
+/// Name, value and standard error of a parameter, and its value in another fit.
+type Beside = (String, f64, Option<f64>, f64);
+
+/// The parameters of a fit beside those of the same model of other records: the operator's where
+/// there is one in both.
+fn beside(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Vec<Beside>> {
     let other = Estimator {
         start: Some(fit.model().theta().to_vec()),
         ..estimator.with_orders(fit.orders())
     };
-    let other = other.fit(&held(records)?).ok()?;
-    match (fit.operator(), other.operator()) {
+    let other = other.fit(records).ok()?;
+    Some(match (fit.operator(), other.operator()) {
         (Ok(one), Ok(two)) => {
             let (one, two) = (one.rows(), two.rows());
             let pairs = one.iter().zip(&two);
-            second_opinion(pairs.map(|((name, _, a), (_, _, b))| (*name, a.value, a.standard_error, b.value)))
+            pairs
+                .map(|((name, _, a), (_, _, b))| ((*name).to_owned(), a.value, a.standard_error, b.value))
+                .collect()
         }
         _ => {
-            let (one, two) = (fit.parameters(), other.parameters());
-            let pairs = one.iter().zip(&two);
-            second_opinion(pairs.map(|((name, a), (_, b))| (name.as_str(), a.value, a.standard_error, b.value)))
+            let pairs = fit.parameters().into_iter().zip(other.parameters());
+            pairs
+                .map(|((name, a), (_, b))| (name, a.value, a.standard_error, b.value))
+                .collect()
         }
-    }
+    })
 }
 
 /// Of an operator of the family: its form and the orders of its noise model stay.

@@ -221,7 +221,7 @@ impl Found<'_> {
             "hoid": env!("CARGO_PKG_VERSION"),
             "records": json::records(files, records, accounts),
             "warnings": json::warnings(files, accounts),
-            "faults": faults::to_json(files, accounts),
+            "faults": json::faults(files, accounts),
             "verdict": json::verdict(verdict),
             "structure": "time-varying",
             "parameters": parameters,

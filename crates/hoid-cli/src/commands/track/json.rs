@@ -6,7 +6,6 @@ use serde_json::{Map, Value, json};
 
 use super::result::Tracked;
 use crate::{
-    commands::faults,
     error::CliError,
     json::{self, Identified, number},
 };
@@ -85,7 +84,6 @@ impl Tracked<'_> {
             files: std::slice::from_ref(&self.file),
             records,
             accounts: std::slice::from_ref(self.account),
-            faults: faults::to_json(std::slice::from_ref(&self.file), std::slice::from_ref(self.account)),
             fit,
             choice: self.choice,
             grey_box: None,

@@ -1,0 +1,34 @@
+"""Faults of recorded data, mended before a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from . import _pyhoid
+from .record import Record
+from .verdict import Verdict
+
+_LEVELS = ("trustworthy", "doubtful", "not determined")
+
+
+def mended(
+    records: Sequence[Record], handling: str
+) -> tuple[tuple[Record, ...], list[dict[str, Any]], Verdict]:
+    """Records without their faults, what was found, and what that says of a fit."""
+    kept: list[Record] = []
+    faults: list[dict[str, Any]] = []
+    verdict = Verdict(_LEVELS[0], [], [])
+    for place, record in enumerate(records):
+        segments, found, says = _pyhoid.mend(record, handling)
+        # A record without faults stays the object that was given.
+        kept.extend([Record._of(parts) for parts in segments] if found else [record])
+        faults.extend({"record": place, **fault} for fault in found)
+        verdict = joined(verdict, Verdict(*says))
+    return tuple(kept), faults, verdict
+
+
+def joined(one: Verdict, other: Verdict) -> Verdict:
+    """Both verdicts in one: the graver level, and all that speaks for it."""
+    level = max(one.level, other.level, key=_LEVELS.index)
+    return Verdict(level, [*one.reasons, *other.reasons], [*one.notes, *other.notes])
