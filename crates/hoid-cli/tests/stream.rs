@@ -279,13 +279,13 @@ fn a_wild_value_and_a_hostile_span_are_told_in_their_lines() {
         let found = events.iter().find(|(_, e)| e["kind"] == kind && e["action"] == action);
         found.unwrap_or_else(|| panic!("{kind} {action}: {events:?}"))
     };
-    let (at, held) = of("outlier", "held");
+    let (at, held) = of("spike", "held");
     assert_eq!(
         (*at, &held["from"], &held["channel"]),
         (2501, &25.0.into(), &"e".into())
     );
-    let (paused, _) = of("level", "paused");
-    let (restarted, span) = of("level", "restarted");
+    let (paused, _) = of("scale", "paused");
+    let (restarted, span) = of("scale", "restarted");
     assert!(
         (3000..3030).contains(paused) && (4200..4500).contains(restarted),
         "{events:?}"

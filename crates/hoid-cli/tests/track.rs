@@ -114,7 +114,7 @@ fn one_wild_sample_is_held_back_and_told() {
     });
     let found = tracked(d, &arguments);
     let fault = &found["faults"][0];
-    assert_eq!((&fault["kind"], &fault["channel"]), (&"outlier".into(), &"e".into()));
+    assert_eq!((&fault["kind"], &fault["channel"]), (&"spike".into(), &"e".into()));
     assert_eq!(
         (&fault["from"], &fault["action"]),
         (&50.0.into(), &"held".into()),

@@ -26,13 +26,13 @@ pub enum GuardKind {
 }
 
 hoid_model::named_choice!(GuardKind, "kind of fault", 9, {
-    Outlier => "outlier",
+    Outlier => "spike",
     Step => "step",
     Missing => "missing",
-    Level => "level",
+    Level => "scale",
     Frozen => "frozen",
     Idle => "idle",
-    Swapped => "swapped",
+    Swapped => "exchanged",
     Misfit => "misfit",
     Astray => "astray",
 });
