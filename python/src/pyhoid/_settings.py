@@ -83,6 +83,10 @@ class MethodSettings(TypedDict, total=False):
     # For forgetting by the gradient: step size. For rls, rpem, physical.
     rate: float | None
 
+    # Guard: outliers of e and u are held back, spans that no tracking makes are left out, and
+    # the estimate begins again after them. For rls, rpem, physical, adaptive.
+    guard: Literal["yes", "no"] | None
+
     # Pseudo-linear regression (extended least squares) instead of the gradient. For rpem.
     pseudo_linear: bool | None
 
@@ -150,6 +154,9 @@ SETTINGS = """covariance : float
             (standard deviation), as K_e=.01,K_e_dot=.01. For rls, rpem, physical.
         rate : float
             For forgetting by the gradient: step size. For rls, rpem, physical.
+        guard : Literal['yes', 'no']
+            Guard: outliers of e and u are held back, spans that no tracking makes are left out,
+            and the estimate begins again after them. For rls, rpem, physical, adaptive.
         pseudo_linear : bool
             Pseudo-linear regression (extended least squares) instead of the gradient. For rpem.
         stable : Literal['predictor', 'noise']
