@@ -299,7 +299,7 @@ fn nothing_is_wrong_and_not_flagged() {
     let silent: Vec<String> = all
         .iter()
         // Where clean runs are wrong too no fault is to blame: rls has a noise model of its own, and
-        // of 13 s of a person the start fit of a tracker says little.
+        // trackers, whose start has 13 s, are off on clean runs of people (the page has how often).
         .filter(|o| o.way != Way::Rls && (o.who != Who::Person || !o.way.tracks()))
         .filter(|o| o.judged.silently_wrong())
         .map(|o| {
