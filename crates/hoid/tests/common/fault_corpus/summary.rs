@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{
+    bases::Who,
     kinds::{Kind, What},
     program::{Outcome, Way},
 };
@@ -57,13 +58,15 @@ pub fn median(mut all: Vec<f64>) -> Option<f64> {
     all.get(all.len() / 2).copied()
 }
 
-/// By method: the gate.
+/// By method, for the runs of the text and for those of people: the gate.
 pub fn by_way(all: &[Outcome]) -> String {
-    let mut text = "| method | cases | wrong | wrong and not flagged | flagged, of those right | refused | fault reported at its place |\n|---|---|---|---|---|---|---|\n".to_owned();
-    let mut put = |name: &str, n: Numbers| {
+    let mut text = "| runs | method | results | wrong | wrong and not flagged | flagged, of those right | refused | \
+                    fault reported at its place |\n|---|---|---|---|---|---|---|---|\n"
+        .to_owned();
+    let mut put = |runs: &str, name: &str, n: Numbers| {
         let _ = writeln!(
             text,
-            "| {name} | {} | {} | {} ({}) | {} | {} | {} |",
+            "| {runs} | {name} | {} | {} | {} ({}) | {} | {} | {} |",
             n.all,
             percent(n.wrong, n.all),
             n.silent,
@@ -73,10 +76,17 @@ pub fn by_way(all: &[Outcome]) -> String {
             percent(n.placed, n.all)
         );
     };
-    for way in Way::ALL {
-        put(way.name(), Numbers::of(all.iter().filter(|o| o.way == way)));
+    for (runs, of_people) in [("C1, C2", false), ("people", true)] {
+        let such = |o: &&Outcome| (o.who == Who::Person) == of_people;
+        for way in Way::ALL {
+            let n = Numbers::of(all.iter().filter(such).filter(|o| o.way == way));
+            // Not all methods are for people.
+            if !of_people || n.all > 0 {
+                put(runs, way.name(), n);
+            }
+        }
+        put(runs, "all", Numbers::of(all.iter().filter(such)));
     }
-    put("all", Numbers::of(all));
     text
 }
 
