@@ -68,7 +68,7 @@ fn hold(values: &mut [f64], sample_time_s: f64) -> bool {
 }
 
 /// What a fit to the held record says of that to the record: a doubt that names the parameters that
-/// differ by more than [`DIFFERENT`] standard errors; each is given by its name, value and standard
+/// differ by more than 3 standard errors; each is given by its name, value and standard
 /// error, and its value in the other fit.
 pub fn second_opinion<'a>(pairs: impl IntoIterator<Item = (&'a str, f64, Option<f64>, f64)>) -> Option<Finding> {
     let differ: Vec<String> = pairs

@@ -165,7 +165,7 @@ impl Reference {
                     lately[LASTING - 1][i] = 0.0;
                 }
                 shift = shift.max(lately.iter().map(|of| of[i]).fold(f64::INFINITY, f64::min));
-                far |= !(distance <= 2.0 * a[1].max(b[1]));
+                far |= distance.is_nan() || distance > 2.0 * a[1].max(b[1]);
             }
             if far {
                 last_far = Some(n);
