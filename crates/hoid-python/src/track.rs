@@ -177,6 +177,9 @@ impl PyTrace {
         if !trace.change_odds().is_empty() {
             all.set_item("change_log_odds", PyArray1::from_slice(py, trace.change_odds()))?;
         }
+        if trace.is_guarded() {
+            all.set_item("held", PyArray1::from_slice(py, trace.held()))?;
+        }
         all.set_item("steps_shortened", PyArray1::from_slice(py, trace.steps_shortened()))?;
         Ok(all)
     }

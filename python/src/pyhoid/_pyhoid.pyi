@@ -46,6 +46,7 @@ __all__ = [
     "identify_operator",
     "info",
     "margins",
+    "mend",
     "merge_shards",
     "plan_names",
     "read",
@@ -438,6 +439,9 @@ def margins(
 def mend(
     record: Record, handling: str
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]], tuple[str, list[str], list[str]]]: ...
+def mend(
+    record: Record, handling: str
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]], _Verdict]: ...
 def merge_shards(shards: Sequence[_Path], directory: _Path, csv: bool) -> _Left: ...
 def plan_names() -> list[tuple[str, str]]: ...
 def read(

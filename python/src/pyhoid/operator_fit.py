@@ -364,7 +364,7 @@ def _prior(prior: Any) -> str | _Entries | _OfFit:
     if prior is None:
         return "none"
     if isinstance(prior, OperatorFit):
-        rows = [
+        rows: list[tuple[str, float | None, float | None, bool]] = [
             (name, p.value, p.standard_error, p.determined) for name, p in prior.parameters.items()
         ]
         return rows, "an earlier fit"
