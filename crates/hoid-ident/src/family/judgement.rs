@@ -120,7 +120,8 @@ fn determined(judged: &Judged<'_>, all: &mut Vec<Finding>) {
             true => "tau_e is determined by the prior alone".to_owned(),
             false => "tau_e is not determined".to_owned(),
         };
-        all.push(Finding::doubt("delay", words));
+        // As with other parameters: it has no digits, and what is reported beside it stands.
+        all.push(Finding::note("delay", words));
     }
     if let Some((t_i, (low, high))) = find("T_I").and_then(|t| Some((t, t.interval?)))
         && !t_i.determined

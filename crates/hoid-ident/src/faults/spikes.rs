@@ -14,7 +14,9 @@
 //! Both have m unknowns. The fewest samples are a fault where their interpolation
 //!
 //! 1. takes more than [`LARGE`]^2 away: for normal innovations once in 1e15 samples;
-//! 2. leaves less than m pushes do, by [`BETTER`]^2 and by [`PART`] of what it takes away;
+//! 2. leaves less than m pushes do, by [`BETTER`]^2 and by [`PART`] of what it takes away, or leaves less
+//!    than a part in [`DECISIVE`] of what they leave (several faulty samples of a smooth channel make
+//!    few more large innovations than there are pushes, whose squares are nearly all of S);
 //! 3. leaves nothing beyond [`CLEAN`] sigma (or a twentieth of S);
 //! 4. moves a sample by more than [`SMALLEST`] of the deviation of the channel, and by two of its steps.
 //!
@@ -41,6 +43,8 @@ const LARGE: f64 = 8.0;
 const BETTER: f64 = 5.0;
 /// The same as a part of the fall.
 const PART: f64 = 0.2;
+/// How many times what faults leave, or what noise would, pushes must leave where it is a small part.
+const DECISIVE: f64 = 20.0;
 /// Largest innovation that is left, as sigma.
 const CLEAN: f64 = 5.0;
 /// Innovation that a search begins at, as sigma.
@@ -232,7 +236,8 @@ impl Search<'_> {
             let better = left_by_pushes - left_by_faults;
             let largest = left.iter().copied().fold(0.0, f64::max);
             let clean = largest <= CLEAN * CLEAN || left_by_faults <= 0.05 * total;
-            let is_fault = better > (BETTER * BETTER).max(PART * fall) && clean;
+            let decisive = left_by_pushes > DECISIVE * left_by_faults.max(left.len() as f64);
+            let is_fault = clean && better > BETTER * BETTER && (better > PART * fall || decisive);
             let worst = |k: usize| x[start + k].abs();
             let is_wild = m <= 3
                 && (0..m).all(|k| worst(k) > WILD * self.deviation)

@@ -63,6 +63,25 @@ fn clean_runs_have_no_faults_and_stay_as_they_are() {
 }
 
 #[test]
+fn bursts_of_few_samples_are_found_whatever_their_signs() {
+    for signs in [&[-1.0, 1.0][..], &[1.0, 1.0], &[1.0, -1.0, 1.0, 1.0, -1.0], &[1.0; 8]] {
+        for place in [490, 4000] {
+            let clean = run(Condition::C1, 5);
+            let record = with(&clean, |e, _| {
+                (0..signs.len()).for_each(|k| e[place + k] += 7.0 * signs[k]);
+            });
+            let found = mended(&record);
+            assert_eq!(kinds(&found.faults), [FaultKind::Spike], "{signs:?} {place}");
+            let fault = &found.faults[0];
+            let first = (fault.from_s - record.time_s(place)) / record.sample_time().s();
+            assert!(first.abs() < 1.5 && fault.samples <= signs.len() + 2, "{fault}");
+            let off = found.segments[0].input()[place] - clean.input()[place];
+            assert!(off.abs() < 0.2, "{off}");
+        }
+    }
+}
+
+#[test]
 fn one_sample_of_the_error_is_found_and_bridged() {
     for (condition, place) in [(Condition::C1, 4000), (Condition::C3, 700), (Condition::C6, 7000)] {
         let clean = run(condition, 5);
