@@ -1,10 +1,6 @@
 //! The operator at the lines of the excitation, with its errors by the jackknife over runs.
 
-use hoid_model::{
-    FamilyOperator, Form, SampleTime,
-    operator_family::NamedParameter,
-    uncertainty::{Estimate, variance_along},
-};
+use hoid_model::{FamilyOperator, Form, SampleTime, uncertainty::Estimate};
 
 use super::{
     jackknife::{add_open_part, jackknife},
@@ -50,16 +46,10 @@ impl LineFit {
 
     /// The parameters by name, their errors to first order; without one where they are infinite.
     pub fn parameters(&self) -> Vec<(&'static str, Estimate)> {
-        let of = |(parameter, gradient): (NamedParameter, Vec<f64>)| {
-            let estimate = match &self.covariance {
-                Some(c) if parameter.value.is_finite() => {
-                    Estimate::with_variance(parameter.value, variance_along(&gradient, c))
-                }
-                _ => Estimate::fixed(parameter.value),
-            };
-            (parameter.name, estimate)
-        };
-        self.operator.named_gradients().into_iter().map(of).collect()
+        let all = self.operator.named_estimates(self.covariance.as_deref());
+        all.into_iter()
+            .map(|(named, estimate)| (named.name, estimate))
+            .collect()
     }
 }
 

@@ -42,7 +42,7 @@
 //! | `choice` | which form |
 //! | `agreement` | do two methods agree |
 //! | `open_loop` | crossover and phase margin |
-//! | `of_polynomials` | polynomials back to an operator |
+//! | `of_polynomials`, `pole_reading` | polynomials back to an operator; which pole is what |
 //! | `judgement` | what makes a result doubtful |
 
 mod agreement;
@@ -64,6 +64,7 @@ mod noise;
 mod of_polynomials;
 mod open_loop;
 mod parameter;
+mod pole_reading;
 mod prediction;
 mod prediction_fit;
 mod prior;
@@ -77,8 +78,9 @@ pub use choice::FormFigures;
 pub use clusters::ClusterKind;
 pub use estimator::{FamilyEstimator, HIGHEST_NOISE_ORDER};
 pub use line_fit::LineFit;
-pub use of_polynomials::{FamilyConversion, PoleRole, RealPole, family_of_polynomials};
+pub use of_polynomials::{FamilyConversion, family_of_polynomials};
 pub use open_loop::{LoopMeasures, loop_measures};
 pub use parameter::Parameter;
+pub use pole_reading::{PoleRole, RealPole};
 pub use prior::{OperatorPrior, ParameterPrior};
 pub use result::{FamilyFit, FreeModel, OperatorOfRecord};

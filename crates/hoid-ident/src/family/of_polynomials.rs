@@ -1,9 +1,7 @@
 //! The operator of the family that polynomials stand for: `q^-nk B/F` (or `B/A`) back to K, T_L,
 //! T_I, omega_nm, zeta_nm and tau_e.
 //!
-//! The poles are `s_i = ln z_i / Ts`: a pair of complex poles is the neuromuscular system, the real
-//! one that is left is the lag. Of three real poles each may be the lag; all three readings are
-//! tried, and what was read is told ([`RealPole`]).
+//! The poles say which is the lag and which are the neuromuscular system ([`super::pole_reading`]).
 //!
 //! The exact model of an operator ([`FamilyOperator::hold`]) has fewer parameters than B has
 //! coefficients, so that estimated polynomials lie beside it. The operator is the one whose exact
@@ -20,13 +18,13 @@
 use hoid_model::{
     Complex64, FamilyOperator, Form, NotConvertible, PolynomialModel, SampleTime,
     operator_family::{Coordinate, HeldFamily},
-    polynomial,
-    polynomial_model::monic,
     uncertainty::Estimate,
-    uncertainty::variance_along,
 };
 
-use super::coordinates;
+use super::{
+    coordinates,
+    pole_reading::{Reading, RealPole, readings},
+};
 use crate::{
     Fit, SearchOptions,
     linalg::least_squares::solve_symmetric,
@@ -54,24 +52,6 @@ const LATER: [f64; 6] = [0.02, 0.5, 0.98, 2.5, 5.0, 10.0];
 /// Lead times from which searches start, s.
 const LEADS_S: [f64; 3] = [0.1, 0.5, 2.0];
 
-/// What a real pole was read as.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PoleRole {
-    /// The lag: `T_I = 1/rate`.
-    Lag,
-    /// One of the two poles of an overdamped neuromuscular system.
-    Neuromuscular,
-}
-
-/// A real pole `s = -rate`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RealPole {
-    /// Its rate, 1/s.
-    pub rate: f64,
-    /// What it is.
-    pub role: PoleRole,
-}
-
 /// An operator of the family that stands for polynomials.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FamilyConversion {
@@ -88,16 +68,10 @@ pub struct FamilyConversion {
 impl FamilyConversion {
     /// The parameters with their names, units and errors to first order.
     pub fn parameters(&self) -> Vec<(&'static str, &'static str, Estimate)> {
-        let of = |(parameter, gradient): (hoid_model::operator_family::NamedParameter, Vec<f64>)| {
-            let estimate = match &self.covariance {
-                Some(c) if parameter.value.is_finite() => {
-                    Estimate::with_variance(parameter.value, variance_along(&gradient, c))
-                }
-                _ => Estimate::fixed(parameter.value),
-            };
-            (parameter.name, parameter.unit, estimate)
-        };
-        self.operator.named_gradients().into_iter().map(of).collect()
+        let all = self.operator.named_estimates(self.covariance.as_deref());
+        all.into_iter()
+            .map(|(named, estimate)| (named.name, named.unit, estimate))
+            .collect()
     }
 }
 
@@ -190,91 +164,6 @@ pub fn family_of_polynomials(
     })
 }
 
-/// Which pole is which.
-#[derive(Debug, Clone, PartialEq)]
-struct Reading {
-    /// Rate of the lag, 1/s.
-    lag: Option<f64>,
-    /// omega and zeta.
-    neuromuscular: Option<(f64, f64)>,
-    /// Rates of the neuromuscular poles where they are real.
-    real: Vec<f64>,
-}
-
-impl Reading {
-    fn real_poles(&self) -> Vec<RealPole> {
-        let lag = self.lag.iter().map(|&rate| RealPole {
-            rate,
-            role: PoleRole::Lag,
-        });
-        let others = self.real.iter().map(|&rate| RealPole {
-            rate,
-            role: PoleRole::Neuromuscular,
-        });
-        let mut all: Vec<RealPole> = lag.chain(others).collect();
-        all.sort_by(|a, b| a.rate.total_cmp(&b.rate));
-        all
-    }
-}
-
-/// All ways in which the poles of F can be read.
-fn readings(f: &[f64], sample_time: SampleTime) -> Result<Vec<Reading>, NotConvertible> {
-    let other = |reason: String| NotConvertible::NotOfTheFamily { reason };
-    let roots = polynomial::roots(&monic(f)).unwrap_or_default();
-    if roots.len() != f.len() || !(1..=3).contains(&roots.len()) {
-        return Err(other(format!(
-            "operators of the family have one to three poles, found {}",
-            f.len()
-        )));
-    }
-    let (mut rates, mut pair) = (Vec::new(), None);
-    for z in roots {
-        if z.norm() >= 1.0 {
-            return Err(other(format!(
-                "the pole at |z| = {:.6} is no lag and no neuromuscular pole: it is not stable",
-                z.norm()
-            )));
-        }
-        if z.im == 0.0 && z.re <= 0.0 {
-            return Err(NotConvertible::NegativeRealPole { pole: z.re });
-        }
-        let s = z.ln() / sample_time.s();
-        if z.im == 0.0 {
-            rates.push(-s.re);
-        } else {
-            pair = Some((s.norm(), -s.re / s.norm()));
-        }
-    }
-    let overdamped = |a: f64, b: f64| Some(((a * b).sqrt(), 0.5 * (a + b) / (a * b).sqrt()));
-    Ok(match (pair, rates.as_slice()) {
-        (neuromuscular, &[]) => vec![Reading {
-            lag: None,
-            neuromuscular,
-            real: Vec::new(),
-        }],
-        (neuromuscular, &[rate]) => vec![Reading {
-            lag: Some(rate),
-            neuromuscular,
-            real: Vec::new(),
-        }],
-        (_, &[a, b]) => vec![Reading {
-            lag: None,
-            neuromuscular: overdamped(a, b),
-            real: vec![a, b],
-        }],
-        (_, three) => (0..three.len())
-            .map(|i| {
-                let rest: Vec<f64> = (0..three.len()).filter(|j| *j != i).map(|j| three[j]).collect();
-                Reading {
-                    lag: Some(three[i]),
-                    neuromuscular: overdamped(rest[0], rest[1]),
-                    real: rest,
-                }
-            })
-            .collect(),
-    })
-}
-
 /// The response of the polynomials at one frequency.
 struct Point {
     omega_rad_s: f64,
@@ -340,7 +229,7 @@ impl<'a> Nearest<'a> {
         for (limit, coordinate) in limits.iter_mut().zip(form.coordinates(neuromuscular)) {
             match coordinate {
                 Coordinate::LagRate | Coordinate::LogOmega | Coordinate::LogZeta => {
-                    let x = of_reading(reading, coordinate);
+                    let x = reading.coordinate(coordinate);
                     let reach = if coordinate == Coordinate::LagRate {
                         x.abs()
                     } else {
@@ -376,7 +265,7 @@ impl<'a> Nearest<'a> {
                     Coordinate::Gain => 1.0,
                     Coordinate::Lead => lead,
                     Coordinate::Delay => before + later * self.sample_time.s(),
-                    other => of_reading(self.reading, *other),
+                    other => self.reading.coordinate(*other),
                 })
                 .collect();
             // The gain enters linearly: the best one.
@@ -447,16 +336,6 @@ impl<'a> Nearest<'a> {
     }
 }
 
-fn of_reading(reading: &Reading, coordinate: Coordinate) -> f64 {
-    let (omega, zeta) = reading.neuromuscular.unwrap_or((1.0, 1.0));
-    match coordinate {
-        Coordinate::LagRate => reading.lag.unwrap_or(0.0),
-        Coordinate::LogOmega => omega.ln(),
-        Coordinate::LogZeta => zeta.ln(),
-        _ => 0.0,
-    }
-}
-
 /// `z^-nk B/F` at `z = e^{j theta}` and its derivatives along the first `p` coordinates.
 fn response(held: &HeldFamily, angle: f64, p: usize) -> (Complex64, Vec<Complex64>) {
     let back = |k: usize| Complex64::from_polar(1.0, -angle * k as f64);
@@ -487,26 +366,13 @@ impl Objective for Nearest<'_> {
     }
 
     fn linearise(&self, x: &[f64], _: &mut ()) -> Linearisation {
-        let p = x.len();
-        let mut total = Linearisation {
-            sum_of_squares: 0.0,
-            descent: vec![0.0; p],
-            gram: vec![0.0; p * p],
-        };
+        let mut total = Linearisation::empty(x.len());
         let Some(responses) = self.responses(x) else {
             total.sum_of_squares = f64::NAN;
             return total;
         };
         for (point, (m, slopes)) in self.points.iter().zip(responses) {
-            let weight = point.response.norm_sqr().recip();
-            let off = point.response - m;
-            total.sum_of_squares += weight * off.norm_sqr();
-            for i in 0..p {
-                total.descent[i] += weight * (slopes[i].conj() * off).re;
-                for j in 0..p {
-                    total.gram[i * p + j] += weight * (slopes[i].conj() * slopes[j]).re;
-                }
-            }
+            total.add_complex(point.response.norm_sqr().recip(), point.response - m, &slopes);
         }
         total
     }
@@ -523,6 +389,7 @@ impl Objective for Nearest<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::family::PoleRole;
     use hoid_model::{Orders, Structure};
 
     fn ts() -> SampleTime {

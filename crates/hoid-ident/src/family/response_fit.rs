@@ -212,12 +212,7 @@ impl Objective for ResponseCriterion<'_> {
     }
 
     fn linearise(&self, x: &[f64], _: &mut ()) -> Linearisation {
-        let p = x.len();
-        let mut total = Linearisation {
-            sum_of_squares: 0.0,
-            descent: vec![0.0; p],
-            gram: vec![0.0; p * p],
-        };
+        let mut total = Linearisation::empty(x.len());
         let Ok(operator) = FamilyOperator::new(self.form, self.neuromuscular, x) else {
             total.sum_of_squares = f64::NAN;
             return total;
@@ -227,14 +222,8 @@ impl Objective for ResponseCriterion<'_> {
             let model = operator.response_and_gradient(point.omega_rad_s);
             let weight = 2.0 / point.variance;
             let off = point.response - model.value * hold;
-            total.sum_of_squares += weight * off.norm_sqr();
             let slopes: Vec<Complex64> = model.gradient.iter().map(|g| g * hold).collect();
-            for i in 0..p {
-                total.descent[i] += weight * (slopes[i].conj() * off).re;
-                for j in 0..p {
-                    total.gram[i * p + j] += weight * (slopes[i].conj() * slopes[j]).re;
-                }
-            }
+            total.add_complex(weight, off, &slopes);
         }
         for penalty in &self.penalty {
             penalty.add_to(x, &mut total);

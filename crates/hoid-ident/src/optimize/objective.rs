@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use hoid_model::Complex64;
+
 use super::termination::Termination;
 
 /// Sum of squares, `psi' eps` and the projected `psi' psi` (by rows).
@@ -10,6 +12,29 @@ pub(crate) struct Linearisation {
     pub sum_of_squares: f64,
     pub descent: Vec<f64>,
     pub gram: Vec<f64>,
+}
+
+impl Linearisation {
+    /// Nothing summed, over p parameters.
+    pub fn empty(p: usize) -> Self {
+        Self {
+            sum_of_squares: 0.0,
+            descent: vec![0.0; p],
+            gram: vec![0.0; p * p],
+        }
+    }
+
+    /// Adds `weight |r|^2` of a complex residual r = H - M, `slopes` the derivatives of M.
+    pub fn add_complex(&mut self, weight: f64, residual: Complex64, slopes: &[Complex64]) {
+        let p = slopes.len();
+        self.sum_of_squares += weight * residual.norm_sqr();
+        for i in 0..p {
+            self.descent[i] += weight * (slopes[i].conj() * residual).re;
+            for j in 0..p {
+                self.gram[i * p + j] += weight * (slopes[i].conj() * slopes[j]).re;
+            }
+        }
+    }
 }
 
 /// A sum of squares over theta with its derivatives: what the search needs to know of a model.

@@ -6,7 +6,10 @@ use super::{
     dual::{Dual, PARTIALS},
     form::{Coordinate, Form, Rational},
 };
-use crate::{ContinuousTransferFunction, ModelError, polynomial};
+use crate::{
+    ContinuousTransferFunction, ModelError, polynomial,
+    uncertainty::{Estimate, variance_along},
+};
 
 /// The parameters of all forms, as [`FamilyOperator::named`] calls them, with their units.
 pub const PARAMETERS: [(&str, &str); 13] = [
@@ -253,6 +256,22 @@ impl FamilyOperator {
             (parameter, gradient)
         };
         self.named().into_iter().map(with).collect()
+    }
+
+    /// The parameters of [`FamilyOperator::named`] with their errors to first order, from the
+    /// covariance of the coordinates by rows; without an error where there is none or where a
+    /// parameter is infinite.
+    pub fn named_estimates(&self, covariance: Option<&[f64]>) -> Vec<(NamedParameter, Estimate)> {
+        let of = |(parameter, gradient): (NamedParameter, Vec<f64>)| {
+            let estimate = match covariance {
+                Some(c) if parameter.value.is_finite() => {
+                    Estimate::with_variance(parameter.value, variance_along(&gradient, c))
+                }
+                _ => Estimate::fixed(parameter.value),
+            };
+            (parameter, estimate)
+        };
+        self.named_gradients().into_iter().map(of).collect()
     }
 
     /// The coordinates as variables.

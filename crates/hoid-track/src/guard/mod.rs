@@ -8,7 +8,6 @@
 //! | no numbers for longer | the same | stays | goes on once the filters have settled |
 //! | 30 times the usual magnitude | the long-run mean of e, the prediction of u | stays | goes on from there once the filters have settled |
 //! | frozen, idle, larger or rescaled, swapped, misfit (by blocks of a second) | the samples, into the filters alone | is put back to before it | goes on from there once the span is over and the filters have settled |
-//!
 //! | an estimate that has gone astray by [`hoid_core::guard::reference`] | the samples, into the filters alone | is put back to the start | goes on from there once the filters have settled |
 //!
 //! **Putting back.** The numbers of a recursion are few ([`hoid_core::state`]). They are kept when a

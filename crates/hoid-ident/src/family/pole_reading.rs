@@ -1,0 +1,121 @@
+//! Which poles of a discrete model are the lag, and which the neuromuscular system.
+//!
+//! The poles are `s_i = ln z_i / Ts`: a pair of complex poles is the neuromuscular system, the real
+//! one that is left is the lag. Of three real poles each may be the lag; all three readings are
+//! tried by who asks, and what was read is told ([`RealPole`]).
+
+use hoid_model::{NotConvertible, SampleTime, operator_family::Coordinate, polynomial, polynomial_model::monic};
+
+/// What a real pole was read as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PoleRole {
+    /// The lag: `T_I = 1/rate`.
+    Lag,
+    /// One of the two poles of an overdamped neuromuscular system.
+    Neuromuscular,
+}
+
+/// A real pole `s = -rate`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RealPole {
+    /// Its rate, 1/s.
+    pub rate: f64,
+    /// What it is.
+    pub role: PoleRole,
+}
+
+/// Which pole is which.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Reading {
+    /// Rate of the lag, 1/s.
+    pub lag: Option<f64>,
+    /// omega and zeta.
+    pub neuromuscular: Option<(f64, f64)>,
+    /// Rates of the neuromuscular poles where they are real.
+    real: Vec<f64>,
+}
+
+impl Reading {
+    pub fn real_poles(&self) -> Vec<RealPole> {
+        let lag = self.lag.iter().map(|&rate| RealPole {
+            rate,
+            role: PoleRole::Lag,
+        });
+        let others = self.real.iter().map(|&rate| RealPole {
+            rate,
+            role: PoleRole::Neuromuscular,
+        });
+        let mut all: Vec<RealPole> = lag.chain(others).collect();
+        all.sort_by(|a, b| a.rate.total_cmp(&b.rate));
+        all
+    }
+
+    /// A coordinate that the poles say; zero for others.
+    pub fn coordinate(&self, wanted: Coordinate) -> f64 {
+        let (omega, zeta) = self.neuromuscular.unwrap_or((1.0, 1.0));
+        match wanted {
+            Coordinate::LagRate => self.lag.unwrap_or(0.0),
+            Coordinate::LogOmega => omega.ln(),
+            Coordinate::LogZeta => zeta.ln(),
+            _ => 0.0,
+        }
+    }
+}
+
+/// All ways in which the poles of F can be read.
+pub(super) fn readings(f: &[f64], sample_time: SampleTime) -> Result<Vec<Reading>, NotConvertible> {
+    let other = |reason: String| NotConvertible::NotOfTheFamily { reason };
+    let roots = polynomial::roots(&monic(f)).unwrap_or_default();
+    if roots.len() != f.len() || !(1..=3).contains(&roots.len()) {
+        return Err(other(format!(
+            "operators of the family have one to three poles, found {}",
+            f.len()
+        )));
+    }
+    let (mut rates, mut pair) = (Vec::new(), None);
+    for z in roots {
+        if z.norm() >= 1.0 {
+            return Err(other(format!(
+                "the pole at |z| = {:.6} is no lag and no neuromuscular pole: it is not stable",
+                z.norm()
+            )));
+        }
+        if z.im == 0.0 && z.re <= 0.0 {
+            return Err(NotConvertible::NegativeRealPole { pole: z.re });
+        }
+        let s = z.ln() / sample_time.s();
+        if z.im == 0.0 {
+            rates.push(-s.re);
+        } else {
+            pair = Some((s.norm(), -s.re / s.norm()));
+        }
+    }
+    let overdamped = |a: f64, b: f64| Some(((a * b).sqrt(), 0.5 * (a + b) / (a * b).sqrt()));
+    Ok(match (pair, rates.as_slice()) {
+        (neuromuscular, &[]) => vec![Reading {
+            lag: None,
+            neuromuscular,
+            real: Vec::new(),
+        }],
+        (neuromuscular, &[rate]) => vec![Reading {
+            lag: Some(rate),
+            neuromuscular,
+            real: Vec::new(),
+        }],
+        (_, &[a, b]) => vec![Reading {
+            lag: None,
+            neuromuscular: overdamped(a, b),
+            real: vec![a, b],
+        }],
+        (_, three) => (0..three.len())
+            .map(|i| {
+                let rest: Vec<f64> = (0..three.len()).filter(|j| *j != i).map(|j| three[j]).collect();
+                Reading {
+                    lag: Some(three[i]),
+                    neuromuscular: overdamped(rest[0], rest[1]),
+                    real: rest,
+                }
+            })
+            .collect(),
+    })
+}
