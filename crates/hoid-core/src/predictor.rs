@@ -15,7 +15,14 @@
 //! | `f_j` | `-(D/(C F)) w(t-j)` |
 //!
 //! Each filter works with the coefficients of its time; for a theta that stays, eps and psi are
-//! those of the batch criterion started at rest. After the estimate has moved, w, v and eps of the
+//! those of the batch criterion started at rest. `D/(C F)` is **one filter in direct form**, `y(t) =
+//! x(t) + sum d_j x(t-j) - sum g_j y(t-j)` with `G = C F`. A cascade, first `1/F` and then `D/C`, is
+//! the same filter only while theta stays: time-varying filters do not commute. Its inner signal
+//! `x/F` remembers the F of earlier estimates until its poles have forgotten them, and D of today no
+//! longer cancels what it should; near the unit circle psi is then wrong for as long as theta moves
+//! ([`Regressor::Cascade`], for comparison).
+//!
+//! After the estimate has moved, w, v and eps of the
 //! sample are computed again with it ([`Predictor::correct`]): the a-posteriori residuals, with
 //! which the recursion converges faster (L. Ljung and T. Söderström, *Theory and Practice of
 //! Recursive Identification*, 1983, section 3.7.3 and eq. 3.151).
@@ -36,6 +43,9 @@ pub enum Regressor {
     /// The gradient: prediction-error method.
     #[default]
     Gradient,
+    /// The gradient with `D/(C F)` as a cascade, `1/F` before `D/C`: the same while theta stays, and
+    /// slower to converge while it moves. For comparison.
+    Cascade,
     /// The signals without their filters: pseudo-linear regression, also called extended least
     /// squares (Ljung and Söderström, section 3.7.4). Fewer operations; it converges where 1/C (1/F
     /// ...) is positive real.
@@ -51,13 +61,13 @@ pub struct Predictor<S, const N: usize, const L: usize> {
     x: [f64; L],
     /// `(D/(C F)) x`.
     filtered_x: [f64; L],
-    /// `x/F`.
+    /// `x/F`, of the cascade alone.
     x_over_f: [f64; N],
     u: [f64; N],
     w: [f64; N],
     v: [f64; N],
     eps: [f64; N],
-    /// `(D/C) u`, `eps/C`, `v/C`, `w/F` and `(D/(C F)) w`.
+    /// `(D/C) u`, `eps/C`, `v/C`, `w/F` (of the cascade alone) and `(D/(C F)) w`.
     filtered_u: [f64; N],
     filtered_eps: [f64; N],
     filtered_v: [f64; N],
@@ -74,7 +84,8 @@ crate::state!([S, const N: usize, const L: usize] Predictor<S, N, L> {
 impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
     /// All filters at rest. `None` when the shape does not fit in N and L, or has no parameter.
     pub fn new(shape: S, regressor: Regressor) -> Option<Self> {
-        let fits = (1..=N).contains(&shape.parameters()) && shape.nb().max(shape.nc()) <= L;
+        let inputs = shape.nb().max(shape.nd() + 1).max(shape.nc() + shape.nf());
+        let fits = (1..=N).contains(&shape.parameters()) && (shape.nb() == 0 || inputs <= L);
         fits.then_some(Self {
             shape,
             regressor,
@@ -129,18 +140,32 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         let shape = self.shape;
         let [_, _, c, d, f] = shape.split(theta);
         let offset = self.offset();
-        // Where B cannot shift, only the inputs under its own coefficients are kept.
-        let input = if L > N { L } else { shape.nb() };
-        push(&mut self.x, input, x);
+        // Where B cannot shift, only the inputs under the coefficients of B and D are kept.
+        let (input, output) = if L > N {
+            (L, L)
+        } else {
+            (shape.nb().max(shape.nd() + 1), shape.nb().max(shape.nc() + shape.nf()))
+        };
         self.pending[0] = u;
-        let gradient = self.regressor == Regressor::Gradient;
-        if gradient && shape.nb() > 0 {
-            let over_f = x - dot_of_fresh(f, &self.x_over_f);
-            let filtered = over_f + dot(d, &self.x_over_f) - dot(c, &self.filtered_x);
-            self.pending[1] = over_f;
-            push(&mut self.filtered_x, input.max(shape.nc()), filtered);
+        if shape.nb() > 0 {
+            match self.regressor {
+                Regressor::Gradient => {
+                    let g: [f64; N] = product(c, f);
+                    let poles = dot_of_fresh(&g[..c.len() + f.len()], &self.filtered_x);
+                    let filtered = x + dot(d, &self.x) - poles;
+                    push(&mut self.filtered_x, output, filtered);
+                }
+                Regressor::Cascade => {
+                    let over_f = x - dot_of_fresh(f, &self.x_over_f);
+                    let filtered = over_f + dot(d, &self.x_over_f) - dot(c, &self.filtered_x);
+                    self.pending[1] = over_f;
+                    push(&mut self.filtered_x, output, filtered);
+                }
+                Regressor::PseudoLinear => {}
+            }
         }
-        let psi = if gradient {
+        push(&mut self.x, input, x);
+        let psi = if self.regressor != Regressor::PseudoLinear {
             let of = [&self.filtered_u, &self.filtered_eps, &self.filtered_v, &self.filtered_w];
             gather(&shape, &self.filtered_x[offset..], of)
         } else {
@@ -167,12 +192,13 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         let [w, v, eps] = self.residual(theta);
         let u = self.pending[0];
         let [_, _, c, d, f] = shape.split(theta);
-        if self.regressor == Regressor::Gradient {
+        let cascade = self.regressor == Regressor::Cascade;
+        if self.regressor != Regressor::PseudoLinear {
             if shape.na() > 0 {
                 let filtered = u + dot(d, &self.u) - dot(c, &self.filtered_u);
                 push(&mut self.filtered_u, shape.na().max(shape.nc()), filtered);
             }
-            if shape.nb() > 0 {
+            if cascade && shape.nb() > 0 {
                 push(&mut self.x_over_f, shape.nf().max(shape.nd()), self.pending[1]);
             }
             if shape.nc() > 0 {
@@ -184,17 +210,23 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
                 push(&mut self.filtered_v, shape.nd().max(shape.nc()), filtered);
             }
             if shape.nf() > 0 {
-                let over_f = w - dot(f, &self.w_over_f);
-                let filtered = over_f + dot(d, &self.w_over_f) - dot(c, &self.filtered_w);
-                push(&mut self.w_over_f, shape.nf().max(shape.nd()), over_f);
-                push(&mut self.filtered_w, shape.nf().max(shape.nc()), filtered);
+                let filtered = if cascade {
+                    let over_f = w - dot(f, &self.w_over_f);
+                    let filtered = over_f + dot(d, &self.w_over_f) - dot(c, &self.filtered_w);
+                    push(&mut self.w_over_f, shape.nf().max(shape.nd()), over_f);
+                    filtered
+                } else {
+                    let g: [f64; N] = product(c, f);
+                    w + dot(d, &self.w) - dot(&g[..c.len() + f.len()], &self.filtered_w)
+                };
+                push(&mut self.filtered_w, shape.nf() + shape.nc(), filtered);
             }
         }
         if shape.na() > 0 {
             push(&mut self.u, shape.na().max(shape.nd()), u);
         }
         if shape.nf() > 0 {
-            push(&mut self.w, shape.nf(), w);
+            push(&mut self.w, shape.nf().max(shape.nd()), w);
         }
         if shape.nd() > 0 {
             push(&mut self.v, shape.nd(), v);
@@ -279,6 +311,20 @@ fn dot_of_fresh(coefficients: &[f64], history: &[f64]) -> f64 {
         sum += c * black_box(*h);
     }
     sum
+}
+
+/// The coefficients `g_1 ... g_(nc+nf)` of `G = C F`, C and F with a leading 1.
+#[inline(always)]
+fn product<const N: usize>(c: &[f64], f: &[f64]) -> [f64; N] {
+    let mut g = [0.0; N];
+    g[..f.len()].copy_from_slice(f);
+    for (i, c) in c.iter().enumerate() {
+        g[i] += c;
+        for (j, f) in f.iter().enumerate() {
+            g[i + j + 1] += c * f;
+        }
+    }
+    g
 }
 
 /// Puts a value in front of the n newest ones.

@@ -133,9 +133,12 @@ fn table(runs: usize) {
         (4, 0.1),
         (4, 0.2),
     ];
-    let methods: [(&str, TrackOptions); 4] = [
+    // What the order of the filters of the gradient does.
+    let cascade = of_the_text(Method::rpem()).with(&[("regressor", "cascade")]).unwrap();
+    let methods: [(&str, TrackOptions); 5] = [
         ("RLS, text", of_the_text(Method::rls())),
         ("RPEM, text", of_the_text(Method::rpem())),
+        ("cascade", cascade),
         ("RPEM", options(Method::rpem())),
         ("physical", options(Method::physical())),
     ];

@@ -87,8 +87,9 @@ class MethodSettings(TypedDict, total=False):
     # the estimate begins again after them. For rls, rpem, physical, adaptive.
     guard: Literal["yes", "no"] | None
 
-    # Pseudo-linear regression (extended least squares) instead of the gradient. For rpem.
-    pseudo_linear: bool | None
+    # Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
+    # comparison), or pseudo-linear (without filters: extended least squares). For rpem.
+    regressor: Literal["gradient", "cascade", "pseudo-linear"] | None
 
     # Polynomials kept stable: predictor (C and F), or noise (D too). For rpem, physical, fused.
     stable: Literal["predictor", "noise"] | None
@@ -157,8 +158,9 @@ SETTINGS = """covariance : float
         guard : Literal['yes', 'no']
             Guard: outliers of e and u are held back, spans that no tracking makes are left out,
             and the estimate begins again after them. For rls, rpem, physical, adaptive.
-        pseudo_linear : bool
-            Pseudo-linear regression (extended least squares) instead of the gradient. For rpem.
+        regressor : Literal['gradient', 'cascade', 'pseudo-linear']
+            Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
+            comparison), or pseudo-linear (without filters: extended least squares). For rpem.
         stable : Literal['predictor', 'noise']
             Polynomials kept stable: predictor (C and F), or noise (D too). For rpem, physical,
             fused.

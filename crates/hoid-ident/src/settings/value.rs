@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_core::recursion::Stable;
+use hoid_core::{predictor::Regressor, recursion::Stable};
 
 use super::kind::Kind;
 use crate::Constraint;
@@ -224,6 +224,7 @@ macro_rules! choices {
     };
 }
 
+choices!(Regressor { "gradient" = Regressor::Gradient, "cascade" = Regressor::Cascade, "pseudo-linear" = Regressor::PseudoLinear });
 choices!(Stable { "predictor" = Stable::Predictor, "noise" = Stable::PredictorAndNoise } also { "predictor-and-noise" = Stable::PredictorAndNoise });
 
 #[cfg(test)]

@@ -20,8 +20,9 @@ use crate::{
 settings! {
     /// Options of the recursive prediction-error method.
     pub struct RpemOptions {
-        /// Pseudo-linear regression (extended least squares) instead of the gradient
-        pub pseudo_linear: bool = false,
+        /// Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
+        /// comparison), or pseudo-linear (without filters: extended least squares)
+        pub regressor: Regressor = Regressor::Gradient,
     }
     groups {
         /// The gain.
@@ -65,12 +66,7 @@ impl RecursiveMethod for RpemOptions {
         from: &StartState,
         sample_time: SampleTime,
     ) -> Result<Box<dyn Recursion>, IdentError> {
-        let regressor = if self.pseudo_linear {
-            Regressor::PseudoLinear
-        } else {
-            Regressor::Gradient
-        };
-        Plan::new(setup, from, sample_time).build(Kernel::PredictionError(regressor))
+        Plan::new(setup, from, sample_time).build(Kernel::PredictionError(self.regressor))
     }
 
     fn memories(&self) -> Option<&MemoryOptions> {

@@ -1,0 +1,117 @@
+//! The recursive prediction-error method against its plain twin in Python
+//! (`fixtures/recursive/make.py`), while theta moves: only there does the order of filters show.
+
+#![allow(clippy::unwrap_used)]
+
+use hoid_core::{
+    adaptation::Forgetting,
+    covariance::Covariance,
+    error_bars::ErrorBars,
+    innovation_variance::InnovationVariance,
+    predictor::Regressor,
+    recursion::Stable,
+    rpem::Rpem,
+    shape::{AnyShape, Shape},
+    ud_covariance::UdCovariance,
+};
+
+const N: usize = 8;
+const LAMBDA: f64 = 1.0 - 1.0 / 256.0;
+const P0: f64 = 0.1;
+
+struct Row {
+    name: String,
+    shape: AnyShape,
+    x: f64,
+    u: f64,
+    innovation: f64,
+    theta: Vec<f64>,
+}
+
+fn rows() -> Vec<Row> {
+    include_str!("../../../fixtures/recursive/rpem.csv")
+        .lines()
+        .skip(1)
+        .map(|line| {
+            let cells: Vec<&str> = line.split(',').collect();
+            let order = |i: usize| cells[i].parse().unwrap();
+            let number = |i: usize| cells[i].parse().unwrap();
+            Row {
+                name: cells[0].to_owned(),
+                shape: AnyShape {
+                    na: order(1),
+                    nb: order(2),
+                    nc: order(3),
+                    nd: order(4),
+                    nf: order(5),
+                },
+                x: number(6),
+                u: number(7),
+                innovation: number(8),
+                theta: cells[9].split(' ').map(|v| v.parse().unwrap()).collect(),
+            }
+        })
+        .collect()
+}
+
+fn recursion(shape: AnyShape, regressor: Regressor) -> Rpem<AnyShape, N, 8, Covariance<N>> {
+    let mut theta = [0.0; N];
+    let mut at = 0;
+    for (n, values) in [
+        (shape.na, [-0.4, 0.0]),
+        (shape.nb, [0.02, 0.0]),
+        (shape.nc, [0.0, 0.0]),
+        (shape.nd, [-0.4, 0.0]),
+        (shape.nf, [-1.6, 0.7]),
+    ] {
+        theta[at..at + n].copy_from_slice(&values[..n]);
+        at += n;
+    }
+    let forgetting = Forgetting::Exponential { lambda: [LAMBDA; N] };
+    let covariance = Covariance::new(UdCovariance::diagonal([P0; N]), forgetting, [f64::INFINITY; N]);
+    let mut unit = [[0.0; N]; N];
+    (0..N).for_each(|i| unit[i][i] = P0);
+    let bars = ErrorBars::new(&unit, InnovationVariance::new(0.0, 0.0, 1.0), f64::INFINITY);
+    Rpem::new(shape, regressor, Stable::Predictor, theta, covariance, bars).unwrap()
+}
+
+/// Largest difference of theta from the twin, relative to the largest parameter, for each shape.
+fn differences(regressor: Regressor) -> Vec<(String, f64)> {
+    let mut found: Vec<(String, f64)> = Vec::new();
+    let mut running = None;
+    for row in rows() {
+        if found.last().is_none_or(|(name, _)| *name != row.name) {
+            found.push((row.name.clone(), 0.0));
+            running = Some(recursion(row.shape, regressor));
+        }
+        let recursion = running.as_mut().unwrap();
+        let step = recursion.step(row.x, row.u);
+        let scale = row.theta.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let worst = &mut found.last_mut().unwrap().1;
+        for (ours, theirs) in recursion.theta().iter().zip(&row.theta) {
+            *worst = worst.max((ours - theirs).abs() / scale);
+        }
+        let size = 1.0_f64.max(row.innovation.abs());
+        *worst = worst.max((step.innovation - row.innovation).abs() / size);
+        assert_eq!(row.theta.len(), row.shape.parameters());
+    }
+    found
+}
+
+#[test]
+fn the_gradient_is_one_filter_in_direct_form_while_theta_moves() {
+    let found = differences(Regressor::Gradient);
+    assert_eq!(found.len(), 6);
+    for (name, difference) in found {
+        assert!(difference < 1e-9, "{name}: {difference:e}");
+    }
+}
+
+/// The test can fail: a cascade of 1/F and D/C is another recursion wherever F stands beside C or D.
+#[test]
+fn a_cascade_is_another_recursion() {
+    for (name, difference) in differences(Regressor::Cascade) {
+        let same = ["armax", "oe", "ararx"].contains(&name.as_str());
+        assert_eq!(difference < 1e-9, same, "{name}: {difference:e}");
+    }
+}
