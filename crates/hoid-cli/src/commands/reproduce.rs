@@ -56,10 +56,10 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
             args.out.display()
         )));
     };
-    if let Some([hold, in_part, not, untestable]) = found.tally {
+    if let Some([hold, more_so, in_part, not, untestable]) = found.tally {
         output::print(&format!(
-            "{} claims: {hold} hold, {in_part} in part, {not} do not, {untestable} cannot be tested\n",
-            hold + in_part + not + untestable
+            "{} claims: {hold} hold, {more_so} hold, and more so, {in_part} in part, {not} do not, {untestable} cannot be tested\n",
+            hold + more_so + in_part + not + untestable
         ))?;
     }
     let (simulated_s, drawn_s) = (found.simulated_s, found.drawn_s);

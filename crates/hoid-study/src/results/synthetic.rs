@@ -33,8 +33,9 @@ impl Results {
             "K_n_backward_euler",
             "T_n",
         ];
-        const OTHERS: [&str; 13] = [
+        const OTHERS: [&str; 14] = [
             "K_n",
+            "loss",
             "vaf",
             "response_error",
             "innovation_variance",

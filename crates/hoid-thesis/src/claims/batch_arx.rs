@@ -24,7 +24,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "arx-b-around-50",
         theme: Theme::BatchArx,
-        statement: "For m0 >= 2 the ARX error \"in b0 and b1 is still around 50 % in most cases\".",
+        statement: "For m0 >= 2 the ARX \"estimation error in b0 and b1 is still around 50 % in most cases\".",
         place: "V.A.1, Fig. 5",
         measure: "Magnitude of the median bias of b0 and b1 over m0 = 2 to 4 and the noise levels, C1, n_k* = 29; its sign is shown beside it.",
         plans: PLANS,
@@ -42,7 +42,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "arx-linear-in-delay",
         theme: Theme::BatchArx,
-        statement: "\"Changes in model time delay produce a linear trend in computed relative bias\" of ARX.",
+        statement: "\"Changes in model time delay (x-axis) produce a linear trend in computed relative bias\" of ARX.",
         place: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
         measure: "R^2 of the straight line through the median biases over n_k* = 25 to 30, by coefficient, m0 and noise level, C1.",
         plans: PLANS,
@@ -87,7 +87,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "arx-only-gain-ideal",
         theme: Theme::BatchArx,
-        statement: "At the true delay \"only the HO gain K_e results achieve the ideal performance\" (ARX).",
+        statement: "At the true delay \"Only the HO gain K_e results in Figure C.2 achieve the ideal performance\" (ARX).",
         place: "6.1.1, Fig. C.2",
         measure: "Magnitude of the median bias of K_e, and of T_L, omega_nm and zeta_nm, m0 = 2 to 4, C1, n_k* = 29.",
         plans: PLANS,
@@ -96,7 +96,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "arx-c2-against-c1",
         theme: Theme::BatchArx,
-        statement: "In C2 \"K_e and T_L present a greater bias when compared to C1, while omega_nm and zeta_nm are slightly improved\" (ARX).",
+        statement: "In C2 \"K_e and T_L present a greater bias when compared to the results for C1, while estimations of omega_nm and zeta_nm are slightly improved\" (ARX).",
         place: "6.1.1, Figs. C.2, C.10",
         measure: "Magnitude of the median bias in C2 less that in C1, points of %, m0 = 2 to 4, n_k* = 29.",
         plans: PLANS,

@@ -44,7 +44,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "bj-linear-in-delay",
         theme: Theme::BatchBj,
-        statement: "\"The BJ estimator creates lag or lead depending on the assumed delay, hence, a linear trend is also found.\"",
+        statement: "\"The BJ estimator creates lag or lead depending on the assumed model time delay, hence, a linear trend is also found.\"",
         place: "V.A.1, Fig. 6",
         measure: "R^2 of the straight line through the median biases over n_k* = 25 to 30, BJ(m* = m0), by coefficient, m0 and noise level, C1.",
         plans: PLANS,
@@ -53,7 +53,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "bj-lead-and-lag",
         theme: Theme::BatchBj,
-        statement: "\"BJ poles are placed at lower frequencies for smaller model time delays, and vice versa.\"",
+        statement: "\"BJ poles are placed at lower frequencies for smaller model time delays to create additional lag, and vice versa.\"",
         place: "6.1.2, Figs. D.5 to D.8",
         measure: "Median of the paired change of omega_nm from n_k* = 29 to the others, % of the true value, BJ(m* = m0), C1.",
         plans: PLANS,
@@ -89,7 +89,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "bj-remnant-gain",
         theme: Theme::BatchBj,
-        statement: "\"The estimation of the remnant gain also presents important errors for orders greater than 1.\"",
+        statement: "\"The estimation of the remnant gain also presents important errors for m-th orders greater than 1.\"",
         place: "6.1.2, Fig. C.5",
         measure: "Magnitude of the median bias of K_n (backward Euler, as in B.2), BJ(m* = m0), m0 = 2 to 4, C1, n_k* = 29; of the exact retrieval beside it.",
         plans: PLANS,
@@ -98,7 +98,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "bj-c2-against-c1",
         theme: Theme::BatchBj,
-        statement: "In C2 \"K_e and T_L present a less precise estimation, while the neuromuscular dynamics are better captured\" (BJ).",
+        statement: "In C2 \"K_e and T_L associated with the HO zero present a less precise estimation, while the neuromuscular dynamics are better captured\" (BJ).",
         place: "6.1.2, Figs. C.4, C.12",
         measure: "Median |bias| in C2 less that in C1, points of %, BJ(m* = m0), n_k* = 29, by m0 and noise level.",
         plans: PLANS,

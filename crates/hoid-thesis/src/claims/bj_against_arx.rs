@@ -23,7 +23,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "bj-5000-percent",
         theme: Theme::BatchBj,
-        statement: "\"BJ offers a 5000 % more accurate estimation when the remnant order is 1.\"",
+        statement: "\"BJ offers a 5000 % more accurate estimation when the remnant order is m* = 1.\"",
         place: "VII",
         measure: "Median |bias| of ARX over that of BJ(m* = 1), m0 = 1, C1, n_k* = 29: around 50 times.",
         plans: PLANS,
@@ -50,7 +50,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "bj-always-outperforms",
         theme: Theme::BatchBj,
-        statement: "\"Except for the remnant-free case, the BJ model always outperforms the ARX one, both in magnitude and phase.\"",
+        statement: "Except for the remnant-free case, \"the BJ model always outperforms the ARX one, both in magnitude and phase estimation\".",
         place: "6.1.2, Figs. D.9, D.18",
         measure: "Median of the paired difference of response_error, the root mean square of |H - H0| / |H0| at the lines of the forcing function, BJ(m* = m0) less ARX, C1 and C2, n_k* = 29, %.",
         plans: PLANS,
@@ -89,7 +89,7 @@ fn fifty_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     for at in settings(&["C1"], &[1], &LEVELS) {
         for name in DISCRETE {
             let queries = [at.bj(&bias_of(name), 1, TRUE_DELAY), at.arx(&bias_of(name), TRUE_DELAY)];
-            part.around(
+            part.effect(
                 at.label(name),
                 study.of(&queries, &|s| median_magnitude(&s[1]) / median_magnitude(&s[0]))?,
                 50.0,
@@ -133,7 +133,7 @@ fn half_the_error(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
             let found = study.of(&queries, &|s| {
                 100.0 * (1.0 - median_magnitude(&s[0]) / median_magnitude(&s[1]))
             })?;
-            part.around(at.label(name), found, 50.0);
+            part.effect(at.label(name), found, 50.0);
         }
     }
     Ok(vec![part])

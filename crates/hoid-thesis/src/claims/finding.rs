@@ -19,9 +19,11 @@ pub struct Finding {
     pub measured: Vec<Measured>,
     /// Cells that pass.
     pub passed: usize,
+    /// Cells that go beyond the claimed number the same way.
+    pub exceeded: usize,
     /// Cells that fail.
     pub failed: usize,
-    /// Cells in all; those that neither pass nor fail are undecided.
+    /// Cells in all; the others are undecided.
     pub of: usize,
     /// What was found, in words.
     pub text: String,
@@ -58,6 +60,7 @@ impl Claim {
         let count = |outcome| parts.iter().map(|part| part.count(outcome)).sum();
         Finding {
             passed: count(CellOutcome::Passes),
+            exceeded: count(CellOutcome::Exceeds),
             failed: count(CellOutcome::Fails),
             of: parts.iter().map(|part| part.tests.len()).sum(),
             measured: parts.iter().flat_map(measured).collect(),
@@ -94,13 +97,19 @@ fn in_words(verdict: &Verdict, parts: &[Part]) -> String {
     let of_part = |part: &Part| {
         let (above, below) = part.beyond();
         let open = part.count(CellOutcome::Undecided);
+        let further = part.count(CellOutcome::Exceeds);
         let mut text = format!(
             "{}: {} of {} cells pass",
             part.label,
             part.count(CellOutcome::Passes),
             part.tests.len()
         );
-        for (count, what) in [(above, "above"), (below, "below"), (open, "undecided")] {
+        for (count, what) in [
+            (further, "go further"),
+            (above, "above"),
+            (below, "below"),
+            (open, "undecided"),
+        ] {
             if count > 0 {
                 text.push_str(&format!(", {count} {what}"));
             }

@@ -13,7 +13,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "rls-large-at-m1",
         theme: Theme::Recursive,
-        statement: "m0 = 1: \"ARX models lead to significant relative bias while BJ provides almost null bias after full convergence\".",
+        statement: "m0 = 1: \"ARX models lead to significant relative bias while BJ provides a much more precise estimation with almost null bias after full convergence\".",
         place: "V.B, Fig. 11",
         measure: "Magnitude of the bias of the median trace over the last 30.72 s, C4, m0 = 1, RLS and RPEM, by coefficient and noise level.",
         plans: &["recursive"],
@@ -40,7 +40,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "batch-represents-recursion",
         theme: Theme::Recursive,
-        statement: "\"Batch-fitting results also represent the real functioning of RLS and RPEM algorithms.\"",
+        statement: "Batch-fitting results \"also represent the real functioning of RLS and RPEM algorithms in recursive estimation\".",
         place: "V.B, Figs. 11, 12",
         measure: "Bias of the median trace over the last 30.72 s less the median bias of the batch fit of that span, C4, points of %, by coefficient, m0, noise level.",
         plans: &["recursive"],
@@ -49,7 +49,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "rls-a2-violates",
         theme: Theme::Recursive,
-        statement: "m0 = 1: \"condition a2 > 0 is not fulfilled at multiple occasions\", with \"many divergences in the computation\".",
+        statement: "m0 = 1: \"condition a2 > 0 is not fulfilled at multiple occasions\", with \"important divergences in the computation of T_L\".",
         place: "6.2.1, Figs. G.1, G.5",
         measure: "Median share of the trace that does not convert at m0 = 1 and at m0 = 2 to 4, RLS with matrix, C3.",
         plans: &["recursive-arx"],
@@ -76,7 +76,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "rls-more-noise-more-error",
         theme: Theme::Recursive,
-        statement: "\"An increment in noise level clearly produces a bigger error in b0 and b1\" (recursive ARX).",
+        statement: "\"An increment in noise level clearly produces a bigger error in b0 and b1 parameters\" (recursive ARX).",
         place: "6.2.1, Figs. G.1 to G.4",
         measure: "Growth of the magnitude of the bias of the median trace over the last 30.72 s from one noise level to the next, m0 = 2 to 4, C3, points of %.",
         plans: &["recursive-arx"],
@@ -109,11 +109,11 @@ fn ten_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         let first = Setting { m0: 1, ..at };
         for name in DISCRETE {
             let [reference, found] = [first, at].map(|at| study.trace_bias(&at.rls(""), name));
-            discrete.around(at.label(name), reference?.abs().over(found?.abs()), 10.0);
+            discrete.effect(at.label(name), reference?.abs().over(found?.abs()), 10.0);
         }
         for name in NMS {
             let [reference, found] = [first, at].map(|at| study.median(&at.rls(&format!("rms_{name}"))));
-            nms.around(at.label(name), reference?.over(found?), 10.0);
+            nms.effect(at.label(name), reference?.over(found?), 10.0);
         }
     }
     Ok(vec![discrete, nms])

@@ -54,7 +54,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "rls-better-gain-and-zero",
         theme: Theme::Recursive,
-        statement: "For m0 >= 2 \"ARX offers more stable, precise results than BJ in K_e, T_L and K_e_dot, BJ a more adequate outcome in NMS\".",
+        statement: "For m0 >= 2 \"ARX offers more stable, precise results than BJ in K_e, T_L and K_e_dot, while the BJ model provides a more adequate outcome in NMS parameters\".",
         place: "V.B, Fig. 12; VII",
         measure: "Median of the paired difference of the RMS error of the trace, RPEM less RLS, C4, m0 = 2 to 4, by parameter and noise level.",
         plans: PLANS,
@@ -63,18 +63,18 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "rls-0-to-5-percent",
         theme: Theme::Recursive,
-        statement: "\"Except for a first-order remnant, RLS usually captures the HO gain and zero with 0-5 % less bias.\"",
+        statement: "\"Except for a first-order remnant, the RLS algorithm usually captures the HO gain and zero with 0-5 % less bias.\"",
         place: "VIII",
-        measure: "Magnitude of the bias of the median trace of K_e and T_L over the last 30.72 s, RPEM less RLS, C4, m0 = 2 to 4: from 0 to 5 points; RMS error of the trace likewise.",
+        measure: "100 (1 - RLS / RPEM) of the magnitude of the bias of the median trace of K_e and T_L over the last 30.72 s, C4, m0 = 2 to 4: from 0 to 5 %; median RMS error of the trace likewise.",
         plans: PLANS,
         source: Source::Data(zero_to_five),
     },
     Claim {
         id: "rpem-nms-25-percent",
         theme: Theme::Recursive,
-        statement: "\"BJ is able to approximate the real NMS dynamics with 25 % less error.\"",
+        statement: "\"BJ is able to approximate the real Neuro-Muscular (NMS) dynamics with 25 % less error.\"",
         place: "VIII",
-        measure: "Magnitude of the bias of the median trace of omega_nm and zeta_nm over the last 30.72 s, RPEM less RLS, C4, m0 = 2 to 4: 12.5 to 37.5 points smaller; RMS error of the trace likewise.",
+        measure: "100 (1 - RPEM / RLS) of the magnitude of the bias of the median trace of omega_nm and zeta_nm over the last 30.72 s, C4, m0 = 2 to 4: from 12.5 to 37.5 %; median RMS error of the trace likewise.",
         plans: PLANS,
         source: Source::Data(nms_error),
     },
@@ -155,7 +155,7 @@ fn five_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.settling(&query, name));
             let (rls, rpem) = (rls?, rpem?);
-            part.around(at.label(""), rpem.over(rls), 5.0);
+            part.effect(at.label(""), rpem.over(rls), 5.0);
             if at.m0 == 2 && at.level == 0.1 {
                 part.show(format!("settling time of {name} by RLS, {}, s", at.label("")), rls);
                 part.show(format!("settling time of {name} by RPEM, {}, s", at.label("")), rpem);
@@ -208,6 +208,11 @@ fn rms(study: Study<'_>, at: Setting, name: &str) -> Result<Value, String> {
     study.difference(&at.rpem(&quantity), &at.rls(&quantity))
 }
 
+/// By how many % the median RMS error of one trace is less than that of another, of the same runs.
+fn less_rms(study: Study<'_>, one: Query, other: Query) -> Result<Value, String> {
+    study.of(&[one, other], &|s| 100.0 * (1.0 - med(&s[0]) / med(&s[1])))
+}
+
 fn better_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut gains = Part::new("K_e, T_L, K_e_dot: RMS error of RPEM less that of RLS above 0");
@@ -225,13 +230,14 @@ fn better_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn zero_to_five(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut bias = Part::new("|bias| of RPEM less that of RLS from 0 to 5 points");
-    let mut error = Part::new("RMS error of RPEM less that of RLS from 0 to 5 points");
+    let mut bias = Part::new("|bias| of RLS is less than that of RPEM by 0 to 5 %");
+    let mut error = Part::new("RMS error of RLS is less than that of RPEM by 0 to 5 %");
     for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
         for name in ["K_e", "T_L"] {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.trace_bias(&query, name));
-            bias.between(at.label(name), rpem?.abs().minus(rls?.abs()), 0.0, 5.0);
-            error.between(at.label(name), rms(study, at, name)?, 0.0, 5.0);
+            let rms = format!("rms_{name}");
+            bias.effect_between(at.label(name), rls?.abs().less_than(rpem?.abs()), 0.0, 5.0);
+            error.effect_between(at.label(name), less_rms(study, at.rls(&rms), at.rpem(&rms))?, 0.0, 5.0);
         }
     }
     Ok(vec![bias, error])
@@ -239,13 +245,14 @@ fn zero_to_five(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn nms_error(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut bias = Part::new("|bias| of RPEM less that of RLS from -37.5 to -12.5 points");
-    let mut error = Part::new("RMS error of RPEM less that of RLS from -37.5 to -12.5 points");
+    let mut bias = Part::new("|bias| of RPEM is less than that of RLS by 12.5 to 37.5 %");
+    let mut error = Part::new("RMS error of RPEM is less than that of RLS by 12.5 to 37.5 %");
     for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
         for name in NMS {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.trace_bias(&query, name));
-            bias.between(at.label(name), rpem?.abs().minus(rls?.abs()), -37.5, -12.5);
-            error.between(at.label(name), rms(study, at, name)?, -37.5, -12.5);
+            let rms = format!("rms_{name}");
+            bias.effect(at.label(name), rpem?.abs().less_than(rls?.abs()), 25.0);
+            error.effect(at.label(name), less_rms(study, at.rpem(&rms), at.rls(&rms))?, 25.0);
         }
     }
     Ok(vec![bias, error])

@@ -24,7 +24,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "vaf-lower-with-m4-at-m1",
         theme: Theme::RemnantOrder,
-        statement: "At m0 = 1 \"a model remnant order equal to 4 provides lower VAF results\".",
+        statement: "At m0 = 1 \"a model remnant order equal to 4 (the simulation one is 1 for this case) provides lower VAF results\".",
         place: "V.A.2; 6.1.3, Figs. E.1, E.9",
         measure: "Mean of the paired difference of VAF, m* = 4 less m* = 1, m0 = 1, C1 and C2, by n_k* and noise level: lower by more than 0.1 points.",
         plans: PLANS,
@@ -33,7 +33,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "vaf-bj-as-arx",
         theme: Theme::RemnantOrder,
-        statement: "VAF: \"no significant differences are found between BJ and ARX for a time delay close to n_k* = 29\".",
+        statement: "VAF: \"No significant differences are found between BJ and ARX for cases with a time delay close to n_k* = 29\".",
         place: "V.A.2, Fig. 8",
         measure: "Magnitude of the mean of the paired difference of VAF, BJ less ARX, C1, m0 = 3, n_k* = 28 to 30, m* = 1 to 4.",
         plans: PLANS,
@@ -87,7 +87,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "m1-gain-and-zero-by-delay",
         theme: Theme::RemnantOrder,
-        statement: "With m* = 1 NMS values are very similar, \"although bias in K_e and T_L become noticeably higher when the delay differs\".",
+        statement: "With m* = 1 NMS values are very similar, \"bias in K_e and T_L become noticeably higher when the model time delay differs from the simulation one\".",
         place: "6.1.3, Figs. C.7, C.15",
         measure: "Median |bias| with m* = 1 less that with m* = m0 at n_k* = 25 to 28 and 30, m0 = 2 to 4, C1: growth for K_e, T_L; within 5 points for NMS.",
         plans: PLANS,
@@ -123,7 +123,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "order-over-delay-for-remnant",
         theme: Theme::RemnantOrder,
-        statement: "Innovation variance and d1: \"the time delay becomes irrelevant, while the remnant order is fundamental\".",
+        statement: "Innovation variance and d1: \"the time delay becomes irrelevant in terms of bias reduction, while the remnant order is fundamental\".",
         place: "6.1.3, Figs. E.2, E.4, E.6, E.8",
         measure: "Spread of the medians over m* (n_k* = 29) over that over n_k* (m* = m0), C1, by m0 and noise level: above 1.",
         plans: PLANS,

@@ -7,20 +7,26 @@
 //!      within the margin.
 //!    - *Number* (around 50 %, 10 times): the cell passes when x lies within the range of the
 //!      wording, widened by the margin, and fails otherwise. It is undecided where it would pass
-//!      with a margin of more than half the range: such an x says nothing of the number.
+//!      with a margin of more than half the range: such an x says nothing of the number. Where the
+//!      number is the size of an effect (so many times slower, so much less error), an x beyond the
+//!      range on the side of the larger effect *exceeds* the claim: what was said is true, and more
+//!      so.
 //!    - Where less than half of the replications give a value (models that do not convert) the cell
 //!      is undecided.
 //! 2. **A part** of a claim (same figure of merit, same test) holds when 90 % of its decided cells
-//!    pass, holds in part when 50 % do, and does not hold otherwise. When less than half of its
-//!    cells are decided, the replications do not decide it.
-//! 3. **A claim** holds when all its parts hold, does not hold when none of them does even in part,
-//!    and holds in part otherwise. When no part is decided, it cannot be tested.
+//!    pass. It holds, and more so, when 90 % pass or exceed the claim and not enough of them pass.
+//!    It holds in part when 50 % pass or exceed, and does not hold otherwise. When less than half of
+//!    its cells are decided, the replications do not decide it.
+//! 3. **A claim** holds when all its parts hold, and more so when one of them does. It does not hold
+//!    when none of its parts holds even in part, and holds in part otherwise. When no part is
+//!    decided, it cannot be tested.
 //!
 //! What words mean, the same for all claims:
 //!
 //! | wording | test |
 //! |---|---|
 //! | around x, x %, x times | from x / 2 to 3 x / 2 |
+//! | x % more, x % less, reduced by x % | of the value that it is compared with, also where both are % of a true value |
 //! | large, important, considerable, huge, wrong bias | beyond 25 % of the true value |
 //! | acceptable, accurate, always accurate | within 10 % |
 //! | close to zero, null on average, the same, not affected | within 5 points of % of the true value |
@@ -54,6 +60,8 @@ const IN_PART_FROM: f64 = 0.5;
 pub enum Verdict {
     /// It holds.
     Holds,
+    /// What it says is true, and the effect is larger than the number that it gives.
+    HoldsAndMoreSo,
     /// It holds in part.
     HoldsInPart,
     /// It does not hold.
@@ -67,6 +75,7 @@ impl Verdict {
     pub fn words(&self) -> &'static str {
         match self {
             Self::Holds => "holds",
+            Self::HoldsAndMoreSo => "holds, and more so",
             Self::HoldsInPart => "holds in part",
             Self::DoesNotHold => "does not hold",
             Self::CannotBeTested(_) => "cannot be tested",
@@ -88,6 +97,8 @@ impl std::fmt::Display for Verdict {
 pub enum CellOutcome {
     /// As claimed.
     Passes,
+    /// Beyond the claimed number, on the side of the larger effect.
+    Exceeds,
     /// Not as claimed.
     Fails,
     /// Within the margin, or without a value.
@@ -103,6 +114,8 @@ pub enum Bound {
     Below(f64),
     /// A claimed number: from, to.
     Between(f64, f64),
+    /// A claimed size of an effect, from, to; a larger value is a larger effect.
+    Effect(f64, f64),
 }
 
 /// A claim in one cell.
@@ -127,8 +140,11 @@ impl CellTest {
         let beyond = match self.bound {
             Bound::Above(limit) => value - limit,
             Bound::Below(limit) => limit - value,
-            Bound::Between(low, high) => {
-                return if !(low - margin..=high + margin).contains(&value) {
+            Bound::Between(low, high) | Bound::Effect(low, high) => {
+                let effect = matches!(self.bound, Bound::Effect(..));
+                return if effect && value > high + margin {
+                    CellOutcome::Exceeds
+                } else if !(low - margin..=high + margin).contains(&value) {
                     CellOutcome::Fails
                 } else if margin > 0.5 * (high - low) {
                     CellOutcome::Undecided
@@ -191,6 +207,16 @@ impl Part {
         self.between(label, measured, 0.5 * number, 1.5 * number);
     }
 
+    /// A cell in which an effect, the larger the larger the value, is claimed to have this size.
+    pub(super) fn effect(&mut self, label: String, measured: Value, size: f64) {
+        self.add(label, measured, Bound::Effect(0.5 * size, 1.5 * size));
+    }
+
+    /// A cell in which an effect is claimed to be from one size to another.
+    pub(super) fn effect_between(&mut self, label: String, measured: Value, low: f64, high: f64) {
+        self.add(label, measured, Bound::Effect(low, high));
+    }
+
     /// A cell in which the value is claimed to be from one number to another.
     pub(super) fn between(&mut self, label: String, measured: Value, low: f64, high: f64) {
         self.add(label, measured, Bound::Between(low, high));
@@ -205,23 +231,31 @@ impl Part {
     pub fn beyond(&self) -> (usize, usize) {
         let fails = self.tests.iter().filter(|test| test.outcome() == CellOutcome::Fails);
         fails.fold((0, 0), |(above, below), test| match test.bound {
-            Bound::Between(low, _) if test.measured.value < low => (above, below + 1),
-            Bound::Between(..) => (above + 1, below),
+            Bound::Between(low, _) | Bound::Effect(low, _) => {
+                if test.measured.value < low {
+                    (above, below + 1)
+                } else {
+                    (above + 1, below)
+                }
+            }
             _ => (above, below),
         })
     }
 
     /// Rule 2; none when the replications do not decide.
     pub fn verdict(&self) -> Option<Verdict> {
-        let (passes, fails) = (self.count(CellOutcome::Passes), self.count(CellOutcome::Fails));
-        let decided = passes + fails;
+        let [passes, exceeds, fails] =
+            [CellOutcome::Passes, CellOutcome::Exceeds, CellOutcome::Fails].map(|outcome| self.count(outcome));
+        let decided = passes + exceeds + fails;
         if decided == 0 || 2 * decided < self.tests.len() {
             return None;
         }
-        let share = passes as f64 / decided as f64;
-        Some(if share >= HOLDS_FROM {
+        let share = |cells: usize| cells as f64 / decided as f64;
+        Some(if share(passes) >= HOLDS_FROM {
             Verdict::Holds
-        } else if share >= IN_PART_FROM {
+        } else if share(passes + exceeds) >= HOLDS_FROM {
+            Verdict::HoldsAndMoreSo
+        } else if share(passes + exceeds) >= IN_PART_FROM {
             Verdict::HoldsInPart
         } else {
             Verdict::DoesNotHold
@@ -238,9 +272,13 @@ pub fn verdict(parts: &[Part]) -> Verdict {
         let open: usize = parts.iter().map(|part| part.count(CellOutcome::Undecided)).sum();
         return Verdict::CannotBeTested(format!("the replications leave {open} of {cells} cells undecided"));
     }
-    if is(&Verdict::Holds) == each.len() {
+    let [holds, more_so, in_part] =
+        [Verdict::Holds, Verdict::HoldsAndMoreSo, Verdict::HoldsInPart].map(|asked| is(&asked));
+    if holds == each.len() {
         Verdict::Holds
-    } else if is(&Verdict::Holds) + is(&Verdict::HoldsInPart) == 0 {
+    } else if holds + more_so == each.len() {
+        Verdict::HoldsAndMoreSo
+    } else if holds + more_so + in_part == 0 {
         Verdict::DoesNotHold
     } else {
         Verdict::HoldsInPart
@@ -298,6 +336,38 @@ mod tests {
             assert_eq!(cell(value, error, around), Undecided);
             assert_eq!(cell(value, error, Bound::Above(0.0)), Undecided);
         }
+    }
+
+    #[test]
+    fn a_larger_effect_than_claimed_exceeds_the_claim() {
+        use CellOutcome::{Exceeds, Fails, Passes, Undecided};
+        let times = Bound::Effect(25.0, 75.0);
+        for (value, outcome) in [(284.0, Exceeds), (77.1, Exceeds), (76.9, Passes), (22.9, Fails)] {
+            assert_eq!(cell(value, 1.0, times), outcome);
+        }
+        assert_eq!(cell(100.9, 13.0, times), Undecided);
+        let part = |values: &[f64]| {
+            let mut part = Part::new("by hand");
+            values.iter().for_each(|value| {
+                part.effect(
+                    String::new(),
+                    Value {
+                        value: *value,
+                        error: 1.0,
+                    },
+                    50.0,
+                )
+            });
+            part
+        };
+        assert_eq!(part(&[50.0, 50.0]).verdict(), Some(Verdict::Holds));
+        assert_eq!(part(&[50.0, 284.0]).verdict(), Some(Verdict::HoldsAndMoreSo));
+        assert_eq!(part(&[1.0, 284.0]).verdict(), Some(Verdict::HoldsInPart));
+        assert_eq!(part(&[1.0, 2.0, 284.0]).verdict(), Some(Verdict::DoesNotHold));
+        let (plain, more, not) = (part(&[50.0]), part(&[284.0]), part(&[1.0]));
+        assert_eq!(verdict(&[plain.clone(), more.clone()]), Verdict::HoldsAndMoreSo);
+        assert_eq!(verdict(&[more.clone(), not]), Verdict::HoldsInPart);
+        assert_eq!(more.beyond(), (0, 0));
     }
 
     #[test]

@@ -37,6 +37,7 @@ pub fn claims_table(findings: &[(Claim, Finding)]) -> OutputTable {
             text("plans", &|claim, _| claim.plans.join(" ")),
             text("verdict", &|_, finding| finding.verdict.to_string()),
             whole("passed", &|finding| finding.passed),
+            whole("exceeded", &|finding| finding.exceeded),
             whole("failed", &|finding| finding.failed),
             whole("cells", &|finding| finding.of),
             real("value", &|measured| measured.value),

@@ -47,6 +47,16 @@ impl Value {
             error: value.abs() * (self.error / self.value).hypot(other.error / other.value),
         }
     }
+
+    /// By how many % it is less than a number from other replications.
+    #[must_use]
+    pub fn less_than(self, other: Self) -> Self {
+        let ratio = self.over(other);
+        Self {
+            value: 100.0 * (1.0 - ratio.value),
+            error: 100.0 * ratio.error,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -67,5 +77,7 @@ mod tests {
         let ratio = a.over(b);
         // sqrt((0.3 / 8)^2 + (0.4 / 2)^2) = 0.203485
         assert!((ratio.value - 4.0).abs() < 1e-12 && (ratio.error - 4.0 * 0.203_485).abs() < 1e-5);
+        let less = b.less_than(a);
+        assert!((less.value - 75.0).abs() < 1e-12 && (less.error - 25.0 * 0.203_485).abs() < 1e-3);
     }
 }

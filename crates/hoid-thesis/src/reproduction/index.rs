@@ -20,7 +20,7 @@ pub struct IndexPage {
     entries: Vec<Value>,
     claims: Vec<Value>,
     /// Claims that hold, hold in part, do not hold, cannot be tested.
-    tally: [usize; 4],
+    tally: [usize; 5],
     studies: Vec<Value>,
 }
 
@@ -58,7 +58,7 @@ impl IndexPage {
             let heading = (claim.theme.title() != theme).then(|| claim.theme.title());
             theme = claim.theme.title();
             let class = match finding.verdict {
-                Verdict::Holds => "holds",
+                Verdict::Holds | Verdict::HoldsAndMoreSo => "holds",
                 Verdict::HoldsInPart => "part",
                 Verdict::DoesNotHold => "not",
                 Verdict::CannotBeTested(_) => "open",
@@ -72,14 +72,15 @@ impl IndexPage {
         let count = |of: fn(&Verdict) -> bool| findings.iter().filter(|(_, finding)| of(&finding.verdict)).count();
         self.tally = [
             count(|v| *v == Verdict::Holds),
+            count(|v| *v == Verdict::HoldsAndMoreSo),
             count(|v| *v == Verdict::HoldsInPart),
             count(|v| *v == Verdict::DoesNotHold),
             count(|v| matches!(v, Verdict::CannotBeTested(_))),
         ];
     }
 
-    /// Claims that hold, hold in part, do not hold, cannot be tested.
-    pub fn tally(&self) -> [usize; 4] {
+    /// Claims that hold, hold and more so, hold in part, do not hold, cannot be tested.
+    pub fn tally(&self) -> [usize; 5] {
         self.tally
     }
 

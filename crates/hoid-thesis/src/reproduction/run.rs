@@ -66,9 +66,9 @@ pub struct ReproductionSummary {
     pub index: PathBuf,
     /// Tables and figures.
     pub items: usize,
-    /// Claims that hold, hold in part, do not hold, cannot be tested; none where they were not
-    /// chosen.
-    pub tally: Option<[usize; 4]>,
+    /// Claims that hold, hold and more so, hold in part, do not hold, cannot be tested; none where
+    /// they were not chosen.
+    pub tally: Option<[usize; 5]>,
     /// Time that the studies took, s.
     pub simulated_s: f64,
     /// Time that the drawing took, s.
@@ -174,7 +174,7 @@ fn chosen(all: Vec<Item>, only: &[String]) -> Result<(Vec<Item>, bool), ThesisEr
 }
 
 /// Tests the claims of the text: their table, their part of the page, and how many hold.
-fn test_claims(studies: &Studies, index: &mut IndexPage, directory: &Path) -> Result<[usize; 4], ThesisError> {
+fn test_claims(studies: &Studies, index: &mut IndexPage, directory: &Path) -> Result<[usize; 5], ThesisError> {
     let mut evidence = Evidence::new();
     for results in studies.values() {
         evidence.add(results);
