@@ -325,13 +325,17 @@ impl Identified<'_> {
 /// Files and sampling of the records, and what was done to them.
 pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> Value {
     let record = |((file, r), account): ((&String, &Record), &Account)| {
-        json!({
+        let mut one = json!({
             "file": file,
             "samples": r.len(),
             "sample_time": number(r.sample_time().s()),
             "preparation": list(&account.steps),
             "trouble": list(&account.quality_issues),
-        })
+        });
+        if let Some(level) = &account.level {
+            one["level"] = estimate(level);
+        }
+        one
     };
     files.iter().zip(records).zip(accounts).map(record).collect()
 }

@@ -67,6 +67,9 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> St
         if account.faults.len() > FAULTS_SHOWN {
             lines.push_str(&format!("  and {} more faults\n", account.faults.len() - FAULTS_SHOWN));
         }
+        if let Some(level) = &account.level {
+            lines.push_str(&format!("  level of u beside its response to e: {level}\n"));
+        }
         lines
     };
     files.iter().zip(records).zip(accounts).map(line).collect()

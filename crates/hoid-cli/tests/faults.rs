@@ -214,22 +214,105 @@ fn a_record_that_is_too_short() {
 }
 
 #[test]
-fn an_offset_is_harmless_or_said() {
+fn an_offset_is_estimated_and_biases_nothing() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let run = simulated(d, "C1", "76");
-    let rms = (run.iter().map(|[_, e, _]| e * e).sum::<f64>() / run.len() as f64).sqrt();
-    for share in [0.03, 0.1, 0.5] {
-        written(d, &run.iter().map(|[t, e, u]| [*t, e + share * rms, *u]).collect());
+    let deviation = |k: usize| (run.iter().map(|row| row[k] * row[k]).sum::<f64>() / run.len() as f64).sqrt();
+    let (of_e, of_u) = (deviation(1), deviation(2));
+    written(d, &run);
+    let clean = identified(d, &BOX_JENKINS);
+    let level = |found: &Value| {
+        let level = &found["records"][0]["level"];
+        (
+            level["value"].as_f64().unwrap(),
+            level["standard_error"].as_f64().unwrap(),
+        )
+    };
+    for share in [0.03, 0.5] {
+        let moved = |[t, e, u]: &[f64; 3]| [*t, e + share * of_e, u + share * of_u];
+        written(d, &run.iter().map(moved).collect());
         let found = identified(d, &BOX_JENKINS);
-        right_or_said(&found, "offset");
-        if share == 0.5 {
-            let findings = found["verdict"]["findings"].as_array().unwrap();
-            assert!(findings.iter().any(|f| f["kind"] == "level"), "{findings:?}");
+        assert_eq!(found["verdict"]["level"], "trustworthy", "{}", found["verdict"]);
+        for ((name, one, error), (_, other, _)) in estimates(&clean).iter().zip(estimates(&found)) {
+            assert!((one - other).abs() < 0.01 * error, "{share}: {name} {one} {other}");
         }
-        let without = identified(d, &[&BOX_JENKINS[..], &["--detrend", "mean"]].concat());
-        right_or_said(&without, "without its mean");
-        assert_eq!(without["verdict"]["level"], "trustworthy");
+        // c moves by what was added to u, less the response to what was added to e.
+        let gain = estimates(&found).iter().find(|(name, ..)| name == "K_e").unwrap().1;
+        let (by, (_, error)) = (level(&found).0 - level(&clean).0, level(&found));
+        let added = share * of_u - gain * share * of_e;
+        assert!(
+            error > 0.0 && (by - added).abs() < 0.01 * added.abs().max(error),
+            "{by} {added}"
+        );
+        // As they are: said where it matters.
+        let kept = identified(d, &[&BOX_JENKINS[..], &["--detrend", "mean"]].concat());
+        assert!(kept["records"][0]["level"].is_null());
+        let page = good(d, &[&["identify", "c.csv"], &BOX_JENKINS[..]].concat());
+        assert!(page.contains("level of u beside its response to e: "), "{page}");
+        let family = identified(d, &["--form", "lead"]);
+        assert!(family["records"][0]["level"]["value"].is_number());
+    }
+    // A simulated run carries its truth, and has no level.
+    let as_simulated = json(d, &[&["identify", "run.csv", "--json"], &BOX_JENKINS[..]].concat());
+    assert!(as_simulated["records"][0]["level"].is_null());
+}
+
+#[test]
+fn a_delay_that_jumps_and_a_second_operator_are_told() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    let (run, other) = (simulated(d, "C1", "77"), simulated(d, "C2", "78"));
+    let told = |how: &[&str]| {
+        let found = identified(d, how);
+        let findings = found["verdict"]["findings"].as_array().unwrap().clone();
+        let mut words = findings.iter().filter(|f| f["kind"] == "not-constant");
+        words.next().map(|f| f["words"].as_str().unwrap().to_owned())
+    };
+    let fits: [&[&str]; 3] = [&BOX_JENKINS, &["--remnant-order", "1"], &["--form", "lead"]];
+    let n = run.len();
+    let late: Rows = (0..n)
+        .map(|t| [run[t][0], run[t][1], run[if t < n / 2 { t } else { t - 20 }][2]])
+        .collect();
+    written(d, &late);
+    for how in fits {
+        let words = told(how).unwrap();
+        assert!(words.contains("tau_e changes by about +"), "{how:?}: {words}");
+    }
+    let from = 2 * n / 3;
+    let second: Rows = (0..n)
+        .map(|t| {
+            if t < from {
+                run[t]
+            } else {
+                [run[t][0], other[t][1], other[t][2]]
+            }
+        })
+        .collect();
+    written(d, &second);
+    for how in fits {
+        assert!(told(how).is_some(), "{how:?}");
+    }
+    written(d, &run);
+    for how in fits {
+        assert_eq!(told(how), None, "{how:?}");
+    }
+}
+
+#[test]
+fn a_robust_fit_of_data_as_they_are_is_moved_by_no_sample() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    let mut rows = simulated(d, "C1", "79");
+    let how = [&BOX_JENKINS[..], &["--robust", "--faults", "keep"]].concat();
+    written(d, &rows);
+    let before = estimates(&identified(d, &how));
+    rows[4000][1] = 30.0;
+    written(d, &rows);
+    let after = estimates(&identified(d, &how));
+    assert!(before.len() > 3);
+    for ((name, one, error), (_, other, _)) in before.iter().zip(&after) {
+        assert!((one - other).abs() < 0.5 * error, "{name} {one} {other} ± {error}");
     }
 }
 

@@ -9,6 +9,7 @@ use hoid_model::{Orders, Record, Structure};
 
 use crate::{
     Constraint, Fit, IdentError, InitialState, Loss, Prior, SearchOptions,
+    faults::held,
     pem::{batched, fit_settings::FitSettings, prediction_focus, simulation_focus},
 };
 
@@ -49,7 +50,8 @@ pub struct Estimator {
     pub constraints: BTreeMap<String, Constraint>,
     /// Prior guesses of coefficients, by name.
     pub priors: BTreeMap<String, Prior>,
-    /// How a residual counts. Default: by its square.
+    /// How a residual counts. Default: by its square. With a robust loss each sample of e and u is
+    /// held to its neighbours beforehand ([`crate::faults::resistant`]).
     pub loss: Loss,
     /// What the model is to be good at. Default: prediction.
     pub focus: Focus,
@@ -169,6 +171,12 @@ impl Estimator {
     /// As [`Estimator::fit`].
     pub fn fit_from(&self, records: &[Record], first: usize) -> Result<Fit, IdentError> {
         self.check()?;
+        // What a sample brings into the filters is bounded first: the loss bounds residuals alone.
+        let held = match self.loss {
+            Loss::Huber { .. } => held(records),
+            Loss::Quadratic => None,
+        };
+        let records = held.as_deref().unwrap_or(records);
         if self.simulates() {
             simulation_focus::fit(&self.settings(), records, first)
         } else {

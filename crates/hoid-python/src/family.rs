@@ -9,6 +9,7 @@ use hoid_ident::{
         Parameter, ParameterPrior,
     },
     frequency::{DescriptionOptions, describe_runs},
+    judgement::second_opinion::of_family,
 };
 use hoid_model::{ContinuousTransferFunction, Form, operator_family::Coordinate, uncertainty::Estimate};
 use numpy::{PyArray1, PyArray2};
@@ -86,7 +87,7 @@ impl PriorOfUser {
 
 #[pyfunction]
 #[pyo3(signature = (records, *, form, neuromuscular, prior, excitation, period, controlled_element, individual, delay, nc, nd, run_to_run,
-    initial_state, search_method, max_iterations, tolerance))]
+    initial_state, search_method, max_iterations, tolerance, second_opinion))]
 #[allow(clippy::too_many_arguments)]
 pub fn identify_operator(
     py: Python<'_>,
@@ -106,6 +107,7 @@ pub fn identify_operator(
     search_method: &str,
     max_iterations: usize,
     tolerance: f64,
+    second_opinion: bool,
 ) -> Outcome<PyOperatorFit> {
     let records = arrays::records(&records, Wanted::All)?;
     let usual = FamilyEstimator::default();
@@ -131,6 +133,7 @@ pub fn identify_operator(
     };
     let element = controlled_element.map(|e| e.transfer_function()).transpose()?;
     let count = records.len();
+    let of_opinion = element.clone();
     let work = move |_: &interrupt::Standing| {
         let none = excitation.as_deref() == Some("none");
         let options = DescriptionOptions {
@@ -149,7 +152,11 @@ pub fn identify_operator(
             Some(Err(error)) if excitation.is_some() => Some(Err(error)),
             _ => None,
         };
-        let found = estimator.fit_beside(&records, of_lines)?;
+        let mut found = estimator.fit_beside(&records, of_lines)?;
+        if second_opinion {
+            let opinion = of_family(&estimator, &found, &records, of_opinion.as_ref());
+            found.verdict = found.verdict.and(opinion);
+        }
         Ok::<_, IdentError>((found, channel))
     };
     let (found, channel) = interrupt::run(py, 1, None, false, work)?;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use hoid_ident::{Candidate, Choice, Fit, GreyBoxFit, MarginEstimates, Series, grey_box::OrderCandidate};
-use hoid_model::{Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
+use hoid_model::{Finding, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
 use hoid_report::{ModelSection, Report, known_operator, write_report};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::{
@@ -27,6 +27,8 @@ pub struct PyFit {
     grey_box: Option<GreyBoxFit>,
     /// Number of records that the model was fitted to.
     records: usize,
+    /// What a second fit says of it.
+    opinion: Option<Finding>,
 }
 
 impl PyFit {
@@ -36,7 +38,13 @@ impl PyFit {
             choice,
             grey_box,
             records,
+            opinion: None,
         }
+    }
+
+    /// With what a second fit says of it.
+    pub fn with_opinion(self, opinion: Option<Finding>) -> Self {
+        Self { opinion, ..self }
     }
 
     fn margins_with(&self, element: &ControlledElement) -> Outcome<MarginEstimates> {
@@ -200,7 +208,7 @@ impl PyFit {
             Some(grey_box) => grey_box.verdict(&records),
             None => self.fit.verdict(&records, self.choice.as_ref()),
         })?;
-        Ok(figures::verdict(&found))
+        Ok(figures::verdict(&found.and(self.opinion.clone())))
     }
 
     fn predict<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>, horizon: usize) -> Outcome<SeriesParts<'py>> {

@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use hoid_ident::{
     Choice, Estimator, Fit, GreyBox, GreyBoxFit, IdentError, InitialState, InstrumentalVariable, Instruments, Loss,
     SearchOptions, SigmoidChange, SigmoidFit, estimators,
+    judgement::second_opinion::{of_grey_box, of_polynomials, of_sigmoid},
     order_selection::{default_operator_ranges, fit_or_choose},
     settings::MethodSpec,
 };
-use hoid_model::Record;
+use hoid_model::{Finding, Record};
 use pyo3::prelude::*;
 
 use crate::{
@@ -25,14 +26,14 @@ const LONG: usize = 50_000;
 
 /// What a fit gave.
 enum Found {
-    Model(Box<(Fit, Option<Choice>, Option<GreyBoxFit>)>),
-    Change(Box<SigmoidFit>),
+    Model(Box<(Fit, Option<Choice>, Option<GreyBoxFit>)>, Option<Finding>),
+    Change(Box<SigmoidFit>, Option<Finding>),
 }
 
 /// Fits a model to records. The package has brought all options into plain form.
 #[pyfunction]
 #[pyo3(signature = (records, structure, *, orders, method, instruments, remnant_order, delay, individual, criterion, initial_state, start, fix,
-    bound, coefficient_prior, robust, focus, stable, search_method, max_iterations, tolerance, progress))]
+    bound, coefficient_prior, robust, focus, stable, search_method, max_iterations, tolerance, second_opinion, progress))]
 #[allow(clippy::too_many_arguments)]
 pub fn identify<'py>(
     py: Python<'py>,
@@ -56,6 +57,7 @@ pub fn identify<'py>(
     search_method: &str,
     max_iterations: usize,
     tolerance: f64,
+    second_opinion: bool,
     progress: Option<Bound<'py, PyAny>>,
 ) -> Outcome<Bound<'py, PyAny>> {
     let kind = names::kind(structure)?;
@@ -117,7 +119,9 @@ pub fn identify<'py>(
                     }
                     .fit(&records)?;
                 }
-                Ok(Found::Model(Box::new((fit, choice, None))))
+                let by_squares = by_instruments.is_none() && estimator.loss == Loss::Quadratic;
+                let opinion = (second_opinion && by_squares).then(|| of_polynomials(&estimator, &fit, &records, None));
+                Ok(Found::Model(Box::new((fit, choice, None)), opinion.flatten()))
             });
             (work, combinations.len())
         }
@@ -135,11 +139,9 @@ pub fn identify<'py>(
             }
             let work: Work = Box::new(move |_| {
                 let found = estimator.fit(&records)?;
-                Ok(Found::Model(Box::new((
-                    found.polynomial_fit(0).clone(),
-                    None,
-                    Some(found),
-                ))))
+                let opinion = second_opinion.then(|| of_grey_box(&estimator, &found, &records, None));
+                let model = Box::new((found.polynomial_fit(0).clone(), None, Some(found)));
+                Ok(Found::Model(model, opinion.flatten()))
             });
             (work, 10)
         }
@@ -165,7 +167,11 @@ pub fn identify<'py>(
             if let Some(delay) = delay {
                 estimator.delay_range_s = delay;
             }
-            let work: Work = Box::new(move |_| Ok(Found::Change(Box::new(estimator.fit(&records)?))));
+            let work: Work = Box::new(move |_| {
+                let found = estimator.fit(&records)?;
+                let opinion = second_opinion.then(|| of_sigmoid(&estimator, &found, &records));
+                Ok(Found::Change(Box::new(found), opinion.flatten()))
+            });
             (work, 10)
         }
     };
@@ -175,11 +181,11 @@ pub fn identify<'py>(
         interrupt::run(py, models as u64, progress.as_ref(), false, work)?
     };
     Ok(match found {
-        Found::Model(found) => {
+        Found::Model(found, opinion) => {
             let (fit, choice, grey_box) = *found;
-            Bound::new(py, PyFit::new(fit, choice, grey_box, count))?.into_any()
+            Bound::new(py, PyFit::new(fit, choice, grey_box, count).with_opinion(opinion))?.into_any()
         }
-        Found::Change(fit) => Bound::new(py, PyTimeVaryingFit::new(*fit))?.into_any(),
+        Found::Change(fit, opinion) => Bound::new(py, PyTimeVaryingFit::new(*fit, opinion))?.into_any(),
     })
 }
 

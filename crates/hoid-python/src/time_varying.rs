@@ -1,7 +1,7 @@
 //! The fit of an operator whose gains change once.
 
 use hoid_ident::{GainsAt, SigmoidFit, validation::whiteness};
-use hoid_model::uncertainty::Estimate;
+use hoid_model::{Finding, uncertainty::Estimate};
 use numpy::{PyArray1, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
 
@@ -15,11 +15,13 @@ use crate::{
 #[pyclass(name = "TimeVaryingFit", module = "pyhoid._pyhoid", frozen)]
 pub struct PyTimeVaryingFit {
     fit: SigmoidFit,
+    /// What a second fit says of it.
+    opinion: Option<Finding>,
 }
 
 impl PyTimeVaryingFit {
-    pub fn new(fit: SigmoidFit) -> Self {
-        Self { fit }
+    pub fn new(fit: SigmoidFit, opinion: Option<Finding>) -> Self {
+        Self { fit, opinion }
     }
 }
 
@@ -121,7 +123,7 @@ impl PyTimeVaryingFit {
 
     fn verdict(&self, py: Python<'_>, records: Vec<Bound<'_, PyAny>>) -> Outcome<VerdictParts> {
         let records = arrays::records(&records, Wanted::Only(&[]))?;
-        let found = py.detach(|| self.fit.verdict(&records))?;
+        let found = py.detach(|| self.fit.verdict(&records))?.and(self.opinion.clone());
         Ok(figures::verdict(&found))
     }
 

@@ -21,11 +21,12 @@
 //! | `steps-in-signals` | jumps of e or u that stayed (a note) |
 //! | `gain-sign` | K_e is significantly positive in some rows and negative in others |
 //! | `idle-head` | a head in which neither e nor u moves: left out of the start span (a note), or in it (a doubt) |
+//! | `not-followed` | what the last seconds of the record say against the last row |
 //! | `not-finite` | an estimate that is no number |
 
 use hoid_ident::{
     Choice, IdentError,
-    judgement::{gain_findings, is_open, neuromuscular_finding},
+    judgement::{gain_findings, is_open, neuromuscular_finding, operator_step},
 };
 use hoid_model::{
     Finding, NotConvertible, Record, SampleTime, Severity, Verdict, VerdictLevel,
@@ -54,6 +55,10 @@ const SIGN: f64 = 0.02;
 const NAMED: usize = 3;
 /// After a restart the estimate is doubtful for so long, s.
 const UNSETTLED_S: f64 = 10.0;
+/// Lengths of the end of the record at which the last row is held against it, s.
+const LAST_S: [f64; 2] = [16.0, 30.0];
+/// p-value of one of ten comparisons below which they differ.
+const UNLIKELY: f64 = 1e-4;
 /// Standard error over its median beyond which the covariance has blown up.
 const BLOWN_UP: f64 = 30.0;
 /// Upper bound of omega_nm of the physical recursions as a share of the Nyquist frequency, less
@@ -92,6 +97,7 @@ impl Trace {
         all.extend(self.count_findings());
         all.extend(self.guard_findings());
         all.extend(self.idle_finding(record));
+        all.extend(self.not_followed(record));
         Ok(Verdict::of(all))
     }
 
@@ -102,7 +108,11 @@ impl Trace {
         };
         let span = [record.span(from, to)?];
         let of_start = |finding: &Finding| Finding {
-            severity: finding.severity.min(Severity::Doubt),
+            severity: match finding.kind {
+                // A tracker is there to follow it.
+                "not-constant" => Severity::Note,
+                _ => finding.severity.min(Severity::Doubt),
+            },
             words: format!("start fit: {}", finding.words),
             ..finding.clone()
         };
@@ -296,6 +306,51 @@ impl Trace {
             ));
         }
         all
+    }
+
+    /// What the last seconds of the record say against the last row: a delay that is another now, or an
+    /// estimate that has not come back. A step of [`operator_step`] that is [`UNLIKELY`] beside its own
+    /// error and that of the row; of a delay that is a whole number of samples, beyond one and a half.
+    fn not_followed(&self, record: &Record) -> Option<Finding> {
+        let row = self.len().checked_sub(1)?;
+        let operator = self.operator(row).ok()?;
+        let end = self.times_s()[row] + self.sample_time().s();
+        let of_row = |name: &str| {
+            let rows = operator.rows();
+            rows.iter()
+                .find(|(known, ..)| *known == name)
+                .and_then(|(_, _, e)| e.standard_error)
+        };
+        let mut worst: Option<(f64, String)> = None;
+        for length in LAST_S {
+            let from = end - length;
+            if from < record.time_s(0) {
+                continue;
+            }
+            let steps = record
+                .span(from, end)
+                .ok()
+                .and_then(|span| operator_step(&operator.parameters(), &span));
+            for step in steps.into_iter().flatten() {
+                let (name, own) = (step.name, of_row(step.name));
+                let whole_samples = name == "tau_e" && own.is_none();
+                let grid = if whole_samples {
+                    1.5 * self.sample_time().s()
+                } else {
+                    0.0
+                };
+                let p_value = step.p_value(own.unwrap_or(0.0), grid);
+                if p_value < UNLIKELY && worst.as_ref().is_none_or(|(known, _)| p_value < *known) {
+                    let words = format!(
+                        "the last {length:.0} s ask for another {name} than the last row, by {}: the person changed in a way \
+                         that the estimate does not follow, or it has not come back; begin it again there",
+                        step.by
+                    );
+                    worst = Some((p_value, words));
+                }
+            }
+        }
+        worst.map(|(_, words)| Finding::doubt("not-followed", words))
     }
 
     /// An idle head of the record.
@@ -530,6 +585,28 @@ mod tests {
         assert_eq!(grown, ["covariance-blown-up"]);
         let broken = changed(|trace| *trace.theta.last_mut().unwrap() = f64::NAN);
         assert_eq!(broken, ["not-finite"]);
+    }
+
+    #[test]
+    fn a_delay_that_jumps_is_not_followed_by_a_fixed_one() {
+        let record = simulated(Condition::C1);
+        let late = |at: usize, by: usize| {
+            let u = |t: usize| record.output()[if t >= at { t - by } else { t }];
+            let u = Channel::new("u", "", (0..record.len()).map(u).collect());
+            let e = Channel::new("e", "", record.input().to_vec());
+            Record::new(record.sample_time(), e, u).unwrap()
+        };
+        let options = TrackOptions::usual(Method::physical(), 29);
+        let told = |record: &Record| kinds(&judged(record, &options)).contains(&"not-followed");
+        assert!(told(&late(5000, 20)));
+        assert!(!told(&late(5000, 0)));
+        // Shorter than what is looked at.
+        assert!(
+            judged(&record.span(0.0, 12.0).unwrap(), &options)
+                .findings()
+                .iter()
+                .all(|f| f.kind != "not-followed")
+        );
     }
 
     #[test]

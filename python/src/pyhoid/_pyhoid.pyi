@@ -403,6 +403,7 @@ def identify(
     search_method: str,
     max_iterations: int,
     tolerance: float,
+    second_opinion: bool,
     progress: _Progress,
 ) -> Fit | TimeVaryingFit: ...
 def identify_operator(
@@ -425,6 +426,7 @@ def identify_operator(
     search_method: str,
     max_iterations: int,
     tolerance: float,
+    second_opinion: bool,
 ) -> OperatorFit: ...
 def info(path: _Path) -> dict[str, Any]: ...
 def margins(

@@ -263,6 +263,7 @@ def identify(
         search_method=search_method,
         max_iterations=int(max_iterations),
         tolerance=float(tolerance),
+        second_opinion=faults != "keep",
         progress=_options.reporter(progress, "candidates"),
     )
     if isinstance(found, _pyhoid.TimeVaryingFit):

@@ -503,6 +503,7 @@ def identify_operator(
         search_method=search_method,
         max_iterations=int(max_iterations),
         tolerance=float(tolerance),
+        second_opinion=faults != "keep",
     )
     fit = OperatorFit(found, several, settings)
     fit.faults, fit.verdict = of_faults, _faults.joined(fit.verdict, says)

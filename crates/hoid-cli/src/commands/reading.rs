@@ -8,7 +8,7 @@ use std::{
 use hoid_io::{
     NewRate, Preparation, QualityIssue, ReadOptions, ReadRecord, Repair, Step, read_prepared, read_segments,
 };
-use hoid_model::{Fault, Finding, Record};
+use hoid_model::{Fault, Finding, Record, uncertainty::Estimate};
 
 use crate::{
     args::{MaskArgs, ReadArgs},
@@ -25,6 +25,8 @@ pub struct Account {
     pub faults: Vec<Fault>,
     /// What they say of any result.
     pub findings: Vec<Finding>,
+    /// The constant of u that was estimated with the fit.
+    pub level: Option<Estimate>,
 }
 
 /// Records with the files that they come from; a file that is cut gives several.

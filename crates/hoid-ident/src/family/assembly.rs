@@ -4,7 +4,7 @@
 //! The order matters: both methods are compared with their own errors, and only then does their
 //! difference become a part of the errors of the operator (`Covariances::add_bias`).
 
-use hoid_model::{Complex64, Verdict, operator_family::Coordinate, uncertainty::variance_along};
+use hoid_model::{Complex64, Finding, Verdict, operator_family::Coordinate, uncertainty::variance_along};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
@@ -24,7 +24,10 @@ use crate::{
     criterion::{Criterion, Workspace},
     frequency::DescribingFunction,
     grey_box::parametrisation::Parametrisation,
-    judgement::residuals::ResidualMeasures,
+    judgement::{
+        constancy::{Constancy, Direction, physical_blocks},
+        residuals::ResidualMeasures,
+    },
     optimize::minimise,
 };
 
@@ -81,6 +84,7 @@ impl Chosen<'_, '_> {
             delay: (fit.eta()[of_delay], layout.limits()[of_delay]),
             parameters: &all_parameters,
             residuals,
+            not_constant: constancy(fit, self.run_to_run, workspace),
             lines: self.lines.fit.as_ref(),
             no_lines: self.lines.why_none.as_deref(),
             agreement: agreement.as_ref(),
@@ -220,6 +224,41 @@ fn residuals(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> ResidualMeas
         .map(|(eps, d)| (eps.as_slice(), &d.e[first..first + eps.len()]))
         .collect();
     ResidualMeasures::of(&pairs, fit.layout().sample_time.s())
+}
+
+/// A doubt where the person is not the same throughout the records.
+fn constancy(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace) -> Option<Finding> {
+    let (layout, eta, free) = (fit.layout(), fit.eta(), fit.free());
+    let blocks = physical_blocks(&fit.criterion, eta, &free, workspace)?;
+    let direction = |(place, (coordinate, record)): (usize, &(Coordinate, Option<usize>))| {
+        let logarithm = matches!(coordinate, Coordinate::LogOmega | Coordinate::LogZeta);
+        let mut vector = vec![0.0; eta.len()];
+        vector[place] = 1.0;
+        Direction {
+            name: coordinate.name().to_owned(),
+            unit: if *coordinate == Coordinate::Delay { " s" } else { "" },
+            vector,
+            delay: *coordinate == Coordinate::Delay,
+            size: match record {
+                Some(_) => 0.0,
+                None if logarithm => 1.0,
+                None => eta[place].abs(),
+            },
+        }
+    };
+    let elements = layout
+        .elements
+        .iter()
+        .enumerate()
+        .filter(|(place, _)| free.contains(place));
+    Constancy {
+        blocks: &blocks,
+        directions: &elements.map(direction).collect::<Vec<_>>(),
+        variance: fit.innovation_variance,
+        run_to_run,
+        sample_time_s: layout.sample_time.s(),
+    }
+    .finding()
 }
 
 /// Mean squared coherence of the lines.

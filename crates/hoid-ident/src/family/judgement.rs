@@ -28,6 +28,8 @@ pub(super) struct Judged<'a> {
     pub delay: (f64, (f64, f64)),
     pub parameters: &'a [Parameter],
     pub residuals: ResidualMeasures,
+    /// A doubt where the person is not the same throughout.
+    pub not_constant: Option<Finding>,
     pub lines: Option<&'a LineFit>,
     pub no_lines: Option<&'a str>,
     pub agreement: Option<&'a Agreement>,
@@ -67,6 +69,7 @@ pub(super) fn findings(judged: &Judged<'_>) -> Vec<Finding> {
     }
     determined(judged, &mut all);
     all.extend(judged.residuals.findings());
+    all.extend(judged.not_constant.clone());
     methods(judged, &mut all);
     if let Some(ratio) = judged.error_ratio.filter(|r| *r > NOTED_ERROR_RATIO) {
         let what = match judged.cluster_kind {

@@ -6,9 +6,11 @@ use hoid_model::{Channel, Fault, FaultAction, FaultHandling, FaultKind, Finding,
 
 use super::{
     direction::wrong_direction,
-    limits::SHORTEST_S,
+    limits::{MOST_SPIKES, SHORTEST_S},
     search::{Place, search},
+    spikes,
 };
+use crate::frequency::USUAL_EXCITATIONS;
 
 /// Sample time in s that no person is recorded with.
 const SLOWEST_S: f64 = 0.5;
@@ -24,7 +26,7 @@ pub struct Mended {
     pub findings: Vec<Finding>,
 }
 
-/// The faults of e and u of a record, mended as is said.
+/// The faults of e and u of a record, mended as is said, and the spikes of its excitation.
 ///
 /// # Errors
 /// None that a record can give; [`ModelError`] is that of making one.
@@ -47,7 +49,8 @@ pub fn mend(record: &Record, handling: FaultHandling) -> Result<Mended, ModelErr
     if handling == FaultHandling::Keep {
         return Ok(untouched(Vec::new()));
     }
-    let (input, output, others) = record.clone().into_channels();
+    let (input, output, mut others) = record.clone().into_channels();
+    let of_excitation = excitations(&mut others, record);
     let mut channels: Vec<Channel> = input.into_iter().chain([output]).collect();
     let mut values: Vec<Vec<f64>> = channels.iter().map(|c| c.values.clone()).collect();
     let ts = record.sample_time().s();
@@ -63,6 +66,8 @@ pub fn mend(record: &Record, handling: FaultHandling) -> Result<Mended, ModelErr
         action,
     };
     let mut faults: Vec<Fault> = places.iter().map(|(place, action)| of(place, *action)).collect();
+    faults.extend(of_excitation);
+    faults.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
     if ts > SLOWEST_S {
         faults.insert(0, all_of_it(record, FaultKind::TimeUnit, ts));
     }
@@ -117,6 +122,40 @@ pub fn mend(record: &Record, handling: FaultHandling) -> Result<Mended, ModelErr
         findings: fault_findings(&faults, record.len()),
         faults,
     })
+}
+
+/// The spikes of channels that are named as an excitation is; they are bridged, since nothing is fitted
+/// to such a channel: its lines alone are taken from it.
+fn excitations(others: &mut [Channel], record: &Record) -> Vec<Fault> {
+    let ts = record.sample_time().s();
+    let mut all = Vec::new();
+    for channel in others
+        .iter_mut()
+        .filter(|c| USUAL_EXCITATIONS.contains(&c.name.as_str()))
+    {
+        let mut values = channel.values.clone();
+        let found = spikes::find(&mut values, ts);
+        let samples: usize = found.iter().map(|spike| spike.samples.len()).sum();
+        let few = samples as f64 <= (MOST_SPIKES * values.len() as f64).max(3.0);
+        if few {
+            channel.values = values;
+        }
+        all.extend(found.into_iter().map(|spike| Fault {
+            kind: FaultKind::Spike,
+            channel: channel.name.clone(),
+            from_s: record.time_s(spike.samples.start),
+            to_s: record.time_s(spike.samples.end),
+            samples: spike.samples.len(),
+            size: spike.size,
+            deviations: Some(spike.deviations),
+            action: if few {
+                FaultAction::Bridged
+            } else {
+                FaultAction::Reported
+            },
+        }));
+    }
+    all
 }
 
 /// What is left between cuts.

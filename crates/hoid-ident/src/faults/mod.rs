@@ -43,4 +43,4 @@ mod tests;
 
 pub use limits::{BRIDGED_S, MOST_SPIKES, SHORTEST_S};
 pub use mending::{Mended, mend};
-pub use resistant::{resistant, second_opinion};
+pub use resistant::{held, resistant, second_opinion};

@@ -218,3 +218,35 @@ fn exchanged_channels_and_a_wrong_sign() {
         assert_eq!(found.findings[0].severity, Severity::Doubt);
     }
 }
+
+#[test]
+fn a_spike_of_the_excitation_is_bridged_and_a_clean_one_is_left_alone() {
+    for condition in [Condition::C1, Condition::C2, Condition::C4] {
+        let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
+        let record = simulator.run(RunSeed::default(), false).unwrap();
+        assert!(record.channel("f_t").is_some());
+        let clean = mend(&record, FaultHandling::Bridge).unwrap();
+        assert!(clean.faults.is_empty(), "{condition:?}: {:?}", clean.faults);
+        let (input, output, others) = record.clone().into_channels();
+        let mut spoilt = Record::new(record.sample_time(), input.unwrap(), output).unwrap();
+        for mut channel in others {
+            if channel.name == "f_t" {
+                channel.values[3000] += 5.0;
+            }
+            spoilt = spoilt.with_channel(channel).unwrap();
+        }
+        let found = mend(&spoilt, FaultHandling::Bridge).unwrap();
+        assert_eq!((found.faults.len(), found.faults[0].channel.as_str()), (1, "f_t"));
+        let (mended, truth) = (
+            found.segments[0].channel("f_t").unwrap(),
+            record.channel("f_t").unwrap(),
+        );
+        assert!(
+            (mended[3000] - truth[3000]).abs() < 0.05,
+            "{} {}",
+            mended[3000],
+            truth[3000]
+        );
+        assert_eq!(mend(&spoilt, FaultHandling::Report).unwrap().segments[0], spoilt);
+    }
+}

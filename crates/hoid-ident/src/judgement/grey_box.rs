@@ -3,10 +3,18 @@
 use hoid_model::{Finding, Record, Verdict, uncertainty::OperatorEstimate};
 
 use super::{
+    constancy::{Constancy, Direction, USUAL_RUN_TO_RUN, physical_blocks},
     operator::{delay_finding, gain_findings, pole_findings, search_finding},
     residuals::ResidualMeasures,
 };
-use crate::{GreyBoxFit, IdentError, grey_box::layout::DELAY};
+use crate::{
+    GreyBoxFit, IdentError,
+    criterion::{Data, Workspace, first_residual},
+    grey_box::{
+        layout::{self, DELAY, LEAD, TIME_CONSTANT},
+        objective::PhysicalCriterion,
+    },
+};
 
 impl GreyBoxFit {
     /// What the fit is worth, on the records that it was fitted to, in their order. The kinds of
@@ -32,6 +40,7 @@ impl GreyBoxFit {
         all.extend(self.operator_findings());
         if self.covariance().is_some() {
             all.extend(self.residual_measures(records)?.findings());
+            all.extend(self.constancy_finding(records));
         }
         Ok(Verdict::of(all))
     }
@@ -76,6 +85,41 @@ impl GreyBoxFit {
             }
         }
         all
+    }
+
+    /// A doubt where the operator is not the same throughout the records.
+    fn constancy_finding(&self, records: &[Record]) -> Option<Finding> {
+        let layout = &self.layout;
+        let initial = self.polynomial_fit(0).initial_state();
+        let first = first_residual(&layout::orders(layout.order, layout.longest_nk().ok()?), initial);
+        let criterion = PhysicalCriterion::new(layout.clone(), Data::of(records), initial, first);
+        let blocks = physical_blocks(&criterion, &self.eta, &self.free, &mut Workspace::of_thread())?;
+        let direction = |place: &usize| {
+            let (slot, p) = (layout.slots[*place], self.eta.len());
+            let individual = layout.names[*place].contains('[');
+            let mut vector = vec![0.0; p];
+            vector[*place] = 1.0;
+            Direction {
+                name: layout.names[*place].clone(),
+                unit: match slot {
+                    LEAD | DELAY => " s",
+                    2 => " rad/s",
+                    _ => "",
+                },
+                vector,
+                delay: slot == DELAY,
+                size: if individual { 0.0 } else { self.eta[*place].abs() },
+            }
+        };
+        let of_operator = self.free.iter().filter(|place| layout.slots[**place] != TIME_CONSTANT);
+        Constancy {
+            blocks: &blocks,
+            directions: &of_operator.map(direction).collect::<Vec<_>>(),
+            variance: self.innovation_variance(),
+            run_to_run: USUAL_RUN_TO_RUN,
+            sample_time_s: layout.sample_time.s(),
+        }
+        .finding()
     }
 
     fn residual_measures(&self, records: &[Record]) -> Result<ResidualMeasures, IdentError> {

@@ -11,19 +11,27 @@
 //! | `gain`, `undetermined-parameter` | standard errors as large as the values |
 //! | `not-convertible` | coefficients that stand for no operator |
 //! | `neuromuscular-lag` | the two poles describe no neuromuscular system |
+//! | `not-constant` | parameters that change within the records, or from one to the next |
 //! | `residuals-not-white`, `structure`, `leverage` | sizes in the residuals |
 //! | `exact-fit`, `no-change`, `change-point` | worth knowing; the result stands |
 //!
 //! | file | what it holds |
 //! |---|---|
 //! | `residuals` | how far residuals are from white; also for the family |
+//! | `constancy` | whether parameters change; also for the family |
 //! | `operator` | gains, poles and delay of an operator |
+//! | `operator_step` | what a stretch of data says against an operator |
+//! | `second_opinion` | fits to records that no single sample can carry |
 //! | `fit`, `grey_box`, `sigmoid` | the verdict of each kind of fit |
 
+pub(crate) mod constancy;
 mod fit;
 mod grey_box;
 mod operator;
+mod operator_step;
 pub(crate) mod residuals;
+pub mod second_opinion;
 mod sigmoid;
 
 pub use operator::{gain_findings, is_open, neuromuscular_finding, pole_findings};
+pub use operator_step::{OperatorStep, operator_step};

@@ -7,6 +7,14 @@
 //! 0.6745, from the residuals of the round before; it is held after [`SCALES`] rounds, so that the
 //! rounds settle.
 //!
+//! A bounded loss bounds what a residual weighs, and not what a sample brings into the regressors: one
+//! sample of e that is wrong is in the response of the operator for seconds, with residuals that are
+//! large because theta is right, and theta gives way (F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw
+//! and W. A. Stahel, *Robust Statistics*, 1986, section 6.3: the influence is that of the residual times
+//! that of the position). So that the position is bounded too, the records come here with each sample
+//! of e and u held to its neighbours ([`crate::faults::resistant`], by the estimator); of a normal
+//! channel one sample in 16 000 is moved, and the efficiency is that of the loss.
+//!
 //! Covariance (Huber, eq. 7.6.8, for residuals that are independent of the gradient):
 //! `s^2 kappa (psi' psi)^-1`, `kappa = mean(rho'^2) / mean(rho'')^2`, with the unweighted psi.
 
@@ -159,7 +167,14 @@ fn median_absolute(residuals: &[Vec<f64>]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use hoid_model::{
+        Channel, Record, Structure,
+        scenario::{Condition, Scenario},
+    };
+    use hoid_sim::{RunSeed, Simulator};
+
     use super::*;
+    use crate::{Estimator, Loss};
 
     #[test]
     fn weights_fall_beyond_the_threshold_only() {
@@ -189,5 +204,88 @@ mod tests {
         rounds.next(std::slice::from_ref(&r));
         let variance = rounds.variance(&[r], 0);
         assert!((variance - 1.0 / 0.95).abs() < 0.02, "{variance}");
+    }
+
+    fn simulated(replication: u64) -> Record {
+        let streams = RunSeed {
+            seed: 4711,
+            replication,
+            ..RunSeed::default()
+        };
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        simulator.run(streams, false).unwrap()
+    }
+
+    fn box_jenkins(loss: Loss) -> Estimator {
+        let orders = Structure::BoxJenkins.operator_orders(29);
+        Estimator {
+            loss,
+            ..Estimator::new(Structure::BoxJenkins, orders)
+        }
+    }
+
+    const HUBER: Loss = Loss::Huber { threshold: 1.345 };
+
+    fn with_sample(record: &Record, of_input: bool, value: f64) -> Record {
+        let (mut e, mut u) = (record.input().to_vec(), record.output().to_vec());
+        (if of_input { &mut e } else { &mut u })[4000] = value;
+        let u = Channel::new("u", "", u);
+        Record::new(record.sample_time(), Channel::new("e", "", e), u).unwrap()
+    }
+
+    #[test]
+    fn one_sample_moves_nothing_by_half_a_standard_error() {
+        let clean = simulated(1);
+        let fit = |record: Record| box_jenkins(HUBER).fit(&[record]).unwrap().operator().unwrap();
+        let before = fit(clean.clone());
+        for of_input in [true, false] {
+            // However far it is off: the influence is bounded.
+            for value in [3.0, 30.0, 3e4] {
+                let after = fit(with_sample(&clean, of_input, value));
+                for ((name, _, a), (_, _, b)) in before.rows().iter().zip(after.rows()) {
+                    let off = (a.value - b.value).abs();
+                    let most = 0.5 * a.standard_error.unwrap_or(1e-9);
+                    assert!(off < most, "e {of_input}, {value}: {name} {} and {}", a.value, b.value);
+                }
+            }
+        }
+        let plain = box_jenkins(Loss::Quadratic)
+            .fit(&[with_sample(&clean, true, 30.0)])
+            .unwrap();
+        let off = plain.operator().unwrap().t_l_s.value - before.t_l_s.value;
+        assert!(off.abs() > 4.0 * before.t_l_s.standard_error.unwrap(), "{off}");
+    }
+
+    #[test]
+    fn clean_records_lose_five_per_cent_of_efficiency() {
+        // The squares are efficient, so that var(robust) = var(squares) + var(difference) (J. A.
+        // Hausman, Econometrica 46 (1978) 1251-1271).
+        let (mut squares, mut count) = (0.0, 0.0);
+        for replication in 10..26 {
+            let record = [simulated(replication)];
+            let plain = box_jenkins(Loss::Quadratic).fit(&record).unwrap();
+            let robust = box_jenkins(HUBER).fit(&record).unwrap();
+            for ((_, a), (_, b)) in plain.parameters().into_iter().zip(robust.parameters()) {
+                squares += ((a.value - b.value) / a.standard_error.unwrap()).powi(2);
+                count += 1.0;
+            }
+        }
+        let efficiency = 1.0 / (1.0 + squares / count);
+        // 16 runs of some three independent directions: standard error 0.011.
+        assert!((efficiency - 0.95).abs() < 0.033, "{efficiency}");
+    }
+
+    #[test]
+    fn what_cannot_be_held_is_fitted_as_it_is() {
+        // A constant error has no neighbours that say anything of it, and no response to find.
+        let clean = simulated(2);
+        let e = Channel::new("e", "", vec![1.0; clean.len()]);
+        let u = Channel::new("u", "", clean.output().to_vec());
+        let record = [Record::new(clean.sample_time(), e, u).unwrap()];
+        let (plain, robust) = (
+            box_jenkins(Loss::Quadratic).fit(&record),
+            box_jenkins(HUBER).fit(&record),
+        );
+        assert_eq!(plain.is_err(), robust.is_err(), "{plain:?} {robust:?}");
     }
 }

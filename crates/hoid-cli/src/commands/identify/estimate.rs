@@ -19,8 +19,14 @@ pub struct Estimated {
     pub choice: Option<Choice>,
     pub grey_box: Option<GreyBoxFit>,
     /// What fitted it by the prediction error, with the loss of squares.
-    pub estimator: Option<Estimator>,
+    pub estimator: Option<FittedBy>,
     pub settings: Vec<(String, String)>,
+}
+
+/// What fitted a model by the prediction error.
+pub enum FittedBy {
+    Polynomials(Estimator),
+    GreyBox(GreyBox),
 }
 
 /// What is to be fitted, the options checked against each other.
@@ -203,7 +209,8 @@ fn polynomial(args: &IdentifyArgs, structure: Structure, records: &[Record]) -> 
         settings.push(("stable models only".to_owned(), "yes".to_owned()));
     }
     let (mut fit, choice, estimator) = prediction_error(args, structure, &ranges, records)?;
-    let estimator = (args.method.is_none() && args.robust.is_none()).then_some(estimator);
+    let by_squares = args.method.is_none() && args.robust.is_none();
+    let estimator = by_squares.then_some(FittedBy::Polynomials(estimator));
     if let Some(method) = args.method {
         let instruments = instruments(args, records);
         settings.push(("method".to_owned(), format!("{method}, {instruments}")));
@@ -308,7 +315,7 @@ fn grey_box(args: &IdentifyArgs, records: &[Record]) -> Result<Estimated, CliErr
         fit: found.polynomial_fit(0).clone(),
         choice: None,
         grey_box: Some(found),
-        estimator: None,
+        estimator: Some(FittedBy::GreyBox(estimator)),
         settings,
     })
 }

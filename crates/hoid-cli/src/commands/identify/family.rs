@@ -6,6 +6,7 @@ use hoid_ident::{
     IdentError, SearchOptions,
     family::{FamilyEstimator, HIGHEST_NOISE_ORDER, OperatorPrior},
     frequency::{Description, DescriptionOptions, describe_runs},
+    judgement::second_opinion,
 };
 use hoid_io::{read_text, write_atomically};
 use hoid_model::{Detrend, Record, VerdictLevel, operator_family::Coordinate, uncertainty::Estimate};
@@ -16,7 +17,7 @@ use hoid_report::{
 };
 use serde_json::Value;
 
-use super::{family_form::Found, second_opinion, settings::common_settings};
+use super::{family_form::Found, level, settings::common_settings};
 use crate::{
     args::IdentifyArgs,
     commands::{
@@ -46,7 +47,7 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
     let opinion = args
         .faults
         .looks()
-        .then(|| second_opinion::of_family(&estimator, &fit, records))
+        .then(|| second_opinion::of_family(&estimator, &fit, records, args.controlled_element.as_ref()))
         .flatten();
     fit.verdict = faults::judged(fit.verdict, files, accounts).and(opinion);
     let described = described.ok();
@@ -65,12 +66,16 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
     if let Some(channel) = described.as_ref().and_then(|d| d.channel.clone()) {
         settings.push(("excitation".to_owned(), channel));
     }
+    let mut accounts = accounts.to_vec();
+    if estimator.detrend == Detrend::Mean {
+        level::into_accounts(&mut accounts, records, |k| &fit.operator(k).polynomial_fit);
+    }
     let prepared: Vec<Record> = records.iter().map(|r| r.clone().detrended(estimator.detrend)).collect();
     let found = Found {
         fit: &fit,
         files,
         records: &prepared,
-        accounts,
+        accounts: &accounts,
         element: args.controlled_element.as_ref(),
         validation: validation.as_ref().map(|(file, q)| (file.as_str(), *q)),
         settings: &settings,

@@ -3,8 +3,8 @@
 mod estimate;
 mod family;
 mod family_form;
+mod level;
 mod run;
-mod second_opinion;
 mod settings;
 mod sigmoid;
 

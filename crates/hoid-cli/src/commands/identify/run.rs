@@ -4,14 +4,15 @@ use std::path::{Path, PathBuf};
 
 use hoid_ident::{
     Fit, MarginEstimates,
+    judgement::second_opinion,
     validation::{GoodnessOfFit, nrmse_fit, vaf},
 };
 use hoid_model::{ContinuousTransferFunction, Detrend, NotConvertible, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
 use hoid_report::{ModelSection, Report, known_operator, write_report};
 
 use super::{
-    estimate::{self, Estimated},
-    family, second_opinion,
+    estimate::{self, Estimated, FittedBy},
+    family, level,
     settings::common_settings,
     sigmoid,
 };
@@ -37,7 +38,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let ReadAll {
         files,
         records,
-        accounts,
+        mut accounts,
     } = faults::mended(
         reading::read_all(&args.records, &args.read, &args.mask, with_input)?,
         args.faults.faults,
@@ -48,6 +49,11 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     if kind == ModelKind::Family {
         return family::run(args, &files, &records, &accounts);
     }
+    let as_read = level::is_estimated(args, with_input, &records).then(|| records.clone());
+    let records = match &as_read {
+        Some(as_read) => level::without(as_read),
+        None => records,
+    };
     let Estimated {
         fit,
         choice,
@@ -59,11 +65,23 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let validation = match &args.validate {
         Some(path) => Some((
             path.display().to_string(),
-            fit.quality(&[reading::read(path, &args.read, with_input)?.0])?,
+            fit.quality(&[{
+                let other = reading::read(path, &args.read, with_input)?.0;
+                if as_read.is_some() {
+                    other.detrended(Detrend::Mean)
+                } else {
+                    other
+                }
+            }])?,
         )),
         None => None,
     };
     let mut settings = chosen;
+    if let Some(as_read) = &as_read {
+        let of = |k: usize| grey_box.as_ref().map_or(&fit, |found| found.polynomial_fit(k));
+        level::into_accounts(&mut accounts, as_read, of);
+        settings.push(("level".to_owned(), "one constant of u a record, estimated".to_owned()));
+    }
     settings.extend(common_settings(args, with_input));
     let operator = fit.operator();
     // Three poles or one are no gain with a lead, but may be another form.
@@ -82,12 +100,22 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         Some(found) => found.verdict(&records)?,
         None => fit.verdict(&records, choice.as_ref())?,
     };
-    let opinion = estimator.as_ref().filter(|_| args.faults.looks());
-    let opinion = opinion.and_then(|e| second_opinion::of_polynomials(e, &fit, &records));
-    let level = estimator
-        .as_ref()
-        .filter(|_| args.faults.looks() && args.read.detrend == Detrend::None);
-    let level = level.and_then(|e| second_opinion::of_level(e, &fit, &records));
+    let element = args.controlled_element.as_ref();
+    let opinion = match (&estimator, &grey_box) {
+        _ if !args.faults.looks() => None,
+        (Some(FittedBy::Polynomials(e)), _) => second_opinion::of_polynomials(e, &fit, &records, element),
+        (Some(FittedBy::GreyBox(e)), Some(found)) => second_opinion::of_grey_box(e, found, &records, element),
+        _ => None,
+    };
+    let level = match &estimator {
+        // Where the level is not estimated it may matter.
+        Some(FittedBy::Polynomials(e))
+            if args.faults.looks() && as_read.is_none() && args.read.detrend == Detrend::None =>
+        {
+            second_opinion::of_level(e, &fit, &records)
+        }
+        _ => None,
+    };
     let verdict = faults::judged(verdict, &files, &accounts).and(opinion).and(level);
     let identified = Identified {
         verdict: &verdict,

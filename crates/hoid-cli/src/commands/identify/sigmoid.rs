@@ -2,6 +2,7 @@
 
 use hoid_ident::{
     GainsAt, InitialState, SigmoidChange, SigmoidFit,
+    judgement::second_opinion,
     validation::{LjungBox, whiteness},
 };
 use hoid_io::write_record;
@@ -50,7 +51,12 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
         .iter()
         .map(test)
         .collect::<Result<Vec<Option<LjungBox>>, CliError>>()?;
-    let verdict = faults::judged(fit.verdict(records)?, files, accounts);
+    let opinion = args
+        .faults
+        .looks()
+        .then(|| second_opinion::of_sigmoid(&estimator, &fit, records))
+        .flatten();
+    let verdict = faults::judged(fit.verdict(records)?, files, accounts).and(opinion);
     let found = Found {
         fit: &fit,
         verdict: &verdict,

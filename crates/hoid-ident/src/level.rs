@@ -1,0 +1,134 @@
+//! The level of a record: the constant of u that is no response to e.
+//!
+//! `u(t) = c + G e(t) + v(t)`: a stick that rests off its zero, an amplifier with an offset, an e with one.
+//! For given dynamics c is linear, and of long records least squares is that of the means,
+//!
+//! `c = mean(u) - G(1) mean(e)`,
+//!
+//! so that a fit to e and u without their means ([`hoid_model::Detrend::Mean`]) is the fit with c for each record (L.
+//! Ljung, *System Identification*, 1999, section 14.1), but for the ends of the record. Its variance is
+//! `sigma^2 |H(1)|^2/n`, H = C/(A D) the noise model, and what is not known of G(1),
+//! `mean(e)^2 var G(1)`.
+
+use hoid_model::{
+    Record,
+    polynomial_model::monic,
+    uncertainty::{Estimate, variance_along},
+};
+
+use crate::Fit;
+
+impl Fit {
+    /// The level c of u in a record, in the unit of u, with its standard error; the fit is one to the
+    /// record without its means. `None` where the model has no static gain (an integration), no input or
+    /// no noise.
+    pub fn level(&self, record: &Record) -> Option<Estimate> {
+        let model = self.model();
+        let covariance = self.covariance()?;
+        if !model.structure().has_input() {
+            return None;
+        }
+        let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+        let (e, u) = (mean(record.input()), mean(record.output()));
+        let (response, gradient) = model.response_and_gradient(0.0);
+        let gradient: Vec<f64> = gradient.iter().map(|g| g.re).collect();
+        let at_rest = |coefficients: &[f64]| monic(coefficients).iter().sum::<f64>();
+        let noise = at_rest(model.c()) / (at_rest(model.a()) * at_rest(model.d()));
+        let variance = self.innovation_variance() * noise * noise / record.len() as f64
+            + e * e * variance_along(&gradient, covariance);
+        let level = Estimate::with_variance(u - response.re * e, variance);
+        (level.value.is_finite() && variance.is_finite()).then_some(level)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::{
+        Channel, Detrend, Structure,
+        scenario::{Condition, Scenario},
+    };
+    use hoid_sim::{RunSeed, Simulator};
+
+    use super::*;
+    use crate::{Estimator, linalg::least_squares::solve_symmetric};
+
+    fn simulated(replication: u64) -> Record {
+        let streams = RunSeed {
+            seed: 31,
+            replication,
+            ..RunSeed::default()
+        };
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        simulator.run(streams, false).unwrap()
+    }
+
+    fn moved(record: &Record, by_e: f64, by_u: f64) -> Record {
+        let add = |x: &[f64], by: f64| x.iter().map(|v| v + by).collect::<Vec<f64>>();
+        let e = Channel::new("e", "", add(record.input(), by_e));
+        let u = Channel::new("u", "", add(record.output(), by_u));
+        Record::new(record.sample_time(), e, u).unwrap()
+    }
+
+    fn fitted(structure: Structure, record: &Record) -> Fit {
+        let without = record.clone().detrended(Detrend::Mean);
+        Estimator::new(structure, structure.operator_orders(29))
+            .fit(&[without])
+            .unwrap()
+    }
+
+    #[test]
+    fn an_offset_of_u_is_found_and_biases_nothing() {
+        // Mean squared error of c in its standard errors, over runs.
+        let (mut squares, runs) = (0.0, 12);
+        for k in 0..runs {
+            let record = simulated(k);
+            let (clean, off) = (fitted(Structure::BoxJenkins, &record), moved(&record, 0.02, 0.01));
+            let fit = fitted(Structure::BoxJenkins, &off);
+            assert!((fit.model().b()[0] - clean.model().b()[0]).abs() < 1e-9);
+            let (before, after) = (clean.level(&record).unwrap(), fit.level(&off).unwrap());
+            let gain = fit.model().response(0.0).re;
+            assert!((after.value - before.value - (0.01 - 0.02 * gain)).abs() < 1e-9);
+            squares += (before.value / before.standard_error.unwrap()).powi(2);
+        }
+        // chi-square of 12: 3.1 to 28.3 at 0.5 % on each side.
+        assert!((3.1..28.3).contains(&squares), "{squares}");
+    }
+
+    #[test]
+    fn it_is_the_constant_of_the_regression() {
+        // Twin: ARX is linear, with a column of ones beside the regressors.
+        let record = moved(&simulated(40), 0.0, 0.03);
+        let fit = fitted(Structure::Arx, &record);
+        let (e, u) = (record.input(), record.output());
+        let rows: Vec<[f64; 5]> = (31..u.len())
+            .map(|t| [-u[t - 1], -u[t - 2], e[t - 29], e[t - 30], 1.0])
+            .collect();
+        let gram: Vec<f64> = (0..25)
+            .map(|k| rows.iter().map(|r| r[k / 5] * r[k % 5]).sum())
+            .collect();
+        let right: Vec<f64> = (0..5)
+            .map(|k| rows.iter().zip(&u[31..]).map(|(r, u)| r[k] * u).sum())
+            .collect();
+        let theta = solve_symmetric(&gram, &right).unwrap();
+        let twin = theta[4] / (1.0 + theta[0] + theta[1]);
+        let level = fit.level(&record).unwrap();
+        // The ends of the record are a part of 30/8192 of it.
+        assert!(
+            (level.value - twin).abs() < 0.1 * level.standard_error.unwrap(),
+            "{level} and {twin}"
+        );
+    }
+
+    #[test]
+    fn there_is_none_without_an_input() {
+        let record = simulated(41);
+        let orders = hoid_model::Orders {
+            na: 2,
+            ..hoid_model::Orders::default()
+        };
+        let fit = Estimator::new(Structure::Ar, orders)
+            .fit(std::slice::from_ref(&record))
+            .unwrap();
+        assert!(fit.level(&record).is_none());
+    }
+}
