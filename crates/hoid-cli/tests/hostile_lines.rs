@@ -45,10 +45,10 @@ const CELLS: [&str; 28] = [
 
 fn line() -> impl Strategy<Value = Vec<u8>> {
     let cells = |n| vec(select(&CELLS[..]), n);
-    let joined = (cells(0..5_usize.into()), select(&[",", ";", "\t", " , "][..]))
+    let joined = (cells(0..5_usize), select(&[",", ";", "\t", " , "][..]))
         .prop_map(|(cells, separator)| cells.join(separator).into_bytes());
     prop_oneof![
-        4 => (cells(2..3_usize.into())).prop_map(|cells| cells.join(",").into_bytes()),
+        4 => cells(2..3_usize).prop_map(|cells| cells.join(",").into_bytes()),
         4 => joined,
         1 => vec(any::<u8>().prop_filter("a line has no line end", |byte| *byte != b'\n'), 0..60),
         1 => (1..80_000_usize).prop_map(|n| vec![b'7'; n]),

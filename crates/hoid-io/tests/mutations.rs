@@ -2,6 +2,8 @@
 //! is whole.
 #![allow(clippy::unwrap_used)]
 
+// The command uses the rest of it.
+#[allow(dead_code)]
 #[path = "common/mutations/mod.rs"]
 mod mutations;
 

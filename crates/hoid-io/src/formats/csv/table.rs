@@ -275,7 +275,7 @@ mod tests {
             found[0].contains("(-0.5)") && found[0].contains("may be cut"),
             "{found:?}"
         );
-        let found = message(text[..text.len() - 9].as_bytes());
+        let found = message(&text.as_bytes()[..text.len() - 9]);
         assert!(
             found.contains("run.csv is cut in line 21, its last: 2 of 3 values"),
             "{found}"

@@ -44,7 +44,7 @@ pub fn all(path: &Path, bytes: usize, choice: u64) -> Answers {
     }
     let mask = [*draw.one_of(&QualityIssueKind::MASKABLE)];
     let read = read_segments(path, &options(&mut draw), &Preparation::default(), &mask, 0.02);
-    take(read.map(|all| all.iter().for_each(|read| finite(read))).err());
+    take(read.map(|all| all.iter().for_each(finite)).err());
     take(survey(path).map(|found| assert!(!found.format.is_empty())).err());
     take(
         read_table(path)
