@@ -101,9 +101,11 @@ proptest! {
         let expected = hostile.iter().filter(|line| counts(line)).count() + good as usize;
         prop_assert_eq!(lines.len(), expected);
         let last = lines.last().unwrap();
+        // A second of samples without a start determines little: what is far off has to say so.
         for (name, parameter) in last["parameters"].as_object().unwrap() {
+            let error = parameter["standard_error"].as_f64().unwrap_or(f64::INFINITY);
             let value = parameter["value"].as_f64();
-            prop_assert!(value.is_some_and(|v| v.abs() < 1e3), "{}: {}", name, parameter);
+            prop_assert!(value.is_some_and(|v| v.abs() < 10.0 + 4.0 * error), "{}: {}", name, parameter);
         }
         prop_assert!(last["skipped"].as_u64().unwrap() <= hostile.len() as u64);
     }
