@@ -4,16 +4,18 @@
 //! |---|---|
 //! | `cargo xtask test` | all tests of the workspace, those of the documentation included, then those of the Python package |
 //! | `cargo xtask python [ARGUMENT...]` | the tests of the Python package alone, arguments for pytest |
-//! | `cargo xtask check` | formatting, lints, documentation of the crates and the book, as continuous integration does |
+//! | `cargo xtask check` | formatting, crates that are used, lints, documentation of the crates and the book, as continuous integration does |
+//! | `cargo xtask crates` | licences, bans and versions of the crates that are used, alone (module `crates`) |
 //! | `cargo xtask book` | the book in `docs/`, into `docs/book/` (needs mdbook) |
 //! | `cargo xtask bench [OPTION...]` | the tasks of the page "Speed beside others" beside the peers that are installed, or how cost grows (module `bench`) |
-//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults` |
+//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `kills` |
 //!
 //! Little but the standard library: a chore must start at once on a fresh machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod bench;
 mod counts;
+mod crates;
 mod process;
 mod python;
 
@@ -25,7 +27,7 @@ use std::{
 use counts::Counts;
 use process::{cargo, cargo_command, each_line, run};
 
-const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | book | bench [OPTION...] | slow NAME [ARGUMENT...]";
+const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | crates | book | bench [OPTION...] | slow NAME [ARGUMENT...]";
 
 fn main() -> ExitCode {
     let mut arguments = env::args().skip(1);
@@ -33,6 +35,7 @@ fn main() -> ExitCode {
         Some("test") => test(&arguments.collect::<Vec<_>>()),
         Some("python") => python::test(&arguments.collect::<Vec<_>>()).and_then(|counts| counts.verdict()),
         Some("check") => check(),
+        Some("crates") => crates::check(),
         Some("book") => book(),
         Some("bench") => bench::bench(&arguments.collect::<Vec<_>>()),
         Some("slow") => slow(&arguments.collect::<Vec<_>>()),
@@ -69,45 +72,68 @@ fn test(arguments: &[String]) -> Result<(), String> {
     total.verdict()
 }
 
-/// Studies that take too long for a test: name, package and example, and the package whose program
-/// one of them runs.
-const SLOW: [(&str, &str, &str, Option<&str>); 4] = [
-    ("people-coverage", "hoid", "people_coverage", None),
-    ("faults", "hoid", "faults", Some("hoid-cli")),
-    ("faults-clean", "hoid-ident", "faults_clean", None),
-    ("tracker-faults", "hoid", "tracker_faults", None),
+/// A study that takes too long for a test.
+struct Slow {
+    name: &'static str,
+    package: &'static str,
+    example: &'static str,
+    /// The package whose program it runs.
+    program: Option<&'static str>,
+    /// `release`, or `dev` where sums that overflow are looked for, as in the tests.
+    profile: &'static str,
+}
+
+const fn slow_of(name: &'static str, package: &'static str, example: &'static str) -> Slow {
+    Slow {
+        name,
+        package,
+        example,
+        program: None,
+        profile: "release",
+    }
+}
+
+const SLOW: [Slow; 6] = [
+    slow_of("people-coverage", "hoid", "people_coverage"),
+    Slow {
+        program: Some("hoid-cli"),
+        ..slow_of("faults", "hoid", "faults")
+    },
+    slow_of("faults-clean", "hoid-ident", "faults_clean"),
+    slow_of("tracker-faults", "hoid", "tracker_faults"),
+    Slow {
+        profile: "dev",
+        ..slow_of("mutations", "hoid-io", "mutations")
+    },
+    Slow {
+        program: Some("hoid-cli"),
+        ..slow_of("kills", "hoid-cli", "kills")
+    },
 ];
 
 /// Runs one of them, with further arguments of its own.
 fn slow(arguments: &[String]) -> Result<(), String> {
-    let names = || SLOW.map(|(name, ..)| name).join(", ");
+    let names = || SLOW.map(|slow| slow.name).join(", ");
     let (name, rest) = arguments
         .split_first()
         .ok_or_else(|| format!("which study: {}", names()))?;
-    let (_, package, example, program) = (SLOW.iter())
-        .find(|(known, ..)| known == name)
+    let slow = (SLOW.iter())
+        .find(|slow| slow.name == name)
         .ok_or_else(|| format!("no study is called {name}; there is {}", names()))?;
-    if let Some(program) = program {
-        cargo(&["build", "--release", "-p", program], &[])?;
+    if let Some(program) = slow.program {
+        cargo(&["build", "--profile", slow.profile, "-p", program], &[])?;
     }
     let mut command = cargo_command();
     command
-        .args([
-            "run",
-            "--release",
-            "-p",
-            package,
-            "--no-default-features",
-            "--example",
-            example,
-            "--",
-        ])
+        .args(["run", "--profile", slow.profile, "-p", slow.package])
+        .args(["--no-default-features", "--example", slow.example, "--"])
         .args(rest);
     run(&mut command)
 }
 
 fn check() -> Result<(), String> {
     cargo(&["fmt", "--all", "--check"], &[])?;
+    crates::check()?;
     cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"], &[])?;
     cargo(&["doc", "--workspace", "--no-deps"], &[("RUSTDOCFLAGS", "-D warnings")])?;
     book()

@@ -139,6 +139,20 @@ pub enum IoError {
         /// Names in the header.
         expected: usize,
     },
+    /// A last line that lacks values and its end.
+    #[error(
+        "{file} is cut in {place}, its last: {found} of {expected} values; copy or record it again, or remove that line and use what is above it"
+    )]
+    CutRow {
+        /// The file.
+        file: String,
+        /// Where.
+        place: String,
+        /// Values in the row.
+        found: usize,
+        /// Names in the header.
+        expected: usize,
+    },
     /// A column that the file does not have.
     #[error(
         "{file} has no column {missing} (asked for: {asked}); it has {available}; choose by --input and --output with NAME, -NAME or NAME-NAME"

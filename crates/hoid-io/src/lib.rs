@@ -94,3 +94,4 @@ pub use segments::read_segments;
 pub use survey::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey, survey};
 pub use table_file::{check_table_path, read_table, write_table};
 pub use table_writer::TableWriter;
+pub use wording::printable;

@@ -11,7 +11,7 @@ use crate::repair;
 use crate::table::Table;
 use crate::table_reader::TableReader;
 use crate::time_grid::TimeGrid;
-use crate::wording::list;
+use crate::wording::{list, named};
 
 /// A record, what was done to it, and what else a person should know about how it was read.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,7 +105,9 @@ impl TableReader<'_> {
                 }
                 Err(error) if used(column) => return Err(error),
                 Err(error) => {
-                    self.table.notes.push(format!("column {name} is left out: {error}"));
+                    self.table
+                        .notes
+                        .push(format!("column {} is left out: {error}", named(&name)));
                     columns.push(None);
                 }
             }

@@ -14,7 +14,8 @@ use crate::data_quality::{
 };
 use crate::format::Reading;
 use crate::formats::bytes_of;
-use crate::table::{Column, Precision, Table};
+use crate::table::{Column, DECIMAL_COMMA, Precision, Table, has_decimal_comma};
+use crate::wording::named;
 
 /// Characters of a sketch.
 const SKETCH: usize = 32;
@@ -146,8 +147,10 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
     })
 }
 
-fn of_table(table: Table<'_>) -> (Vec<Read>, Vec<String>) {
+fn of_table(mut table: Table<'_>) -> (Vec<Read>, Vec<String>) {
     let rows = table.rows;
+    let commas = decimal_commas(&table);
+    table.notes.extend(commas);
     let read = |column: Column| {
         let text = column.texts.len() == rows;
         Read {
@@ -162,6 +165,20 @@ fn of_table(table: Table<'_>) -> (Vec<Read>, Vec<String>) {
         }
     };
     (table.columns.into_iter().map(read).collect(), table.notes)
+}
+
+/// Columns of text that would be numbers with a point in the place of each comma.
+fn decimal_commas(table: &Table<'_>) -> Vec<String> {
+    let first_text = |(at, column): (usize, &Column)| {
+        let row = *column.texts.first()?;
+        let cell = table.source.cell(row, at);
+        has_decimal_comma(&cell).then(|| {
+            let (name, place) = (named(&column.name), table.source.place(row));
+            let (count, rows) = (column.texts.len(), table.rows);
+            format!("column {name}, {place}: \"{cell}\" is text, {count} of {rows} cells in all; {DECIMAL_COMMA}")
+        })
+    };
+    table.columns.iter().enumerate().filter_map(first_text).collect()
 }
 
 fn of_arrays(contents: &Contents) -> (Vec<Read>, Vec<String>) {

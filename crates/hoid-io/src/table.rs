@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::IoError;
-use crate::wording::shown;
+use crate::wording::{named, shown};
 
 /// What stands in a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,6 +111,10 @@ pub(crate) trait Source {
     fn place(&self, row: usize) -> String;
     /// What stands in a cell, cut to a readable length.
     fn cell(&self, row: usize, column: usize) -> String;
+    /// Whether the file ends in the middle of this row, as far as can be seen.
+    fn is_open(&self, _row: usize) -> bool {
+        false
+    }
 }
 
 /// The columns of a file.
@@ -138,10 +142,13 @@ impl Table<'_> {
         let file = self.source.file().to_owned();
         let place = self.source.place(row);
         let found = self.source.cell(row, column);
-        let column = name.clone();
+        let is_last_cell = column + 1 == self.columns.len();
+        let column = named(name);
         if texts.binary_search(&row).is_ok() {
-            let remedy = if matches!(Cell::parse(&found.replacen(',', ".", 1)), Cell::Number(_)) {
-                "write the numbers with a decimal point instead of a comma"
+            let remedy = if has_decimal_comma(&found) {
+                DECIMAL_COMMA
+            } else if is_last_cell && self.source.is_open(row) {
+                "the file is cut there, in the middle of its last line: copy or record it again, or remove that line"
             } else {
                 "correct the cell, empty it and bridge it with --fill, or choose another column"
             };
@@ -174,6 +181,14 @@ impl Table<'_> {
             rows: rows.len(),
         }
     }
+}
+
+/// The remedy for [`has_decimal_comma`].
+pub(crate) const DECIMAL_COMMA: &str = "write the numbers with a decimal point instead of a comma";
+
+/// Whether a cell that is text would be a number with a point in the place of its comma.
+pub(crate) fn has_decimal_comma(cell: &str) -> bool {
+    cell.contains(',') && matches!(Cell::parse(&cell.replacen(',', ".", 1)), Cell::Number(_))
 }
 
 /// Checks that the names differ, and notes the columns without one.

@@ -9,6 +9,7 @@ use crate::preparation::Step;
 use crate::read_options::ReadOptions;
 use crate::repair::{self, OpenEnd};
 use crate::table::Table;
+use crate::wording::named;
 
 /// The table, and what was done to it.
 pub(crate) struct TableReader<'a> {
@@ -49,7 +50,7 @@ impl TableReader<'_> {
             IoError::NothingToBridgeTo {
                 file: self.file.clone(),
                 place: self.table.source.place(row),
-                column: source.name.clone(),
+                column: named(&source.name),
                 end,
             }
         })?;

@@ -126,6 +126,10 @@ impl TableReader<'_> {
         sample_time: SampleTime,
         precision: Precision,
     ) -> Result<TimeGrid, IoError> {
+        // A sample alone has no line to stand on.
+        if t.len() < 2 {
+            return Err(self.uneven(Uneven::TooFew, &rows, &t));
+        }
         let (start_s, end_s, ts) = (t[0], t[t.len() - 1], sample_time.s());
         // The rounding of the last t does not cost the last sample.
         let slack = 1e-6 + (precision.unit(end_s) / ts).min(0.5);

@@ -15,6 +15,41 @@ pub(crate) fn shown(text: &str) -> String {
     cut.escape_debug().to_string()
 }
 
+/// The longest name of a column in a message, characters.
+const NAMED: usize = 80;
+
+/// The name of a column for a message: as it stands, but for its length and what a terminal obeys.
+pub(crate) fn named(name: &str) -> String {
+    let mut text = String::with_capacity(name.len().min(4 * NAMED));
+    for (at, character) in name.chars().enumerate() {
+        if at == NAMED {
+            text.push_str("...");
+            break;
+        }
+        if character.is_control() {
+            text.extend(character.escape_default());
+        } else {
+            text.push(character);
+        }
+    }
+    text
+}
+
+/// A message that may repeat parts of a file, without anything that a terminal obeys: other control
+/// characters than line ends are written as `\u{1b}`.
+#[must_use]
+pub fn printable(message: &str) -> String {
+    let mut text = String::with_capacity(message.len());
+    for character in message.chars() {
+        if character.is_control() && character != '\n' {
+            text.extend(character.escape_default());
+        } else {
+            text.push(character);
+        }
+    }
+    text
+}
+
 /// What a crate says, short, and without anything that a terminal obeys.
 pub(crate) fn told(what: &str) -> String {
     let line = what.lines().next().unwrap_or_default();
@@ -24,9 +59,10 @@ pub(crate) fn told(what: &str) -> String {
 /// Names for a message: all of them, unless there are very many.
 pub(crate) fn list(names: &[&str]) -> String {
     const SHOWN: usize = 40;
-    let named: Vec<&str> = names.iter().copied().filter(|name| !name.is_empty()).collect();
-    let mut text = named[..named.len().min(SHOWN)].join(", ");
-    match named.len() {
+    let known: Vec<&str> = names.iter().copied().filter(|name| !name.is_empty()).collect();
+    let shown: Vec<String> = known.iter().take(SHOWN).map(|name| named(name)).collect();
+    let mut text = shown.join(", ");
+    match known.len() {
         0 => text.push_str("no named columns"),
         n if n > SHOWN => text.push_str(&format!(" and {} more", n - SHOWN)),
         _ => {}

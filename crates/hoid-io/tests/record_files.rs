@@ -422,6 +422,19 @@ fn resample_goes_over_gaps_and_jitter() {
     assert!(back.contains("expected increasing time"), "{back}");
 }
 
+/// What a cut file, or a short span of one, leaves.
+#[test]
+fn one_sample_is_not_resampled() {
+    let desk = Desk::new();
+    let options = ReadOptions {
+        sampling_hz: Some(50.0),
+        repair: RESAMPLE,
+        ..defaults()
+    };
+    let message = desk.error("# sample_time: 0.01 s\nt,e,u\n0,1,2\n", &options);
+    assert!(message.contains("1 sample, expected at least 2"), "{message}");
+}
+
 #[test]
 fn what_lies_outside_the_span_is_not_looked_at() {
     let desk = Desk::new();

@@ -74,6 +74,7 @@ mod predictor;
 mod recursion;
 mod reported;
 mod saved;
+mod seal;
 mod setup;
 mod shared_options;
 mod smoother;

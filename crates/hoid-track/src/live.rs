@@ -5,7 +5,11 @@ use std::collections::VecDeque;
 use hoid_core::state::{State, visit_all};
 use hoid_model::{Channel, Record, SampleTime};
 
-use crate::{Outcome, Sample, StartAt, TrackOptions, Tracker, idle::idle_head};
+use crate::{
+    Outcome, Sample, StartAt, TrackOptions, Tracker,
+    idle::idle_head,
+    seal::{opened, sealed},
+};
 use hoid_ident::{Choice, IdentError};
 
 /// What makes the options of a record of the warm-up, with what was searched for them.
@@ -136,13 +140,14 @@ impl WarmUp {
     pub fn saved(&mut self) -> Vec<f64> {
         let mut numbers = Vec::new();
         self.visit(&mut |number| numbers.push(*number));
-        numbers
+        sealed(numbers)
     }
 
-    /// The warm-up that [`WarmUp::saved`] was asked of. `None` for the numbers of something else.
+    /// The warm-up that [`WarmUp::saved`] was asked of. `None` for the numbers of something else, and
+    /// for such that were changed or cut.
     pub fn restored(sample_time: SampleTime, numbers: &[f64]) -> Option<Self> {
         let mut warm_up = Self::new(0, sample_time);
-        let mut left = numbers.iter();
+        let mut left = opened(numbers)?.iter();
         let mut lacking = false;
         warm_up.visit(&mut |number| match left.next() {
             Some(saved) => *number = *saved,

@@ -1,13 +1,19 @@
 //! A tracker as numbers, to go on elsewhere: in another process, or after a restart.
 //!
 //! The numbers are those of the start, of which gains and bounds are made, and then all that
-//! changes ([`hoid_core::state`]). A tracker that was restored goes on with the same digits. It
+//! changes ([`hoid_core::state`]), and a seal against damage. A tracker that was restored goes on with the same digits. It
 //! does not have the start fit any more.
 
 use hoid_core::state::{State, visit_all};
 use hoid_model::SampleTime;
 
-use crate::{Counts, Tracker, options::TrackOptions, start::StartState, tracker::guard_of};
+use crate::{
+    Counts, Tracker,
+    options::TrackOptions,
+    seal::{opened, sealed},
+    start::StartState,
+    tracker::guard_of,
+};
 use hoid_ident::IdentError;
 
 impl State for Tracker {
@@ -59,18 +65,22 @@ impl Tracker {
         let mut save = |number: &mut f64| numbers.push(*number);
         self.start.visit(&mut save);
         self.visit(&mut save);
-        numbers
+        sealed(numbers)
     }
 
     /// The tracker that [`Tracker::saved`] was asked of, from its options and its numbers.
     ///
     /// # Errors
-    /// [`IdentError::BadStart`] for numbers of another tracker; those of [`Tracker::new`].
+    /// [`IdentError::BadStart`] for numbers of another tracker, and for such that were changed or cut;
+    /// those of [`Tracker::new`].
     pub fn restored(options: &TrackOptions, sample_time: SampleTime, numbers: &[f64]) -> Result<Self, IdentError> {
         options.check()?;
         let wrong = || IdentError::BadStart {
             reason: "the numbers are those of a tracker with other options; save it again".to_owned(),
         };
+        let numbers = opened(numbers).ok_or_else(|| IdentError::BadStart {
+            reason: "the numbers of the saved tracker were changed or cut since; save it again".to_owned(),
+        })?;
         let p = options.parameter_names().len();
         let mut start = StartState {
             values: vec![0.0; p],

@@ -8,6 +8,7 @@ use super::error::ScenarioFileError;
 use super::family_keys::FamilyFile;
 use super::keys::File;
 use super::values::{Source, line_of};
+use crate::wording::printable;
 
 /// What a scenario file describes.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,7 +93,7 @@ fn syntax(text: &str, path: &str, error: &toml::de::Error) -> ScenarioFileError 
     ScenarioFileError::Syntax {
         path: path.to_owned(),
         line: error.span().map_or(1, |span| line_of(text, span.start)),
-        reason: error.message().trim_end().to_owned(),
+        reason: printable(error.message().trim_end()),
     }
 }
 

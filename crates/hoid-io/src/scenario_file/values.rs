@@ -4,6 +4,7 @@ use hoid_model::{ModelError, SampleTime};
 
 use super::error::ScenarioFileError;
 use super::keys::Number;
+use crate::wording::printable;
 
 /// Most samples of a run, so that a slip of the unit does not ask for all memory.
 const MOST_SAMPLES: f64 = 1e7;
@@ -146,7 +147,7 @@ impl Source<'_> {
             path: self.path.to_owned(),
             line: line_of(self.text, offset),
             key: key.to_owned(),
-            found: found.to_string(),
+            found: printable(&found.to_string()),
             expected: expected.to_owned(),
         }
     }

@@ -122,7 +122,7 @@ impl Manifest {
         let bad = |line: Option<usize>, reason: String| StudyError::Plan {
             path: path.to_owned(),
             line,
-            reason,
+            reason: hoid_io::printable(&reason),
         };
         let manifest: Self = toml::from_str(text).map_err(|error| {
             let line = error.span().map(|span| crate::plan::line_at(text, span.start));

@@ -105,7 +105,7 @@ impl Plan {
         Self::of_text(text).map_err(|problem| StudyError::Plan {
             path: path.to_owned(),
             line: problem.line,
-            reason: problem.reason,
+            reason: hoid_io::printable(&problem.reason),
         })
     }
 

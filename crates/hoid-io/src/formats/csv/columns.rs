@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use super::text::{comments, is_aside, place, reader, row_start, separator, text};
+use super::text::{as_meant, comments, harmless, is_aside, place, reader, row_start, separator, text};
 use crate::IoError;
 use crate::format::RowWriter;
 use crate::output_table::{ColumnKind, ColumnValues, OutputColumn, OutputTable, TableSchema, Values};
@@ -39,7 +39,7 @@ impl RowWriter for CsvColumns {
                     Values::Real(values) => write!(cell, "{:?}", values[row]),
                     Values::Whole(values) => write!(cell, "{}", values[row]),
                     Values::Text(values) => {
-                        csv.write_field(&values[row])?;
+                        csv.write_field(harmless(&values[row]).as_bytes())?;
                         continue;
                     }
                 };
@@ -64,7 +64,10 @@ impl CsvColumns {
         }
         let this = Self { separator };
         let mut csv = this.writer(file);
-        csv.write_record(schema.columns.iter().map(|column| &column.name))?;
+        for column in &schema.columns {
+            csv.write_field(harmless(&column.name).as_bytes())?;
+        }
+        csv.write_record(None::<&[u8]>)?;
         csv.flush()?;
         drop(csv);
         Ok(this)
@@ -110,7 +113,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<OutputTable, IoError> {
                     Cell::Missing | Cell::Text => f64::NAN,
                 }),
                 ColumnValues::Whole(values) => values.push(whole(cell).unwrap_or_default()),
-                ColumnValues::Text(values) => values.push(cell.to_owned()),
+                ColumnValues::Text(values) => values.push(as_meant(cell).to_owned()),
             }
         }
     }
@@ -137,7 +140,10 @@ fn survey(text: &str, file: &str, separator: u8) -> Result<(Vec<String>, Vec<Col
             place(text.as_bytes(), row_start(text.as_bytes(), at))
         };
         if names.is_empty() {
-            names = record.iter().map(|name| utf8(name).trim().to_owned()).collect();
+            names = record
+                .iter()
+                .map(|name| as_meant(utf8(name).trim()).to_owned())
+                .collect();
             if names.iter().all(|name| !matches!(Cell::parse(name), Cell::Text)) {
                 return Err(IoError::NoHeader {
                     file: file.to_owned(),

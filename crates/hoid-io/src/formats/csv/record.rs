@@ -5,6 +5,7 @@ use std::io::{self, Write};
 
 use hoid_model::Record;
 
+use super::text::harmless;
 use crate::record_columns::{channels, comments};
 
 /// Writes the record, divided by commas.
@@ -26,7 +27,7 @@ fn write(file: &mut dyn Write, record: &Record, separator: u8) -> io::Result<()>
     let mut csv = csv::WriterBuilder::new().delimiter(separator).from_writer(file);
     csv.write_field("t")?;
     for channel in &channels {
-        csv.write_field(&channel.name)?;
+        csv.write_field(harmless(&channel.name).as_bytes())?;
     }
     csv.write_record(None::<&[u8]>)?;
     let mut text = String::new();

@@ -10,7 +10,7 @@
 //! Blank lines are skipped; a byte order mark and CRLF are tolerated. The stated sample time says
 //! without rounding what t can only say up to its last digit; it counts where t agrees with it.
 
-use super::text::{comments, is_aside, place, reader, row_start, separator, text};
+use super::text::{as_meant, comments, is_aside, open_line, place, reader, row_start, separator, text};
 use crate::IoError;
 use crate::table::{Cell, Column, Source, Table, asides, check_names, check_number};
 use crate::wording::shown;
@@ -22,6 +22,8 @@ struct CsvSource<'a> {
     separator: u8,
     /// Byte at which each row starts.
     starts: Vec<usize>,
+    /// Where the last line starts, where it lacks its end.
+    open: Option<usize>,
 }
 
 impl Source for CsvSource<'_> {
@@ -45,6 +47,12 @@ impl Source for CsvSource<'_> {
             _ => String::new(),
         }
     }
+
+    fn is_open(&self, row: usize) -> bool {
+        self.open
+            .zip(self.starts.get(row))
+            .is_some_and(|(open, start)| *start >= open)
+    }
 }
 
 /// The table in the bytes of a CSV file.
@@ -60,6 +68,7 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
     let mut starts = Vec::new();
     let mut notes = Vec::new();
     let mut empty_at_end = 0;
+    let open = open_line(text);
     // The reader fails on nothing but input and output, of which there is none here.
     while matches!(reader.read_byte_record(&mut record), Ok(true)) {
         let blank = record.iter().all(|cell| cell.trim_ascii().is_empty());
@@ -71,6 +80,14 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
         if columns.is_empty() {
             columns = header(&record, file, &mut line, &mut notes)?;
             continue;
+        }
+        if record.len() < columns.len() && open.is_some_and(|open| start >= open) {
+            return Err(IoError::CutRow {
+                file: file.to_owned(),
+                place: line(),
+                found: record.len(),
+                expected: columns.len(),
+            });
         }
         if record.len() != columns.len() {
             return Err(IoError::RowLength {
@@ -114,6 +131,9 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
         return Err(IoError::NoRows { file: file.to_owned() });
     }
     let sample_time_s = asides(comments(text), &mut columns);
+    if open.is_some_and(|open| starts.last().is_some_and(|start| *start >= open)) {
+        notes.extend(cut_number(text, separator, &starts));
+    }
     Ok(Table {
         columns,
         rows: starts.len(),
@@ -123,8 +143,36 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
             text,
             separator,
             starts,
+            open,
         }),
         notes,
+    })
+}
+
+/// Lines above the last one whose numbers say how long one is.
+const COMPARED: usize = 8;
+
+/// That the last number of a file may be cut: the last line lacks its end, and its last cell is
+/// shorter by two characters or more than that of each of the [`COMPARED`] lines before, which have
+/// digits behind a point.
+fn cut_number(text: &str, separator: u8, starts: &[usize]) -> Option<String> {
+    let (last, before) = starts.split_last()?;
+    let compared = before.len().checked_sub(COMPARED)?;
+    let last_cell = |start: usize| {
+        let line = text[start..].lines().next().unwrap_or_default();
+        line.rsplit(char::from(separator)).next().unwrap_or_default().trim()
+    };
+    let cut = last_cell(*last);
+    let is_longer = |start: &usize| {
+        let cell = last_cell(*start);
+        cell.contains('.') && cell.len() > cut.len() + 1
+    };
+    before[compared..].iter().all(is_longer).then(|| {
+        format!(
+            "the file ends without the end of its last line, whose last number ({}) is shorter than those above it: it may be \
+             cut; leave that line out with --to",
+            shown(cut)
+        )
     })
 }
 
@@ -137,7 +185,7 @@ fn header(
     check_number(record.len(), file)?;
     let names: Vec<String> = record
         .iter()
-        .map(|name| String::from_utf8_lossy(name).trim().to_owned())
+        .map(|name| as_meant(String::from_utf8_lossy(name).trim()).to_owned())
         .collect();
     if names.iter().all(|name| !matches!(Cell::parse(name), Cell::Text)) {
         return Err(IoError::NoHeader {
@@ -212,6 +260,31 @@ mod tests {
         let none = parse(b"# sample_time: -1 s\nt,e\n0,1\n# units: t h\n", "run.csv").unwrap();
         assert_eq!(none.sample_time_s, None);
         assert_eq!(none.columns[0].unit, "");
+    }
+
+    #[test]
+    fn a_cut_file_is_named_as_cut() {
+        let rows: String = (0..20).map(|k| format!("{k}.00,0.12{k:02},-0.5{k:02}1\n")).collect();
+        let text = format!("t,e,u\n{rows}");
+        let notes = |text: &str| parse(text.as_bytes(), "run.csv").unwrap().notes;
+        assert!(notes(&text).is_empty());
+        // The end of the last line alone may be a habit of who wrote it.
+        assert!(notes(text.trim_end()).is_empty());
+        let found = notes(&text[..text.len() - 4]);
+        assert!(
+            found[0].contains("(-0.5)") && found[0].contains("may be cut"),
+            "{found:?}"
+        );
+        let found = message(&text.as_bytes()[..text.len() - 9]);
+        assert!(
+            found.contains("run.csv is cut in line 21, its last: 2 of 3 values"),
+            "{found}"
+        );
+        // In the middle of a file that is no cut.
+        assert!(message(b"t,e,u\n0,1\n1,2,3").contains("line 2: 2 values, expected 3"));
+        let table = parse(b"t,e,u\n0,1,2\n1,2,-", "run.csv").unwrap();
+        let error = table.bad_value(2, 1, 0..2).to_string();
+        assert!(error.contains("line 3") && error.contains("cut there"), "{error}");
     }
 
     #[test]

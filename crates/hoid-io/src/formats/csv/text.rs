@@ -1,6 +1,9 @@
 //! The text of a CSV file: its encoding, comments, separator, lines and cells.
 
+use std::borrow::Cow;
+
 use crate::IoError;
+use crate::table::Cell;
 
 pub(crate) fn text<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, IoError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
@@ -16,6 +19,38 @@ pub(crate) fn text<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, IoError> 
         let at = error.valid_up_to();
         not_text(at, format!("the byte 0x{:02X}", bytes.get(at).copied().unwrap_or(0)))
     })
+}
+
+/// Characters that make a spreadsheet run what begins with them.
+const RUN: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
+
+/// Whether a spreadsheet may run a cell: numbers and a sign alone are none of that.
+fn is_run(cell: &str) -> bool {
+    cell.starts_with(RUN) && !["-", "+"].contains(&cell) && !matches!(Cell::parse(cell), Cell::Number(_))
+}
+
+/// A text as it is written: what a spreadsheet would run has an apostrophe in front, which makes it
+/// text for spreadsheets and which [`as_meant`] takes away again.
+pub(crate) fn harmless(cell: &str) -> Cow<'_, str> {
+    if is_run(cell.trim_start_matches('\'')) {
+        Cow::Owned(format!("'{cell}"))
+    } else {
+        Cow::Borrowed(cell)
+    }
+}
+
+/// A text as it was meant, from [`harmless`].
+pub(crate) fn as_meant(cell: &str) -> &str {
+    match cell.strip_prefix('\'') {
+        Some(meant) if is_run(meant.trim_start_matches('\'')) => meant,
+        _ => cell,
+    }
+}
+
+/// Whether the last line lacks its end, and where it begins.
+pub(crate) fn open_line(text: &str) -> Option<usize> {
+    let ends = ['\n', '\r'];
+    (!text.ends_with(ends)).then(|| text.rfind(ends).map_or(0, |at| at + 1))
 }
 
 pub(crate) fn reader(bytes: &[u8], separator: u8) -> csv::Reader<&[u8]> {
@@ -75,4 +110,46 @@ pub(crate) fn place(bytes: &[u8], at: usize) -> String {
         count(b'\r')
     };
     format!("line {}", lines + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_spreadsheet_would_run_is_text_and_comes_back() {
+        for (cell, written) in [
+            ("=1+1", "'=1+1"),
+            ("+cmd|' /C calc'!A0", "'+cmd|' /C calc'!A0"),
+            ("@SUM(A1)", "'@SUM(A1)"),
+            ("-2+3", "'-2+3"),
+            ("-x", "'-x"),
+            ("\t=1", "'\t=1"),
+            ("\r=1", "'\r=1"),
+            ("'=1", "''=1"),
+        ] {
+            assert_eq!(harmless(cell), written);
+            assert_eq!(as_meant(&harmless(cell)), cell);
+        }
+        for cell in [
+            "", "-", "+", "-1.5e3", "+0.5", "-inf", "a=b", "'", "'a", "''", "x-y", " =1",
+        ] {
+            assert_eq!(harmless(cell), cell);
+            assert_eq!(as_meant(cell), cell);
+        }
+    }
+
+    #[test]
+    fn lines_that_lack_their_end() {
+        for (text, at) in [
+            ("", Some(0)),
+            ("a", Some(0)),
+            ("a\nb", Some(2)),
+            ("a\rb", Some(2)),
+            ("a\r\n", None),
+            ("a\n", None),
+        ] {
+            assert_eq!(open_line(text), at, "{text:?}");
+        }
+    }
 }

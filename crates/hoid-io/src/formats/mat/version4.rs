@@ -27,7 +27,7 @@ pub(super) fn read(bytes: &[u8], budget: &mut Budget, file: &str) -> Result<Vec<
 fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
     let header = bytes
         .get(..HEADER)
-        .ok_or_else(|| format!("it ends after {} bytes", bytes.len()))?;
+        .ok_or_else(|| format!("the file is cut: it ends after {} bytes", bytes.len()))?;
     let number = |at: usize, big_endian: bool| {
         let bytes = <[u8; 4]>::try_from(&header[4 * at..4 * at + 4]).unwrap_or_default();
         if big_endian {
@@ -58,7 +58,10 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
     }
     let count = rows.checked_mul(columns);
     let length = count.and_then(|count| count.checked_mul(kind.size() * if imaginary == 0 { 1 } else { 2 }));
-    let ends = || format!("{rows} x {columns} numbers end after {} bytes", bytes.len());
+    let ends = || {
+        let there = bytes.len();
+        format!("the file is cut, or a size is wrong: {rows} x {columns} numbers end after {there} bytes")
+    };
     let data = bytes.get(HEADER + name..).ok_or_else(ends)?;
     let (data, rest) = length
         .and_then(|length| data.split_at_checked(length))

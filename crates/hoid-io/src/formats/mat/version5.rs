@@ -85,7 +85,9 @@ struct Place<'a> {
 
 impl Reader<'_> {
     fn variable(&mut self, elements: &mut Elements<'_>) -> Result<(), Stop> {
-        let element = elements.next()?;
+        // At top level an element that goes beyond the file is what a cut leaves.
+        let cut = |found: String| format!("the file is cut, or a length is wrong: {found}");
+        let element = elements.next().map_err(cut)?;
         let top = Place {
             parent: "",
             path: "",

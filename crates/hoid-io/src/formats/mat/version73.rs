@@ -39,7 +39,12 @@ impl Reader<'_> {
     /// What the crate says: damage, or what it does not know.
     fn damaged(&self, place: &str, error: &Error) -> IoError {
         let what = error.to_string();
-        let (file, found) = (self.file.to_owned(), format!("{}: {}", told(place), told(&what)));
+        let cut = if what.contains("unexpected EOF") {
+            "the file is cut, or a length is wrong: "
+        } else {
+            ""
+        };
+        let (file, found) = (self.file.to_owned(), format!("{}: {cut}{}", told(place), told(&what)));
         match ["version", "filter", "unsupported"]
             .iter()
             .any(|word| what.to_lowercase().contains(word))

@@ -50,7 +50,10 @@ fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
     } else if bytes.len() < 12 {
         String::from("it ends behind its first bytes")
     } else if !bytes.ends_with(MAGIC) {
-        String::from("its end is missing")
+        return Err(IoError::Damaged {
+            file: file(),
+            found: String::from("it is cut, for its end is missing, which says where the columns stand"),
+        });
     } else {
         return Ok(());
     };

@@ -67,8 +67,9 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// The streams of a file that begins with its magic bytes, in the order of their headers.
-pub(super) fn streams(bytes: &[u8]) -> Result<Vec<Stream>, String> {
+/// The streams of a file that begins with its magic bytes, in the order of their headers; and where
+/// it is cut: the place of a last chunk that goes beyond the end. What stands before it is whole.
+pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), String> {
     let mut rest = Bytes {
         rest: bytes.get(4..).unwrap_or_default(),
     };
@@ -77,10 +78,14 @@ pub(super) fn streams(bytes: &[u8]) -> Result<Vec<Stream>, String> {
     while !rest.rest.is_empty() {
         let at = bytes.len() - rest.rest.len();
         let ends = || format!("the chunk at byte {at} is cut, or its length is wrong");
-        let length = rest.length().ok_or_else(ends)?;
-        let mut content = Bytes {
-            rest: rest.take(length).ok_or_else(ends)?,
+        let is_length = matches!(bytes[at], 1 | 4 | 8);
+        let Some(taken) = rest.length().and_then(|length| rest.take(length)) else {
+            if is_length && !streams.is_empty() {
+                return Ok((streams, Some(at)));
+            }
+            return Err(ends());
         };
+        let mut content = Bytes { rest: taken };
         let tag = content.array().map(u16::from_le_bytes).ok_or_else(ends)?;
         if !matches!(tag, STREAM_HEADER | SAMPLES | CLOCK_OFFSET | STREAM_FOOTER) {
             continue;
@@ -117,7 +122,7 @@ pub(super) fn streams(bytes: &[u8]) -> Result<Vec<Stream>, String> {
         };
         read.ok_or_else(|| damaged(String::from("it ends in the middle of a sample")))?;
     }
-    Ok(streams)
+    Ok((streams, None))
 }
 
 fn empty(format: &str) -> Option<Samples> {

@@ -24,11 +24,19 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
         });
     }
     let mut budget = Budget::of(bytes.len());
-    let streams = chunks::streams(bytes).map_err(|found| IoError::Damaged {
+    let (streams, cut) = chunks::streams(bytes).map_err(|found| IoError::Damaged {
         file: file.to_owned(),
         found,
     })?;
     let mut notes = Vec::new();
+    notes.extend(cut.map(|at| {
+        format!(
+            "the file is cut at byte {at} of {}: the samples before it are read, and the {} bytes behind it are not; copy the \
+             file again where its original is whole",
+            bytes.len(),
+            bytes.len() - at
+        )
+    }));
     for stream in &streams {
         stream.check_footer().map_err(|found| IoError::Damaged {
             file: file.to_owned(),
@@ -146,7 +154,9 @@ mod tests {
     #[test]
     fn the_times_of_pyxdf() {
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/xdf");
-        let streams = chunks::streams(&std::fs::read(folder.join("tracking.xdf")).unwrap()).unwrap();
+        let streams = chunks::streams(&std::fs::read(folder.join("tracking.xdf")).unwrap())
+            .unwrap()
+            .0;
         let expected = std::fs::read_to_string(folder.join("expected.csv")).unwrap();
         let mut compared = 0;
         for stream in streams {
@@ -243,10 +253,20 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_is_damaged() {
+    fn what_is_cut_is_read_up_to_there_and_said() {
         let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/xdf/tracking.xdf");
         let bytes = std::fs::read(file).unwrap();
-        let message = read(&bytes[..bytes.len() - 3], "a.xdf").unwrap_err().to_string();
+        let whole = read(&bytes, "a.xdf").unwrap();
+        assert!(!whole.notes.iter().any(|note| note.contains("is cut")));
+        for left in [bytes.len() - 3, bytes.len() / 2] {
+            let notes = read(&bytes[..left], "a.xdf").unwrap().notes;
+            assert!(
+                notes[0].contains("the file is cut at byte") && notes[0].contains("are read"),
+                "{notes:?}"
+            );
+        }
+        // Before the first stream nothing is left to use.
+        let message = read(&bytes[..20], "a.xdf").map(drop).unwrap_err().to_string();
         assert!(message.contains("a.xdf is damaged: the chunk at byte"), "{message}");
     }
 }

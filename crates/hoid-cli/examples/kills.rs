@@ -1,0 +1,316 @@
+//! Studies, groups and reproductions that are killed at random instants, or whose blocks are damaged
+//! between two kills, and then go on: are their results the same, byte for byte? The numbers of the
+//! page "Damaged inputs and kills".
+//!
+//! `cargo xtask slow kills [--kills N] [--damaged N] [--seed N] [--only study|group|reproduce]
+//! [--program FILE]`: so many kills by SIGKILL, which lets no program tidy up, and so many blocks
+//! damaged. Instants and damage come from
+//! the seed; what the program was doing at an instant depends on the machine.
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    process::{Child, Command, ExitCode, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+/// Kills of one run before it is let to its end.
+const IN_A_ROW: usize = 5;
+
+const PLAN: &str = r#"
+name = "short"
+seed = 3
+replications = 12
+block = 1
+
+[[scenarios]]
+condition = ["C1", "C2"]
+remnant.noise_level = 0.1
+
+[[estimators]]
+name = "BJ"
+method = "fit"
+structure = "bj"
+orders.nd = [1]
+"#;
+
+/// What is killed: its name, its arguments before `--out`, those behind, and whether its blocks stand
+/// in `parts/` of the directory itself.
+struct Work {
+    name: &'static str,
+    arguments: &'static [&'static str],
+    resume: &'static [&'static str],
+    has_parts: bool,
+}
+
+const WORKS: [Work; 3] = [
+    Work {
+        name: "study",
+        arguments: &["study", "run", "plan.toml", "--jobs", "1"],
+        resume: &["--resume"],
+        has_parts: true,
+    },
+    Work {
+        name: "group",
+        arguments: &["group", "people", "--jobs", "1"],
+        resume: &["--resume"],
+        has_parts: true,
+    },
+    Work {
+        name: "reproduce",
+        arguments: &[
+            "reproduce",
+            "--only",
+            "table-2,fig-3,A.1",
+            "--replications",
+            "4",
+            "--jobs",
+            "1",
+        ],
+        resume: &[],
+        has_parts: false,
+    },
+];
+
+/// SplitMix64 (Steele, Lea, Flood, 2014).
+struct Draw(u64);
+
+impl Draw {
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        (self.bits() % (n.max(1) as u64)) as usize
+    }
+
+    fn share(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+fn main() -> ExitCode {
+    let (mut kills, mut damaged, mut seed, mut program, mut only) = (200, 50, 1, beside_this(), None);
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        let mut value = || arguments.next().unwrap();
+        match argument.as_str() {
+            "--kills" => kills = value().parse().unwrap(),
+            "--damaged" => damaged = value().parse().unwrap(),
+            "--seed" => seed = value().parse().unwrap(),
+            "--only" => only = Some(value()),
+            "--program" => program = value().into(),
+            other => panic!("{other}: there is --kills, --damaged, --seed, --only and --program"),
+        }
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let bench = Bench {
+        program,
+        at: directory.path().to_owned(),
+    };
+    bench.prepare();
+    let mut draw = Draw(seed);
+    let mut failures = Vec::new();
+    for (k, work) in WORKS.iter().enumerate() {
+        if only.as_ref().is_some_and(|name| name != work.name) {
+            continue;
+        }
+        let begun = Instant::now();
+        bench.whole(work, "whole");
+        // How long a run takes depends on what else the machine does: a kill that came too late makes
+        // the next ones earlier.
+        let mut took = begun.elapsed();
+        let expected = files(&bench.place(work, "whole"));
+        // The first works take what does not divide by three.
+        let share = |all: usize, of: usize| all / of + usize::from(k < all % of);
+        let (mut killed, mut runs) = (0, 0);
+        while killed < share(kills, 3) {
+            runs += 1;
+            let name = format!("killed-{runs}");
+            for _ in 0..IN_A_ROW.min(share(kills, 3) - killed) {
+                let child = bench.start(work, &name);
+                let hit = kill(child, took.mul_f64(draw.share()));
+                killed += usize::from(hit);
+                if !hit {
+                    took = took.mul_f64(0.8);
+                    break;
+                }
+            }
+            let begun = Instant::now();
+            bench.whole(work, &name);
+            took = took.max(begun.elapsed());
+            compare(
+                &expected,
+                &bench.place(work, &name),
+                &format!("{} {name}", work.name),
+                &mut failures,
+            );
+            fs::remove_dir_all(bench.place(work, &name)).unwrap();
+        }
+        let mut hit = 0;
+        let mut tries = 0;
+        while work.has_parts && hit < share(damaged, 2) {
+            tries += 1;
+            let name = format!("damaged-{tries}");
+            let child = bench.start(work, &name);
+            if !kill(child, took.mul_f64(0.1 + 0.8 * draw.share())) {
+                took = took.mul_f64(0.8);
+            }
+            let what = damage(&bench.place(work, &name).join("parts"), &mut draw);
+            hit += usize::from(what.is_some());
+            bench.whole(work, &name);
+            let told = format!("{} {name} ({})", work.name, what.unwrap_or("no block yet"));
+            compare(&expected, &bench.place(work, &name), &told, &mut failures);
+            fs::remove_dir_all(bench.place(work, &name)).unwrap();
+        }
+        println!(
+            "{}: {killed} kills over {runs} runs, {hit} blocks damaged in {tries}; {} files compared each, {} failures so far",
+            work.name,
+            expected.len(),
+            failures.len()
+        );
+    }
+    failures.iter().for_each(|failure| println!("{failure}"));
+    if failures.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    }
+}
+
+/// The program, in a directory.
+struct Bench {
+    program: PathBuf,
+    at: PathBuf,
+}
+
+impl Bench {
+    /// The plan, and the recordings of a group.
+    fn prepare(&self) {
+        fs::write(self.at.join("plan.toml"), PLAN).unwrap();
+        let mut simulate = Command::new(&self.program);
+        simulate.args(["simulate-group", "--subjects", "2", "--conditions", "C1", "--runs", "1"]);
+        simulate.args(["--noise-level", "0.05", "--out", "people"]);
+        let done = simulate.current_dir(&self.at).stdout(Stdio::null()).status().unwrap();
+        assert!(done.success(), "simulate-group: {done}");
+    }
+
+    fn place(&self, work: &Work, name: &str) -> PathBuf {
+        self.at.join(format!("{}-{name}", work.name))
+    }
+
+    fn start(&self, work: &Work, name: &str) -> Child {
+        let mut command = Command::new(&self.program);
+        command
+            .args(work.arguments)
+            .args(work.resume)
+            .arg("--out")
+            .arg(self.place(work, name));
+        command
+            .current_dir(&self.at)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
+        command.spawn().unwrap()
+    }
+
+    /// Runs to the end.
+    fn whole(&self, work: &Work, name: &str) {
+        let status = self.start(work, name).wait().unwrap();
+        assert!(status.success(), "{} {name}: {status}", work.name);
+    }
+}
+
+/// True where the process was still at work.
+fn kill(mut child: Child, after: Duration) -> bool {
+    thread::sleep(after);
+    let _ = child.kill();
+    !child.wait().unwrap().success()
+}
+
+/// Damages one file of a block; what was done, or none where there is no block yet.
+fn damage(parts: &Path, draw: &mut Draw) -> Option<&'static str> {
+    let mut all: Vec<PathBuf> = fs::read_dir(parts).ok()?.map(|entry| entry.unwrap().path()).collect();
+    all.retain(|path| !path.file_name().unwrap().to_str().unwrap().starts_with('.') && path.is_file());
+    all.sort();
+    if all.is_empty() {
+        return None;
+    }
+    let path = &all[draw.below(all.len())];
+    let mut bytes = fs::read(path).unwrap();
+    let what = match draw.below(5) {
+        0 if !bytes.is_empty() => {
+            let at = draw.below(bytes.len());
+            bytes[at] ^= 1 << draw.below(8);
+            "a bit"
+        }
+        1 => {
+            bytes.truncate(draw.below(bytes.len()));
+            "cut"
+        }
+        2 => {
+            bytes = fs::read(&all[draw.below(all.len())]).unwrap();
+            "another file in its place"
+        }
+        3 => {
+            fs::remove_file(path).unwrap();
+            return Some("removed");
+        }
+        _ => {
+            bytes.clear();
+            "emptied"
+        }
+    };
+    fs::write(path, bytes).unwrap();
+    Some(what)
+}
+
+/// All files below a directory, by their paths. The page of a reproduction says how long its studies
+/// took, which is the one thing that differs.
+fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut open = vec![directory.to_owned()];
+    while let Some(folder) = open.pop() {
+        for entry in fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                open.push(path);
+                continue;
+            }
+            let mut bytes = fs::read(&path).unwrap();
+            if path.ends_with("index.html") {
+                let text = String::from_utf8(bytes).unwrap();
+                let timed = |line: &&str| !line.starts_with("<tr><th>") || !line.contains("studies/");
+                bytes = text.lines().filter(timed).collect::<Vec<_>>().join("\n").into_bytes();
+            }
+            found.insert(path.strip_prefix(directory).unwrap().to_owned(), bytes);
+        }
+    }
+    found
+}
+
+fn compare(expected: &BTreeMap<PathBuf, Vec<u8>>, directory: &Path, what: &str, failures: &mut Vec<String>) {
+    let found = files(directory);
+    for path in expected.keys().chain(found.keys()) {
+        match (expected.get(path), found.get(path)) {
+            (Some(a), Some(b)) if a == b => {}
+            (Some(_), Some(_)) => failures.push(format!("{what}: {} differs", path.display())),
+            (Some(_), None) => failures.push(format!("{what}: {} is missing", path.display())),
+            _ => failures.push(format!("{what}: {} is left over", path.display())),
+        }
+    }
+}
+
+/// The program that is built beside this example.
+fn beside_this() -> PathBuf {
+    let mut path = std::env::current_exe().unwrap();
+    path.pop();
+    path.pop();
+    path.join(format!("hoid{}", std::env::consts::EXE_SUFFIX))
+}

@@ -1,0 +1,157 @@
+//! Files as they should not be: cut, with decimal commas, without units, with cells that a
+//! spreadsheet would run.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::{
+    fs,
+    io::Write,
+    path::Path,
+    process::{Command, Stdio},
+};
+
+use tempfile::TempDir;
+
+use common::{bad, good, hoid};
+
+/// A simulated run as text.
+fn run(directory: &Path) -> String {
+    good(directory, &["simulate", "--condition", "C1", "--out", "c1.csv"]);
+    fs::read_to_string(directory.join("c1.csv")).unwrap()
+}
+
+#[test]
+fn a_decimal_comma_is_explained_wherever_the_file_is_read() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    fs::write(d.join("comma.csv"), "t;e;u\n0,00;1,5;2,5\n0,01;1,6;2,6\n").unwrap();
+    let told = good(d, &["info", "comma.csv"]);
+    assert!(told.contains("decimal point instead of a comma"), "{told}");
+    assert!(
+        told.contains("column e, line 2: \"1,5\" is text, 2 of 2 cells"),
+        "{told}"
+    );
+    let (_, message) = bad(d, &["identify", "comma.csv"]);
+    assert!(message.contains("decimal point instead of a comma"), "{message}");
+}
+
+#[test]
+fn cut_files_are_named_as_cut() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    let text = run(d);
+    fs::write(d.join("cut.csv"), &text[..text.len() - 60]).unwrap();
+    let (_, message) = bad(d, &["identify", "cut.csv"]);
+    assert!(
+        message.contains("cut.csv is cut in line") && message.contains("remove that line"),
+        "{message}"
+    );
+    for extension in ["parquet", "mat"] {
+        let (whole, cut) = (format!("c1.{extension}"), format!("cut.{extension}"));
+        good(d, &["simulate", "--condition", "C1", "--out", &whole]);
+        let bytes = fs::read(d.join(&whole)).unwrap();
+        fs::write(d.join(&cut), &bytes[..bytes.len() / 2]).unwrap();
+        let (_, message) = bad(d, &["info", &cut]);
+        assert!(message.contains("is cut"), "{message}");
+    }
+    let xdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/xdf/tracking.xdf");
+    let bytes = fs::read(xdf).unwrap();
+    fs::write(d.join("cut.xdf"), &bytes[..bytes.len() / 2]).unwrap();
+    let told = good(d, &["info", "cut.xdf"]);
+    assert!(told.contains("the file is cut at byte"), "{told}");
+}
+
+#[test]
+fn gains_without_units_are_not_in_degrees() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    let text = run(d);
+    let identify = [
+        "identify",
+        "run.csv",
+        "--structure",
+        "bj",
+        "--nk",
+        "29",
+        "--orders",
+        "nd=1",
+    ];
+    for (units, said) in [
+        ("# units: t s, e deg, u deg\n", None),
+        ("# units: t s, e deg, u V\n", Some("K_e is in V/deg")),
+        ("", Some("no unit is given for e and u")),
+        ("# units: e deg\n", Some("no unit is given for u")),
+    ] {
+        let rest: String = text.lines().skip(1).map(|line| format!("{line}\n")).collect();
+        fs::write(d.join("run.csv"), format!("{units}{rest}")).unwrap();
+        let output = hoid(d, &identify);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        match said {
+            Some(said) => assert!(message.contains(said), "{units}: {message}"),
+            None => assert!(!message.contains("K_e is in"), "{message}"),
+        }
+    }
+}
+
+#[test]
+fn a_subject_that_a_spreadsheet_would_run_is_text_in_every_table() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    good(
+        d,
+        &[
+            "simulate-group",
+            "--subjects",
+            "1",
+            "--conditions",
+            "C1",
+            "--runs",
+            "1",
+            "--out",
+            "h",
+        ],
+    );
+    let manifest = d.join("h/group.toml");
+    let text = fs::read_to_string(&manifest).unwrap();
+    assert!(text.contains("\"S1\""), "{text}");
+    fs::write(&manifest, text.replace("\"S1\"", "\"=1+1\"")).unwrap();
+    good(d, &["group", "h", "--out", "results"]);
+    let mut found = 0;
+    for entry in fs::read_dir(d.join("results")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|extension| extension == "csv") {
+            let text = fs::read_to_string(&path).unwrap();
+            found += text.matches("'=1+1").count();
+            assert_eq!(
+                text.matches("=1+1").count(),
+                text.matches("'=1+1").count(),
+                "{}",
+                path.display()
+            );
+        }
+    }
+    assert!(found > 0, "no table names the subject");
+}
+
+#[test]
+fn a_stream_at_another_rate_is_told_once() {
+    let mut stream = Command::new(env!("CARGO_BIN_EXE_hoid"))
+        .args([
+            "stream", "--fs", "100", "--method", "rpem", "--nk", "29", "--orders", "nd=1", "--start", "nothing",
+        ])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut input = stream.stdin.take().unwrap();
+    for k in 0..2000 {
+        let t = 0.02 * f64::from(k);
+        writeln!(input, "{t},{},{}", (1.7 * t).sin(), 0.1 * (1.7 * t - 0.8).sin()).unwrap();
+    }
+    drop(input);
+    let said = String::from_utf8(stream.wait_with_output().unwrap().stderr).unwrap();
+    assert_eq!(said.matches("warning").count(), 1, "{said}");
+    assert!(said.contains("the times go at 50.0000 Hz"), "{said}");
+}

@@ -1,0 +1,34 @@
+//! Numbers that look like chance: SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom
+//! number generators", 2014). Each case has a sequence of its own, so that one can be made again
+//! without those before it.
+
+/// A sequence.
+pub struct Draw(u64);
+
+impl Draw {
+    /// The sequence of a case.
+    pub fn new(seed: u64, number: u64) -> Self {
+        let mut draw = Self(seed);
+        let start = draw.bits() ^ number.wrapping_mul(0xd134_2543_de82_ef95);
+        Self(start)
+    }
+
+    /// 64 bits.
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A whole number below `n`; 0 where there is none.
+    pub fn below(&mut self, n: usize) -> usize {
+        (self.bits() % (n.max(1) as u64)) as usize
+    }
+
+    /// One of some.
+    pub fn one_of<'a, T>(&mut self, of: &'a [T]) -> &'a T {
+        &of[self.below(of.len())]
+    }
+}

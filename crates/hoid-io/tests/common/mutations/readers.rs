@@ -1,0 +1,107 @@
+//! All readers over one file, and what must hold: a record is even, finite and not longer than the
+//! file gives reason for; an error names the file, is short, and holds nothing that a terminal
+//! obeys.
+
+use std::path::Path;
+
+use hoid_io::{
+    IoError, Preparation, QualityIssueKind, ReadOptions, ReadRecord, Repair, read_prepared, read_segments, read_table,
+    survey,
+};
+
+use super::draw::Draw;
+
+/// Characters that a message may have.
+const LONGEST_MESSAGE: usize = 4000;
+/// Samples that a byte of a file may give: `--resample` makes some out of one.
+const SAMPLES_PER_BYTE: usize = 200;
+
+/// How often something was read and refused.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Answers {
+    pub read: u64,
+    pub refused: u64,
+}
+
+/// Gives a file to all readers.
+///
+/// # Panics
+/// Where what must hold does not.
+pub fn all(path: &Path, bytes: usize, choice: u64) -> Answers {
+    let mut answers = Answers::default();
+    let mut draw = Draw::new(choice, 0);
+    let file = path.file_name().unwrap().to_str().unwrap();
+    let mut take = |failed: Option<IoError>| match failed {
+        None => answers.read += 1,
+        Some(error) => {
+            answers.refused += 1;
+            message(&error, file);
+        }
+    };
+    for options in [ReadOptions::default(), options(&mut draw)] {
+        let read = read_prepared(path, &options, &Preparation::default());
+        take(read.map(|read| whole(&read, bytes, &options)).err());
+    }
+    let mask = [*draw.one_of(&QualityIssueKind::MASKABLE)];
+    let read = read_segments(path, &options(&mut draw), &Preparation::default(), &mask, 0.02);
+    take(read.map(|all| all.iter().for_each(finite)).err());
+    take(survey(path).map(|found| assert!(!found.format.is_empty())).err());
+    take(
+        read_table(path)
+            .map(|table| {
+                let rows = table.columns.first().map_or(0, |column| column.values.len());
+                assert!(
+                    table.columns.iter().all(|column| column.values.len() == rows),
+                    "a ragged table"
+                );
+            })
+            .err(),
+    );
+    answers
+}
+
+fn options(draw: &mut Draw) -> ReadOptions {
+    let input = *draw.one_of(&["e", "e", "e", "r-y", "-e", "s1.e"]);
+    let output = *draw.one_of(&["u", "u", "u", "y", "-u", "s1.u"]);
+    ReadOptions {
+        input: (draw.below(8) > 0).then(|| input.parse().unwrap()),
+        output: output.parse().unwrap(),
+        sampling_hz: [None, None, Some(100.0), Some(1e-6), Some(1e6)][draw.below(5)],
+        span_s: [(None, None), (Some(0.005), Some(0.025)), (Some(-1e300), Some(1e300))][draw.below(3)],
+        repair: Repair {
+            resample: draw.below(2) == 0,
+            fill: draw.below(2) == 0,
+        },
+    }
+}
+
+fn whole(read: &ReadRecord, bytes: usize, options: &ReadOptions) {
+    finite(read);
+    let record = &read.record;
+    assert!(record.sample_time().s() > 0.0 && record.sample_time().s().is_finite());
+    // Compressed zeros take next to nothing.
+    let most = SAMPLES_PER_BYTE * bytes + (1 << 25);
+    assert!(record.len() <= most, "{} samples of {bytes} bytes", record.len());
+    assert!(!record.is_empty(), "an empty record by {options:?}");
+}
+
+fn finite(read: &ReadRecord) {
+    let record = &read.record;
+    assert!(
+        record.input().iter().chain(record.output()).all(|v| v.is_finite()),
+        "a value that is not finite"
+    );
+}
+
+fn message(error: &IoError, file: &str) {
+    let message = error.to_string();
+    assert!(!matches!(error, IoError::Unreadable { .. }), "{message}");
+    assert!(
+        message.chars().count() <= LONGEST_MESSAGE,
+        "{} characters: {message}",
+        message.len()
+    );
+    assert!(!message.chars().any(char::is_control), "{message:?}");
+    let of_options = matches!(error, IoError::SamplingFrequency { .. } | IoError::Expression { .. });
+    assert!(of_options || message.contains(file), "{file} is not named: {message}");
+}

@@ -1,0 +1,60 @@
+//! A sample of the damaged files of `cargo xtask slow mutations`: no reader panics, and what it gives
+//! is whole.
+#![allow(clippy::unwrap_used)]
+
+// The command uses the rest of it.
+#[allow(dead_code)]
+#[path = "common/mutations/mod.rs"]
+mod mutations;
+
+use std::fs;
+
+use mutations::{case, originals::originals, readers};
+
+/// Not that of the page.
+const SEED: u64 = 5;
+const CASES: u64 = 2000;
+
+#[test]
+fn damaged_files_are_read_or_refused() {
+    let originals = originals();
+    let directory = tempfile::tempdir().unwrap();
+    let (mut read, mut refused) = (0, 0);
+    for number in 0..CASES {
+        let case = case(&originals, SEED, number);
+        let path = directory.path().join(format!("{number}.{}", case.extension));
+        fs::write(&path, &case.bytes).unwrap();
+        let answers = readers::all(&path, case.bytes.len(), case.choice);
+        read += answers.read;
+        refused += answers.refused;
+        fs::remove_file(&path).unwrap();
+    }
+    // Neither the good files nor the damage are too small to say anything.
+    assert!(read > CASES / 2 && refused > CASES, "{read} read, {refused} refused");
+}
+
+#[test]
+fn a_case_is_the_same_again_and_good_files_are_read() {
+    let originals = originals();
+    for number in 0..50 {
+        assert_eq!(
+            case(&originals, SEED, number).bytes,
+            case(&originals, SEED, number).bytes
+        );
+    }
+    let directory = tempfile::tempdir().unwrap();
+    for original in &originals {
+        let path = directory.path().join("good").with_extension(original.extension);
+        fs::write(&path, &original.bytes).unwrap();
+        let answers = readers::all(&path, original.bytes.len(), 1);
+        assert!(answers.read > 0, "{}", original.name);
+        if let Some(inside) = &original.inside {
+            fs::write(&path, inside.packed()).unwrap();
+            assert!(
+                readers::all(&path, original.bytes.len(), 1).read > 0,
+                "{} packed",
+                original.name
+            );
+        }
+    }
+}

@@ -1,0 +1,247 @@
+//! Plans of studies, manifests of groups and scenarios whose text was changed: read or refused in
+//! words that name the file, and never a panic; what is read can be read again.
+#![allow(clippy::unwrap_used)]
+
+use std::{fs, path::Path};
+
+use hoid_io::parse_any_scenario;
+use hoid_study::{Plan, group::Manifest};
+use proptest::{collection::vec, prelude::*, sample::Index, test_runner::RngSeed};
+
+const PLAN: &str = r#"
+name = "short"
+title = "A plan"
+description = """
+Two lines."""
+seed = 3
+replications = 40
+block = 2
+
+[keep]
+changes = true
+standard_errors = false
+
+[[scenarios]]
+name = "all"
+condition = ["C1", "C2"]
+realisation = "output"
+remnant.noise_level = [0.1, 0.2]
+remnant.order = 2
+
+[[scenarios]]
+condition = "C6"
+last.T_L_s = 0.8
+schedule.rate_per_s = 100
+schedule.midpoint_s = 40.96
+tau_e_s = [0.25, 0.31]
+
+[[estimators]]
+name = "BJ"
+method = "fit"
+structure = "bj"
+orders.nd = [1, 2]
+
+[[estimators]]
+name = "recursion"
+method = "physical"
+scenarios = ["all"]
+orders.nk = 29
+memory = 256
+start_span_s = [0.0, 30.72]
+track_delay_s = [0.2, 0.4]
+"#;
+
+const MANIFEST: &str = r#"
+name = "tracking"
+
+[read]
+input = "r-y"
+output = "u"
+from_s = 5.0
+to_s = 45.0
+
+[prepare]
+offset = { u = 1 }
+
+[analysis]
+windows_s = [[5.0, 25.0], [25.0, 45.0]]
+nd = [1, 4]
+methods = ["rls", "rpem"]
+
+[conditions.fo]
+controlled_element = "1/1,0"
+excitation = "d"
+
+[[runs]]
+file = "P03_fo_03.csv"
+subject = "P03"
+condition = "fo"
+run = "3"
+counts = true
+
+[[runs]]
+file = "P04_fo_01.csv"
+subject = "P04"
+condition = "fo"
+run = "1"
+"#;
+
+/// Values that stand where others belong.
+const VALUES: [&str; 30] = [
+    "",
+    "0",
+    "-1",
+    "1e308",
+    "-1e308",
+    "1e-320",
+    "inf",
+    "-inf",
+    "nan",
+    "true",
+    "\"\"",
+    "\"C1\"",
+    "\"../../etc/passwd\"",
+    "\"\\u001b[31m\"",
+    "[]",
+    "[[]]",
+    "[1, 2, 3]",
+    "[0.0, 1e300]",
+    "[\"C1\", \"C1\"]",
+    "{}",
+    "{ u = 1 }",
+    "9223372036854775807",
+    "18446744073709551615",
+    "99999999999999999999",
+    "1979-05-27",
+    "'''",
+    "\"\"\"",
+    "0x7fffffffffffffff",
+    "[[[[[[[[[[[[[[[[[[[[",
+    "\"1/0\"",
+];
+const CHARACTERS: [char; 14] = [
+    '[', ']', '{', '}', '"', '\'', '=', '.', ',', '#', '\n', '\0', '\u{1b}', '\u{fffd}',
+];
+
+/// What is done to a text.
+#[derive(Debug, Clone)]
+enum Change {
+    Value(Index, Index),
+    Grow(Index, usize),
+    Remove(Index),
+    Repeat(Index, Index),
+    Swap(Index, Index),
+    Insert(Index, char),
+    Cut(Index),
+}
+
+fn change() -> impl Strategy<Value = Change> {
+    let at = any::<Index>;
+    prop_oneof![
+        6 => (at(), at()).prop_map(|(line, value)| Change::Value(line, value)),
+        1 => (at(), 2..3000_usize).prop_map(|(line, n)| Change::Grow(line, n)),
+        2 => at().prop_map(Change::Remove),
+        2 => (at(), at()).prop_map(|(line, to)| Change::Repeat(line, to)),
+        2 => (at(), at()).prop_map(|(a, b)| Change::Swap(a, b)),
+        3 => (at(), proptest::sample::select(&CHARACTERS[..])).prop_map(|(at, c)| Change::Insert(at, c)),
+        1 => at().prop_map(Change::Cut),
+    ]
+}
+
+fn changed(text: &str, by: &[Change]) -> String {
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    for one in by {
+        let n = lines.len();
+        if n == 0 {
+            break;
+        }
+        match one {
+            Change::Value(line, value) => {
+                let line = &mut lines[line.index(n)];
+                let key = line.split('=').next().unwrap_or_default().to_owned();
+                *line = format!("{key}= {}", value.get(&VALUES));
+            }
+            // A list of many values multiplies the cells of a plan.
+            Change::Grow(line, times) => {
+                let line = &mut lines[line.index(n)];
+                let key = line.split('=').next().unwrap_or_default().to_owned();
+                let values: Vec<String> = (0..*times).map(|k| k.to_string()).collect();
+                *line = format!("{key}= [{}]", values.join(", "));
+            }
+            Change::Remove(line) => {
+                lines.remove(line.index(n));
+            }
+            Change::Repeat(line, to) => {
+                let copy = lines[line.index(n)].clone();
+                lines.insert(to.index(n), copy);
+            }
+            Change::Swap(a, b) => lines.swap(a.index(n), b.index(n)),
+            Change::Insert(at, character) => {
+                let line = &mut lines[at.index(n)];
+                let places: Vec<usize> = line.char_indices().map(|(place, _)| place).collect();
+                let place = if places.is_empty() { 0 } else { *at.get(&places) };
+                line.insert(place, *character);
+            }
+            Change::Cut(at) => lines.truncate(at.index(n)),
+        }
+    }
+    lines.join("\n")
+}
+
+/// A message names its file, is short, and holds nothing that a terminal obeys.
+fn message(said: &str) -> Result<(), TestCaseError> {
+    prop_assert!(said.contains("made-up.toml"), "{}", said);
+    prop_assert!(said.chars().count() < 4000, "{} characters", said.len());
+    let obeyed = |c: char| c.is_control() && c != '\n';
+    prop_assert!(!said.chars().any(obeyed), "{:?}", said);
+    Ok(())
+}
+
+fn fixture(name: &str) -> String {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/scenario");
+    fs::read_to_string(folder.join(name)).unwrap()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, rng_seed: RngSeed::Fixed(22), ..ProptestConfig::with_cases(150) })]
+
+    #[test]
+    fn plans(by in vec(change(), 0..5)) {
+        match Plan::parse(&changed(PLAN, &by), "made-up.toml") {
+            Err(error) => message(&error.to_string())?,
+            Ok(plan) => {
+                let again = Plan::parse(plan.text(), "made-up.toml").unwrap();
+                prop_assert_eq!(again.hash(), plan.hash());
+                prop_assert!(plan.estimates() > 0 && plan.estimates() <= 10_000_000_000);
+            }
+        }
+    }
+
+    #[test]
+    fn manifests(by in vec(change(), 0..5)) {
+        match Manifest::parse(&changed(MANIFEST, &by), "made-up.toml") {
+            Err(error) => message(&error.to_string())?,
+            Ok(manifest) => {
+                let text = toml::to_string(&manifest).unwrap();
+                prop_assert_eq!(Manifest::parse(&text, "made-up.toml").unwrap(), manifest);
+            }
+        }
+    }
+
+    #[test]
+    fn scenarios(of_a_person in any::<bool>(), by in vec(change(), 0..5)) {
+        let text = fixture(if of_a_person { "person.toml" } else { "full.toml" });
+        if let Err(error) = parse_any_scenario(&changed(&text, &by), "made-up.toml", "made-up") {
+            message(&error.to_string())?;
+        }
+    }
+}
+
+#[test]
+fn the_texts_are_good_before_they_are_changed() {
+    Plan::parse(PLAN, "plan.toml").unwrap();
+    Manifest::parse(MANIFEST, "group.toml").unwrap();
+    for name in ["person.toml", "full.toml"] {
+        parse_any_scenario(&fixture(name), name, "made-up").unwrap();
+    }
+}

@@ -1,0 +1,69 @@
+//! The seal of saved numbers: a sum over all of them behind the last, by which numbers that were
+//! changed, cut or mixed up since are refused.
+//!
+//! A state that is only nearly right is worse than none: a place in a ring that lies outside ends the
+//! process, a covariance that is not one gives small error bars. The sum is FNV-1a (Fowler, Noll, Vo,
+//! 1991; offset basis and prime of 64 bits) over the bits of the numbers in their order, its upper 53
+//! bits as a whole number, which every way of writing an f64 keeps. All NaN count as one, for
+//! languages do not keep their bits. It guards against damage, not against an adversary, who can
+//! compute it too.
+
+const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
+const PRIME: u64 = 0x0000_0100_0000_01b3;
+/// Bits of a whole number that f64 holds.
+const KEPT: u32 = 53;
+
+/// The numbers and their seal.
+pub(crate) fn sealed(mut numbers: Vec<f64>) -> Vec<f64> {
+    numbers.push(seal(&numbers));
+    numbers
+}
+
+/// The numbers before their seal; none where it is another.
+pub(crate) fn opened(sealed: &[f64]) -> Option<&[f64]> {
+    let (stated, numbers) = sealed.split_last()?;
+    (stated.to_bits() == seal(numbers).to_bits()).then_some(numbers)
+}
+
+fn seal(numbers: &[f64]) -> f64 {
+    let bits = |number: &f64| {
+        if number.is_nan() {
+            f64::NAN.to_bits()
+        } else {
+            number.to_bits()
+        }
+    };
+    let bytes = numbers.iter().flat_map(|number| bits(number).to_le_bytes());
+    let sum = bytes.fold(BASIS, |sum, byte| (sum ^ u64::from(byte)).wrapping_mul(PRIME));
+    (sum >> (u64::BITS - KEPT)) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn the_seal_is_fnv_1a() {
+        // The published sum of no bytes is the basis; that of eight zero bytes follows by hand.
+        assert_eq!(sealed(Vec::new()), [(BASIS >> 11) as f64]);
+        let eight = (0..8).fold(BASIS, |sum, _| sum.wrapping_mul(PRIME));
+        assert_eq!(sealed(vec![0.0])[1], (eight >> 11) as f64);
+    }
+
+    #[test]
+    fn what_was_sealed_opens_and_nothing_else() {
+        let numbers = vec![1.0, -0.0, f64::NAN, f64::INFINITY, 5e-324];
+        let whole = sealed(numbers.clone());
+        assert_eq!(opened(&whole).unwrap().len(), numbers.len());
+        let mut other = whole.clone();
+        other[2] = -f64::NAN;
+        assert!(opened(&other).is_some(), "NaN is NaN");
+        other[1] = 0.0;
+        assert!(opened(&other).is_none());
+        other = whole.clone();
+        other.swap(0, 3);
+        assert!(opened(&other).is_none());
+        assert!(opened(&whole[1..]).is_none() && opened(&whole[..5]).is_none() && opened(&[]).is_none());
+    }
+}

@@ -1,0 +1,334 @@
+//! What the crates of the workspace may bring with them, by `cargo metadata`: licences, crates that
+//! are not wanted, one version of each, and not more of them than there are reasons for.
+//!
+//! An expression of licences is one of SPDX (Annex D: `OR` binds less than `AND`, that less than
+//! `WITH`), with the `/` of older manifests for `OR`. Advisories need the network and are looked at
+//! by the hosted workflows.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::Value;
+
+use crate::process::{cargo_command, output};
+
+/// Licences under which hoid can be handed on as `MIT OR Apache-2.0` is.
+const ALLOWED: [&str; 11] = [
+    "0BSD",
+    "Apache-2.0",
+    "Apache-2.0 WITH LLVM-exception",
+    "BSD-2-Clause",
+    "BSD-3-Clause",
+    "BSL-1.0",
+    "CC0-1.0",
+    "MIT",
+    "Unicode-3.0",
+    "Unlicense",
+    "Zlib",
+];
+
+/// Crates that are not wanted, by name or by the beginning of a name that ends with `*`, and why.
+const BANNED: [(&str, &str); 16] = [
+    (
+        "*-sys",
+        "it links a library that is not Rust: hoid builds with cargo alone, everywhere",
+    ),
+    ("cmake", "hoid builds with cargo alone"),
+    ("bindgen", "hoid builds with cargo alone"),
+    ("openssl", "nothing of hoid speaks to a network"),
+    ("native-tls", "nothing of hoid speaks to a network"),
+    ("rustls", "nothing of hoid speaks to a network"),
+    ("reqwest", "nothing of hoid speaks to a network"),
+    ("hyper", "nothing of hoid speaks to a network"),
+    ("tokio", "nothing of hoid waits for a network"),
+    ("arrow*", "Parquet is read without it, in a fifth of the time to build"),
+    ("hdf5", "it links the C library; hdf5-pure reads .mat 7.3"),
+    ("ndarray", "nalgebra is the one crate of matrices"),
+    ("serde_yaml", "it is not maintained; TOML and JSON are what hoid reads"),
+    ("atty", "it is not maintained; std::io::IsTerminal"),
+    ("ansi_term", "it is not maintained"),
+    ("lazy_static", "std::sync::OnceLock and LazyLock"),
+];
+/// Those of [`BANNED`] that are here all the same, and why.
+const TOLERATED: [(&str, &str); 5] = [
+    ("core-foundation-sys", "the system of macOS"),
+    ("js-sys", "the browser, which hoid is not built for"),
+    ("linux-raw-sys", "numbers of Linux, nothing to link"),
+    ("windows-sys", "the system of Windows"),
+    (
+        "ndarray",
+        "arrays of Python are handed over by it, in hoid-python alone",
+    ),
+];
+
+/// Crates of which several versions are here, and what asks for the older ones. Each is built twice.
+const SEVERAL: [(&str, usize, &str); 5] = [
+    ("getrandom", 3, "const-random and ahash, of parquet"),
+    (
+        "glam",
+        4,
+        "options of nalgebra, none of which is on: named by the lock file, not built",
+    ),
+    ("num-bigint", 2, "an option of parquet, not built"),
+    ("r-efi", 2, "the versions of getrandom, on UEFI alone"),
+    ("syn", 2, "zerocopy and windows-core, and the test of imports"),
+];
+
+/// The tree of `hoid-cli` on Linux, its own crates included: another crate needs a reason, and a
+/// line in the table of dependencies of ARCHITECTURE.md.
+const MOST_CRATES: usize = 146;
+
+/// Checks all of it.
+pub fn check() -> Result<(), String> {
+    let mut metadata = cargo_command();
+    metadata.args(["metadata", "--format-version", "1", "--locked"]);
+    let metadata: Value = serde_json::from_str(&output(&mut metadata)?)
+        .map_err(|error| format!("cargo metadata gives no JSON: {error}"))?;
+    let packages = packages(&metadata);
+    if packages.is_empty() {
+        return Err(String::from("cargo metadata names no packages"));
+    }
+    let mut wrong = Vec::new();
+    wrong.extend(packages.iter().filter_map(licence_of));
+    wrong.extend(packages.iter().filter_map(ban_of));
+    wrong.extend(several(&packages));
+    let mut tree = cargo_command();
+    tree.args(["tree", "--locked", "-p", "hoid-cli", "-e", "normal", "--prefix", "none"])
+        .args(["--target", "x86_64-unknown-linux-gnu", "--format", "{p}"]);
+    let tree = output(&mut tree)?;
+    let crates: BTreeSet<&str> = tree.lines().map(|line| line.trim_end_matches(" (*)")).collect();
+    if crates.len() > MOST_CRATES {
+        wrong.push(format!(
+            "hoid-cli is built of {} crates, expected at most {MOST_CRATES}: leave one out, or raise MOST_CRATES in \
+             xtask/src/crates.rs with the reason in ARCHITECTURE.md",
+            crates.len()
+        ));
+    }
+    if wrong.is_empty() {
+        println!(
+            "{} crates in all, {} in hoid-cli: licences, bans and versions are as stated",
+            packages.len(),
+            crates.len()
+        );
+        return Ok(());
+    }
+    Err(format!(
+        "{}\n(the rules stand in xtask/src/crates.rs)",
+        wrong.join("\n")
+    ))
+}
+
+/// A crate that is not of the workspace.
+struct Package {
+    name: String,
+    version: String,
+    licence: Option<String>,
+    source: String,
+}
+
+fn packages(metadata: &Value) -> Vec<Package> {
+    let text = |value: &Value| value.as_str().map(str::to_owned);
+    let package = |value: &Value| {
+        Some(Package {
+            name: text(&value["name"])?,
+            version: text(&value["version"])?,
+            licence: text(&value["license"]),
+            // Those of the workspace have none.
+            source: text(&value["source"])?,
+        })
+    };
+    let all = metadata["packages"].as_array();
+    all.into_iter().flatten().filter_map(package).collect()
+}
+
+/// What is wrong with where a crate comes from and its licence.
+fn licence_of(package: &Package) -> Option<String> {
+    let Package {
+        name, version, source, ..
+    } = package;
+    if !source.starts_with("registry+https://github.com/rust-lang/crates.io-index") {
+        return Some(format!("{name} {version} comes from {source}, expected crates.io"));
+    }
+    let Some(licence) = &package.licence else {
+        return Some(format!(
+            "{name} {version} states no licence by name: take another crate"
+        ));
+    };
+    match allows(licence) {
+        Some(true) => None,
+        Some(false) => Some(format!(
+            "{name} {version} is under {licence}, expected {}: take another crate",
+            ALLOWED.join(", ")
+        )),
+        None => Some(format!("{name} {version}: {licence:?} is no expression of licences")),
+    }
+}
+
+/// Whether an expression lets hoid hand the crate on; none where it cannot be read.
+fn allows(expression: &str) -> Option<bool> {
+    let spaced = expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
+    let words: Vec<&str> = spaced.split_whitespace().collect();
+    let mut rest = words.as_slice();
+    let allowed = either(&mut rest)?;
+    rest.is_empty().then_some(allowed)
+}
+
+fn either(rest: &mut &[&str]) -> Option<bool> {
+    let mut allowed = both(rest)?;
+    while take(rest, "OR") {
+        allowed |= both(rest)?;
+    }
+    Some(allowed)
+}
+
+fn both(rest: &mut &[&str]) -> Option<bool> {
+    let mut allowed = one(rest)?;
+    while take(rest, "AND") {
+        allowed &= one(rest)?;
+    }
+    Some(allowed)
+}
+
+fn one(rest: &mut &[&str]) -> Option<bool> {
+    if take(rest, "(") {
+        let allowed = either(rest)?;
+        return take(rest, ")").then_some(allowed);
+    }
+    let (name, behind) = rest.split_first()?;
+    if ["OR", "AND", "WITH", ")"].contains(name) {
+        return None;
+    }
+    *rest = behind;
+    let mut licence = (*name).to_owned();
+    if take(rest, "WITH") {
+        let (exception, behind) = rest.split_first()?;
+        *rest = behind;
+        licence = format!("{licence} WITH {exception}");
+    }
+    Some(ALLOWED.contains(&licence.as_str()))
+}
+
+fn take(rest: &mut &[&str], word: &str) -> bool {
+    match rest.split_first() {
+        Some((first, behind)) if *first == word => {
+            *rest = behind;
+            true
+        }
+        _ => false,
+    }
+}
+
+/// Why a crate is not wanted.
+fn ban_of(package: &Package) -> Option<String> {
+    let name = package.name.as_str();
+    if TOLERATED.iter().any(|(known, _)| *known == name) {
+        return None;
+    }
+    let matches = |pattern: &str| match (pattern.strip_prefix('*'), pattern.strip_suffix('*')) {
+        (Some(end), _) => name.ends_with(end),
+        (_, Some(start)) => {
+            name == start
+                || name
+                    .strip_prefix(start)
+                    .is_some_and(|rest| rest.starts_with(['-', '_']))
+        }
+        _ => name == pattern,
+    };
+    let (_, why) = BANNED.iter().find(|(pattern, _)| matches(pattern))?;
+    Some(format!("{name} {} is banned: {why}", package.version))
+}
+
+/// Crates of more versions than stated, and statements that are no longer true.
+fn several(packages: &[Package]) -> Vec<String> {
+    let mut versions: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for package in packages {
+        versions.entry(&package.name).or_default().insert(&package.version);
+    }
+    let stated = |name: &str| {
+        SEVERAL
+            .iter()
+            .find(|(known, ..)| *known == name)
+            .map_or(1, |(_, n, _)| *n)
+    };
+    let mut wrong: Vec<String> = versions
+        .iter()
+        .filter(|(name, found)| found.len() > stated(name))
+        .map(|(name, found)| {
+            let found: Vec<&str> = found.iter().copied().collect();
+            format!(
+                "{name} is here in {} versions ({}), expected {}: cargo tree --duplicates says who asks for them",
+                found.len(),
+                found.join(", "),
+                stated(name)
+            )
+        })
+        .collect();
+    wrong.extend(SEVERAL.iter().filter_map(|(name, n, _)| {
+        let found = versions.get(name).map_or(0, BTreeSet::len);
+        (found < *n).then(|| format!("{name} is here in {found} versions, {n} are stated: lower SEVERAL"))
+    }));
+    wrong
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn package(name: &str, version: &str, licence: Option<&str>) -> Package {
+        Package {
+            name: name.into(),
+            version: version.into(),
+            licence: licence.map(str::to_owned),
+            source: "registry+https://github.com/rust-lang/crates.io-index".into(),
+        }
+    }
+
+    #[test]
+    fn expressions_of_licences() {
+        for (expression, expected) in [
+            ("MIT", Some(true)),
+            ("MIT/Apache-2.0", Some(true)),
+            ("GPL-3.0-only", Some(false)),
+            ("GPL-3.0-only OR MIT", Some(true)),
+            ("MIT AND GPL-3.0-only", Some(false)),
+            ("MIT OR GPL-3.0-only AND LGPL-3.0-only", Some(true)),
+            ("(MIT OR GPL-3.0-only) AND Unicode-3.0", Some(true)),
+            ("(MIT OR Apache-2.0) AND MPL-2.0", Some(false)),
+            ("Apache-2.0 WITH LLVM-exception", Some(true)),
+            ("GPL-2.0 WITH Classpath-exception-2.0", Some(false)),
+            ("", None),
+            ("MIT OR", None),
+            ("(MIT", None),
+            ("MIT Apache-2.0", None),
+        ] {
+            assert_eq!(allows(expression), expected, "{expression}");
+        }
+        assert!(licence_of(&package("a", "1.0.0", None)).is_some_and(|said| said.contains("states no licence")));
+        let mut foreign = package("a", "1.0.0", Some("MIT"));
+        assert_eq!(licence_of(&foreign), None);
+        foreign.source = "git+https://example.org/a".into();
+        assert!(licence_of(&foreign).is_some_and(|said| said.contains("expected crates.io")));
+    }
+
+    #[test]
+    fn banned_crates_and_their_families() {
+        for name in ["openssl-sys", "openssl", "arrow", "arrow-array", "lazy_static"] {
+            assert!(ban_of(&package(name, "1.0.0", None)).is_some(), "{name}");
+        }
+        for name in ["arrowhead", "sysinfo", "hdf5-pure", "linux-raw-sys"] {
+            assert_eq!(ban_of(&package(name, "1.0.0", None)), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_second_version_needs_a_statement() {
+        let two = [package("a", "1.0.0", None), package("a", "2.0.0", None)];
+        let said = several(&two);
+        assert!(
+            said.iter()
+                .any(|said| said.contains("a is here in 2 versions (1.0.0, 2.0.0)")),
+            "{said:?}"
+        );
+        let stale = several(&two[..1]);
+        assert_eq!(stale.len(), SEVERAL.len(), "{stale:?}");
+    }
+}
