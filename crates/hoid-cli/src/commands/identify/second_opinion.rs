@@ -91,6 +91,7 @@ pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record
         forms: vec![fit.form],
         nc: nc..=nc,
         nd: nd..=nd,
+        excitation: None,
         ..estimator.clone()
     };
     let other = other.fit_beside(&held(records)?, None).ok()?;
