@@ -73,6 +73,10 @@ def test_what_a_fit_holds(found: pyhoid.OperatorFit) -> None:
     at_lines = found.lines["open_loop"]["crossover_rad_s"]
     assert at_lines.value == pytest.approx(crossover.value, rel=0.2)
     assert found.agreement is not None and 0 <= found.agreement["p_value"] <= 1
+    assert found.riv_bj is not None and found.riv_bj["converged"]
+    by_instruments = found.riv_bj["open_loop"]["crossover_rad_s"]
+    assert by_instruments.value == pytest.approx(crossover.value, rel=0.2)
+    assert all(pair["p_value"] >= found.agreement["p_value"] / 3 for pair in found.agreement["pairs"])
     assert found.prior["omega_nm"] == (10.5, 0.3) and found.settings["form"] == "auto"
     text = found.summary()
     for part in (found.verdict.level, found.form, "tau_e (s)", "at the lines", "phase margin"):

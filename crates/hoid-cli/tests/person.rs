@@ -86,6 +86,7 @@ fn a_person_is_found_by_default() {
         "verdict",
         "forms",
         "agreement",
+        "riv_bj",
         "covariance",
         "prior",
         "box_jenkins",

@@ -5,8 +5,8 @@ use std::ops::RangeInclusive;
 use hoid_ident::{
     IdentError, SearchOptions,
     family::{
-        ClusterKind, FamilyEstimator, FamilyFit, FormFigures, HIGHEST_NOISE_ORDER, LoopMeasures, OperatorPrior,
-        Parameter, ParameterPrior,
+        AgreementMethod, ClusterKind, FamilyEstimator, FamilyFit, FormFigures, HIGHEST_NOISE_ORDER, LoopMeasures,
+        OperatorPrior, Parameter, ParameterPrior,
     },
     frequency::{DescriptionOptions, describe_runs},
     judgement::second_opinion::of_family,
@@ -151,6 +151,11 @@ pub fn identify_operator(
             // What was looked for by name is missed; what was looked for by itself is not.
             Some(Err(error)) if excitation.is_some() => Some(Err(error)),
             _ => None,
+        };
+        let named = excitation.clone().filter(|_| !none);
+        let estimator = FamilyEstimator {
+            excitation: channel.clone().or(named),
+            ..estimator.clone()
         };
         let mut found = estimator.fit_beside(&records, of_lines)?;
         if second_opinion {
@@ -301,6 +306,26 @@ impl PyOperatorFit {
     }
 
     #[getter]
+    fn riv_bj<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(found) = &self.found.instrumental else {
+            return Ok(None);
+        };
+        let (all, parameters) = (PyDict::new(py), PyDict::new(py));
+        for (name, estimate) in found.parameters() {
+            parameters.set_item(name, pair(estimate))?;
+        }
+        all.set_item("parameters", parameters)?;
+        all.set_item("nd", found.noise_order)?;
+        all.set_item("converged", found.termination.converged())?;
+        all.set_item("termination", found.termination.to_string())?;
+        if let Some(element) = &self.element {
+            let measures = self.found.loop_measures_by_instruments(element);
+            all.set_item("open_loop", loop_parts(py, measures)?)?;
+        }
+        Ok(Some(all))
+    }
+
+    #[getter]
     fn agreement<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(agreement) = &self.found.agreement else {
             return Ok(None);
@@ -310,12 +335,26 @@ impl PyOperatorFit {
             let with_error = |(value, error): (f64, f64)| -> Pair { (value, Some(error)) };
             let row = PyDict::new(py);
             row.set_item("coordinate", found.coordinate.name())?;
-            row.set_item("prediction_error", with_error(found.prediction_error))?;
-            row.set_item("lines", with_error(found.lines))?;
+            for method in [
+                AgreementMethod::PredictionError,
+                AgreementMethod::Lines,
+                AgreementMethod::Instrumental,
+            ] {
+                row.set_item(method.name(), found.of(method).map(with_error))?;
+            }
             row.set_item("difference_in_errors", found.difference_in_errors)?;
             rows.push(row);
         }
         all.set_item("coordinates", rows)?;
+        let mut pairs = Vec::new();
+        for found in &agreement.pairs {
+            let pair = PyDict::new(py);
+            pair.set_item("methods", (found.methods.0.name(), found.methods.1.name()))?;
+            pair.set_item("chi2", found.statistic)?;
+            pair.set_item("p_value", found.p_value)?;
+            pairs.push(pair);
+        }
+        all.set_item("pairs", pairs)?;
         all.set_item("chi2", agreement.statistic)?;
         all.set_item("p_value", agreement.p_value)?;
         Ok(Some(all))

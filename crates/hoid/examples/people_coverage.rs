@@ -9,7 +9,7 @@
 #[path = "../tests/common/people_coverage/mod.rs"]
 mod people_coverage;
 
-use std::{fmt::Write as _, path::PathBuf};
+use std::{collections::BTreeSet, fmt::Write as _, path::PathBuf};
 
 use hoid::model::VerdictLevel;
 use people_coverage::{
@@ -154,6 +154,19 @@ fn report(variant: Variant, of: &[&Outcome]) {
             part(0.9),
             over_all(&such).text()
         );
+    }
+    findings(of);
+}
+
+/// How often each finding was made, doubts and notes alike.
+fn findings(of: &[&Outcome]) {
+    let made: Vec<&Vec<String>> = of.iter().filter_map(|o| Some(&o.found.as_ref().ok()?.kinds)).collect();
+    let kinds: BTreeSet<&String> = made.iter().copied().flatten().collect();
+    println!("\n| finding | share |");
+    println!("|---|---|");
+    for kind in kinds {
+        let share = Share::over(made.iter().map(|all| all.contains(kind)));
+        println!("| {kind} | {} |", share.text());
     }
 }
 

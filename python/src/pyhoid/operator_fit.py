@@ -131,7 +131,13 @@ class OperatorFit:
     excitation : str or None
         Its channel.
     agreement : dict or None
-        Prediction error method and lines beside each other: coordinates, chi2, p_value.
+        The methods beside each other: coordinates (each by ``prediction_error``, ``lines`` and
+        ``riv_bj``), pairs of methods with chi2 and p_value, and chi2 and p_value of the pair that
+        agrees least (p_value times the number of pairs).
+    riv_bj : dict or None
+        The operator by refined instrumental variables, the recorded excitation as instrument:
+        parameters (an Estimate each), nd, converged, termination, and open_loop with a controlled
+        element. None without an excitation.
     open_loop : dict or None
         ``crossover_rad_s`` and ``phase_margin_deg``, an Estimate each, or None without a crossover;
         None without a controlled element.
@@ -196,11 +202,17 @@ class OperatorFit:
                 if name in self.lines:
                     self.lines[name] = estimates(self.lines[name])
         self.no_lines = native.no_lines
+        self.riv_bj = native.riv_bj
+        if self.riv_bj is not None:
+            for name in ("parameters", "open_loop"):
+                if name in self.riv_bj:
+                    self.riv_bj[name] = estimates(self.riv_bj[name])
         self.excitation = native.excitation
         self.agreement = native.agreement
         for row in (self.agreement or {}).get("coordinates", []):
-            for name in ("prediction_error", "lines"):
-                row[name] = Estimate(*row[name])
+            for name in ("prediction_error", "lines", "riv_bj"):
+                if row[name] is not None:
+                    row[name] = Estimate(*row[name])
         found = native.open_loop
         self.open_loop: dict[str, Estimate | None] | None = (
             None if found is None else estimates(found)
@@ -293,7 +305,7 @@ class OperatorFit:
             text += f"; {_loop(lines['open_loop'])}"
         if self.agreement is not None:
             text += (
-                f"\nAgreement of the two methods: chi2 {self.agreement['chi2']:.1f}"
+                f"\nAgreement of the methods: chi2 {self.agreement['chi2']:.1f}"
                 f" over {len(self.agreement['coordinates'])} determined coordinates,"
                 f" p = {self.agreement['p_value']:.2f}"
             )

@@ -1,96 +1,273 @@
 //! Do methods agree that rest on different statistics?
 //!
 //! The prediction error fit uses every sample and needs a noise model; the fit at the lines uses the
-//! excited frequencies alone and needs none. Both see the same records, so that they agree better
-//! than two independent measurements: a difference is judged against `s_1^2 + s_2^2`, which is on
-//! the safe side of a false alarm. Over the coordinates that the data determine,
-//! `d' (P_1 + P_2)^-1 d` is chi-square at most.
+//! excited frequencies alone and needs none; refined instrumental variables use every sample of what
+//! follows the excitation. For each pair the difference d of their coordinates, over those that the
+//! data determine, is held against its covariance V: `T = d' V^-1 d`.
+//!
+//! **V** is a sum of three:
+//!
+//! 1. and 2. The covariances that the two methods have from all residuals or lines together, times
+//!    kappa. A jackknife over n runs has a rank of n - 1 at most: with five runs and four coordinates
+//!    it finds the methods sure of some direction by chance (H. Hotelling, *Annals of Mathematical
+//!    Statistics* 2 (1931) 360-378). Both methods see the same records, so that the sum is on the safe
+//!    side of a false alarm.
+//! 3. In a closed loop the prediction error fit has a bias where its noise model is wrong, which
+//!    no scatter shows: `sum d_k d_k'` over its differences to fits with other noise models
+//!    ([`super::sensitivity`]). It becomes a part of the errors of the result, so that it is no
+//!    reason to doubt them.
+//!
+//! **Coordinates that count** are determined by the data and owe less than a quarter to the prior
+//! in each method: a resonance above the lines is the prior in one method and not in the other.
+//!
+//! The gain is compared as `ln |Y|` in the middle of the band of manual control. Gain and lead
+//! time, or gain and lag, make up for each other along a curve, K T_L nearly constant, and what lies
+//! apart on a curve is not apart for it: a straight line through one of them would say so.
+//!
+//! T is chi-square with as many degrees of freedom. Of several pairs the smallest probability counts,
+//! times their number (Bonferroni): a test at 1 % doubts one person in a hundred at most whose
+//! operator is of the form.
 
-use hoid_model::{Form, operator_family::Coordinate};
+use hoid_model::{FamilyOperator, operator_family::Coordinate};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::linalg::least_squares::{dot, solve_symmetric};
 
-/// Two methods side by side.
+/// A method that is held against others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AgreementMethod {
+    /// Prediction error.
+    PredictionError,
+    /// The fit at the lines of the excitation.
+    Lines,
+    /// Refined instrumental variables.
+    Instrumental,
+}
+
+impl AgreementMethod {
+    /// As it stands in a sentence.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::PredictionError => "the prediction error fit",
+            Self::Lines => "the fit at the lines",
+            Self::Instrumental => "RIV-BJ",
+        }
+    }
+
+    /// As a key.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PredictionError => "prediction_error",
+            Self::Lines => "lines",
+            Self::Instrumental => "riv_bj",
+        }
+    }
+}
+
+/// Methods side by side.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreement {
-    /// Coordinate, prediction error, lines, and the difference in combined standard errors.
+    /// Each coordinate that counts, by all methods.
     pub rows: Vec<AgreementRow>,
-    /// `d' (P_1 + P_2)^-1 d` over the rows.
+    /// Each pair of methods.
+    pub pairs: Vec<AgreementPair>,
+    /// T of the pair that agrees least.
     pub statistic: f64,
-    /// Probability of a statistic as large where both are right.
+    /// Probability that a pair differs as much where all are right.
     pub p_value: f64,
 }
 
-/// One coordinate of both methods.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// One coordinate of all methods.
+#[derive(Debug, Clone, PartialEq)]
 pub struct AgreementRow {
     /// The coordinate.
     pub coordinate: Coordinate,
-    /// Value and standard error of the prediction error fit.
-    pub prediction_error: (f64, f64),
-    /// Value and standard error of the fit at the lines.
-    pub lines: (f64, f64),
-    /// Their difference in combined standard errors.
+    /// Value and standard error of each method.
+    pub values: Vec<(AgreementMethod, (f64, f64))>,
+    /// The difference of the first pair, in standard errors of it.
     pub difference_in_errors: f64,
 }
 
-/// Coordinates and their covariance.
-pub(super) type Measured<'a> = (&'a [f64], &'a [f64]);
+impl AgreementRow {
+    /// Value and standard error of a method.
+    pub fn of(&self, method: AgreementMethod) -> Option<(f64, f64)> {
+        self.values.iter().find(|(m, _)| *m == method).map(|(_, v)| *v)
+    }
+}
 
-/// The test over the coordinates that count; `None` where there are none, or no errors.
+/// Two methods.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AgreementPair {
+    /// Which.
+    pub methods: (AgreementMethod, AgreementMethod),
+    /// `d' V^-1 d`.
+    pub statistic: f64,
+    /// Probability of a statistic as large where both are right.
+    pub p_value: f64,
+    /// The coordinate that differs most, and by how many standard errors of the difference.
+    pub most: (Coordinate, f64),
+}
+
+impl Agreement {
+    /// The pair that agrees least.
+    pub fn worst(&self) -> Option<&AgreementPair> {
+        self.pairs.iter().min_by(|a, b| a.p_value.total_cmp(&b.p_value))
+    }
+}
+
+/// What a method found.
+#[derive(Debug, Clone)]
+pub(super) struct Side {
+    pub method: AgreementMethod,
+    /// Its coordinates, the first of them in the place of the gain.
+    pub coordinates: Vec<f64>,
+    /// Their covariance from all residuals or lines, by rows.
+    pub covariance: Vec<f64>,
+    /// The coordinates with the errors that are reported, the gain itself the first.
+    pub reported: Vec<(f64, f64)>,
+}
+
+impl Side {
+    /// An operator with its covariance, and the covariance that is reported.
+    pub fn of(method: AgreementMethod, operator: &FamilyOperator, covariance: &[f64], reported: &[f64]) -> Self {
+        let p = operator.coordinates().len();
+        let gradient = level(operator).1;
+        // The first row is the gradient of the level, the others are those of the unit matrix.
+        let times = |c: &[f64], i: usize, j: usize| -> f64 {
+            match i {
+                0 => (0..p).map(|k| gradient[k] * c[k * p + j]).sum(),
+                _ => c[i * p + j],
+            }
+        };
+        let once: Vec<f64> = (0..p * p).map(|at| times(covariance, at / p, at % p)).collect();
+        let turned: Vec<f64> = (0..p * p).map(|at| once[(at % p) * p + at / p]).collect();
+        Self {
+            method,
+            coordinates: with_level(operator),
+            covariance: (0..p * p).map(|at| times(&turned, at / p, at % p)).collect(),
+            reported: (operator.coordinates().iter().enumerate())
+                .map(|(i, x)| (*x, reported[i * p + i].max(0.0).sqrt()))
+                .collect(),
+        }
+    }
+}
+
+/// Where the gain is compared, rad/s: the middle of the band of manual control.
+const MIDDLE_RAD_S: f64 = 2.4;
+
+/// `ln |Y|` there, and its gradient.
+fn level(operator: &FamilyOperator) -> (f64, Vec<f64>) {
+    let response = operator.response_and_gradient(MIDDLE_RAD_S);
+    let gradient = response.gradient.iter().map(|g| (g / response.value).re);
+    (response.value.norm().ln(), gradient.collect())
+}
+
+/// The coordinates with the level in the place of the gain, the first of all forms.
+pub(super) fn with_level(operator: &FamilyOperator) -> Vec<f64> {
+    let mut x = operator.coordinates().to_vec();
+    x[0] = level(operator).0;
+    x
+}
+
+/// The tests of all pairs over the coordinates that count; `bias` belongs to the prediction error
+/// fit. `None` where there are no coordinates or no two methods with errors.
 pub(super) fn agreement(
-    form: Form,
-    neuromuscular: bool,
-    one: Measured<'_>,
-    other: Measured<'_>,
+    all: &[Coordinate],
+    sides: &[Side],
+    bias: &[f64],
     counts: impl Fn(usize) -> bool,
 ) -> Option<Agreement> {
-    let all = form.coordinates(neuromuscular);
     let p = all.len();
-    let variance = |c: &[f64], i: usize| c[i * p + i];
     let used: Vec<usize> = (0..p)
-        .filter(|&i| counts(i) && variance(one.1, i) > 0.0 && variance(other.1, i) > 0.0)
+        .filter(|&i| counts(i) && sides.iter().all(|s| s.covariance[i * p + i] > 0.0))
         .collect();
-    let difference: Vec<f64> = used.iter().map(|&i| one.0[i] - other.0[i]).collect();
-    let sum: Vec<f64> = used
-        .iter()
-        .flat_map(|&i| used.iter().map(move |&j| i * p + j))
-        .map(|at| one.1[at] + other.1[at])
+    let pairs: Vec<(AgreementPair, Vec<f64>)> = (0..sides.len())
+        .flat_map(|i| (i + 1..sides.len()).map(move |j| (i, j)))
+        .filter_map(|(i, j)| pair(all, &used, (&sides[i], &sides[j]), bias))
         .collect();
-    if used.is_empty() {
-        return None;
-    }
-    let statistic = dot(&difference, &solve_symmetric(&sum, &difference)?);
-    let distribution = ChiSquared::new(used.len() as f64).ok()?;
-    let row = |(&i, d): (&usize, &f64)| AgreementRow {
+    let (first, in_errors) = pairs.first()?;
+    let least = (pairs.iter()).fold(
+        first,
+        |least, (pair, _)| if pair.p_value < least.p_value { pair } else { least },
+    );
+    let row = |(k, &i): (usize, &usize)| AgreementRow {
         coordinate: all[i],
-        prediction_error: (one.0[i], variance(one.1, i).sqrt()),
-        lines: (other.0[i], variance(other.1, i).sqrt()),
-        difference_in_errors: d / (variance(one.1, i) + variance(other.1, i)).sqrt(),
+        values: (sides.iter()).map(|s| (s.method, s.reported[i])).collect(),
+        difference_in_errors: in_errors[k],
     };
     Some(Agreement {
-        rows: used.iter().zip(&difference).map(row).collect(),
-        statistic,
-        p_value: distribution.sf(statistic),
+        statistic: least.statistic,
+        p_value: (least.p_value * pairs.len() as f64).min(1.0),
+        rows: used.iter().enumerate().map(row).collect(),
+        pairs: pairs.iter().map(|(pair, _)| pair.clone()).collect(),
     })
+}
+
+/// The test of two methods, and the difference of each coordinate in its standard errors.
+fn pair(
+    all: &[Coordinate],
+    used: &[usize],
+    (one, other): (&Side, &Side),
+    bias: &[f64],
+) -> Option<(AgreementPair, Vec<f64>)> {
+    let (p, q) = (all.len(), used.len());
+    if q == 0 {
+        return None;
+    }
+    let part = |c: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        used.iter()
+            .flat_map(|&i| used.iter().map(move |&j| i * p + j))
+            .map(c)
+            .collect()
+    };
+    let biased = [one.method, other.method].contains(&AgreementMethod::PredictionError);
+    let covariance = part(&|at| one.covariance[at] + other.covariance[at] + if biased { bias[at] } else { 0.0 });
+    let difference: Vec<f64> = used
+        .iter()
+        .map(|&i| one.coordinates[i] - other.coordinates[i])
+        .collect();
+    let statistic = dot(&difference, &solve_symmetric(&covariance, &difference)?);
+    let p_value = ChiSquared::new(q as f64).ok()?.sf(statistic);
+    let in_errors: Vec<f64> = (0..q).map(|k| difference[k] / covariance[k * q + k].sqrt()).collect();
+    let most = (0..q).max_by(|&a, &b| in_errors[a].abs().total_cmp(&in_errors[b].abs()))?;
+    let found = AgreementPair {
+        methods: (one.method, other.method),
+        statistic,
+        p_value,
+        most: (all[used[most]], in_errors[most]),
+    };
+    p_value.is_finite().then_some((found, in_errors))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hoid_model::Form;
+
+    fn side(method: AgreementMethod, x: &[f64], variance: f64) -> Side {
+        let p = x.len();
+        let mut covariance = vec![0.0; p * p];
+        (0..p).for_each(|i| covariance[i * (p + 1)] = variance);
+        Side {
+            method,
+            coordinates: x.to_vec(),
+            reported: x.iter().map(|x| (*x, variance.sqrt())).collect(),
+            covariance,
+        }
+    }
+
+    const HERE: [f64; 6] = [5.0, 0.6, 0.1, 2.4, -1.2, 0.15];
 
     #[test]
     fn equal_estimates_agree_and_distant_ones_do_not() {
-        let mut covariance = vec![0.0; 36];
-        (0..6).for_each(|i| covariance[i * 7] = 0.01);
-        let here = [5.0, 0.6, 0.1, 2.4, -1.2, 0.15];
-        let mut there = here;
+        let all = Form::LeadLag.coordinates(true);
+        let mut there = HERE;
         let test = |there: &[f64]| {
-            agreement(Form::LeadLag, true, (&here, &covariance), (there, &covariance), |i| {
-                i < 3
-            })
-            .unwrap()
+            let sides = [
+                side(AgreementMethod::PredictionError, &HERE, 0.01),
+                side(AgreementMethod::Lines, there, 0.01),
+            ];
+            agreement(&all, &sides, &[0.0; 36], |i| i < 3).unwrap()
         };
         assert_eq!(test(&there).p_value, 1.0);
         there[1] += 0.1 * 2f64.sqrt() * 4.0;
@@ -98,11 +275,103 @@ mod tests {
         let apart = test(&there);
         assert!((apart.statistic - 16.0).abs() < 1e-9 && apart.p_value < 0.002 && apart.rows.len() == 3);
         assert!((apart.rows[1].difference_in_errors + 4.0).abs() < 1e-9);
-        assert!(
-            agreement(Form::LeadLag, true, (&here, &covariance), (&there, &covariance), |_| {
-                false
-            })
-            .is_none()
-        );
+        assert_eq!(apart.worst().unwrap().most.0, Coordinate::Lead);
+        assert_eq!(apart.rows[1].of(AgreementMethod::Lines).unwrap().0, there[1]);
+        assert_eq!(apart.rows[1].of(AgreementMethod::Instrumental), None);
+        let one = [side(AgreementMethod::Lines, &HERE, 0.01)];
+        assert!(agreement(&all, &one, &[0.0; 36], |_| true).is_none());
+        let two = [one[0].clone(), side(AgreementMethod::Instrumental, &there, 0.01)];
+        assert!(agreement(&all, &two, &[0.0; 36], |_| false).is_none());
+        // Zero variances are those of bounds.
+        let held = [one[0].clone(), side(AgreementMethod::Instrumental, &there, 0.0)];
+        assert!(agreement(&all, &held, &[0.0; 36], |_| true).is_none());
+    }
+
+    #[test]
+    fn the_covariance_of_a_side_is_that_of_small_steps() {
+        let operator = |x: &[f64]| FamilyOperator::new(Form::LeadLag, true, x).unwrap();
+        // Of three directions, one of them the gain.
+        let directions = [
+            [0.2, 0.05, 0.01, 0.1, 0.0, 0.004],
+            [0.0, -0.08, 0.03, 0.0, 0.2, 0.01],
+            [0.3, 0.0, 0.0, 0.0, 0.0, 0.0],
+        ];
+        let outer = |steps: &[Vec<f64>]| -> Vec<f64> {
+            (0..36)
+                .map(|at| steps.iter().map(|d| d[at / 6] * d[at % 6]).sum())
+                .collect()
+        };
+        let covariance = outer(&directions.map(|d| d.to_vec()));
+        let method = AgreementMethod::Lines;
+        let side = Side::of(method, &operator(&HERE), &covariance, &covariance);
+        let moved = directions.map(|d| {
+            let at = |by: f64| {
+                let x: Vec<f64> = HERE.iter().zip(d).map(|(x, d)| x + by * d).collect();
+                with_level(&operator(&x))
+            };
+            let (up, down) = (at(1e-4), at(-1e-4));
+            up.iter().zip(down).map(|(a, b)| (a - b) / 2e-4).collect()
+        });
+        for (a, b) in side.covariance.iter().zip(outer(&moved)) {
+            assert!((a - b).abs() < 1e-6, "{a} {b}");
+        }
+        assert_eq!(side.reported[0].0, HERE[0]);
+        assert!((side.reported[0].1 - 0.13_f64.sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_bias_is_that_of_the_prediction_error_fit() {
+        let all = Form::LeadLag.coordinates(true);
+        let mut there = HERE;
+        there[0] += 1.0;
+        let sides = [
+            side(AgreementMethod::PredictionError, &HERE, 0.01),
+            side(AgreementMethod::Lines, &there, 0.01),
+            side(AgreementMethod::Instrumental, &there, 0.02),
+        ];
+        let mut bias = [0.0; 36];
+        bias[0] = 1.0;
+        let found = agreement(&all, &sides, &bias, |i| i == 0).unwrap();
+        let statistics: Vec<f64> = found.pairs.iter().map(|p| p.statistic).collect();
+        for (statistic, expected) in statistics.iter().zip([1.0 / 1.02, 1.0 / 1.03, 0.0]) {
+            assert!((statistic - expected).abs() < 1e-12, "{statistics:?}");
+        }
+        // Three pairs.
+        let least = found.worst().unwrap();
+        assert!((found.p_value - (3.0 * least.p_value).min(1.0)).abs() < 1e-15);
+        let without = agreement(&all, &sides, &[0.0; 36], |i| i == 0).unwrap();
+        assert!(without.p_value < 1e-6 && without.worst().unwrap().methods.1 == AgreementMethod::Lines);
+    }
+
+    #[test]
+    fn a_test_at_one_percent_has_one_percent() {
+        // Independent normal differences of three coordinates: a linear congruential generator
+        // (D. E. Knuth, MMIX) and the central limit of twelve.
+        let mut state = 11_u64;
+        let mut normal = || {
+            let mut sum = -6.0;
+            for _ in 0..12 {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
+                sum += (state >> 11) as f64 / (1_u64 << 53) as f64;
+            }
+            sum
+        };
+        let all = Form::LeadLag.coordinates(true);
+        let mut doubted = 0;
+        for _ in 0..4000 {
+            let mut sides = [
+                side(AgreementMethod::PredictionError, &HERE, 0.01),
+                side(AgreementMethod::Lines, &HERE, 0.04),
+            ];
+            for (side, s) in sides.iter_mut().zip([0.1, 0.2]) {
+                side.coordinates.iter_mut().for_each(|x| *x += s * normal());
+            }
+            let found = agreement(&all, &sides, &[0.0; 36], |i| i < 3).unwrap();
+            doubted += usize::from(found.p_value < 0.01);
+        }
+        // 40 of 4000, standard error 6.3; twelve uniform deviates have thinner tails.
+        assert!((20..=60).contains(&doubted), "{doubted}");
     }
 }

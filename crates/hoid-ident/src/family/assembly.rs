@@ -4,14 +4,17 @@
 //! The order matters: both methods are compared with their own errors, and only then does their
 //! difference become a part of the errors of the operator (`Covariances::add_bias`).
 
-use hoid_model::{Complex64, Finding, Verdict, operator_family::Coordinate, uncertainty::variance_along};
+use hoid_model::{
+    Complex64, FamilyOperator, Finding, Record, Verdict, operator_family::Coordinate, uncertainty::variance_along,
+};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
-    agreement::{Agreement, agreement},
+    agreement::{Agreement, AgreementMethod, Side, agreement, with_level},
     choice::FormFigures,
     covariances::BAND_RAD_S,
     estimated::{Errors, Estimated, operator_of},
+    instrumental::{Instrumental, InstrumentalFit},
     judgement::{Judged, findings},
     line_fit::LineFit,
     prediction::Prediction,
@@ -46,6 +49,10 @@ pub(super) struct Chosen<'p, 'a> {
     /// All forms that were compared.
     pub forms: Vec<FormFigures>,
     pub prediction: &'p Prediction<'a>,
+    /// The records, detrended.
+    pub records: &'p [Record],
+    /// Channel of the recorded excitation.
+    pub excitation: Option<&'p str>,
     /// Variation of a person's gain from one run to the next, as a part of it.
     pub run_to_run: f64,
     /// Highest order of the noise models that the estimate is held against.
@@ -66,11 +73,22 @@ impl Chosen<'_, '_> {
         };
         let mut errors = Errors::of(fit, self.run_to_run, workspace);
         let error_ratio = errors.largest_ratio(fit);
-        let agreement = match &self.lines.fit {
-            Some(lines) => agreement_of(&Estimated::of(fit, &errors, 0)?, lines),
-            None => None,
+        // What the estimate owes to its noise model: a part of its errors, and of what methods may
+        // differ by.
+        let others = rivals(self.prediction, fit, self.highest_order, workspace);
+        let (instrumental, no_instrumental) = match self.instrumental(separate, workspace) {
+            None => (None, None),
+            Some(Ok(found)) => (Some(found), None),
+            Some(Err(error)) => (None, Some(error.to_string())),
         };
-        self.add_bias(&mut errors, separate, workspace);
+        let agreement = agreement_of(
+            fit,
+            &Estimated::of(fit, &errors, 0)?,
+            self.lines.fit.as_ref(),
+            instrumental.as_ref().filter(|found| found.termination.converged()),
+            &others,
+        );
+        self.add_bias(&mut errors, separate, &others);
         let mut operators = Vec::with_capacity(separate);
         for record in 0..separate {
             operators.push(operator_of(fit, &errors, record)?);
@@ -88,6 +106,8 @@ impl Chosen<'_, '_> {
             lines: self.lines.fit.as_ref(),
             no_lines: self.lines.why_none.as_deref(),
             agreement: agreement.as_ref(),
+            instrumental: instrumental.as_ref(),
+            no_instrumental: no_instrumental.as_deref(),
             free_model: free_model.as_ref(),
             loss: fit.loss,
             error_ratio,
@@ -108,6 +128,8 @@ impl Chosen<'_, '_> {
             coherent_share: self.lines.describing.and_then(coherent_share),
             lines: self.lines.fit,
             no_lines: self.lines.why_none,
+            instrumental,
+            no_instrumental,
             agreement,
             free_model,
             cluster_kind: fit.clusters.kind,
@@ -123,15 +145,30 @@ impl Chosen<'_, '_> {
         })
     }
 
+    /// Refined instrumental variables with the recorded excitation, for one operator of all records.
+    fn instrumental(&self, separate: usize, workspace: &mut Workspace) -> Option<Result<InstrumentalFit, IdentError>> {
+        let channel = self.excitation.filter(|_| separate == 1)?;
+        let own = self.fit.layout().coordinates_of(self.fit.eta(), 0);
+        let auxiliary = match &self.lines.fit {
+            Some(lines) => {
+                let at_lines = lines.operator.coordinates().to_vec();
+                let middle = at_lines.iter().zip(&own).map(|(a, b)| 0.5 * (a + b)).collect();
+                vec![at_lines, own, middle]
+            }
+            None => vec![own],
+        };
+        let found = Instrumental::new(self.prediction, &self.fit, self.records, channel);
+        Some(found.and_then(|method| method.fit(&auxiliary, workspace)))
+    }
+
     /// What the fit may be off by becomes a part of its errors: its difference to the fit at the
     /// lines, and, for what the lines leave to the prior or without lines, its differences to fits
     /// with other noise models ([`super::sensitivity`]).
-    fn add_bias(&self, errors: &mut Errors, separate: usize, workspace: &mut Workspace) {
+    fn add_bias(&self, errors: &mut Errors, separate: usize, others: &[Vec<f64>]) {
         let fit = &self.fit;
         let Some(covariances) = &mut errors.covariances else {
             return;
         };
-        let mut others = || rivals(self.prediction, fit, self.highest_order, workspace);
         match &self.lines.fit {
             Some(lines) if separate == 1 => {
                 let owes: Vec<bool> = (lines.prior_shares.iter())
@@ -139,15 +176,15 @@ impl Chosen<'_, '_> {
                     .collect();
                 covariances.add_bias(fit, lines.operator.coordinates());
                 if owes.contains(&true) {
-                    for other in others() {
-                        covariances.add_besides(fit, &other, 1.0, |place| owes[place]);
+                    for other in others {
+                        covariances.add_besides(fit, other, 1.0, |place| owes[place]);
                     }
                 }
             }
             _ => {
-                for other in others() {
-                    covariances.add_bias(fit, &other);
-                    covariances.add_besides(fit, &other, MORE_WITHOUT_LINES, |_| true);
+                for other in others {
+                    covariances.add_bias(fit, other);
+                    covariances.add_besides(fit, other, MORE_WITHOUT_LINES, |_| true);
                 }
                 for (place, (coordinate, _)) in fit.layout().elements.iter().enumerate() {
                     let unseen = UNSEEN_WITHOUT_LINES.iter().find(|(of, _)| of == coordinate);
@@ -159,25 +196,66 @@ impl Chosen<'_, '_> {
     }
 }
 
-/// Both methods beside each other, over the coordinates whose parameters are determined.
-fn agreement_of(operator: &Estimated, lines: &LineFit) -> Option<Agreement> {
-    let (one, other) = (operator.covariance.as_deref()?, lines.covariance.as_deref()?);
-    let all = operator
-        .operator
-        .form()
-        .coordinates(operator.operator.has_neuromuscular());
+/// All methods beside each other, over the coordinates whose parameters are determined and owe
+/// little to the prior; `None` for fewer than two with errors.
+fn agreement_of(
+    fit: &PredictionFit<'_>,
+    operator: &Estimated,
+    lines: Option<&LineFit>,
+    instrumental: Option<&InstrumentalFit>,
+    others: &[Vec<f64>],
+) -> Option<Agreement> {
+    let layout = fit.layout();
+    let all = layout.form.coordinates(layout.neuromuscular);
+    let model_based = operator.model_based.as_ref()?;
+    let inflated: Vec<f64> = model_based.iter().map(|c| c * fit.inflation).collect();
+    let reported = operator.covariance.as_deref()?;
+    let mut sides = vec![Side::of(
+        AgreementMethod::PredictionError,
+        &operator.operator,
+        &inflated,
+        reported,
+    )];
+    let mut shares = vec![0.0_f64; all.len()];
+    let mut owe = |of: &[f64]| shares.iter_mut().zip(of).for_each(|(most, own)| *most = most.max(*own));
+    if let Some(lines) = lines
+        && let (Some(by_lines), Some(reported)) = (&lines.by_lines, &lines.covariance)
+    {
+        owe(&lines.prior_shares);
+        sides.push(Side::of(AgreementMethod::Lines, &lines.operator, by_lines, reported));
+    }
+    if let Some(instrumental) = instrumental
+        && let Some(covariance) = &instrumental.covariance
+    {
+        owe(&instrumental.prior_shares);
+        sides.push(Side::of(
+            AgreementMethod::Instrumental,
+            &instrumental.operator,
+            covariance,
+            covariance,
+        ));
+    }
+    let (p, places) = (all.len(), layout.positions(0));
+    let mut bias = vec![0.0; p * p];
+    for other in others {
+        let x: Vec<f64> = places[..p].iter().map(|&at| other[at]).collect();
+        let Ok(rival) = FamilyOperator::new(layout.form, layout.neuromuscular, &x) else {
+            continue;
+        };
+        let d: Vec<f64> = (with_level(&rival).iter().zip(&sides[0].coordinates))
+            .map(|(there, here)| there - here)
+            .collect();
+        for i in 0..p {
+            (0..p).for_each(|j| bias[i * p + j] += d[i] * d[j]);
+        }
+    }
     let determined = |wanted: Coordinate| {
         let mut all = operator.parameters.iter();
         all.any(|p| p.name == wanted.parameter() && p.determined)
     };
-    let counts = |i: usize| all[i] == Coordinate::Gain || determined(all[i]);
-    agreement(
-        operator.operator.form(),
-        operator.operator.has_neuromuscular(),
-        (operator.operator.coordinates(), one),
-        (lines.operator.coordinates(), other),
-        counts,
-    )
+    agreement(&all, &sides, &bias, |i| {
+        shares[i] <= LARGEST_SHARE_AT_LINES && (all[i] == Coordinate::Gain || determined(all[i]))
+    })
 }
 
 /// Box-Jenkins of the same orders and delay from the polynomials of the fit, for one operator.

@@ -87,7 +87,7 @@ fn profiles(
 pub(super) struct Estimated {
     pub operator: FamilyOperator,
     pub covariance: Option<Vec<f64>>,
-    model_based: Option<Vec<f64>>,
+    pub model_based: Option<Vec<f64>>,
     pub parameters: Vec<Parameter>,
 }
 

@@ -184,6 +184,8 @@ impl FamilyEstimator {
             },
             forms: figures,
             prediction: &prediction,
+            records: &records,
+            excitation: self.excitation.as_deref(),
             run_to_run: self.run_to_run,
             highest_order: *self.nd.end(),
         };

@@ -5,7 +5,10 @@
 
 use hoid_model::Finding;
 
-use super::{agreement::Agreement, clusters::ClusterKind, line_fit::LineFit, parameter::Parameter, result::FreeModel};
+use super::{
+    agreement::Agreement, clusters::ClusterKind, instrumental::InstrumentalFit, line_fit::LineFit,
+    parameter::Parameter, result::FreeModel,
+};
 use crate::{Termination, judgement::residuals::ResidualMeasures};
 
 /// chi^2 per degree of freedom at the lines beyond which the describing function is missed.
@@ -33,6 +36,8 @@ pub(super) struct Judged<'a> {
     pub lines: Option<&'a LineFit>,
     pub no_lines: Option<&'a str>,
     pub agreement: Option<&'a Agreement>,
+    pub instrumental: Option<&'a InstrumentalFit>,
+    pub no_instrumental: Option<&'a str>,
     pub free_model: Option<&'a FreeModel>,
     pub loss: f64,
     pub error_ratio: Option<f64>,
@@ -184,23 +189,30 @@ fn methods(judged: &Judged<'_>, all: &mut Vec<Finding>) {
         ));
     }
     if let Some(agreement) = judged.agreement.filter(|a| a.p_value < LEVEL) {
-        let worst = agreement
-            .rows
-            .iter()
-            .max_by(|a, b| a.difference_in_errors.abs().total_cmp(&b.difference_in_errors.abs()));
-        let where_ = worst.map_or(String::new(), |row| {
-            format!(
-                ", most in {} by {:.1} combined errors",
-                row.coordinate.name(),
-                row.difference_in_errors.abs()
-            )
-        });
+        let (who, most) = match agreement.worst() {
+            Some(pair) => (
+                format!("{} and {}", pair.methods.0.words(), pair.methods.1.words()),
+                format!(
+                    ", most in {} by {:.1} errors of the difference",
+                    pair.most.0.name(),
+                    pair.most.1.abs()
+                ),
+            ),
+            None => ("the methods".to_owned(), String::new()),
+        };
         all.push(Finding::doubt(
             "agreement",
-            format!(
-                "the prediction error fit and the fit at the lines do not agree (p = {:.2e}{where_})",
-                agreement.p_value
-            ),
+            format!("{who} do not agree (p = {:.2e}{most})", agreement.p_value),
+        ));
+    }
+    let failed = match judged.instrumental {
+        Some(found) if !found.termination.converged() => Some(found.termination.to_string()),
+        _ => judged.no_instrumental.map(str::to_owned),
+    };
+    if let Some(why) = failed {
+        all.push(Finding::note(
+            "no-instruments",
+            format!("no RIV-BJ beside the other methods: {why}"),
         ));
     }
     if let Some(free) = judged.free_model

@@ -31,6 +31,8 @@ pub struct LineFit {
     pub held_out: Option<Vec<f64>>,
     /// How the search ended.
     pub termination: Termination,
+    /// Covariance from the variances of the lines.
+    pub(super) by_lines: Option<Vec<f64>>,
 }
 
 impl LineFit {
@@ -82,7 +84,8 @@ pub(super) fn line_fit(
     let by_runs = (runs >= FEWEST_RUNS && others.len() == runs)
         .then(|| jackknife(&others))
         .flatten();
-    let covariance = criterion.covariance(&found).map(|by_lines| match by_runs {
+    let by_lines = criterion.covariance(&found);
+    let covariance = by_lines.clone().map(|by_lines| match by_runs {
         Some(mut covariance) => {
             add_open_part(&mut covariance, 1.0, &criterion.penalty, &found.coordinates, &by_lines);
             covariance
@@ -100,6 +103,7 @@ pub(super) fn line_fit(
         degrees_of_freedom: (2 * lines.points.len()).saturating_sub(free),
         held_out: (held_out.len() == runs && runs >= 3).then_some(held_out),
         termination: found.termination,
+        by_lines,
     };
     Ok((fit, found))
 }

@@ -15,7 +15,8 @@
 //! 3. The form that held-out runs choose ([`FormFigures`]).
 //! 4. Errors by the scatter of runs or blocks; intervals in coordinates that are nearly normal, by
 //!    profile likelihood where they are not ([`Parameter`]).
-//! 5. Both methods beside each other ([`Agreement`]), a free model of the same orders
+//! 5. The operator by refined instrumental variables, where an excitation was recorded
+//!    ([`InstrumentalFit`]); all methods beside each other ([`Agreement`]), a free model of the same orders
 //!    ([`FreeModel`]), and the [`Verdict`](hoid_model::Verdict) on all of it.
 //!
 //! | file | what it holds |
@@ -30,6 +31,7 @@
 //! | `coordinates` | bounds and starting values of the coordinates |
 //! | `lines`, `line_fit` | the lines with their variances; the operator through them |
 //! | `response_fit` | least squares on a frequency response |
+//! | `instrumental` | the operator by refined instrumental variables |
 //! | `arx_response` | a response without a form |
 //! | `layout` | places of coordinates and noise coefficients |
 //! | `noise` | autoregressions: starts and orders of the noise model |
@@ -40,7 +42,7 @@
 //! | `sensitivity` | what the estimate owes to the choice of a noise model |
 //! | `profile` | intervals by profile likelihood |
 //! | `choice` | which form |
-//! | `agreement` | do two methods agree |
+//! | `agreement` | do methods agree |
 //! | `open_loop` | crossover and phase margin |
 //! | `of_polynomials`, `pole_reading` | polynomials back to an operator; which pole is what |
 //! | `judgement` | what makes a result doubtful |
@@ -55,6 +57,7 @@ mod coordinates;
 mod covariances;
 mod estimated;
 mod estimator;
+mod instrumental;
 mod jackknife;
 mod judgement;
 mod layout;
@@ -73,10 +76,11 @@ mod response_fit;
 mod result;
 mod sensitivity;
 
-pub use agreement::{Agreement, AgreementRow};
+pub use agreement::{Agreement, AgreementMethod, AgreementPair, AgreementRow};
 pub use choice::FormFigures;
 pub use clusters::ClusterKind;
 pub use estimator::{FamilyEstimator, HIGHEST_NOISE_ORDER};
+pub use instrumental::InstrumentalFit;
 pub use line_fit::LineFit;
 pub use of_polynomials::{FamilyConversion, family_of_polynomials};
 pub use open_loop::{LoopMeasures, loop_measures};

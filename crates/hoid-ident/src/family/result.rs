@@ -9,6 +9,7 @@ use super::{
     agreement::Agreement,
     choice::FormFigures,
     clusters::{ClusterKind, quantile},
+    instrumental::InstrumentalFit,
     line_fit::LineFit,
     open_loop::{LoopMeasures, loop_measures},
     parameter::Parameter,
@@ -66,7 +67,12 @@ pub struct FamilyFit {
     pub lines: Option<LineFit>,
     /// Why there is none.
     pub no_lines: Option<String>,
-    /// Prediction error method and lines beside each other.
+    /// The operator of the same form by refined instrumental variables, where an excitation was
+    /// recorded.
+    pub instrumental: Option<InstrumentalFit>,
+    /// Why there is none.
+    pub no_instrumental: Option<String>,
+    /// The methods beside each other.
     pub agreement: Option<Agreement>,
     /// Box-Jenkins of the same orders.
     pub free_model: Option<FreeModel>,
@@ -126,6 +132,12 @@ impl FamilyFit {
     pub fn loop_measures_at_lines(&self, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let lines = self.lines.as_ref()?;
         self.measured(&lines.operator, lines.covariance.as_deref(), element)
+    }
+
+    /// Crossover frequency and phase margin by refined instrumental variables.
+    pub fn loop_measures_by_instruments(&self, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
+        let found = self.instrumental.as_ref()?;
+        self.measured(&found.operator, found.covariance.as_deref(), element)
     }
 
     fn measured(

@@ -37,6 +37,7 @@
 //! | `last_iterate` | where an iteration ended |
 //! | `own_poles` | its nonlinear form, for where it does not settle |
 //! | `refined_system` | that iteration as a start of the prediction error method |
+//! | `noise_free` | noise-free signals for other estimators |
 //! | `simulation_error` | what a system leaves of the output |
 //! | `algorithm` | what a method gives to the estimator, and gets from it |
 //! | `equation` | the filtered equation, its instruments and its solution |
@@ -52,6 +53,7 @@ mod external_signal;
 mod instruments;
 mod last_iterate;
 mod methods;
+mod noise_free;
 mod own_poles;
 mod refined;
 mod refined_system;
@@ -60,4 +62,5 @@ mod simulation_error;
 pub use estimator::InstrumentalVariable;
 pub use instruments::{FORCING_CHANNEL, Instruments};
 pub use methods::IvMethod;
+pub(crate) use noise_free::{NoiseFreeInput, noise_free_inputs, simulated_output};
 pub(crate) use refined_system::refined_system;

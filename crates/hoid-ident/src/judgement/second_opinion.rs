@@ -62,6 +62,7 @@ pub fn of_family(
         forms: vec![fit.form],
         nc: nc..=nc,
         nd: nd..=nd,
+        excitation: None,
         ..estimator.clone()
     };
     let other = other.fit_beside(&held(records)?, None).ok()?;

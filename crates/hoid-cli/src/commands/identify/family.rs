@@ -33,8 +33,13 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
     if let Some(path) = &args.figure {
         check_figure(path)?;
     }
-    let estimator = estimator(args)?;
+    let mut estimator = estimator(args)?;
     let described = description(args, records);
+    // What was found, or what was named: instruments need no lines.
+    estimator.excitation = match &described {
+        Ok(found) => found.channel.clone(),
+        Err(_) => args.excitation.clone().filter(|e| e != "none"),
+    };
     let of_lines = match &described {
         Ok(found) => Some(Ok(found.function.clone())),
         // What was looked for by name is missed; what was looked for by itself is not.
@@ -296,6 +301,9 @@ fn curves(found: &Found<'_>, described: &Description) -> Vec<ModelCurve> {
     if let Some(lines) = &found.fit.lines {
         all.push(curve("fit at the lines", &lines.operator));
     }
+    if let Some(instrumental) = found.fit.instrumental.as_ref().filter(|i| i.termination.converged()) {
+        all.push(curve("RIV-BJ", &instrumental.operator));
+    }
     all
 }
 
@@ -304,7 +312,7 @@ fn through_describing_function(found: &Found<'_>, described: &Description) -> Pi
         svg: picture(found, described),
         caption:
             "The describing function at the lines of the excitation, with 95 % by its scatter, and the operator of the \
-                  chosen form: by prediction error, and fitted at the lines."
+                  chosen form: by prediction error, fitted at the lines, and by instrumental variables (RIV-BJ) where these converge."
                 .to_owned(),
     }
 }

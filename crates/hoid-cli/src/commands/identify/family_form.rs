@@ -2,7 +2,10 @@
 
 use hoid_ident::{
     MarginEstimates,
-    family::{ClusterKind, FamilyFit, FormFigures, LoopMeasures, OperatorOfRecord, Parameter},
+    family::{
+        AgreementMethod, AgreementPair, AgreementRow, ClusterKind, FamilyFit, FormFigures, LoopMeasures,
+        OperatorOfRecord, Parameter,
+    },
     validation::GoodnessOfFit,
 };
 use hoid_model::{ContinuousTransferFunction, FamilyOperator, Record, uncertainty::Estimate};
@@ -75,6 +78,10 @@ impl Found<'_> {
                 let at_lines = fit.loop_measures_at_lines(element);
                 page.push_str(&format!("  of the fit at the lines: {}\n", measures(at_lines.as_ref())));
             }
+            if fit.instrumental.as_ref().is_some_and(|i| i.termination.converged()) {
+                let by_instruments = fit.loop_measures_by_instruments(element);
+                page.push_str(&format!("  by RIV-BJ: {}\n", measures(by_instruments.as_ref())));
+            }
         }
         page.push_str(&self.methods());
         if fit.forms.len() > 1 {
@@ -93,30 +100,55 @@ impl Found<'_> {
         Ok(page)
     }
 
-    /// Prediction error and lines side by side.
+    /// The methods side by side.
     fn methods(&self) -> String {
-        let Some(lines) = &self.fit.lines else {
+        let fit = self.fit;
+        let lines = fit.lines.as_ref().map(|lines| lines.parameters());
+        let instrumental = (fit.instrumental.as_ref())
+            .filter(|found| found.termination.converged())
+            .map(|found| found.parameters());
+        if lines.is_none() && instrumental.is_none() {
             return String::new();
-        };
-        let of = lines.parameters();
-        let mut rows = text::table(&["parameter", "prediction error", "at the lines"]);
-        for (here, (_, there)) in self.fit.operator(0).parameters.iter().zip(of) {
-            let there = with_error(there.value, there.standard_error);
-            rows.add_row([named(here), with_error(here.value, here.standard_error), there]);
+        }
+        let columns = [("at the lines", lines), ("RIV-BJ", instrumental)];
+        let others: Vec<_> = columns.into_iter().filter_map(|(head, of)| Some((head, of?))).collect();
+        let heads: Vec<&str> = ["parameter", "prediction error"]
+            .into_iter()
+            .chain(others.iter().map(|(head, _)| *head))
+            .collect();
+        let mut rows = text::table(&heads);
+        for (k, here) in fit.operator(0).parameters.iter().enumerate() {
+            let beside = others.iter().filter_map(|(_, of)| of.get(k));
+            let beside = beside.map(|(_, there)| with_error(there.value, there.standard_error));
+            rows.add_row(
+                [named(here), with_error(here.value, here.standard_error)]
+                    .into_iter()
+                    .chain(beside),
+            );
         }
         let mut page = format!("\n{rows}\n");
-        let reduced = lines.reduced_chi_squared();
-        page.push_str(&format!(
-            "At the lines: chi^2 = {:.1} with {} degrees of freedom{}.\n",
-            lines.chi_squared,
-            lines.degrees_of_freedom,
-            reduced.map_or(String::new(), |r| format!(" ({r:.2} each)"))
-        ));
-        if let Some(agreement) = &self.fit.agreement {
+        if let Some(lines) = &fit.lines {
+            let reduced = lines.reduced_chi_squared();
             page.push_str(&format!(
-                "Agreement of the two methods over {} determined coordinates: chi^2 = {:.1}, p = {:.2}.\n",
+                "At the lines: chi^2 = {:.1} with {} degrees of freedom{}.\n",
+                lines.chi_squared,
+                lines.degrees_of_freedom,
+                reduced.map_or(String::new(), |r| format!(" ({r:.2} each)"))
+            ));
+        }
+        if let Some(agreement) = &fit.agreement {
+            let pairs = agreement.pairs.iter().map(|pair| {
+                format!(
+                    "{} and {} p = {:.2}",
+                    pair.methods.0.words(),
+                    pair.methods.1.words(),
+                    pair.p_value
+                )
+            });
+            page.push_str(&format!(
+                "Agreement over {} coordinates that the data determine: {}; together p = {:.2}.\n",
                 agreement.rows.len(),
-                agreement.statistic,
+                pairs.collect::<Vec<_>>().join(", "),
                 agreement.p_value
             ));
         }
@@ -211,6 +243,7 @@ impl Found<'_> {
         set("noise", json!({"c": fit.noise.0, "d": fit.noise.1}));
         set("forms", fit.forms.iter().map(form_figures).collect());
         set("lines", self.lines_json());
+        set("riv_bj", self.instrumental_json());
         set("agreement", self.agreement_json());
         set(
             "box_jenkins",
@@ -279,20 +312,59 @@ impl Found<'_> {
         Value::Object(map)
     }
 
+    fn instrumental_json(&self) -> Value {
+        let Some(found) = &self.fit.instrumental else {
+            return match &self.fit.no_instrumental {
+                Some(why) => json!({"reason": why}),
+                None => Value::Null,
+            };
+        };
+        let parameters: Vec<Value> = found
+            .parameters()
+            .iter()
+            .map(|(name, e)| json::named(name, e))
+            .collect();
+        let mut map = Map::new();
+        map.insert("parameters".to_owned(), Value::Array(parameters));
+        map.insert("nd".to_owned(), json!(found.noise_order));
+        map.insert("converged".to_owned(), json!(found.termination.converged()));
+        map.insert("termination".to_owned(), json!(found.termination.to_string()));
+        if let Some(element) = self.element {
+            let measures = self.fit.loop_measures_by_instruments(element);
+            map.insert("open_loop".to_owned(), open_loop(measures.as_ref()));
+        }
+        Value::Object(map)
+    }
+
     fn agreement_json(&self) -> Value {
         self.fit.agreement.as_ref().map_or(Value::Null, |agreement| {
-            let row = |r: &hoid_ident::family::AgreementRow| {
-                let pair =
-                    |(value, error): (f64, f64)| json!({"value": number(value), "standard_error": number(error)});
+            let row = |r: &AgreementRow| {
+                let mut map = Map::new();
+                map.insert("coordinate".to_owned(), json!(r.coordinate.name()));
+                for method in [
+                    AgreementMethod::PredictionError,
+                    AgreementMethod::Lines,
+                    AgreementMethod::Instrumental,
+                ] {
+                    let pair = r.of(method).map_or(
+                        Value::Null,
+                        |(value, error)| json!({"value": number(value), "standard_error": number(error)}),
+                    );
+                    map.insert(method.name().to_owned(), pair);
+                }
+                map.insert("difference_in_errors".to_owned(), number(r.difference_in_errors));
+                Value::Object(map)
+            };
+            let pair = |pair: &AgreementPair| {
                 json!({
-                    "coordinate": r.coordinate.name(),
-                    "prediction_error": pair(r.prediction_error),
-                    "lines": pair(r.lines),
-                    "difference_in_errors": number(r.difference_in_errors),
+                    "methods": [pair.methods.0.name(), pair.methods.1.name()],
+                    "chi2": number(pair.statistic),
+                    "p_value": number(pair.p_value),
                 })
             };
             json!({
                 "coordinates": agreement.rows.iter().map(row).collect::<Vec<_>>(),
+                "pairs": agreement.pairs.iter().map(pair).collect::<Vec<_>>(),
                 "chi2": number(agreement.statistic),
                 "p_value": number(agreement.p_value),
             })

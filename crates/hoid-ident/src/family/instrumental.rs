@@ -1,0 +1,453 @@
+//! The operator by refined instrumental variables: the recorded excitation is the instrument.
+//!
+//! RIV-BJ ([`crate::iv`]) for `u = Y e + v`, `D v = eps`, with Y an operator of the family in place of
+//! free polynomials. In its nonlinear form (T. Söderström and P. Stoica, *Instrumental Variable
+//! Methods for System Identification*, 1983, ch. 6; P. C. Young, *Automatica* 52 (2015) 35-46) it is
+//! the zero x of
+//!
+//! `g(x) = Z' eps(x) + sum_i w_i g_i'(x) (m_i - g_i(x))`,  `eps(x) = D (u - Y(x) e)`,  `Z = D dY/dx xi`,
+//!
+//! with xi the part of e that follows the excitation ([`crate::iv`]), D the autoregression of what Y
+//! leaves of u, and the second term the prior. Z and D belong to an auxiliary operator; for given Z
+//! and D, Newton's step is `(Z' Psi + P)^-1 g`, `Psi = D dY/dx e`, halved until `g' (Z'Z + P)^-1 g`
+//! falls; a coordinate that it drives out of what is sought goes to its bound.
+//!
+//! **The auxiliary operator** is that of the fit at the lines, and where its instruments lead to no
+//! zero that of the prediction error fit, or the middle of both. RIV-BJ as it is usually written takes
+//! the last estimate: where the lines end below the neuromuscular resonance, estimates from two sets
+//! of instruments answer each other without end, each the other's auxiliary operator (with four
+//! in ten virtual people). Any auxiliary operator gives a consistent estimate (Söderström and Stoica,
+//! section 4.2), and the instruments of one that is held are the optimal ones but for its own error.
+//!
+//! Free polynomials have more to lose: their poles are not known, as the lag lies below the lines and
+//! the resonance above, and run to the unit circle. Here the prior keeps them.
+//!
+//! **What it rests on.** A noise that the excitation does not reach leaves x unbiased whatever D
+//! is. It shares the instrument with the fit at the lines, but neither weights nor periods, and the
+//! samples with the prediction error fit, but nothing of e that follows the remnant.
+//!
+//! **Errors.** x less its truth is `A^-1 Z' eps`, `A = Z' Psi + P`, to first order: the covariance is
+//! `kappa sigma^2 A^-1 Z'Z A^-T` with the kappa of the prediction error fit, and what the prior leaves
+//! open.
+
+use std::ops::Range;
+
+use hoid_model::{FamilyOperator, Record, uncertainty::Estimate};
+use nalgebra::{DMatrix, DVector};
+
+use super::{
+    jackknife::add_open_part, layout::FamilyLayout, noise::NoiseProducts, prediction::Prediction,
+    prediction_fit::PredictionFit,
+};
+use crate::{
+    IdentError, Reason, Termination,
+    criterion::{Criterion, Data, Workspace},
+    grey_box::objective::PhysicalCriterion,
+    iv::{NoiseFreeInput, noise_free_inputs, simulated_output},
+    linalg::least_squares::{add_scaled, dot},
+    optimize::Linearisation,
+};
+
+/// Steps for given instruments.
+const STEPS: usize = 25;
+/// A step shorter than this share of the standard errors is the last.
+const SETTLED: f64 = 0.01;
+/// Halvings of a step.
+const HALVINGS: usize = 6;
+
+/// The operator by refined instrumental variables.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InstrumentalFit {
+    /// The operator.
+    pub operator: FamilyOperator,
+    /// Covariance of its coordinates by rows: by runs or blocks, with what the prior leaves open.
+    pub covariance: Option<Vec<f64>>,
+    /// Order of the autoregression D.
+    pub noise_order: usize,
+    /// How the iteration ended.
+    pub termination: Termination,
+    /// Variance after the data over that before, for each coordinate: 0 without a prior, 1 at a
+    /// bound.
+    pub prior_shares: Vec<f64>,
+}
+
+impl InstrumentalFit {
+    /// The parameters by name, their errors to first order.
+    pub fn parameters(&self) -> Vec<(&'static str, Estimate)> {
+        let all = self.operator.named_estimates(self.covariance.as_deref());
+        all.into_iter()
+            .map(|(named, estimate)| (named.name, estimate))
+            .collect()
+    }
+}
+
+/// Instruments and noise model of an auxiliary operator.
+struct Held {
+    z: Vec<Vec<f64>>,
+    d: Vec<f64>,
+    /// `Z'Z` by rows.
+    products: Vec<f64>,
+}
+
+/// A zero of g for given instruments.
+struct Zero {
+    x: Vec<f64>,
+    covariance: Option<Vec<f64>>,
+    found: bool,
+    steps: usize,
+}
+
+/// What the iteration needs at each of its points.
+pub(super) struct Instrumental<'p, 'a> {
+    prediction: &'p Prediction<'a>,
+    /// Of the prediction error fit: its prior, weighed as there, its limits, its clusters.
+    fit: &'p PredictionFit<'a>,
+    inputs: Vec<NoiseFreeInput>,
+    order: usize,
+}
+
+impl<'p, 'a> Instrumental<'p, 'a> {
+    /// # Errors
+    /// Those of the channel: it is missing, constant, or a signal of the loop.
+    pub fn new(
+        prediction: &'p Prediction<'a>,
+        fit: &'p PredictionFit<'a>,
+        records: &[Record],
+        excitation: &str,
+    ) -> Result<Self, IdentError> {
+        let layout = fit.layout();
+        Ok(Self {
+            prediction,
+            fit,
+            inputs: noise_free_inputs(records, excitation)?,
+            order: layout.nc + layout.nd,
+        })
+    }
+
+    /// The fit with the first of these auxiliary operators, in coordinates, that leads to a zero.
+    ///
+    /// # Errors
+    /// [`IdentError::NoFiniteLoss`].
+    pub fn fit(&self, auxiliary: &[Vec<f64>], workspace: &mut Workspace) -> Result<InstrumentalFit, IdentError> {
+        let mut last = Err(IdentError::NoFiniteLoss);
+        let mut iterations = 0;
+        for x in auxiliary {
+            let within = x.iter().zip(self.limits());
+            let x: Vec<f64> = within.map(|(v, (low, high))| v.clamp(*low, *high)).collect();
+            let zero = self
+                .held(&x, workspace)
+                .and_then(|held| self.zero(&x, &held, workspace));
+            iterations += zero.as_ref().map_or(0, |zero| zero.steps);
+            let found = zero.as_ref().is_ok_and(|zero| zero.found);
+            if found || last.is_err() {
+                last = zero;
+            }
+            if found {
+                break;
+            }
+        }
+        let (zero, layout) = (last?, self.fit.layout());
+        let reason = if zero.found {
+            Reason::Settled
+        } else {
+            Reason::IterationLimit
+        };
+        Ok(InstrumentalFit {
+            operator: FamilyOperator::new(layout.form, layout.neuromuscular, &zero.x)?,
+            prior_shares: self.prior_shares(&zero),
+            covariance: zero.covariance,
+            noise_order: self.order,
+            termination: Termination { reason, iterations },
+        })
+    }
+
+    fn limits(&self) -> &[(f64, f64)] {
+        &self.fit.criterion.limits[..self.fit.layout().coordinates()]
+    }
+
+    /// D for what the operator leaves of u.
+    fn noise(&self, x: &[f64], workspace: &mut Workspace) -> Result<Vec<f64>, IdentError> {
+        let layout = self.fit.layout();
+        let left = self
+            .prediction
+            .unexplained((layout.form, layout.neuromuscular), x, workspace)?;
+        let found = NoiseProducts::new(&left, self.order).fit(self.order);
+        found.map(|f| f.d).ok_or(IdentError::NoFiniteLoss)
+    }
+
+    fn criterion(&self) -> PhysicalCriterion<'a, FamilyLayout> {
+        let layout = self.fit.layout();
+        self.prediction
+            .criterion((layout.form, layout.neuromuscular), (0, self.order))
+    }
+
+    /// `eps` and `Psi` of one record with these signals.
+    fn of_record(
+        &self,
+        eta: &[f64],
+        record: usize,
+        data: Data<'_>,
+        workspace: &mut Workspace,
+    ) -> Result<(Vec<f64>, Vec<Vec<f64>>), IdentError> {
+        let mapped = self.criterion().model_of(eta, record)?;
+        let of_theta = Criterion {
+            orders: mapped.orders,
+            data: vec![data],
+            initial: self.prediction.initial,
+            first: self.prediction.first,
+            weights: None,
+        };
+        let eps = of_theta.residuals_of(&mapped.theta, 0, workspace);
+        let by_theta = of_theta.jacobian(&mapped.theta, 0, workspace);
+        let columns = mapped.columns[..self.fit.layout().coordinates()].iter();
+        let psi = columns
+            .map(|column| {
+                let mut sum = vec![0.0; eps.len()];
+                for (slope, of_theta) in column.iter().zip(&by_theta).filter(|(s, _)| **s != 0.0) {
+                    add_scaled(&mut sum, *slope, of_theta);
+                }
+                sum
+            })
+            .collect();
+        Ok((eps, psi))
+    }
+
+    /// Z and D of an auxiliary operator.
+    fn held(&self, x: &[f64], workspace: &mut Workspace) -> Result<Held, IdentError> {
+        let d = self.noise(x, workspace)?;
+        let (eta, p, first) = ([x, &d].concat(), x.len(), self.prediction.first);
+        let mut z = vec![Vec::new(); p];
+        let mut sample = 0;
+        for (record, data) in self.prediction.data.iter().enumerate() {
+            let (n, rows) = (data.u.len(), data.u.len() - first);
+            let mapped = self.criterion().model_of(&eta, record)?;
+            let begun = z[0].len();
+            z.iter_mut().for_each(|column| column.resize(begun + rows, 0.0));
+            for input in &self.inputs {
+                // Samples of this input in this record, as rows.
+                let inside = |s: usize| s.clamp(sample + first, sample + n) - sample - first;
+                let own: Range<usize> = inside(input.samples.start)..inside(input.samples.end);
+                if own.is_empty() {
+                    continue;
+                }
+                let e = &input.inputs[record];
+                let u = simulated_output(&mapped.orders, &mapped.theta, e);
+                let (_, made) = self.of_record(&eta, record, Data { e, u: &u }, workspace)?;
+                for (to, from) in z.iter_mut().zip(&made) {
+                    to[begun + own.start..begun + own.end].copy_from_slice(&from[own.clone()]);
+                }
+            }
+            sample += n;
+        }
+        let products = (z.iter()).flat_map(|a| z.iter().map(move |b| dot(a, b))).collect();
+        Ok(Held { z, d, products })
+    }
+
+    /// `eps` and `Psi` of all records; `None` where there is no model.
+    fn equation(&self, x: &[f64], d: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+        let eta = [x, d].concat();
+        let (mut eps, mut psi) = (Vec::new(), vec![Vec::new(); x.len()]);
+        for (record, data) in self.prediction.data.iter().enumerate() {
+            let (own, of_own) = self.of_record(&eta, record, *data, workspace).ok()?;
+            eps.extend(own);
+            psi.iter_mut().zip(of_own).for_each(|(all, one)| all.extend(one));
+        }
+        eps.iter().all(|e| e.is_finite()).then_some((eps, psi))
+    }
+
+    /// The prior's part of g and P.
+    fn prior(&self, x: &[f64]) -> Linearisation {
+        let mut total = Linearisation::empty(x.len());
+        for penalty in &self.fit.criterion.penalty {
+            penalty.add_to(x, &mut total);
+        }
+        total
+    }
+
+    /// The zero of g for given instruments, from x.
+    fn zero(&self, x: &[f64], held: &Held, workspace: &mut Workspace) -> Result<Zero, IdentError> {
+        let (limits, p) = (self.limits(), x.len());
+        let mut x = x.to_vec();
+        let mut at = self.equation(&x, &held.d, workspace).ok_or(IdentError::NoFiniteLoss)?;
+        let mut steps = 0;
+        loop {
+            let (eps, psi) = &at;
+            let prior = self.prior(&x);
+            let score = |eps: &[f64], prior: &Linearisation| -> Vec<f64> {
+                (0..p).map(|i| dot(&held.z[i], eps) + prior.descent[i]).collect()
+            };
+            let g = score(eps, &prior);
+            let a = DMatrix::from_fn(p, p, |i, j| dot(&held.z[i], &psi[j]) + prior.gram[i * p + j]);
+            let metric = DMatrix::from_fn(p, p, |i, j| held.products[i * p + j] + prior.gram[i * p + j]);
+            let variance = dot(eps, eps) / eps.len() as f64;
+            let covariance = self.covariance(&x, &a, &held.products, variance);
+            let (free, step) = self.step(&x, &a, &g).ok_or(IdentError::NoFiniteLoss)?;
+            let moved = length(&step, &metric, variance);
+            if moved <= SETTLED || steps == STEPS {
+                let found = moved <= SETTLED;
+                return Ok(Zero {
+                    x,
+                    covariance,
+                    found,
+                    steps,
+                });
+            }
+            steps += 1;
+            let part = DMatrix::from_fn(free.len(), free.len(), |i, j| metric[(free[i], free[j])]);
+            let inverse = part.try_inverse().ok_or(IdentError::NoFiniteLoss)?;
+            let merit = |g: &[f64]| {
+                let g = DVector::from_iterator(free.len(), free.iter().map(|&i| g[i]));
+                (g.transpose() * &inverse * &g)[(0, 0)]
+            };
+            let known = merit(&g);
+            let mut share = 1.0;
+            let next = loop {
+                let there: Vec<f64> = (x.iter().zip(&step).zip(limits))
+                    .map(|((v, s), (low, high))| (v + share * s).clamp(*low, *high))
+                    .collect();
+                if let Some(next) = self.equation(&there, &held.d, workspace)
+                    && merit(&score(&next.0, &self.prior(&there))) < known
+                {
+                    break Some((there, next));
+                }
+                share *= 0.5;
+                if share < 0.5_f64.powi(HALVINGS as i32) {
+                    break None;
+                }
+            };
+            let Some((there, next)) = next else {
+                // No step leads nearer: there is no zero in this direction.
+                return Ok(Zero {
+                    x,
+                    covariance,
+                    found: false,
+                    steps,
+                });
+            };
+            (x, at) = (there, next);
+        }
+    }
+
+    /// Newton's step and the coordinates that are free in it. One that would cross its bound is
+    /// moved to it, and the others take that into account; one that rests there stays.
+    fn step(&self, x: &[f64], a: &DMatrix<f64>, score: &[f64]) -> Option<(Vec<usize>, Vec<f64>)> {
+        let limits = self.limits();
+        let mut free: Vec<usize> = (0..x.len()).filter(|&i| limits[i].0 < limits[i].1).collect();
+        let mut step = vec![0.0; x.len()];
+        loop {
+            let part = DMatrix::from_fn(free.len(), free.len(), |i, j| a[(free[i], free[j])]);
+            let bound: Vec<usize> = (0..x.len()).filter(|i| !free.contains(i)).collect();
+            let right = DVector::from_iterator(
+                free.len(),
+                free.iter()
+                    .map(|&i| score[i] - bound.iter().map(|&j| a[(i, j)] * step[j]).sum::<f64>()),
+            );
+            let solved = part.lu().solve(&right)?;
+            free.iter().zip(solved.iter()).for_each(|(&i, s)| step[i] = *s);
+            let beyond = |&i: &usize| x[i] + step[i] < limits[i].0 || x[i] + step[i] > limits[i].1;
+            match free.iter().position(beyond) {
+                Some(place) => {
+                    let i = free.remove(place);
+                    step[i] = (x[i] + step[i]).clamp(limits[i].0, limits[i].1) - x[i];
+                }
+                None => return step.iter().all(|s| s.is_finite()).then_some((free, step)),
+            };
+        }
+    }
+
+    /// `kappa sigma^2 A^-1 Z'Z A^-T`, and what the prior leaves open; zero at bounds.
+    fn covariance(&self, x: &[f64], a: &DMatrix<f64>, products: &[f64], variance: f64) -> Option<Vec<f64>> {
+        let p = x.len();
+        let scale = variance * self.fit.inflation;
+        let inner = |i: usize| self.limits()[i].0 < x[i] && x[i] < self.limits()[i].1;
+        // At a bound an element does not move: its row of A is that of the unit matrix.
+        let held = DMatrix::from_fn(p, p, |i, j| match (inner(i) && inner(j), i == j) {
+            (true, _) => a[(i, j)],
+            (false, same) => f64::from(u8::from(same)),
+        });
+        let inverse = held.try_inverse()?;
+        let middle = DMatrix::from_fn(p, p, |i, j| {
+            if inner(i) && inner(j) {
+                scale * products[i * p + j]
+            } else {
+                0.0
+            }
+        });
+        let by_rows = |m: &DMatrix<f64>| -> Vec<f64> { m.transpose().as_slice().to_vec() };
+        let mut covariance = by_rows(&(&inverse * middle * inverse.transpose()));
+        let penalty: Vec<_> = (self.fit.criterion.penalty.iter().copied())
+            .filter(|penalty| inner(penalty.place))
+            .collect();
+        // The weights are kappa sigma^2/s^2: the square of one over it is kappa sigma^2 times it.
+        add_open_part(&mut covariance, scale, &penalty, x, &by_rows(&inverse));
+        covariance.iter().all(|v| v.is_finite()).then_some(covariance)
+    }
+
+    fn prior_shares(&self, zero: &Zero) -> Vec<f64> {
+        let p = zero.x.len();
+        let mut shares = vec![0.0; p];
+        for penalty in &self.fit.criterion.penalty {
+            let (i, scale) = (penalty.place, self.fit.innovation_variance * self.fit.inflation);
+            shares[i] = match &zero.covariance {
+                Some(c) if c[i * p + i] > 0.0 => (c[i * p + i] * penalty.curvature(&zero.x) / scale).min(1.0),
+                _ => 1.0,
+            };
+        }
+        shares
+    }
+}
+
+/// `|s|` in units of the standard deviation, by this metric.
+fn length(step: &[f64], metric: &DMatrix<f64>, variance: f64) -> f64 {
+    let s = DVector::from_column_slice(step);
+    ((s.transpose() * metric * &s)[(0, 0)].max(0.0) / variance).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::{Channel, Form};
+    use hoid_sim::people::{Person, Plant, Population, RemnantKind, Task};
+
+    use super::*;
+    use crate::family::FamilyEstimator;
+
+    const NOISE_ORDER: usize = 8;
+
+    fn run(number: u64) -> Record {
+        let (population, task) = (Population::default(), Task::default());
+        let form = Some(Form::Lead);
+        let kind = RemnantKind::BroadBand;
+        let plant = Plant::LaggedIntegrator;
+        let person = Person::draw(&population, &task, plant, form, kind, 77, number).unwrap();
+        person.run(0).unwrap().record
+    }
+
+    fn estimator() -> FamilyEstimator {
+        FamilyEstimator {
+            forms: vec![Form::Lead],
+            nd: NOISE_ORDER..=NOISE_ORDER,
+            excitation: Some("d".to_owned()),
+            ..FamilyEstimator::default()
+        }
+    }
+
+    #[test]
+    fn a_channel_that_cannot_be_an_instrument_is_told() {
+        let record = run(4);
+        let without = FamilyEstimator {
+            excitation: Some("x".to_owned()),
+            ..estimator()
+        };
+        let fit = without.fit(std::slice::from_ref(&record)).unwrap();
+        assert!(fit.instrumental.is_none() && fit.no_instrumental.unwrap().contains('x'));
+        assert!(fit.verdict.findings().iter().any(|f| f.kind == "no-instruments"));
+        let constant = Channel::new("still", "", vec![1.0; record.len()]);
+        let records = [record.with_channel(constant).unwrap()];
+        let still = FamilyEstimator {
+            excitation: Some("still".to_owned()),
+            ..estimator()
+        };
+        let fit = still.fit(&records).unwrap();
+        assert!(fit.instrumental.is_none() && fit.no_instrumental.is_some());
+    }
+}

@@ -1,0 +1,45 @@
+//! Noise-free signals of a closed loop for estimators beside the methods of this folder.
+
+use std::ops::Range;
+
+use hoid_core::filter::{divide_in_place, fir};
+use hoid_model::{Orders, Record};
+
+use super::{columns::with_past, external_signal};
+use crate::{IdentError, criterion::Data};
+
+/// The part of e that follows an excitation, for a range of samples.
+pub(crate) struct NoiseFreeInput {
+    /// The part in each record, whole.
+    pub inputs: Vec<Vec<f64>>,
+    /// Samples whose noise is not in it, counted through all records.
+    pub samples: Range<usize>,
+}
+
+/// The parts of e that follow this channel, made with weights of other samples
+/// ([`super::external_signal`]).
+///
+/// # Errors
+/// [`IdentError::NoChannel`], [`IdentError::NoExcitation`], and [`IdentError::BadOption`] for a
+/// signal of the loop.
+pub(crate) fn noise_free_inputs(records: &[Record], channel: &str) -> Result<Vec<NoiseFreeInput>, IdentError> {
+    let data = Data::of(records);
+    let made = external_signal::noise_free(&external_signal::signals(records, channel)?, &data);
+    let of = |source: super::equation::Source<'_>| NoiseFreeInput {
+        inputs: source.inputs.into_iter().map(std::borrow::Cow::into_owned).collect(),
+        samples: source.samples,
+    };
+    Ok(made.into_iter().map(of).collect())
+}
+
+/// `(B/F) q^-nk e` behind an invented past, with theta of a Box-Jenkins model.
+pub(crate) fn simulated_output(orders: &Orders, theta: &[f64], e: &[f64]) -> Vec<f64> {
+    let b = &theta[..orders.nb];
+    let f = &theta[theta.len() - orders.nf..];
+    let (extended, past) = with_past(e);
+    let mut output = vec![0.0; extended.len()];
+    fir(b, orders.nk, &extended, &mut output);
+    divide_in_place(f, &mut output);
+    output.drain(..past);
+    output
+}
