@@ -169,6 +169,8 @@ class OperatorFit:
     @property
     def open_loop(self) -> dict[str, _Pair] | None: ...
     @property
+    def open_loop_intervals(self) -> dict[str, tuple[float, float] | None] | None: ...
+    @property
     def box_jenkins(self) -> dict[str, Any] | None: ...
     @property
     def noise(self) -> tuple[_Array, _Array]: ...
@@ -225,6 +227,8 @@ class Plan:
 
 @final
 class TimeVaryingFit:
+    @property
+    def form(self) -> str: ...
     @property
     def parameters(self) -> list[tuple[str, _Pair, str, str | None]]: ...
     @property
@@ -388,6 +392,12 @@ def identify(
     orders: dict[str, _Ends],
     method: str,
     instruments: str | None,
+    form: str | None,
+    neuromuscular: bool,
+    prior: str
+    | list[tuple[str, float, float, str]]
+    | tuple[list[tuple[str, float | None, float | None, bool]], str]
+    | None,
     remnant_order: _Ends | None,
     delay: tuple[float, float] | None,
     individual: list[str],
