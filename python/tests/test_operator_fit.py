@@ -70,6 +70,11 @@ def test_what_a_fit_holds(found: pyhoid.OperatorFit) -> None:
     assert found.open_loop is not None
     crossover, margin = found.open_loop["crossover_rad_s"], found.open_loop["phase_margin_deg"]
     assert crossover is not None and margin is not None and margin.standard_error is not None
+    assert found.open_loop_intervals is not None
+    ends = found.open_loop_intervals["phase_margin_deg"]
+    # Student's quantile is wider than the normal one.
+    assert ends is not None and ends[1] - margin.value > 1.96 * margin.standard_error
+    assert ends[0] + ends[1] == pytest.approx(2 * margin.value)
     at_lines = found.lines["open_loop"]["crossover_rad_s"]
     assert at_lines.value == pytest.approx(crossover.value, rel=0.2)
     assert found.agreement is not None and 0 <= found.agreement["p_value"] <= 1
@@ -79,7 +84,7 @@ def test_what_a_fit_holds(found: pyhoid.OperatorFit) -> None:
     assert all(pair["p_value"] >= found.agreement["p_value"] / 3 for pair in found.agreement["pairs"])
     assert found.prior["omega_nm"] == (10.5, 0.3) and found.settings["form"] == "auto"
     text = found.summary()
-    for part in (found.verdict.level, found.form, "tau_e (s)", "at the lines", "phase margin"):
+    for part in (found.verdict.level, found.form, "tau_e (s)", "at the lines", "phase margin", "95 %"):
         assert part in text, part
     assert "tau_e" in found._repr_html_() and repr(found) == text
     table = found.to_pandas()

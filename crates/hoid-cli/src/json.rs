@@ -29,6 +29,15 @@ pub fn estimate(e: &Estimate) -> Value {
     json!({"value": number(e.value), "standard_error": optional(e.standard_error)})
 }
 
+/// The same with its interval of 95 %, null where there is none.
+pub fn estimate_within(e: &Estimate, interval: Option<(f64, f64)>) -> Value {
+    json!({
+        "value": number(e.value),
+        "standard_error": optional(e.standard_error),
+        "interval": interval.map(|(low, high)| [number(low), number(high)]),
+    })
+}
+
 /// What a result is worth: the level, what speaks against it, what is worth knowing besides, and
 /// all of it with its names for programs.
 pub fn verdict(v: &Verdict) -> Value {

@@ -268,6 +268,76 @@ fn a_change_is_found_and_its_gains_are_written() {
     assert_eq!(trace.lines().count(), 8195);
 }
 
+/// The example of the book: a lead-lag whose gain and lead change.
+#[test]
+fn a_change_of_another_form_is_found() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    let page = include_str!("../../../docs/src/methods/time-varying.md");
+    let scenario = page
+        .split("<<'END'\n")
+        .nth(1)
+        .and_then(|rest| rest.split("END\n").next());
+    fs::write(d.join("learns.toml"), scenario.unwrap()).unwrap();
+    good(
+        d,
+        &[
+            "simulate",
+            "--scenario",
+            "learns.toml",
+            "--seed",
+            "3",
+            "--out",
+            "learns.csv",
+        ],
+    );
+    let arguments = [
+        "identify",
+        "learns.csv",
+        "--structure",
+        "time-varying",
+        "--form",
+        "lead-lag",
+        "--prior",
+        "population",
+        "--trace",
+        "trace.csv",
+    ];
+    let found = json(d, &[&arguments[..], &["--json"]].concat());
+    assert_eq!(
+        (&found["form"], &found["change"]["found"]),
+        (&"lead-lag".into(), &true.into())
+    );
+    assert_eq!(
+        found["settings"]["prior"],
+        "omega_nm=10.5:0.3,zeta_nm=0.3:0.5,tau_e=0.2:0.7"
+    );
+    for (end, name, truth) in [
+        ("initial", "K_over_T_I", 4.0),
+        ("last", "K_over_T_I", 2.0),
+        ("initial", "T_L", 0.3),
+        ("last", "T_L", 1.0),
+        ("last", "T_I", 5.0),
+        ("last", "K", 10.0),
+    ] {
+        let estimate = &found[end][name];
+        let (value, error) = (
+            estimate["value"].as_f64().unwrap(),
+            estimate["standard_error"].as_f64().unwrap(),
+        );
+        assert!(
+            (value - truth).abs() < 4.0 * error && error < 0.5 * truth,
+            "{end} {name}: {estimate}"
+        );
+    }
+    let trace = fs::read_to_string(d.join("trace.csv")).unwrap();
+    assert!(trace.contains("t,K,K_se,K_over_T_I,K_over_T_I_se,T_L,T_L_se"));
+    let said = good(d, &arguments);
+    for part in ["of the form lead-lag", "before the change", "after it", "T_I"] {
+        assert!(said.contains(part), "{said} lacks {part}");
+    }
+}
+
 #[test]
 fn several_records_start_validation_report_and_margins() {
     let directory = simulated();

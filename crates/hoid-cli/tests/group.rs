@@ -132,12 +132,20 @@ fn a_virtual_experiment_is_analysed_and_reported() {
         let tau = &person["parameters"]["tau_e"];
         let (value, error) = (tau["value"].as_f64().unwrap(), tau["standard_error"].as_f64().unwrap());
         assert!((value - 0.28).abs() < 0.05 && error > 0.0 && error < 0.05, "{tau}");
-        assert!(
-            person["open_loop"]["crossover_rad_s"]["standard_error"]
-                .as_f64()
-                .unwrap()
-                > 0.0
-        );
+        for name in ["crossover_rad_s", "phase_margin_deg"] {
+            let measure = &person["open_loop"][name];
+            let (value, error) = (
+                measure["value"].as_f64().unwrap(),
+                measure["standard_error"].as_f64().unwrap(),
+            );
+            let end = |i: usize| measure["interval"][i].as_f64().unwrap();
+            // Student's quantile of few runs is wider than the normal one.
+            assert!(
+                error > 0.0 && (end(0) + end(1) - 2.0 * value).abs() < 1e-9 * value.abs(),
+                "{measure}"
+            );
+            assert!(end(1) - value > 1.96 * error, "{measure}");
+        }
         assert!(person["verdict"]["level"].is_string());
     }
     // A file that has changed is another group.

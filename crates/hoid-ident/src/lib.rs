@@ -117,4 +117,7 @@ pub use optimize::{Reason, SearchMethod, SearchOptions, Termination};
 pub use order_selection::{Candidate, Choice, OrderRanges, choose_orders, identify};
 pub use pem::loss::Loss;
 pub use registry::{estimator_setting, estimators};
-pub use sigmoid::{ChangeParameter, Comparison, GainsAt, NoiseLevel, Remark, SIGMOID_NAMES, SigmoidChange, SigmoidFit};
+pub use sigmoid::{
+    ChangeParameter, ChangedOperator, Comparison, GainsAt, NamedEstimate, NoiseLevel, Remark, SIGMOID_NAMES,
+    SigmoidChange, SigmoidFit,
+};

@@ -81,10 +81,23 @@ pub fn estimators() -> Vec<MethodSpec> {
     };
     let sigmoid = MethodSpec {
         name: "time-varying",
-        help: "the operator's gains change once, by a sigmoid",
+        help: "the operator's gains change once, by a sigmoid; any form",
         source: "Zaal 2016; the reference text, section II",
         structures: &[Structure::BoxJenkins],
-        settings: [vec![orders(), delay(), initial_state(), fix(), bound()], search()].concat(),
+        settings: [
+            vec![
+                form(),
+                neuromuscular(),
+                operator_prior(),
+                orders(),
+                delay(),
+                initial_state(),
+                fix(),
+                bound(),
+            ],
+            search(),
+        ]
+        .concat(),
     };
     [pem]
         .into_iter()
@@ -156,7 +169,7 @@ fn form() -> Setting {
     let mut words = vec!["auto"];
     words.extend(named::<Form>());
     let help = format!(
-        "Form of the operator: {}; auto: the simplest that held-out runs do not refute",
+        "Form of the operator: {}; auto: the simplest that held-out runs do not refute, of time-varying lead",
         words.join(", ")
     );
     setting("form", Kind::Channel, "auto", &help)
@@ -175,7 +188,7 @@ fn operator_prior() -> Setting {
     setting(
         "prior",
         Kind::Channel,
-        "population",
+        "population; of time-varying none",
         "What is known of the person before the data: population (published people), none, a JSON result of another fit, or \
          NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L, T_I, as omega_nm=10.5:0.3 (the spread is relative)",
     )

@@ -50,7 +50,7 @@ pub enum PriorOfUser {
 }
 
 impl PriorOfUser {
-    fn prior(self) -> Outcome<OperatorPrior> {
+    pub fn prior(self) -> Outcome<OperatorPrior> {
         Ok(match self {
             Self::Text(text) => text.parse()?,
             Self::Entries(entries) => OperatorPrior::new(
@@ -212,6 +212,14 @@ fn loop_parts<'py>(py: Python<'py>, measures: Option<LoopMeasures>) -> PyResult<
     Ok(all)
 }
 
+/// Their intervals of 95 %, Student's.
+fn loop_intervals<'py>(py: Python<'py>, measures: Option<LoopMeasures>) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    all.set_item("crossover_rad_s", measures.and_then(|m| m.crossover_interval()))?;
+    all.set_item("phase_margin_deg", measures.and_then(|m| m.phase_margin_interval()))?;
+    Ok(all)
+}
+
 fn form_row<'py>(py: Python<'py>, f: &FormFigures) -> PyResult<Bound<'py, PyDict>> {
     let row = PyDict::new(py);
     row.set_item("form", f.form.name())?;
@@ -295,6 +303,7 @@ impl PyOperatorFit {
         if let Some(element) = &self.element {
             let measures = self.found.loop_measures_at_lines(element);
             all.set_item("open_loop", loop_parts(py, measures)?)?;
+            all.set_item("open_loop_intervals", loop_intervals(py, measures)?)?;
         }
         Ok(Some(all))
     }
@@ -364,6 +373,12 @@ impl PyOperatorFit {
     #[getter]
     fn open_loop<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let of = |element| loop_parts(py, self.found.loop_measures(0, element));
+        self.element.as_ref().map(of).transpose()
+    }
+
+    #[getter]
+    fn open_loop_intervals<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let of = |element| loop_intervals(py, self.found.loop_measures(0, element));
         self.element.as_ref().map(of).transpose()
     }
 

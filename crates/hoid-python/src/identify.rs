@@ -15,6 +15,7 @@ use pyo3::prelude::*;
 use crate::{
     arrays::{self, Wanted},
     errors::{Failure, Outcome, bad_option},
+    family::PriorOfUser,
     fit::PyFit,
     interrupt::{self, Standing},
     names::{self, Kind},
@@ -32,7 +33,7 @@ enum Found {
 
 /// Fits a model to records. The package has brought all options into plain form.
 #[pyfunction]
-#[pyo3(signature = (records, structure, *, orders, method, instruments, remnant_order, delay, individual, criterion, initial_state, start, fix,
+#[pyo3(signature = (records, structure, *, orders, method, instruments, form, neuromuscular, prior, remnant_order, delay, individual, criterion, initial_state, start, fix,
     bound, coefficient_prior, robust, focus, stable, search_method, max_iterations, tolerance, second_opinion, progress))]
 #[allow(clippy::too_many_arguments)]
 pub fn identify<'py>(
@@ -42,6 +43,9 @@ pub fn identify<'py>(
     orders: BTreeMap<String, (usize, usize)>,
     method: &str,
     instruments: Option<String>,
+    form: Option<String>,
+    neuromuscular: bool,
+    prior: Option<PriorOfUser>,
     remnant_order: Option<(usize, usize)>,
     delay: Option<(f64, f64)>,
     individual: Vec<String>,
@@ -159,6 +163,12 @@ pub fn identify<'py>(
                 Some(_) => return Err(bad_option("the time-varying fit takes only nd, a single number")),
             };
             let mut estimator = SigmoidChange {
+                form: match form.as_deref() {
+                    None | Some("auto") => usual.form,
+                    Some(name) => names::choice("form", name)?,
+                },
+                neuromuscular,
+                prior: prior.map_or(Ok(usual.prior.clone()), PriorOfUser::prior)?,
                 nd,
                 constraints,
                 search,

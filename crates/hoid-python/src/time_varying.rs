@@ -1,6 +1,6 @@
 //! The fit of an operator whose gains change once.
 
-use hoid_ident::{GainsAt, SigmoidFit, validation::whiteness};
+use hoid_ident::{ChangedOperator, GainsAt, SigmoidFit, validation::whiteness};
 use hoid_model::{Finding, uncertainty::Estimate};
 use numpy::{PyArray1, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
@@ -25,8 +25,29 @@ impl PyTimeVaryingFit {
     }
 }
 
+/// The operator before or after the change: of a gain and a lead as that of any fit, else its form
+/// and each parameter by its name; the poles of the family are stable by their bounds.
+fn operator<'py>(py: Python<'py>, of: &ChangedOperator) -> PyResult<Option<Bound<'py, PyDict>>> {
+    if let Some(lead) = of.lead() {
+        return figures::operator(py, &Ok(lead));
+    }
+    let all = PyDict::new(py);
+    all.set_item("convertible", true)?;
+    all.set_item("stable", true)?;
+    all.set_item("form", of.operator.form().name())?;
+    for p in &of.parameters {
+        all.set_item(p.name, pair(p.estimate))?;
+    }
+    Ok(Some(all))
+}
+
 #[pymethods]
 impl PyTimeVaryingFit {
+    #[getter]
+    fn form(&self) -> &'static str {
+        self.fit.form().name()
+    }
+
     /// Name, estimate, unit and remark of each parameter.
     #[getter]
     fn parameters(&self) -> Vec<(String, Pair, &'static str, Option<String>)> {
@@ -78,25 +99,28 @@ impl PyTimeVaryingFit {
 
     #[getter]
     fn initial<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        figures::operator(py, &Ok(self.fit.initial_operator()))
+        operator(py, self.fit.initial_operator())
     }
 
     #[getter]
     fn last<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        figures::operator(py, &Ok(self.fit.last_operator()))
+        operator(py, self.fit.last_operator())
     }
 
-    /// `t`, and K_e, T_L and K_e_dot at these times, each with its standard error.
+    /// `t`, and what changes (K_e, T_L and K_e_dot of a gain and a lead) at these times, each with
+    /// its standard error.
     fn gains<'py>(&self, py: Python<'py>, times: Vec<f64>) -> PyResult<Bound<'py, PyDict>> {
         let gains: Vec<GainsAt> = times.iter().map(|t| self.fit.gains_at(*t)).collect();
         let all = PyDict::new(py);
         all.set_item("t", array(py, times))?;
-        type Gain = fn(&GainsAt) -> Estimate;
-        let columns: [(&str, Gain); 3] = [("K_e", |g| g.k_e), ("T_L", |g| g.t_l_s), ("K_e_dot", |g| g.k_e_dot)];
-        for (name, of) in columns {
-            all.set_item(name, array(py, gains.iter().map(|g| of(g).value).collect()))?;
-            let errors = gains.iter().map(|g| error_or_nan(of(g))).collect();
-            all.set_item(format!("{name}_se"), array(py, errors))?;
+        // The names are there without times too.
+        for (i, of) in self.fit.gains_at(0.0).gains.iter().enumerate() {
+            all.set_item(
+                of.name,
+                array(py, gains.iter().map(|g| g.gains[i].estimate.value).collect()),
+            )?;
+            let errors = gains.iter().map(|g| error_or_nan(g.gains[i].estimate)).collect();
+            all.set_item(format!("{}_se", of.name), array(py, errors))?;
         }
         Ok(all)
     }

@@ -171,6 +171,8 @@ class OperatorFit:
     @property
     def open_loop(self) -> dict[str, _Pair] | None: ...
     @property
+    def open_loop_intervals(self) -> dict[str, tuple[float, float] | None] | None: ...
+    @property
     def box_jenkins(self) -> dict[str, Any] | None: ...
     @property
     def noise(self) -> tuple[_Array, _Array]: ...
@@ -227,6 +229,8 @@ class Plan:
 
 @final
 class TimeVaryingFit:
+    @property
+    def form(self) -> str: ...
     @property
     def parameters(self) -> list[tuple[str, _Pair, str, str | None]]: ...
     @property
@@ -390,6 +394,12 @@ def identify(
     orders: dict[str, _Ends],
     method: str,
     instruments: str | None,
+    form: str | None,
+    neuromuscular: bool,
+    prior: str
+    | list[tuple[str, float, float, str]]
+    | tuple[list[tuple[str, float | None, float | None, bool]], str]
+    | None,
     remnant_order: _Ends | None,
     delay: tuple[float, float] | None,
     individual: list[str],

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 from . import _faults, _options, _pyhoid
 from ._options import Order, Progress
 from .errors import OptionError
 from .fit import Fit
+from .operator_fit import prior_of
 from .record import Record
 from .time_varying import TimeVaryingFit
 
@@ -66,6 +67,9 @@ if TYPE_CHECKING:
         nk: Order | None
         method: str
         instruments: str | None
+        form: str | None
+        neuromuscular: bool
+        prior: Any
         remnant_order: Order | None
         delay: tuple[float, float] | None
         individual: Sequence[str]
@@ -109,6 +113,9 @@ def identify(
     nk: Order | None = None,
     method: str = "pem",
     instruments: str | None = None,
+    form: str | None = None,
+    neuromuscular: bool = True,
+    prior: Any = None,
     remnant_order: Order | None = None,
     delay: tuple[float, float] | None = None,
     individual: Sequence[str] = (),
@@ -149,6 +156,16 @@ def identify(
         rivbj for bj (Young 2011).
     instruments : str, optional
         Channel for the instruments, or ``"simulated"``; default ``f_t`` if all records have it.
+    form : str, optional
+        Form of the operator for ``"time-varying"``: ``"gain"``, ``"lead"``, ``"lead2"``,
+        ``"lag"``, ``"lead-lag"``, ``"lead2-lag"``, ``"quadratic-integral"``, ``"lead-droop"``;
+        default ``"lead"``. Its numerator changes; lag, neuromuscular part and delay stay. Models
+        that do not change: `identify_operator`.
+    neuromuscular : bool
+        With omega_nm and zeta_nm, for ``"time-varying"``.
+    prior : str, path, mapping, OperatorFit or None
+        What is known of the person before the data, for ``"time-varying"``, as for
+        `identify_operator`; default nothing.
     remnant_order : int or (int, int), optional
         Order m of the remnant for ``"grey-box"``; default 1 to 4.
     delay : (float, float), optional
@@ -219,6 +236,9 @@ def identify(
     }
     usual = {
         "instruments": (instruments, None),
+        "form": (form, None),
+        "neuromuscular": (neuromuscular, True),
+        "prior": (prior, None),
         "remnant_order": (remnant_order, None),
         "delay": (delay, None),
         "individual": (tuple(individual), ()),
@@ -241,6 +261,9 @@ def identify(
         orders=orders,
         method=method,
         instruments=instruments,
+        form=form,
+        neuromuscular=bool(neuromuscular),
+        prior=None if prior is None else prior_of(prior),
         remnant_order=None
         if remnant_order is None
         else _options.order("remnant_order", remnant_order),

@@ -125,7 +125,8 @@ class OperatorFit:
         degrees_of_freedom, converged.
     lines : dict or None
         The fit at the lines of the excitation: parameters (an Estimate each), chi2,
-        degrees_of_freedom, held_out, converged, and open_loop with a controlled element.
+        degrees_of_freedom, held_out, converged; with a controlled element open_loop and
+        open_loop_intervals.
     no_lines : str or None
         Why there is none, where an excitation was named.
     excitation : str or None
@@ -141,6 +142,8 @@ class OperatorFit:
     open_loop : dict or None
         ``crossover_rad_s`` and ``phase_margin_deg``, an Estimate each, or None without a crossover;
         None without a controlled element.
+    open_loop_intervals : dict or None
+        Their intervals of 95 %, (low, high) each, Student's: the errors rest on few runs or blocks.
     covariance : ndarray or None
         Covariance of the coordinates, from the scatter of runs or blocks, with what the prior
         leaves open.
@@ -217,6 +220,9 @@ class OperatorFit:
         self.open_loop: dict[str, Estimate | None] | None = (
             None if found is None else estimates(found)
         )
+        self.open_loop_intervals: dict[str, tuple[float, float] | None] | None = (
+            native.open_loop_intervals
+        )
         self.covariance: FloatArray | None = native.covariance(0)
         self.coordinates: dict[str, float] = {
             name: float(value)
@@ -283,7 +289,7 @@ class OperatorFit:
             )
             parts.append(head + repr(operator))
         if self.open_loop is not None:
-            parts.append(f"Open loop: {_loop(self.open_loop)}")
+            parts.append(f"Open loop: {_loop(self.open_loop, self.open_loop_intervals)}")
         if self.lines is not None:
             parts.append(self._beside(self.lines))
         if len(self.forms) > 1:
@@ -302,7 +308,7 @@ class OperatorFit:
             " degrees of freedom"
         )
         if lines.get("open_loop") is not None:
-            text += f"; {_loop(lines['open_loop'])}"
+            text += f"; {_loop(lines['open_loop'], lines['open_loop_intervals'])}"
         if self.agreement is not None:
             text += (
                 f"\nAgreement of the methods: chi2 {self.agreement['chi2']:.1f}"
@@ -348,11 +354,22 @@ class OperatorFit:
         return "".join(parts)
 
 
-def _loop(found: Mapping[str, Estimate | None]) -> str:
+def _loop(
+    found: Mapping[str, Estimate | None],
+    intervals: Mapping[str, tuple[float, float] | None] | None,
+) -> str:
     crossover, margin = found["crossover_rad_s"], found["phase_margin_deg"]
     if crossover is None or margin is None:
         return "no crossover"
-    return f"crossover {crossover} rad/s, phase margin {margin} deg"
+
+    def within(name: str) -> str:
+        ends = (intervals or {}).get(name)
+        return "" if ends is None else f" (95 %: {ends[0]:.3g} to {ends[1]:.3g})"
+
+    return (
+        f"crossover {crossover} rad/s{within('crossover_rad_s')}, "
+        f"phase margin {margin} deg{within('phase_margin_deg')}"
+    )
 
 
 def _of_file(path: str) -> _OfFit:
@@ -372,7 +389,8 @@ def _of_file(path: str) -> _OfFit:
     return rows, path
 
 
-def _prior(prior: Any) -> str | _Entries | _OfFit:
+def prior_of(prior: Any) -> str | _Entries | _OfFit:
+    """A prior in the plain form that the native module takes."""
     if prior is None:
         return "none"
     if isinstance(prior, OperatorFit):
@@ -502,7 +520,7 @@ def identify_operator(
         several,
         form=form,
         neuromuscular=bool(neuromuscular),
-        prior=_prior(prior),
+        prior=prior_of(prior),
         excitation=excitation,
         period=None if period is None else float(period),
         controlled_element=element,

@@ -42,6 +42,11 @@ class TimeVaryingFit:
     structure = "time-varying"
 
     @property
+    def form(self) -> str:
+        """The form of the operator: ``"lead"``, ``"lead-lag"`` ..."""
+        return self._native.form
+
+    @property
     def estimates(self) -> dict[str, Estimate]:
         """Parameters with their standard errors."""
         return {name: Estimate(*pair) for name, pair, _, _ in self._native.parameters}
@@ -107,7 +112,10 @@ class TimeVaryingFit:
         return None if found is None else Operator(found)
 
     def gains(self, times: Any) -> dict[str, FloatArray]:
-        """``t``, K_e, T_L and K_e_dot at these times in s, with their standard errors."""
+        """``t`` and what changes at these times in s, with standard errors under ``_se``.
+
+        K_e, T_L and K_e_dot of a gain and a lead; K (and K_over_T_I) and T_L of other forms.
+        """
         return self._native.gains([float(t) for t in signal(np.atleast_1d(times), "times")])
 
     def residuals(self, record: Record) -> Series:
@@ -143,9 +151,11 @@ class TimeVaryingFit:
         ]
         found = "" if self.change["found"] else "\nThe records show no change."
         header = ["parameter", "value", "standard error", "unit", ""]
-        return (
-            f"Operator whose gains change once (sigmoid)\n{_text.plain_table(header, rows)}{found}"
-        )
+        return f"{self._title()}\n{_text.plain_table(header, rows)}{found}"
+
+    def _title(self) -> str:
+        of_form = "" if self.form == "lead" else f" of the form {self.form}"
+        return f"Operator{of_form} whose gains change once (sigmoid)"
 
     def __repr__(self) -> str:
         return self.summary()
@@ -156,7 +166,7 @@ class TimeVaryingFit:
             for name, pair, unit, remark in self._native.parameters
         ]
         return _text.html_table(
-            "Operator whose gains change once (sigmoid)",
+            self._title(),
             ["", "value", "standard error", "unit", ""],
             rows,
         )

@@ -62,7 +62,7 @@ pub struct IdentifyArgs {
     #[arg(long, help = about("individual"), value_name = "NAMES", value_delimiter = ',')]
     pub individual: Vec<String>,
     #[arg(long, value_name = "FILE", help = format!(
-        "Write K_e, T_L and K_e_dot over time into this file, for time-varying: {}",
+        "Write what changes (K_e, T_L, K_e_dot; K, T_L of another form) over time into this file, for time-varying: {}",
         writable_endings()
     ))]
     pub trace: Option<PathBuf>,
@@ -131,7 +131,7 @@ pub enum ModelKind {
     Family,
     /// A gain with a lead, and its remnant of order m, in physical parameters.
     GreyBox,
-    /// The operator with gains that change once.
+    /// An operator with gains that change once.
     TimeVarying,
 }
 

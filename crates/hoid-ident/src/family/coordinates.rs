@@ -19,7 +19,7 @@ const LOWEST_FREQUENCY: f64 = 2.0;
 const HIGHEST_FREQUENCY: f64 = 0.95;
 
 /// Lower and upper bound of each coordinate.
-pub(super) fn limits(
+pub(crate) fn limits(
     form: Form,
     neuromuscular: bool,
     delay_range_s: (f64, f64),

@@ -16,13 +16,13 @@ const MOST_DRAWN: usize = 200;
 
 /// Coefficients d of the order nd, and the loss.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Autoregression {
+pub(crate) struct Autoregression {
     pub d: Vec<f64>,
     pub loss: f64,
 }
 
 /// Products of v and its past, `sum v(t-i) v(t-j)` for i, j from 0 to the highest order.
-pub(super) struct NoiseProducts {
+pub(crate) struct NoiseProducts {
     highest: usize,
     count: usize,
     products: Vec<f64>,

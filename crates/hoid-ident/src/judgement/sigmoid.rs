@@ -1,12 +1,15 @@
 //! The verdict of a fit whose gains change once.
 
-use hoid_model::{Finding, Record, Verdict};
+use hoid_model::{Finding, Record, SampleTime, Verdict};
 
 use super::{
-    operator::{gain_findings, pole_findings, search_finding},
+    operator::{gain_findings, is_open, neuromuscular_finding, pole_findings, search_finding},
     residuals::ResidualMeasures,
 };
-use crate::{IdentError, SigmoidFit, sigmoid::Remark};
+use crate::{
+    IdentError, SigmoidFit,
+    sigmoid::{ChangedOperator, Remark},
+};
 
 impl SigmoidFit {
     /// What the fit is worth, on the records that it was fitted to. Where the records show no
@@ -17,7 +20,7 @@ impl SigmoidFit {
     pub fn verdict(&self, records: &[Record]) -> Result<Verdict, IdentError> {
         let mut all: Vec<Finding> = search_finding(self.termination()).into_iter().collect();
         all.extend(self.parameter_findings());
-        let operators = if self.change_found() {
+        let operators: Vec<(&str, &ChangedOperator)> = if self.change_found() {
             vec![
                 (" before the change", self.initial_operator()),
                 (" after the change", self.last_operator()),
@@ -25,10 +28,20 @@ impl SigmoidFit {
         } else {
             vec![("", self.constant_operator())]
         };
-        all.extend(gain_findings(&operators));
+        let leads: Option<Vec<_>> = operators.iter().map(|(label, o)| Some((*label, o.lead()?))).collect();
         // The poles are the same before and after.
-        if let Some(((_, operator), record)) = operators.first().zip(records.first()) {
-            all.extend(pole_findings(operator, record.sample_time()));
+        match (leads, records.first()) {
+            (Some(leads), Some(record)) => {
+                all.extend(gain_findings(&leads));
+                all.extend(
+                    leads
+                        .first()
+                        .into_iter()
+                        .flat_map(|(_, operator)| pole_findings(operator, record.sample_time())),
+                );
+            }
+            (_, Some(record)) => all.extend(family_findings(&operators, record.sample_time())),
+            (_, None) => {}
         }
         if self.covariance().is_some() {
             all.extend(self.residual_measures(records)?.findings());
@@ -56,6 +69,15 @@ impl SigmoidFit {
                     "delay-at-bound",
                     format!("the delay {value:.3} s lies at the end of the range in which it was sought; widen it"),
                 )),
+                // A pure integration, or a lag that is none.
+                Some(Remark::AtBound) if name == "T_I" => all.push(Finding::note(
+                    "lag",
+                    format!("T_I and K are not determined, K/T_I is: T_I rests at a bound, {value:.3} s"),
+                )),
+                Some(Remark::PriorAlone) => all.push(Finding::note(
+                    "prior",
+                    format!("{name} is determined by the prior alone"),
+                )),
                 Some(Remark::AtBound) => all.push(Finding::doubt(
                     "parameter-at-bound",
                     format!("{name} = {} rests at a bound", hoid_model::numbers::plain(value)),
@@ -78,6 +100,60 @@ impl SigmoidFit {
         let ts = records.first().map_or(1.0, |record| record.sample_time().s());
         Ok(ResidualMeasures::of_series(&found, records, ts))
     }
+}
+
+/// What of operators of the family is not told from zero, and poles of no person. A gain or a lead
+/// that is open is named; where neither end has a response, nothing is known.
+fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTime) -> Vec<Finding> {
+    let mut all = Vec::new();
+    let mut open = Vec::new();
+    let mut known = false;
+    for (label, of) in operators {
+        for p in &of.parameters {
+            let varies = !matches!(p.name, "T_I" | "K" | "omega_nm" | "zeta_nm" | "tau_e");
+            // Without a lag K is the gain itself.
+            if varies || (p.name == "K" && of.get("T_I").is_none()) {
+                known |= !is_open(&p.estimate);
+                if is_open(&p.estimate) {
+                    open.push(format!("{}{label} ({})", p.name, p.estimate));
+                }
+            }
+        }
+    }
+    let Some((_, first)) = operators.first() else {
+        return all;
+    };
+    let still = ["omega_nm", "zeta_nm", "tau_e"].into_iter().filter_map(|name| {
+        let estimate = first.get(name).filter(is_open)?;
+        Some(format!("{name} ({estimate})"))
+    });
+    open.extend(still);
+    if !known {
+        all.push(Finding::undetermined(
+            "gain",
+            "no gain stands two standard errors from zero: there is too little response to e",
+        ));
+    } else if !open.is_empty() {
+        let verb = if open.len() == 1 { "is" } else { "are" };
+        all.push(Finding::note(
+            "undetermined-parameter",
+            format!(
+                "{} {verb} not determined: less than two standard errors from zero",
+                open.join(", ")
+            ),
+        ));
+    }
+    // An error of T_I as large as half of it: 1/T_I is not told from zero.
+    if first.get("T_I").as_ref().is_some_and(is_open) {
+        all.push(Finding::note(
+            "lag",
+            "T_I and K are not determined, K/T_I is: 1/T_I stands less than two standard errors from zero",
+        ));
+    }
+    if let (Some(omega), Some(zeta)) = (first.get("omega_nm"), first.get("zeta_nm")) {
+        all.extend(neuromuscular_finding(omega.value, zeta.value, sample_time));
+    }
+    all
 }
 
 #[cfg(test)]

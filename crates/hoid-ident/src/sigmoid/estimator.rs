@@ -2,21 +2,22 @@
 
 use std::collections::BTreeMap;
 
-use hoid_model::{Orders, Record, SampleTime, Structure, delayed_operator::whole_samples};
+use hoid_model::{Form, Record, SampleTime, Structure, delayed_operator::whole_samples};
 
 use super::{
+    bounds::{Frame, limits},
     fit::SigmoidFit,
-    layout::{self, DELAY, Frame, limits},
+    layout::{Element, Layout},
     noise_level::NoiseLevel,
     objective::{ChangeCriterion, Data},
-    reweighting::with_levels,
+    prior,
     search::{best_minimum, search, without_change},
     starts,
 };
 use crate::{
     Constraint, IdentError, SearchOptions,
+    family::OperatorPrior,
     informative_data::{check_record, common_sample_time},
-    optimize::Minimum,
 };
 
 /// Lower minima that the walks along t_M and G may come upon before the fit is left at the last
@@ -26,18 +27,24 @@ const MOST_LOWER: usize = 10;
 /// What is to be estimated, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SigmoidChange {
+    /// Form of the operator: what changes is its numerator (K, T_L, c_1, c_2, alpha), with a lag the
+    /// gain K/T_I. Lag, neuromuscular part and delay do not change. Default a gain and a lead.
+    pub form: Form,
+    /// With the neuromuscular part. Default true.
+    pub neuromuscular: bool,
+    /// What is known of the person before the data; that of T_L counts before and after the change.
+    /// Default nothing.
+    pub prior: OperatorPrior,
     /// Order nd of D.
     pub nd: usize,
     /// Shortest and longest delay tau_e, s; any fraction of a sample. Equal ends fix it.
     pub delay_range_s: (f64, f64),
-    /// Fixed and bounded parameters by name ([`SIGMOID_NAMES`](crate::SIGMOID_NAMES), d1 ...). By
-    /// default t_M lies in the middle nine tenths of the span that the records have in common, and
+    /// Fixed and bounded parameters by name ([`SigmoidChange::names`]). By default t_M lies in the middle nine tenths of the span that the records have in common, and
     /// G between 5/span and 2/Ts.
     pub constraints: BTreeMap<String, Constraint>,
     /// Size of the innovations over the record.
     pub noise_level: NoiseLevel,
-    /// Start instead of the own ones: the parameters of [`SIGMOID_NAMES`](crate::SIGMOID_NAMES) in
-    /// their units, then d1 ... d_nd.
+    /// Start instead of the own ones: the parameters of [`SigmoidChange::names`] in their units.
     pub start: Option<Vec<f64>>,
     /// Method and limits of each search.
     pub search: SearchOptions,
@@ -52,6 +59,9 @@ impl Default for SigmoidChange {
     /// error): a small change fills its loss with ripples in t_M.
     fn default() -> Self {
         Self {
+            form: Form::Lead,
+            neuromuscular: true,
+            prior: OperatorPrior::none(),
             nd: 1,
             delay_range_s: (0.05, 0.6),
             constraints: BTreeMap::new(),
@@ -77,8 +87,21 @@ impl SigmoidChange {
     pub fn fit(&self, records: &[Record]) -> Result<SigmoidFit, IdentError> {
         let sample_time = common_sample_time(records)?;
         let mut criterion = self.criterion(records, sample_time)?;
-        let (mut start, minimum) = best_minimum(self.starts(&criterion, records)?, &criterion, &self.search)?;
-        let (mut minimum, mut levels) = self.with_levels(&mut criterion, minimum)?;
+        let unit = prior::penalties(&criterion.layout, &self.prior);
+        for penalty in &unit {
+            // What has a prior is positive.
+            let (low, high) = criterion.limits[penalty.place];
+            criterion.limits[penalty.place] = (low.max(0.0), high);
+        }
+        let starts = self.starts(&criterion, records)?;
+        if let Some((_, theta)) = starts.first() {
+            criterion.penalty = prior::begun(&criterion, &unit, theta);
+        }
+        let (mut start, minimum) = best_minimum(starts, &criterion, &self.search)?;
+        let settled = |criterion: &mut ChangeCriterion<'_>, minimum| {
+            prior::settled(criterion, &unit, minimum, self.noise_level, &self.search)
+        };
+        let (mut minimum, mut levels) = settled(&mut criterion, minimum)?;
         let (mut lower, mut stay) = (0, false);
         loop {
             let constant = without_change(&criterion, &minimum.theta, &self.search)?;
@@ -93,7 +116,8 @@ impl SigmoidChange {
             // decides, weights and all.
             let weights = criterion.weights.clone();
             let other = search(&criterion, theta, &self.search, None).ok_or(IdentError::NoFiniteLoss)?;
-            let (mut other, other_levels) = self.with_levels(&mut criterion, other)?;
+            let penalty = criterion.penalty.clone();
+            let (mut other, other_levels) = settled(&mut criterion, other)?;
             lower += 1;
             if other.at.sum_of_squares < minimum.at.sum_of_squares && lower <= MOST_LOWER {
                 other.termination.iterations += minimum.termination.iterations;
@@ -102,22 +126,20 @@ impl SigmoidChange {
                     start += "; then a lower minimum along t_M or G";
                 }
             } else {
-                criterion.weights = weights;
+                (criterion.weights, criterion.penalty) = (weights, penalty);
                 stay = true;
             }
         }
     }
 
-    /// The minimum with the noise levels that were chosen.
-    fn with_levels(
-        &self,
-        criterion: &mut ChangeCriterion<'_>,
-        minimum: Minimum,
-    ) -> Result<(Minimum, Option<[f64; 2]>), IdentError> {
-        match self.noise_level {
-            NoiseLevel::Constant => Ok((minimum, None)),
-            NoiseLevel::Changing => with_levels(criterion, minimum, &self.search),
-        }
+    /// Names of the parameters of this form and noise model: `K_e1`, `K_e2`, `T_L1`, `T_L2`, `t_M`,
+    /// `G`, `omega_nm`, `zeta_nm`, `tau_e`, `d1` ... of a gain and a lead.
+    pub fn names(&self) -> Vec<String> {
+        self.layout().names()
+    }
+
+    fn layout(&self) -> Layout {
+        Layout::new(self.form, self.neuromuscular, self.nd)
     }
 
     /// Name and theta of each start.
@@ -127,7 +149,7 @@ impl SigmoidChange {
         records: &[Record],
     ) -> Result<Vec<(String, Vec<f64>)>, IdentError> {
         Ok(match &self.start {
-            Some(start) => vec![("given".to_owned(), self.given_start(start)?)],
+            Some(start) => vec![("given".to_owned(), self.given_start(criterion, start)?)],
             None => starts::initial_guesses(criterion, records)
                 .into_iter()
                 .map(|s| (s.label, s.theta))
@@ -136,6 +158,14 @@ impl SigmoidChange {
     }
 
     fn criterion<'a>(&self, records: &'a [Record], sample_time: SampleTime) -> Result<ChangeCriterion<'a>, IdentError> {
+        let layout = self.layout();
+        if !self.form.is_proper(self.neuromuscular) {
+            return Err(IdentError::BadOption {
+                option: "the form of the operator".to_owned(),
+                found: format!("{} without neuromuscular dynamics", self.form),
+                expected: "one that is no pure derivative: with neuromuscular dynamics, or with a lag".to_owned(),
+            });
+        }
         let (low, high) = self.delay_range_s;
         if !(low.is_finite() && high.is_finite() && 0.0 <= low && low <= high) {
             return Err(IdentError::BadOption {
@@ -161,16 +191,11 @@ impl SigmoidChange {
             span_s,
             delay_range_s: self.delay_range_s,
         };
-        let limits = limits(self.nd, &frame, &self.constraints)?;
-        let longest = whole_samples(limits[DELAY].1, sample_time)? + 1;
-        let orders = Orders {
-            nb: 3,
-            nd: self.nd,
-            nf: 2,
-            nk: longest,
-            ..Orders::default()
-        };
+        let limits = limits(&layout, &frame, &self.constraints)?;
+        let longest = whole_samples(limits[layout.delay].1, sample_time)? + layout.reach().max(1);
+        let orders = layout.orders(longest);
         let criterion = ChangeCriterion {
+            layout,
             data: records
                 .iter()
                 .map(|r| Data {
@@ -180,12 +205,12 @@ impl SigmoidChange {
                 })
                 .collect(),
             sample_time,
-            nd: self.nd,
             first: longest + self.nd,
             limits,
-            sample: None,
+            piece: None,
             changes: true,
             weights: None,
+            penalty: Vec::new(),
         };
         for record in records {
             check_record(Structure::BoxJenkins, &orders, record, criterion.first)?;
@@ -202,9 +227,10 @@ impl SigmoidChange {
         Ok(criterion)
     }
 
-    fn given_start(&self, start: &[f64]) -> Result<Vec<f64>, IdentError> {
+    fn given_start(&self, criterion: &ChangeCriterion<'_>, start: &[f64]) -> Result<Vec<f64>, IdentError> {
         let bad = |reason: String| Err(IdentError::BadStart { reason });
-        let names = layout::names(self.nd);
+        let layout = &criterion.layout;
+        let names = layout.names();
         if start.len() != names.len() {
             return bad(format!(
                 "it has {} numbers, expected {}: {}",
@@ -213,20 +239,23 @@ impl SigmoidChange {
                 names.join(", ")
             ));
         }
-        for (place, quantity) in [
-            (layout::LOG_RATE, "G"),
-            (layout::OMEGA, "omega_nm"),
-            (layout::ZETA, "zeta_nm"),
-        ] {
+        let positive = |(place, element): (usize, &Element)| match element {
+            Element::LogRate => Some(place),
+            Element::Constant(_) if place != layout.delay => Some(place),
+            _ => None,
+        };
+        for place in layout.elements().iter().enumerate().filter_map(positive) {
             if start[place].is_nan() || start[place] <= 0.0 {
-                return bad(format!("{quantity} = {}, expected a positive number", start[place]));
+                return bad(format!(
+                    "{} = {}, expected a positive number",
+                    names[place], start[place]
+                ));
             }
         }
         if let Some(i) = start.iter().position(|v| !v.is_finite()) {
             return bad(format!("{} = {}, expected a finite number", names[i], start[i]));
         }
-        let mut theta = start.to_vec();
-        theta[layout::LOG_RATE] = theta[layout::LOG_RATE].ln();
-        Ok(theta)
+        let typed = start.iter().enumerate();
+        Ok(typed.map(|(place, value)| layout.of_typed(place, *value)).collect())
     }
 }

@@ -1,13 +1,11 @@
 //! The fitted change with its uncertainty.
 
-use hoid_model::{
-    Orders, Record, SampleTime, Structure,
-    uncertainty::{Estimate, OperatorEstimate, variance_along},
-};
+use hoid_model::{Form, Record, SampleTime, Structure, uncertainty::Estimate};
 
 use super::{
-    inference::{Comparison, Remark, constant_operator, estimate, inference, operator},
-    layout::{Instant, K_E, LOG_RATE, MIDPOINT, NOISE, SIGMOID_NAMES, T_L, names},
+    ends::{ChangedOperator, Known, NamedEstimate, estimate},
+    inference::{Comparison, Remark, constant_operator, inference},
+    layout::Layout,
     objective::{ChangeCriterion, Data},
     profile_likelihood::{Interval, Profile, profile_likelihood_interval},
 };
@@ -26,26 +24,30 @@ pub struct ChangeParameter {
     pub remark: Option<Remark>,
 }
 
-/// Gains in force at one time.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// What changes, as it is in force at one time.
+#[derive(Debug, Clone, PartialEq)]
 pub struct GainsAt {
     /// Time on the axis of the record, s.
     pub time_s: f64,
-    /// Error gain K_e, deg/deg.
-    pub k_e: Estimate,
-    /// Lead time constant T_L, s.
-    pub t_l_s: Estimate,
-    /// Error-rate gain K_e_dot, s.
-    pub k_e_dot: Estimate,
+    /// K_e, T_L and K_e_dot of a gain and a lead; else K and, with a lag, K_over_T_I, then T_L and
+    /// so on.
+    pub gains: Vec<NamedEstimate>,
+}
+
+impl GainsAt {
+    /// One of them by name.
+    pub fn get(&self, name: &str) -> Option<Estimate> {
+        self.gains.iter().find(|g| g.name == name).map(|g| g.estimate)
+    }
 }
 
 /// An operator who changes once.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SigmoidFit {
-    nd: usize,
+    layout: Layout,
     sample_time: SampleTime,
     first: usize,
-    /// With ln G.
+    /// With ln G and 1/T_I.
     theta: Vec<f64>,
     covariance: Option<Vec<f64>>,
     remarks: Vec<Option<Remark>>,
@@ -60,7 +62,9 @@ pub struct SigmoidFit {
     termination: Termination,
     start: String,
     comparison: Comparison,
-    constant: OperatorEstimate,
+    initial: ChangedOperator,
+    last: ChangedOperator,
+    constant: ChangedOperator,
 }
 
 impl SigmoidFit {
@@ -73,11 +77,20 @@ impl SigmoidFit {
         levels: Option<[f64; 2]>,
     ) -> Result<Self, IdentError> {
         let found = inference(criterion, minimum, constant)?;
+        let known = Known {
+            layout: &criterion.layout,
+            theta: &minimum.theta,
+            covariance: found.covariance.as_deref(),
+            change_point: None,
+        };
+        let squares = minimum.at.sum_of_squares - criterion.penalty_at(&minimum.theta);
         Ok(Self {
-            nd: criterion.nd,
+            layout: criterion.layout,
             sample_time: criterion.sample_time,
             first: criterion.first,
-            loss: minimum.at.sum_of_squares / criterion.residuals() as f64,
+            loss: squares / criterion.residuals() as f64,
+            initial: known.end(0)?,
+            last: known.end(1)?,
             innovation_variance: found.innovation_variance,
             levels,
             residuals: criterion.residuals(),
@@ -95,13 +108,24 @@ impl SigmoidFit {
         })
     }
 
-    /// All parameters: those of [`SIGMOID_NAMES`], then d1 ... d_nd.
+    /// The form of the operator.
+    pub fn form(&self) -> Form {
+        self.layout.form
+    }
+
+    /// True with the neuromuscular part.
+    pub fn has_neuromuscular(&self) -> bool {
+        self.layout.neuromuscular
+    }
+
+    /// All parameters in the order of [`SigmoidChange::names`](crate::SigmoidChange::names): what
+    /// changes before and after the change, t_M, G, the others, then d1 ... d_nd.
     pub fn parameters(&self) -> Vec<ChangeParameter> {
-        let names = names(self.nd).into_iter().enumerate();
+        let names = self.layout.names_and_units().into_iter().enumerate();
         names
-            .map(|(i, name)| ChangeParameter {
+            .map(|(i, (name, unit))| ChangeParameter {
                 name,
-                unit: SIGMOID_NAMES.get(i).map_or("", |(_, unit)| unit),
+                unit,
                 estimate: self.estimate_of(i),
                 remark: self.remarks[i],
             })
@@ -114,13 +138,10 @@ impl SigmoidFit {
     }
 
     fn estimate_of(&self, i: usize) -> Estimate {
-        let value = if i == LOG_RATE {
-            self.theta[i].exp()
-        } else {
-            self.theta[i]
-        };
+        let value = self.layout.typed(i, self.theta[i]);
+        let has_error = self.remarks[i].is_none_or(Remark::leaves_an_error);
         match self.covariance() {
-            Some(c) if self.remarks[i].is_none() => estimate(value, c[i * self.theta.len() + i]),
+            Some(c) if has_error => estimate(value, c[i * self.theta.len() + i]),
             _ => Estimate::fixed(value),
         }
     }
@@ -129,10 +150,9 @@ impl SigmoidFit {
     /// rows; zero for what was held, `None` for an exact fit.
     pub fn covariance(&self) -> Option<Vec<f64>> {
         let p = self.theta.len();
-        let rate = self.theta[LOG_RATE].exp();
-        let scale = |i: usize| if i == LOG_RATE { rate } else { 1.0 };
+        let scale: Vec<f64> = (0..p).map(|i| self.layout.typed_slope(i, self.theta[i])).collect();
         let c = self.covariance.as_ref()?;
-        Some((0..p * p).map(|k| c[k] * scale(k / p) * scale(k % p)).collect())
+        Some((0..p * p).map(|k| c[k] * scale[k / p] * scale[k % p]).collect())
     }
 
     /// Likelihood intervals of t_M and G, if there was a change and noise. Returns theta where the
@@ -148,16 +168,17 @@ impl SigmoidFit {
         if !self.change_found() {
             return None;
         }
+        let (midpoint, log_rate) = (self.layout.midpoint, self.layout.log_rate);
         let covariance = self.covariance.as_ref()?;
         let standard_error = |i: usize| Some(covariance[i * p + i].sqrt()).filter(|s| *s > 0.0);
-        let standard_errors = [MIDPOINT, LOG_RATE].map(standard_error);
-        for (place, standard_error) in [MIDPOINT, LOG_RATE].into_iter().zip(standard_errors) {
+        let standard_errors = [midpoint, log_rate].map(standard_error);
+        for (place, standard_error) in [midpoint, log_rate].into_iter().zip(standard_errors) {
             if self.remarks[place] == Some(Remark::Fixed) {
                 continue;
             }
             match profile_likelihood_interval(criterion, minimum, place, standard_error, self.change_point, stay) {
                 Profile::Lower(theta) => return Some(theta),
-                Profile::Interval(interval) if place == MIDPOINT => self.midpoint_interval = Some(interval),
+                Profile::Interval(interval) if place == midpoint => self.midpoint_interval = Some(interval),
                 Profile::Interval(interval) => self.rate_interval = Some(interval),
             }
         }
@@ -166,11 +187,11 @@ impl SigmoidFit {
         {
             // A normal error with the same interval.
             for i in 0..p {
-                (covariance[MIDPOINT * p + i], covariance[i * p + MIDPOINT]) = (0.0, 0.0);
+                (covariance[midpoint * p + i], covariance[i * p + midpoint]) = (0.0, 0.0);
             }
-            covariance[MIDPOINT * p + MIDPOINT] = ((interval.high - interval.low) / (2.0 * 1.96)).powi(2);
-            if self.remarks[MIDPOINT] == Some(Remark::ChangePoint) {
-                self.remarks[MIDPOINT] = None;
+            covariance[midpoint * p + midpoint] = ((interval.high - interval.low) / (2.0 * 1.96)).powi(2);
+            if self.remarks[midpoint] == Some(Remark::ChangePoint) {
+                self.remarks[midpoint] = None;
             }
         }
         None
@@ -195,18 +216,18 @@ impl SigmoidFit {
     }
 
     /// The operator before the change, where there was one ([`SigmoidFit::change_found`]).
-    pub fn initial_operator(&self) -> OperatorEstimate {
-        operator(&self.theta, self.covariance.as_deref(), 0)
+    pub fn initial_operator(&self) -> &ChangedOperator {
+        &self.initial
     }
 
     /// The operator after the change, where there was one.
-    pub fn last_operator(&self) -> OperatorEstimate {
-        operator(&self.theta, self.covariance.as_deref(), 1)
+    pub fn last_operator(&self) -> &ChangedOperator {
+        &self.last
     }
 
     /// The operator of the fit without a change.
-    pub fn constant_operator(&self) -> OperatorEstimate {
-        self.constant
+    pub fn constant_operator(&self) -> &ChangedOperator {
+        &self.constant
     }
 
     /// The fit against the one without a change.
@@ -227,42 +248,22 @@ impl SigmoidFit {
     /// the sigmoid is no line over the interval of t_M, `step^2 p (1 - p)` stands for the latter,
     /// with p the probability that the change has happened.
     pub fn gains_at(&self, time_s: f64) -> GainsAt {
-        if !self.change_found() {
-            return GainsAt {
-                time_s,
-                k_e: self.constant.k_e,
-                t_l_s: self.constant.t_l_s,
-                k_e_dot: self.constant.k_e_dot,
-            };
-        }
-        let here = Instant::at(&self.theta, time_s);
-        let p = self.theta.len();
-        let step = |[first, last]: [usize; 2]| self.theta[last] - self.theta[first];
-        let along = |value: f64, by_k: f64, by_t: f64| {
-            let Some(covariance) = &self.covariance else {
-                return Estimate::fixed(value);
-            };
-            let mut g = vec![0.0; p];
-            (g[K_E[0]], g[K_E[1]]) = (by_k * (1.0 - here.share), by_k * here.share);
-            (g[T_L[0]], g[T_L[1]]) = (by_t * (1.0 - here.share), by_t * here.share);
-            let by_share = by_k * step(K_E) + by_t * step(T_L);
-            let mut of_time = 0.0;
-            if self.change_point {
-                let x = (time_s - self.theta[MIDPOINT]) / covariance[MIDPOINT * p + MIDPOINT].sqrt();
-                // The logistic function that is nearest to the normal distribution.
-                let happened = 1.0 / (1.0 + (-1.702 * x).exp());
-                of_time = by_share * by_share * happened * (1.0 - happened);
-            } else {
-                (g[MIDPOINT], g[LOG_RATE]) = (by_share * here.by_midpoint, by_share * here.by_log_rate);
-            }
-            estimate(value, variance_along(&g, covariance) + of_time)
+        let known = Known {
+            layout: &self.layout,
+            theta: &self.theta,
+            covariance: self.covariance.as_deref(),
+            change_point: self.covariance.as_ref().filter(|_| self.change_point).map(|c| {
+                let (p, i) = (self.theta.len(), self.layout.midpoint);
+                c[i * p + i]
+            }),
         };
-        GainsAt {
-            time_s,
-            k_e: along(here.k_e, 1.0, 0.0),
-            t_l_s: along(here.t_l, 0.0, 1.0),
-            k_e_dot: along(here.k_e_dot(), here.t_l, here.k_e),
+        let mut gains = known.at(time_s);
+        if !self.change_found() {
+            for gain in &mut gains {
+                gain.estimate = self.constant.get(gain.name).unwrap_or(gain.estimate);
+            }
         }
+        GainsAt { time_s, gains }
     }
 
     /// [`SigmoidFit::gains_at`] at every sample of a record.
@@ -272,7 +273,7 @@ impl SigmoidFit {
 
     /// Coefficients of D.
     pub fn d(&self) -> &[f64] {
-        &self.theta[NOISE..]
+        &self.theta[self.layout.noise..]
     }
 
     /// Loss: mean of the squared residuals, weighted where the noise level changes (weights with
@@ -317,7 +318,7 @@ impl SigmoidFit {
     /// # Errors
     /// [`IdentError::MixedSampling`], [`IdentError::TooFewSamples`].
     pub fn residuals(&self, record: &Record) -> Result<Series, IdentError> {
-        self.errors_of(&self.theta, self.nd, record)
+        self.errors_of(self.layout, &self.theta, record)
     }
 
     /// Output of the operator alone, without noise model; the initial state is that of the least
@@ -326,7 +327,8 @@ impl SigmoidFit {
     /// # Errors
     /// As [`SigmoidFit::residuals`].
     pub fn simulate(&self, record: &Record) -> Result<Series, IdentError> {
-        let errors = self.errors_of(&self.theta[..NOISE], 0, record)?;
+        let silent = Layout { nd: 0, ..self.layout };
+        let errors = self.errors_of(silent, &self.theta[..self.layout.noise], record)?;
         let output = &record.output()[errors.first..];
         Ok(Series {
             first: errors.first,
@@ -334,7 +336,7 @@ impl SigmoidFit {
         })
     }
 
-    fn errors_of(&self, theta: &[f64], nd: usize, record: &Record) -> Result<Series, IdentError> {
+    fn errors_of(&self, layout: Layout, theta: &[f64], record: &Record) -> Result<Series, IdentError> {
         if !self.sample_time.matches(record.sample_time()) {
             return Err(IdentError::MixedSampling {
                 label: record.label().to_owned(),
@@ -342,28 +344,27 @@ impl SigmoidFit {
                 expected: self.sample_time.s(),
             });
         }
-        let first = self.first - self.nd + nd;
-        let orders = Orders {
-            nb: 3,
-            nd,
-            nf: 2,
-            nk: self.first - self.nd,
-            ..Orders::default()
-        };
-        check_record(Structure::BoxJenkins, &orders, record, first)?;
+        let first = self.first - self.layout.nd + layout.nd;
+        check_record(
+            Structure::BoxJenkins,
+            &layout.orders(self.first - self.layout.nd),
+            record,
+            first,
+        )?;
         let criterion = ChangeCriterion {
+            layout,
             data: vec![Data {
                 e: record.input(),
                 u: record.output(),
                 start_s: record.time_s(0),
             }],
             sample_time: self.sample_time,
-            nd,
             first,
             limits: Vec::new(),
-            sample: None,
+            piece: None,
             changes: true,
             weights: None,
+            penalty: Vec::new(),
         };
         let values = criterion.residuals_of(theta, 0).ok_or(IdentError::NoFiniteLoss)?;
         Ok(Series { first, values })

@@ -7,11 +7,12 @@
 
 use std::fmt;
 
-use hoid_model::uncertainty::{Estimate, OperatorEstimate, variance_along};
-
 use super::{
-    layout::{DELAY, FASTEST, K_E, LOG_RATE, MIDPOINT, OF_THE_CHANGE, OMEGA, T_L, ZETA, names},
+    bounds::FASTEST,
+    ends::{ChangedOperator, Known},
+    layout::Layout,
     objective::ChangeCriterion,
+    prior,
     profile_likelihood::is_change_point,
 };
 use crate::{
@@ -20,7 +21,7 @@ use crate::{
     optimize::{Linearisation, Minimum, free_parameters},
 };
 
-/// Why a parameter has no standard error.
+/// Why a parameter has no standard error, or none that the data give.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Remark {
@@ -38,6 +39,18 @@ pub enum Remark {
     ChangePoint,
     /// The data do not determine it.
     Undetermined,
+    /// More than half of its variance before the data is left: its error is that of the prior.
+    PriorAlone,
+}
+
+/// Largest part of the prior's variance in what the data determine.
+const LARGEST_PRIOR_SHARE: f64 = 0.5;
+
+impl Remark {
+    /// True for a parameter that has a standard error all the same.
+    pub(super) fn leaves_an_error(self) -> bool {
+        self == Self::PriorAlone
+    }
 }
 
 impl fmt::Display for Remark {
@@ -49,6 +62,7 @@ impl fmt::Display for Remark {
             Self::NoChange => "the records show no change: take the fit without one",
             Self::ChangePoint => "the change is too fast for a normal error: take the likelihood interval",
             Self::Undetermined => "not determined by the data",
+            Self::PriorAlone => "determined by the prior alone",
         })
     }
 }
@@ -58,7 +72,8 @@ impl fmt::Display for Remark {
 pub struct Comparison {
     /// `n ln(V_0/V_1)`.
     pub likelihood_ratio: f64,
-    /// Parameters that the change adds: those of K_e2, T_L2, t_M and G that were not fixed.
+    /// Parameters that the change adds: those after it (K_e2, T_L2 ...), t_M and G that were not
+    /// fixed.
     pub extra_parameters: usize,
     /// BIC without the change minus BIC with it; positive where the change is worth its parameters.
     pub bic_difference: f64,
@@ -88,13 +103,14 @@ pub(super) fn inference(
 ) -> Result<Inference, IdentError> {
     let theta = &minimum.theta;
     let p = theta.len();
-    let (n, states) = (criterion.residuals(), criterion.states());
+    let layout = &criterion.layout;
+    let (midpoint, log_rate) = (layout.midpoint, layout.log_rate);
+    let n = criterion.residuals();
     let sum_of_squares = minimum.at.sum_of_squares;
-    let not_fixed = criterion.limits.iter().filter(|(low, high)| low < high).count();
-    let innovation_variance = sum_of_squares / (n - not_fixed - states) as f64;
-    let extra_parameters = OF_THE_CHANGE
-        .iter()
-        .filter(|&&i| criterion.limits[i].0 < criterion.limits[i].1)
+    let innovation_variance = prior::innovation_variance(criterion, minimum);
+    let of_the_change = layout.of_the_change().into_iter();
+    let extra_parameters = of_the_change
+        .filter(|&i| criterion.limits[i].0 < criterion.limits[i].1)
         .count();
     // An exact fit without a change leaves two losses of rounding errors.
     let both_exact = constant.termination.reason == Reason::ExactFit;
@@ -113,8 +129,8 @@ pub(super) fn inference(
             let (low, high) = criterion.limits[i];
             match i {
                 _ if low == high => Some(Remark::Fixed),
-                _ if i <= LOG_RATE && !change_found => Some(Remark::NoChange),
-                LOG_RATE if theta[i] >= fastest(criterion) => Some(Remark::Abrupt),
+                _ if i <= log_rate && !change_found => Some(Remark::NoChange),
+                _ if i == log_rate && theta[i] >= fastest(criterion) => Some(Remark::Abrupt),
                 _ if theta[i] <= low || theta[i] >= high => Some(Remark::AtBound),
                 _ => None,
             }
@@ -126,17 +142,26 @@ pub(super) fn inference(
     let covariance = if exact {
         None
     } else {
-        let mut covariance = invert(&minimum.at, &mut free, &mut remarks, &names(criterion.nd))?;
+        let mut covariance = invert(layout, &minimum.at, &mut free, &mut remarks)?;
         covariance.iter_mut().for_each(|c| *c *= innovation_variance);
         Some(covariance)
     };
     let of_midpoint = covariance
         .as_ref()
-        .map(|c: &Vec<f64>| c[MIDPOINT * p + MIDPOINT].sqrt());
-    let change_point = change_found && of_midpoint.is_some_and(|s| is_change_point(theta, s));
+        .map(|c: &Vec<f64>| c[midpoint * p + midpoint].sqrt());
+    let change_point = change_found && of_midpoint.is_some_and(|s| is_change_point(layout, theta, s));
     if change_point {
-        for place in [MIDPOINT, LOG_RATE] {
+        for place in [midpoint, log_rate] {
             remarks[place] = remarks[place].or(Some(Remark::ChangePoint));
+        }
+    }
+    if let Some(covariance) = &covariance {
+        for penalty in &criterion.penalty {
+            let i = penalty.place;
+            let share = covariance[i * p + i] * penalty.curvature(theta) / innovation_variance;
+            if share > LARGEST_PRIOR_SHARE {
+                remarks[i] = remarks[i].or(Some(Remark::PriorAlone));
+            }
         }
     }
     Ok(Inference {
@@ -156,18 +181,20 @@ fn fastest(criterion: &ChangeCriterion<'_>) -> f64 {
 /// Inverse of the information of the free parameters. Time and rate of a change that leaves no
 /// trace are taken out.
 fn invert(
+    layout: &Layout,
     at: &Linearisation,
     free: &mut Vec<usize>,
     remarks: &mut [Option<Remark>],
-    names: &[String],
 ) -> Result<Vec<f64>, IdentError> {
-    match inverse_of_free(&at.gram, free, names) {
-        Err(IdentError::SingularInformation { .. }) if free.contains(&MIDPOINT) || free.contains(&LOG_RATE) => {
-            free.retain(|i| ![MIDPOINT, LOG_RATE].contains(i));
-            for i in [MIDPOINT, LOG_RATE] {
+    let names = layout.names();
+    let of_time = [layout.midpoint, layout.log_rate];
+    match inverse_of_free(&at.gram, free, &names) {
+        Err(IdentError::SingularInformation { .. }) if of_time.iter().any(|i| free.contains(i)) => {
+            free.retain(|i| !of_time.contains(i));
+            for i in of_time {
                 remarks[i] = remarks[i].or(Some(Remark::Undetermined));
             }
-            inverse_of_free(&at.gram, free, names)
+            inverse_of_free(&at.gram, free, &names)
         }
         other => other,
     }
@@ -180,13 +207,14 @@ fn invert(
 pub(super) fn constant_operator(
     criterion: &ChangeCriterion<'_>,
     minimum: &Minimum,
-) -> Result<OperatorEstimate, IdentError> {
+) -> Result<ChangedOperator, IdentError> {
     let theta = &minimum.theta;
+    let layout = &criterion.layout;
     let mut constant = ChangeCriterion {
         changes: false,
         ..criterion.clone()
     };
-    for place in OF_THE_CHANGE {
+    for place in layout.of_the_change() {
         constant.limits[place] = (theta[place], theta[place]);
     }
     let free = free_parameters(&constant, theta, &minimum.at.descent);
@@ -194,43 +222,17 @@ pub(super) fn constant_operator(
         None
     } else {
         let freedom = criterion.residuals() - free.len() - criterion.states();
-        let variance = minimum.at.sum_of_squares / freedom as f64;
-        let mut inverse = inverse_of_free(&minimum.at.gram, &free, &names(criterion.nd))?;
+        let squares = minimum.at.sum_of_squares - constant.penalty_at(theta);
+        let variance = squares / freedom as f64;
+        let mut inverse = inverse_of_free(&minimum.at.gram, &free, &layout.names())?;
         inverse.iter_mut().for_each(|c| *c *= variance);
         Some(inverse)
     };
-    Ok(operator(theta, covariance.as_deref(), 0))
-}
-
-/// The operator at one end.
-pub(super) fn operator(theta: &[f64], covariance: Option<&[f64]>, end: usize) -> OperatorEstimate {
-    let along = |value: f64, parts: &[(usize, f64)]| match covariance {
-        None => Estimate::fixed(value),
-        Some(covariance) => {
-            let mut gradient = vec![0.0; theta.len()];
-            for &(i, g) in parts {
-                gradient[i] = g;
-            }
-            estimate(value, variance_along(&gradient, covariance))
-        }
+    let known = Known {
+        layout,
+        theta,
+        covariance: covariance.as_deref(),
+        change_point: None,
     };
-    let single = |i: usize| along(theta[i], &[(i, 1.0)]);
-    let (k_e, t_l) = (theta[K_E[end]], theta[T_L[end]]);
-    OperatorEstimate {
-        k_e: single(K_E[end]),
-        t_l_s: single(T_L[end]),
-        k_e_dot: along(k_e * t_l, &[(K_E[end], t_l), (T_L[end], k_e)]),
-        omega_nm_rad_s: single(OMEGA),
-        zeta_nm: single(ZETA),
-        tau_e_s: single(DELAY),
-    }
-}
-
-/// No variance, no standard error: what was held has none.
-pub(super) fn estimate(value: f64, variance: f64) -> Estimate {
-    if variance > 0.0 {
-        Estimate::with_variance(value, variance)
-    } else {
-        Estimate::fixed(value)
-    }
+    Ok(known.end(0)?)
 }

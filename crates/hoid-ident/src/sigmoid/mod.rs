@@ -1,13 +1,17 @@
 //! An operator who changes once: gains that follow a sigmoid, with the time and the rate of the
 //! change estimated.
 //!
-//! `u(t) = K_e(t - tau) y1(t) + K_e_dot(t - tau) y2(t) + (1/D) eps`, `K_e_dot = K_e T_L`, where K_e
-//! and T_L go from their initial to their last value as `1/(1 + e^{-G (t - t_M)})` (eq. 5) and y1,
-//! y2 are the exact responses of the neuromuscular system and the delay to the held error
-//! (`objective`). Gains at both ends, t_M, G, omega_nm, zeta_nm, a real tau_e and D are found
-//! together by the prediction error method, which is maximum likelihood for normal innovations.
-//! Source: P. M. T. Zaal, *Manual control adaptation to changing vehicle dynamics in roll-pitch
-//! control tasks*, J. Guidance, Control, and Dynamics 39 (2016).
+//! `u(t) = sum_i n_i(t - tau) y_i(t) + (1/D) eps`, where y_i is the exact response of `s^i` over the
+//! poles of the operator, behind their delay, to the held error ([`objective`]), and n_i the
+//! coefficients of their numerator. Its parameters, the gain and T_L (or c_1 and c_2, or T_L and
+//! alpha), go from their initial to their last value as `1/(1 + e^{-G (t - t_M)})` (eq. 5); the lag,
+//! the neuromuscular part and the delay stay. Every form of [`hoid_model::operator_family`] will do;
+//! by default it is a gain and a lead, `u = K_e y_0 + K_e_dot y_1`, `K_e_dot = K_e T_L`. What is in
+//! the numerator at both ends, t_M, G, the poles, a real tau_e and D are found together by the
+//! prediction error method, which is maximum likelihood for normal innovations. Source: P. M. T.
+//! Zaal, *Manual control adaptation to changing vehicle dynamics in roll-pitch control tasks*, J.
+//! Guidance, Control, and Dynamics 39 (2016); the family: D. T. McRuer and H. R. Jex, IEEE Trans.
+//! Human Factors in Electronics 8 (1967) 231-249.
 //!
 //! The innovations may have another size after the change ([`NoiseLevel`]). Without that the error
 //! bars of one end would be too small and those of the other too large.
@@ -20,25 +24,39 @@
 //! | module | what it holds |
 //! |---|---|
 //! | `estimator` | options, and the fit |
-//! | `layout` | order and meaning of the parameters, the sigmoid, the bounds |
+//! | `layout` | order and meaning of the parameters |
+//! | `bounds` | within what they are sought |
+//! | `instant` | the sigmoid and the numerator at one time |
+//! | `unit_operator` | responses of each power of s over the poles, with their derivatives |
 //! | `objective` | the criterion and its derivatives |
-//! | `starts`, `search` | where the searches begin, and how they cross the kinks of the delay |
+//! | `prior` | what is known before the data |
+//! | `frozen`, `ranking`, `starts` | poles, numerators and changes from which searches start |
+//! | `search` | how searches cross the kinks of the delay |
 //! | `noise_level`, `reweighting` | one noise level before the change and one after it |
 //! | `inference` | covariance, and whether there was a change |
 //! | `profile_likelihood` | intervals of t_M and G |
+//! | `ends` | the operator before and after the change, and at any time |
 //! | `fit` | the fitted change with its uncertainty |
 
+mod bounds;
+mod ends;
 mod estimator;
 mod fit;
+mod frozen;
 mod inference;
+mod instant;
 mod layout;
 mod noise_level;
 mod objective;
+mod prior;
 mod profile_likelihood;
+mod ranking;
 mod reweighting;
 mod search;
 mod starts;
+mod unit_operator;
 
+pub use ends::{ChangedOperator, NamedEstimate};
 pub use estimator::SigmoidChange;
 pub use fit::{ChangeParameter, GainsAt, SigmoidFit};
 pub use inference::{Comparison, Remark};

@@ -1,38 +1,41 @@
 //! The prediction-error criterion of an operator that changes.
 //!
-//! With y1 and y2 the responses of `omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}` and of s
-//! times that to the held error,
+//! With y_i the response of `s^i` over the poles of the operator, behind their delay, to the held
+//! error, and n_i the coefficients of the numerator,
 //!
-//! `w(t) = K_e(t - tau) y1(t) + K_e_dot(t - tau) y2(t)`,  `v = u - w`,  `eps = D v`,
+//! `w(t) = sum_i n_i(t - tau) y_i(t)`,  `v = u - w`,  `eps = D v`,
 //!
-//! because the delay stands behind the gains. y1 and y2 have one F and one state in common, which
-//! the gains do not touch, so that y_i = (B_i/F) q^-nk e holds throughout
-//! ([`hoid_model::delayed_operator`], linear in the gains), and
-//! `F dy_i/dp = (dB_i/dp) q^-nk e - (dF/dp) y_i`.
+//! because the delay stands behind the gains. For a gain and a lead that is `K_e(t - tau) y_0(t) +
+//! K_e_dot(t - tau) y_1(t)`, with y_0 of `omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}`. The
+//! y_i have one F and one state in common, which the numerator does not touch, so that
+//! y_i = (B_i/F) q^-nk e holds throughout ([`super::unit_operator`]). With the gain k and the shape
+//! m of the numerator, `n = k m(x)` ([`hoid_model::Form::shape`]),
 //!
-//! **Initial states.** The state of the operator where a record begins is unknown, two numbers. Any
-//! state is reached from rest by two held errors before the record; those are the unknowns, so that
-//! the same filters give the responses to them and all derivatives. They enter eps linearly and are
-//! eliminated exactly for each theta, as in [`crate::criterion::initial_state_responses`]:
-//! `eps = (I - Q Q') eps_0`, psi with the best states, `psi' (I - Q Q') psi` (G. H. Golub and V.
-//! Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432; L. Kaufman, *BIT* 15 (1975) 49-57).
+//! `dw/dk = sum_i m_i y_i`,  `dw/dx_j = k sum_i (dm_i/dx_j) y_i`.
+//!
+//! **Initial states.** The state of the operator where a record begins is unknown, as many numbers
+//! as they have poles. Any state is reached from rest by as many held errors before it; those are
+//! the unknowns, so that the same filters give the responses to them and all derivatives. Of a gain
+//! and a lead they stand before the record, of other forms right before the first residual: there
+//! nothing of a fast pole has died away, and none of the responses is lost beside the others.
+//! They enter eps linearly and are eliminated exactly for each theta, as in
+//! [`crate::criterion::initial_state_responses`]: `eps = (I - Q Q') eps_0`, psi with the best
+//! states, `psi' (I - Q Q') psi` (G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973)
+//! 413-432; L. Kaufman, *BIT* 15 (1975) 49-57).
+//!
+//! **Prior.** What is known before the data stands beside them as squares of its own
+//! ([`super::prior`]).
 
-use hoid_core::filter::{divide_in_place, fir};
-use hoid_model::{
-    SampleTime,
-    delayed_operator::{delayed_operator_and_jacobian_within, whole_samples},
-};
+use hoid_model::{Form, SampleTime};
 
-use super::layout::{DELAY, Instant, K_E, LOG_RATE, MIDPOINT, NOISE, OMEGA, T_L, ZETA};
+use super::{instant::Instant, layout::Layout, unit_operator::UnitOperator};
 use crate::{
     criterion::Workspace,
+    grey_box::objective::Penalty,
     linalg::least_squares::{add_scaled, dot},
     optimize::Linearisation,
     optimize::Objective,
 };
-
-/// Held errors before the record that stand for its initial state.
-const PAST: usize = 2;
 
 /// Input, output and start of one record.
 #[derive(Debug, Clone, Copy)]
@@ -45,29 +48,22 @@ pub(crate) struct Data<'a> {
 /// The criterion over one or several records.
 #[derive(Debug, Clone)]
 pub(crate) struct ChangeCriterion<'a> {
+    pub layout: Layout,
     pub data: Vec<Data<'a>>,
     pub sample_time: SampleTime,
-    pub nd: usize,
     /// First sample whose residual counts; at least the longest nk plus nd.
     pub first: usize,
     pub limits: Vec<(f64, f64)>,
-    /// Sample in which the delay is held; by the delay itself where there is none.
-    pub sample: Option<usize>,
+    /// Piece of a sample in which the delay is held ([`Layout::pieces`]); by the delay itself where
+    /// there is none.
+    pub piece: Option<usize>,
     /// False for the model whose first state holds throughout.
     pub changes: bool,
     /// Weights of the residuals of each record, from the first residual on; none where all count
     /// the same.
     pub weights: Option<Vec<Vec<f64>>>,
-}
-
-/// The operator with unit gains at one theta, and the derivatives for omega, zeta and tau.
-#[derive(Debug, Clone)]
-pub(crate) struct UnitOperator {
-    pub nk: usize,
-    pub b: [[f64; 3]; 2],
-    pub f: [f64; 2],
-    b_slopes: [[[f64; 3]; 3]; 2],
-    f_slopes: [[f64; 2]; 3],
+    /// What is known before the data.
+    pub penalty: Vec<Penalty>,
 }
 
 /// Signals of one record at one theta.
@@ -77,8 +73,8 @@ pub(crate) struct Pass {
     /// The error with the past in front.
     input: Vec<f64>,
     /// Responses to it.
-    y: [Vec<f64>; 2],
-    /// Gains from the first regressed sample on.
+    y: Vec<Vec<f64>>,
+    /// Numerators from the first regressed sample on.
     gains: Vec<Instant>,
     /// `u - w` from the first regressed sample on.
     v: Vec<f64>,
@@ -87,62 +83,15 @@ pub(crate) struct Pass {
     basis: Vec<Vec<f64>>,
 }
 
-impl UnitOperator {
-    /// `None` where theta has no meaning.
-    pub fn of(theta: &[f64], sample: Option<usize>, ts: SampleTime) -> Option<Self> {
-        let at = |gains: [f64; 2]| [gains[0], gains[1], theta[OMEGA], theta[ZETA], theta[DELAY]];
-        let sample = match sample {
-            Some(sample) => sample,
-            None => whole_samples(theta[DELAY], ts).ok()?,
-        };
-        let (held, by_gain) = delayed_operator_and_jacobian_within(sample, at([1.0, 0.0]), ts).ok()?;
-        let (_, by_rate) = delayed_operator_and_jacobian_within(sample, at([0.0, 1.0]), ts).ok()?;
-        let jacobians = [by_gain, by_rate];
-        let column = |side: usize, j: usize| std::array::from_fn(|i| jacobians[side][i][j]);
-        Some(Self {
-            nk: held.nk,
-            b: [column(0, 0), column(0, 1)],
-            f: held.f,
-            b_slopes: std::array::from_fn(|side| std::array::from_fn(|p| column(side, 2 + p))),
-            f_slopes: std::array::from_fn(|p| [jacobians[0][3][2 + p], jacobians[0][4][2 + p]]),
+/// `sum_i of(instant, i) y_i`, as long as the shortest y_i.
+fn combined(gains: &[Instant], y: &[&[f64]], of: impl Fn(&Instant, usize) -> f64) -> Vec<f64> {
+    let length = y.iter().map(|y| y.len()).fold(gains.len(), usize::min);
+    (0..length)
+        .map(|t| {
+            let first = of(&gains[t], 0) * y[0][t];
+            (1..y.len()).fold(first, |sum, i| sum + of(&gains[t], i) * y[i][t])
         })
-    }
-
-    /// `y_i` for an input with the past in front.
-    pub fn response(&self, i: usize, input: &[f64]) -> Vec<f64> {
-        let mut y = vec![0.0; input.len()];
-        fir(&self.b[i], 0, input, &mut y);
-        divide_in_place(&self.f, &mut y);
-        y
-    }
-
-    /// Derivative of `y_i` for the p-th of omega, zeta and tau.
-    fn slope(&self, i: usize, p: usize, input: &[f64], y: &[f64]) -> Vec<f64> {
-        let mut x = vec![0.0; input.len()];
-        fir(&self.b_slopes[i][p], 0, input, &mut x);
-        for (lag, &slope) in self.f_slopes[p].iter().enumerate().filter(|(_, s)| **s != 0.0) {
-            add_scaled(&mut x[lag + 1..], -slope, &y[..y.len() - lag - 1]);
-        }
-        divide_in_place(&self.f, &mut x);
-        x
-    }
-
-    /// Response of `B_i/F` to a unit input, until it has died away or `longest` is reached.
-    fn impulse_response(&self, i: usize, longest: usize) -> Vec<f64> {
-        let mut h: Vec<f64> = Vec::with_capacity(longest.min(4096));
-        let (mut before, mut earlier, mut largest) = (0.0_f64, 0.0_f64, 0.0_f64);
-        for t in 0..longest {
-            let drive = self.b[i].get(t).copied().unwrap_or(0.0);
-            let y = (drive - self.f[1] * earlier) - self.f[0] * before;
-            (earlier, before) = (before, y);
-            largest = largest.max(y.abs());
-            h.push(y);
-            if t > 3 && y.abs().max(earlier.abs()) < 1e-20 * largest {
-                break;
-            }
-        }
-        h
-    }
+        .collect()
 }
 
 impl ChangeCriterion<'_> {
@@ -153,7 +102,28 @@ impl ChangeCriterion<'_> {
 
     /// Number of initial states over all records.
     pub fn states(&self) -> usize {
-        PAST * self.data.len()
+        self.layout.order() * self.data.len()
+    }
+
+    /// What the prior adds to the sum of squares.
+    pub fn penalty_at(&self, theta: &[f64]) -> f64 {
+        let p = theta.len();
+        let mut total = Linearisation {
+            sum_of_squares: 0.0,
+            descent: vec![0.0; p],
+            gram: vec![0.0; p * p],
+        };
+        self.add_penalty(theta, &mut total);
+        total.sum_of_squares
+    }
+
+    fn add_penalty(&self, theta: &[f64], total: &mut Linearisation) {
+        let last = self.layout.of_the_change();
+        for penalty in &self.penalty {
+            if self.changes || !last.contains(&penalty.place) {
+                penalty.add_to(theta, total);
+            }
+        }
     }
 
     /// Residuals of one record from [`ChangeCriterion::first`] on, not weighted.
@@ -167,9 +137,10 @@ impl ChangeCriterion<'_> {
 
     /// `D x` with the weights of the record, of a signal from the first regressed sample on.
     fn whitened(&self, theta: &[f64], record: usize, x: &[f64]) -> Vec<f64> {
-        let mut y = x[self.nd..].to_vec();
-        for (i, &d) in theta[NOISE..].iter().enumerate() {
-            add_scaled(&mut y, d, &x[self.nd - 1 - i..x.len() - 1 - i]);
+        let nd = self.layout.nd;
+        let mut y = x[nd..].to_vec();
+        for (i, &d) in theta[self.layout.noise..].iter().enumerate() {
+            add_scaled(&mut y, d, &x[nd - 1 - i..x.len() - 1 - i]);
         }
         self.weigh(record, &mut y);
         y
@@ -181,61 +152,65 @@ impl ChangeCriterion<'_> {
         }
     }
 
-    /// Parameters in force behind the delay at each sample from the first regressed one on.
+    /// Numerators in force behind the delay at each sample from the first regressed one on.
     fn gains(&self, theta: &[f64], record: usize) -> Vec<Instant> {
-        let (from, data) = (self.first - self.nd, self.data[record]);
-        let at = |t: usize| data.start_s + t as f64 * self.sample_time.s() - theta[DELAY];
+        let (from, data) = (self.first - self.layout.nd, self.data[record]);
+        let at = |t: usize| data.start_s + t as f64 * self.sample_time.s() - theta[self.layout.delay];
         (from..data.u.len())
             .map(|t| {
                 if !self.changes {
-                    return Instant::constant(theta);
+                    return Instant::constant(&self.layout, theta);
                 }
-                Instant::at(theta, at(t))
+                Instant::at(&self.layout, theta, at(t))
             })
             .collect()
     }
 
     pub fn pass(&self, theta: &[f64], record: usize) -> Option<Pass> {
-        let unit = UnitOperator::of(theta, self.sample, self.sample_time)?;
+        let unit = UnitOperator::of(&self.layout, theta, self.piece, self.sample_time)?;
         let data = self.data[record];
-        let (n, from) = (data.u.len(), self.first - self.nd);
-        if unit.nk > from || self.first >= n {
+        let layout = &self.layout;
+        let (nd, past_errors) = (layout.nd, layout.order());
+        let (n, from) = (data.u.len(), self.first - nd);
+        if unit.nk + layout.reach() > from || self.first >= n {
             return None;
         }
-        let mut input = vec![0.0; PAST];
-        input.extend_from_slice(&data.e[..n - unit.nk]);
-        let mut y = [unit.response(0, &input), unit.response(1, &input)];
-        // Sample t stands at t - nk + PAST.
-        let begin = from + PAST - unit.nk;
-        let gains = self.gains(theta, record);
-        let respond = |y1: &[f64], y2: &[f64]| -> Vec<f64> {
-            let pairs = y1.iter().zip(y2).zip(&gains);
-            pairs.map(|((a, b), g)| g.k_e * a + g.k_e_dot() * b).collect()
+        // Where the oldest error of the past stands; those of a direct part reach on by two samples.
+        let oldest = match layout.form {
+            Form::Lead => 0,
+            _ => from - unit.nk - layout.reach(),
         };
-        let w = respond(&y[0][begin..], &y[1][begin..]);
+        let mut input = vec![0.0; past_errors];
+        input.extend_from_slice(&data.e[..n - unit.nk]);
+        let powers = unit.b.len();
+        let mut y: Vec<Vec<f64>> = (0..powers).map(|i| unit.response(i, &input)).collect();
+        // Sample t stands at t - nk + past_errors.
+        let begin = from + past_errors - unit.nk;
+        let gains = self.gains(theta, record);
+        let respond = |y: &[&[f64]]| combined(&gains, y, Instant::numerator);
+        let w = respond(&y.iter().map(|y| &y[begin..]).collect::<Vec<_>>());
         let mut v: Vec<f64> = data.u[from..].iter().zip(&w).map(|(u, w)| u - w).collect();
         let mut eps = self.whitened(theta, record, &v);
 
-        // Responses to the two errors before the record, the older one first.
-        let h = [
-            unit.impulse_response(0, input.len()),
-            unit.impulse_response(1, input.len()),
-        ];
-        let free: Vec<Vec<f64>> = (0..PAST)
+        // Responses to the errors before the record, the oldest one first.
+        let h: Vec<Vec<f64>> = (0..powers).map(|i| unit.impulse_response(i, input.len())).collect();
+        let free: Vec<Vec<f64>> = (0..past_errors)
             .map(|age| {
-                let tail = |h: &'_ Vec<f64>| h.get(begin - age..).unwrap_or(&[]).to_vec();
-                let mut column = respond(&tail(&h[0]), &tail(&h[1]));
+                let tails: Vec<&[f64]> = h.iter().map(|h| h.get(begin - oldest - age..).unwrap_or(&[])).collect();
+                let mut column = respond(&tails);
                 // Room for D behind its end.
-                column.resize((column.len().max(PAST) + self.nd).min(n - from), 0.0);
+                column.resize((column.len().max(past_errors) + nd).min(n - from), 0.0);
                 column
             })
             .collect();
         let columns = free.iter().map(|x| self.whitened(theta, record, x)).collect();
         let (basis, past) = eliminate(columns, &mut eps);
         for (age, &x) in past.iter().enumerate() {
-            input[age] = x;
+            let place = oldest + age;
+            input[place] += x;
             for (y, h) in y.iter_mut().zip(&h) {
-                add_scaled(&mut y[age..], x, h);
+                let common = h.len().min(y.len() - place);
+                add_scaled(&mut y[place..], x, &h[..common]);
             }
             add_scaled(&mut v, -x, &free[age]);
         }
@@ -252,41 +227,57 @@ impl ChangeCriterion<'_> {
 
     /// Columns of psi in one record, weighted, not projected.
     fn columns(&self, theta: &[f64], record: usize, pass: &Pass) -> Vec<Vec<f64>> {
-        let begin = self.first - self.nd + PAST - pass.unit.nk;
-        let [y1, y2] = [&pass.y[0][begin..], &pass.y[1][begin..]];
-        let map = |f: &dyn Fn(&Instant, f64, f64) -> f64| -> Vec<f64> {
-            let rows = pass.gains.iter().zip(y1).zip(y2);
-            self.whitened(
-                theta,
-                record,
-                &rows.map(|((g, a), b)| f(g, *a, *b)).collect::<Vec<f64>>(),
-            )
+        let (layout, gains) = (&self.layout, &pass.gains);
+        let begin = self.first - layout.nd + layout.order() - pass.unit.nk;
+        let y: Vec<&[f64]> = pass.y.iter().map(|y| &y[begin..]).collect();
+        // Along the gain; along the others over the gain.
+        let along: Vec<Vec<f64>> = (0..layout.varying)
+            .map(|j| match j.checked_sub(1) {
+                None => combined(gains, &y, |g, i| g.shape[i]),
+                Some(j) => combined(gains, &y, |g, i| g.slopes[j][i]),
+            })
+            .collect();
+        let steps: Vec<f64> = (0..layout.varying)
+            .map(Layout::ends)
+            .map(|[first, last]| theta[last] - theta[first])
+            .collect();
+        let mapped = |of: &dyn Fn(usize, &Instant) -> f64| {
+            let values: Vec<f64> = gains.iter().enumerate().map(|(t, g)| of(t, g)).collect();
+            self.whitened(theta, record, &values)
         };
-        let (step_k, step_t) = (theta[K_E[1]] - theta[K_E[0]], theta[T_L[1]] - theta[T_L[0]]);
-        let by_share = |g: &Instant, a: f64, b: f64| step_k * (a + g.t_l * b) + step_t * g.k_e * b;
+        let by_share = |t: usize, g: &Instant| {
+            (1..layout.varying).fold(steps[0] * along[0][t], |sum, j| sum + steps[j] * g.gain() * along[j][t])
+        };
         let mut columns = vec![Vec::new(); theta.len()];
-        columns[K_E[0]] = map(&|g, a, b| (1.0 - g.share) * (a + g.t_l * b));
-        columns[K_E[1]] = map(&|g, a, b| g.share * (a + g.t_l * b));
-        columns[T_L[0]] = map(&|g, _, b| (1.0 - g.share) * g.k_e * b);
-        columns[T_L[1]] = map(&|g, _, b| g.share * g.k_e * b);
-        columns[MIDPOINT] = map(&|g, a, b| g.by_midpoint * by_share(g, a, b));
-        columns[LOG_RATE] = map(&|g, a, b| g.by_log_rate * by_share(g, a, b));
-        for (p, place) in [OMEGA, ZETA, DELAY].into_iter().enumerate() {
-            let slopes: [Vec<f64>; 2] = std::array::from_fn(|i| pass.unit.slope(i, p, &pass.input, &pass.y[i]));
-            let rows = pass.gains.iter().zip(&slopes[0][begin..]).zip(&slopes[1][begin..]);
-            let column: Vec<f64> = rows.map(|((g, a), b)| g.k_e * a + g.k_e_dot() * b).collect();
-            columns[place] = self.whitened(theta, record, &column);
+        for (j, along) in along.iter().enumerate() {
+            let [first, last] = Layout::ends(j);
+            if j == 0 {
+                columns[first] = mapped(&|t, g| (1.0 - g.share) * along[t]);
+                columns[last] = mapped(&|t, g| g.share * along[t]);
+            } else {
+                columns[first] = mapped(&|t, g| (1.0 - g.share) * g.gain() * along[t]);
+                columns[last] = mapped(&|t, g| g.share * g.gain() * along[t]);
+            }
+        }
+        columns[layout.midpoint] = mapped(&|t, g| g.by_midpoint * by_share(t, g));
+        columns[layout.log_rate] = mapped(&|t, g| g.by_log_rate * by_share(t, g));
+        for (p, place) in layout.poles().into_iter().enumerate() {
+            let slopes: Vec<Vec<f64>> = (0..y.len())
+                .map(|i| pass.unit.slope(i, p, &pass.input, &pass.y[i]))
+                .collect();
+            let slopes: Vec<&[f64]> = slopes.iter().map(|slope| &slope[begin..]).collect();
+            columns[place] = self.whitened(theta, record, &combined(gains, &slopes, Instant::numerator));
         }
         // A longer delay takes the change along.
-        let (head, tail) = columns.split_at_mut(DELAY);
-        add_scaled(&mut tail[0], 1.0, &head[MIDPOINT]);
-        for i in 0..self.nd {
-            let mut column: Vec<f64> = pass.v[self.nd - 1 - i..pass.v.len() - 1 - i]
+        let (head, tail) = columns.split_at_mut(layout.delay);
+        add_scaled(&mut tail[0], 1.0, &head[layout.midpoint]);
+        for i in 0..layout.nd {
+            let mut column: Vec<f64> = pass.v[layout.nd - 1 - i..pass.v.len() - 1 - i]
                 .iter()
                 .map(|v| -v)
                 .collect();
             self.weigh(record, &mut column);
-            columns[NOISE + i] = column;
+            columns[layout.noise + i] = column;
         }
         columns
     }
@@ -347,9 +338,9 @@ impl Objective for ChangeCriterion<'_> {
 
     fn is_feasible(&self, theta: &[f64]) -> bool {
         theta.iter().all(|v| v.is_finite())
-            && theta[ZETA] > 0.0
-            && UnitOperator::of(theta, self.sample, self.sample_time)
-                .is_some_and(|unit| unit.nk + self.nd <= self.first)
+            && self.layout.muscles.is_none_or(|[_, zeta]| theta[zeta] > 0.0)
+            && UnitOperator::of(&self.layout, theta, self.piece, self.sample_time)
+                .is_some_and(|unit| unit.nk + self.layout.reach() + self.layout.nd <= self.first)
     }
 
     fn linearise(&self, theta: &[f64], _: &mut Workspace) -> Linearisation {
@@ -382,6 +373,7 @@ impl Objective for ChangeCriterion<'_> {
                 }
             }
         }
+        self.add_penalty(theta, &mut total);
         for i in 0..p {
             // A parameter without any effect here would make the matrix singular; with a diagonal
             // of one it rests.
@@ -405,5 +397,7 @@ impl Objective for ChangeCriterion<'_> {
     }
 }
 
+#[cfg(test)]
+mod family_tests;
 #[cfg(test)]
 mod tests;

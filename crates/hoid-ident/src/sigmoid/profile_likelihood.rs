@@ -8,11 +8,7 @@
 //! `P(loss <= q) = (1 - e^{-q/2})^2`, q = 7.35 for 95 % (B. E. Hansen, *Econometrica* 68 (2000)
 //! 575-603, theorem 2).
 
-use super::{
-    layout::{LOG_RATE, MIDPOINT},
-    objective::ChangeCriterion,
-    search::search,
-};
+use super::{layout::Layout, objective::ChangeCriterion, search::search};
 use crate::optimize::{Minimum, SearchMethod, SearchOptions};
 
 /// 95 % quantile of chi-square with one degree of freedom.
@@ -47,10 +43,10 @@ pub(crate) enum Profile {
 }
 
 /// Whether t_M, with this standard error of a regular parameter, is a change point.
-pub(crate) fn is_change_point(theta: &[f64], standard_error: f64) -> bool {
+pub(crate) fn is_change_point(layout: &Layout, theta: &[f64], standard_error: f64) -> bool {
     // Derivatives at one t_M do not tell about another one a width of the change away: the ends of
     // a 95 % interval.
-    2.0 * standard_error >= (-theta[LOG_RATE]).exp()
+    2.0 * standard_error >= (-theta[layout.log_rate]).exp()
 }
 
 /// 95 % interval of t_M or ln G around a minimum, `standard_error` its own where it has one; with
@@ -63,7 +59,7 @@ pub(crate) fn profile_likelihood_interval(
     change_point: bool,
     stay: bool,
 ) -> Profile {
-    let quantile = if change_point && place == MIDPOINT {
+    let quantile = if change_point && place == criterion.layout.midpoint {
         CHANGE_POINT
     } else {
         REGULAR
@@ -85,7 +81,7 @@ pub(crate) fn profile_likelihood_interval(
             found.theta,
         ))
     };
-    let finest = if place == MIDPOINT {
+    let finest = if place == criterion.layout.midpoint {
         criterion.sample_time.s()
     } else {
         0.05
@@ -135,7 +131,7 @@ pub(crate) fn profile_likelihood_interval(
         return Profile::Lower(theta);
     }
     let [low_end, high_end] = ends;
-    Profile::Interval(if place == LOG_RATE {
+    Profile::Interval(if place == criterion.layout.log_rate {
         Interval {
             low: low_end.exp(),
             high: if high_end >= high {

@@ -3,7 +3,7 @@
 //! level in force ([`super::noise_level`]).
 
 use super::{
-    layout::Instant,
+    instant::Instant,
     noise_level::{levels, weights},
     objective::{ChangeCriterion, Data},
     search::search,
@@ -69,7 +69,7 @@ fn shares(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> Vec<Vec<f64>> {
     let ts = criterion.sample_time.s();
     let of = |d: &Data<'_>| {
         (criterion.first..d.u.len())
-            .map(|t| Instant::at(theta, d.start_s + t as f64 * ts).share)
+            .map(|t| Instant::at(&criterion.layout, theta, d.start_s + t as f64 * ts).share)
             .collect()
     };
     criterion.data.iter().map(of).collect()

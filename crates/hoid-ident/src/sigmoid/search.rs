@@ -1,11 +1,7 @@
 //! Searches for the minimum of the loss, which has kinks where the delay is a whole number of
-//! samples.
+//! samples, and of an operator with a direct part between them too ([`super::layout`], pieces).
 
-use super::{
-    layout::{DELAY, OF_THE_CHANGE},
-    objective::ChangeCriterion,
-    starts,
-};
+use super::{objective::ChangeCriterion, starts};
 use crate::{
     IdentError, SearchOptions,
     criterion::Workspace,
@@ -14,7 +10,7 @@ use crate::{
 
 /// Steps from each start before the best of them is followed to its end.
 const LOOK: usize = 30;
-/// Distance to the border of a sample, in samples, below which the next sample is tried.
+/// Distance to the border of a piece, in pieces, below which the next piece is tried.
 const NEAR_BORDER: f64 = 1e-6;
 
 /// The lowest of the minima from these starts, with the name of its start: a look at each, then the
@@ -64,14 +60,14 @@ pub(super) fn without_change(
         ..criterion.clone()
     };
     let start = starts::without_change(&constant, theta);
-    for place in OF_THE_CHANGE {
+    for place in constant.layout.of_the_change() {
         constant.limits[place] = (start[place], start[place]);
     }
     search(&constant, start, options, None).ok_or(IdentError::NoFiniteLoss)
 }
 
 /// Searches from theta. The loss has kinks where tau_e is a whole number of samples, and a search
-/// may end in one; it is then finished inside each of the samples that meet there.
+/// may end in one; it is then finished inside each of the pieces that meet there.
 pub(super) fn search(
     criterion: &ChangeCriterion<'_>,
     theta: Vec<f64>,
@@ -80,35 +76,36 @@ pub(super) fn search(
 ) -> Option<Minimum> {
     let mut workspace = Workspace::of_thread();
     let minimum = minimise(criterion, theta, options, rival, &mut workspace)?;
-    let (low, high) = criterion.limits[DELAY];
+    let delay = criterion.layout.delay;
+    let (low, high) = criterion.limits[delay];
     if minimum.termination.converged() || low == high {
         return Some(minimum);
     }
-    let ts = criterion.sample_time.s();
-    let mut inside = |sample: usize, theta: &[f64]| {
+    let length = criterion.sample_time.s() / criterion.layout.pieces() as f64;
+    let mut inside = |piece: usize, theta: &[f64]| {
         let mut within = criterion.clone();
-        within.sample = Some(sample);
-        within.limits[DELAY] = (
-            (sample as f64 * ts).clamp(low, high),
-            ((sample + 1) as f64 * ts).clamp(low, high),
+        within.piece = Some(piece);
+        within.limits[delay] = (
+            (piece as f64 * length).clamp(low, high),
+            ((piece + 1) as f64 * length).clamp(low, high),
         );
         minimise(&within, theta.to_vec(), options, None, &mut workspace)
     };
-    let mut sample = (minimum.theta[DELAY] / ts + NEAR_BORDER).floor() as usize;
+    let mut piece = (minimum.theta[delay] / length + NEAR_BORDER).floor() as usize;
     let mut iterations = minimum.termination.iterations;
-    let mut best = inside(sample, &minimum.theta)?;
+    let mut best = inside(piece, &minimum.theta)?;
     iterations += best.termination.iterations;
     // Each move lowers the loss; the limit only guards against rounding.
     for _ in 0..100 {
-        let position = best.theta[DELAY] / ts;
+        let position = best.theta[delay] / length;
         let neighbours = [
-            (position <= sample as f64 + NEAR_BORDER)
-                .then(|| sample.checked_sub(1))
+            (position <= piece as f64 + NEAR_BORDER)
+                .then(|| piece.checked_sub(1))
                 .flatten(),
-            (position >= (sample + 1) as f64 - NEAR_BORDER).then_some(sample + 1),
+            (position >= (piece + 1) as f64 - NEAR_BORDER).then_some(piece + 1),
         ];
         let better = neighbours.into_iter().flatten().find_map(|there| {
-            if (there + 1) as f64 * ts <= low || there as f64 * ts >= high {
+            if (there + 1) as f64 * length <= low || there as f64 * length >= high {
                 return None;
             }
             let found = inside(there, &best.theta)?;
@@ -117,7 +114,7 @@ pub(super) fn search(
         });
         let Some((there, found)) = better else { break };
         iterations += found.termination.iterations;
-        (sample, best) = (there, found);
+        (piece, best) = (there, found);
     }
     best.termination.iterations = iterations;
     Some(best)

@@ -1,7 +1,7 @@
 //! From the keys to a scenario of the family.
 
 use hoid_model::{
-    ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, SampleTime,
+    ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, SampleTime,
     family_scenario::{
         Excitation, Followed, Intermittence, MultiSine, PartStrength, Pulses, RemnantPart, RemnantShape,
         SignalDependence, Stick,
@@ -153,7 +153,7 @@ impl Source<'_> {
         }
         let Some(element) = &given.controlled_element else {
             return Err(self.keys(&format!(
-                "[{table}] lacks controlled_element, such as controlled_element = \"1/1,0\" for 1/s"
+                "[{table}] lacks controlled_element, such as controlled_element = \"1/s\" or \"90/(s(s+6))\""
             )));
         };
         Ok(FamilyState {
@@ -162,23 +162,18 @@ impl Source<'_> {
         })
     }
 
+    /// `90/(s(s+6))`, or `90/1,6,0` by falling powers of s.
     fn element(&self, key: &str, given: &Spanned<String>) -> Result<ContinuousTransferFunction, ScenarioFileError> {
-        let numbers = |part: &str| -> Option<Vec<f64>> { part.split(',').map(|c| c.trim().parse().ok()).collect() };
-        let parts = given.get_ref().split_once('/');
-        let Some((num, den)) = parts.and_then(|(num, den)| Some((numbers(num)?, numbers(den)?))) else {
-            let expected = "NUM/DEN by falling powers of s, such as 1/1,1,0";
-            return Err(self.value(key, given.span().start, given.get_ref(), expected));
-        };
-        if let Some(value) = num.iter().chain(&den).find(|value| !Limits::ANY.hold(**value)) {
-            return Err(self.value(
-                key,
-                given.span().start,
-                value,
-                &format!("{} in each coefficient", Limits::ANY),
-            ));
+        let at = given.span().start;
+        let element: ContinuousTransferFunction = given.get_ref().parse().map_err(|error| match error {
+            ModelError::TransferFunction { expected, .. } => self.value(key, at, given.get_ref(), &expected),
+            other => self.model(other),
+        })?;
+        let mut coefficients = element.num().iter().chain(element.den());
+        if let Some(value) = coefficients.find(|value| !Limits::ANY.hold(**value)) {
+            return Err(self.value(key, at, value, &format!("{} in each coefficient", Limits::ANY)));
         }
-        ContinuousTransferFunction::new(&num, &den)
-            .map_err(|error| self.value(key, given.span().start, given.get_ref(), &error.to_string()))
+        Ok(element)
     }
 
     fn excitation(&self, name: &str, given: ExcitationTable) -> Result<Excitation, ScenarioFileError> {

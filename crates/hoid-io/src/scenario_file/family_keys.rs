@@ -60,7 +60,7 @@ pub(super) struct FamilyStateTable {
     pub(super) omega_nm_rad_s: Option<f64>,
     pub(super) zeta_nm: Option<f64>,
     pub(super) tau_e_s: Option<f64>,
-    /// `NUM/DEN` by falling powers of s.
+    /// In s, as `90/(s(s+6))`, or `NUM/DEN` by falling powers of s, as `90/1,6,0`.
     #[schemars(with = "Option<String>")]
     pub(super) controlled_element: Option<Spanned<String>>,
 }

@@ -72,6 +72,17 @@ fn a_pure_integration_is_an_infinite_lag() {
 }
 
 #[test]
+fn an_element_is_written_as_a_transfer_function() {
+    let element = |text: &str| parse(&SHORT.replace("1/1,0", text)).unwrap().initial.controlled_element;
+    let expected = element("90/1,6,0");
+    assert_eq!((expected.num(), expected.den()), (&[90.0][..], &[1.0, 6.0, 0.0][..]));
+    for text in ["90/(s(s+6))", " 90 / 1, 6, 0 ", "180/(2s^2 + 12s)"] {
+        assert_eq!(element(text), expected, "{text}");
+    }
+    assert_eq!(element("1/s"), element("1/1,0"));
+}
+
+#[test]
 fn what_does_not_fit_is_refused_with_its_remedy() {
     let with = |from: &str, to: &str| SHORT.replace(from, to);
     let more = |tail: &str| format!("{SHORT}{tail}\n");
@@ -83,6 +94,9 @@ fn what_does_not_fit_is_refused_with_its_remedy() {
         (with("T_L_s = 0.6\n", "T_L_s = 0.6\nc_1_s = 1\n"), "[initial] has c_1_s"),
         (with("1/1,0", "1,0,0/1,0"), "higher degree"),
         (with("1/1,0", "one"), "line 9: initial.controlled_element is one"),
+        (with("1/1,0", "90/s(s+6)"), "at character 5 stands '('"),
+        (with("1/1,0", "1e13/s"), "controlled_element is 10000000000000"),
+        (with("1/1,0", "exp(-0.1s)/s"), "the delay of a task is the operator's"),
         (with("controlled_element = \"1/1,0\"\n", ""), "lacks controlled_element"),
         (with("form", "sample_time_s = 0\nform"), "line 1: sample_time_s is 0"),
         (

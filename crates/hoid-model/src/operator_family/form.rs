@@ -169,6 +169,35 @@ impl Form {
         all
     }
 
+    /// Number of coordinates of the numerator beside the gain: T_L, or c_1 and c_2, or T_L and
+    /// alpha. They stand behind the gain in [`Form::coordinates`], before those of the poles.
+    pub fn varying_beside_gain(self) -> usize {
+        match self {
+            Self::Gain | Self::Lag => 0,
+            Self::Lead | Self::Lead2 | Self::LeadLag | Self::Lead2Lag => 1,
+            Self::QuadraticIntegral | Self::LeadDroop => 2,
+        }
+    }
+
+    /// The numerator over its gain, `m_0 + m_1 s + m_2 s^2`, from the coordinates of the numerator
+    /// behind the gain, and the derivatives of its coefficients along them.
+    pub fn shape(self, x: &[f64]) -> ([f64; 3], [[f64; 3]; 2]) {
+        let none = [0.0; 3];
+        match self {
+            Self::Gain | Self::Lag => ([1.0, 0.0, 0.0], [none; 2]),
+            Self::Lead | Self::LeadLag => ([1.0, x[0], 0.0], [[0.0, 1.0, 0.0], none]),
+            Self::Lead2 | Self::Lead2Lag => {
+                let t = x[0];
+                ([1.0, 2.0 * t, t * t], [[0.0, 2.0, 2.0 * t], none])
+            }
+            Self::QuadraticIntegral => ([1.0, x[0], x[1]], [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+            Self::LeadDroop => {
+                let (t, alpha) = (x[0], x[1]);
+                ([alpha, 1.0 + t * alpha, t], [[0.0, alpha, 1.0], [1.0, t, 0.0]])
+            }
+        }
+    }
+
     /// Numerator and pole from the first coordinates.
     pub(super) fn rational(self, x: &[Dual]) -> Rational {
         let zero = Dual::constant(0.0);
@@ -188,3 +217,25 @@ impl Form {
 }
 
 const _: () = assert!(PARTIALS >= 6);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shape_is_the_numerator_over_its_gain() {
+        for form in Form::ALL {
+            let x = [3.0, 0.6, 0.4];
+            let variables: Vec<Dual> = x.iter().enumerate().map(|(i, v)| Dual::variable(*v, i)).collect();
+            let Rational { numerator, .. } = form.rational(&variables);
+            let (shape, slopes) = form.shape(&x[1..]);
+            for (i, n) in numerator.iter().enumerate() {
+                assert!((n.value - 3.0 * shape[i]).abs() < 1e-14, "{form} {i}");
+                assert!((n.partials[0] - shape[i]).abs() < 1e-14, "{form} {i}");
+                for j in 0..form.varying_beside_gain() {
+                    assert!((n.partials[1 + j] - 3.0 * slopes[j][i]).abs() < 1e-14, "{form} {i} {j}");
+                }
+            }
+        }
+    }
+}

@@ -22,7 +22,7 @@
 use super::{
     dual::{Dual, PARTIALS},
     form::Rational,
-    matrices::{SIZE, Vector, characteristic, companion, exponential, product, times},
+    matrices::{Matrix, SIZE, Vector, characteristic, companion, exponential, product, times},
     operator::FamilyOperator,
 };
 use crate::{ModelError, SampleTime, delayed_operator::whole_samples};
@@ -38,6 +38,19 @@ pub struct HeldFamily {
     pub f: Vec<f64>,
     /// A row for each coefficient of B, then of F, with a derivative for each coordinate.
     pub jacobian: Vec<[f64; PARTIALS]>,
+}
+
+/// What poles and delay make of a sample, whatever the numerator.
+struct HeldPoles {
+    /// omega^2, where there is a neuromuscular part.
+    gain: Option<Dual>,
+    f: Vec<Dual>,
+    denominator: Vector,
+    /// delta in samples.
+    delta: Dual,
+    phi: Matrix,
+    gamma_old: Vector,
+    gamma_new: Vector,
 }
 
 impl HeldFamily {
@@ -99,23 +112,35 @@ impl FamilyOperator {
     /// As [`FamilyOperator::hold`].
     pub fn hold_within(&self, sample: usize, sample_time: SampleTime) -> Result<HeldFamily, ModelError> {
         let variables = self.variables();
+        let Rational { numerator, .. } = self.form().rational(&variables);
+        let poles = self.held_poles(&variables, sample, sample_time.s());
+        self.held(&poles, numerator, sample, sample_time.s())
+    }
+
+    /// The exact discrete models of `s^i` in place of the numerator, i from 0 to its degree, with
+    /// the poles and the delay of this operator, and one F: what passes from e to u is
+    /// `sum_i n_i(t) (B_i/F) q^-nk e` also where the coefficients n_i of the numerator change with
+    /// time and the poles do not.
+    ///
+    /// # Errors
+    /// As [`FamilyOperator::hold`].
+    pub fn hold_powers_within(&self, sample: usize, sample_time: SampleTime) -> Result<Vec<HeldFamily>, ModelError> {
+        let poles = self.held_poles(&self.variables(), sample, sample_time.s());
+        let power = |i: usize| std::array::from_fn(|j| Dual::constant(f64::from(u8::from(i == j))));
+        (0..=self.form().degree())
+            .map(|i| self.held(&poles, power(i), sample, sample_time.s()))
+            .collect()
+    }
+
+    /// What the poles and the delay make of a sample.
+    fn held_poles(&self, variables: &[Dual], sample: usize, ts: f64) -> HeldPoles {
         let delay = variables[variables.len() - 1];
-        let ts = sample_time.s();
         // In units of a sample: all matrices have entries of moderate size.
         let delta = delay.scaled(1.0 / ts) - Dual::constant(sample as f64);
-        let (numerator, denominator) = self.by_samples(&variables, ts);
+        let denominator = self.denominator_by_samples(variables, ts);
         let order = self.order();
-        let direct = if self.has_direct_part() {
-            numerator[order]
-        } else {
-            Dual::constant(0.0)
-        };
         let zero = Dual::constant(0.0);
-        let one = Dual::constant(1.0);
-
-        // The strictly proper part, c_i = n_i - D d_i.
-        let output: Vec<Dual> = (0..order).map(|i| numerator[i] - direct * denominator[i]).collect();
-        let rest = one - delta;
+        let rest = Dual::constant(1.0) - delta;
         let (mut phi, mut gamma_old, mut gamma_new) = ([[zero; SIZE]; SIZE], [zero; SIZE], [zero; SIZE]);
         if order > 0 {
             let first = exponential(&companion(&denominator, order), delta);
@@ -126,41 +151,82 @@ impl FamilyOperator {
                 gamma_old[i] = (0..order).fold(zero, |sum, j| sum + second[i][j] * first[j][order]);
             }
         }
-        let f = characteristic(&phi, order);
+        HeldPoles {
+            gain: self.numerator_gain(variables),
+            f: characteristic(&phi, order),
+            denominator,
+            delta,
+            phi,
+            gamma_old,
+            gamma_new,
+        }
+    }
+
+    /// The model of this numerator over these poles.
+    fn held(&self, poles: &HeldPoles, numerator: [Dual; 3], sample: usize, ts: f64) -> Result<HeldFamily, ModelError> {
+        let (zero, one) = (Dual::constant(0.0), Dual::constant(1.0));
+        let order = self.order();
+        let numerator = self.numerator_by_samples(numerator, poles.gain, ts);
+        let direct = if self.has_direct_part() { numerator[order] } else { zero };
+        // The strictly proper part, c_i = n_i - D d_i.
+        let output: Vec<Dual> = (0..order)
+            .map(|i| numerator[i] - direct * poles.denominator[i])
+            .collect();
 
         // Impulse response from e(k-l-1), then B = F h; h ends where B does.
         let (nb, _, shift) = self.held_orders();
         let first_dynamic = 1 - shift;
         let mut impulse = vec![zero; nb];
-        let mut state = gamma_new;
-        let mut late = gamma_old;
+        let mut state = poles.gamma_new;
+        let mut late = poles.gamma_old;
         for j in first_dynamic..nb {
             let value = |x: &Vector| (0..order).fold(zero, |sum, i| sum + output[i] * x[i]);
             impulse[j] = impulse[j] + value(&state);
             if j + 1 < nb {
                 impulse[j + 1] = impulse[j + 1] + value(&late);
             }
-            state = times(&phi, &state, order);
-            late = times(&phi, &late, order);
+            state = times(&poles.phi, &state, order);
+            late = times(&poles.phi, &late, order);
         }
         if self.has_direct_part() {
             // tau + Ts/2 = (sample + whole + part) Ts.
-            let late_by = delta + Dual::constant(0.5);
+            let late_by = poles.delta + Dual::constant(0.5);
             let whole = usize::from(late_by.value >= 1.0);
             let part = late_by - Dual::constant(whole as f64);
             impulse[whole] = impulse[whole] + direct * (one - part);
             impulse[whole + 1] = impulse[whole + 1] + direct * part;
         }
-        HeldFamily::of_impulse_response(sample + shift, &impulse, &f)
+        HeldFamily::of_impulse_response(sample + shift, &impulse, &poles.f)
     }
 
     /// Numerator and monic denominator by ascending powers of `s Ts`.
     pub(super) fn by_samples(&self, variables: &[Dual], ts: f64) -> (Vector, Vector) {
+        let Rational { numerator, .. } = self.form().rational(variables);
+        (
+            self.numerator_by_samples(numerator, self.numerator_gain(variables), ts),
+            self.denominator_by_samples(variables, ts),
+        )
+    }
+
+    /// omega^2, by which the neuromuscular part multiplies the numerator; 1 without it.
+    fn numerator_gain(&self, variables: &[Dual]) -> Option<Dual> {
+        self.neuromuscular_of(variables).map(|(omega, _)| omega * omega)
+    }
+
+    fn numerator_by_samples(&self, numerator: [Dual; 3], gain: Option<Dual>, ts: f64) -> Vector {
+        let mut num = [Dual::constant(0.0); SIZE];
+        num[..3].copy_from_slice(&numerator);
+        if let Some(square) = gain {
+            num = num.map(|c| c * square);
+        }
+        std::array::from_fn(|i| num[i].scaled(self.scale(i, ts)))
+    }
+
+    fn denominator_by_samples(&self, variables: &[Dual], ts: f64) -> Vector {
         let zero = Dual::constant(0.0);
         let one = Dual::constant(1.0);
-        let Rational { numerator, pole } = self.form().rational(variables);
-        let (mut num, mut den) = ([zero; SIZE], [zero; SIZE]);
-        num[..3].copy_from_slice(&numerator);
+        let Rational { pole, .. } = self.form().rational(variables);
+        let mut den = [zero; SIZE];
         den[0] = one;
         if let Some(a) = pole {
             (den[0], den[1]) = (a, one);
@@ -168,20 +234,18 @@ impl FamilyOperator {
         if let Some((omega, zeta)) = self.neuromuscular_of(variables) {
             let square = omega * omega;
             let middle = (zeta * omega).scaled(2.0);
-            num = num.map(|c| c * square);
             let before = den;
             den = std::array::from_fn(|i| {
                 let shifted = |by: usize| if i >= by { before[i - by] } else { zero };
                 square * shifted(0) + middle * shifted(1) + shifted(2)
             });
         }
-        // s^i = (s Ts)^i / Ts^i, then monic again.
-        let order = self.order() as i32;
-        let scale = |i: usize| ts.powi(order - i as i32);
-        (
-            std::array::from_fn(|i| num[i].scaled(scale(i))),
-            std::array::from_fn(|i| den[i].scaled(scale(i))),
-        )
+        std::array::from_fn(|i| den[i].scaled(self.scale(i, ts)))
+    }
+
+    /// `s^i = (s Ts)^i / Ts^i`, then monic again.
+    fn scale(&self, i: usize, ts: f64) -> f64 {
+        ts.powi(self.order() as i32 - i as i32)
     }
 }
 
@@ -259,6 +323,34 @@ mod tests {
                 // The hold and the aliases are (omega Ts)^2 at most.
                 let error = (h - expected).norm() / expected.norm();
                 assert!(error < (omega * ts_s).powi(2) + 2e-5, "{operator:?} {omega} {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn powers_make_up_the_operator() {
+        for operator in all() {
+            let sample = whole_samples(operator.tau_e_s(), ts()).unwrap();
+            let whole = operator.hold(ts()).unwrap();
+            let powers = operator.hold_powers_within(sample, ts()).unwrap();
+            let x = operator.coordinates();
+            let (shape, _) = operator.form().shape(&x[1..]);
+            assert_eq!(powers.len(), operator.form().degree() + 1);
+            for (k, b) in whole.b.iter().enumerate() {
+                let sum: f64 = powers.iter().zip(shape).map(|(p, m)| x[0] * m * p.b[k]).sum();
+                let size: f64 = powers.iter().zip(shape).map(|(p, m)| (x[0] * m * p.b[k]).abs()).sum();
+                assert!((sum - b).abs() <= 1e-12 * size, "{operator:?} {k}: {sum} {b}");
+            }
+            // The numerator is no part of them.
+            let of_numerator = 1 + operator.form().varying_beside_gain();
+            for power in &powers {
+                assert_eq!((power.nk, &power.f), (whole.nk, &whole.f));
+                assert!(
+                    power
+                        .jacobian
+                        .iter()
+                        .all(|row| row[..of_numerator].iter().all(|d| *d == 0.0))
+                );
             }
         }
     }

@@ -62,7 +62,11 @@ pub fn people_table<'a>(people: impl Iterator<Item = &'a Person>) -> PeopleTable
         };
         let mut cells = vec![p.subject.clone(), p.condition.clone(), runs, p.form.clone()];
         if in_loop {
-            cells.extend([p.crossover_rad_s, p.phase_margin_deg].map(|e| e.map_or_else(dash, |e| estimate(&e))));
+            let measures = [
+                (p.crossover_rad_s, p.crossover_interval),
+                (p.phase_margin_deg, p.phase_margin_interval),
+            ];
+            cells.extend(measures.map(|(e, interval)| e.map_or_else(dash, |e| estimate_within(&e, interval))));
         }
         cells.extend(
             columns
@@ -91,6 +95,18 @@ fn estimate(e: &Estimate) -> String {
             format!("{value} \u{b1} {error}")
         }
     }
+}
+
+/// Value, standard error, and in brackets the interval.
+fn estimate_within(e: &Estimate, interval: Option<(f64, f64)>) -> String {
+    let ends = interval.map(|(low, high)| {
+        format!(
+            " [{} to {}]",
+            numbers::significant(low, 3),
+            numbers::significant(high, 3)
+        )
+    });
+    format!("{}{}", estimate(e), ends.unwrap_or_default())
 }
 
 fn parameter(p: &Parameter) -> String {
@@ -169,5 +185,16 @@ mod tests {
         assert_eq!(of(20.0, Some(90.0), Some((4.13, f64::INFINITY)), false), "> 4.1");
         assert_eq!(of(f64::INFINITY, None, None, false), numbers::DASH);
         assert_eq!(of(0.314, Some(0.2), Some((0.1, 0.8)), false), "(0.31)");
+    }
+
+    #[test]
+    fn crossovers_have_their_intervals_beside_them() {
+        let crossover = Estimate {
+            value: 3.05,
+            standard_error: Some(0.12),
+        };
+        let with = estimate_within(&crossover, Some((2.7778, 3.3222)));
+        assert_eq!(with, "3.05 \u{b1} 0.12 [2.78 to 3.32]");
+        assert_eq!(estimate_within(&crossover, None), "3.05 \u{b1} 0.12");
     }
 }

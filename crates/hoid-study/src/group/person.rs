@@ -3,8 +3,8 @@
 //!
 //! A row has the form, for each parameter its value, standard error (`_se`), interval of 95 %
 //! (`_low`, `_high`), whether the data determine it (`_determined`) and how much of it is prior
-//! (`_prior_share`), crossover and phase margin with the controlled element, the figures of the fit
-//! and its verdict. Parameters that no person has, have no columns. Where some parameters are
+//! (`_prior_share`), crossover and phase margin with the controlled element and their errors and
+//! intervals, the figures of the fit and its verdict. Parameters that no person has, have no columns. Where some parameters are
 //! individual, a person has a row for each run.
 
 use hoid_ident::family::{FamilyFit, OperatorOfRecord, Parameter};
@@ -55,8 +55,12 @@ pub struct Person {
     pub parameters: Vec<Parameter>,
     /// Crossover frequency with the controlled element, rad/s.
     pub crossover_rad_s: Option<Estimate>,
+    /// Its interval of 95 %, Student's: the errors rest on few runs.
+    pub crossover_interval: Option<(f64, f64)>,
     /// Phase margin, deg.
     pub phase_margin_deg: Option<Estimate>,
+    /// Its interval, likewise.
+    pub phase_margin_interval: Option<(f64, f64)>,
     /// chi^2 at the lines of the excitation, and its degrees of freedom.
     pub chi2: Option<(f64, usize)>,
     /// Clustered over model-based variances.
@@ -84,7 +88,9 @@ impl Person {
             form: String::new(),
             parameters: Vec::new(),
             crossover_rad_s: None,
+            crossover_interval: None,
             phase_margin_deg: None,
+            phase_margin_interval: None,
             chi2: None,
             kappa: None,
             noise_order: None,
@@ -112,7 +118,9 @@ impl Person {
             form: fit.form.name().to_owned(),
             parameters: parameters.clone(),
             crossover_rad_s: measures.map(|m| m.crossover_rad_s),
+            crossover_interval: measures.and_then(|m| m.crossover_interval()),
             phase_margin_deg: measures.map(|m| m.phase_margin_deg),
+            phase_margin_interval: measures.and_then(|m| m.phase_margin_interval()),
             chi2: fit.lines.as_ref().map(|l| (l.chi_squared, l.degrees_of_freedom)),
             kappa: Some(fit.inflation),
             noise_order: Some(fit.noise_orders.1),
@@ -165,13 +173,16 @@ impl Person {
             let determined = if p.determined { "yes" } else { "no" };
             rows.text(&format!("{name}_determined"), determined);
         }
-        for (name, estimate) in [
-            ("crossover_rad_s", self.crossover_rad_s),
-            ("phase_margin_deg", self.phase_margin_deg),
+        for (name, estimate, interval) in [
+            ("crossover_rad_s", self.crossover_rad_s, self.crossover_interval),
+            ("phase_margin_deg", self.phase_margin_deg, self.phase_margin_interval),
         ] {
             if let Some(estimate) = estimate {
                 rows.real(name, estimate.value);
                 rows.real(&format!("{name}_se"), estimate.standard_error.unwrap_or(f64::NAN));
+                let (low, high) = interval.unwrap_or((f64::NAN, f64::NAN));
+                rows.real(&format!("{name}_low"), low);
+                rows.real(&format!("{name}_high"), high);
             }
         }
         let (chi2, dof) = self.chi2.map_or((f64::NAN, f64::NAN), |(c, dof)| (c, dof as f64));
@@ -190,14 +201,14 @@ impl Person {
                 standard_error: any(&format!("{name}_se")),
             })
         };
+        let interval = |name: &str| any(&format!("{name}_low")).zip(any(&format!("{name}_high")));
         let parameter = |&(name, unit): &(&str, &'static str)| {
-            let low_and_high = any(&format!("{name}_low")).zip(any(&format!("{name}_high")));
             any(name).map(|value| Parameter {
                 name: name.to_owned(),
                 unit,
                 value,
                 standard_error: any(&format!("{name}_se")),
-                interval: low_and_high,
+                interval: interval(name),
                 prior_share: any(&format!("{name}_prior_share")).unwrap_or(0.0),
                 determined: cell(&format!("{name}_determined")) == "yes",
             })
@@ -212,7 +223,9 @@ impl Person {
             form: cell("form"),
             parameters: PARAMETERS.iter().filter_map(parameter).collect(),
             crossover_rad_s: estimate("crossover_rad_s"),
+            crossover_interval: interval("crossover_rad_s"),
             phase_margin_deg: estimate("phase_margin_deg"),
+            phase_margin_interval: interval("phase_margin_deg"),
             chi2: any("chi2").zip(any("dof").map(|dof| dof as usize)),
             kappa: any("kappa"),
             noise_order: any("noise_order").map(|nd| nd as usize),
@@ -246,7 +259,7 @@ fn people_schema(parameters: &[&str]) -> TableSchema {
     let ends = ["crossover_rad_s", "phase_margin_deg"];
     let of_ends: Vec<String> = ends
         .iter()
-        .flat_map(|name| ["", "_se"].map(|end| format!("{name}{end}")))
+        .flat_map(|name| ["", "_se", "_low", "_high"].map(|end| format!("{name}{end}")))
         .collect();
     let of_parameters: Vec<String> = parameters
         .iter()
@@ -301,6 +314,7 @@ mod tests {
                 value: 3.0,
                 standard_error: Some(0.1),
             }),
+            crossover_interval: Some((2.7, 3.3)),
             chi2: Some((12.5, 9)),
             kappa: Some(2.0),
             noise_order: Some(7),

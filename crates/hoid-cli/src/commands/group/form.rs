@@ -38,7 +38,7 @@ impl Finished<'_> {
             page.push_str(&format!(
                 "\nOperators, each of all runs of a person in a condition\n{}\n{}\n\
                  Value \u{b1} standard error by the scatter between runs. What the data do not determine is in \
-                 parentheses, or beyond a bound (> is a limit of 95 %).\n",
+                 parentheses, or beyond a bound (> is a limit of 95 %). In brackets: intervals of 95 %, Student's.\n",
                 columns_of(&table, &in_loop),
                 columns_of(&table, &parameters),
             ));
@@ -96,7 +96,10 @@ fn person(p: &Person) -> Value {
     if let (Some(crossover), Some(margin)) = (p.crossover_rad_s, p.phase_margin_deg) {
         set(
             "open_loop",
-            json!({"crossover_rad_s": json::estimate(&crossover), "phase_margin_deg": json::estimate(&margin)}),
+            json!({
+                "crossover_rad_s": json::estimate_within(&crossover, p.crossover_interval),
+                "phase_margin_deg": json::estimate_within(&margin, p.phase_margin_interval),
+            }),
         );
     }
     set("chi2", json::optional(p.chi2.map(|(chi2, _)| chi2)));

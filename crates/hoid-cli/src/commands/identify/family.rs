@@ -214,7 +214,7 @@ fn coordinate(name: &str) -> Result<Coordinate, CliError> {
 }
 
 /// `population`, `none`, `NAME=CENTRE:SPREAD,...`, or the JSON of another fit.
-fn prior(text: &str) -> Result<OperatorPrior, CliError> {
+pub(super) fn prior(text: &str) -> Result<OperatorPrior, CliError> {
     let path = Path::new(text);
     if path
         .extension()

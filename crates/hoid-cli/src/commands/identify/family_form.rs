@@ -497,15 +497,12 @@ fn operator(of: &OperatorOfRecord) -> Value {
 }
 
 fn open_loop(found: Option<&LoopMeasures>) -> Value {
-    let estimate = |e: Option<Estimate>, interval: Option<(f64, f64)>| {
-        let mut value = json::estimate(&e?);
-        let ends = interval.map_or(Value::Null, |(low, high)| json!([number(low), number(high)]));
-        value.as_object_mut()?.insert("interval".to_owned(), ends);
-        Some(value)
+    let of = |value: fn(&LoopMeasures) -> Estimate, interval: fn(&LoopMeasures) -> Option<(f64, f64)>| {
+        found.map(|m| json::estimate_within(&value(m), interval(m)))
     };
     json!({
-        "crossover_rad_s": estimate(found.map(|m| m.crossover_rad_s), found.and_then(|m| m.crossover_interval())),
-        "phase_margin_deg": estimate(found.map(|m| m.phase_margin_deg), found.and_then(|m| m.phase_margin_interval())),
+        "crossover_rad_s": of(|m| m.crossover_rad_s, LoopMeasures::crossover_interval),
+        "phase_margin_deg": of(|m| m.phase_margin_deg, LoopMeasures::phase_margin_interval),
     })
 }
 

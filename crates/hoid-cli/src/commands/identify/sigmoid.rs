@@ -1,16 +1,16 @@
 //! `hoid identify --structure time-varying`: the operator whose gains change once.
 
 use hoid_ident::{
-    GainsAt, InitialState, SigmoidChange, SigmoidFit,
+    ChangedOperator, InitialState, SigmoidChange, SigmoidFit,
     judgement::second_opinion,
     validation::{LjungBox, whiteness},
 };
 use hoid_io::write_record;
-use hoid_model::{Channel, Record, Verdict, uncertainty::Estimate};
+use hoid_model::{Channel, Form, Record, Verdict};
 use hoid_report::numbers;
 use serde_json::{Map, Value, json};
 
-use super::{estimate::search, settings::common_settings};
+use super::{estimate::search, family::prior, settings::common_settings};
 use crate::{
     args::IdentifyArgs,
     commands::{faults, reading::Account},
@@ -25,11 +25,15 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
             "--initial-state: the time-varying fit estimates the initial states; give auto or estimate".to_owned(),
         ));
     }
+    let usual = SigmoidChange::default();
     let mut estimator = SigmoidChange {
+        form: args.form.unwrap_or(usual.form),
+        neuromuscular: args.neuromuscular,
+        prior: args.prior.as_deref().map_or(Ok(usual.prior.clone()), prior)?,
         nd: noise_order(args)?,
         constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
         search: search(args),
-        ..SigmoidChange::default()
+        ..usual
     };
     if let Some(delay) = args.delay {
         estimator.delay_range_s = delay;
@@ -38,6 +42,12 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
     let (low, high) = estimator.delay_range_s;
     let mut settings = vec![
         ("structure".to_owned(), "time-varying".to_owned()),
+        ("form".to_owned(), estimator.form.name().to_owned()),
+        (
+            "neuromuscular".to_owned(),
+            if estimator.neuromuscular { "yes" } else { "no" }.to_owned(),
+        ),
+        ("prior".to_owned(), estimator.prior.to_string()),
         ("orders".to_owned(), format!("nd={}", estimator.nd)),
         ("delay in s".to_owned(), format!("{low}..{high}")),
     ];
@@ -86,21 +96,16 @@ fn noise_order(args: &IdentifyArgs) -> Result<usize, CliError> {
     }
 }
 
-/// The gains over the time of a record, with their standard errors where they have them.
+/// What changes over the time of a record, with standard errors where they are all known.
 fn trace(fit: &SigmoidFit, record: &Record) -> Result<Record, CliError> {
-    type Gain = fn(&GainsAt) -> Estimate;
     let gains = fit.trace(record);
-    let columns: [(&str, &str, Gain); 3] = [
-        ("K_e", "deg/deg", |g| g.k_e),
-        ("T_L", "s", |g| g.t_l_s),
-        ("K_e_dot", "s", |g| g.k_e_dot),
-    ];
     let mut trace: Option<Record> = None;
-    for (name, unit, of) in columns {
-        let values = gains.iter().map(|g| of(g).value).collect();
-        let errors: Option<Vec<f64>> = gains.iter().map(|g| of(g).standard_error).collect();
-        let value = Channel::new(name, unit, values);
-        let error = errors.map(|errors| Channel::new(format!("{name}_se"), unit, errors));
+    let all = gains.first().map(|g| g.gains.as_slice()).unwrap_or_default();
+    for (i, of) in all.iter().enumerate() {
+        let values = gains.iter().map(|g| g.gains[i].estimate.value).collect();
+        let errors: Option<Vec<f64>> = gains.iter().map(|g| g.gains[i].estimate.standard_error).collect();
+        let value = Channel::new(of.name, of.unit, values);
+        let error = errors.map(|errors| Channel::new(format!("{}_se", of.name), of.unit, errors));
         for channel in [Some(value), error].into_iter().flatten() {
             trace = Some(match trace {
                 None => Record::of_output(record.sample_time(), channel)?.starting_at(record.time_s(0)),
@@ -108,8 +113,37 @@ fn trace(fit: &SigmoidFit, record: &Record) -> Result<Record, CliError> {
             });
         }
     }
-    // K_e is always there.
+    // A gain is always there.
     Ok(trace.unwrap_or_else(|| record.clone()))
+}
+
+/// Name of each parameter of an operator, before and after the change.
+fn before_and_after(fit: &SigmoidFit) -> String {
+    let mut rows = text::table(&["parameter", "before the change", "", "after it", "", "unit"]);
+    let (before, after) = (fit.initial_operator(), fit.last_operator());
+    for (a, b) in before.parameters.iter().zip(&after.parameters) {
+        let cells = |e| {
+            let (value, error) = text::with_uncertainty(e);
+            [value, if error.is_empty() { error } else { format!("± {error}") }]
+        };
+        let ([a1, a2], [b1, b2]) = (cells(&a.estimate), cells(&b.estimate));
+        rows.add_row([a.name.to_owned(), a1, a2, b1, b2, a.unit.to_owned()]);
+    }
+    rows.to_string()
+}
+
+/// The operator before or after the change.
+fn operator(of: &ChangedOperator) -> Value {
+    if let Some(lead) = of.lead() {
+        return json::operator(&Ok(lead));
+    }
+    let mut map = Map::new();
+    map.insert("convertible".to_owned(), json!(true));
+    map.insert("form".to_owned(), json!(of.operator.form().name()));
+    for p in &of.parameters {
+        map.insert(p.name.to_owned(), json::estimate(&p.estimate));
+    }
+    Value::Object(map)
 }
 
 /// Everything that was found.
@@ -143,7 +177,16 @@ impl Found<'_> {
             let remark = p.remark.map(|r| r.to_string()).unwrap_or_default();
             rows.add_row([p.name, value, error, p.unit.to_owned(), remark]);
         }
-        page.push_str(&format!("\nOperator whose gains change once (sigmoid)\n{rows}\n"));
+        let of_form = match fit.form() {
+            Form::Lead => String::new(),
+            form => format!(" of the form {form}"),
+        };
+        page.push_str(&format!(
+            "\nOperator{of_form} whose gains change once (sigmoid)\n{rows}\n"
+        ));
+        if fit.form() != Form::Lead && fit.change_found() {
+            page.push_str(&format!("{}\n", before_and_after(fit)));
+        }
         let interval = |name: &str, unit: &str, interval: Option<(f64, f64)>| {
             interval.map_or(String::new(), |(low, high)| {
                 format!("{name}: 95 % likelihood interval {low:.4} to {high:.4} {unit}.\n")
@@ -230,6 +273,8 @@ impl Found<'_> {
             "faults": json::faults(files, accounts),
             "verdict": json::verdict(verdict),
             "structure": "time-varying",
+            "form": fit.form().name(),
+            "neuromuscular": fit.has_neuromuscular(),
             "parameters": parameters,
             "loss": number(fit.loss()),
             "innovation_variance": number(fit.innovation_variance()),
@@ -246,8 +291,8 @@ impl Found<'_> {
                 "G_interval": interval(fit.rate_interval()),
             },
             "residual_tests": tests.iter().map(|t| json!({"ljung_box": json::ljung_box(t.as_ref())})).collect::<Vec<_>>(),
-            "initial": json::operator(&Ok(fit.initial_operator())),
-            "last": json::operator(&Ok(fit.last_operator())),
+            "initial": operator(fit.initial_operator()),
+            "last": operator(fit.last_operator()),
             "settings": settings,
         })
     }

@@ -1,7 +1,18 @@
+use hoid_model::Form;
+
 use super::*;
 
+/// Places of a gain and a lead.
+const K_E: [usize; 2] = [0, 1];
+const T_L: [usize; 2] = [2, 3];
+const MIDPOINT: usize = 4;
+const OMEGA: usize = 6;
+const ZETA: usize = 7;
+const DELAY: usize = 8;
+const NOISE: usize = 9;
+
 /// A record with a rate, a start away from rest and coloured noise.
-fn record(n: usize) -> (Vec<f64>, Vec<f64>) {
+pub(super) fn record(n: usize) -> (Vec<f64>, Vec<f64>) {
     let mut state = 7_u64;
     let mut noise = || {
         state = state
@@ -25,14 +36,15 @@ fn theta(nd: usize) -> Vec<f64> {
 
 fn criterion<'a>(e: &'a [f64], u: &'a [f64], nd: usize) -> ChangeCriterion<'a> {
     ChangeCriterion {
+        layout: Layout::new(Form::Lead, true, nd),
         data: vec![Data { e, u, start_s: -0.3 }],
         sample_time: SampleTime::HUNDREDTH,
-        nd,
         first: 20 + nd,
         limits: vec![(f64::NEG_INFINITY, f64::INFINITY); NOISE + nd],
-        sample: None,
+        piece: None,
         changes: true,
         weights: None,
+        penalty: Vec::new(),
     }
 }
 
@@ -115,15 +127,15 @@ fn the_initial_state_costs_nothing_without_noise() {
     let whole = criterion(&e, &silence, 0);
     let theta = theta(0);
     // With u = 0 and rest before the record, the residual is -w.
-    let unit = UnitOperator::of(&theta, None, whole.sample_time).unwrap();
+    let unit = UnitOperator::of(&whole.layout, &theta, None, whole.sample_time).unwrap();
     let y = [unit.response(0, &e), unit.response(1, &e)];
     let u: Vec<f64> = (0..2000)
         .map(|t| {
             if t < unit.nk {
                 return 0.0;
             }
-            let g = Instant::at(&theta, -0.3 + 0.01 * t as f64 - theta[DELAY]);
-            g.k_e * y[0][t - unit.nk] + g.k_e_dot() * y[1][t - unit.nk]
+            let g = Instant::at(&whole.layout, &theta, -0.3 + 0.01 * t as f64 - theta[DELAY]);
+            g.numerator(0) * y[0][t - unit.nk] + g.numerator(1) * y[1][t - unit.nk]
         })
         .collect();
     let mut cut = criterion(&e[300..], &u[300..], 0);
@@ -150,11 +162,7 @@ fn without_a_change_only_the_first_state_counts() {
     (other[K_E[1]], other[T_L[1]], other[MIDPOINT]) = (0.5, 0.1, 1.0);
     let there = c.linearise(&other, &mut Workspace::default());
     assert_eq!(at.sum_of_squares, there.sum_of_squares);
-    assert!(
-        super::super::layout::OF_THE_CHANGE
-            .iter()
-            .all(|&i| at.descent[i] == 0.0)
-    );
+    assert!(c.layout.of_the_change().iter().all(|&i| at.descent[i] == 0.0));
 }
 
 #[test]

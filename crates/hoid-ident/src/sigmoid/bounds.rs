@@ -1,0 +1,173 @@
+//! Within what the parameters of a change are sought.
+
+use std::collections::BTreeMap;
+
+use hoid_model::{Form, SampleTime, operator_family::Coordinate};
+
+use super::layout::{Element, Layout};
+use crate::{Constraint, IdentError, family::coordinates};
+
+/// Bounds of zeta_nm: beyond them the two poles have nothing to do with each other.
+const ZETA_LIMITS: (f64, f64) = (1e-4, 100.0);
+/// T_I that can be given, s: a shorter lag is none, a longer one an integration.
+const LAG_LIMITS_S: (f64, f64) = (1e-3, 1e6);
+/// Largest omega_nm as a share of pi/Ts.
+const HIGHEST_FREQUENCY: f64 = 0.999;
+/// Share of the span at either end in which t_M is not sought by default: less of a record does not
+/// determine two gains.
+const ENDS: f64 = 0.05;
+/// Largest rate times the sample time: four fifths of the change take two samples (2 ln 9 = 4.4). A
+/// faster one looks the same, and its likelihood would be a staircase in t_M, with a step for each
+/// sample (here its slope varies by 2 % with the place of t_M between two samples, for twice the
+/// rate by 50 %).
+pub(crate) const FASTEST: f64 = 2.0;
+/// Largest rate times the sample time that can be given.
+const FASTEST_GIVEN: f64 = 10.0;
+/// Smallest rate times the span: nine tenths of the change fill it (2 ln 19 = 5.9), and its ends
+/// are hardly told from a line.
+const SLOWEST: f64 = 5.0;
+
+/// What bounds depend on.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Frame {
+    pub ts_s: f64,
+    /// Time that all records have in common, s.
+    pub span_s: (f64, f64),
+    pub delay_range_s: (f64, f64),
+}
+
+/// Bounds of theta; G by its logarithm, T_I by its inverse.
+///
+/// # Errors
+/// [`IdentError::UnknownParameter`], [`IdentError::BadOption`].
+pub(crate) fn limits(
+    layout: &Layout,
+    frame: &Frame,
+    constraints: &BTreeMap<String, Constraint>,
+) -> Result<Vec<(f64, f64)>, IdentError> {
+    let names = layout.names();
+    if let Some(name) = constraints.keys().find(|name| !names.contains(name)) {
+        return Err(IdentError::UnknownParameter {
+            name: name.clone(),
+            available: names.join(", "),
+        });
+    }
+    let mut result = Vec::with_capacity(names.len());
+    for (place, (name, element)) in names.iter().zip(layout.elements()).enumerate() {
+        let (widest, usual) = ranges(layout, frame, element)?;
+        let asked = constraints.get(name).copied();
+        let (low, high) = asked.map_or(usual, Constraint::limits);
+        let within = (low.max(widest.0), high.min(widest.1));
+        let moved = low == high && within != (low, high);
+        if asked.is_some_and(|c| !c.is_sound()) || within.0 > within.1 || moved {
+            return Err(IdentError::BadOption {
+                option: format!("the constraint on {name}"),
+                found: format!("{low} to {high}"),
+                expected: format!("a value or a range within {:.6} to {:.6}", widest.0, widest.1),
+            });
+        }
+        let ends = [within.0, within.1].map(|end| layout.of_typed(place, end));
+        result.push((ends[0].min(ends[1]), ends[0].max(ends[1])));
+    }
+    Ok(result)
+}
+
+type Range = (f64, f64);
+
+/// Where a parameter has a meaning at all, and where it is sought unless the user says otherwise,
+/// in the units that are typed.
+fn ranges(layout: &Layout, frame: &Frame, element: Element) -> Result<(Range, Range), IdentError> {
+    let (from, to) = frame.span_s;
+    let span = to - from;
+    let sample_time = SampleTime::new(frame.ts_s)?;
+    // As the family seeks it.
+    let of_family = |coordinate: Coordinate| {
+        let all = coordinates::limits(layout.form, layout.neuromuscular, frame.delay_range_s, sample_time);
+        let place = layout.coordinates().iter().position(|c| *c == coordinate);
+        place.map(|i| all[i])
+    };
+    let known = layout.form == Form::Lead;
+    let all = (f64::NEG_INFINITY, f64::INFINITY);
+    Ok(match element {
+        Element::Midpoint => ((from, to), (from + ENDS * span, to - ENDS * span)),
+        Element::LogRate => {
+            let slowest = (SLOWEST / span).min(FASTEST / frame.ts_s);
+            ((slowest, FASTEST_GIVEN / frame.ts_s), (slowest, FASTEST / frame.ts_s))
+        }
+        Element::Constant(Coordinate::LagRate) => {
+            let (low, high) = of_family(Coordinate::LagRate).unwrap_or(all);
+            (LAG_LIMITS_S, (1.0 / high, 1.0 / low))
+        }
+        Element::Constant(coordinate @ (Coordinate::LogOmega | Coordinate::LogZeta)) => {
+            let widest = if coordinate == Coordinate::LogOmega {
+                (1e-3, HIGHEST_FREQUENCY * std::f64::consts::PI / frame.ts_s)
+            } else {
+                ZETA_LIMITS
+            };
+            let of_family = of_family(coordinate).map(|(low, high)| (low.exp(), high.exp()));
+            (widest, if known { widest } else { of_family.unwrap_or(widest) })
+        }
+        Element::Constant(Coordinate::Delay) => (frame.delay_range_s, frame.delay_range_s),
+        Element::Varying(..) | Element::Constant(_) | Element::Noise(_) => (all, all),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame() -> Frame {
+        Frame {
+            ts_s: 0.01,
+            span_s: (0.0, 80.0),
+            delay_range_s: (0.05, 0.6),
+        }
+    }
+
+    #[test]
+    fn limits_hold_what_has_a_meaning() {
+        let none = BTreeMap::new();
+        let layout = Layout::new(Form::Lead, true, 1);
+        let usual = limits(&layout, &frame(), &none).unwrap();
+        assert_eq!(usual.len(), 10);
+        assert_eq!(usual[layout.midpoint], (4.0, 76.0));
+        assert_eq!(usual[layout.delay], (0.05, 0.6));
+        assert!((usual[layout.log_rate].1.exp() - 200.0).abs() < 1e-9);
+        let with = |name: &str, c: Constraint| limits(&layout, &frame(), &BTreeMap::from([(name.to_owned(), c)]));
+        assert_eq!(
+            with("t_M", Constraint::Fixed(79.0)).unwrap()[layout.midpoint],
+            (79.0, 79.0)
+        );
+        assert_eq!(
+            with("G", Constraint::Fixed(0.5)).unwrap()[layout.log_rate],
+            (0.5f64.ln(), 0.5f64.ln())
+        );
+        for (name, c) in [
+            ("t_M", Constraint::Fixed(81.0)),
+            ("G", Constraint::Fixed(-1.0)),
+            ("G", Constraint::Between(2000.0, 3000.0)),
+            ("tau_e", Constraint::Fixed(0.7)),
+            ("K_e1", Constraint::Fixed(f64::NAN)),
+            ("zeta_nm", Constraint::Between(2.0, 1.0)),
+        ] {
+            assert!(matches!(with(name, c), Err(IdentError::BadOption { .. })), "{name}");
+        }
+        assert!(matches!(
+            with("K_n", Constraint::Fixed(1.0)),
+            Err(IdentError::UnknownParameter { .. })
+        ));
+    }
+
+    #[test]
+    fn a_lag_is_bounded_by_its_time_constant() {
+        let layout = Layout::new(Form::LeadLag, true, 0);
+        let with = |c: Constraint| limits(&layout, &frame(), &BTreeMap::from([("T_I".to_owned(), c)]));
+        let place = layout.lag.unwrap();
+        assert_eq!(with(Constraint::Fixed(5.0)).unwrap()[place], (0.2, 0.2));
+        assert_eq!(with(Constraint::Between(2.0, 8.0)).unwrap()[place], (0.125, 0.5));
+        assert!(with(Constraint::Fixed(-5.0)).is_err());
+        let usual = limits(&layout, &frame(), &BTreeMap::new()).unwrap();
+        let (low, high) = usual[place];
+        assert!((low - 1e-3).abs() < 1e-15 && (high - 30.0).abs() < 1e-12);
+    }
+}

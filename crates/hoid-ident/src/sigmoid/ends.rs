@@ -1,0 +1,175 @@
+//! The operator before and after the change, and at any time, with its errors.
+
+use hoid_model::{
+    FamilyOperator, Form, ModelError,
+    operator_family::Coordinate,
+    uncertainty::{Estimate, OperatorEstimate, variance_along},
+};
+
+use super::{
+    instant::Instant,
+    layout::{Layout, MOST_VARYING},
+};
+
+/// A parameter with its unit and its error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NamedEstimate {
+    /// K, T_L, T_I ... as [`FamilyOperator::named`] calls them.
+    pub name: &'static str,
+    /// Unit; empty for none.
+    pub unit: &'static str,
+    /// Estimate.
+    pub estimate: Estimate,
+}
+
+/// An operator with the errors of its parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChangedOperator {
+    /// The operator.
+    pub operator: FamilyOperator,
+    /// Its parameters: those of the numerator, products of them, and what does not change.
+    pub parameters: Vec<NamedEstimate>,
+}
+
+impl ChangedOperator {
+    /// A parameter by its name.
+    pub fn get(&self, name: &str) -> Option<Estimate> {
+        self.parameters.iter().find(|p| p.name == name).map(|p| p.estimate)
+    }
+
+    /// The same by the names of the reference text; `None` for another form than a gain and a lead
+    /// with the neuromuscular part.
+    pub fn lead(&self) -> Option<OperatorEstimate> {
+        if self.operator.form() != Form::Lead {
+            return None;
+        }
+        Some(OperatorEstimate {
+            k_e: self.get("K_e")?,
+            t_l_s: self.get("T_L")?,
+            k_e_dot: self.get("K_e_dot")?,
+            omega_nm_rad_s: self.get("omega_nm")?,
+            zeta_nm: self.get("zeta_nm")?,
+            tau_e_s: self.get("tau_e")?,
+        })
+    }
+}
+
+/// What theta is known to.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Known<'a> {
+    pub layout: &'a Layout,
+    pub theta: &'a [f64],
+    /// Of theta, by rows; `None` for an exact fit.
+    pub covariance: Option<&'a [f64]>,
+    /// Variance of t_M where it is that of a change point: the sigmoid is then no line over it.
+    pub change_point: Option<f64>,
+}
+
+impl Known<'_> {
+    /// The operator before (0) or after (1) the change.
+    pub fn end(&self, end: usize) -> Result<ChangedOperator, ModelError> {
+        let mut values = [0.0; MOST_VARYING];
+        for (i, value) in values.iter_mut().enumerate().take(self.layout.varying) {
+            *value = self.theta[Layout::ends(i)[end]];
+        }
+        let operator = self.layout.operator(self.theta, &values)?;
+        let of = |gradient: &[f64]| {
+            let mut whole = self.constant_part(gradient);
+            for (i, slope) in gradient.iter().enumerate().take(self.layout.varying) {
+                whole[Layout::ends(i)[end]] = *slope;
+            }
+            (whole, 0.0)
+        };
+        let parameters = self.named(&operator, |_| true, of);
+        Ok(ChangedOperator { operator, parameters })
+    }
+
+    /// The parameters that change, at one time.
+    pub fn at(&self, time_s: f64) -> Vec<NamedEstimate> {
+        let here = Instant::at(self.layout, self.theta, time_s);
+        // Between two operators lies one.
+        let Ok(operator) = self.layout.operator(self.theta, &here.values) else {
+            return Vec::new();
+        };
+        let of = |gradient: &[f64]| {
+            let mut whole = self.constant_part(gradient);
+            let mut by_share = 0.0;
+            for (i, slope) in gradient.iter().enumerate().take(self.layout.varying) {
+                let [first, last] = Layout::ends(i);
+                (whole[first], whole[last]) = (slope * (1.0 - here.share), slope * here.share);
+                by_share += slope * (self.theta[last] - self.theta[first]);
+            }
+            let (midpoint, log_rate) = (self.layout.midpoint, self.layout.log_rate);
+            let mut of_time = 0.0;
+            if let Some(variance) = self.change_point {
+                let x = (time_s - self.theta[midpoint]) / variance.sqrt();
+                // The logistic function that is nearest to the normal distribution.
+                let happened = 1.0 / (1.0 + (-1.702 * x).exp());
+                of_time = by_share * by_share * happened * (1.0 - happened);
+            } else {
+                (whole[midpoint], whole[log_rate]) = (by_share * here.by_midpoint, by_share * here.by_log_rate);
+            }
+            (whole, of_time)
+        };
+        let changes = |gradient: &[f64]| gradient[..self.layout.varying].iter().any(|slope| *slope != 0.0);
+        self.named(&operator, changes, of)
+    }
+
+    /// The part of a gradient that belongs to what does not change.
+    fn constant_part(&self, gradient: &[f64]) -> Vec<f64> {
+        let mut whole = vec![0.0; self.theta.len()];
+        for (place, slope) in self.layout.poles().into_iter().zip(&gradient[self.layout.varying..]) {
+            // omega_nm and zeta_nm stand in theta themselves.
+            let logarithmic = self.layout.muscles.is_some_and(|own| own.contains(&place));
+            whole[place] = if logarithmic { slope / self.theta[place] } else { *slope };
+        }
+        whole
+    }
+
+    /// The parameters of an operator whose gradients are `wanted`; `of` makes from a gradient along
+    /// the coordinates that along theta, and a variance beside.
+    fn named(
+        &self,
+        operator: &FamilyOperator,
+        wanted: impl Fn(&[f64]) -> bool,
+        of: impl Fn(&[f64]) -> (Vec<f64>, f64),
+    ) -> Vec<NamedEstimate> {
+        let all = operator.named_gradients().into_iter();
+        all.filter(|(_, gradient)| wanted(gradient))
+            .map(|(parameter, gradient)| {
+                let (mut whole, beside) = of(&gradient);
+                let mut value = parameter.value;
+                // Themselves, without the way over their logarithms.
+                let own = match (parameter.coordinate, self.layout.muscles) {
+                    (Some(Coordinate::LogOmega), Some([omega, _])) => Some(omega),
+                    (Some(Coordinate::LogZeta), Some([_, zeta])) => Some(zeta),
+                    _ => None,
+                };
+                if let Some(place) = own {
+                    (whole[place], value) = (1.0, self.theta[place]);
+                }
+                NamedEstimate {
+                    name: parameter.name,
+                    unit: if parameter.name == "K_e" {
+                        "deg/deg"
+                    } else {
+                        parameter.unit
+                    },
+                    estimate: match self.covariance {
+                        Some(covariance) => estimate(value, variance_along(&whole, covariance) + beside),
+                        None => Estimate::fixed(value),
+                    },
+                }
+            })
+            .collect()
+    }
+}
+
+/// No variance, no standard error: what was held has none.
+pub(super) fn estimate(value: f64, variance: f64) -> Estimate {
+    if variance > 0.0 {
+        Estimate::with_variance(value, variance)
+    } else {
+        Estimate::fixed(value)
+    }
+}

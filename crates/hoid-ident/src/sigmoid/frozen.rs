@@ -1,0 +1,172 @@
+//! Poles, delay and noise model from which searches start.
+//!
+//! Of an operator of a gain and a lead they come from Box-Jenkins fits to the first and the last
+//! third of the records; where those give no operator, from a small grid of poles. A form of the
+//! family has a grid throughout.
+
+use hoid_model::{OperatorParameters, Orders, Record, Structure};
+
+use super::{layout::Layout, objective::ChangeCriterion};
+use crate::{Estimator, Fit, SearchMethod, SearchOptions};
+
+/// Time between the delays that are tried, s: the search finds its way from a distance of a tenth
+/// of the period of the poles.
+const DELAY_STEP_S: f64 = 0.06;
+/// Searches in the windows: a start need not be exact.
+const COARSE: SearchOptions = SearchOptions {
+    method: SearchMethod::LevenbergMarquardt,
+    max_iterations: 15,
+    tolerance: 1e-6,
+};
+/// Poles where the windows give none: omega_nm in rad/s, zeta_nm.
+const GRID: [(f64, f64); 3] = [(6.0, 0.4), (11.0, 0.4), (18.0, 0.4)];
+/// 1/T_I of the grid, 1/s.
+const LAG_RATES: [f64; 3] = [0.05, 0.25, 1.2];
+/// d1 where the windows give none.
+const GRID_D1: f64 = -0.8;
+
+/// Poles, delay and noise model in a theta without a change.
+#[derive(Debug, Clone)]
+pub(super) struct Frozen {
+    pub label: String,
+    pub theta: Vec<f64>,
+}
+
+/// The grid of a form of the family.
+pub(super) fn of_family(criterion: &ChangeCriterion<'_>) -> Vec<Frozen> {
+    let (layout, ts) = (&criterion.layout, criterion.sample_time.s());
+    let muscles: &[(f64, f64)] = if layout.muscles.is_some() { &GRID } else { &[(0.0, 0.0)] };
+    let rates: &[f64] = if layout.lag.is_some() { &LAG_RATES } else { &[0.0] };
+    let mut all = Vec::new();
+    for nk in delays(criterion) {
+        for (omega, zeta) in muscles {
+            for rate in rates {
+                let mut theta = vec![0.0; layout.len()];
+                if let Some(place) = layout.lag {
+                    theta[place] = *rate;
+                }
+                if let Some([of_omega, of_zeta]) = layout.muscles {
+                    (theta[of_omega], theta[of_zeta]) = (*omega, *zeta);
+                }
+                theta[layout.delay] = (nk - 1) as f64 * ts;
+                if layout.nd > 0 {
+                    theta[layout.noise] = GRID_D1;
+                }
+                within_limits(criterion, &mut theta);
+                all.push(Frozen {
+                    label: format!("grid, tau_e = {:.3} s", theta[layout.delay]),
+                    theta,
+                });
+            }
+        }
+    }
+    all
+}
+
+/// The poles of the windows.
+pub(super) fn of_windows(criterion: &ChangeCriterion<'_>, records: &[Record]) -> Vec<Frozen> {
+    let third = |record: &Record, part: usize| {
+        let (from, to) = (record.time_s(0), record.time_s(record.len()));
+        let length = (to - from) / 3.0;
+        record
+            .span(from + part as f64 * length, from + (part + 1) as f64 * length)
+            .ok()
+    };
+    let mut found = Vec::new();
+    for (part, name) in [(0, "first"), (2, "last")] {
+        let windows: Option<Vec<Record>> = records.iter().map(|r| third(r, part)).collect();
+        let Some(windows) = windows else { continue };
+        // Each delay goes on from the model of the one before.
+        let mut fits: Vec<Fit> = Vec::new();
+        for nk in delays(criterion) {
+            let before = fits.last().map(|f| f.model().theta().to_vec());
+            fits.extend(fit(criterion, &windows, nk, before));
+        }
+        let Some(best) = fits.into_iter().min_by(|a, b| a.loss().total_cmp(&b.loss())) else {
+            continue;
+        };
+        if let Ok(operator) = best.operator() {
+            let (orders, theta) = (best.orders(), best.model().theta());
+            found.push(Frozen {
+                label: format!("{name} third, nk = {}", orders.nk),
+                theta: frozen_theta(
+                    criterion,
+                    &operator.parameters(),
+                    &theta[orders.nb..orders.nb + orders.nd],
+                ),
+            });
+        }
+    }
+    found
+}
+
+fn fit(criterion: &ChangeCriterion<'_>, windows: &[Record], nk: usize, start: Option<Vec<f64>>) -> Option<Fit> {
+    let orders = Orders {
+        nb: 2,
+        nd: criterion.layout.nd,
+        nf: 2,
+        nk,
+        ..Orders::default()
+    };
+    let estimator = Estimator {
+        starts: 1,
+        search: COARSE,
+        start,
+        ..Estimator::new(Structure::BoxJenkins, orders)
+    };
+    // Only models that are operators have poles to give.
+    estimator.fit(windows).ok().filter(|fit| fit.operator().is_ok())
+}
+
+/// The grid of a gain and a lead.
+pub(super) fn of_grid(criterion: &ChangeCriterion<'_>) -> Vec<Frozen> {
+    let ts = criterion.sample_time.s();
+    let mut d = vec![0.0; criterion.layout.nd];
+    if let Some(d1) = d.first_mut() {
+        *d1 = GRID_D1;
+    }
+    let mut all = Vec::new();
+    for nk in delays(criterion) {
+        for (omega, zeta) in GRID {
+            let operator = OperatorParameters {
+                k_e: 0.0,
+                t_l_s: 0.0,
+                omega_nm_rad_s: omega,
+                zeta_nm: zeta,
+                tau_e_s: (nk - 1) as f64 * ts,
+            };
+            all.push(Frozen {
+                label: format!("grid, nk = {nk}, omega_nm = {omega} rad/s"),
+                theta: frozen_theta(criterion, &operator, &d),
+            });
+        }
+    }
+    all
+}
+
+/// nk from the shortest to the longest delay.
+fn delays(criterion: &ChangeCriterion<'_>) -> Vec<usize> {
+    let ts = criterion.sample_time.s();
+    let (low, high) = criterion.limits[criterion.layout.delay];
+    let nk = |tau: f64| (tau / ts).round() as usize + 1;
+    let step = (DELAY_STEP_S / ts).round().max(1.0) as usize;
+    (nk(low)..=nk(high)).step_by(step).collect()
+}
+
+fn frozen_theta(criterion: &ChangeCriterion<'_>, operator: &OperatorParameters, d: &[f64]) -> Vec<f64> {
+    let layout: &Layout = &criterion.layout;
+    let mut theta = vec![0.0; layout.len()];
+    if let Some([omega, zeta]) = layout.muscles {
+        (theta[omega], theta[zeta]) = (operator.omega_nm_rad_s, operator.zeta_nm);
+    }
+    theta[layout.delay] = operator.tau_e_s;
+    theta[layout.noise..].copy_from_slice(d);
+    within_limits(criterion, &mut theta);
+    theta
+}
+
+fn within_limits(criterion: &ChangeCriterion<'_>, theta: &mut [f64]) {
+    for (t, (low, high)) in theta.iter_mut().zip(&criterion.limits) {
+        *t = t.max(*low).min(*high);
+    }
+}

@@ -1,0 +1,138 @@
+//! The criterion of all forms of the family.
+
+use hoid_model::Form;
+
+use super::{tests::record, *};
+
+/// A change of each form that a person may make, all parameters away from special values.
+fn theta(layout: &Layout) -> Vec<f64> {
+    let mut theta = vec![0.0; layout.len()];
+    for (i, [first, last]) in [[0.09, 0.07], [0.4, 0.9], [0.15, 0.3]]
+        .into_iter()
+        .enumerate()
+        .take(layout.varying)
+    {
+        let [a, b] = Layout::ends(i);
+        (theta[a], theta[b]) = (first, last);
+    }
+    (theta[layout.midpoint], theta[layout.log_rate]) = (3.1, f64::ln(2.0));
+    if let Some(place) = layout.lag {
+        theta[place] = 0.4;
+    }
+    if let Some([omega, zeta]) = layout.muscles {
+        (theta[omega], theta[zeta]) = (11.25, 0.35);
+    }
+    theta[layout.delay] = 0.1234;
+    if layout.nd > 0 {
+        theta[layout.noise] = -0.8;
+    }
+    theta
+}
+
+fn criterion<'a>(layout: Layout, e: &'a [f64], u: &'a [f64]) -> ChangeCriterion<'a> {
+    ChangeCriterion {
+        layout,
+        data: vec![Data { e, u, start_s: -0.3 }],
+        sample_time: SampleTime::HUNDREDTH,
+        first: 20 + layout.nd,
+        limits: vec![(f64::NEG_INFINITY, f64::INFINITY); layout.len()],
+        piece: None,
+        changes: true,
+        weights: None,
+        penalty: Vec::new(),
+    }
+}
+
+fn all() -> impl Iterator<Item = Layout> {
+    let pairs = Form::ALL.into_iter().flat_map(|form| [(form, true), (form, false)]);
+    pairs
+        .filter(|(form, neuromuscular)| form.is_proper(*neuromuscular))
+        .map(|(form, neuromuscular)| Layout::new(form, neuromuscular, 1))
+}
+
+#[test]
+fn gradient_agrees_with_finite_differences() {
+    let (e, u) = record(700);
+    for layout in all() {
+        let mut c = criterion(layout, &e, &u);
+        let theta = theta(&layout);
+        // A prior is part of it.
+        c.penalty = vec![Penalty {
+            place: layout.delay,
+            logarithmic: true,
+            mean: -1.5,
+            weight: 0.3,
+        }];
+        let mut ws = Workspace::default();
+        let exact = c.linearise(&theta, &mut ws);
+        for i in 0..theta.len() {
+            let h = 1e-3 * theta[i].abs();
+            let mut at = |factor: f64| {
+                let mut moved = theta.clone();
+                moved[i] += factor * h;
+                c.linearise(&moved, &mut ws).sum_of_squares
+            };
+            let slope = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * h);
+            let scale = (exact.gram[i * theta.len() + i] * exact.sum_of_squares).sqrt();
+            // Rounding over h, truncation h^4. The recursion of three poles near one loses digits by
+            // 1/|F(1)|, 1e5 here: 1e-11 of the loss.
+            assert!(
+                (slope + 2.0 * exact.descent[i]).abs() < 1e-7 * scale,
+                "{layout:?} parameter {i}: {slope} and {}",
+                -2.0 * exact.descent[i]
+            );
+        }
+    }
+}
+
+#[test]
+fn the_initial_state_costs_nothing_without_noise() {
+    let (e, _) = record(1500);
+    for layout in all() {
+        let layout = Layout { nd: 0, ..layout };
+        let theta = &theta(&layout)[..layout.len()];
+        let unit = UnitOperator::of(&layout, theta, None, SampleTime::HUNDREDTH).unwrap();
+        let y: Vec<Vec<f64>> = (0..unit.b.len()).map(|i| unit.response(i, &e)).collect();
+        let at = |t: usize| {
+            if t < unit.nk {
+                return 0.0;
+            }
+            let g = Instant::at(&layout, theta, -0.3 + 0.01 * t as f64 - theta[layout.delay]);
+            (0..y.len()).map(|i| g.numerator(i) * y[i][t - unit.nk]).sum()
+        };
+        let u: Vec<f64> = (0..1500).map(at).collect();
+        let size = u.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let mut cut = criterion(layout, &e[300..], &u[300..]);
+        cut.data[0].start_s = -0.3 + 3.0;
+        let eps = cut.pass(theta, 0).unwrap().eps;
+        let largest = eps.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        // Three states by three errors a sample apart: condition 1e5.
+        assert!(largest < 1e-10 * size, "{layout:?}: {largest:e} of {size}");
+    }
+}
+
+#[test]
+fn without_a_change_only_the_first_state_counts() {
+    let (e, u) = record(600);
+    for layout in all() {
+        let mut c = ChangeCriterion {
+            changes: false,
+            ..criterion(layout, &e, &u)
+        };
+        let prior = |place: usize| Penalty {
+            place,
+            logarithmic: true,
+            mean: 0.0,
+            weight: 1.0,
+        };
+        c.penalty = vec![prior(0), prior(1)];
+        let at = c.linearise(&theta(&layout), &mut Workspace::default());
+        let mut other = theta(&layout);
+        for place in layout.of_the_change() {
+            other[place] *= 1.3;
+        }
+        let there = c.linearise(&other, &mut Workspace::default());
+        assert_eq!(at.sum_of_squares, there.sum_of_squares, "{layout:?}");
+        assert!(layout.of_the_change().iter().all(|&i| at.descent[i] == 0.0));
+    }
+}

@@ -1,0 +1,110 @@
+//! What is known of the person before the data, beside the criterion of a change.
+//!
+//! A prior of a positive parameter x, `ln x ~ N(m, s)`, stands as `sigma^2 (ln x - m)^2/s^2` beside
+//! the squared residuals ([`crate::family::OperatorPrior`]); that of T_L counts before and after the
+//! change. sigma^2, the variance of the innovations, is that of the fit: both in turn.
+
+use super::{
+    layout::{Element, Layout},
+    objective::ChangeCriterion,
+    reweighting::with_levels,
+    search::search,
+};
+use crate::{
+    IdentError, NoiseLevel, SearchOptions,
+    family::OperatorPrior,
+    grey_box::objective::Penalty,
+    optimize::{Minimum, Objective},
+};
+
+/// Rounds in which sigma^2 of the prior is brought up to date.
+const ROUNDS: usize = 3;
+/// Relative change of sigma^2 that needs no other round.
+const SETTLED: f64 = 0.05;
+
+/// The prior for each place in theta, in units of one standard deviation.
+pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> {
+    let all = layout.coordinates();
+    let elements = layout.elements();
+    let places = |penalty: Penalty| {
+        let coordinate = all[penalty.place];
+        let is_own = move |element: &Element| match element {
+            Element::Varying(own, _) | Element::Constant(own) => *own == coordinate,
+            _ => false,
+        };
+        // omega_nm and zeta_nm stand here themselves, in the family by their logarithms.
+        let own = elements.iter().enumerate().filter(move |(_, e)| is_own(e));
+        own.map(move |(place, _)| Penalty {
+            place,
+            logarithmic: true,
+            ..penalty
+        })
+        .collect::<Vec<_>>()
+    };
+    let unit = prior.penalties(layout.form, layout.neuromuscular);
+    unit.into_iter().flat_map(places).collect()
+}
+
+/// The penalties with the variance of the innovations as their unit.
+pub(super) fn weighted(unit: &[Penalty], variance: f64) -> Vec<Penalty> {
+    let of = |p: &Penalty| Penalty {
+        weight: p.weight * variance,
+        ..*p
+    };
+    unit.iter().map(of).collect()
+}
+
+/// Variance of the innovations at a minimum.
+pub(super) fn innovation_variance(criterion: &ChangeCriterion<'_>, minimum: &Minimum) -> f64 {
+    let not_fixed = criterion.limits.iter().filter(|(low, high)| low < high).count();
+    let squares = minimum.at.sum_of_squares - criterion.penalty_at(&minimum.theta);
+    squares / (criterion.residuals() - not_fixed - criterion.states()) as f64
+}
+
+/// The minimum with noise levels, and with the prior in units of the variance that belongs to it.
+///
+/// # Errors
+/// [`IdentError::NoFiniteLoss`].
+pub(super) fn settled(
+    criterion: &mut ChangeCriterion<'_>,
+    unit: &[Penalty],
+    found: Minimum,
+    noise_level: NoiseLevel,
+    options: &SearchOptions,
+) -> Result<(Minimum, Option<[f64; 2]>), IdentError> {
+    let levelled = |criterion: &mut ChangeCriterion<'_>, minimum| match noise_level {
+        NoiseLevel::Constant => Ok((minimum, None)),
+        NoiseLevel::Changing => with_levels(criterion, minimum, options),
+    };
+    let (mut minimum, mut levels) = levelled(criterion, found)?;
+    for _ in 1..ROUNDS {
+        let Some((now, then)) = criterion.penalty.first().zip(unit.first()) else {
+            break;
+        };
+        let variance = innovation_variance(criterion, &minimum);
+        if (variance * then.weight / now.weight - 1.0).abs() < SETTLED || variance <= 0.0 {
+            break;
+        }
+        criterion.penalty = weighted(unit, variance);
+        let next = search(criterion, minimum.theta.clone(), options, None).ok_or(IdentError::NoFiniteLoss)?;
+        let before = minimum.termination.iterations;
+        (minimum, levels) = levelled(criterion, next)?;
+        minimum.termination.iterations += before;
+    }
+    Ok((minimum, levels))
+}
+
+/// The prior in units of the variance at a start.
+pub(super) fn begun(criterion: &ChangeCriterion<'_>, unit: &[Penalty], theta: &[f64]) -> Vec<Penalty> {
+    if unit.is_empty() {
+        return Vec::new();
+    }
+    let mut workspace = crate::criterion::Workspace::default();
+    let squares = criterion.linearise(theta, &mut workspace).sum_of_squares;
+    let variance = squares / criterion.residuals() as f64;
+    if variance.is_finite() {
+        weighted(unit, variance)
+    } else {
+        Vec::new()
+    }
+}

@@ -1,0 +1,272 @@
+//! Reads an expression in s by descending through its grammar ([`super`]).
+
+use super::{coefficients::EXAMPLES, ratio::Ratio};
+
+/// Degree beyond which a denominator is a typing error, and beyond which its roots are rounding.
+const HIGHEST_DEGREE: usize = 50;
+/// Parentheses inside of parentheses.
+const DEEPEST: usize = 50;
+
+/// The characters that are left, and how deep in parentheses they stand.
+pub(super) struct Reader {
+    signs: Vec<char>,
+    at: usize,
+    depth: usize,
+}
+
+impl Reader {
+    pub fn new(text: &str) -> Self {
+        // Typographic signs come with text that is copied from papers.
+        let plain = |sign| match sign {
+            '\u{2212}' | '\u{2013}' => '-',
+            '\u{b7}' | '\u{d7}' | '\u{22c5}' => '*',
+            'S' => 's',
+            other => other,
+        };
+        Self {
+            signs: text.chars().map(plain).collect(),
+            at: 0,
+            depth: 0,
+        }
+    }
+
+    /// The next sign that is no blank, which is not taken.
+    fn next(&mut self) -> Option<char> {
+        while self.signs.get(self.at).is_some_and(|sign| sign.is_whitespace()) {
+            self.at += 1;
+        }
+        self.signs.get(self.at).copied()
+    }
+
+    fn takes(&mut self, wanted: char) -> bool {
+        let found = self.next() == Some(wanted);
+        self.at += usize::from(found);
+        found
+    }
+
+    fn refuse<T>(&mut self, expected: &str) -> Result<T, String> {
+        let found = match self.next() {
+            Some(sign) => format!("{sign:?}"),
+            None => "the end".to_owned(),
+        };
+        Err(format!(
+            "at character {} stands {found}, expected {expected}; {EXAMPLES}",
+            self.at + 1
+        ))
+    }
+
+    pub fn whole(mut self) -> Result<Ratio, String> {
+        if self.next().is_none() {
+            return Err(format!("it is empty; {EXAMPLES}"));
+        }
+        let all = self.sum()?;
+        match self.next() {
+            None => Ok(all),
+            Some(')') => self.refuse("no ')' that was not opened"),
+            Some('=' | 'z' | 'p' | 'x') => self.refuse("an expression in s alone"),
+            Some(_) => self.refuse("a number, s, a parenthesis, or one of + - * / ^"),
+        }
+    }
+
+    fn sum(&mut self) -> Result<Ratio, String> {
+        let mut sum = self.product()?;
+        loop {
+            let begin = self.at;
+            let sign = match self.next() {
+                Some('+') => 1.0,
+                Some('-') => -1.0,
+                _ => return Ok(sum),
+            };
+            self.at += 1;
+            let term = self.product()?;
+            let Some(total) = sum.plus(&term, sign) else {
+                self.at = begin;
+                return self.refuse("one delay, as a factor of the whole: 5exp(-0.1s)/(s+1)");
+            };
+            sum = self.checked(total, begin)?;
+        }
+    }
+
+    fn product(&mut self) -> Result<Ratio, String> {
+        let mut product = self.factor()?;
+        let mut divided = false;
+        loop {
+            let begin = self.at;
+            match self.next() {
+                Some('*') => {
+                    self.at += 1;
+                    divided = false;
+                    product = product.times(&self.factor()?);
+                }
+                Some('/') => {
+                    self.at += 1;
+                    divided = true;
+                    self.next();
+                    let at = self.at;
+                    let by = self.factor()?;
+                    if by.is_zero() {
+                        return Err(format!("it divides by zero at character {}; {EXAMPLES}", at + 1));
+                    }
+                    product = product.times(&by.inverse());
+                }
+                Some(sign) if is_of_number(sign) => {
+                    return self.refuse("a sign before a number: s^2 or s*2");
+                }
+                Some('s' | '(' | 'e') => {
+                    if divided {
+                        return self.refuse(
+                            "a sign: after a divisor it is not clear whether it is divided by this too; \
+                             1/(s(s+6)) divides by both, 1/s*(s+6) by s alone",
+                        );
+                    }
+                    product = product.times(&self.power()?);
+                }
+                _ => return Ok(product),
+            }
+            product = self.checked(product, begin)?;
+        }
+    }
+
+    fn factor(&mut self) -> Result<Ratio, String> {
+        let mut sign = 1.0;
+        loop {
+            if self.takes('-') {
+                sign = -sign;
+            } else if !self.takes('+') {
+                break;
+            }
+        }
+        Ok(self.power()?.times(&Ratio::of(&[sign])))
+    }
+
+    fn power(&mut self) -> Result<Ratio, String> {
+        let base = self.atom()?;
+        if !self.takes('^') {
+            return Ok(base);
+        }
+        self.next();
+        let begin = self.at;
+        let negative = self.takes('-');
+        self.next();
+        let from = self.at;
+        while self.signs.get(self.at).is_some_and(char::is_ascii_digit) {
+            self.at += 1;
+        }
+        let digits: String = self.signs[from..self.at].iter().collect();
+        let expected = format!("a whole number up to {HIGHEST_DEGREE} as power");
+        let whole = digits.parse::<usize>().ok().filter(|n| *n <= HIGHEST_DEGREE);
+        let fraction = self.signs.get(self.at).is_some_and(|sign| *sign == '.');
+        let Some(n) = whole.filter(|_| !fraction) else {
+            self.at = begin;
+            return self.refuse(&expected);
+        };
+        if negative && base.is_zero() {
+            return Err(format!("it divides by zero at character {}; {EXAMPLES}", begin + 1));
+        }
+        let base = if negative { base.inverse() } else { base };
+        let mut power = Ratio::of(&[1.0]);
+        for _ in 0..n {
+            power = self.checked(power.times(&base), begin)?;
+        }
+        Ok(power)
+    }
+
+    fn atom(&mut self) -> Result<Ratio, String> {
+        match self.next() {
+            Some('s') => {
+                self.at += 1;
+                Ok(Ratio::of(&[1.0, 0.0]))
+            }
+            Some('(') => self.parentheses(),
+            Some('e') => self.delay(),
+            Some(sign) if is_of_number(sign) => self.number(),
+            _ => self.refuse("a number, s or '('"),
+        }
+    }
+
+    fn parentheses(&mut self) -> Result<Ratio, String> {
+        let opened = self.at + 1;
+        self.at += 1;
+        self.depth += 1;
+        if self.depth > DEEPEST {
+            return Err(format!(
+                "more than {DEEPEST} parentheses stand inside of each other at character {opened}; {EXAMPLES}"
+            ));
+        }
+        let inside = self.sum()?;
+        if !self.takes(')') {
+            return self.refuse(&format!("')' for the '(' at character {opened}"));
+        }
+        self.depth -= 1;
+        Ok(inside)
+    }
+
+    /// `exp(-0.1s)` or `e^(-0.1s)`.
+    fn delay(&mut self) -> Result<Ratio, String> {
+        const EXPECTED: &str = "exp(-0.1s), a delay in s";
+        let begin = self.at;
+        let rest = &self.signs[begin..];
+        let length = if rest.starts_with(&['e', 'x', 'p']) { 3 } else { 1 };
+        self.at += length;
+        if (length == 1 && !self.takes('^')) || self.next() != Some('(') {
+            self.at = begin;
+            return self.refuse(EXPECTED);
+        }
+        let exponent = self.parentheses()?;
+        let slope = match (exponent.num.as_slice(), exponent.den.as_slice()) {
+            ([slope, constant], [by]) if *constant == 0.0 && exponent.delay_s == 0.0 => Some(slope / by),
+            _ => None,
+        };
+        let Some(slope) = slope.filter(|v| v.is_finite()) else {
+            self.at = begin;
+            return self.refuse(EXPECTED);
+        };
+        Ok(Ratio {
+            delay_s: -slope,
+            ..Ratio::of(&[1.0])
+        })
+    }
+
+    fn number(&mut self) -> Result<Ratio, String> {
+        let begin = self.at;
+        let signs = &self.signs;
+        let digits = |from: usize| signs[from..].iter().take_while(|sign| sign.is_ascii_digit()).count();
+        let mut end = begin + digits(begin);
+        if signs.get(end) == Some(&'.') {
+            end += 1 + digits(end + 1);
+        }
+        // An e that no digits follow is the one of a delay.
+        if matches!(signs.get(end), Some('e' | 'E')) {
+            let sign = usize::from(matches!(signs.get(end + 1), Some('+' | '-')));
+            let exponent = digits((end + 1 + sign).min(signs.len()));
+            if exponent > 0 {
+                end += 1 + sign + exponent;
+            }
+        }
+        let text: String = signs[begin..end].iter().collect();
+        match text.parse::<f64>() {
+            Ok(value) if value.is_finite() => {
+                self.at = end;
+                Ok(Ratio::of(&[value]))
+            }
+            _ => self.refuse("a finite number"),
+        }
+    }
+
+    /// What a step gives must stay a number, and of a degree that someone means.
+    fn checked(&mut self, ratio: Ratio, at: usize) -> Result<Ratio, String> {
+        if ratio.num.len().max(ratio.den.len()) > HIGHEST_DEGREE + 1 {
+            self.at = at;
+            return self.refuse(&format!("a degree of at most {HIGHEST_DEGREE}"));
+        }
+        if ratio.num.iter().chain(&ratio.den).any(|c| !c.is_finite()) {
+            self.at = at;
+            return self.refuse("coefficients within the range of floating point");
+        }
+        Ok(ratio)
+    }
+}
+
+fn is_of_number(sign: char) -> bool {
+    sign.is_ascii_digit() || sign == '.'
+}
