@@ -7,7 +7,7 @@
 //! | `cargo xtask check` | formatting, lints, documentation of the crates and the book, as continuous integration does |
 //! | `cargo xtask book` | the book in `docs/`, into `docs/book/` (needs mdbook) |
 //! | `cargo xtask bench [OPTION...]` | the tasks of the page "Speed beside others" beside the peers that are installed, or how cost grows (module `bench`) |
-//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults` |
+//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `challenge`, `challenge-people` |
 //!
 //! Little but the standard library: a chore must start at once on a fresh machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
@@ -71,11 +71,13 @@ fn test(arguments: &[String]) -> Result<(), String> {
 
 /// Studies that take too long for a test: name, package and example, and the package whose program
 /// one of them runs.
-const SLOW: [(&str, &str, &str, Option<&str>); 4] = [
+const SLOW: [(&str, &str, &str, Option<&str>); 6] = [
     ("people-coverage", "hoid", "people_coverage", None),
     ("faults", "hoid", "faults", Some("hoid-cli")),
     ("faults-clean", "hoid-ident", "faults_clean", None),
     ("tracker-faults", "hoid", "tracker_faults", None),
+    ("challenge", "hoid-study", "challenge", None),
+    ("challenge-people", "hoid-study", "challenge_people", None),
 ];
 
 /// Runs one of them, with further arguments of its own.

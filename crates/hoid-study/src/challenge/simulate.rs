@@ -62,11 +62,12 @@ impl Truth {
 
     /// The response from recorded e to recorded u.
     pub fn response(&self, omega_rad_s: f64, t_s: f64) -> Complex64 {
-        let response = self.operator(t_s).response(omega_rad_s) * self.sign(t_s);
-        match self.case.sight {
-            Sight::Held => response * hold(omega_rad_s, self.sample_time),
-            Sight::Continuous => response,
-        }
+        let operator = self.operator(t_s);
+        let response = match self.case.sight {
+            Sight::Held => held(&operator, omega_rad_s, self.sample_time),
+            Sight::Continuous => operator.response(omega_rad_s),
+        };
+        response * self.sign(t_s)
     }
 
     /// -1 where u is recorded with the wrong sign.
@@ -87,6 +88,19 @@ impl Truth {
         }
     }
 }
+
+/// The response between samples of a held error: `sum over m of (Y H)(omega + m 2 pi/Ts)`, H the hold
+/// (Poisson's sum; A. V. Oppenheim and R. W. Schafer, *Discrete-Time Signal Processing*, section 4.2).
+fn held(operator: &Operator, omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
+    let each = (-ALIASES..=ALIASES).map(|m| {
+        let omega = omega_rad_s + f64::from(m) * TAU / sample_time.s();
+        operator.response(omega) * hold(omega, sample_time)
+    });
+    each.sum()
+}
+
+/// Aliases on either side; they fall as the square of their number, or faster.
+const ALIASES: i32 = 100;
 
 /// What only an oracle knows, sample by sample.
 #[derive(Debug, Clone)]
@@ -559,7 +573,7 @@ fn sizes(operator: &Operator, case: &Case, lines: &ForcingFunction) -> [f64; 2] 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::challenge::{Seeds, cases};
+    use crate::challenge::{Seeds, Theme, cases};
 
     fn case(name: &str) -> Case {
         cases().into_iter().find(|case| case.name == name).unwrap()
@@ -582,12 +596,13 @@ mod tests {
         ] {
             let quiet = Case {
                 ratio: 0.0,
+                length_s: 40.0,
                 shifts: Vec::new(),
                 ..case(name)
             };
             let run = simulate(&quiet, RUN).unwrap();
             let per_second = quiet.rate_hz as usize;
-            let span = 40 * per_second..80 * per_second;
+            let span = 20 * per_second..40 * per_second;
             for multiple in [2.0, 3.0, 5.0, 11.0, 19.0] {
                 let omega = multiple * TAU / 20.0;
                 let turn = |x: &[f64]| -> Complex64 {
@@ -634,14 +649,15 @@ mod tests {
         assert!(run.u.iter().filter(|u| u.abs() == largest).count() > 50);
     }
 
-    /// Everybody who is drawn keeps control, in both sets of seeds.
+    /// Everybody who is drawn keeps control.
     #[test]
-    fn every_case_runs() {
-        for case in cases().into_iter().filter(|case| case.rate_hz <= 100.0) {
-            let short = Case {
-                length_s: case.length_s.min(20.0),
-                ..case
-            };
+    fn every_loop_runs() {
+        let are_loops = |case: &Case| !matches!(case.theme, Theme::Changes | Theme::ChangesInRemnants);
+        for case in cases()
+            .into_iter()
+            .filter(|case| case.rate_hz <= 100.0 && are_loops(case))
+        {
+            let short = Case { length_s: 18.0, ..case };
             let run = simulate(&short, RUN).unwrap();
             assert!(run.u.iter().any(|u| u.abs() > 0.01), "{}", short.name);
         }

@@ -1,0 +1,262 @@
+//! The tables of the challenge, in Markdown.
+
+use std::fmt::Write as _;
+
+use super::{
+    measure::{AFTER_S, FOUND_S, Line},
+    oracle::CERTAIN,
+};
+
+/// The tables of lines: error of H, its course after a change, alarms, changes found, coverage,
+/// parameters, findings.
+pub fn tables(lines: &[Line]) -> String {
+    let mut text = String::new();
+    let methods = in_order(lines.iter().map(|line| line.method.as_str()));
+    let cases = in_order(lines.iter().map(|line| line.case.as_str()));
+    let failures: Vec<String> = (lines.iter())
+        .filter_map(|line| {
+            Some(format!(
+                "{} in {} {}: {}",
+                line.method,
+                line.case,
+                line.run,
+                line.failed.as_ref()?
+            ))
+        })
+        .collect();
+
+    text += "\n### Error of H\n\nMean of |dH|/|H| over the lines, from 8 s after a change on or where nobody changes; median over the runs.\n\n";
+    head(&mut text, "case", &methods);
+    for case in &cases {
+        let cell = |method: &&str| {
+            let of = own(lines, case, method).flat_map(|line| &line.moments);
+            let settled = of.filter(|m| is_settled(&m.label)).map(|m| m.error);
+            median(settled.collect()).map_or("–".to_owned(), |e| format!("{e:.2}"))
+        };
+        row(&mut text, case, methods.iter().map(cell));
+    }
+
+    text += "\n### Course of the error of H\n\nMedian over all runs in which somebody changes at once.\n\n";
+    let labels: Vec<String> = ["before".to_owned()]
+        .into_iter()
+        .chain(AFTER_S.map(|s| format!("+{s:.0}")))
+        .collect();
+    head(
+        &mut text,
+        "method",
+        &labels.iter().map(String::as_str).collect::<Vec<_>>(),
+    );
+    for method in &methods {
+        let cell = |label: &String| {
+            let of = lines
+                .iter()
+                .filter(|line| line.method == *method && !line.changes.is_empty());
+            let errors = of
+                .flat_map(|line| &line.moments)
+                .filter(|m| m.label == *label)
+                .map(|m| m.error);
+            median(errors.collect()).map_or("–".to_owned(), |e| format!("{e:.2}"))
+        };
+        row(&mut text, method, labels.iter().map(cell));
+    }
+
+    let declaring: Vec<&str> = (methods.iter().copied())
+        .filter(|m| {
+            lines
+                .iter()
+                .any(|line| line.method == *m && line.false_alarms.is_some())
+        })
+        .collect();
+    text += "\n### Alarms an hour without a change\n\nThose that are said to be of the remnant alone are behind the plus sign. Two alarms in an hour may come by chance of one.\n\n";
+    head(&mut text, "case", &[&["hours"], declaring.as_slice()].concat());
+    for case in &cases {
+        let hours = |method: &str| own(lines, case, method).map(|line| line.exposed_s).sum::<f64>() / 3600.0;
+        let cell = |method: &&str| {
+            let of = || own(lines, case, method);
+            let alarms: usize = of().filter_map(|line| line.false_alarms).sum();
+            let of_remnant: usize = of().map(|line| line.of_remnant).sum();
+            let rate = |n: usize| n as f64 / hours(method);
+            match of_remnant {
+                0 => format!("{:.0}", rate(alarms)),
+                n => format!("{:.0} + {:.0}", rate(alarms), rate(n)),
+            }
+        };
+        let all = declaring.first().map_or(0.0, |m| hours(m));
+        if all > 0.0 {
+            row(
+                &mut text,
+                case,
+                [format!("{all:.2}")].into_iter().chain(declaring.iter().map(cell)),
+            );
+        }
+    }
+
+    text += "\n### Changes found\n\nOf the changes that the oracle finds with certainty (log likelihood ratio of the true models over 12) within 5 and 8 s, those that were declared in that time; median delay.\n\n";
+    head(
+        &mut text,
+        "case",
+        &[&["changes", "certain 5 s, 8 s"], declaring.as_slice()].concat(),
+    );
+    for case in &cases {
+        let of = |method: &str| {
+            own(lines, case, method)
+                .flat_map(|line| line.changes.clone())
+                .collect::<Vec<_>>()
+        };
+        let all = declaring.first().map_or(Vec::new(), |m| of(m));
+        if all.is_empty() {
+            continue;
+        }
+        let certain = |i: usize| all.iter().filter(|c| c.evidence[i] > CERTAIN).count();
+        let cell = |method: &&str| {
+            let found = |i: usize| {
+                let own = of(method);
+                let such = own.iter().filter(|c| c.evidence[i] > CERTAIN);
+                such.filter(|c| c.after_s.is_some_and(|s| s <= FOUND_S[i])).count()
+            };
+            let delay = median(of(method).iter().filter_map(|c| c.after_s).collect());
+            let delay = delay.map_or(String::new(), |s| format!(" ({s:.1} s)"));
+            format!("{}, {}{delay}", found(0), found(1))
+        };
+        let head = [all.len().to_string(), format!("{}, {}", certain(0), certain(1))];
+        row(&mut text, case, head.into_iter().chain(declaring.iter().map(cell)));
+    }
+
+    text += "\n### Coverage\n\nBands of 1.96 standard errors of real and imaginary part of H that hold the truth, in percent; from 8 s after a change on or where nobody changes.\n\n";
+    head(&mut text, "case", &methods);
+    for case in &cases {
+        let cell = |method: &&str| {
+            let of = own(lines, case, method)
+                .flat_map(|line| &line.moments)
+                .filter(|m| is_settled(&m.label));
+            let [inside, all] = of.fold([0, 0], |sum, m| [sum[0] + m.covered[0], sum[1] + m.covered[1]]);
+            share(inside, all)
+        };
+        row(&mut text, case, methods.iter().map(cell));
+    }
+
+    text += "\n### Parameters\n\nMedian relative error in percent and coverage, in runs whose operator is that of the reference text; from 8 s after a change on or where nobody changes.\n\n";
+    let names = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
+    head(&mut text, "method", &names);
+    for method in &methods {
+        let cell = |name: &&str| {
+            let of = lines
+                .iter()
+                .filter(|line| line.method == *method)
+                .flat_map(|line| &line.moments);
+            let said: Vec<(f64, Option<bool>)> = (of.filter(|m| is_settled(&m.label)))
+                .filter_map(|m| m.parameters.get(*name).copied())
+                .collect();
+            let bands: Vec<bool> = said.iter().filter_map(|(_, inside)| *inside).collect();
+            let covered = share(bands.iter().filter(|inside| **inside).count(), bands.len());
+            median(said.iter().map(|(e, _)| *e).collect())
+                .map_or("–".to_owned(), |e| format!("{:.0} ({covered})", 100.0 * e))
+        };
+        row(&mut text, method, names.iter().map(cell));
+    }
+
+    if !failures.is_empty() {
+        let _ = write!(text, "\n{} runs could not be followed:\n\n", failures.len());
+        failures.iter().take(30).for_each(|f| {
+            let _ = writeln!(text, "- {f}");
+        });
+    }
+    text
+}
+
+/// True from 8 s after a change on, and where nobody changes.
+fn is_settled(label: &str) -> bool {
+    !matches!(label, "+2" | "+4" | "before")
+}
+
+fn own<'a>(lines: &'a [Line], case: &'a str, method: &'a str) -> impl Iterator<Item = &'a Line> + Clone {
+    lines
+        .iter()
+        .filter(move |line| line.case == case && line.method == method)
+}
+
+fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut all: Vec<&str> = Vec::new();
+    for name in names {
+        if !all.contains(&name) {
+            all.push(name);
+        }
+    }
+    all
+}
+
+fn head(text: &mut String, first: &str, others: &[&str]) {
+    let _ = writeln!(
+        text,
+        "| {first} | {} |\n|---|{}",
+        others.join(" | "),
+        "---|".repeat(others.len())
+    );
+}
+
+fn row(text: &mut String, first: &str, cells: impl Iterator<Item = String>) {
+    let _ = writeln!(text, "| {first} | {} |", cells.collect::<Vec<_>>().join(" | "));
+}
+
+fn share(of: usize, all: usize) -> String {
+    match all {
+        0 => "–".to_owned(),
+        _ => format!("{:.0}", 100.0 * of as f64 / all as f64),
+    }
+}
+
+/// The median; none of nothing.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    match n % 2 {
+        _ if n == 0 => None,
+        1 => Some(values[n / 2]),
+        _ => Some((values[n / 2 - 1] + values[n / 2]) / 2.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+    use crate::challenge::measure::{Found, Moment};
+
+    #[test]
+    fn numbers_are_where_they_belong() {
+        let moment = |label: &str, error| Moment {
+            label: label.to_owned(),
+            t_s: 0.0,
+            error,
+            covered: [13, 14],
+            parameters: BTreeMap::from([("K_e".to_owned(), (0.07, Some(true)))]),
+        };
+        let line = |method: &str, found| Line {
+            case: "a-case".to_owned(),
+            run: 0,
+            method: method.to_owned(),
+            failed: None,
+            moments: vec![moment("+4", 0.9), moment("+8", 0.31), moment("+28", 0.11)],
+            false_alarms: Some(3),
+            of_remnant: 1,
+            exposed_s: 1800.0,
+            changes: vec![Found {
+                at_s: 45.0,
+                evidence: [11.0, 20.0],
+                after_s: found,
+            }],
+            findings: Vec::new(),
+        };
+        let text = tables(&[line("one", Some(6.5)), line("two", None)]);
+        for expected in [
+            "| a-case | 0.21 | 0.21 |",
+            "| a-case | 0.50 | 6 + 2 | 6 + 2 |",
+            "| a-case | 1 | 0, 1 | 0, 1 (6.5 s) | 0, 0 |",
+            "| a-case | 93 | 93 |",
+            "| one | 7 (100) |",
+        ] {
+            assert!(text.contains(expected), "{expected}: {text}");
+        }
+    }
+}
