@@ -313,6 +313,12 @@ fn of_response(said: &Said, truths: &[Complex64]) -> (f64, [usize; 2]) {
     (error, covered)
 }
 
+/// What is asked in a run, for tests of contestants.
+#[cfg(test)]
+pub(super) fn posed_task(case: &Case, of: RunOf) -> Task {
+    Posed::new(case, of).unwrap_or_else(|e| panic!("{e}")).task
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -588,21 +588,17 @@ mod tests {
     /// response that is called the truth: held and continuous, a whole delay and a fraction.
     #[test]
     fn the_loop_has_the_response_that_is_called_true() {
-        for (name, within) in [
-            ("none-lag-1", 1e-3),
-            ("delay-half-60", 1e-3),
-            ("continuous-60", 4e-3),
-            ("rate-50", 1e-3),
-        ] {
+        for (name, within) in [("none-lag-1", 1e-3), ("delay-half-60", 1e-3), ("continuous-60", 4e-3)] {
             let quiet = Case {
                 ratio: 0.0,
-                length_s: 40.0,
+                length_s: 80.0,
                 shifts: Vec::new(),
                 ..case(name)
             };
             let run = simulate(&quiet, RUN).unwrap();
             let per_second = quiet.rate_hz as usize;
-            let span = 20 * per_second..40 * per_second;
+            // Late enough for what the start stirs up to be gone.
+            let span = 60 * per_second..80 * per_second;
             for multiple in [2.0, 3.0, 5.0, 11.0, 19.0] {
                 let omega = multiple * TAU / 20.0;
                 let turn = |x: &[f64]| -> Complex64 {
@@ -652,12 +648,15 @@ mod tests {
     /// Everybody who is drawn keeps control.
     #[test]
     fn every_loop_runs() {
-        let are_loops = |case: &Case| !matches!(case.theme, Theme::Changes | Theme::ChangesInRemnants);
+        let are_loops = |case: &Case| {
+            let again = matches!(case.theme, Theme::Changes | Theme::ChangesInRemnants);
+            !again && !matches!(case.blemish, Blemish::IdleStart(_))
+        };
         for case in cases()
             .into_iter()
             .filter(|case| case.rate_hz <= 100.0 && are_loops(case))
         {
-            let short = Case { length_s: 18.0, ..case };
+            let short = Case { length_s: 6.0, ..case };
             let run = simulate(&short, RUN).unwrap();
             assert!(run.u.iter().any(|u| u.abs() > 0.01), "{}", short.name);
         }

@@ -103,7 +103,8 @@ fn over_samples(task: &Task, options: &TrackOptions) -> Result<Answer, String> {
         let t_s = task.time_s(k);
         tracker.update(sample, t_s >= moves_from - task.sample_time.s() / 2.0);
         changes.extend(tracker.change().map(|change| (t_s, change)));
-        while task.asked_s.get(next).is_some_and(|t| task.sample(*t) <= k) {
+        // The last sample before the time, as the rows of a trace have it.
+        while task.asked_s.get(next).is_some_and(|t| task.sample(*t) <= k + 1) {
             let (covariance, operator) = (tracker.covariance(), tracker.operator().ok());
             let said = said(task, options, tracker.theta(), covariance.as_deref(), operator.as_ref());
             answer.said.push(said);
@@ -145,5 +146,52 @@ fn said(
         response: each.into_iter().map(|(h, _)| h).collect(),
         covariance,
         parameters,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::challenge::{RunOf, Seeds, cases, measure::posed_task};
+
+    fn task(name: &str) -> Task {
+        let case = cases().into_iter().find(|case| case.name == name).unwrap();
+        posed_task(
+            &case,
+            RunOf {
+                seeds: Seeds::Open,
+                number: 2,
+            },
+        )
+    }
+
+    /// Sample by sample is the same as over a record.
+    #[test]
+    fn both_ways_say_the_same() {
+        let task = task("change-K_e_dot-100");
+        for method in [Method::rls(), Method::physical(), Method::adaptive()] {
+            let own = OfMethod(method);
+            let (over_record, options) = (own.follow(&task).unwrap(), own.options(&task).unwrap());
+            let by_sample = over_samples(&task, &options).unwrap();
+            assert_eq!(over_record.alarms, by_sample.alarms, "{}", own.name());
+            assert_eq!(over_record.said.len(), task.asked_s.len());
+            for (a, b) in over_record.said.iter().zip(&by_sample.said) {
+                assert_eq!(a.response, b.response, "{}", own.name());
+            }
+        }
+    }
+
+    #[test]
+    fn missing_samples_are_no_end() {
+        let task = task("none-missing");
+        let answer = OfMethod(Method::physical()).follow(&task).unwrap();
+        assert_eq!(answer.said.len(), task.asked_s.len());
+        assert!(
+            answer
+                .said
+                .iter()
+                .flat_map(|said| &said.response)
+                .all(|h| h.norm().is_finite())
+        );
     }
 }
