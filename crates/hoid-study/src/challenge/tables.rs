@@ -67,7 +67,7 @@ pub fn tables(lines: &[Line]) -> String {
                 .any(|line| line.method == *m && line.false_alarms.is_some())
         })
         .collect();
-    text += "\n### Alarms an hour without a change\n\nThose that are said to be of the remnant alone are behind the plus sign. Two alarms in an hour may come by chance of one.\n\n";
+    text += "\n### Alarms an hour without a change\n\nThose that are said to be of the remnant alone are behind the plus sign.\n\n";
     head(&mut text, "case", &[&["hours"], declaring.as_slice()].concat());
     for case in &cases {
         let hours = |method: &str| own(lines, case, method).map(|line| line.exposed_s).sum::<f64>() / 3600.0;
@@ -155,6 +155,18 @@ pub fn tables(lines: &[Line]) -> String {
         row(&mut text, method, names.iter().map(cell));
     }
 
+    let judged: Vec<&str> = (methods.iter().copied())
+        .filter(|m| lines.iter().any(|line| line.method == *m && !line.findings.is_empty()))
+        .collect();
+    if !judged.is_empty() {
+        text += "\n### What their verdicts say\n\nThe two findings that a verdict has most often, with the runs that have them.\n\n";
+        head(&mut text, "case", &judged);
+        for case in &cases {
+            let cells = judged.iter().map(|method| commonest(own(lines, case, method)));
+            row(&mut text, case, cells);
+        }
+    }
+
     if !failures.is_empty() {
         let _ = write!(text, "\n{} runs could not be followed:\n\n", failures.len());
         failures.iter().take(30).for_each(|f| {
@@ -162,6 +174,29 @@ pub fn tables(lines: &[Line]) -> String {
         });
     }
     text
+}
+
+/// The two commonest findings.
+fn commonest<'a>(lines: impl Iterator<Item = &'a Line> + Clone) -> String {
+    let mut counts: Vec<(&str, usize)> = Vec::new();
+    for kind in in_order(lines.clone().flat_map(|line| &line.findings).map(String::as_str)) {
+        let count = lines
+            .clone()
+            .filter(|line| line.findings.iter().any(|f| f == kind))
+            .count();
+        counts.push((kind, count));
+    }
+    counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    let words: Vec<String> = counts
+        .iter()
+        .take(2)
+        .map(|(kind, count)| format!("{kind} {count}"))
+        .collect();
+    if words.is_empty() {
+        "–".to_owned()
+    } else {
+        words.join(", ")
+    }
 }
 
 /// True from 8 s after a change on, and where nobody changes.
