@@ -2,7 +2,7 @@
 
 use super::operator::{Parameter, Plant};
 
-/// The operator's form; ranges of its parameters in [`draw`](super::draw).
+/// The operator's form; its parameters are drawn anew in each run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
     /// Gain and lead: the operator of the reference text.

@@ -13,18 +13,6 @@ pub fn tables(lines: &[Line]) -> String {
     let mut text = String::new();
     let methods = in_order(lines.iter().map(|line| line.method.as_str()));
     let cases = in_order(lines.iter().map(|line| line.case.as_str()));
-    let failures: Vec<String> = (lines.iter())
-        .filter_map(|line| {
-            Some(format!(
-                "{} in {} {}: {}",
-                line.method,
-                line.case,
-                line.run,
-                line.failed.as_ref()?
-            ))
-        })
-        .collect();
-
     text += "\n### Error of H\n\nMean of |dH|/|H| over the lines, from 8 s after a change on or where nobody changes; median over the runs.\n\n";
     head(&mut text, "case", &methods);
     for case in &cases {
@@ -138,7 +126,12 @@ pub fn tables(lines: &[Line]) -> String {
     text += "\n### Parameters\n\nMedian relative error in percent and coverage, in runs whose operator is that of the reference text; from 8 s after a change on or where nobody changes.\n\n";
     let names = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
     head(&mut text, "method", &names);
-    for method in &methods {
+    let named = |m: &&&str| {
+        lines
+            .iter()
+            .any(|l| l.method == **m && l.moments.iter().any(|m| !m.parameters.is_empty()))
+    };
+    for method in methods.iter().filter(named) {
         let cell = |name: &&str| {
             let of = lines
                 .iter()
@@ -167,11 +160,32 @@ pub fn tables(lines: &[Line]) -> String {
         }
     }
 
-    if !failures.is_empty() {
-        let _ = write!(text, "\n{} runs could not be followed:\n\n", failures.len());
-        failures.iter().take(30).for_each(|f| {
-            let _ = writeln!(text, "- {f}");
-        });
+    text += &failures(lines);
+    text
+}
+
+/// Who could not follow, why, and where.
+fn failures(lines: &[Line]) -> String {
+    let failed = || (lines.iter()).filter_map(|line| Some((line, line.failed.as_deref()?)));
+    let mut text = String::new();
+    if failed().next().is_some() {
+        text += "\n### Runs that could not be followed\n\n| method | runs | why | cases |\n|---|---|---|---|\n";
+    }
+    for method in in_order(failed().map(|(line, _)| line.method.as_str())) {
+        for reason in in_order(
+            failed()
+                .filter(|(line, _)| line.method == method)
+                .map(|(_, reason)| reason),
+        ) {
+            let of = || failed().filter(|(line, why)| line.method == method && *why == reason);
+            let cases = in_order(of().map(|(line, _)| line.case.as_str()));
+            let _ = writeln!(
+                text,
+                "| {method} | {} | {reason} | {} |",
+                of().count(),
+                cases.join(", ")
+            );
+        }
     }
     text
 }
