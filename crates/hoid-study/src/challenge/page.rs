@@ -16,7 +16,8 @@ pub fn page(lines: &[Line], measured: &str) -> String {
          half a second, and is of the operator alone. Remnant, plant and forcing stay.\n\n\
          H is asked for at seven lines from .5 to 6 rad/s. Who says nothing, or fails, has the error 1.\n\
          `batch (oracle)` knows the changes and the delay: Box-Jenkins on everything since the last change\n\
-         (none before 7.5 s). A change is certain where the logarithm of the likelihood ratio of the true\n\
+         (none before 7.5 s), without a constant and over no missing sample, so that offsets, drift and\n\
+         gaps cost it. A change is certain where the logarithm of the likelihood ratio of the true\n\
          models, remnant known, is over 12 within the time. `basis-kalman` and `chow` are plain methods in\n\
          three gains of a nominal person, `error-threshold` the published baseline.\n\n\
          There are two sets of seeds: `open`, for making a method, and `sealed`, for its judgement.\n\n\

@@ -13,6 +13,8 @@ pub fn tables(lines: &[Line]) -> String {
     let mut text = String::new();
     let methods = in_order(lines.iter().map(|line| line.method.as_str()));
     let cases = in_order(lines.iter().map(|line| line.case.as_str()));
+    text += &overview(lines, &methods, &cases);
+
     text += "\n### Error of H\n\nMean of |dH|/|H| over the lines, from 8 s after a change on or where nobody changes; median over the runs.\n\n";
     head(&mut text, "case", &methods);
     for case in &cases {
@@ -164,6 +166,72 @@ pub fn tables(lines: &[Line]) -> String {
     text
 }
 
+/// Each contestant in a row.
+fn overview(lines: &[Line], methods: &[&str], cases: &[&str]) -> String {
+    let mut text = "\n### In a row each\n\nError of H from 8 s after a change on or where nobody changes: median and largest of the cases. Coverage of its bands in percent. Alarms an hour in runs without a change, those of the remnant alone behind the plus sign. Changes found of those that the oracle finds with certainty, within 5 and 8 s.\n\n".to_owned();
+    head(
+        &mut text,
+        "method",
+        &[
+            "error",
+            "largest",
+            "coverage",
+            "alarms an hour",
+            "found in 5 s",
+            "in 8 s",
+        ],
+    );
+    for method in methods {
+        let of = || lines.iter().filter(|line| line.method == *method);
+        let settled = |line: &'_ Line| {
+            line.moments
+                .iter()
+                .filter(|m| is_settled(&m.label))
+                .cloned()
+                .collect::<Vec<_>>()
+        };
+        let by_case: Vec<f64> = (cases.iter())
+            .filter_map(|case| median(own(lines, case, method).flat_map(settled).map(|m| m.error).collect()))
+            .collect();
+        let [inside, all] = of()
+            .flat_map(settled)
+            .fold([0, 0], |sum, m| [sum[0] + m.covered[0], sum[1] + m.covered[1]]);
+        let steady = || of().filter(|line| line.changes.is_empty() && line.false_alarms.is_some());
+        let hours = steady().map(|line| line.exposed_s).sum::<f64>() / 3600.0;
+        let rate = |n: usize| n as f64 / hours;
+        let alarms = match hours > 0.0 {
+            true => format!(
+                "{:.1} + {:.1}",
+                rate(steady().filter_map(|line| line.false_alarms).sum()),
+                rate(steady().map(|line| line.of_remnant).sum())
+            ),
+            false => "–".to_owned(),
+        };
+        let declares = of().any(|line| line.false_alarms.is_some());
+        let found = |i: usize| {
+            let certain = || of().flat_map(|line| &line.changes).filter(|c| c.evidence[i] > CERTAIN);
+            let found = certain().filter(|c| c.after_s.is_some_and(|s| s <= FOUND_S[i])).count();
+            if declares {
+                format!("{found} of {}", certain().count())
+            } else {
+                "–".to_owned()
+            }
+        };
+        let number = |e: Option<f64>| e.map_or("–".to_owned(), |e| format!("{e:.2}"));
+        let largest = by_case.iter().copied().reduce(f64::max);
+        let cells = [
+            number(median(by_case)),
+            number(largest),
+            share(inside, all),
+            alarms,
+            found(0),
+            found(1),
+        ];
+        row(&mut text, method, cells.into_iter());
+    }
+    text
+}
+
 /// Who could not follow, why, and where.
 fn failures(lines: &[Line]) -> String {
     let failed = || (lines.iter()).filter_map(|line| Some((line, line.failed.as_deref()?)));
@@ -304,6 +372,7 @@ mod tests {
             "| a-case | 1 | 0, 1 | 0, 1 (6.5 s) | 0, 0 |",
             "| a-case | 93 | 93 |",
             "| one | 7 (100) |",
+            "| one | 0.21 | 0.21 | 93 | – | 0 of 0 | 1 of 1 |",
         ] {
             assert!(text.contains(expected), "{expected}: {text}");
         }
