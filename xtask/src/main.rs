@@ -8,7 +8,7 @@
 //! | `cargo xtask crates` | licences, bans and versions of the crates that are used, alone (module `crates`) |
 //! | `cargo xtask book` | the book in `docs/`, into `docs/book/` (needs mdbook) |
 //! | `cargo xtask bench [OPTION...]` | the tasks of the page "Speed beside others" beside the peers that are installed, or how cost grows (module `bench`) |
-//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `kills` |
+//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `kills`, `challenge`, `challenge-people` |
 //!
 //! Little but the standard library: a chore must start at once on a fresh machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
@@ -93,7 +93,7 @@ const fn slow_of(name: &'static str, package: &'static str, example: &'static st
     }
 }
 
-const SLOW: [Slow; 6] = [
+const SLOW: [Slow; 8] = [
     slow_of("people-coverage", "hoid", "people_coverage"),
     Slow {
         program: Some("hoid-cli"),
@@ -109,6 +109,8 @@ const SLOW: [Slow; 6] = [
         program: Some("hoid-cli"),
         ..slow_of("kills", "hoid-cli", "kills")
     },
+    slow_of("challenge", "hoid-study", "challenge"),
+    slow_of("challenge-people", "hoid-study", "challenge_people"),
 ];
 
 /// Runs one of them, with further arguments of its own.

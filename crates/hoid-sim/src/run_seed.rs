@@ -25,6 +25,7 @@ pub struct RunSeed {
 /// Last eight bytes of each key: other uses of (seed, cell, replication) get another tag and so
 /// another stream.
 const REMNANT: u64 = u64::from_le_bytes(*b"remnant\0");
+const UNIFORM: u64 = u64::from_le_bytes(*b"uniform\0");
 
 impl RunSeed {
     /// White Gaussian noise of unit variance.
@@ -37,6 +38,11 @@ impl RunSeed {
     /// The first samples of [`RunSeed::white_noise`], into memory that was used before.
     pub fn white_noise_into(&self, noise: &mut [f64]) {
         normal_deviates(self.generator(REMNANT), noise);
+    }
+
+    /// Numbers from `[0, 1)`, each equally likely, for who draws persons or phases of a run.
+    pub fn uniform(&self, n: usize) -> Vec<f64> {
+        self.uniform_of(UNIFORM, n)
     }
 
     /// White Gaussian noise of unit variance of another use of the run.

@@ -1,0 +1,197 @@
+//! The methods of `hoid_track` with their default options.
+//!
+//! Where the delay is told, it is given; where it is not, it is searched on the start span over the
+//! range that the program searches, the other orders as they are. H is that of the polynomials of a
+//! row, its covariance `g' C g` with the gradient g of [`PolynomialModel`].
+
+use hoid_ident::{
+    OrderRanges,
+    order_selection::{Criterion, default_operator_ranges},
+};
+use hoid_model::PolynomialModel;
+use hoid_track::{Change, Method, Sample, StartAt, TrackOptions, TrackPlan, Tracker, track};
+
+use super::super::contestant::{Alarm, Answer, Contestant, Said, Task, of_complex};
+
+/// A method.
+pub(super) struct OfMethod(pub Method);
+
+impl Contestant for OfMethod {
+    fn name(&self) -> String {
+        self.0.name().to_owned()
+    }
+
+    fn follow(&self, task: &Task) -> Result<Answer, String> {
+        let options = self.options(task)?;
+        match task.record() {
+            Some(record) if task.seam.is_none() => {
+                // Rows at every half second, on which all times that are asked for lie.
+                let every = (0.5 / task.sample_time.s()).round() as usize;
+                let trace = track(&record, &options, every).map_err(|e| e.to_string())?;
+                let row = |t_s: &f64| ((t_s / task.sample_time.s() / every as f64 + 1e-6) as usize).max(1) - 1;
+                let rows = task.asked_s.iter().map(|t_s| row(t_s).min(trace.len() - 1));
+                let said = rows.map(|row| {
+                    let covariance = trace.covariance(row);
+                    let operator = trace.operator(row).ok();
+                    said(
+                        task,
+                        &options,
+                        trace.theta(row),
+                        covariance.as_deref(),
+                        operator.as_ref(),
+                    )
+                });
+                let verdict = trace.verdict(&record, None).map_err(|e| e.to_string())?;
+                Ok(Answer {
+                    said: said.collect(),
+                    alarms: (!trace.change_odds().is_empty()).then(|| alarms(trace.changes())),
+                    findings: verdict.findings().iter().map(|f| f.kind.to_owned()).collect(),
+                })
+            }
+            _ => over_samples(task, &options),
+        }
+    }
+}
+
+impl OfMethod {
+    fn options(&self, task: &Task) -> Result<TrackOptions, String> {
+        let with = |nk| TrackOptions {
+            start: StartAt::Span(Some(task.start_s)),
+            ..TrackOptions::usual(self.0.clone(), nk)
+        };
+        if let Some(nk) = task.nk {
+            return Ok(with(nk));
+        }
+        let usual = with(1);
+        let ranges = OrderRanges {
+            nk: default_operator_ranges(usual.structure, task.sample_time).nk,
+            ..OrderRanges::from(usual.orders)
+        };
+        let span = task.start_record().ok_or("the start span is not all there")?;
+        let chosen = TrackPlan::new(usual, ranges, Criterion::Bic, task.sample_time)
+            .and_then(|plan| plan.choose(&span, &|| ()))
+            .map_err(|e| e.to_string())?;
+        Ok(chosen.0)
+    }
+}
+
+fn alarms(changes: &[(f64, Change)]) -> Vec<Alarm> {
+    let of = |(t_s, change): &(f64, Change)| Alarm {
+        t_s: *t_s,
+        of_remnant: change.changed() == ["remnant"],
+    };
+    changes.iter().map(of).collect()
+}
+
+/// Sample by sample: what a record does not hold, missing samples and the history of a second
+/// recording.
+fn over_samples(task: &Task, options: &TrackOptions) -> Result<Answer, String> {
+    let span = task.start_record().ok_or("the start span is not all there")?;
+    let mut tracker = Tracker::new(options, Some(&span), task.sample_time).map_err(|e| e.to_string())?;
+    let moves_from = if options.method.covariance().is_none() {
+        task.start_s.1
+    } else {
+        f64::NEG_INFINITY
+    };
+    let (mut answer, mut changes, mut next) = (Answer::default(), Vec::new(), 0);
+    for (k, e, u) in task.samples() {
+        let sample = Sample { e, u, reference: None };
+        let Some(k) = k else {
+            tracker.update(sample, false);
+            continue;
+        };
+        let t_s = task.time_s(k);
+        tracker.update(sample, t_s >= moves_from - task.sample_time.s() / 2.0);
+        changes.extend(tracker.change().map(|change| (t_s, change)));
+        // The last sample before the time, as the rows of a trace have it.
+        while task.asked_s.get(next).is_some_and(|t| task.sample(*t) <= k + 1) {
+            let (covariance, operator) = (tracker.covariance(), tracker.operator().ok());
+            let said = said(task, options, tracker.theta(), covariance.as_deref(), operator.as_ref());
+            answer.said.push(said);
+            next += 1;
+        }
+    }
+    answer.alarms = tracker.change_odds().map(|_| alarms(&changes));
+    Ok(answer)
+}
+
+fn said(
+    task: &Task,
+    options: &TrackOptions,
+    theta: &[f64],
+    covariance: Option<&[f64]>,
+    operator: Option<&hoid_model::uncertainty::OperatorEstimate>,
+) -> Said {
+    let Ok(model) = PolynomialModel::new(options.structure, options.orders, task.sample_time, theta.to_vec()) else {
+        return Said::default();
+    };
+    let each: Vec<_> = task
+        .lines_rad_s
+        .iter()
+        .map(|w| model.response_and_gradient(*w))
+        .collect();
+    let covariance = covariance.map(|c| each.iter().map(|(_, g)| of_complex(g, c)).collect());
+    let parameters = operator.map_or_else(Vec::new, |o| {
+        [
+            ("K_e", o.k_e),
+            ("K_e_dot", o.k_e_dot),
+            ("omega_nm", o.omega_nm_rad_s),
+            ("zeta_nm", o.zeta_nm),
+            ("tau_e", o.tau_e_s),
+        ]
+        .map(|(name, e)| (name, e.value, e.standard_error))
+        .into()
+    });
+    Said {
+        response: each.into_iter().map(|(h, _)| h).collect(),
+        covariance,
+        parameters,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::challenge::{RunOf, Seeds, cases, measure::posed_task};
+
+    fn task(name: &str) -> Task {
+        let case = cases().into_iter().find(|case| case.name == name).unwrap();
+        posed_task(
+            &case,
+            RunOf {
+                seeds: Seeds::Open,
+                number: 2,
+            },
+        )
+    }
+
+    /// Sample by sample is the same as over a record.
+    #[test]
+    fn both_ways_say_the_same() {
+        let task = task("change-K_e_dot-100");
+        for method in [Method::rls(), Method::physical(), Method::adaptive()] {
+            let own = OfMethod(method);
+            let (over_record, options) = (own.follow(&task).unwrap(), own.options(&task).unwrap());
+            let by_sample = over_samples(&task, &options).unwrap();
+            assert_eq!(over_record.alarms, by_sample.alarms, "{}", own.name());
+            assert_eq!(over_record.said.len(), task.asked_s.len());
+            for (a, b) in over_record.said.iter().zip(&by_sample.said) {
+                assert_eq!(a.response, b.response, "{}", own.name());
+            }
+        }
+    }
+
+    #[test]
+    fn missing_samples_are_no_end() {
+        let task = task("none-missing");
+        let answer = OfMethod(Method::physical()).follow(&task).unwrap();
+        assert_eq!(answer.said.len(), task.asked_s.len());
+        assert!(
+            answer
+                .said
+                .iter()
+                .flat_map(|said| &said.response)
+                .all(|h| h.norm().is_finite())
+        );
+    }
+}

@@ -1,0 +1,231 @@
+//! Who acts in a run: seeds and persons.
+//!
+//! Every run has a person of its own, so that no method can know the numbers. Parameters are
+//! uniform over ranges of people (see [`hoid_sim::people`] for the sources), the gain follows from a
+//! crossover that is drawn. A person whose loop is not stable, or rings (`|1/(1 + Y P)|` over 3.5),
+//! before a change, after it or half-way, is drawn again.
+
+use std::{fmt, str::FromStr};
+
+use hoid_model::{Complex64, ModelError, SampleTime, margins::closed_loop_is_stable};
+use hoid_sim::{RunSeed, SimError};
+
+use super::{
+    case::{Case, DelayKnown, Form, Sight},
+    operator::{Operator, Plant},
+};
+
+/// Which runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Seeds {
+    /// Those for making a method.
+    Open,
+    /// Those for its judgement: run once, when it is made.
+    Sealed,
+}
+
+hoid_model::named_choice!(Seeds, "seeds of the challenge", 2, { Open => "open", Sealed => "sealed" });
+
+impl Seeds {
+    /// The seed of all their runs.
+    pub(super) fn seed(self) -> u64 {
+        match self {
+            Self::Open => 2_026_112_201,
+            Self::Sealed => 7_305_118_846_190_275_513,
+        }
+    }
+}
+
+/// A run of a case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RunOf {
+    /// Which seeds.
+    pub seeds: Seeds,
+    /// Its number.
+    pub number: u64,
+}
+
+impl RunOf {
+    /// A stream of the run: those of a case depend on its name alone, so that cases can be added.
+    pub(super) fn stream(self, case: &Case, tag: u64) -> RunSeed {
+        // FNV-1a.
+        let name = case.name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        });
+        RunSeed {
+            seed: self.seeds.seed(),
+            cell: name.wrapping_add(tag),
+            replication: self.number,
+        }
+    }
+}
+
+/// A part of the work, `2/7`: every seventh run from the second on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Portion {
+    index: usize,
+    of: usize,
+}
+
+impl Portion {
+    /// All of it.
+    pub const ALL: Self = Self { index: 1, of: 1 };
+
+    /// True where item i belongs to it.
+    pub fn holds(self, i: usize) -> bool {
+        i % self.of + 1 == self.index
+    }
+}
+
+impl FromStr for Portion {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let read = |(a, b): (&str, &str)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?));
+        match text.split_once('/').and_then(read) {
+            Some((index, of)) if (1..=of).contains(&index) => Ok(Self { index, of }),
+            _ => Err(format!("part {text:?}: expected I/N with 1 <= I <= N, such as 2/7")),
+        }
+    }
+}
+
+impl fmt::Display for Portion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.of)
+    }
+}
+
+/// Draws before a case counts as one that nobody bears.
+const MOST_DRAWS: usize = 2000;
+const NUMBERS: usize = 10;
+/// Largest `|1/(1 + Y P)|`.
+const LARGEST_SENSITIVITY: f64 = 3.5;
+const PERSON: u64 = 1;
+
+/// The person of a run; `attempt` counts those who lost control in the simulation.
+pub(super) fn person(case: &Case, run: RunOf, ts: SampleTime, attempt: usize) -> Result<Operator, SimError> {
+    let numbers = run.stream(case, PERSON).uniform(NUMBERS * MOST_DRAWS);
+    let mut left = attempt;
+    for draw in numbers.chunks_exact(NUMBERS) {
+        let Some(operator) = drawn(case, ts, draw)? else {
+            continue;
+        };
+        if left == 0 {
+            return Ok(operator);
+        }
+        left -= 1;
+    }
+    Err(SimError::NobodyFound {
+        form: format!("{:?} of the case {}", case.form, case.name),
+        plant: format!("{:?}", case.plant),
+        draws: MOST_DRAWS,
+    })
+}
+
+fn drawn(case: &Case, ts: SampleTime, draw: &[f64]) -> Result<Option<Operator>, SimError> {
+    let between = |(low, high): (f64, f64), i: usize| low + (high - low) * draw[i];
+    let (lead, delay, crossover) = match case.plant {
+        Plant::Integrator => ((0.3, 0.7), (0.12, 0.22), (2.0, 4.0)),
+        Plant::Unstable => ((0.3, 0.7), (0.1, 0.16), (2.5, 4.0)),
+        // People's two leads are each as long as the one of a plant of second order.
+        Plant::Lagged if case.form == Form::Lead2Lag => ((0.5, 1.0), (0.14, 0.24), (1.2, 2.5)),
+        Plant::Lagged => ((0.4, 0.9), (0.16, 0.28), (1.5, 2.8)),
+        Plant::DoubleIntegrator => ((0.5, 1.5), (0.16, 0.3), (1.0, 2.2)),
+    };
+    let leads = match case.form {
+        Form::Gain => 0,
+        Form::Lead2Lag => 2,
+        _ => 1,
+    };
+    let has_lag = matches!(case.form, Form::LeadLag | Form::Lead2Lag);
+    let samples = between(delay, 1) / ts.s();
+    let samples = match case.delay {
+        DelayKnown::Whole => samples.round(),
+        DelayKnown::Fraction => samples.floor() + 0.5,
+        DelayKnown::No => samples,
+    };
+    let unit = Operator {
+        gain: 1.0,
+        lead_s: between(lead, 0),
+        leads,
+        lag_s: if has_lag { between((2.0, 8.0), 2) } else { 0.0 },
+        omega_nm_rad_s: between((8.0, 14.0), 3),
+        zeta_nm: between((0.15, 0.55), 4),
+        third_s: if case.form == Form::ThirdOrder {
+            between((0.05, 0.15), 5)
+        } else {
+            0.0
+        },
+        stick_rad_s: if case.form == Form::StickDynamics {
+            between((20.0, 30.0), 6)
+        } else {
+            0.0
+        },
+        tau_e_s: samples * ts.s(),
+    };
+    let at = between(crossover, 7);
+    let gain = 1.0 / (unit.response(at) * case.plant.response(at)).norm();
+    let first = Operator { gain, ..unit };
+    let mut states = vec![first];
+    for shift in &case.shifts {
+        let before = states[states.len() - 1];
+        states.push(before.times(shift.parameter, shift.factor.sqrt()));
+        states.push(before.times(shift.parameter, shift.factor));
+    }
+    // What is held is late by half a sample twice.
+    let late = if case.sight == Sight::Held { ts.s() } else { 0.0 };
+    for state in states {
+        let state = Operator {
+            tau_e_s: state.tau_e_s + late,
+            ..state
+        };
+        if !is_borne(&state, case.plant).map_err(SimError::Model)? {
+            return Ok(None);
+        }
+    }
+    Ok(Some(first))
+}
+
+/// True where the loop is stable and does not ring.
+fn is_borne(operator: &Operator, plant: Plant) -> Result<bool, ModelError> {
+    let sensitivity = |i: i32| {
+        let omega = 0.1 * 10f64.powf(f64::from(i) / 40.0);
+        let open_loop = operator.response(omega) * plant.response(omega);
+        1.0 / (Complex64::from(1.0) + open_loop).norm()
+    };
+    if (0..=100).any(|i| sensitivity(i) > LARGEST_SENSITIVITY) {
+        return Ok(false);
+    }
+    Ok(closed_loop_is_stable(&operator.open_loop(plant)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::challenge::cases;
+
+    #[test]
+    fn somebody_bears_every_case_and_nobody_twice() {
+        for case in cases() {
+            let ts = SampleTime::new(1.0 / case.rate_hz).unwrap();
+            let of = |seeds, number| {
+                let person = person(&case, RunOf { seeds, number }, ts, 0);
+                person.unwrap_or_else(|e| panic!("{}: {e}", case.name))
+            };
+            let (a, b) = (of(Seeds::Open, 0), of(Seeds::Open, 1));
+            assert!(a != b && a != of(Seeds::Sealed, 0), "{}", case.name);
+            assert_eq!(a, of(Seeds::Open, 0));
+        }
+    }
+
+    #[test]
+    fn parts_share_the_work() {
+        let parts: Vec<Portion> = ["1/3", "2/3", "3/3"].map(|t| t.parse().unwrap()).into();
+        for i in 0..20 {
+            assert_eq!(parts.iter().filter(|part| part.holds(i)).count(), 1);
+        }
+        for bad in ["0/3", "4/3", "x", "1"] {
+            assert!(bad.parse::<Portion>().is_err());
+        }
+    }
+}

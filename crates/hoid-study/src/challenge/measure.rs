@@ -1,0 +1,392 @@
+//! What an answer is worth: the line of a contestant in a run.
+//!
+//! The response is asked for at seven lines from .5 to 6 rad/s, at +2, +4, +8, +13, +18 and +28 s
+//! after each change, once before the first, and every 10 s where nobody changes. The error is the
+//! mean of `|dH|/|H|` over the lines; who says nothing, or no number, has the error 1, that of saying
+//! zero. The band of a line covers when real and imaginary part lie within 1.96 standard errors, each
+//! counted by itself.
+
+use std::collections::BTreeMap;
+
+use hoid_model::Complex64;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    case::{Blemish, Case},
+    contestant::{Answer, Contestant, Said, Task},
+    draw::RunOf,
+    oracle::{batch, evidence},
+    simulate::{Run, Truth, simulate},
+};
+
+/// Seconds after a change at which the response is asked for.
+pub const AFTER_S: [f64; 6] = [2.0, 4.0, 8.0, 13.0, 18.0, 28.0];
+/// Lines, rad/s: seven from .5 to 6 on a logarithmic scale.
+const LINES: usize = 7;
+const LINES_RAD_S: (f64, f64) = (0.5, 6.0);
+/// Seconds before the first change at which it is asked for.
+const BEFORE_S: f64 = 0.5;
+/// Seconds between two where nobody changes, and times of its own of the long case.
+const STEADY_S: f64 = 10.0;
+const LONG_S: [f64; 4] = [60.0, 120.0, 200.0, 300.0];
+/// Largest error that is kept: a response that runs away counts as this.
+const LARGEST: f64 = 10.0;
+const STUDENT: f64 = 1.96;
+/// An alarm up to so long after a change is not false; one up to [`FOUND_S`] has found it.
+const OF_CHANGE_S: f64 = 12.0;
+/// The seconds within which a change is to be found.
+pub const FOUND_S: [f64; 2] = [5.0, 8.0];
+
+/// The name of the batch fit that knows the changes.
+pub const BATCH: &str = "batch (oracle)";
+
+/// A contestant in a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Line {
+    /// The case.
+    pub case: String,
+    /// Its number in the seeds.
+    pub run: u64,
+    /// The contestant.
+    pub method: String,
+    /// Why it could not follow.
+    pub failed: Option<String>,
+    /// What it said at each time.
+    pub moments: Vec<Moment>,
+    /// Alarms that no change explains; none for one that declares none.
+    pub false_alarms: Option<usize>,
+    /// Those among them that are said to be of the remnant alone.
+    pub of_remnant: usize,
+    /// Seconds in which an alarm is false.
+    pub exposed_s: f64,
+    /// The changes.
+    pub changes: Vec<Found>,
+    /// What speaks against the result.
+    pub findings: Vec<String>,
+}
+
+/// What was said at a time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Moment {
+    /// `+8` after a change, `before`, `steady`, or the time of the long case.
+    pub label: String,
+    /// When, s.
+    pub t_s: f64,
+    /// Mean of |dH|/|H|.
+    pub error: f64,
+    /// Bands of the response that hold the truth, and all.
+    pub covered: [usize; 2],
+    /// Relative error of each parameter, and whether its band holds the truth.
+    pub parameters: BTreeMap<String, (f64, Option<bool>)>,
+}
+
+/// A change, and whether it was found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Found {
+    /// When it began, s.
+    pub at_s: f64,
+    /// Logarithm of the true likelihood ratio within 5 and 8 s.
+    pub evidence: [f64; 2],
+    /// Seconds to the first alarm, where there is one within 8 s.
+    pub after_s: Option<f64>,
+}
+
+/// The lines of the response, rad/s.
+pub(super) fn lines_rad_s() -> Vec<f64> {
+    let (low, high) = LINES_RAD_S;
+    let of = |i: usize| low * (high / low).powf(i as f64 / (LINES - 1) as f64);
+    (0..LINES).map(of).collect()
+}
+
+/// Times that are asked for, each with its label.
+pub(super) fn asked(changes_s: &[f64], start_s: f64, length_s: f64, is_long: bool) -> Vec<(String, f64)> {
+    let mut all = Vec::new();
+    let steady = |from: f64| {
+        let count = ((length_s - from) / STEADY_S + 1e-9) as usize;
+        (1..=count).map(move |i| ("steady".to_owned(), from + STEADY_S * i as f64))
+    };
+    match changes_s.first() {
+        None if is_long => all.extend(LONG_S.map(|t| (format!("{t:.0} s"), t))),
+        None => all.extend(steady(start_s)),
+        Some(first) if first - BEFORE_S >= start_s => all.push(("before".to_owned(), first - BEFORE_S)),
+        Some(_) => {}
+    }
+    for (i, change) in changes_s.iter().enumerate() {
+        let next = changes_s.get(i + 1).copied().unwrap_or(length_s);
+        let times = AFTER_S.map(|after| (format!("+{after:.0}"), change + after));
+        all.extend(times.into_iter().filter(|(_, t)| *t <= next && *t >= start_s));
+    }
+    all
+}
+
+/// A run with what is asked of it.
+pub struct Posed {
+    case: Case,
+    number: u64,
+    run: Run,
+    task: Task,
+    labels: Vec<String>,
+    /// Changes that have a moment.
+    changes: Vec<Found>,
+}
+
+impl Posed {
+    /// The run of a case.
+    ///
+    /// # Errors
+    /// Where nobody bears the case.
+    pub fn new(case: &Case, of: RunOf) -> Result<Self, String> {
+        let run = simulate(case, of).map_err(|e| e.to_string())?;
+        let changes_s = if case.changes_at_once() {
+            case.changes_s()
+        } else {
+            Vec::new()
+        };
+        let start_s = case.start_s();
+        let asked = asked(&changes_s, start_s.1, case.length_s, case.length_s > 200.0);
+        let (labels, asked_s) = asked.into_iter().unzip();
+        let changes = (changes_s.iter().enumerate())
+            .map(|(i, at_s)| Found {
+                at_s: *at_s,
+                evidence: FOUND_S.map(|seconds| evidence(case, &run, i, seconds)),
+                after_s: None,
+            })
+            .collect();
+        let task = Task {
+            sample_time: run.sample_time,
+            e: run.e.clone(),
+            u: run.u.clone(),
+            label: format!("{} {}", case.name, of.number),
+            start_s,
+            nk: run.truth.told_nk(),
+            lines_rad_s: lines_rad_s(),
+            asked_s,
+            seam: None,
+        };
+        Ok(Self {
+            case: case.clone(),
+            number: of.number,
+            run,
+            task,
+            labels,
+            changes,
+        })
+    }
+
+    /// The line of a contestant.
+    pub fn line(&self, contestant: &dyn Contestant) -> Line {
+        let mut line = self.measured(contestant.name(), contestant.follow(&self.task));
+        if !self.case.changes_at_once() {
+            // While somebody changes slowly an alarm is neither false nor late.
+            (line.false_alarms, line.exposed_s, line.of_remnant) = (None, 0.0, 0);
+        }
+        line
+    }
+
+    /// The line of the batch fit that knows the changes.
+    pub fn batch(&self) -> Line {
+        let changes_s: Vec<f64> = self.changes.iter().map(|change| change.at_s).collect();
+        let tau_e_s = self.run.truth.operator(0.0).tau_e_s;
+        let answer = Answer {
+            said: batch(&self.task, &changes_s, tau_e_s),
+            ..Answer::default()
+        };
+        self.measured(BATCH.to_owned(), Ok(answer))
+    }
+
+    fn measured(&self, method: String, answer: Result<Answer, String>) -> Line {
+        let truth = &self.run.truth;
+        let at = |omega: f64, t_s: f64| truth.response(omega, t_s);
+        let mut line = scored(&self.task, &self.labels, &at, method, answer, &self.changes);
+        (line.case, line.run) = (self.case.name.clone(), self.number);
+        // Parameters have names where the operator is that of the reference text, as it was recorded.
+        let named = truth.operator(0.0).is_lead() && !matches!(self.case.blemish, Blemish::Polarity(_));
+        for moment in &mut line.moments {
+            match named {
+                true => with_truth(&mut moment.parameters, truth, moment.t_s),
+                false => moment.parameters.clear(),
+            }
+        }
+        line
+    }
+}
+
+/// Turns values and bands into errors: `(value, None)` and the name with ` se` are what
+/// [`scored`] leaves.
+fn with_truth(parameters: &mut BTreeMap<String, (f64, Option<bool>)>, truth: &Truth, t_s: f64) {
+    let said = std::mem::take(parameters);
+    for (name, value) in truth.operator(t_s).named() {
+        let Some((found, _)) = said.get(name) else { continue };
+        let covered = said
+            .get(&format!("{name} se"))
+            .map(|(error, _)| (found - value).abs() <= STUDENT * error);
+        let error = ((found - value) / value).abs();
+        if error.is_finite() {
+            parameters.insert(name.to_owned(), (error.min(LARGEST), covered));
+        }
+    }
+}
+
+/// The line of an answer against a true response; parameters are left as they were said.
+pub(super) fn scored(
+    task: &Task,
+    labels: &[String],
+    truth: &dyn Fn(f64, f64) -> Complex64,
+    method: String,
+    answer: Result<Answer, String>,
+    changes: &[Found],
+) -> Line {
+    let (answer, failed) = match answer {
+        Ok(answer) => (answer, None),
+        Err(reason) => (Answer::default(), Some(reason)),
+    };
+    let nothing = Said::default();
+    let moments = (labels.iter().zip(&task.asked_s).enumerate())
+        .map(|(i, (label, t_s))| {
+            let said = answer.said.get(i).unwrap_or(&nothing);
+            let truths: Vec<Complex64> = task.lines_rad_s.iter().map(|omega| truth(*omega, *t_s)).collect();
+            let (error, covered) = of_response(said, &truths);
+            let mut parameters = BTreeMap::new();
+            for (name, value, standard_error) in &said.parameters {
+                parameters.insert((*name).to_owned(), (*value, None));
+                if let Some(s) = standard_error {
+                    parameters.insert(format!("{name} se"), (*s, None));
+                }
+            }
+            Moment {
+                label: label.clone(),
+                t_s: *t_s,
+                error,
+                covered,
+                parameters,
+            }
+        })
+        .collect();
+    let length_s = task.time_s(task.e.len());
+    let from = task.start_s.1;
+    let of_change = |t: f64| changes.iter().any(|c| t >= c.at_s && t < c.at_s + OF_CHANGE_S);
+    let step = 0.01;
+    let exposed = (0..((length_s - from) / step) as usize).filter(|i| !of_change(from + step * *i as f64));
+    let exposed_s = exposed.count() as f64 * step;
+    let mut found = changes.to_vec();
+    for change in &mut found {
+        let own = |t: f64| t >= change.at_s && t <= change.at_s + FOUND_S[1];
+        let first = (answer.alarms.iter().flatten()).find(|alarm| !alarm.of_remnant && own(alarm.t_s));
+        change.after_s = first.map(|alarm| alarm.t_s - change.at_s);
+    }
+    let false_ones = |alarms: &Vec<super::contestant::Alarm>| {
+        let outside = alarms.iter().filter(|a| a.t_s >= from && !of_change(a.t_s));
+        let of_remnant = outside.clone().filter(|a| a.of_remnant).count();
+        (outside.count(), of_remnant)
+    };
+    let counted = answer.alarms.as_ref().map(false_ones);
+    Line {
+        case: String::new(),
+        run: 0,
+        method,
+        failed,
+        moments,
+        false_alarms: counted.map(|(all, of_remnant)| all - of_remnant),
+        of_remnant: counted.map_or(0, |(_, of_remnant)| of_remnant),
+        exposed_s,
+        changes: found,
+        findings: answer.findings,
+    }
+}
+
+/// Mean of |dH|/|H|, bands that hold and all.
+fn of_response(said: &Said, truths: &[Complex64]) -> (f64, [usize; 2]) {
+    if said.response.len() != truths.len() {
+        return (1.0, [0, 0]);
+    }
+    let each = said.response.iter().zip(truths);
+    let error = each.map(|(h, truth)| (h - truth).norm() / truth.norm()).sum::<f64>() / truths.len() as f64;
+    let error = if error.is_finite() { error.min(LARGEST) } else { LARGEST };
+    let mut covered = [0, 0];
+    for ((h, truth), c) in said.response.iter().zip(truths).zip(said.covariance.iter().flatten()) {
+        let d = h - truth;
+        for (distance, variance) in [(d.re, c[0]), (d.im, c[1])] {
+            covered[0] += usize::from(distance.abs() <= STUDENT * variance.sqrt());
+            covered[1] += 1;
+        }
+    }
+    (error, covered)
+}
+
+/// What is asked in a run, for tests of contestants.
+#[cfg(test)]
+pub(super) fn posed_task(case: &Case, of: RunOf) -> Task {
+    Posed::new(case, of).unwrap_or_else(|e| panic!("{e}")).task
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::challenge::contestant::Alarm;
+
+    #[test]
+    fn what_is_asked_lies_between_changes() {
+        let all = asked(&[45.0], 30.0, 90.0, false);
+        let labels: Vec<&str> = all.iter().map(|(l, _)| l.as_str()).collect();
+        assert_eq!(labels, ["before", "+2", "+4", "+8", "+13", "+18", "+28"]);
+        let six = asked(&[40.0, 52.0], 30.0, 120.0, false);
+        assert_eq!(six.iter().filter(|(l, _)| l == "+8").count(), 2);
+        assert_eq!(six.iter().filter(|(l, _)| l == "+13").count(), 1);
+        assert_eq!(asked(&[], 30.0, 90.0, false).len(), 6);
+        assert!(asked(&[15.0], 30.0, 90.0, false).iter().all(|(_, t)| *t >= 30.0));
+    }
+
+    struct Says(Answer);
+
+    impl Contestant for Says {
+        fn name(&self) -> String {
+            "says".to_owned()
+        }
+
+        fn follow(&self, _: &Task) -> Result<Answer, String> {
+            Ok(self.0.clone())
+        }
+    }
+
+    /// The truth itself has no error, and its alarm is the one that is found.
+    #[test]
+    fn the_truth_has_no_error_and_silence_has_the_error_one() {
+        let case = super::super::cases()
+            .into_iter()
+            .find(|c| c.name == "change-K_e_dot-100")
+            .unwrap();
+        let posed = Posed::new(
+            &case,
+            RunOf {
+                seeds: crate::challenge::Seeds::Open,
+                number: 0,
+            },
+        )
+        .unwrap();
+        let alarm = |t_s| Alarm { t_s, of_remnant: false };
+        let said = (posed.task.asked_s.iter())
+            .map(|t| {
+                let lines = posed.task.lines_rad_s.iter();
+                let response: Vec<Complex64> = lines.map(|w| posed.run.truth.response(*w, *t)).collect();
+                Said {
+                    covariance: Some(vec![[1e-12, 1e-12, 0.0]; response.len()]),
+                    response,
+                    parameters: vec![("K_e", posed.run.truth.operator(*t).gain, Some(0.1))],
+                }
+            })
+            .collect();
+        let answer = Answer {
+            said,
+            alarms: Some(vec![alarm(33.0), alarm(48.5), alarm(56.0), alarm(80.0)]),
+            findings: Vec::new(),
+        };
+        let line = posed.line(&Says(answer));
+        assert!(line.moments.iter().all(|m| m.error < 1e-12 && m.covered == [14, 14]));
+        assert!(line.moments.iter().all(|m| m.parameters["K_e"].1 == Some(true)));
+        assert_eq!(line.changes[0].after_s, Some(3.5));
+        assert_eq!(line.false_alarms, Some(2));
+        assert!((line.exposed_s - 48.0).abs() < 0.05, "{}", line.exposed_s);
+        let silent = posed.line(&Says(Answer::default()));
+        assert!(silent.moments.iter().all(|m| m.error == 1.0) && silent.false_alarms.is_none());
+    }
+}

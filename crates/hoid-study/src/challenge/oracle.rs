@@ -1,0 +1,166 @@
+//! What could be known: bounds that no method can be asked to pass.
+//!
+//! **Evidence of a change.** The logarithm of the likelihood ratio of the true model after a change
+//! against the true model before it, the change's time, the remnant's spectrum, density and course
+//! known: `sum over k of log f(A n/s) - log f(A (n + delta)/s)`, n the remnant, delta the response of
+//! the person now less that of the person of before to the same errors, A the whitening filter. Over
+//! 12 a change is certain: no test at one false alarm an hour misses it but by its own fault. It is
+//! computed before stick and recorder, where the model is exact.
+//!
+//! **The batch fit that knows the change.** Box-Jenkins by the prediction error method with the true
+//! delay and a noise model of order 4 on everything since the last change: it uses every sample, and
+//! its errors are what the same data give once nothing has to be followed.
+
+use hoid_ident::Estimator;
+use hoid_model::{Orders, Structure};
+
+use super::{
+    case::Case,
+    contestant::{Said, Task, of_complex},
+    noise::density,
+    simulate::Run,
+};
+
+/// Logarithm of the likelihood ratio from which a change is certain.
+pub const CERTAIN: f64 = 12.0;
+/// Least course of the strength: at a zero of the error the remnant would say everything.
+const LEAST_LEVEL: f64 = 0.05;
+/// Order of the noise model of the batch fit, and the least seconds that it takes.
+const ND: usize = 4;
+const LEAST_S: f64 = 7.5;
+
+/// Logarithm of the likelihood ratio over some seconds since a change, by its number.
+pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
+    let hidden = &run.hidden;
+    let Some((first, before)) = hidden.before.get(change) else {
+        return 0.0;
+    };
+    let end = (first + (seconds / run.sample_time.s()).round() as usize).min(hidden.n.len());
+    let density = density(case.course, run.sample_time.s());
+    let log = |w: f64| {
+        let each = density.iter().map(|(p, v)| p / v.sqrt() * (-0.5 * w * w / v).exp());
+        // Where all underflow the widest decides.
+        let widest = density.iter().map(|(_, v)| *v).fold(0.0, f64::max);
+        each.sum::<f64>().ln().max(-0.5 * w * w / widest - 20.0)
+    };
+    let delta = |k: usize| {
+        if k < *first {
+            0.0
+        } else {
+            hidden.response[k] - before[k - first]
+        }
+    };
+    (*first..end)
+        .map(|k| {
+            let scale = hidden.innovation * hidden.level[k].max(LEAST_LEVEL);
+            let (mut now, mut old) = (0.0, 0.0);
+            for (lag, a) in hidden.whitening.iter().enumerate().take(k + 1) {
+                now += a * hidden.n[k - lag];
+                old += a * (hidden.n[k - lag] + delta(k - lag));
+            }
+            log(now / scale) - log(old / scale)
+        })
+        .sum()
+}
+
+/// What the batch fit says at the times that are asked for, `changes_s` known; nothing where it has
+/// too few seconds or fails.
+pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<Said> {
+    let nk = (tau_e_s / task.sample_time.s()).round() as usize + 1;
+    let structure = Structure::BoxJenkins;
+    let orders = Orders {
+        nd: ND,
+        ..structure.operator_orders(nk)
+    };
+    let estimator = Estimator::new(structure, orders);
+    let at = |t_s: &f64| -> Option<Said> {
+        // What changes takes half a second.
+        let from = (changes_s.iter().rev().find(|c| *c < t_s)).map_or(task.start_s.0, |c| c + 0.5);
+        if t_s - from < LEAST_S {
+            return None;
+        }
+        let fit = estimator
+            .fit(&[task.span(task.sample(from), task.sample(*t_s))?])
+            .ok()?;
+        let each: Vec<_> = (task.lines_rad_s.iter())
+            .map(|omega| fit.model().response_and_gradient(*omega))
+            .collect();
+        let covariance = (fit.covariance()).map(|c| each.iter().map(|(_, g)| of_complex(g, c)).collect());
+        let operator = fit.operator().ok();
+        let parameters = operator.map_or_else(Vec::new, |o| {
+            [
+                ("K_e", o.k_e),
+                ("K_e_dot", o.k_e_dot),
+                ("omega_nm", o.omega_nm_rad_s),
+                ("zeta_nm", o.zeta_nm),
+            ]
+            .map(|(name, e)| (name, e.value, e.standard_error))
+            .into()
+        });
+        Some(Said {
+            response: each.into_iter().map(|(h, _)| h).collect(),
+            covariance,
+            parameters,
+        })
+    };
+    task.asked_s.iter().map(|t_s| at(t_s).unwrap_or_default()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::challenge::{RunOf, Seeds, cases, simulate};
+
+    fn found(name: &str, seconds: f64) -> f64 {
+        let case = cases().into_iter().find(|case| case.name == name).unwrap();
+        let run = simulate(
+            &case,
+            RunOf {
+                seeds: Seeds::Open,
+                number: 1,
+            },
+        )
+        .unwrap();
+        evidence(&case, &run, 0, seconds)
+    }
+
+    #[test]
+    fn a_large_change_is_certain_a_small_one_is_not() {
+        let (large, small) = (found("change-K_e_dot-100", 8.0), found("change-zeta-10", 8.0));
+        assert!(large > CERTAIN && small < CERTAIN && large > small, "{large} {small}");
+    }
+
+    /// The mean of the logarithm is the divergence, half the power of the whitened difference over
+    /// the variance; over runs it scatters by the root of twice that.
+    #[test]
+    fn the_evidence_of_a_normal_remnant_is_half_the_power_of_the_difference() {
+        let case = cases().into_iter().find(|case| case.name == "change-omega-30").unwrap();
+        let (mut sum, mut expected) = (0.0, 0.0);
+        for number in 0..6 {
+            let run = simulate(
+                &case,
+                RunOf {
+                    seeds: Seeds::Open,
+                    number,
+                },
+            )
+            .unwrap();
+            let (first, before) = &run.hidden.before[0];
+            let delta = |k: usize| {
+                if k < *first {
+                    0.0
+                } else {
+                    run.hidden.response[k] - before[k - first]
+                }
+            };
+            sum += evidence(&case, &run, 0, 8.0);
+            for k in *first..first + 800 {
+                let each = run.hidden.whitening.iter().enumerate();
+                let w: f64 = each.map(|(lag, a)| a * delta(k - lag)).sum();
+                expected += 0.5 * (w / run.hidden.innovation).powi(2);
+            }
+        }
+        let scatter = (2.0_f64 * expected).sqrt();
+        assert!((sum - expected).abs() < 4.0 * scatter, "{sum} {expected} {scatter}");
+    }
+}

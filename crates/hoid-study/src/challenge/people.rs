@@ -1,0 +1,329 @@
+//! The same measures on recorded people.
+//!
+//! Trials of one person, each 40 s behind its ramp at 60 Hz, are joined: one on `1/s` to one on
+//! `1/(s(s+1))` and the other way round, a change of the plant and so of the person at 40 s, and two
+//! of one plant, a seam without a change. The second trial brings its own ramp as history
+//! ([`Seam`]): no filter jumps. Single trials are time without a change. The truth is the person's
+//! average describing function over their other trials on that plant, at the seven lowest lines of
+//! the disturbance: `sum U conj(D) / sum E conj(D)` over trials of two whole periods. Nothing is told
+//! of the delay. The control of a row was read a sample before it was written: e(k) stands beside
+//! u(k+1).
+//!
+//! The recordings are not part of the project.
+
+use std::{collections::BTreeMap, f64::consts::TAU, path::Path};
+
+use hoid_io::{ReadOptions, read_record};
+use hoid_model::{Complex64, SampleTime};
+use rayon::prelude::*;
+
+use super::{
+    contestant::{Contestant, Seam, Task},
+    draw::Portion,
+    measure::{Found, Line, asked, scored},
+    run::{chosen_contestants, kept, refused},
+};
+use crate::StudyError;
+
+/// Seconds of the ramp, of a trial behind it, and of a period.
+const RAMP_S: f64 = 5.0;
+const TRIAL_S: f64 = 40.0;
+const PERIOD_S: f64 = 20.0;
+/// The lines, multiples of 1/period.
+const MULTIPLES: [f64; 7] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0];
+const RATE_HZ: f64 = 60.0;
+/// Start spans of joined trials and of single ones, s.
+const START_S: (f64, f64) = (5.0, 30.0);
+const SINGLE_START_S: (f64, f64) = (5.0, 20.0);
+
+/// The change of the plant is known: its evidence is not computed.
+const SURE: f64 = 1e9;
+
+/// What is to be run.
+#[derive(Debug, Clone)]
+pub struct PeopleOptions {
+    /// Directory of the recordings.
+    pub recordings: std::path::PathBuf,
+    /// Directory of the lines.
+    pub directory: std::path::PathBuf,
+    /// Joined records of each kind and person at most.
+    pub runs: usize,
+    /// Kinds: `fo-so`, `so-fo`, `fo-fo`, `so-so`, `fo`, `so`; none for all.
+    pub kinds: Vec<String>,
+    /// Names of contestants; none for all.
+    pub methods: Vec<String>,
+    /// Part of the runs.
+    pub portion: Portion,
+}
+
+/// A trial: e and u with the ramp, and what they have at the lines behind it.
+struct Trial {
+    e: Vec<f64>,
+    u: Vec<f64>,
+    /// `U conj(D)` and `E conj(D)` at each line.
+    products: Vec<[Complex64; 2]>,
+}
+
+/// The trials of a person on a plant.
+type Cells = BTreeMap<(String, String), Vec<Trial>>;
+
+/// Runs what is not there yet.
+///
+/// # Errors
+/// [`StudyError`] for recordings that cannot be read, names that are none, files.
+pub fn challenge_people(options: &PeopleOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, StudyError> {
+    let cells = read_all(&options.recordings)?;
+    let (contestants, _) = chosen_contestants(&options.methods)?;
+    let mut all = Vec::new();
+    for (person, plant) in cells.keys() {
+        let count = cells[&(person.clone(), plant.clone())].len();
+        let other = if plant == "fo" { "so" } else { "fo" };
+        let others = cells.get(&(person.clone(), other.to_owned())).map_or(0, Vec::len);
+        for i in 0..count {
+            if i < others {
+                all.push(Joined::new(person, plant, i, Some((other, i))));
+            }
+            if i % 2 == 0 && i + 1 < count {
+                all.push(Joined::new(person, plant, i, Some((plant, i + 1))));
+            }
+            all.push(Joined::new(person, plant, i, None));
+        }
+    }
+    all.retain(|j| (options.kinds.is_empty() || options.kinds.contains(&j.kind())) && j.number() < options.runs);
+    let own: Vec<Joined> = (all.into_iter().enumerate())
+        .filter(|(i, _)| options.portion.holds(*i))
+        .map(|(_, joined)| joined)
+        .collect();
+    let lines: Vec<Vec<Line>> = own
+        .into_par_iter()
+        .map(|joined| {
+            let folder = options
+                .directory
+                .join("people")
+                .join(&joined.person)
+                .join(joined.kind());
+            let lines = kept(&folder, joined.first.1 as u64, &contestants, false, &mut || {
+                let posed = joined.posed(&cells)?;
+                Ok(Box::new(move |contestant: Option<&dyn Contestant>| {
+                    posed.line(contestant)
+                }))
+            });
+            each(&format!("{} {} {}", joined.person, joined.kind(), joined.first.1));
+            lines
+        })
+        .collect::<Result<_, _>>()?;
+    Ok(lines.concat())
+}
+
+fn read_all(directory: &Path) -> Result<Cells, StudyError> {
+    let mut names = hoid_io::file_names(directory)?;
+    names.sort();
+    let mut cells = Cells::new();
+    let options = ReadOptions {
+        input: Some("r-y".parse().map_err(|e| refused(format!("{e}")))?),
+        ..ReadOptions::default()
+    };
+    for name in names.iter().filter(|name| name.ends_with("_d_only.csv")) {
+        let mut parts = name.split('_');
+        let (Some(person), Some(plant)) = (parts.next(), parts.next()) else {
+            continue;
+        };
+        let record = read_record(&directory.join(name), &options)?.record;
+        let own = Trial::new(record.input(), record.output(), record.channel("d")).ok_or_else(|| {
+            refused(format!(
+                "{name} is no trial of {} s with the column d",
+                RAMP_S + TRIAL_S
+            ))
+        })?;
+        cells
+            .entry((person.to_owned(), plant.to_owned()))
+            .or_default()
+            .push(own);
+    }
+    if cells.is_empty() {
+        return Err(refused(format!(
+            "{} holds no trials; expected PERSON_PLANT_NUMBER_d_only.csv",
+            directory.display()
+        )));
+    }
+    Ok(cells)
+}
+
+impl Trial {
+    fn new(e: &[f64], u: &[f64], d: Option<&[f64]>) -> Option<Self> {
+        let (ramp, end) = ((RAMP_S * RATE_HZ) as usize, ((RAMP_S + TRIAL_S) * RATE_HZ) as usize);
+        if e.len() <= end {
+            return None;
+        }
+        let (e, u, d) = (e[..end].to_vec(), u[1..=end].to_vec(), &d?[..end]);
+        let products = MULTIPLES
+            .iter()
+            .map(|multiple| {
+                let turn = |x: &[f64]| -> Complex64 {
+                    let phase = -TAU * multiple / PERIOD_S / RATE_HZ;
+                    let each = x[ramp..].iter().enumerate();
+                    each.map(|(k, x)| Complex64::from_polar(*x, phase * k as f64)).sum()
+                };
+                let of_d = turn(d).conj();
+                [turn(&u) * of_d, turn(&e) * of_d]
+            })
+            .collect();
+        Some(Self { e, u, products })
+    }
+}
+
+/// Which trials make a record: plant and place of the first and of the second.
+struct Joined {
+    person: String,
+    first: (String, usize),
+    second: Option<(String, usize)>,
+}
+
+impl Joined {
+    fn new(person: &str, plant: &str, i: usize, second: Option<(&str, usize)>) -> Self {
+        Self {
+            person: person.to_owned(),
+            first: (plant.to_owned(), i),
+            second: second.map(|(plant, i)| (plant.to_owned(), i)),
+        }
+    }
+
+    fn kind(&self) -> String {
+        match &self.second {
+            Some((second, _)) => format!("{}-{second}", self.first.0),
+            None => self.first.0.clone(),
+        }
+    }
+
+    /// Its place among those of its kind.
+    fn number(&self) -> usize {
+        match &self.second {
+            Some((second, _)) if *second == self.first.0 => self.first.1 / 2,
+            _ => self.first.1,
+        }
+    }
+
+    fn posed(&self, cells: &Cells) -> Result<Posed, StudyError> {
+        let sample_time = SampleTime::new(1.0 / RATE_HZ).map_err(|e| refused(e.to_string()))?;
+        let ramp = (RAMP_S * RATE_HZ) as usize;
+        let cell = |plant: &str| &cells[&(self.person.clone(), plant.to_owned())];
+        let of = |(plant, i): &(String, usize)| &cell(plant)[*i];
+        let first = of(&self.first);
+        let (mut e, mut u) = (first.e[ramp..].to_vec(), first.u[ramp..].to_vec());
+        let seam = self.second.as_ref().map(|second| {
+            let next = of(second);
+            let at = e.len();
+            e.extend_from_slice(&next.e[ramp..]);
+            u.extend_from_slice(&next.u[ramp..]);
+            Seam {
+                at,
+                e: next.e[..ramp].to_vec(),
+                u: next.u[..ramp].to_vec(),
+            }
+        });
+        // The person's response on a plant, without the trials that are in the record.
+        let average = |plant: &str| -> Vec<Complex64> {
+            let used: Vec<usize> = [Some(&self.first), self.second.as_ref()]
+                .into_iter()
+                .flatten()
+                .filter(|(own, _)| own == plant)
+                .map(|(_, i)| *i)
+                .collect();
+            let others = cell(plant).iter().enumerate().filter(|(i, _)| !used.contains(i));
+            let mut sums = [[Complex64::from(0.0); 2]; MULTIPLES.len()];
+            for (_, trial) in others {
+                for (sum, own) in sums.iter_mut().zip(&trial.products) {
+                    *sum = [sum[0] + own[0], sum[1] + own[1]];
+                }
+            }
+            sums.iter().map(|[u, e]| u / e).collect()
+        };
+        let second = self.second.as_ref().unwrap_or(&self.first);
+        let changes = self.second.as_ref().is_some_and(|second| second.0 != self.first.0);
+        let start_s = if self.second.is_some() { START_S } else { SINGLE_START_S };
+        let length_s = e.len() as f64 / RATE_HZ;
+        // A seam is asked about at the same times as a change.
+        let at_s: &[f64] = if self.second.is_some() { &[TRIAL_S] } else { &[] };
+        let (labels, asked_s): (Vec<String>, Vec<f64>) = asked(at_s, start_s.1, length_s, false).into_iter().unzip();
+        let found = Found {
+            at_s: TRIAL_S,
+            evidence: [SURE; 2],
+            after_s: None,
+        };
+        Ok(Posed {
+            case: self.kind(),
+            number: self.first.1 as u64,
+            truths: [average(&self.first.0), average(&second.0)],
+            changes: if changes { vec![found] } else { Vec::new() },
+            labels,
+            task: Task {
+                sample_time,
+                e,
+                u,
+                label: format!("{} {} {}", self.person, self.kind(), self.first.1),
+                start_s,
+                nk: None,
+                lines_rad_s: MULTIPLES.map(|m| m * TAU / PERIOD_S).into(),
+                asked_s,
+                seam,
+            },
+        })
+    }
+}
+
+/// A joined record with what is asked of it.
+struct Posed {
+    case: String,
+    number: u64,
+    task: Task,
+    labels: Vec<String>,
+    changes: Vec<Found>,
+    /// The response at the lines before and after the seam.
+    truths: [Vec<Complex64>; 2],
+}
+
+impl Posed {
+    fn line(&self, contestant: Option<&dyn Contestant>) -> Line {
+        let truth = |omega: f64, t_s: f64| {
+            let at = self
+                .task
+                .lines_rad_s
+                .iter()
+                .position(|line| *line == omega)
+                .unwrap_or(0);
+            self.truths[usize::from(t_s >= TRIAL_S && self.task.seam.is_some())][at]
+        };
+        let (name, answer) = match contestant {
+            Some(contestant) => (contestant.name(), contestant.follow(&self.task)),
+            None => (String::new(), Err("nobody".to_owned())),
+        };
+        let mut line = scored(&self.task, &self.labels, &truth, name, answer, &self.changes);
+        (line.case, line.run) = (self.case.clone(), self.number);
+        line.moments.iter_mut().for_each(|moment| moment.parameters.clear());
+        line
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A trial whose control is its error behind a delay of one sample and a gain: the describing
+    /// function is that gain, the sample is the shift of the recorder.
+    #[test]
+    fn the_describing_function_of_a_gain_is_the_gain() {
+        let n = 2702;
+        let sines = |k: usize, shift: f64| -> f64 {
+            let t = (k as f64 - shift) / RATE_HZ;
+            MULTIPLES.iter().map(|m| (m * TAU / PERIOD_S * t + m).sin()).sum()
+        };
+        let d: Vec<f64> = (0..n).map(|k| sines(k, 0.0)).collect();
+        let e: Vec<f64> = (0..n).map(|k| 0.5 * sines(k, 7.0)).collect();
+        let u: Vec<f64> = (0..n).map(|k| 1.5 * sines(k, 8.0)).collect();
+        let trial = Trial::new(&e, &u, Some(&d)).unwrap();
+        for [u, e] in trial.products {
+            assert!((u / e - 3.0).norm() < 1e-9, "{}", u / e);
+        }
+        assert!(Trial::new(&e[..2000], &u[..2000], Some(&d)).is_none() && Trial::new(&e, &u, None).is_none());
+    }
+}

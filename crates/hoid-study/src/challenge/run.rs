@@ -1,0 +1,230 @@
+//! Runs of the challenge, on all threads, kept on disk.
+//!
+//! Each run of a case is a file, a line of JSON for each contestant. It is written beside and
+//! renamed; what is there is not computed again, so that a challenge can be stopped, go on, take in
+//! another contestant, or be done in parts on several machines. Nothing depends on the number of
+//! threads.
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use super::{
+    case::Case,
+    cases::cases,
+    contestant::Contestant,
+    contestants::contestants,
+    draw::{Portion, RunOf, Seeds},
+    measure::{BATCH, Line, Posed},
+};
+use crate::StudyError;
+
+/// What is to be run.
+#[derive(Debug, Clone)]
+pub struct ChallengeOptions {
+    /// Directory of the lines.
+    pub directory: PathBuf,
+    /// Which seeds.
+    pub seeds: Seeds,
+    /// Runs of each case.
+    pub runs: u64,
+    /// Names of cases, their beginnings (`none-`), or themes; none for all.
+    pub cases: Vec<String>,
+    /// Names of contestants; none for all. `batch` is the batch fit that knows the changes.
+    pub methods: Vec<String>,
+    /// Part of the runs.
+    pub portion: Portion,
+}
+
+/// The contestants of these names, all where there are none, and whether the batch fit is among them.
+///
+/// # Errors
+/// [`StudyError::Plan`] for a name that is none.
+pub(super) fn chosen_contestants(names: &[String]) -> Result<(Vec<Box<dyn Contestant>>, bool), StudyError> {
+    let mut all = contestants();
+    let known: Vec<String> = all.iter().map(|c| c.name()).chain(["batch".to_owned()]).collect();
+    if let Some(unknown) = names.iter().find(|name| !known.contains(name)) {
+        return Err(refused(format!(
+            "no contestant is called {unknown}; there is {}",
+            known.join(", ")
+        )));
+    }
+    all.retain(|c| names.is_empty() || names.contains(&c.name()));
+    Ok((all, names.is_empty() || names.iter().any(|n| n == "batch")))
+}
+
+/// The cases of these names, beginnings or themes; all where there are none.
+///
+/// # Errors
+/// [`StudyError::Plan`] for a name of nothing.
+pub fn chosen_cases(names: &[String]) -> Result<Vec<Case>, StudyError> {
+    let all = cases();
+    let is = |case: &Case, name: &String| {
+        case.name == *name || case.theme.to_string() == *name || name.ends_with('-') && case.name.starts_with(name)
+    };
+    if let Some(unknown) = names.iter().find(|name| !all.iter().any(|case| is(case, name))) {
+        let known: Vec<&str> = all.iter().map(|case| case.name.as_str()).collect();
+        return Err(refused(format!(
+            "no case is called {unknown}; there is {}",
+            known.join(", ")
+        )));
+    }
+    let chosen = all
+        .into_iter()
+        .filter(|case| names.is_empty() || names.iter().any(|name| is(case, name)));
+    Ok(chosen.collect())
+}
+
+pub(super) fn refused(reason: String) -> StudyError {
+    StudyError::Plan {
+        path: "challenge".to_owned(),
+        line: None,
+        reason,
+    }
+}
+
+/// Runs what is not there yet; the lines of all that was chosen, in the order of cases, runs and
+/// contestants. `each` is called after every run.
+///
+/// # Errors
+/// [`StudyError`] for names that are none, files, and cases that nobody bears.
+pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, StudyError> {
+    let cases = chosen_cases(&options.cases)?;
+    let (contestants, batch) = chosen_contestants(&options.methods)?;
+    let all: Vec<(&Case, u64)> = (cases.iter())
+        .flat_map(|case| (0..options.runs).map(move |number| (case, number)))
+        .collect();
+    let own: Vec<_> = (all.into_iter().enumerate())
+        .filter(|(i, _)| options.portion.holds(*i))
+        .map(|(_, item)| item)
+        .collect();
+    let lines: Vec<Vec<Line>> = own
+        .into_par_iter()
+        .map(|(case, number)| {
+            let folder = options.directory.join(options.seeds.to_string()).join(&case.name);
+            let lines = kept(&folder, number, &contestants, batch, &mut || {
+                let of = RunOf {
+                    seeds: options.seeds,
+                    number,
+                };
+                let posed = Posed::new(case, of).map_err(refused)?;
+                Ok(Box::new(move |contestant: Option<&dyn Contestant>| match contestant {
+                    Some(contestant) => posed.line(contestant),
+                    None => posed.batch(),
+                }))
+            });
+            each(&format!("{} {number}", case.name));
+            lines
+        })
+        .collect::<Result<_, _>>()?;
+    Ok(lines.concat())
+}
+
+/// Gives the line of a contestant, or of the batch fit.
+pub(super) type LineOf = Box<dyn Fn(Option<&dyn Contestant>) -> Line>;
+
+/// The lines of a run: those of the file, and those that are not there computed and added.
+pub(super) fn kept(
+    folder: &Path,
+    number: u64,
+    contestants: &[Box<dyn Contestant>],
+    batch: bool,
+    pose: &mut dyn FnMut() -> Result<LineOf, StudyError>,
+) -> Result<Vec<Line>, StudyError> {
+    let path = folder.join(format!("{number}.jsonl"));
+    let mut lines = if path.exists() { read(&path)? } else { Vec::new() };
+    let mut wanted: Vec<(String, Option<&dyn Contestant>)> =
+        contestants.iter().map(|c| (c.name(), Some(c.as_ref()))).collect();
+    if batch {
+        wanted.push((BATCH.to_owned(), None));
+    }
+    let missing: Vec<_> = (wanted.iter())
+        .filter(|(name, _)| !lines.iter().any(|line| line.method == *name))
+        .collect();
+    if !missing.is_empty() {
+        let line_of = pose()?;
+        lines.extend(missing.into_iter().map(|(_, contestant)| line_of(*contestant)));
+        write(&path, folder, &lines)?;
+        // As they will be read: the last digit of a number may differ from what was written.
+        lines = read(&path)?;
+    }
+    let of = |(name, _): &(String, _)| lines.iter().find(|line| line.method == *name).cloned();
+    Ok(wanted.iter().filter_map(of).collect())
+}
+
+fn read(path: &Path) -> Result<Vec<Line>, StudyError> {
+    let text = hoid_io::read_text(path)?;
+    let line = |line: &str| {
+        serde_json::from_str(line).map_err(|e| {
+            refused(format!(
+                "{}: {e}; remove the file, and the run is computed again",
+                path.display()
+            ))
+        })
+    };
+    text.lines().map(line).collect()
+}
+
+fn write(path: &Path, folder: &Path, lines: &[Line]) -> Result<(), StudyError> {
+    hoid_io::make_directory(folder)?;
+    let mut text = String::new();
+    for line in lines {
+        text += &serde_json::to_string(line).map_err(|e| refused(e.to_string()))?;
+        text.push('\n');
+    }
+    hoid_io::write_atomically(path, |file| file.write_all(text.as_bytes()))?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn options(directory: &Path) -> ChallengeOptions {
+        ChallengeOptions {
+            directory: directory.to_owned(),
+            seeds: Seeds::Open,
+            runs: 2,
+            cases: vec!["change-K_e_dot-100".to_owned()],
+            methods: vec!["basis-kalman".to_owned(), "chow".to_owned()],
+            portion: Portion::ALL,
+        }
+    }
+
+    /// A run that is there is read, not computed; the lines are the same in any order and with any
+    /// number of threads.
+    #[test]
+    fn what_is_there_is_not_computed_again() {
+        let directory = tempfile::tempdir().unwrap();
+        let usual = options(directory.path());
+        let all = challenge(&usual, &|_| ()).unwrap();
+        assert_eq!(all.len(), 4);
+        assert!(all.iter().all(|line| line.failed.is_none()), "{all:?}");
+        let path = directory.path().join("open/change-K_e_dot-100/0.jsonl");
+        let text = std::fs::read_to_string(&path)
+            .unwrap()
+            .replace("\"exposed_s\":", "\"exposed_s\":1");
+        std::fs::write(&path, text).unwrap();
+        let again = challenge(&usual, &|_| ()).unwrap();
+        assert!(again[0].exposed_s > 100.0 && again[2..] == all[2..]);
+        // One thread, another directory.
+        let other = tempfile::tempdir().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let single = pool.install(|| challenge(&options(other.path()), &|_| ())).unwrap();
+        assert_eq!(single, all);
+    }
+
+    #[test]
+    fn names_are_checked() {
+        assert!(chosen_cases(&["none-".to_owned()]).unwrap().len() > 20);
+        assert_eq!(chosen_cases(&["rates".to_owned()]).unwrap().len(), 5);
+        let refused = chosen_cases(&["nothing".to_owned()]).unwrap_err().to_string();
+        assert!(
+            refused.contains("nothing") && refused.contains("none-lag-1"),
+            "{refused}"
+        );
+        assert!(chosen_contestants(&["oracle".to_owned()]).is_err());
+        let (all, batch) = chosen_contestants(&[]).unwrap();
+        assert!(batch && all.iter().any(|c| c.name() == "chow"));
+    }
+}

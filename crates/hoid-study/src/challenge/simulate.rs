@@ -1,0 +1,664 @@
+//! The loop of a case, simulated step by step in continuous time.
+//!
+//! `e = f - y`, `u = stick(Y e + n)`, `y = P (u + d)`; 15 s of run-in. Operator and plant are
+//! integrated in steps of a millisecond or less ([`Canonical`]); the delay is read from the history
+//! of e, at any fraction of a step: a held error enters each step with its mean over that step, one
+//! that is seen all the time with its values between the steps. Nothing here is shared with the
+//! simulators of [`hoid_sim`] but the random streams.
+//!
+//! Beside the signals a run keeps what only an oracle knows: the remnant, the course of its
+//! strength, the true response, and what the person of before each change would have answered to
+//! the same errors.
+
+use std::f64::consts::TAU;
+
+use hoid_model::{
+    Channel, Complex64, Record, SampleTime,
+    family_scenario::MultiSine,
+    forcing::{ForcingFunction, Sinusoid},
+};
+use hoid_sim::SimError;
+
+use super::{
+    case::{Blemish, Case, Course, DelayKnown, Forcing, Sight},
+    draw::{RunOf, person},
+    noise::Noise,
+    operator::{Canonical, Operator, Plant, hold},
+};
+
+/// A run with all that is true of it.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// Time between two samples.
+    pub sample_time: SampleTime,
+    /// Recorded error; NaN where nothing was recorded.
+    pub e: Vec<f64>,
+    /// Recorded control.
+    pub u: Vec<f64>,
+    /// The disturbance, or the target.
+    pub excitation: Vec<f64>,
+    /// The operator over time.
+    pub truth: Truth,
+    /// What an oracle knows.
+    pub hidden: Hidden,
+}
+
+/// The operator over time.
+#[derive(Debug, Clone)]
+pub struct Truth {
+    first: Operator,
+    case: Case,
+    sample_time: SampleTime,
+}
+
+impl Truth {
+    /// The operator at a time.
+    pub fn operator(&self, t_s: f64) -> Operator {
+        self.case.shifts.iter().fold(self.first, |operator, shift| {
+            let part = ((t_s - shift.at_s) / shift.takes_s).clamp(0.0, 1.0);
+            operator.times(shift.parameter, shift.factor.powf(part))
+        })
+    }
+
+    /// The response from recorded e to recorded u.
+    pub fn response(&self, omega_rad_s: f64, t_s: f64) -> Complex64 {
+        let operator = self.operator(t_s);
+        let response = match self.case.sight {
+            Sight::Held => held(&operator, omega_rad_s, self.sample_time),
+            Sight::Continuous => operator.response(omega_rad_s),
+        };
+        response * self.sign(t_s)
+    }
+
+    /// -1 where u is recorded with the wrong sign.
+    fn sign(&self, t_s: f64) -> f64 {
+        match self.case.blemish {
+            Blemish::Polarity(at_s) if t_s >= at_s => -1.0,
+            _ => 1.0,
+        }
+    }
+
+    /// The operator's delay in samples of `q^-nk`, where it is told: with the one of the hold.
+    pub fn told_nk(&self) -> Option<usize> {
+        let samples = self.first.tau_e_s / self.sample_time.s();
+        match self.case.delay {
+            DelayKnown::No => None,
+            // Rounding of a whole number is none.
+            DelayKnown::Whole | DelayKnown::Fraction => Some((samples + 1e-6).floor() as usize + 1),
+        }
+    }
+}
+
+/// The response between samples of a held error: `sum over m of (Y H)(omega + m 2 pi/Ts)`, H the hold
+/// (Poisson's sum; A. V. Oppenheim and R. W. Schafer, *Discrete-Time Signal Processing*, section 4.2).
+fn held(operator: &Operator, omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
+    let each = (-ALIASES..=ALIASES).map(|m| {
+        let omega = omega_rad_s + f64::from(m) * TAU / sample_time.s();
+        operator.response(omega) * hold(omega, sample_time)
+    });
+    each.sum()
+}
+
+/// Aliases on either side; they fall as the square of their number, or faster.
+const ALIASES: i32 = 100;
+
+/// What only an oracle knows, sample by sample.
+#[derive(Debug, Clone)]
+pub struct Hidden {
+    /// Remnant, before stick and recorder.
+    pub(super) n: Vec<f64>,
+    /// Course s of its strength.
+    pub(super) level: Vec<f64>,
+    /// Response to the error, before stick and recorder, with the recorded sign.
+    pub(super) response: Vec<f64>,
+    /// For each change its first sample, and from there on the response of the person of before.
+    pub(super) before: Vec<(usize, Vec<f64>)>,
+    /// Whitening filter of n over its standard deviation.
+    pub(super) whitening: Vec<f64>,
+    /// Standard deviation of the innovations of n for s = 1.
+    pub(super) innovation: f64,
+}
+
+const RUN_IN_S: f64 = 15.0;
+/// Longest step, s.
+const STEP_S: f64 = 0.001;
+/// Persons who may lose control in the simulation.
+const MOST_ATTEMPTS: usize = 20;
+/// Standard deviations of u beyond which control is lost.
+const LOST: f64 = 30.0;
+
+const NUMBERS: u64 = 2;
+const PHASES: u64 = 3;
+const GLITCHES: u64 = 4;
+const WALK: u64 = 5;
+
+/// A run of a case.
+///
+/// # Errors
+/// [`SimError`] where nobody bears the case.
+pub fn simulate(case: &Case, run: RunOf) -> Result<Run, SimError> {
+    let sample_time = SampleTime::new(1.0 / case.rate_hz)?;
+    let mut outcome = Err(SimError::Diverged {
+        signal: "u",
+        time_s: 0.0,
+        scenario: case.name.clone(),
+    });
+    for attempt in 0..MOST_ATTEMPTS {
+        let operator = person(case, run, sample_time, attempt)?;
+        outcome = of_person(case, run, operator, sample_time);
+        if !matches!(outcome, Err(SimError::Diverged { .. })) {
+            break;
+        }
+    }
+    outcome
+}
+
+fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTime) -> Result<Run, SimError> {
+    let ts = sample_time.s();
+    let run_in = (RUN_IN_S / ts).round() as usize;
+    let samples = (case.length_s / ts).round() as usize;
+    let total = run_in + samples;
+    let time = |k: usize| (k as f64 - run_in as f64) * ts;
+    let truth = Truth {
+        first: operator,
+        case: case.clone(),
+        sample_time,
+    };
+    let lines = forcing(case, run)?;
+    let idle_s = match case.blemish {
+        Blemish::IdleStart(s) => s,
+        _ => f64::NEG_INFINITY,
+    };
+    // One sample more, for what lies between two.
+    let mut excitation = lines.samples(time(0), sample_time, total + 1);
+    for (k, value) in excitation.iter_mut().enumerate() {
+        if time(k) < idle_s {
+            *value = 0.0;
+        }
+    }
+    let [sigma_u, sigma_e] = sizes(&operator, case, &lines);
+    let sigma_n = case.ratio * sigma_u;
+    let numbers = run.stream(case, NUMBERS).uniform(4);
+    let streams = |tag| run.stream(case, tag);
+    let band = [numbers[0], numbers[1], numbers[2]];
+    let mut noise = Noise::new(
+        case.spectrum,
+        case.course,
+        operator.omega_nm_rad_s,
+        band,
+        streams,
+        ts,
+        total + 1,
+    );
+    let (whitening, variance) = noise.whitening();
+    let steps = match case.blemish {
+        Blemish::Drift(_) => run.stream(case, WALK).white_noise(total),
+        _ => Vec::new(),
+    };
+    let stick = |u: f64| match case.blemish {
+        Blemish::Quantised(part) => (u / (part * sigma_u)).round() * part * sigma_u,
+        Blemish::Saturated(at) => u.clamp(-at * sigma_u, at * sigma_u),
+        _ => u,
+    };
+    let mut strength = Strength::new(case, [sigma_u, sigma_e], numbers[3], ts);
+    let changes: Vec<usize> = (case.changes_s().iter())
+        .map(|at_s| run_in + (at_s / ts).round() as usize)
+        .collect();
+    let mut hidden = Hidden {
+        n: Vec::with_capacity(total),
+        level: Vec::with_capacity(total),
+        response: Vec::with_capacity(total),
+        before: Vec::new(),
+        whitening,
+        innovation: variance.sqrt() * sigma_n,
+    };
+    let mut shadows: Vec<(Operator, Canonical)> = Vec::new();
+    let mut world = World::new(case, ts, total);
+    let (mut e, mut u) = (Vec::with_capacity(total), Vec::with_capacity(total));
+    let (mut now, mut walk) = (Held::of(operator), 0.0);
+    let target = case.forcing != Forcing::Disturbance;
+    let mut next_noise = 0.0;
+    for k in 0..total {
+        let t = time(k);
+        if changes.contains(&k) {
+            // The parameters of the sample before: this one is the first that may differ.
+            shadows.push((truth.operator(t - ts), world.operator));
+            hidden.before.push((k, Vec::new()));
+        }
+        let operator = truth.operator(t);
+        if operator != now.operator {
+            now = Held::of(operator);
+        }
+        let error = (if target { excitation[k] } else { 0.0 }) - world.plant.x[0];
+        let level = if t < idle_s { 0.0 } else { strength.of(t, error) };
+        let n = if case.sight == Sight::Held || k == 0 {
+            sigma_n * noise.step(k, level)
+        } else {
+            next_noise
+        } + walk;
+        if case.sight == Sight::Continuous {
+            next_noise = sigma_n * noise.step(k + 1, level);
+        }
+        let response = world.operator.output(&now.numerator);
+        let control = stick(response + n);
+        if !(control.is_finite() && control.abs() < LOST * sigma_u) {
+            return Err(SimError::Diverged {
+                signal: "u",
+                time_s: t,
+                scenario: case.name.clone(),
+            });
+        }
+        strength.follow(control);
+        for ((operator, state), (_, responses)) in shadows.iter().zip(&mut hidden.before) {
+            responses.push(state.output(&operator.numerator()));
+        }
+        let ends = [excitation[k], excitation[k + 1]];
+        let noises = [
+            n,
+            if case.sight == Sight::Held {
+                n
+            } else {
+                next_noise + walk
+            },
+        ];
+        world.sample(&now, &mut shadows, k, error, control, ends, noises, &stick);
+        if let Blemish::Drift(size) = case.blemish {
+            walk += size * sigma_u * ts.sqrt() * steps[k];
+        }
+        hidden.n.push(n);
+        hidden.level.push(level);
+        hidden.response.push(response);
+        e.push(error);
+        u.push(control);
+    }
+    for signal in [&mut e, &mut u, &mut hidden.n, &mut hidden.level, &mut hidden.response] {
+        signal.drain(..run_in);
+    }
+    hidden.before.iter_mut().for_each(|(k, _)| *k -= run_in);
+    excitation.drain(..run_in);
+    excitation.truncate(samples);
+    let mut result = Run {
+        sample_time,
+        e,
+        u,
+        excitation,
+        truth,
+        hidden,
+    };
+    result.recorded(case, run, [sigma_u, sigma_e]);
+    Ok(result)
+}
+
+impl Run {
+    /// What the recorder makes of it.
+    fn recorded(&mut self, case: &Case, run: RunOf, [sigma_u, sigma_e]: [f64; 2]) {
+        let ts = self.sample_time.s();
+        let at = |t_s: f64| ((t_s / ts).round() as usize).min(self.e.len());
+        let gap = at(60.0)..at(63.0);
+        match case.blemish {
+            Blemish::Offset(part) => {
+                self.e.iter_mut().for_each(|e| *e += part * sigma_e);
+                self.u.iter_mut().for_each(|u| *u -= part * sigma_u);
+            }
+            Blemish::Glitches(size) => {
+                let draws = run.stream(case, GLITCHES).uniform(2 * self.u.len());
+                for (u, draw) in self.u.iter_mut().zip(draws.chunks_exact(2)) {
+                    if draw[0] < ts / 50.0 {
+                        *u += size * self.hidden.innovation * if draw[1] < 0.5 { -1.0 } else { 1.0 };
+                    }
+                }
+            }
+            Blemish::Missing | Blemish::Silent => {
+                let value = if case.blemish == Blemish::Missing {
+                    f64::NAN
+                } else {
+                    0.0
+                };
+                self.e[gap.clone()].fill(value);
+                self.u[gap].fill(value);
+            }
+            Blemish::Polarity(at_s) => {
+                let from = at(at_s);
+                let Hidden { n, response, .. } = &mut self.hidden;
+                for signal in [&mut self.u, n, response] {
+                    signal[from..].iter_mut().for_each(|u| *u = -*u);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Recorded e and u as a record, where all of it was recorded; the excitation is the channel
+    /// `excitation`.
+    pub fn record(&self) -> Option<Record> {
+        let channel = |name: &str, values: &[f64]| Channel::new(name, "", values.to_vec());
+        let record = Record::new(self.sample_time, channel("e", &self.e), channel("u", &self.u)).ok()?;
+        record.with_channel(channel("excitation", &self.excitation)).ok()
+    }
+}
+
+/// An operator with its polynomials.
+struct Held {
+    operator: Operator,
+    numerator: Vec<f64>,
+    denominator: Vec<f64>,
+}
+
+impl Held {
+    fn of(operator: Operator) -> Self {
+        Self {
+            operator,
+            numerator: operator.numerator(),
+            denominator: operator.denominator(),
+        }
+    }
+}
+
+/// States and the history of the error.
+struct World {
+    operator: Canonical,
+    plant: Canonical,
+    element: Plant,
+    sight: Sight,
+    disturbed: bool,
+    ts: f64,
+    /// Steps in a sample.
+    steps: usize,
+    /// The error of each sample (held), or of each step.
+    errors: Vec<f64>,
+}
+
+impl World {
+    fn new(case: &Case, ts: f64, total: usize) -> Self {
+        let steps = (ts / STEP_S - 1e-9).ceil().max(1.0) as usize;
+        let each = if case.sight == Sight::Held { 1 } else { steps };
+        Self {
+            operator: Canonical::at_rest(),
+            plant: Canonical::at_rest(),
+            element: case.plant,
+            sight: case.sight,
+            disturbed: case.forcing == Forcing::Disturbance,
+            ts,
+            steps,
+            errors: Vec::with_capacity(total * each),
+        }
+    }
+
+    /// From sample k to the next: `error` and `control` at its start, excitation and remnant at its
+    /// start and end.
+    #[allow(clippy::too_many_arguments)]
+    fn sample(
+        &mut self,
+        now: &Held,
+        shadows: &mut [(Operator, Canonical)],
+        k: usize,
+        error: f64,
+        control: f64,
+        excitation: [f64; 2],
+        noise: [f64; 2],
+        stick: &dyn Fn(f64) -> f64,
+    ) {
+        let h = self.ts / self.steps as f64;
+        let element = self.element.denominator();
+        let between = |ends: [f64; 2], i: usize| ends[0] + (ends[1] - ends[0]) * i as f64 / self.steps as f64;
+        let mut u = control;
+        for i in 0..self.steps {
+            let [f, d] = if self.disturbed { [0.0, 1.0] } else { [1.0, 0.0] };
+            match self.sight {
+                Sight::Held if i == 0 => self.errors.push(error),
+                Sight::Held => {}
+                Sight::Continuous => self.errors.push(f * between(excitation, i) - self.plant.x[0]),
+            }
+            let place = (k * self.steps + i) as f64;
+            let input = self.input(place - now.operator.tau_e_s / h);
+            self.operator.advance(&now.denominator, input, h);
+            for (operator, state) in shadows.iter_mut() {
+                let input = self.input(place - operator.tau_e_s / h);
+                state.advance(&operator.denominator(), input, h);
+            }
+            let next = match self.sight {
+                Sight::Held => control,
+                Sight::Continuous => stick(self.operator.output(&now.numerator) + between(noise, i + 1)),
+            };
+            let force = match self.sight {
+                Sight::Held => [d * excitation[0]; 2],
+                Sight::Continuous => [d * between(excitation, i), d * between(excitation, i + 1)],
+            };
+            let ends = [u + force[0], next + force[1]];
+            self.plant
+                .advance(element, [ends[0], 0.5 * (ends[0] + ends[1]), ends[1]], h);
+            u = next;
+        }
+    }
+
+    /// What reaches the operator at start, middle and end of the step that begins at a place, in steps.
+    fn input(&self, place: f64) -> [f64; 3] {
+        match self.sight {
+            Sight::Held => [self.mean_held(place); 3],
+            Sight::Continuous => [0.0, 0.5, 1.0].map(|part| self.seen(place + part)),
+        }
+    }
+
+    /// Mean of the held error over the step that begins at a place, in steps.
+    fn mean_held(&self, place: f64) -> f64 {
+        let n = self.steps as f64;
+        let (first, last) = (place / n, (place + 1.0) / n);
+        let value = |sample: f64| {
+            if sample < 0.0 {
+                0.0
+            } else {
+                self.errors.get(sample as usize).copied().unwrap_or(0.0)
+            }
+        };
+        // A place on the border but for rounding is on it.
+        let edge = (first + 1.0 - 1e-9).floor();
+        if edge >= last || edge <= first {
+            return value(first + 1e-9);
+        }
+        let part = (edge - first) * n;
+        part * value(first) + (1.0 - part) * value(edge)
+    }
+
+    /// The error at a place, in steps.
+    fn seen(&self, place: f64) -> f64 {
+        if place < 0.0 {
+            return 0.0;
+        }
+        let i = place as usize;
+        let value = |i: usize| self.errors.get(i).copied().unwrap_or(0.0);
+        value(i) + (value(i + 1) - value(i)) * (place - i as f64)
+    }
+}
+
+/// The course of the remnant's strength.
+struct Strength {
+    course: Course,
+    sizes: [f64; 2],
+    phase: f64,
+    forgets: f64,
+    square: f64,
+}
+
+/// Period of [`Course::Wander`] and of two spans of [`Course::Steps`], s.
+const PERIOD_S: f64 = 30.0;
+
+impl Strength {
+    fn new(case: &Case, sizes: [f64; 2], number: f64, ts: f64) -> Self {
+        Self {
+            course: case.course,
+            sizes,
+            phase: number,
+            forgets: 1.0 - (-ts).exp(),
+            square: sizes[0] * sizes[0],
+        }
+    }
+
+    fn of(&self, t_s: f64, error: f64) -> f64 {
+        let place = t_s / PERIOD_S + self.phase;
+        match self.course {
+            Course::Wander(part) => 1.0 + part * (TAU * place).sin(),
+            Course::Steps(factor) if place.rem_euclid(1.0) >= 0.5 => factor,
+            Course::Error => (error.abs() / self.sizes[1]).min(4.0),
+            Course::Control => (self.square.sqrt() / self.sizes[0]).clamp(0.2, 4.0),
+            _ => 1.0,
+        }
+    }
+
+    /// Takes u into its running mean square over 1 s.
+    fn follow(&mut self, u: f64) {
+        self.square += self.forgets * (u * u - self.square);
+    }
+}
+
+/// Target or disturbance of a run, of unit rms.
+fn forcing(case: &Case, run: RunOf) -> Result<ForcingFunction, SimError> {
+    let lines: Vec<Sinusoid> = match case.forcing {
+        Forcing::McRuer => MCRUER_RAD_S
+            .iter()
+            .map(|omega| Sinusoid {
+                amplitude_deg: if *omega < MCRUER_SHELF_RAD_S { 1.0 } else { 0.1 },
+                omega_rad_s: *omega,
+                phase_rad: 0.0,
+            })
+            .collect(),
+        Forcing::Disturbance | Forcing::Target => {
+            // Loops on plants of second order are slower.
+            let largest = if matches!(case.plant, Plant::Integrator | Plant::Unstable) {
+                31
+            } else {
+                23
+            };
+            let sum = MultiSine {
+                largest,
+                ..MultiSine::default()
+            };
+            sum.excitation()?.function.sinusoids().to_vec()
+        }
+    };
+    let rms = lines.iter().map(|l| l.amplitude_deg.powi(2) / 2.0).sum::<f64>().sqrt();
+    let phases = run.stream(case, PHASES).uniform(lines.len());
+    let with = |(line, phase): (&Sinusoid, f64)| Sinusoid {
+        amplitude_deg: line.amplitude_deg / rms,
+        phase_rad: TAU * phase,
+        ..*line
+    };
+    Ok(ForcingFunction::new(lines.iter().zip(phases).map(with).collect())?)
+}
+
+const MCRUER_RAD_S: [f64; 10] = [0.157, 0.262, 0.393, 0.602, 0.969, 1.49, 2.54, 4.03, 7.57, 13.8];
+const MCRUER_SHELF_RAD_S: f64 = 3.0;
+
+/// Rms of u and e without a remnant.
+fn sizes(operator: &Operator, case: &Case, lines: &ForcingFunction) -> [f64; 2] {
+    let mut squares = [0.0; 2];
+    for line in lines.sinusoids() {
+        let (y, p) = (
+            operator.response(line.omega_rad_s),
+            case.plant.response(line.omega_rad_s),
+        );
+        let sensitivity = Complex64::from(1.0) / (Complex64::from(1.0) + y * p);
+        let of_e = sensitivity
+            * if case.forcing == Forcing::Disturbance {
+                -p
+            } else {
+                Complex64::from(1.0)
+            };
+        for (sum, response) in squares.iter_mut().zip([of_e * y, of_e]) {
+            *sum += (line.amplitude_deg * response.norm()).powi(2) / 2.0;
+        }
+    }
+    squares.map(f64::sqrt)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::challenge::{Seeds, Theme, cases};
+
+    fn case(name: &str) -> Case {
+        cases().into_iter().find(|case| case.name == name).unwrap()
+    }
+
+    const RUN: RunOf = RunOf {
+        seeds: Seeds::Open,
+        number: 0,
+    };
+
+    /// U/E at the lines of the excitation over whole periods of 20 s, without a remnant, is the
+    /// response that is called the truth: held and continuous, a whole delay and a fraction.
+    #[test]
+    fn the_loop_has_the_response_that_is_called_true() {
+        for (name, within) in [("none-lag-1", 1e-3), ("delay-half-60", 1e-3), ("continuous-60", 4e-3)] {
+            let quiet = Case {
+                ratio: 0.0,
+                length_s: 80.0,
+                shifts: Vec::new(),
+                ..case(name)
+            };
+            let run = simulate(&quiet, RUN).unwrap();
+            let per_second = quiet.rate_hz as usize;
+            // Late enough for what the start stirs up to be gone.
+            let span = 60 * per_second..80 * per_second;
+            for multiple in [2.0, 3.0, 5.0, 11.0, 19.0] {
+                let omega = multiple * TAU / 20.0;
+                let turn = |x: &[f64]| -> Complex64 {
+                    let each = x[span.clone()].iter().enumerate();
+                    each.map(|(k, x)| Complex64::from_polar(*x, -omega * k as f64 / quiet.rate_hz))
+                        .sum()
+                };
+                let (found, truth) = (turn(&run.u) / turn(&run.e), run.truth.response(omega, 50.0));
+                let error = (found - truth).norm() / truth.norm();
+                assert!(error < within, "{name} at {omega:.2} rad/s: {error:.5}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_shadow_is_the_person_of_before_and_the_sum_is_what_was_recorded() {
+        let run = simulate(&case("change-K_e_dot-100"), RUN).unwrap();
+        let Hidden {
+            n, response, before, ..
+        } = &run.hidden;
+        for k in 0..run.u.len() {
+            assert!((run.u[k] - response[k] - n[k]).abs() < 1e-12);
+        }
+        let (first, shadow) = &before[0];
+        assert_eq!((*first, shadow.len()), (4500, run.u.len() - 4500));
+        assert!((shadow[0] - response[*first]).abs() < 1e-9);
+        let far = (0..shadow.len())
+            .map(|k| (shadow[k] - response[first + k]).abs())
+            .fold(0.0, f64::max);
+        assert!(far > 0.1, "{far}");
+    }
+
+    #[test]
+    fn blemishes_are_where_they_should_be() {
+        let run = simulate(&case("none-missing"), RUN).unwrap();
+        assert!(run.e[6000..6300].iter().all(|e| e.is_nan()) && run.record().is_none());
+        assert!(run.e[..6000].iter().chain(&run.e[6300..]).all(|e| e.is_finite()));
+        let run = simulate(&case("polarity"), RUN).unwrap();
+        assert!((run.truth.response(1.0, 44.9) + run.truth.response(1.0, 45.1)).norm() < 1e-12);
+        let run = simulate(&case("idle-start"), RUN).unwrap();
+        assert!(run.u[..1499].iter().all(|u| *u == 0.0) && run.u[1600..].iter().any(|u| u.abs() > 0.1));
+        let run = simulate(&case("none-saturated"), RUN).unwrap();
+        let largest = run.u.iter().fold(0.0_f64, |a, u| a.max(u.abs()));
+        assert!(run.u.iter().filter(|u| u.abs() == largest).count() > 50);
+    }
+
+    /// Everybody who is drawn keeps control.
+    #[test]
+    fn every_loop_runs() {
+        let are_loops = |case: &Case| {
+            let again = matches!(case.theme, Theme::Changes | Theme::ChangesInRemnants);
+            !again && !matches!(case.blemish, Blemish::IdleStart(_))
+        };
+        for case in cases()
+            .into_iter()
+            .filter(|case| case.rate_hz <= 100.0 && are_loops(case))
+        {
+            let short = Case { length_s: 6.0, ..case };
+            let run = simulate(&short, RUN).unwrap();
+            assert!(run.u.iter().any(|u| u.abs() > 0.01), "{}", short.name);
+        }
+    }
+}
