@@ -16,8 +16,8 @@
 //! zero that of the prediction error fit, or the middle of both. RIV-BJ as it is usually written takes
 //! the last estimate: where the lines end below the neuromuscular resonance, estimates from two sets
 //! of instruments answer each other without end, each the other's auxiliary operator (with four
-//! in ten virtual people). Any auxiliary operator gives a consistent estimate (Söderström and Stoica,
-//! section 4.2), and the instruments of one that is held are the optimal ones but for its own error.
+//! in ten virtual people). Any auxiliary operator gives a consistent estimate, and the instruments of
+//! one that is held are the optimal ones but for its own error.
 //!
 //! Free polynomials have more to lose: their poles are not known, as the lag lies below the lines and
 //! the resonance above, and run to the unit circle. Here the prior keeps them.
