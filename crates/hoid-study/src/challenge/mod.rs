@@ -13,6 +13,7 @@
 //! | `operator` | [`Operator`], [`Plant`]: who acts on what, in continuous time |
 //! | `draw` | [`Seeds`]: open and sealed; the person of a run; [`Portion`] |
 //! | `noise` | remnants, and the filters that whiten them |
+//! | `driving`, `world` | excitation and strength of the remnant; operator and plant between two samples |
 //! | `simulate` | [`simulate()`]: the loop of a case |
 //! | `contestant`, `contestants` | [`Contestant`]: one who takes part; the methods, and plain ones |
 //! | `oracle` | what could be known |
@@ -26,6 +27,7 @@ mod cases;
 mod contestant;
 mod contestants;
 mod draw;
+mod driving;
 mod measure;
 mod noise;
 mod operator;
@@ -35,6 +37,7 @@ mod people;
 mod run;
 mod simulate;
 mod tables;
+mod world;
 
 pub use case::{Blemish, Case, Course, DelayKnown, Forcing, Form, Shift, Sight, Spectrum, Theme};
 pub use cases::cases;

@@ -12,18 +12,16 @@
 
 use std::f64::consts::TAU;
 
-use hoid_model::{
-    Channel, Complex64, Record, SampleTime,
-    family_scenario::MultiSine,
-    forcing::{ForcingFunction, Sinusoid},
-};
+use hoid_model::{Channel, Complex64, Record, SampleTime};
 use hoid_sim::SimError;
 
 use super::{
-    case::{Blemish, Case, Course, DelayKnown, Forcing, Sight},
+    case::{Blemish, Case, DelayKnown, Forcing, Sight},
     draw::{RunOf, person},
+    driving::{Strength, forcing, sizes},
     noise::Noise,
-    operator::{Canonical, Operator, Plant, hold},
+    operator::{Canonical, Operator, hold},
+    world::{Held, World},
 };
 
 /// A run with all that is true of it.
@@ -120,15 +118,12 @@ pub struct Hidden {
 }
 
 const RUN_IN_S: f64 = 15.0;
-/// Longest step, s.
-const STEP_S: f64 = 0.001;
 /// Persons who may lose control in the simulation.
 const MOST_ATTEMPTS: usize = 20;
 /// Standard deviations of u beyond which control is lost.
 const LOST: f64 = 30.0;
 
 const NUMBERS: u64 = 2;
-const PHASES: u64 = 3;
 const GLITCHES: u64 = 4;
 const WALK: u64 = 5;
 
@@ -335,239 +330,6 @@ impl Run {
         let record = Record::new(self.sample_time, channel("e", &self.e), channel("u", &self.u)).ok()?;
         record.with_channel(channel("excitation", &self.excitation)).ok()
     }
-}
-
-/// An operator with its polynomials.
-struct Held {
-    operator: Operator,
-    numerator: Vec<f64>,
-    denominator: Vec<f64>,
-}
-
-impl Held {
-    fn of(operator: Operator) -> Self {
-        Self {
-            operator,
-            numerator: operator.numerator(),
-            denominator: operator.denominator(),
-        }
-    }
-}
-
-/// States and the history of the error.
-struct World {
-    operator: Canonical,
-    plant: Canonical,
-    element: Plant,
-    sight: Sight,
-    disturbed: bool,
-    ts: f64,
-    /// Steps in a sample.
-    steps: usize,
-    /// The error of each sample (held), or of each step.
-    errors: Vec<f64>,
-}
-
-impl World {
-    fn new(case: &Case, ts: f64, total: usize) -> Self {
-        let steps = (ts / STEP_S - 1e-9).ceil().max(1.0) as usize;
-        let each = if case.sight == Sight::Held { 1 } else { steps };
-        Self {
-            operator: Canonical::at_rest(),
-            plant: Canonical::at_rest(),
-            element: case.plant,
-            sight: case.sight,
-            disturbed: case.forcing == Forcing::Disturbance,
-            ts,
-            steps,
-            errors: Vec::with_capacity(total * each),
-        }
-    }
-
-    /// From sample k to the next: `error` and `control` at its start, excitation and remnant at its
-    /// start and end.
-    #[allow(clippy::too_many_arguments)]
-    fn sample(
-        &mut self,
-        now: &Held,
-        shadows: &mut [(Operator, Canonical)],
-        k: usize,
-        error: f64,
-        control: f64,
-        excitation: [f64; 2],
-        noise: [f64; 2],
-        stick: &dyn Fn(f64) -> f64,
-    ) {
-        let h = self.ts / self.steps as f64;
-        let element = self.element.denominator();
-        let between = |ends: [f64; 2], i: usize| ends[0] + (ends[1] - ends[0]) * i as f64 / self.steps as f64;
-        let mut u = control;
-        for i in 0..self.steps {
-            let [f, d] = if self.disturbed { [0.0, 1.0] } else { [1.0, 0.0] };
-            match self.sight {
-                Sight::Held if i == 0 => self.errors.push(error),
-                Sight::Held => {}
-                Sight::Continuous => self.errors.push(f * between(excitation, i) - self.plant.x[0]),
-            }
-            let place = (k * self.steps + i) as f64;
-            let input = self.input(place - now.operator.tau_e_s / h);
-            self.operator.advance(&now.denominator, input, h);
-            for (operator, state) in shadows.iter_mut() {
-                let input = self.input(place - operator.tau_e_s / h);
-                state.advance(&operator.denominator(), input, h);
-            }
-            let next = match self.sight {
-                Sight::Held => control,
-                Sight::Continuous => stick(self.operator.output(&now.numerator) + between(noise, i + 1)),
-            };
-            let force = match self.sight {
-                Sight::Held => [d * excitation[0]; 2],
-                Sight::Continuous => [d * between(excitation, i), d * between(excitation, i + 1)],
-            };
-            let ends = [u + force[0], next + force[1]];
-            self.plant
-                .advance(element, [ends[0], 0.5 * (ends[0] + ends[1]), ends[1]], h);
-            u = next;
-        }
-    }
-
-    /// What reaches the operator at start, middle and end of the step that begins at a place, in steps.
-    fn input(&self, place: f64) -> [f64; 3] {
-        match self.sight {
-            Sight::Held => [self.mean_held(place); 3],
-            Sight::Continuous => [0.0, 0.5, 1.0].map(|part| self.seen(place + part)),
-        }
-    }
-
-    /// Mean of the held error over the step that begins at a place, in steps.
-    fn mean_held(&self, place: f64) -> f64 {
-        let n = self.steps as f64;
-        let (first, last) = (place / n, (place + 1.0) / n);
-        let value = |sample: f64| {
-            if sample < 0.0 {
-                0.0
-            } else {
-                self.errors.get(sample as usize).copied().unwrap_or(0.0)
-            }
-        };
-        // A place on the border but for rounding is on it.
-        let edge = (first + 1.0 - 1e-9).floor();
-        if edge >= last || edge <= first {
-            return value(first + 1e-9);
-        }
-        let part = (edge - first) * n;
-        part * value(first) + (1.0 - part) * value(edge)
-    }
-
-    /// The error at a place, in steps.
-    fn seen(&self, place: f64) -> f64 {
-        if place < 0.0 {
-            return 0.0;
-        }
-        let i = place as usize;
-        let value = |i: usize| self.errors.get(i).copied().unwrap_or(0.0);
-        value(i) + (value(i + 1) - value(i)) * (place - i as f64)
-    }
-}
-
-/// The course of the remnant's strength.
-struct Strength {
-    course: Course,
-    sizes: [f64; 2],
-    phase: f64,
-    forgets: f64,
-    square: f64,
-}
-
-/// Period of [`Course::Wander`] and of two spans of [`Course::Steps`], s.
-const PERIOD_S: f64 = 30.0;
-
-impl Strength {
-    fn new(case: &Case, sizes: [f64; 2], number: f64, ts: f64) -> Self {
-        Self {
-            course: case.course,
-            sizes,
-            phase: number,
-            forgets: 1.0 - (-ts).exp(),
-            square: sizes[0] * sizes[0],
-        }
-    }
-
-    fn of(&self, t_s: f64, error: f64) -> f64 {
-        let place = t_s / PERIOD_S + self.phase;
-        match self.course {
-            Course::Wander(part) => 1.0 + part * (TAU * place).sin(),
-            Course::Steps(factor) if place.rem_euclid(1.0) >= 0.5 => factor,
-            Course::Error => (error.abs() / self.sizes[1]).min(4.0),
-            Course::Control => (self.square.sqrt() / self.sizes[0]).clamp(0.2, 4.0),
-            _ => 1.0,
-        }
-    }
-
-    /// Takes u into its running mean square over 1 s.
-    fn follow(&mut self, u: f64) {
-        self.square += self.forgets * (u * u - self.square);
-    }
-}
-
-/// Target or disturbance of a run, of unit rms.
-fn forcing(case: &Case, run: RunOf) -> Result<ForcingFunction, SimError> {
-    let lines: Vec<Sinusoid> = match case.forcing {
-        Forcing::McRuer => MCRUER_RAD_S
-            .iter()
-            .map(|omega| Sinusoid {
-                amplitude_deg: if *omega < MCRUER_SHELF_RAD_S { 1.0 } else { 0.1 },
-                omega_rad_s: *omega,
-                phase_rad: 0.0,
-            })
-            .collect(),
-        Forcing::Disturbance | Forcing::Target => {
-            // Loops on plants of second order are slower.
-            let largest = if matches!(case.plant, Plant::Integrator | Plant::Unstable) {
-                31
-            } else {
-                23
-            };
-            let sum = MultiSine {
-                largest,
-                ..MultiSine::default()
-            };
-            sum.excitation()?.function.sinusoids().to_vec()
-        }
-    };
-    let rms = lines.iter().map(|l| l.amplitude_deg.powi(2) / 2.0).sum::<f64>().sqrt();
-    let phases = run.stream(case, PHASES).uniform(lines.len());
-    let with = |(line, phase): (&Sinusoid, f64)| Sinusoid {
-        amplitude_deg: line.amplitude_deg / rms,
-        phase_rad: TAU * phase,
-        ..*line
-    };
-    Ok(ForcingFunction::new(lines.iter().zip(phases).map(with).collect())?)
-}
-
-const MCRUER_RAD_S: [f64; 10] = [0.157, 0.262, 0.393, 0.602, 0.969, 1.49, 2.54, 4.03, 7.57, 13.8];
-const MCRUER_SHELF_RAD_S: f64 = 3.0;
-
-/// Rms of u and e without a remnant.
-fn sizes(operator: &Operator, case: &Case, lines: &ForcingFunction) -> [f64; 2] {
-    let mut squares = [0.0; 2];
-    for line in lines.sinusoids() {
-        let (y, p) = (
-            operator.response(line.omega_rad_s),
-            case.plant.response(line.omega_rad_s),
-        );
-        let sensitivity = Complex64::from(1.0) / (Complex64::from(1.0) + y * p);
-        let of_e = sensitivity
-            * if case.forcing == Forcing::Disturbance {
-                -p
-            } else {
-                Complex64::from(1.0)
-            };
-        for (sum, response) in squares.iter_mut().zip([of_e * y, of_e]) {
-            *sum += (line.amplitude_deg * response.norm()).powi(2) / 2.0;
-        }
-    }
-    squares.map(f64::sqrt)
 }
 
 #[cfg(test)]
