@@ -1,7 +1,7 @@
 //! The fit of an operator whose gains change once.
 
 use hoid_ident::{ChangedOperator, GainsAt, SigmoidFit, validation::whiteness};
-use hoid_model::{Finding, uncertainty::Estimate};
+use hoid_model::Finding;
 use numpy::{PyArray1, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
 

@@ -81,7 +81,7 @@ def reproduce(
             " make the same call again to go on"
         )
     page, _, tally = made
-    names = ("hold", "hold in part", "do not hold", "cannot be tested")
+    names = ("hold", "hold, and more so", "hold in part", "do not hold", "cannot be tested")
     data = [*(target / "tables").glob("*.csv"), *(target / "figures").glob("*.csv")]
     return Reproduction(
         page=Path(page),

@@ -101,9 +101,16 @@ pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record
         ));
     }
     if !fit.change_found() {
-        let (one, two) = (fit.constant_operator().rows(), other.constant_operator().rows());
-        let pairs = one.iter().zip(&two);
-        return said(pairs.map(|((name, _, a), (_, _, b))| ((*name).to_owned(), a.value, a.standard_error, b.value)));
+        let (one, two) = (fit.constant_operator(), other.constant_operator());
+        let pairs = one.parameters.iter().zip(&two.parameters);
+        return said(pairs.map(|(a, b)| {
+            (
+                a.name.to_owned(),
+                a.estimate.value,
+                a.estimate.standard_error,
+                b.estimate.value,
+            )
+        }));
     }
     let pairs = fit.parameters().into_iter().zip(other.parameters());
     said(pairs.map(|(a, b)| (a.name, a.estimate.value, a.estimate.standard_error, b.estimate.value)))
