@@ -165,7 +165,9 @@ fn main() -> ExitCode {
             }
             let what = damage(&bench.place(work, &name).join("parts"), &mut draw);
             hit += usize::from(what.is_some());
+            let begun = Instant::now();
             bench.whole(work, &name);
+            took = took.max(begun.elapsed());
             let told = format!("{} {name} ({})", work.name, what.unwrap_or("no block yet"));
             compare(&expected, &bench.place(work, &name), &told, &mut failures);
             fs::remove_dir_all(bench.place(work, &name)).unwrap();
