@@ -133,10 +133,12 @@ fn with_an_infinite_memory_it_comes_to_the_batch_fit_from_several_starts() {
     };
     let span = |to: f64| from(StartAt::Span(Some((0.0, to))), None);
     // With filters that are warm. The memory grows at the start, so that the way from there is
-    // forgotten.
+    // forgotten. The covariance is ten times the text's: with 10 the first steps throw the estimate
+    // to the border of stability, and two of these starts are still .6 standard errors away at the
+    // end (the cascade forgot that faster).
     let theta = |theta: Vec<f64>| {
         let from = from(StartAt::Theta(theta), Some(4.0));
-        from.with(&[("covariance", "10")]).unwrap()
+        from.with(&[("covariance", "1")]).unwrap()
     };
     let starts = [
         ("batch fit of 20 s", span(20.0)),
