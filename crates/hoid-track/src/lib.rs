@@ -29,7 +29,7 @@
 //! | `methods`, `method` | [`Method`]: the recursive methods, a file or folder each; what each says of itself |
 //! | `options`, `shared_options`, `memory`, `forgetting` | [`TrackOptions`]: what is to be tracked, and how |
 //! | `plan` | [`TrackPlan`]: orders that are still open, searched on the start span |
-//! | `setup`, `start`, `gain` | what a recursion is built of: structure, start, way of forgetting |
+//! | `setup`, `start`, `start_noise`, `gain` | what a recursion is built of: structure, start, way of forgetting |
 //! | `kernel`, `recursion` | RLS, RPEM and the physical recursion of the real-time kernel; what every recursion does |
 //! | `predictor`, `past`, `reported` | signals and reports for methods that are not of the kernel |
 //! | `tracker`, `outcome`, `saved` | [`Tracker`]: one sample at a time; a tracker as numbers, to go on elsewhere |
@@ -78,6 +78,7 @@ mod setup;
 mod shared_options;
 mod smoother;
 mod start;
+mod start_noise;
 mod summary;
 mod trace;
 mod tracker;
