@@ -64,7 +64,7 @@ impl StartState {
     ) -> Result<Self, IdentError> {
         match (&setup.start, span) {
             (StartAt::Theta(theta), _) => Self::given(setup, theta, sample_time),
-            (StartAt::Span(_), Some(record)) => Self::fitted(setup, record, known),
+            (StartAt::Span(_), Some(record)) if !setup.starts_itself => Self::fitted(setup, record, known),
             _ => Self::nothing(setup, sample_time),
         }
     }
