@@ -138,9 +138,11 @@ mod tests {
                 model.solve();
             }
         }
-        // A standard error is sqrt((1 - a_p^2)/n) = .014 for n of 5000.
+        // With a memory of half the time the weights are (s/t)^2, and 10 000 samples count as
+        // 5/9 of them. The variance of a coefficient is at most (1 + 1.55^2 + .57^2)/5556, a
+        // standard error of .026; four of them.
         for (d, expected) in model.d().iter().zip([-1.55, 0.57, 0.0, 0.0, 0.0, 0.0]) {
-            assert!((d - expected).abs() < 0.06, "{:?}", model.d());
+            assert!((d - expected).abs() < 0.104, "{:?}", model.d());
         }
         assert!((model.sum() - 1.0 - model.d().iter().sum::<f64>()).abs() < 1e-15);
     }
