@@ -31,7 +31,7 @@ pub const BLOCK_S: f64 = 0.5;
 /// Expectation of the logarithm of a chi-square with two degrees of freedom.
 const MEAN_LOG: f64 = 0.115_931_515_658_412_45;
 /// Blocks that the supposed level of T counts for, and the logarithm of that level.
-const SUPPOSED: f64 = 15.0;
+const SUPPOSED: f64 = 5.0;
 const USUAL: f64 = 0.5;
 /// Blocks that the level is a mean of at most.
 const LONGEST: f64 = 240.0;

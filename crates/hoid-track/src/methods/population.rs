@@ -77,9 +77,9 @@ const REFRACTORY_S: f64 = 8.0;
 /// The threshold in T/c at [`RATE`] false alarms an hour, and by how much it rises with each
 /// logarithm of the rate: the distribution on simulated people without a change, under remnants that
 /// are steady, that wander by 30 %, and that follow |e|.
-const THRESHOLD: f64 = 9.0;
-const RATE: f64 = 26.0;
-const SLOPE: f64 = 5.5;
+const THRESHOLD: f64 = 10.0;
+const RATE: f64 = 30.0;
+const SLOPE: f64 = 9.0;
 /// Frequencies at which gain and lead are nearest, rad/s.
 const NEAR_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
 
