@@ -1,4 +1,5 @@
 //! The recursion in the basis that people share, on signals whose truth is known.
+#![allow(clippy::expect_used)]
 
 use hoid_core::{
     population::{
