@@ -29,9 +29,10 @@
 //! | `methods`, `method` | [`Method`]: the recursive methods, a file or folder each; what each says of itself |
 //! | `options`, `shared_options`, `memory`, `forgetting` | [`TrackOptions`]: what is to be tracked, and how |
 //! | `plan` | [`TrackPlan`]: orders that are still open, searched on the start span |
-//! | `setup`, `start`, `gain` | what a recursion is built of: structure, start, way of forgetting |
+//! | `setup`, `start`, `start_noise`, `gain` | what a recursion is built of: structure, start, way of forgetting |
 //! | `kernel`, `recursion` | RLS, RPEM and the physical recursion of the real-time kernel; what every recursion does |
 //! | `predictor`, `past`, `reported` | signals and reports for methods that are not of the kernel |
+//! | `response` | [`Response`]: gain and phase of an estimate at a frequency |
 //! | `tracker`, `outcome`, `saved` | [`Tracker`]: one sample at a time; a tracker as numbers, to go on elsewhere |
 //! | `live` | [`Live`]: the warm-up of a stream, then its tracker |
 //! | `guard` | samples and spans that no tracking makes, kept from the recursion |
@@ -73,12 +74,14 @@ mod plan;
 mod predictor;
 mod recursion;
 mod reported;
+mod response;
 mod saved;
 mod seal;
 mod setup;
 mod shared_options;
 mod smoother;
 mod start;
+mod start_noise;
 mod summary;
 mod trace;
 mod tracker;
@@ -96,6 +99,7 @@ pub use outcome::{Counts, Outcome};
 pub use over_record::{track, track_from};
 pub use plan::{TrackPlan, narrowed};
 pub use recursion::Sample;
+pub use response::Response;
 pub use setup::StartAt;
 pub use shared_options::{BoundOptions, DelayOptions, GainOptions, StabilityOptions};
 pub use trace::{OPERATOR_COLUMNS, Trace};

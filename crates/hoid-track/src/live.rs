@@ -48,7 +48,7 @@ impl Live {
     /// [`IdentError`] for a start that cannot be used.
     pub fn new(options: &TrackOptions, warm_up: usize, sample_time: SampleTime) -> Result<Self, IdentError> {
         Ok(match options.start {
-            StartAt::Span(_) => Self::Collecting(WarmUp::new(warm_up, sample_time)),
+            StartAt::Span(_) if !options.method.starts_itself() => Self::Collecting(WarmUp::new(warm_up, sample_time)),
             _ => Self::Tracking(Box::new(Tracker::new(options, None, sample_time)?)),
         })
     }

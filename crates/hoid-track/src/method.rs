@@ -77,6 +77,11 @@ pub(crate) trait RecursiveMethod: Settings {
         false
     }
 
+    /// True for a method that needs no start fit and learns from the first sample on.
+    fn starts_itself(&self) -> bool {
+        false
+    }
+
     /// True where the two-sided estimate of a recorded run was asked for.
     fn smooths(&self) -> bool {
         false

@@ -131,6 +131,7 @@ impl TrackOptions {
             covariance: method.covariance(),
             limit: method.limit(),
             stable: method.stable(),
+            starts_itself: method.starts_itself(),
             is_physical: method.is_physical(),
             bounds: method.bounds(),
             track_delay_s: method.track_delay_s(),

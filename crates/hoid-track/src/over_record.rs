@@ -49,7 +49,7 @@ pub fn track_from(
     let options = &options;
     let reference = reference(record, options)?;
     let mut tracker = Tracker::from_fit(options, span.as_ref(), start, sample_time)?;
-    let known = span.is_some() && options.method.covariance().is_none();
+    let known = span.is_some() && options.method.covariance().is_none() && !options.method.starts_itself();
     let from_s = options
         .update_from_s
         .unwrap_or(if known { end_s } else { f64::NEG_INFINITY })

@@ -1,7 +1,7 @@
 //! What is to be tracked while some orders may still be open: they are searched on the start span
 //! or the warm-up.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, ops::RangeInclusive};
 
 use hoid_model::{Orders, Record, SampleTime};
 
@@ -10,6 +10,9 @@ use hoid_ident::{
     Choice, IdentError, OrderRanges,
     order_selection::{Criterion, choose_orders_with},
 };
+
+/// Delay of people who track, s.
+const USUAL_DELAY_S: f64 = 0.2;
 
 /// A recursion whose orders may still be ranges.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +35,10 @@ impl TrackPlan {
         criterion: Criterion,
         sample_time: SampleTime,
     ) -> Result<Self, IdentError> {
+        let ranges = match options.method.starts_itself() {
+            true => usual_ranges(&options.method, &ranges, sample_time),
+            false => ranges,
+        };
         let combinations = ranges.combinations()?;
         if matches!(options.start, StartAt::Theta(_)) && combinations.len() > 1 {
             return Err(IdentError::BadStart {
@@ -96,6 +103,24 @@ impl TrackPlan {
         let names = options.parameter_names();
         options.method.inner_mut().retain(&|key| is_known(&names, key));
         options
+    }
+}
+
+/// Ranges of a method that searches none: the orders that are usual, as near as the ranges allow.
+fn usual_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime) -> OrderRanges {
+    let nk = (USUAL_DELAY_S / sample_time.s()).round() as usize + 1;
+    let usual = method.usual_orders(nk);
+    let only = |usual: usize, range: &RangeInclusive<usize>| {
+        let one = usual.clamp(*range.start(), (*range.end()).max(*range.start()));
+        one..=one
+    };
+    OrderRanges {
+        na: only(usual.na, &ranges.na),
+        nb: only(usual.nb, &ranges.nb),
+        nc: only(usual.nc, &ranges.nc),
+        nd: only(usual.nd, &ranges.nd),
+        nf: only(usual.nf, &ranges.nf),
+        nk: only(nk, &ranges.nk),
     }
 }
 
@@ -191,6 +216,22 @@ mod tests {
         let found = narrowed(usual.clone(), Some((0.2, 0.3)), &start, ts);
         assert_eq!((found.nd.clone(), found.nk.clone()), (2..=2, 21..=31));
         assert_eq!(narrowed(usual.clone(), None, &[], ts), usual);
+    }
+
+    #[test]
+    fn a_method_that_starts_itself_searches_nothing() {
+        let ts = SampleTime::HUNDREDTH;
+        let ranges = OrderRanges {
+            nd: 16..=16,
+            ..default_operator_ranges(Structure::BoxJenkins, ts)
+        };
+        let options = TrackOptions::usual(Method::population(), 29);
+        let plan = TrackPlan::new(options.clone(), ranges.clone(), Criterion::Bic, ts).unwrap();
+        assert!(plan.is_settled());
+        assert_eq!((plan.options().orders.nk, plan.options().orders.nd), (21, 16));
+        let known = OrderRanges { nk: 29..=29, ..ranges };
+        let plan = TrackPlan::new(options, known, Criterion::Bic, ts).unwrap();
+        assert_eq!(plan.options().orders.nk, 29);
     }
 
     #[test]

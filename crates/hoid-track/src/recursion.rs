@@ -3,7 +3,7 @@
 use hoid_core::{recursion::Step, state::State};
 use hoid_model::uncertainty::OperatorEstimate;
 
-use crate::change::Change;
+use crate::{change::Change, response::Response};
 
 /// One sample of the loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,6 +58,10 @@ pub(crate) trait Recursion: State + Send + Sync {
     }
     /// Number of fits that failed, and why the last did, for methods that fit.
     fn failures(&self) -> Option<(usize, String)> {
+        None
+    }
+    /// The response at a frequency in rad/s, where it is not that of the polynomials.
+    fn response(&self, _omega_rad_s: f64) -> Option<Response> {
         None
     }
     /// The operator, where it is what the recursion estimates.

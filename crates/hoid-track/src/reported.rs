@@ -58,6 +58,14 @@ impl Reported {
         self.by = by;
     }
 
+    /// Takes the first coefficients of a noise model; those that it does not have are zero.
+    pub(crate) fn set_noise(&mut self, d: &[f64]) {
+        let p = self.theta.len();
+        for (i, place) in self.theta[2..p - 2].iter_mut().enumerate() {
+            *place = d.get(i).copied().unwrap_or(0.0);
+        }
+    }
+
     pub(crate) fn theta(&self) -> &[f64] {
         &self.theta
     }

@@ -45,6 +45,8 @@ pub struct Setup {
     pub limit: f64,
     /// Polynomials that are kept stable.
     pub stable: Stable,
+    /// True for a method that needs no start fit.
+    pub starts_itself: bool,
     /// True where the operator's parameters move.
     pub is_physical: bool,
     /// Bounds of physical parameters.

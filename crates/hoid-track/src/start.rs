@@ -12,7 +12,10 @@ use hoid_model::{Record, SampleTime, operator::retrieval_jacobian};
 
 use hoid_ident::{Constraint, Fit, GreyBox, IdentError};
 
-use crate::setup::{PHYSICAL_NAMES, Setup, StartAt};
+use crate::{
+    setup::{PHYSICAL_NAMES, Setup, StartAt},
+    start_noise::StartNoise,
+};
 
 /// Variance of P for a start from nothing, in units of the innovation variance.
 const UNKNOWN: f64 = 1e6;
@@ -61,7 +64,7 @@ impl StartState {
     ) -> Result<Self, IdentError> {
         match (&setup.start, span) {
             (StartAt::Theta(theta), _) => Self::given(setup, theta, sample_time),
-            (StartAt::Span(_), Some(record)) => Self::fitted(setup, record, known),
+            (StartAt::Span(_), Some(record)) if !setup.starts_itself => Self::fitted(setup, record, known),
             _ => Self::nothing(setup, sample_time),
         }
     }
@@ -118,14 +121,23 @@ impl StartState {
 
     /// From the batch fit of a record.
     fn fitted(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Self, IdentError> {
-        let (values, covariance, fit) = if setup.is_physical {
+        let Found {
+            values,
+            covariance,
+            fit,
+            variance,
+        } = if setup.is_physical {
             fit_physical(setup, record, known)?
         } else {
             let fit = polynomial_fit(setup, record, known)?;
-            (fit.model().theta().to_vec(), fit.covariance().map(<[f64]>::to_vec), fit)
+            Found {
+                values: fit.model().theta().to_vec(),
+                covariance: fit.covariance().map(<[f64]>::to_vec),
+                variance: fit.innovation_variance(),
+                fit,
+            }
         };
         let values = stabilised(setup, values);
-        let variance = fit.innovation_variance();
         let p = values.len();
         let spread = match &covariance {
             Some(c) if variance > 0.0 => c.iter().map(|c| c / variance).collect(),
@@ -250,7 +262,14 @@ fn physical_values(setup: &Setup, theta: &[f64], sample_time: SampleTime) -> Res
     Ok(eta)
 }
 
-type PhysicalStart = (Vec<f64>, Option<Vec<f64>>, Fit);
+/// What a fit gives: the values, their covariance, the fit, and the variance of the innovations of
+/// the model with these values.
+struct Found {
+    values: Vec<f64>,
+    covariance: Option<Vec<f64>>,
+    fit: Fit,
+    variance: f64,
+}
 
 /// The fit of the start span, made where it is not known.
 fn polynomial_fit(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Fit, IdentError> {
@@ -261,8 +280,8 @@ fn polynomial_fit(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result
 }
 
 /// The Box-Jenkins fit where it has physical parameters within the bounds, else the grey box, which
-/// always has.
-fn fit_physical(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<PhysicalStart, IdentError> {
+/// always has, with a noise model of the order that was asked for.
+fn fit_physical(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Found, IdentError> {
     if setup.delay_parameter_s.is_none()
         && let Some(start) = from_box_jenkins(setup, record, known)?
     {
@@ -271,7 +290,7 @@ fn fit_physical(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<P
     from_grey_box(setup, record)
 }
 
-fn from_box_jenkins(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Option<PhysicalStart>, IdentError> {
+fn from_box_jenkins(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Option<Found>, IdentError> {
     let sample_time = record.sample_time();
     let Ok(fit) = polynomial_fit(setup, record, known) else {
         return Ok(None);
@@ -300,7 +319,12 @@ fn from_box_jenkins(setup: &Setup, record: &Record, known: Option<&Fit>) -> Resu
         debug_assert_eq!(noise, setup.orders.nc + setup.orders.nd);
         congruence(&(0..p).map(row).collect::<Vec<_>>(), c, p)
     });
-    Ok(Some((eta, covariance, fit)))
+    Ok(Some(Found {
+        values: eta,
+        covariance,
+        variance: fit.innovation_variance(),
+        fit,
+    }))
 }
 
 /// `T C T'` for sparse rows of T.
@@ -314,7 +338,7 @@ fn congruence(rows: &[Vec<(usize, f64)>], c: &[f64], width: usize) -> Vec<f64> {
         .collect()
 }
 
-fn from_grey_box(setup: &Setup, record: &Record) -> Result<PhysicalStart, IdentError> {
+fn from_grey_box(setup: &Setup, record: &Record) -> Result<Found, IdentError> {
     let ts = record.sample_time().s();
     let o = &setup.orders;
     let names = setup.names();
@@ -343,7 +367,18 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<PhysicalStart, IdentE
     let parameters = found.parameters();
     let value = |name: &str| parameters.iter().position(|(n, _)| n == name);
     let operator = if setup.delay_parameter_s.is_some() { 5 } else { 4 };
-    let variance = found.innovation_variance();
+    let fit = found.polynomial_fit(0).clone();
+    // The remnant of the grey box has one pole. Where D is to have more, it is fitted to what the
+    // operator leaves: a D that is too small colours the innovations, and a bank of hypotheses takes
+    // coloured innovations for changes.
+    let noise = if o.nd > 1 {
+        StartNoise::of(&fit, record, o.nd)
+    } else {
+        None
+    };
+    let variance = noise
+        .as_ref()
+        .map_or(found.innovation_variance(), |noise| noise.variance);
     let width = parameters.len();
     let (mut eta, mut rows) = (Vec::new(), Vec::new());
     for (name, [low, high]) in PHYSICAL_NAMES[..operator].iter().zip(&limits) {
@@ -356,7 +391,12 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<PhysicalStart, IdentE
         rows.push(vec![(place, 1.0)]);
     }
     for i in 0..o.nc + o.nd {
+        let of_noise = noise.as_ref().filter(|_| i >= o.nc);
         match value("T_n") {
+            _ if of_noise.is_some() => {
+                eta.push(of_noise.map_or(0.0, |noise| noise.d[i - o.nc]));
+                rows.push(Vec::new());
+            }
             // d1 = -exp(-Ts/T_n).
             Some(place) if i == o.nc => {
                 let t_n = parameters[place].1.value;
@@ -373,6 +413,14 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<PhysicalStart, IdentE
     let p = eta.len();
     let mut covariance = found.covariance().map(|c| congruence(&rows, c, width));
     if let Some(covariance) = &mut covariance {
+        if let Some(noise) = &noise {
+            let first = operator + o.nc;
+            for i in 0..o.nd {
+                for j in 0..o.nd {
+                    covariance[(first + i) * p + first + j] = noise.covariance[i * o.nd + j];
+                }
+            }
+        }
         for i in 0..p {
             // What the grey box did not have, or held, is not known: coefficients are of the size
             // of 1, gains may change as they are.
@@ -382,6 +430,10 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<PhysicalStart, IdentE
             }
         }
     }
-    let fit = found.polynomial_fit(0).clone();
-    Ok((eta, covariance, fit))
+    Ok(Found {
+        values: eta,
+        covariance,
+        fit,
+        variance,
+    })
 }

@@ -13,6 +13,7 @@ use crate::{
     options::TrackOptions,
     outcome::{Counts, Outcome},
     recursion::{Recursion, Sample},
+    response::Response,
     setup::StartAt,
     start::StartState,
     trace::operator_of,
@@ -205,6 +206,18 @@ impl Tracker {
         }
     }
 
+    /// The response of the estimate at a frequency in rad/s; `None` while there is no estimate.
+    pub fn response(&self, omega_rad_s: f64) -> Option<Response> {
+        if self.options.method.starts_itself() {
+            return self.recursion.response(omega_rad_s);
+        }
+        let orders = self.options.polynomial_orders();
+        let covariance = self.covariance();
+        let (theta, ts) = (self.theta(), self.sample_time);
+        let whole = covariance.as_deref();
+        Some(Response::of_polynomials(&orders, theta, whole, omega_rad_s, ts))
+    }
+
     /// Logarithm of the odds that the person changed within the last four seconds, by
     /// [`crate::Method::Adaptive`].
     pub fn change_odds(&self) -> Option<f64> {
@@ -261,6 +274,7 @@ pub(crate) fn guard_of(
     let mut guard = Guard::new(recursion, nk, span, sample_time);
     let o = options.orders;
     if matches!(options.start, StartAt::Span(_))
+        && !method.starts_itself()
         && method.track_delay_s().is_none()
         && let Some(model) = ReferenceModel::new([o.na, o.nb, o.nc, o.nd, o.nf], recursion.theta())
     {

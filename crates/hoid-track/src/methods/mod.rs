@@ -4,6 +4,7 @@ mod adaptive;
 mod fused;
 mod joint_filter;
 mod physical;
+mod population;
 mod rls;
 mod rpem;
 mod rriv;
@@ -26,6 +27,7 @@ pub use adaptive::AdaptiveOptions;
 pub use fused::FusedOptions;
 pub use joint_filter::{EkfOptions, UkfOptions};
 pub use physical::PhysicalOptions;
+pub use population::PopulationOptions;
 pub use rls::RlsOptions;
 pub use rpem::RpemOptions;
 pub use rriv::RrivOptions;
@@ -89,6 +91,8 @@ methods! {
     /// A bank of hypotheses of when the person changed, in physical parameters: Box-Jenkins with nc
     /// = 0.
     Adaptive(AdaptiveOptions) = adaptive,
+    /// Gains in a basis that people share: Box-Jenkins with nc = 0.
+    Population(PopulationOptions) = population,
     /// Recursive least squares for B with the poles of the recursive prediction-error method:
     /// Box-Jenkins.
     Fused(FusedOptions) = fused,
@@ -167,6 +171,11 @@ impl Method {
     /// parameters behind the noise model of a batch fit, which stays.
     pub fn is_model_of_change(&self) -> bool {
         self.inner().is_model_of_change()
+    }
+
+    /// True for a method that needs no start fit and learns from the first sample on.
+    pub fn starts_itself(&self) -> bool {
+        self.inner().starts_itself()
     }
 
     /// Its memories, where it has some.

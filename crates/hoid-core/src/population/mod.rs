@@ -1,0 +1,47 @@
+//! A person in a basis that people share: what changes is a few gains.
+//!
+//! People who track integrate slow errors, lead, and act through a neuromuscular system and a delay,
+//!
+//! `Y(s) = N(s)/((T_I s + 1) (s^2/omega^2 + 2 zeta s/omega + 1)) e^{-tau s}`,
+//! `N(s) = n_0 + n_1 s + n_2 s^2`
+//!
+//! (D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249). Data of
+//! seconds determine the numerator; poles, lag and delay they do not, and they are nearly the same
+//! for everybody. So those are held, at a few points around what is usual ([`basis`]), and with the
+//! responses x_i of `s^i/(..)` to the error
+//!
+//! `u = sum_i theta_i x_i + level + v`, `D(q^-1) v = eps`,
+//!
+//! which is linear in the gains. A gain with a lead but without a lag is in the span: then
+//! `N = (K_e + K_e_dot s)(T_I s + 1)`.
+//!
+//! - **Noise** ([`noise`]). D is a long autoregression by least squares with a slow memory. At each
+//!   sample all its lags are made with the same gains, so that a move of the gains leaves no step in
+//!   it. The level of eps follows with a time constant of its own: a remnant that grows makes the
+//!   gains slower, not faster.
+//! - **Gains** ([`gains`]). For each point of the basis there are Kalman filters of
+//!   `[theta, level]` that differ in how much the gains drift: hardly, somewhat, much. Weights follow
+//!   the likelihood, forgotten slowly. While nothing changes the one that hardly drifts wins, and
+//!   the precision grows; where it fails it takes over the state of the best. (D. T. Magill, IEEE
+//!   Trans. Automatic Control 10 (1965) 434-439.) The likelihood and the gain are those of a Student
+//!   distribution, so that an outlier says little (J. Meinhold and N. Singpurwalla, JASA 84 (1989)
+//!   479-486).
+//! - **Changes** ([`detector`]). Declared from the difference of Y at one frequency between the last
+//!   seconds and the time before, each fitted by least squares with a variance of its own (G. C.
+//!   Chow, Econometrica 28 (1960) 591-605; unequal variances: B. L. Welch, Biometrika 34 (1947)
+//!   28-35), in units of how much the same person varies without a change.
+//!
+//! Nothing has to be fitted before: the estimate begins with the first second, whose ratio of
+//! output to error gives the scale of the gains' prior. [`PopulationFilter`] is the recursion.
+
+pub mod basis;
+pub mod detector;
+pub mod gains;
+pub mod noise;
+
+mod cholesky;
+mod filter;
+mod sizes;
+
+pub use filter::{PopulationFilter, PopulationPrior, errors_needed};
+pub use sizes::{DRIFTS, GAINS, LARGEST_ORDER, POINTS, STATES};

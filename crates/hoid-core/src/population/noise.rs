@@ -1,0 +1,164 @@
+//! The noise model: a long autoregression `D v = eps`, by least squares with a slow memory.
+//!
+//! D minimises `sum_k lambda^{t-k} w_k (v(k) + d_1 v(k-1) + .. + d_p v(k-p))^2` with
+//! `v = u - theta' x - level` (L. Ljung, *System Identification*, 1999, section 10.1). The products
+//! of `[v(t), .., v(t-p)]` are summed at each sample, all its lags with the gains of that sample, and
+//! solved now and then. The weights w are one over the variance of eps, so that loud spans count no
+//! more than others. The memory grows with the time since the start up to its limit: the first
+//! seconds, in which the gains are not known, do not stay.
+//!
+//! D is only ever used as a filter of finite length: it need not be stable.
+
+use super::{cholesky, sizes::LARGEST_ORDER};
+
+const WIDTH: usize = LARGEST_ORDER + 1;
+/// Time constants of the remnant that is supposed before anything is known, s.
+const USUAL: [f64; 2] = [0.3, 0.06];
+/// Weight of that supposition: a share of the power of v, in samples.
+const SUPPOSED: f64 = 1e-4;
+
+/// The sums and D.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoiseModel {
+    order: usize,
+    supposed: [f64; 2],
+    /// Samples that the supposition counts for, longest memory and shortest, in samples.
+    prior: f64,
+    longest: f64,
+    shortest: f64,
+    products: [[f64; WIDTH]; WIDTH],
+    weight: f64,
+    samples: f64,
+    d: [f64; LARGEST_ORDER],
+}
+
+crate::state!([] NoiseModel { products, weight, samples, d });
+
+impl NoiseModel {
+    /// Before anything is known. Ts and memory in s. `None` for an order below 2 or above
+    /// [`LARGEST_ORDER`].
+    pub fn new(order: usize, memory: f64, ts: f64) -> Option<Self> {
+        if !(2..=LARGEST_ORDER).contains(&order) || memory.is_nan() || memory <= 0.0 {
+            return None;
+        }
+        let [a, b] = USUAL.map(|t| libm::exp(-ts / t));
+        let supposed = [-(a + b), a * b];
+        let mut d = [0.0; LARGEST_ORDER];
+        d[..2].copy_from_slice(&supposed);
+        Some(Self {
+            order,
+            supposed,
+            prior: 1.0 / ts,
+            longest: memory / ts,
+            shortest: (3.0 / ts).min(memory / ts).max(2.0 * order as f64),
+            products: [[0.0; WIDTH]; WIDTH],
+            weight: 0.0,
+            samples: 0.0,
+            d,
+        })
+    }
+
+    /// Coefficients behind the 1.
+    pub fn d(&self) -> &[f64] {
+        &self.d[..self.order]
+    }
+
+    /// Largest lag.
+    pub fn order(&self) -> usize {
+        self.order
+    }
+
+    /// D at frequency zero.
+    pub fn sum(&self) -> f64 {
+        1.0 + self.d().iter().sum::<f64>()
+    }
+
+    /// Takes v, the newest first, with a weight.
+    #[inline(always)]
+    pub fn update(&mut self, v: &[f64; WIDTH], weight: f64) {
+        self.samples += 1.0;
+        let memory = (0.5 * self.samples).clamp(self.shortest, self.longest.max(self.shortest));
+        let lambda = 1.0 - 1.0 / memory;
+        self.weight = lambda * self.weight + 1.0;
+        let n = self.order + 1;
+        for i in 0..n {
+            let a = weight * v[i];
+            for (product, v) in self.products[i][i..n].iter_mut().zip(&v[i..n]) {
+                *product = lambda * *product + a * v;
+            }
+        }
+    }
+
+    /// D of what was taken so far. It stays where the sums do not determine it.
+    pub fn solve(&mut self) {
+        let p = self.order;
+        let ridge = self.prior * self.products[0][0] / self.weight.max(1.0) * SUPPOSED + 1e-12;
+        let mut matrix = [[0.0; LARGEST_ORDER]; LARGEST_ORDER];
+        let mut d = [0.0; LARGEST_ORDER];
+        for i in 0..p {
+            for j in 0..=i {
+                matrix[i][j] = self.products[j + 1][i + 1];
+            }
+            matrix[i][i] += ridge;
+            d[i] = ridge * self.supposed.get(i).copied().unwrap_or(0.0) - self.products[0][i + 1];
+        }
+        if !cholesky::factor(&mut matrix, p) {
+            return;
+        }
+        cholesky::solve(&matrix, p, &mut d);
+        if d.iter().all(|d| d.is_finite()) {
+            self.d = d;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// Noise of a fixed stream, uniform with variance 1/12.
+    fn stream(seed: &mut u64) -> f64 {
+        *seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (*seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    }
+
+    #[test]
+    fn an_autoregression_is_found() {
+        // Poles .95 and .6: D = 1 - 1.55 q^-1 + .57 q^-2.
+        let (mut model, mut seed) = (NoiseModel::new(6, 100.0, 0.01).unwrap(), 7);
+        let mut v = [0.0; WIDTH];
+        for t in 0..10_000 {
+            v.copy_within(0..WIDTH - 1, 1);
+            v[0] = 1.55 * v[1] - 0.57 * v[2] + stream(&mut seed);
+            model.update(&v, 12.0);
+            if t % 25 == 0 {
+                model.solve();
+            }
+        }
+        // With a memory of half the time the weights are (s/t)^2, and 10 000 samples count as
+        // 5/9 of them. The variance of a coefficient is at most (1 + 1.55^2 + .57^2)/5556, a
+        // standard error of .026; four of them.
+        for (d, expected) in model.d().iter().zip([-1.55, 0.57, 0.0, 0.0, 0.0, 0.0]) {
+            assert!((d - expected).abs() < 0.104, "{:?}", model.d());
+        }
+        assert!((model.sum() - 1.0 - model.d().iter().sum::<f64>()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn silence_leaves_what_was_supposed() {
+        let mut model = NoiseModel::new(4, 40.0, 0.01).unwrap();
+        let before = model.d().to_vec();
+        for _ in 0..1000 {
+            model.update(&[0.0; WIDTH], 1.0);
+            model.solve();
+        }
+        for (d, b) in model.d().iter().zip(&before) {
+            assert!((d - b).abs() < 1e-9);
+        }
+        assert!(NoiseModel::new(1, 40.0, 0.01).is_none() && NoiseModel::new(25, 40.0, 0.01).is_none());
+        assert!(NoiseModel::new(4, f64::NAN, 0.01).is_none());
+    }
+}

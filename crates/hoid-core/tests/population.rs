@@ -1,0 +1,301 @@
+//! The recursion in the basis that people share, on signals whose truth is known.
+#![allow(clippy::expect_used)]
+
+use hoid_core::{
+    population::{
+        DRIFTS, GAINS, POINTS, PopulationFilter, PopulationPrior,
+        basis::{Basis, Point},
+        detector::Detection,
+        errors_needed,
+        gains::GainPrior,
+    },
+    state::State,
+};
+
+const TS: f64 = 0.02;
+/// Drift that stands for "nothing changes", and those of people who vary.
+const DRIFT: [f64; DRIFTS] = [0.005, 0.07, 0.3];
+
+fn prior(threshold: f64) -> PopulationPrior {
+    PopulationPrior {
+        gains: GainPrior {
+            drifts: DRIFT,
+            freedom: 5.0,
+            limit: 3.5,
+            forgotten: [TS / 60.0, TS / 15.0],
+            sample_time: TS,
+        },
+        order: 8,
+        noise_memory: 40.0,
+        level_memory: [5.0, 10.0],
+        offset_drift: 0.02,
+        hold: 1.0,
+        jump: 0.3,
+        detection: Detection {
+            frequency: 2.5,
+            recent: 10,
+            least: 16,
+            most: 80,
+            threshold,
+            persistence: 2,
+            refractory: 16,
+        },
+    }
+}
+
+fn points() -> [Basis; POINTS] {
+    [0.2, 0.12, 0.16, 0.24, 0.28, 0.34, 0.4].map(|tau| {
+        let point = Point {
+            tau,
+            omega: 11.0,
+            zeta: 0.25,
+            lag: 3.0,
+        };
+        Basis::new(point, TS).expect("a sound point")
+    })
+}
+
+fn filter(threshold: f64) -> PopulationFilter<Vec<f64>> {
+    let points = points();
+    let errors = vec![0.0; errors_needed(&points)];
+    PopulationFilter::new(points, prior(threshold), errors).expect("a sound prior")
+}
+
+/// Nearly normal numbers of a fixed stream: sums of twelve uniform ones.
+struct Stream(u64);
+
+impl Stream {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// Someone with the gains of the first point and an autoregressive remnant of order 2.
+struct Person {
+    stream: Stream,
+    basis: Basis,
+    past: Vec<f64>,
+    e: f64,
+    v: [f64; 2],
+}
+
+impl Person {
+    fn new(seed: u64) -> Self {
+        let basis = points()[0].clone();
+        Self {
+            stream: Stream(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) + 1),
+            past: vec![0.0; basis.delay() + 3],
+            basis,
+            e: 0.0,
+            v: [0.0; 2],
+        }
+    }
+
+    /// e and u of a sample, with these gains and this level of the remnant.
+    fn sample(&mut self, gains: [f64; GAINS], remnant: f64) -> [f64; 2] {
+        self.e = 0.97 * self.e + 0.24 * self.stream.normal();
+        self.past.rotate_right(1);
+        self.past[0] = self.e;
+        let l = self.basis.delay();
+        let x = self.basis.step([self.past[l], self.past[l + 1], self.past[l + 2]]);
+        let v = 1.6 * self.v[0] - 0.63 * self.v[1] + remnant * self.stream.normal();
+        self.v = [v, self.v[0]];
+        let w: f64 = gains.iter().zip(x).map(|(g, x)| g * x).sum();
+        [self.e, w + v]
+    }
+}
+
+const GAINS_OF_A_PERSON: [f64; GAINS] = [1.2, 1.8, 0.9];
+
+fn response(basis: &Basis, gains: [f64; GAINS], omega: f64) -> [f64; 2] {
+    let h = basis.response(omega);
+    [0, 1].map(|part| (0..GAINS).map(|i| gains[i] * h[i][part]).sum())
+}
+
+/// The estimate at a frequency, real and imaginary part, with their variances.
+fn estimate(filter: &PopulationFilter<Vec<f64>>, omega: f64) -> ([f64; 2], [f64; 2]) {
+    let maps = std::array::from_fn(|i| {
+        let h = filter.bases()[i].response(omega);
+        [h.map(|h| h[0]), h.map(|h| h[1])]
+    });
+    let (mean, c) = filter.gains().moments(&maps);
+    (mean, [c[0][0], c[1][1]])
+}
+
+#[test]
+fn bands_cover_and_precision_grows() {
+    let (mut inside, mut all) = (0.0, 0.0);
+    let mut squares = [0.0; 2];
+    for seed in 0..16 {
+        let (mut person, mut filter) = (Person::new(seed), filter(1e9));
+        for k in 0..5000 {
+            let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+            filter.step(e, u);
+            let age = match k {
+                499 => 0,
+                4999 => 1,
+                _ => continue,
+            };
+            for omega in [1.0, 2.0, 4.0] {
+                let truth = response(&person.basis, GAINS_OF_A_PERSON, omega);
+                let (value, variance) = estimate(&filter, omega);
+                for part in 0..2 {
+                    let error = value[part] - truth[part];
+                    squares[age] += error * error;
+                    all += 1.0;
+                    inside += f64::from(error.abs() < 1.96 * variance[part].sqrt());
+                }
+            }
+        }
+    }
+    // Of 192, not independent: a standard error of 3 to 4 %.
+    let share = inside / all;
+    assert!((0.87..=1.0).contains(&share), "{share}");
+    // After 100 s against 10 s: ten times the data.
+    let ratio = (squares[1] / squares[0]).sqrt();
+    assert!(ratio < 0.5, "{ratio}");
+}
+
+#[test]
+fn a_change_is_found_and_followed_and_a_louder_remnant_is_no_change() {
+    let mut found = 0;
+    for seed in 0..4 {
+        let (mut person, mut filter) = (Person::new(100 + seed), filter(27.0));
+        let after = GAINS_OF_A_PERSON.map(|g| 0.5 * g);
+        for k in 0..3000 {
+            let gains = if k < 1500 { GAINS_OF_A_PERSON } else { after };
+            let [e, u] = person.sample(gains, 0.03);
+            filter.step(e, u);
+            found += u32::from(filter.detector().declared() && (1500..2000).contains(&k));
+            assert!(!filter.detector().declared() || k >= 1500, "{seed}: false alarm at {k}");
+        }
+        let truth = response(&person.basis, after, 2.0);
+        let (value, _) = estimate(&filter, 2.0);
+        let error = (value[0] - truth[0]).hypot(value[1] - truth[1]) / truth[0].hypot(truth[1]);
+        assert!(error < 0.15, "{seed}: {error}");
+    }
+    assert!(found >= 3, "{found} of 4");
+
+    let mut alarms = 0;
+    for seed in 0..4 {
+        let (mut person, mut filter) = (Person::new(200 + seed), filter(27.0));
+        for k in 0..3000 {
+            let [e, u] = person.sample(GAINS_OF_A_PERSON, if k < 1500 { 0.03 } else { 0.06 });
+            filter.step(e, u);
+            alarms += u32::from(filter.detector().declared());
+        }
+    }
+    assert_eq!(alarms, 0);
+}
+
+#[test]
+fn a_copy_goes_on_with_the_same_digits() {
+    let (mut person, mut first) = (Person::new(5), filter(27.0));
+    for _ in 0..1234 {
+        let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+        first.step(e, u);
+    }
+    let mut numbers = Vec::new();
+    first.visit(&mut |number| numbers.push(*number));
+    let mut second = filter(27.0);
+    let mut left = numbers.iter();
+    second.visit(&mut |number| *number = *left.next().expect("as many numbers"));
+    assert!(left.next().is_none());
+    for k in 0..1000 {
+        let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+        assert_eq!(first.step(e, u), second.step(e, u), "{k}");
+        assert_eq!(first.detector().statistic(), second.detector().statistic());
+    }
+    assert_eq!(estimate(&first, 2.0), estimate(&second, 2.0));
+}
+
+#[test]
+fn what_says_nothing_does_no_harm() {
+    let mut silent = filter(27.0);
+    for _ in 0..500 {
+        assert_eq!(silent.step(0.0, 0.0).innovation, 0.0);
+    }
+    assert!(!silent.began());
+    // No error ever, an output that moves: nothing to begin with.
+    let mut stream = Stream(3);
+    for _ in 0..500 {
+        silent.step(0.0, stream.normal());
+    }
+    assert!(!silent.began());
+
+    let (mut person, mut filter) = (Person::new(9), filter(27.0));
+    let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+    assert!(filter.step(e, u).innovation.is_finite() && !filter.began());
+    for k in 0..2000 {
+        let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+        match k % 7 {
+            0 => filter.bridge(e),
+            1 => assert!(filter.step_without_update(e, u).innovation.is_finite()),
+            _ => assert!(filter.step(e, u).innovation.is_finite()),
+        }
+    }
+    // A still person: the estimate stays finite, and bands do too.
+    for _ in 0..3000 {
+        filter.step(0.0, 0.0);
+    }
+    let (value, variance) = estimate(&filter, 2.0);
+    assert!(value.iter().chain(&variance).all(|v| v.is_finite()));
+    assert!(filter.step(1e200, 1.0).shortened || filter.step(1.0, 1e200).shortened);
+    let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+    assert!(filter.step(e, u).innovation.is_finite() && filter.restarts() > 0);
+}
+
+#[test]
+fn an_outlier_hardly_moves_the_estimate() {
+    let (mut person, mut filter) = (Person::new(11), filter(27.0));
+    for _ in 0..1500 {
+        let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+        filter.step(e, u);
+    }
+    let (before, variance) = estimate(&filter, 2.0);
+    let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+    filter.step(e, u + 100.0);
+    let (after, _) = estimate(&filter, 2.0);
+    for part in 0..2 {
+        assert!((after[part] - before[part]).abs() < variance[part].sqrt());
+    }
+}
+
+#[test]
+fn what_makes_no_sense_is_refused() {
+    let errors = || vec![0.0; errors_needed(&points())];
+    assert!(PopulationFilter::new(points(), prior(27.0), vec![0.0; 3]).is_none());
+    let sound = prior(27.0);
+    for wrong in [
+        PopulationPrior { order: 1, ..sound },
+        PopulationPrior { hold: 0.0, ..sound },
+        PopulationPrior {
+            level_memory: [5.0, f64::NAN],
+            ..sound
+        },
+        PopulationPrior {
+            gains: GainPrior {
+                freedom: -1.0,
+                ..sound.gains
+            },
+            ..sound
+        },
+        PopulationPrior {
+            detection: Detection {
+                most: 500,
+                ..sound.detection
+            },
+            ..sound
+        },
+    ] {
+        assert!(PopulationFilter::new(points(), wrong, errors()).is_none(), "{wrong:?}");
+    }
+}

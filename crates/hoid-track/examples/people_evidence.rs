@@ -1,0 +1,225 @@
+//! How recorded people are followed: two trials of a person joined, of one controlled element or of
+//! two.
+//!
+//! `HOID_HUMAN_DATA=DIR cargo run --release -p hoid-track --example people_evidence -- [METHOD...]`
+//!
+//! Error: mean of `|dH|/|H|` over seven lines of the disturbance against the describing function of
+//! the person's ten trials of that element, `mean(U/D)/mean(E/D)`. The start span of methods that
+//! have one is 5 to 30 s. A seam without a change is no change, but no person makes its jump: alarms
+//! within 12 s of it do not count among those without a change.
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+#[allow(dead_code, reason = "scenarios are for the other examples")]
+mod evidence;
+
+use std::{env, f64::consts::PI, fs, path::PathBuf};
+
+use evidence::{median, on_all_cores};
+use hoid_model::{Channel, Record, SampleTime};
+use hoid_track::{Method, StartAt, TrackOptions, Tracker};
+
+const PEOPLE: [&str; 3] = ["P03", "P05", "P09"];
+const ELEMENTS: [&str; 2] = ["fo", "so"];
+/// Harmonics of 1/20 Hz in the disturbance of both elements.
+const LINES: [f64; 7] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0];
+/// Rows of a trial that are analysed: whole periods.
+const FROM: usize = 300;
+const ROWS: usize = 2400;
+const RATE_HZ: f64 = 60.0;
+const AT_S: [usize; 6] = [2, 4, 8, 13, 18, 28];
+const NK: usize = 13;
+const SETTLING_S: f64 = 12.0;
+
+/// Error, output, disturbance of a trial.
+type Trial = [Vec<f64>; 3];
+
+fn read(folder: &PathBuf, person: &str, element: &str) -> Vec<Trial> {
+    let start = format!("{person}_{element}_");
+    let mut files: Vec<PathBuf> = fs::read_dir(folder)
+        .unwrap()
+        .map(|file| file.unwrap().path())
+        .filter(|path| path.file_name().unwrap().to_string_lossy().starts_with(&start))
+        .collect();
+    files.sort();
+    let of = |path: &PathBuf| {
+        let text = fs::read_to_string(path).unwrap();
+        let mut lines = text.lines();
+        let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+        let place = |name: &str| header.iter().position(|h| *h == name).unwrap();
+        let places = ["r", "y", "u", "d"].map(place);
+        let mut trial: Trial = Default::default();
+        for line in lines {
+            let cells: Vec<&str> = line.split(',').collect();
+            let [r, y, u, d] = places.map(|p| cells[p].parse::<f64>().unwrap());
+            trial[0].push(r - y);
+            trial[1].push(u);
+            trial[2].push(d);
+        }
+        // u of a row was read one tick before.
+        trial[0] = trial[0][FROM..FROM + ROWS].to_vec();
+        trial[1] = trial[1][FROM + 1..FROM + 1 + ROWS].to_vec();
+        trial[2] = trial[2][FROM..FROM + ROWS].to_vec();
+        trial
+    };
+    files.iter().map(of).collect()
+}
+
+fn omega(line: f64) -> f64 {
+    2.0 * PI * line / 20.0
+}
+
+fn coefficient(values: &[f64], line: f64) -> [f64; 2] {
+    values.iter().enumerate().fold([0.0; 2], |[re, im], (k, v)| {
+        let (sin, cos) = (omega(line) * k as f64 / RATE_HZ).sin_cos();
+        [re + v * cos, im - v * sin]
+    })
+}
+
+fn over(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    let square = b[0] * b[0] + b[1] * b[1];
+    [
+        (a[0] * b[0] + a[1] * b[1]) / square,
+        (a[1] * b[0] - a[0] * b[1]) / square,
+    ]
+}
+
+fn describing(trials: &[Trial]) -> [[f64; 2]; 7] {
+    LINES.map(|line| {
+        let mean = |channel: usize| {
+            trials.iter().fold([0.0; 2], |[re, im], t| {
+                let [a, b] = over(coefficient(&t[channel], line), coefficient(&t[2], line));
+                [re + a, im + b]
+            })
+        };
+        over(mean(1), mean(0))
+    })
+}
+
+fn error(tracker: &Tracker, truth: &[[f64; 2]; 7]) -> f64 {
+    let each = LINES
+        .iter()
+        .zip(truth)
+        .map(|(line, t)| match tracker.response(omega(*line)) {
+            Some(h) => (h.value[0] - t[0]).hypot(h.value[1] - t[1]) / t[0].hypot(t[1]),
+            None => f64::NAN,
+        });
+    each.sum::<f64>() / LINES.len() as f64
+}
+
+struct Run {
+    before: f64,
+    after: [f64; 6],
+    alarms_s: Vec<f64>,
+    change: bool,
+}
+
+fn run(method: &str, first: &Trial, second: &Trial, truths: [&[[f64; 2]; 7]; 2], change: bool) -> Option<Run> {
+    let (name, option) = method
+        .split_once(':')
+        .map_or((method, None), |(name, option)| (name, Some(option)));
+    let mut method: Method = name.parse().unwrap();
+    if let Some((key, value)) = option.and_then(|o| o.split_once('=')) {
+        method.set(key, value).unwrap();
+    }
+    let ts = SampleTime::new(1.0 / RATE_HZ).unwrap();
+    let mut options = TrackOptions::usual(method, NK);
+    options.start = StartAt::Span(Some((5.0, 30.0)));
+    let joined = |c: usize| [first[c].clone(), second[c].clone()].concat();
+    let record = Record::new(ts, Channel::new("e", "", joined(0)), Channel::new("u", "", joined(1))).unwrap();
+    let starts_itself = options.method.starts_itself();
+    let span = record.span(5.0, 30.0).unwrap();
+    let mut tracker = Tracker::new(&options, (!starts_itself).then_some(&span), ts).ok()?;
+    let mut run = Run {
+        before: f64::NAN,
+        after: [f64::NAN; 6],
+        alarms_s: Vec::new(),
+        change,
+    };
+    for k in 0..record.len() {
+        let t = k as f64 / RATE_HZ;
+        let sample = hoid_track::Sample {
+            e: record.input()[k],
+            u: record.output()[k],
+            reference: None,
+        };
+        tracker.update(sample, starts_itself || t >= 30.0);
+        if tracker.change().is_some() {
+            run.alarms_s.push(t);
+        }
+        if k + 1 == ROWS {
+            run.before = error(&tracker, truths[0]);
+        }
+        for (place, at) in run.after.iter_mut().zip(AT_S) {
+            if k == ROWS + at * RATE_HZ as usize {
+                *place = error(&tracker, truths[1]);
+            }
+        }
+    }
+    Some(run)
+}
+
+fn main() {
+    let Some(folder) = env::var_os("HOID_HUMAN_DATA") else {
+        println!("HOID_HUMAN_DATA does not name the folder of the recorded people");
+        return;
+    };
+    let folder = PathBuf::from(folder);
+    let mut methods: Vec<String> = env::args().skip(1).collect();
+    if methods.is_empty() {
+        methods = ["population", "rls", "adaptive", "physical", "rpem"]
+            .map(str::to_owned)
+            .to_vec();
+    }
+    let mut pairs = Vec::new();
+    let cells: Vec<Vec<Trial>> = PEOPLE
+        .iter()
+        .flat_map(|p| ELEMENTS.map(|e| read(&folder, p, e)))
+        .collect();
+    let truths: Vec<[[f64; 2]; 7]> = cells.iter().map(|c| describing(c)).collect();
+    for person in 0..PEOPLE.len() {
+        for [a, b] in [[0, 1], [1, 0], [0, 0], [1, 1]] {
+            for trial in 0..10 {
+                let next = if a == b { (trial + 1) % 10 } else { trial };
+                pairs.push(([2 * person + a, trial], [2 * person + b, next]));
+            }
+        }
+    }
+    println!(
+        "| method | before | +2 | +4 | +8 | +13 | +18 | +28 s | mean from +8 | no change, +2 to +28 | found in 5 s | in 8 s | seams | alarms/h |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
+    for method in &methods {
+        let runs: Vec<Run> = on_all_cores(pairs.len(), |i| {
+            let ([a, i0], [b, i1]) = pairs[i as usize];
+            run(method, &cells[a][i0], &cells[b][i1], [&truths[a], &truths[b]], a != b)
+        })
+        .into_iter()
+        .flatten()
+        .collect();
+        let of = |change: bool, at: usize| median(runs.iter().filter(|r| r.change == change).map(|r| r.after[at]));
+        let curve: Vec<f64> = (0..6).map(|at| of(true, at)).collect();
+        let still: Vec<String> = (0..6).map(|at| format!("{:.2}", of(false, at))).collect();
+        let seam = ROWS as f64 / RATE_HZ;
+        let found = |change: bool, within: f64| {
+            let these: Vec<&Run> = runs.iter().filter(|r| r.change == change).collect();
+            let hit = |r: &&&Run| r.alarms_s.iter().any(|t| (seam..seam + within).contains(t));
+            these.iter().filter(hit).count() as f64 / these.len() as f64
+        };
+        let away = |t: &&f64| **t < seam || **t > seam + SETTLING_S;
+        let alarms: usize = runs.iter().map(|r| r.alarms_s.iter().filter(away).count()).sum();
+        let hours = runs.len() as f64 * (2.0 * seam - SETTLING_S) / 3600.0;
+        let figures: Vec<String> = curve.iter().map(|c| format!("{c:.3}")).collect();
+        println!(
+            "| {method} ({}) | {:.3} | {} | {:.3} | {} | {:.2} | {:.2} | {:.2} | {:.1} |",
+            runs.len(),
+            median(runs.iter().map(|r| r.before)),
+            figures.join(" | "),
+            curve[2..].iter().sum::<f64>() / 4.0,
+            still.join(" "),
+            found(true, 5.0),
+            found(true, 8.0),
+            found(false, 8.0),
+            alarms as f64 / hours
+        );
+    }
+}

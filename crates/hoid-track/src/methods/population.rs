@@ -1,0 +1,433 @@
+//! The recursion in the basis that people share ([`hoid_core::population`]) behind the face of a
+//! recursion: what is usual of people, in seconds.
+//!
+//! It needs no start fit. The usual person (lag 3 s, neuromuscular system of 11 rad/s and .25, their
+//! form `(T_L s + 1)^2/(T_I s + 1)`) is what recorded people have been found to be, and the delays
+//! stand around that of nk, .2 s where nothing is said. All other numbers were set on simulated
+//! people whose operator has a lag, whose delay is no whole number of samples, and whose remnant is
+//! an autoregression with a level that may change; none on recorded people.
+//!
+//! **What it reports.** Gains of the basis are no parameters of an operator. K_e and K_e_dot are those
+//! of the gain and lead that are nearest to it at [`NEAR_RAD_S`], by least squares in
+//! `K_e + K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`;
+//! exactly those of a person who has a gain and a lead. The polynomials are the hold of that.
+
+use hoid_core::{
+    adaptive::prior::OPERATOR,
+    population::{
+        DRIFTS, GAINS, POINTS, PopulationFilter, PopulationPrior,
+        basis::{Basis, Point},
+        detector::{BLOCK_S, Detection, Span},
+        errors_needed,
+        gains::GainPrior,
+    },
+    state::{State, visit_all},
+};
+use hoid_ident::{IdentError, settings, settings::Bounds};
+use hoid_model::{
+    SampleTime, Structure,
+    uncertainty::{Estimate, OperatorEstimate},
+};
+
+use crate::{
+    change::Change,
+    guard::GuardOptions,
+    memory::Memory,
+    method::{About, RecursiveMethod, bad as bad_option, check_delay, check_operator_orders},
+    recursion::{Recursion, Sample, StepOutcome},
+    reported::Reported,
+    response::Response,
+    setup::{Setup, StartAt},
+    start::StartState,
+};
+
+/// Lag T_I in s, natural frequency in rad/s and damping of the usual person.
+const LAG_S: f64 = 3.0;
+const OMEGA_RAD_S: f64 = 11.0;
+const ZETA: f64 = 0.25;
+/// Delays of the points, from that of nk on, s.
+const DELAYS_S: [f64; POINTS] = [0.0, -0.08, -0.04, 0.04, 0.08, 0.14, 0.2];
+/// Standard deviations of the gains' drift in one second, over |Y| at 2 rad/s.
+const DRIFT: [f64; DRIFTS] = [0.005, 0.07, 0.3];
+/// Degrees of freedom of the innovations, and limit in standard deviations.
+const FREEDOM: f64 = 5.0;
+const LIMIT: f64 = 3.5;
+/// Time constants with which the weights of points and of drifts are forgotten, s.
+const POINT_MEMORY_S: f64 = 60.0;
+const DRIFT_MEMORY_S: f64 = 15.0;
+/// Order of the noise model when none is named, and the largest; its memory, s.
+const USUAL_ND: usize = 16;
+const LARGEST_ND: usize = hoid_core::population::LARGEST_ORDER;
+const NOISE_MEMORY_S: f64 = 40.0;
+/// Time constants of the innovations' variance for the gains and for the detector, s.
+const LEVEL_MEMORY_S: [f64; 2] = [5.0, 10.0];
+/// Drift of the level of u in one second, over the root mean square of u.
+const OFFSET_DRIFT: f64 = 0.02;
+/// Time after which the estimate begins, s.
+const HOLD_S: f64 = 1.0;
+/// What a declared change adds to the gains, over |Y| at 2 rad/s.
+const JUMP: f64 = 0.3;
+/// Frequency in which changes are looked for, rad/s; seconds that are now, and seconds before, at
+/// least and at most; blocks that must agree; seconds after a change in which none is declared.
+const CHANGE_RAD_S: f64 = 2.5;
+const NOW_S: f64 = 5.0;
+const BEFORE_S: [f64; 2] = [15.0, 40.0];
+const PERSISTENCE: u64 = 2;
+const REFRACTORY_S: f64 = 8.0;
+/// The threshold in T/c at [`RATE`] false alarms an hour, and by how much it rises with each
+/// logarithm of the rate: the distribution on simulated people without a change, under remnants that
+/// are steady, that wander by 30 %, and that follow |e|.
+const THRESHOLD: f64 = 10.0;
+const RATE: f64 = 30.0;
+const SLOPE: f64 = 9.0;
+/// Frequencies at which gain and lead are nearest, rad/s.
+const NEAR_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
+
+settings! {
+    /// Options of the recursion in the basis that people share.
+    pub struct PopulationOptions {
+        /// False alarms in an hour that are accepted: a lower number finds fewer changes, later
+        #[setting(unit("1/h"), bounds(Bounds::PositiveFinite))]
+        pub false_alarms: f64 = 1.0,
+        /// Standard deviations beyond which an innovation moves the estimate no further
+        #[setting(bounds(Bounds::Positive), default("3.5"))]
+        pub limit: Option<f64> = None,
+    }
+    groups {
+        /// The guard.
+        pub guard: GuardOptions,
+    }
+}
+
+impl PopulationOptions {
+    fn threshold(&self) -> f64 {
+        (THRESHOLD + SLOPE * (RATE / self.false_alarms).ln()).max(1.0)
+    }
+}
+
+impl RecursiveMethod for PopulationOptions {
+    fn about(&self) -> About {
+        About {
+            name: "population",
+            help: "gains in a basis that people share, with a noise model of its own; starts without a fit",
+            source: "McRuer and Jex 1967; Magill 1965; Chow 1960; Welch 1947; the book, page Recursive methods",
+            structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
+            defaults: &[],
+        }
+    }
+
+    fn usual_nd(&self) -> Option<usize> {
+        Some(USUAL_ND)
+    }
+
+    /// It follows from the weights of the drifts.
+    fn usual_memory(&self, _parameter: &str) -> Memory {
+        Memory::Infinite
+    }
+
+    fn check(&self, setup: &Setup) -> Result<(), IdentError> {
+        check_operator_orders("population", setup)?;
+        check_delay(&setup.orders)?;
+        let o = &setup.orders;
+        if o.nc != 0 || o.nd > LARGEST_ND {
+            return Err(bad_option(
+                "the noise model of population",
+                format!("nc={},nd={}", o.nc, o.nd),
+                "nc = 0 and nd of at most 24",
+            ));
+        }
+        if matches!(setup.start, StartAt::Theta(_)) {
+            return Err(bad_option(
+                "the start of population",
+                "coefficients".to_owned(),
+                "none: it starts from what is usual of people",
+            ));
+        }
+        Ok(())
+    }
+
+    fn build(
+        &self,
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Box<dyn Recursion>, IdentError> {
+        Ok(Box::new(PopulationRecursion::new(self, setup, from, sample_time)?))
+    }
+
+    fn is_physical(&self) -> bool {
+        true
+    }
+
+    fn starts_itself(&self) -> bool {
+        true
+    }
+
+    fn memory_in_words(&self) -> Option<String> {
+        Some(format!(
+            "since the last change where nothing changes; a change is declared so that {} false alarms an hour are to be expected",
+            self.false_alarms
+        ))
+    }
+
+    fn is_guarded(&self) -> bool {
+        self.guard.is_on(false)
+    }
+
+    fn limit(&self) -> f64 {
+        self.limit.unwrap_or(LIMIT)
+    }
+}
+
+/// What is supposed of people, in samples.
+fn prior(options: &PopulationOptions, setup: &Setup, ts: f64) -> PopulationPrior {
+    let blocks = |seconds: f64| (seconds / BLOCK_S).round() as usize;
+    PopulationPrior {
+        gains: GainPrior {
+            drifts: DRIFT,
+            freedom: FREEDOM,
+            limit: options.limit(),
+            forgotten: [POINT_MEMORY_S, DRIFT_MEMORY_S].map(|memory| (ts / memory).min(1.0)),
+            sample_time: ts,
+        },
+        // A structure without a noise model, or with one pole, does not say how it is coloured.
+        order: match setup.orders.nd {
+            0 | 1 => USUAL_ND,
+            nd => nd,
+        },
+        noise_memory: NOISE_MEMORY_S,
+        level_memory: LEVEL_MEMORY_S,
+        offset_drift: OFFSET_DRIFT,
+        hold: HOLD_S,
+        jump: JUMP,
+        detection: Detection {
+            frequency: CHANGE_RAD_S,
+            recent: blocks(NOW_S),
+            least: blocks(BEFORE_S[0]),
+            most: blocks(BEFORE_S[1]),
+            threshold: options.threshold(),
+            persistence: PERSISTENCE,
+            refractory: blocks(REFRACTORY_S) as u64,
+        },
+    }
+}
+
+type Maps = [[[f64; GAINS]; 2]; POINTS];
+
+/// The matrices that take the gains of each point to `[K_e, K_e_dot]`.
+fn gain_and_lead(basis: &Basis) -> [[f64; GAINS]; 2] {
+    let Point { tau, omega, zeta, .. } = basis.point();
+    let squares: f64 = NEAR_RAD_S.iter().map(|w| w * w).sum();
+    let mut map = [[0.0; GAINS]; 2];
+    for w in NEAR_RAD_S {
+        let share = w / omega;
+        let (second, first) = (1.0 - share * share, 2.0 * zeta * share);
+        let (sin, cos) = (tau * w).sin_cos();
+        // What a delay and a neuromuscular system took away.
+        let [re, im] = [second * cos - first * sin, second * sin + first * cos];
+        for (i, [a, b]) in basis.response(w).into_iter().enumerate() {
+            map[0][i] += (a * re - b * im) / NEAR_RAD_S.len() as f64;
+            map[1][i] += w * (a * im + b * re) / squares;
+        }
+    }
+    map
+}
+
+/// The filter with its report.
+struct PopulationRecursion {
+    model: Box<PopulationFilter<Vec<f64>>>,
+    maps: Maps,
+    reported: Reported,
+}
+
+impl PopulationRecursion {
+    fn new(
+        options: &PopulationOptions,
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Self, IdentError> {
+        let ts = sample_time.s();
+        let nk = setup.orders.nk;
+        let about = (nk as f64 - 1.0) * ts;
+        let mut bases = Vec::with_capacity(POINTS);
+        for later in DELAYS_S {
+            let point = Point {
+                tau: (about + later).max(0.0),
+                omega: OMEGA_RAD_S,
+                zeta: ZETA,
+                lag: LAG_S,
+            };
+            bases.push(Basis::new(point, ts).ok_or_else(|| unusable(&format!("a delay of {} s", point.tau)))?);
+        }
+        let bases: [Basis; POINTS] = bases.try_into().map_err(|_| unusable("its delays"))?;
+        let errors = vec![0.0; errors_needed(&bases)];
+        let maps = std::array::from_fn(|i| gain_and_lead(&bases[i]));
+        let model = PopulationFilter::new(bases, prior(options, setup, ts), errors)
+            .ok_or_else(|| unusable("its sample time or options"))?;
+        Ok(Self {
+            model: Box::new(model),
+            maps,
+            reported: Reported::new(from, nk, sample_time),
+        })
+    }
+
+    fn report(&mut self) {
+        let ([k_e, k_e_dot], _) = self.model.gains().moments(&self.maps);
+        self.reported.set([k_e, k_e_dot, OMEGA_RAD_S, ZETA]);
+        self.reported.set_noise(self.model.d());
+    }
+
+    /// Mean and variance of the delay over the points, that of the steps between them included.
+    fn delay(&self) -> Estimate {
+        let (mut mean, mut square, mut total) = (0.0, 0.0, 0.0);
+        for (i, basis) in self.model.bases().iter().enumerate() {
+            let (probability, tau) = (self.model.gains().probability(i), basis.point().tau);
+            total += probability;
+            mean += probability * tau;
+            square += probability * tau * tau;
+        }
+        let mean = mean / total;
+        let step = DELAYS_S[3];
+        Estimate::with_variance(mean, (square / total - mean * mean).max(0.0) + step * step / 12.0)
+    }
+
+    /// K_e and K_e_dot of one of the spans that were compared.
+    fn of_span(&self, span: &Span) -> [Estimate; 2] {
+        self.maps[0].map(|row| {
+            let value: f64 = row.iter().zip(span.state).map(|(m, s)| m * s).sum();
+            let mut variance = 0.0;
+            for (i, a) in row.iter().enumerate() {
+                for (j, b) in row.iter().enumerate() {
+                    variance += a * span.covariance[i][j] * b;
+                }
+            }
+            // The spans are compared in units of how much this person varies without a change.
+            Estimate::with_variance(value, variance * self.model.detector().usual_level())
+        })
+    }
+}
+
+/// T that makes `E (K_e_dot - T K_e)^2` least, and its variance.
+fn lead_time([k_e, k_e_dot]: [f64; 2], c: &[[f64; 2]; 2]) -> [f64; 2] {
+    let square = k_e * k_e + c[0][0];
+    let lead = (k_e * k_e_dot + c[0][1]) / square;
+    let variance = c[1][1] - 2.0 * lead * c[0][1] + lead * lead * c[0][0];
+    [lead, variance.max(0.0) / square]
+}
+
+fn unusable(what: &str) -> IdentError {
+    IdentError::BadStart {
+        reason: format!("the basis of people cannot be made for {what}; check nk and the sample time"),
+    }
+}
+
+impl State for PopulationRecursion {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        visit_all(&mut [&mut *self.model, &mut self.reported], each);
+    }
+}
+
+impl Recursion for PopulationRecursion {
+    fn step(&mut self, sample: Sample) -> StepOutcome {
+        let step = self.model.step(sample.e, sample.u);
+        if self.model.began() {
+            self.report();
+        }
+        step.into()
+    }
+
+    fn follow(&mut self, sample: Sample) -> StepOutcome {
+        self.model.step_without_update(sample.e, sample.u).into()
+    }
+
+    fn bridge(&mut self, sample: Sample) {
+        self.model.bridge(sample.e);
+    }
+
+    fn theta(&self) -> &[f64] {
+        self.reported.theta()
+    }
+
+    fn covariance(&self, into: &mut [f64]) -> bool {
+        if !self.model.began() {
+            return false;
+        }
+        let (_, c) = self.model.gains().moments(&self.maps);
+        let mut whole = [[0.0; OPERATOR]; OPERATOR];
+        for i in 0..2 {
+            whole[i][..2].copy_from_slice(&c[i]);
+        }
+        self.reported.covariance(&whole, into);
+        true
+    }
+
+    fn innovation_variance(&self) -> f64 {
+        self.model.variance()
+    }
+
+    fn operator(&self) -> Option<OperatorEstimate> {
+        let (values, covariance) = self.model.gains().moments(&self.maps);
+        let [lead, lead_variance] = match self.model.began() {
+            true => lead_time(values, &covariance),
+            false => [f64::NAN; 2],
+        };
+        let of = |i: usize| Estimate::with_variance(values[i], covariance[i][i]);
+        Some(OperatorEstimate {
+            k_e: of(0),
+            t_l_s: Estimate::with_variance(lead, lead_variance),
+            k_e_dot: of(1),
+            omega_nm_rad_s: Estimate::fixed(OMEGA_RAD_S),
+            zeta_nm: Estimate::fixed(ZETA),
+            tau_e_s: self.delay(),
+        })
+    }
+
+    fn change_odds(&self) -> Option<f64> {
+        Some(self.model.detector().statistic() / 2.0)
+    }
+
+    fn change(&self) -> Option<Change> {
+        let detector = self.model.detector();
+        if !detector.declared() {
+            return None;
+        }
+        let [before, after] = detector.spans();
+        let ([k_e, k_e_dot], [now_k_e, now_k_e_dot]) = (self.of_span(before), self.of_span(after));
+        let z = |a: Estimate, b: Estimate| {
+            let variance = |e: Estimate| e.standard_error.map_or(0.0, |s| s * s);
+            (b.value - a.value) / (variance(a) + variance(b)).sqrt()
+        };
+        let log_variance = 2.0 / before.samples + 2.0 / after.samples;
+        let level = (after.variance / before.variance).ln() / (log_variance * detector.usual_level()).sqrt();
+        let same = |e: Estimate| [e, e];
+        Some(Change {
+            seconds_ago: NOW_S,
+            odds: detector.statistic() / 2.0,
+            k_e: [k_e, now_k_e],
+            k_e_dot: [k_e_dot, now_k_e_dot],
+            omega_nm_rad_s: same(Estimate::fixed(OMEGA_RAD_S)),
+            zeta_nm: same(Estimate::fixed(ZETA)),
+            tau_e_s: same(self.delay()),
+            t_l_s: [k_e_dot.value / k_e.value, now_k_e_dot.value / now_k_e.value],
+            innovation_variance: [before.variance, after.variance],
+            z: [z(k_e, now_k_e), z(k_e_dot, now_k_e_dot), 0.0, 0.0, level, 0.0],
+        })
+    }
+
+    fn response(&self, omega_rad_s: f64) -> Option<Response> {
+        if !self.model.began() {
+            return None;
+        }
+        let bases = self.model.bases();
+        let maps: Maps = std::array::from_fn(|i| {
+            let h = bases[i].response(omega_rad_s);
+            [h.map(|h| h[0]), h.map(|h| h[1])]
+        });
+        let (value, covariance) = self.model.gains().moments(&maps);
+        Some(Response { value, covariance })
+    }
+}
+
+#[cfg(test)]
+mod tests;

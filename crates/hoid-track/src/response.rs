@@ -1,0 +1,182 @@
+//! The response of an estimate at a frequency: what seconds of data determine best.
+//!
+//! Of the polynomials, `H = B z^-nk/(A F)` at `z = e^{j omega Ts}`, with the derivatives
+//!
+//! `dH/db_j = z^-(nk+j)/(A F)`, `dH/da_j = -H z^-j/A`, `dH/df_j = -H z^-j/F`,
+//!
+//! so that the covariance of theta gives that of the real and the imaginary part. Gain and phase
+//! follow to first order: `d ln H = dH/H`, whose real part is the relative change of the gain and
+//! whose imaginary part is that of the phase.
+
+use hoid_model::{Orders, SampleTime, uncertainty::Estimate};
+
+/// Decibels of a factor of e.
+const DB: f64 = 8.685_889_638_065_037;
+
+/// Response at a frequency.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Response {
+    /// Real and imaginary part.
+    pub value: [f64; 2],
+    /// Their covariance; NaN where there is none.
+    pub covariance: [[f64; 2]; 2],
+}
+
+impl Response {
+    /// |H| in dB.
+    pub fn gain_db(&self) -> Estimate {
+        let [re, im] = self.value;
+        Estimate::with_variance(DB * re.hypot(im).ln(), DB * DB * self.along([re, im]))
+    }
+
+    /// Phase in degrees, between -180 and 180.
+    pub fn phase_deg(&self) -> Estimate {
+        let [re, im] = self.value;
+        let degrees = 180.0 / std::f64::consts::PI;
+        Estimate::with_variance(degrees * im.atan2(re), degrees * degrees * self.along([-im, re]))
+    }
+
+    /// Variance along a direction of the length of H, over |H|^2 twice.
+    fn along(&self, [a, b]: [f64; 2]) -> f64 {
+        let c = &self.covariance;
+        let square = self.value[0] * self.value[0] + self.value[1] * self.value[1];
+        (a * a * c[0][0] + 2.0 * a * b * c[0][1] + b * b * c[1][1]) / (square * square)
+    }
+
+    /// Of polynomials theta with these orders; `covariance` is that of theta by rows.
+    pub(crate) fn of_polynomials(
+        orders: &Orders,
+        theta: &[f64],
+        covariance: Option<&[f64]>,
+        omega_rad_s: f64,
+        sample_time: SampleTime,
+    ) -> Self {
+        let angle = -omega_rad_s * sample_time.s();
+        let power = |k: usize| {
+            let (sin, cos) = (angle * k as f64).sin_cos();
+            [cos, sin]
+        };
+        let o = orders;
+        let (first_b, first_f) = (o.na, o.na + o.nb + o.nc + o.nd);
+        let monic = |from: usize, n: usize| {
+            (0..n).fold([1.0, 0.0], |[re, im], j| {
+                let [c, s] = power(j + 1);
+                [re + theta[from + j] * c, im + theta[from + j] * s]
+            })
+        };
+        let (a, f) = (monic(0, o.na), monic(first_f, o.nf));
+        let poles = times(a, f);
+        let b = (0..o.nb).fold([0.0; 2], |[re, im], j| {
+            let [c, s] = power(o.nk + j);
+            [re + theta[first_b + j] * c, im + theta[first_b + j] * s]
+        });
+        let value = over(b, poles);
+        let mut gradient = vec![[0.0; 2]; theta.len()];
+        let minus = [-value[0], -value[1]];
+        for j in 0..o.nb {
+            gradient[first_b + j] = over(power(o.nk + j), poles);
+        }
+        for j in 0..o.na {
+            gradient[j] = over(times(minus, power(j + 1)), a);
+        }
+        for j in 0..o.nf {
+            gradient[first_f + j] = over(times(minus, power(j + 1)), f);
+        }
+        let mut spread = [[f64::NAN; 2]; 2];
+        if let Some(c) = covariance {
+            spread = [[0.0; 2]; 2];
+            for (i, gi) in gradient.iter().enumerate() {
+                for (j, gj) in gradient.iter().enumerate() {
+                    for (row, a) in spread.iter_mut().zip(gi) {
+                        for (s, b) in row.iter_mut().zip(gj) {
+                            *s += a * c[i * theta.len() + j] * b;
+                        }
+                    }
+                }
+            }
+        }
+        Self {
+            value,
+            covariance: spread,
+        }
+    }
+}
+
+fn times(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
+}
+
+fn over(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    let square = b[0] * b[0] + b[1] * b[1];
+    let [re, im] = times(a, [b[0], -b[1]]);
+    [re / square, im / square]
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    const ORDERS: Orders = Orders {
+        na: 1,
+        nb: 2,
+        nc: 0,
+        nd: 1,
+        nf: 2,
+        nk: 3,
+    };
+    const THETA: [f64; 6] = [-0.3, 0.05, -0.04, -0.8, -1.7, 0.74];
+
+    fn at(theta: &[f64], covariance: Option<&[f64]>) -> Response {
+        Response::of_polynomials(&ORDERS, theta, covariance, 4.0, SampleTime::HUNDREDTH)
+    }
+
+    #[test]
+    fn covariance_is_that_of_finite_differences() {
+        let p = THETA.len();
+        let mut covariance = vec![0.0; p * p];
+        for i in 0..p {
+            for j in 0..p {
+                covariance[i * p + j] = if i == j { 1e-4 * (1.0 + i as f64) } else { 1e-5 };
+            }
+        }
+        let exact = at(&THETA, Some(&covariance));
+        let columns: Vec<[f64; 2]> = (0..p)
+            .map(|i| {
+                let moved = |h: f64| {
+                    let mut theta = THETA;
+                    theta[i] += h;
+                    at(&theta, None).value
+                };
+                let (up, down) = (moved(1e-6), moved(-1e-6));
+                [(up[0] - down[0]) / 2e-6, (up[1] - down[1]) / 2e-6]
+            })
+            .collect();
+        for a in 0..2 {
+            for b in 0..2 {
+                let mut expected = 0.0;
+                for i in 0..p {
+                    for j in 0..p {
+                        expected += columns[i][a] * covariance[i * p + j] * columns[j][b];
+                    }
+                }
+                let size = (exact.covariance[0][0] * exact.covariance[1][1]).sqrt();
+                assert!((exact.covariance[a][b] - expected).abs() < 1e-6 * size);
+            }
+        }
+    }
+
+    #[test]
+    fn gain_and_phase_are_those_of_the_number() {
+        let response = Response {
+            value: [0.0, -10.0],
+            covariance: [[0.04, 0.0], [0.0, 0.01]],
+        };
+        let (gain, phase) = (response.gain_db(), response.phase_deg());
+        assert!((gain.value - 20.0).abs() < 1e-12 && (phase.value + 90.0).abs() < 1e-12);
+        // The imaginary part is along H, the real part across.
+        assert!((gain.standard_error.unwrap() - DB * 0.01).abs() < 1e-12);
+        assert!((phase.standard_error.unwrap() - 0.02_f64.to_degrees()).abs() < 1e-12);
+        assert!(at(&THETA, None).gain_db().standard_error.is_none());
+    }
+}

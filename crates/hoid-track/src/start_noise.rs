@@ -1,0 +1,135 @@
+//! The noise model of a start whose operator is known: D of what the operator leaves of the output.
+//!
+//! `v(t) = u(t) - (B/F) q^-nk e(t)` is an autoregression, `D v = eps`, whose coefficients follow from
+//! least squares (L. Ljung, *System Identification*, 1999, section 10.1).
+
+use hoid_ident::{Estimator, Fit};
+use hoid_model::{Channel, Orders, Record, Structure};
+
+/// D with its covariance.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct StartNoise {
+    /// Coefficients behind the 1.
+    pub d: Vec<f64>,
+    /// Their covariance, by rows.
+    pub covariance: Vec<f64>,
+    /// Variance of the innovations.
+    pub variance: f64,
+}
+
+impl StartNoise {
+    /// Of order nd, from what the operator of this fit leaves of a record; `None` where that is too
+    /// short or constant, or the fit is one of another sampling.
+    pub fn of(fit: &Fit, record: &Record, nd: usize) -> Option<Self> {
+        let simulated = fit.simulate(record).ok()?;
+        let output = record.output().get(simulated.first..)?;
+        let left = output.iter().zip(&simulated.values).map(|(u, w)| u - w).collect();
+        let left = Record::of_output(record.sample_time(), Channel::new("v", "", left)).ok()?;
+        let orders = Orders {
+            na: nd,
+            nb: 0,
+            nc: 0,
+            nd: 0,
+            nf: 0,
+            nk: 0,
+        };
+        let found = Estimator::new(Structure::Ar, orders)
+            .fit(std::slice::from_ref(&left))
+            .ok()?;
+        let variance = found.innovation_variance();
+        (variance > 0.0).then_some(Self {
+            d: found.model().theta().to_vec(),
+            covariance: found.covariance()?.to_vec(),
+            variance,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::collections::BTreeMap;
+
+    use hoid_ident::Constraint;
+    use hoid_model::{
+        SampleTime,
+        scenario::{Condition, Scenario},
+    };
+    use hoid_sim::{RunSeed, Simulator};
+
+    use crate::{Method, TrackOptions, Tracker};
+
+    use super::*;
+
+    fn span() -> Record {
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        simulator
+            .run(RunSeed::default(), false)
+            .unwrap()
+            .span(0.0, 30.0)
+            .unwrap()
+    }
+
+    /// Bounds that the Box-Jenkins fit cannot keep lead to the grey box.
+    fn outside() -> TrackOptions {
+        let mut options = TrackOptions::usual(Method::adaptive(), 29);
+        let narrow = BTreeMap::from([("omega_nm".to_owned(), Constraint::Between(20.0, 30.0))]);
+        if let Method::Adaptive(own) = &mut options.method {
+            own.bounds.bound = narrow;
+        }
+        options
+    }
+
+    #[test]
+    fn a_start_outside_the_bounds_keeps_the_order_of_its_noise_model() {
+        let (span, options) = (span(), outside());
+        let tracker = Tracker::new(&options, Some(&span), SampleTime::HUNDREDTH).unwrap();
+        let names = tracker.parameter_names();
+        let d: Vec<f64> = names
+            .iter()
+            .zip(tracker.theta())
+            .filter(|(name, _)| name.starts_with('d'))
+            .map(|(_, d)| *d)
+            .collect();
+        assert_eq!(d.len(), 6);
+        assert!(d.iter().skip(1).any(|d| d.abs() > 0.02), "{d:?}");
+        // The innovations of its first samples are as white as those of the fit: their variance is
+        // that of the start.
+        let fit = tracker.start().unwrap();
+        assert!(tracker.innovation_variance() <= fit.innovation_variance() * 1.001);
+    }
+
+    #[test]
+    fn d_is_that_of_the_autoregression() {
+        let span = span();
+        let fit = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29))
+            .fit(std::slice::from_ref(&span))
+            .unwrap();
+        let noise = StartNoise::of(&fit, &span, 4).unwrap();
+        assert_eq!((noise.d.len(), noise.covariance.len()), (4, 16));
+        // The batch twin: the normal equations hold for the residuals of D on what is left.
+        let w = fit.simulate(&span).unwrap();
+        let v: Vec<f64> = span.output()[w.first..]
+            .iter()
+            .zip(&w.values)
+            .map(|(u, w)| u - w)
+            .collect();
+        let eps = |t: usize| v[t] + (0..4).map(|j| noise.d[j] * v[t - 1 - j]).sum::<f64>();
+        let n = v.len() as f64;
+        for lag in 1..=4 {
+            let products: f64 = (4..v.len()).map(|t| eps(t) * v[t - lag]).sum::<f64>() / n;
+            let size = (noise.variance * v.iter().map(|v| v * v).sum::<f64>() / n).sqrt();
+            assert!(products.abs() < 2e-2 * size, "{lag} {products} {size}");
+        }
+    }
+
+    #[test]
+    fn nothing_to_fit_gives_nothing() {
+        let span = span();
+        let fit = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29))
+            .fit(std::slice::from_ref(&span))
+            .unwrap();
+        let short = span.span(0.0, 0.03).unwrap();
+        assert!(StartNoise::of(&fit, &short, 6).is_none());
+    }
+}
