@@ -18,6 +18,7 @@ RecursiveMethod = Literal[
     "window",
     "rriv",
     "adaptive",
+    "population",
     "fused",
     "ekf",
     "ukf",
@@ -47,7 +48,7 @@ class MethodSettings(TypedDict, total=False):
     covariance: float | None
 
     # Standard deviations beyond which an innovation moves the estimate no further. For rls,
-    # rpem, physical, adaptive, fused.
+    # rpem, physical, adaptive, population, fused.
     limit: float | None
 
     # Memory of single parameters, or of all of one letter, as b0=256,f=inf,K_e=5s. For rls,
@@ -84,7 +85,7 @@ class MethodSettings(TypedDict, total=False):
     rate: float | None
 
     # Guard: outliers of e and u are held back, spans that no tracking makes are left out, and
-    # the estimate begins again after them. For rls, rpem, physical, adaptive.
+    # the estimate begins again after them. For rls, rpem, physical, adaptive, population.
     guard: Literal["yes", "no"] | None
 
     # Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
@@ -118,6 +119,10 @@ class MethodSettings(TypedDict, total=False):
     # place of what the past alone says. For adaptive.
     smooth: bool | None
 
+    # False alarms in an hour that are accepted: a lower number finds fewer changes, later. For
+    # population.
+    false_alarms: float | None
+
 
 #: The methods, as the documentation of `track` lists them.
 METHODS = """``"rls"``: recursive least squares;
@@ -127,6 +132,8 @@ METHODS = """``"rls"``: recursive least squares;
         ``"rriv"``: recursive refined instrumental variable;
         ``"adaptive"``: a bank of hypotheses of when the person changed, which sets its memory
         itself and tells of changes;
+        ``"population"``: gains in a basis that people share, with a noise model of its own;
+        starts without a fit;
         ``"fused"``: least squares for B with the poles of rpem, for comparison;
         ``"ekf"``: extended Kalman filter of state and parameters, for comparison;
         ``"ukf"``: unscented Kalman filter of state and parameters, for comparison."""
@@ -137,7 +144,7 @@ SETTINGS = """covariance : float
             variance (the reference text: 0.1). For rls, rpem, physical, fused.
         limit : float
             Standard deviations beyond which an innovation moves the estimate no further. For
-            rls, rpem, physical, adaptive, fused.
+            rls, rpem, physical, adaptive, population, fused.
         memory_of : Mapping[str, float | str]
             Memory of single parameters, or of all of one letter, as b0=256,f=inf,K_e=5s. For
             rls, rpem, physical, rriv, fused.
@@ -157,7 +164,8 @@ SETTINGS = """covariance : float
             For forgetting by the gradient: step size. For rls, rpem, physical.
         guard : Literal['yes', 'no']
             Guard: outliers of e and u are held back, spans that no tracking makes are left out,
-            and the estimate begins again after them. For rls, rpem, physical, adaptive.
+            and the estimate begins again after them. For rls, rpem, physical, adaptive,
+            population.
         regressor : Literal['gradient', 'cascade', 'pseudo-linear']
             Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
             comparison), or pseudo-linear (without filters: extended least squares). For rpem.
@@ -181,4 +189,7 @@ SETTINGS = """covariance : float
             Logarithm of the odds from which a change is declared. For adaptive.
         smooth : bool
             At each sample what all of a recorded run says of it, by hypotheses run from both
-            ends, in place of what the past alone says. For adaptive."""
+            ends, in place of what the past alone says. For adaptive.
+        false_alarms : float
+            False alarms in an hour that are accepted: a lower number finds fewer changes,
+            later. For population."""
