@@ -92,6 +92,17 @@ impl Reported {
         }
     }
 
+    /// Puts the covariance of the coefficients of a noise model that is followed in the place of
+    /// that of the start fit.
+    pub(crate) fn set_covariance_of_noise<const D: usize>(&self, of_d: &[[f64; D]; D], into: &mut [f64]) {
+        let p = self.theta.len();
+        let nd = p - OPERATOR;
+        for (i, row) in of_d.iter().enumerate().take(nd) {
+            let shown = nd.min(D);
+            into[(2 + i) * p + 2..(2 + i) * p + 2 + shown].copy_from_slice(&row[..shown]);
+        }
+    }
+
     /// The operator, with T_L in s and its variance as given.
     pub(crate) fn operator(
         &self,

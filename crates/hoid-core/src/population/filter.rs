@@ -327,6 +327,11 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
         self.noise.d()
     }
 
+    /// The noise model.
+    pub fn noise(&self) -> &NoiseModel {
+        &self.noise
+    }
+
     /// Variance of eps of the last seconds.
     pub fn variance(&self) -> f64 {
         self.variance[0]

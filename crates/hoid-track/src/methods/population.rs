@@ -359,6 +359,10 @@ impl Recursion for PopulationRecursion {
             whole[i][..2].copy_from_slice(&c[i]);
         }
         self.reported.covariance(&whole, into);
+        match self.model.noise().covariance() {
+            Some(of_d) => self.reported.set_covariance_of_noise(&of_d, into),
+            None => return false,
+        }
         true
     }
 

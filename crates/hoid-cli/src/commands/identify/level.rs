@@ -14,7 +14,9 @@ const TRUTH: &str = "K_e";
 pub fn is_estimated(args: &IdentifyArgs, with_input: bool, records: &[Record]) -> bool {
     let simulated = records.iter().any(|record| record.channel(TRUTH).is_some());
     let moves = |x: &[f64]| x.iter().any(|v| *v != x[0]);
-    let alive = records.iter().all(|record| moves(record.input()) && moves(record.output()));
+    let alive = records
+        .iter()
+        .all(|record| moves(record.input()) && moves(record.output()));
     with_input && !simulated && alive && args.faults.looks() && args.read.detrend == Detrend::None
 }
 
