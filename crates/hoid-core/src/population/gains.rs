@@ -10,7 +10,7 @@
 //! with eps limited to some standard deviations. The logarithm of its weight grows by that of the
 //! Student density and is forgotten with a time constant, so that weights speak of the last seconds:
 //! short among the drifts, long among the points, since a person's gains may be steady or not from
-//! one moment to the next, their delay not. A filter whose weight has fallen below [`LEAST`] takes
+//! one moment to the next, their delay not. A filter whose weight has fallen below `LEAST` takes
 //! over the state of the best at its point.
 
 use super::sizes::{DRIFTS, GAINS, POINTS, STATES};

@@ -117,7 +117,7 @@ pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record
 }
 
 /// What a level that is left in e and u does to a fit of polynomials, by a fit without their means: a
-/// doubt where a parameter moves by more than [`LEVEL`] standard errors.
+/// doubt where a parameter moves by more than `LEVEL` standard errors.
 pub fn of_level(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Finding> {
     let without: Vec<Record> = records.iter().map(|r| r.clone().detrended(Detrend::Mean)).collect();
     let other = again(estimator, fit, &without)?;
