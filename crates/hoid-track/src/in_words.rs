@@ -53,6 +53,7 @@ impl TrackOptions {
             Some(p) => format!("P = {p} I"),
         };
         match &self.start {
+            _ if self.method.starts_itself() => "what is usual of people".to_owned(),
             StartAt::Span(Some((from, to))) => format!("batch fit of {from:.2} to {to:.2} s, {covariance}"),
             StartAt::Span(None) => format!("batch fit of the first third, {covariance}"),
             StartAt::Theta(_) => "from coefficients that were given".to_owned(),

@@ -51,6 +51,8 @@ const SHORTENED: f64 = 0.05;
 const FAULTS: f64 = 0.1;
 const HELD: f64 = 0.01;
 const SIGN: f64 = 0.02;
+/// Share of the rows with a negative lead beyond which it is told.
+const NEGATIVE_LEAD: f64 = 0.1;
 /// Spans that are named one by one.
 const NAMED: usize = 3;
 /// After a restart the estimate is doubtful for so long, s.
@@ -163,6 +165,7 @@ impl Trace {
             |is: &dyn Fn(&OperatorEstimate) -> bool| share(found.iter().filter(|o| is(o)).count(), found.len());
         all.extend(gains_over_rows(&rows_with));
         all.extend(sign_finding(&rows_with));
+        all.extend(lead_finding(&rows_with));
         let nyquist = self.sample_time().nyquist_rad_s();
         let bounded = self.options().method.is_physical();
         let senseless = rows_with(&|o| {
@@ -400,6 +403,29 @@ fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     })
 }
 
+/// True where K_e and K_e_dot have opposite signs by two standard errors each: a negative lead.
+fn leads_backwards(o: &OperatorEstimate) -> bool {
+    let sign = |e: &Estimate| match is_open(e) {
+        true => 0.0,
+        false => e.value.signum(),
+    };
+    sign(&o.k_e) * sign(&o.k_e_dot) < 0.0
+}
+
+/// A lead below zero: nobody has one; a gain and a lead that stand for a lag do.
+fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
+    let negative = rows_with(&leads_backwards);
+    (negative > NEGATIVE_LEAD).then(|| {
+        Finding::doubt(
+            "negative-lead",
+            format!(
+                "the lead T_L is negative in {:.0} % of the rows, by two standard errors of K_e and of K_e_dot: a gain and a                  lead are not the form of this person, who may have a lag; K_e, T_L and K_e_dot are none of their parameters                  then, only the response is theirs (hoid identify finds the form)",
+                100.0 * negative
+            ),
+        )
+    })
+}
+
 /// Share of the rows whose operator has a property.
 type ShareOfRows<'a> = dyn Fn(&dyn Fn(&OperatorEstimate) -> bool) -> f64 + 'a;
 
@@ -490,7 +516,11 @@ fn level_of_operator(operator: &OperatorEstimate, sample_time: SampleTime) -> Ve
     let open = gains.iter().any(|finding| finding.severity == Severity::Undetermined);
     if open {
         VerdictLevel::NotDetermined
-    } else if !gains.is_empty() || senseless.is_some() || !operator.parameters().is_stable() {
+    } else if !gains.is_empty()
+        || senseless.is_some()
+        || leads_backwards(operator)
+        || !operator.parameters().is_stable()
+    {
         VerdictLevel::Doubtful
     } else {
         VerdictLevel::Trustworthy
@@ -530,6 +560,32 @@ mod tests {
         let arx = TrackOptions::usual(Method::rls(), 29);
         let verdict = judged(&record, &arx);
         assert!(verdict.reasons().any(|r| r.starts_with("start fit: ")), "{verdict}");
+    }
+
+    #[test]
+    fn a_negative_lead_is_no_lead() {
+        let operator = |k_e: f64, k_e_dot: f64| OperatorEstimate {
+            k_e: Estimate::with_variance(k_e, 0.01),
+            t_l_s: Estimate::fixed(k_e_dot / k_e),
+            k_e_dot: Estimate::with_variance(k_e_dot, 0.01),
+            omega_nm_rad_s: Estimate::fixed(11.0),
+            zeta_nm: Estimate::fixed(0.25),
+            tau_e_s: Estimate::fixed(0.2),
+        };
+        // Two standard errors are .2.
+        for (k_e, k_e_dot, expected) in [
+            (1.0, 1.0, false),
+            (1.0, -0.3, true),
+            (1.0, -0.1, false),
+            (-1.0, 0.3, true),
+            (0.1, -0.3, false),
+            (-1.0, -0.3, false),
+        ] {
+            assert_eq!(leads_backwards(&operator(k_e, k_e_dot)), expected, "{k_e}, {k_e_dot}");
+        }
+        let share = |negative: f64| move |_: &dyn Fn(&OperatorEstimate) -> bool| negative;
+        assert!(lead_finding(&share(0.05)).is_none());
+        assert_eq!(lead_finding(&share(0.4)).unwrap().kind, "negative-lead");
     }
 
     #[test]

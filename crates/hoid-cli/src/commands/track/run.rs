@@ -46,6 +46,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     settings.push((
         "start".to_owned(),
         match &options.start {
+            _ if options.method.starts_itself() => "what is usual of people".to_owned(),
             StartAt::Span(Some((from, to))) => format!("batch fit of {from:.2} to {to:.2} s"),
             StartAt::Span(None) => "batch fit of the first third".to_owned(),
             StartAt::Theta(_) => "given".to_owned(),
