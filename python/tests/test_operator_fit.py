@@ -186,5 +186,6 @@ def test_guesses_of_coefficients_have_their_own_name(c1: pyhoid.Record) -> None:
     free = pyhoid.identify(c1, "bj", **orders)
     held = pyhoid.identify(c1, "bj", coefficient_prior={"f1": (-1.9, 1e3)}, **orders)
     assert abs(held.parameters["f1"] + 1.9) < abs(free.parameters["f1"] + 1.9)
-    with pytest.raises(TypeError, match="prior"):
-        pyhoid.identify(c1, "bj", prior={"f1": (-1.9, 1.0)})  # type: ignore[call-overload]
+    of_coefficients: Any = {"f1": (-1.9, 1.0)}
+    with pytest.raises(pyhoid.OptionError, match="prior belongs to"):
+        pyhoid.identify(c1, "bj", prior=of_coefficients)

@@ -419,7 +419,9 @@ fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
         Finding::doubt(
             "negative-lead",
             format!(
-                "the lead T_L is negative in {:.0} % of the rows, by two standard errors of K_e and of K_e_dot: a gain and a                  lead are not the form of this person, who may have a lag; K_e, T_L and K_e_dot are none of their parameters                  then, only the response is theirs (hoid identify finds the form)",
+                "the lead T_L is negative in {:.0} % of the rows, by two standard errors of K_e and of K_e_dot: a gain and a \
+                 lead are not the form of this person, who may have a lag; K_e, T_L and K_e_dot are none of their parameters \
+                 then, only the response is theirs (hoid identify finds the form)",
                 100.0 * negative
             ),
         )
