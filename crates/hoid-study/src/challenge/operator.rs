@@ -11,7 +11,7 @@
 //! over a sample, the response from sampled e to sampled u at low frequencies is `Y(j omega)` times
 //! the hold `(1 - e^(-j omega Ts))/(j omega Ts)`; where they see it all the time, `Y(j omega)`.
 
-use hoid_model::{Complex64, ContinuousTransferFunction, ModelError, SampleTime};
+use hoid_model::{Complex64, ContinuousTransferFunction, ModelError, SampleTime, polynomial};
 
 /// An operator. Times in s, frequencies in rad/s; zero where a factor is not there.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,7 +78,7 @@ impl Operator {
     pub(super) fn numerator(&self) -> Vec<f64> {
         let mut all = vec![self.gain];
         for _ in 0..self.leads {
-            all = product(&all, &[1.0, self.lead_s]);
+            all = polynomial::product(&all, &[1.0, self.lead_s]);
         }
         all
     }
@@ -89,11 +89,11 @@ impl Operator {
         let mut all = second(self.omega_nm_rad_s, self.zeta_nm).to_vec();
         for time_s in [self.lag_s, self.third_s] {
             if time_s > 0.0 {
-                all = product(&all, &[1.0, time_s]);
+                all = polynomial::product(&all, &[1.0, time_s]);
             }
         }
         if self.stick_rad_s > 0.0 {
-            all = product(&all, &second(self.stick_rad_s, STICK_DAMPING));
+            all = polynomial::product(&all, &second(self.stick_rad_s, STICK_DAMPING));
         }
         all
     }
@@ -101,7 +101,7 @@ impl Operator {
     /// `Y(j omega)`.
     pub fn response(&self, omega_rad_s: f64) -> Complex64 {
         let s = Complex64::new(0.0, omega_rad_s);
-        at(&self.numerator(), s) / at(&self.denominator(), s) * (-s * self.tau_e_s).exp()
+        polynomial::value(&self.numerator(), s) / polynomial::value(&self.denominator(), s) * (-s * self.tau_e_s).exp()
     }
 
     /// Its names and values as those of the operator of the reference text: K_e, K_e_dot in s,
@@ -159,7 +159,7 @@ impl Plant {
 
     /// `P(j omega)`.
     pub(super) fn response(self, omega_rad_s: f64) -> Complex64 {
-        Complex64::from(1.0) / at(self.denominator(), Complex64::new(0.0, omega_rad_s))
+        Complex64::from(1.0) / polynomial::value(self.denominator(), Complex64::new(0.0, omega_rad_s))
     }
 }
 
@@ -171,24 +171,6 @@ pub fn hold(omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
     }
     let j = Complex64::new(0.0, turn);
     (Complex64::from(1.0) - (-j).exp()) / j
-}
-
-/// A polynomial with ascending coefficients.
-fn at(ascending: &[f64], s: Complex64) -> Complex64 {
-    ascending
-        .iter()
-        .rev()
-        .fold(Complex64::from(0.0), |sum, c| sum * s + Complex64::from(*c))
-}
-
-fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
-    let mut all = vec![0.0; a.len() + b.len() - 1];
-    for (i, x) in a.iter().enumerate() {
-        for (j, y) in b.iter().enumerate() {
-            all[i + j] += x * y;
-        }
-    }
-    all
 }
 
 /// Largest order of a system here.

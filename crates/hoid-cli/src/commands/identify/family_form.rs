@@ -287,45 +287,27 @@ impl Found<'_> {
 
     fn lines_json(&self) -> Value {
         let Some(lines) = &self.fit.lines else {
-            return match &self.fit.no_lines {
-                Some(why) => json!({"reason": why}),
-                None => Value::Null,
-            };
+            return why_not(self.fit.no_lines.as_ref());
         };
-        let parameters: Vec<Value> = lines
-            .parameters()
-            .iter()
-            .map(|(name, e)| json::named(name, e))
-            .collect();
         let mut map = Map::new();
-        map.insert("parameters".to_owned(), Value::Array(parameters));
+        map.insert("parameters".to_owned(), all_named(&lines.parameters()));
         map.insert("chi2".to_owned(), number(lines.chi_squared));
         map.insert("degrees_of_freedom".to_owned(), json!(lines.degrees_of_freedom));
         map.insert("held_out".to_owned(), optional(lines.held_out_total()));
         map.insert("converged".to_owned(), json!(lines.termination.converged()));
         if let Some(element) = self.element {
-            map.insert(
-                "open_loop".to_owned(),
-                open_loop(self.fit.loop_measures_at_lines(element).as_ref()),
-            );
+            let measures = self.fit.loop_measures_at_lines(element);
+            map.insert("open_loop".to_owned(), open_loop(measures.as_ref()));
         }
         Value::Object(map)
     }
 
     fn instrumental_json(&self) -> Value {
         let Some(found) = &self.fit.instrumental else {
-            return match &self.fit.no_instrumental {
-                Some(why) => json!({"reason": why}),
-                None => Value::Null,
-            };
+            return why_not(self.fit.no_instrumental.as_ref());
         };
-        let parameters: Vec<Value> = found
-            .parameters()
-            .iter()
-            .map(|(name, e)| json::named(name, e))
-            .collect();
         let mut map = Map::new();
-        map.insert("parameters".to_owned(), Value::Array(parameters));
+        map.insert("parameters".to_owned(), all_named(&found.parameters()));
         map.insert("nd".to_owned(), json!(found.noise_order));
         map.insert("converged".to_owned(), json!(found.termination.converged()));
         map.insert("termination".to_owned(), json!(found.termination.to_string()));
@@ -370,6 +352,16 @@ impl Found<'_> {
             })
         })
     }
+}
+
+/// Of a method that gave nothing: the reason, where there is one.
+fn why_not(reason: Option<&String>) -> Value {
+    reason.map_or(Value::Null, |why| json!({"reason": why}))
+}
+
+/// Estimates in the order of the form, each with its name.
+fn all_named(parameters: &[(&'static str, Estimate)]) -> Value {
+    parameters.iter().map(|(name, e)| json::named(name, e)).collect()
 }
 
 fn named(p: &Parameter) -> String {

@@ -49,10 +49,10 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     if kind == ModelKind::Family {
         return family::run(args, &files, &records, &accounts);
     }
-    let as_read = level::is_estimated(args, with_input, &records).then(|| records.clone());
-    let records = match &as_read {
-        Some(as_read) => level::without(as_read),
-        None => records,
+    let (records, as_read) = if level::is_estimated(args, with_input, &records) {
+        (level::without(&records), Some(records))
+    } else {
+        (records, None)
     };
     let Estimated {
         fit,
@@ -63,17 +63,13 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     } = estimate::fit(args, kind, &records)?;
     // Read before anything is written: a bad validation file leaves nothing behind.
     let validation = match &args.validate {
-        Some(path) => Some((
-            path.display().to_string(),
-            fit.quality(&[{
-                let other = reading::read(path, &args.read, with_input)?.0;
-                if as_read.is_some() {
-                    other.detrended(Detrend::Mean)
-                } else {
-                    other
-                }
-            }])?,
-        )),
+        Some(path) => {
+            let mut other = vec![reading::read(path, &args.read, with_input)?.0];
+            if as_read.is_some() {
+                other = level::without(&other);
+            }
+            Some((path.display().to_string(), fit.quality(&other)?))
+        }
         None => None,
     };
     let mut settings = chosen;

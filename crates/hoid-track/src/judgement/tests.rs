@@ -1,0 +1,152 @@
+#![allow(clippy::unwrap_used)]
+use hoid_model::{
+    Channel, Orders, Structure, VerdictLevel,
+    scenario::{Condition, Scenario},
+};
+use hoid_sim::{RunSeed, Simulator};
+
+use super::*;
+use crate::{Method, StartAt, TrackOptions, Tracker, track};
+
+fn simulated(condition: Condition) -> Record {
+    let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
+    simulator.run(RunSeed::default(), false).unwrap()
+}
+
+fn kinds(verdict: &Verdict) -> Vec<&'static str> {
+    verdict.findings().iter().map(|f| f.kind).collect()
+}
+
+fn judged(record: &Record, options: &TrackOptions) -> Verdict {
+    track(record, options, 10).unwrap().verdict(record, None).unwrap()
+}
+
+#[test]
+fn a_clean_run_is_trustworthy_and_a_wrong_start_is_named() {
+    let record = simulated(Condition::C4);
+    let verdict = judged(&record, &TrackOptions::usual(Method::physical(), 29));
+    assert_eq!(verdict.level, VerdictLevel::Trustworthy, "{verdict}");
+    let arx = TrackOptions::usual(Method::rls(), 29);
+    let verdict = judged(&record, &arx);
+    assert!(verdict.reasons().any(|r| r.starts_with("start fit: ")), "{verdict}");
+}
+
+#[test]
+fn an_output_without_a_response_is_not_determined() {
+    let record = simulated(Condition::C1);
+    let mut state = 3_u64;
+    let mut draw = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let noise = Channel::new("u", "", (0..record.len()).map(|_| draw()).collect());
+    let input = Channel::new("e", "", record.input().to_vec());
+    let other = Record::new(record.sample_time(), input, noise).unwrap();
+    let trace = track(&other, &TrackOptions::usual(Method::physical(), 29), 10).unwrap();
+    let verdict = trace.verdict(&other, None).unwrap();
+    assert_ne!(verdict.level, VerdictLevel::Trustworthy);
+    assert!(kinds(&verdict).contains(&"start-explains-little"), "{verdict}");
+}
+
+/// A trace of C1 whose rows are as they are wanted.
+fn changed(change: impl FnOnce(&mut Trace)) -> Vec<&'static str> {
+    let record = simulated(Condition::C1);
+    let mut trace = track(&record, &TrackOptions::usual(Method::physical(), 29), 100).unwrap();
+    change(&mut trace);
+    kinds(&trace.verdict(&record, None).unwrap())
+}
+
+#[test]
+fn each_size_of_the_trace_has_its_finding() {
+    assert!(changed(|_| ()).is_empty());
+    let counted = changed(|trace| (trace.counts.shortened, trace.counts.skipped) = (1000, 1000));
+    assert_eq!(counted, ["faults", "steps-shortened"]);
+    let open = |e: &mut Estimate| e.standard_error = Some(e.value.abs());
+    let one = changed(|trace| trace.operator.iter_mut().for_each(|o| open(&mut o.k_e)));
+    assert_eq!(one, ["undetermined-parameter"]);
+    let both = changed(|trace| {
+        for o in &mut trace.operator {
+            open(&mut o.k_e);
+            open(&mut o.k_e_dot);
+        }
+    });
+    assert_eq!(both, ["gain"]);
+    let lag = changed(|trace| trace.operator.iter_mut().for_each(|o| o.zeta_nm.value = 4.0));
+    assert_eq!(lag, ["neuromuscular-lag"]);
+    let none = changed(|trace| trace.operator.iter_mut().for_each(|o| o.t_l_s.value = f64::NAN));
+    assert_eq!(none, ["not-convertible"]);
+    let grown = changed(|trace| {
+        let last = trace.covariance.len() - 1;
+        trace.covariance[last] *= 1e4;
+    });
+    assert_eq!(grown, ["covariance-blown-up"]);
+    let broken = changed(|trace| *trace.theta.last_mut().unwrap() = f64::NAN);
+    assert_eq!(broken, ["not-finite"]);
+}
+
+#[test]
+fn a_delay_that_jumps_is_not_followed_by_a_fixed_one() {
+    let record = simulated(Condition::C1);
+    let late = |at: usize, by: usize| {
+        let u = |t: usize| record.output()[if t >= at { t - by } else { t }];
+        let u = Channel::new("u", "", (0..record.len()).map(u).collect());
+        let e = Channel::new("e", "", record.input().to_vec());
+        Record::new(record.sample_time(), e, u).unwrap()
+    };
+    let options = TrackOptions::usual(Method::physical(), 29);
+    let told = |record: &Record| kinds(&judged(record, &options)).contains(&"not-followed");
+    assert!(told(&late(5000, 20)));
+    assert!(!told(&late(5000, 0)));
+    // Shorter than what is looked at.
+    assert!(
+        judged(&record.span(0.0, 12.0).unwrap(), &options)
+            .findings()
+            .iter()
+            .all(|f| f.kind != "not-followed")
+    );
+}
+
+#[test]
+fn the_level_of_a_moment_follows_the_estimate() {
+    let options = TrackOptions {
+        start: StartAt::Nothing,
+        ..TrackOptions::usual(Method::physical(), 29)
+    };
+    let record = simulated(Condition::C1);
+    let mut tracker = Tracker::new(&options, None, record.sample_time()).unwrap();
+    // From nothing nothing is known.
+    assert_ne!(tracker.level(&tracker.operator()), VerdictLevel::Trustworthy);
+    let usual = TrackOptions::usual(Method::physical(), 29);
+    let mut known = Tracker::new(&usual, Some(&record), record.sample_time()).unwrap();
+    for (e, u) in record.input().iter().zip(record.output()) {
+        tracker.step(*e, *u);
+        known.step(*e, *u);
+    }
+    let mut operator = known.operator().unwrap();
+    assert_eq!(known.level(&Ok(operator)), VerdictLevel::Trustworthy);
+    operator.zeta_nm.value = 4.0;
+    assert_eq!(known.level(&Ok(operator)), VerdictLevel::Doubtful);
+    for gain in [&mut operator.k_e, &mut operator.k_e_dot] {
+        gain.standard_error = Some(gain.value.abs());
+    }
+    assert_eq!(known.level(&Ok(operator)), VerdictLevel::NotDetermined);
+    assert_eq!(known.level(&Err(NotConvertible::ZeroGain)), VerdictLevel::Doubtful);
+}
+
+#[test]
+fn orders_of_no_operator_are_judged_by_their_coefficients() {
+    let record = simulated(Condition::C1);
+    let orders = Orders {
+        na: 3,
+        nb: 3,
+        nk: 29,
+        ..Orders::default()
+    };
+    let options = TrackOptions::new(Method::rls(), Structure::Arx, orders);
+    let tracker = Tracker::new(&options, Some(&record), record.sample_time()).unwrap();
+    assert_eq!(tracker.level(&tracker.operator()), VerdictLevel::Trustworthy);
+    let verdict = judged(&record, &options);
+    assert!(!kinds(&verdict).contains(&"not-convertible"), "{verdict}");
+}
