@@ -38,3 +38,22 @@ def test_what_is_only_reported_is_doubted() -> None:
     assert kept.faults == []
     with pytest.raises(ValueError):
         pyhoid.identify(bad, "bj", nk=29, faults="mend")
+
+
+def test_a_level_of_u_is_found_and_moves_nothing() -> None:
+    clean = pyhoid.simulate(condition="C3", seed=82)
+    assert pyhoid.identify(clean, "bj", nk=29, nd=1).levels == []
+    e, u = np.array(clean.e), np.array(clean.u)
+    bare = pyhoid.Record(e=e, u=u, sample_time=clean.sample_time)
+    moved = pyhoid.Record(e=e, u=u + 0.5, sample_time=clean.sample_time)
+    for structure, options in (("bj", {"nk": 29, "nd": 1}), ("time-varying", {"delay": (0.27, 0.29)})):
+        before = pyhoid.identify(bare, structure, **options)
+        found = pyhoid.identify(moved, structure, **options)
+        for name, value in found.parameters.items():
+            assert value == pytest.approx(before.parameters[name], rel=1e-5), name
+        [one], [other] = before.levels, found.levels
+        assert one is not None and other is not None and one.standard_error
+        assert other.value - one.value == pytest.approx(0.5, abs=1e-5)
+        assert abs(one.value) < 4 * one.standard_error
+        as_read = pyhoid.identify(moved, structure, **options, faults="keep")
+        assert [level for level in as_read.levels if level is not None] == []

@@ -121,8 +121,7 @@ def test_segments_between_faults(stalled: Path, cli: Any) -> None:
         segments = pyhoid.read_segments(stalled, ["stalled"])
     assert len(segments) == 2 and sum(map(len, segments)) < 8192
     fit = pyhoid.identify(segments, "bj", nk=29, nd=1)
-    # Data as they are: otherwise the command line takes the level of recorded data out.
-    options = "--structure bj --nk 29 --orders nd=1 --mask stalled --faults keep".split()
+    options = "--structure bj --nk 29 --orders nd=1 --mask stalled".split()
     found = cli.json("identify", stalled, *options)
     assert fit.parameters == {p["name"]: p["value"] for p in found["parameters"]}
     with pytest.raises(pyhoid.OptionError, match="clock"):

@@ -11,12 +11,29 @@
 //! `mean(e)^2 var G(1)`.
 
 use hoid_model::{
-    Record,
+    Detrend, Record,
     polynomial_model::monic,
     uncertainty::{Estimate, variance_along},
 };
 
 use crate::Fit;
+
+/// The channel of true gains that simulated runs carry: they have no level.
+const TRUTH: &str = "K_e";
+
+/// True for records that a level is estimated of: not of simulated runs, which carry their true
+/// gains, and not where e or u never moves, which the fit refuses with the value as it was read.
+pub fn may_have_level(records: &[Record]) -> bool {
+    let simulated = records.iter().any(|record| record.channel(TRUTH).is_some());
+    let moves = |x: &[f64]| x.iter().any(|v| *v != x[0]);
+    let alive = |record: &Record| moves(record.input()) && moves(record.output());
+    !simulated && records.iter().all(alive)
+}
+
+/// The records without the means of e and u, which takes the level out of a constant model.
+pub fn without_level(records: &[Record]) -> Vec<Record> {
+    records.iter().map(|r| r.clone().detrended(Detrend::Mean)).collect()
+}
 
 impl Fit {
     /// The level c of u in a record, in the unit of u, with its standard error; the fit is one to the
@@ -44,7 +61,7 @@ impl Fit {
 #[cfg(test)]
 mod tests {
     use hoid_model::{
-        Channel, Detrend, Structure,
+        Channel, Structure,
         scenario::{Condition, Scenario},
     };
     use hoid_sim::{RunSeed, Simulator};

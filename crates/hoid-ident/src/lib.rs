@@ -92,7 +92,7 @@ mod informative_data;
 mod initial_guess;
 pub mod iv;
 pub mod judgement;
-mod level;
+pub mod level;
 pub mod linalg;
 mod multistart;
 mod noise_model;

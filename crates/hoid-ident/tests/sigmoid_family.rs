@@ -9,9 +9,10 @@ use hoid_model::{
     Channel, ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, Record, SampleTime,
     VerdictLevel,
     family_scenario::{MultiSine, RemnantPart, RemnantShape},
+    scenario::{Condition, Scenario},
     schedule::Schedule,
 };
-use hoid_sim::{FamilySimulator, RunSeed};
+use hoid_sim::{FamilySimulator, RunSeed, Simulator};
 
 const T_M: f64 = 30.0;
 const G: f64 = 2.0;
@@ -140,6 +141,52 @@ fn the_square_of_a_lead_is_recovered_over_its_kinks() {
         let error = value(&fit, name) / expected - 1.0;
         assert!(error.abs() < 1e-6, "{name}: {error:e}, from {}", fit.start());
     }
+}
+
+#[test]
+fn a_level_of_u_is_found_and_moves_nothing() {
+    // Mean square of the level over its standard error, without one and with one in u.
+    let (runs, level) = (6, 0.7);
+    let with_level = SigmoidChange {
+        level: true,
+        ..estimator(Form::Lead)
+    };
+    let simulator = Simulator::new(&Scenario::condition(Condition::C3)).unwrap();
+    let mut squares = 0.0;
+    for replication in 0..runs {
+        let seed = RunSeed {
+            seed: 21,
+            replication,
+            ..RunSeed::default()
+        };
+        let record = simulator.run(seed, false).unwrap();
+        let channel = |name: &str, x: &[f64], by: f64| Channel::new(name, "", x.iter().map(|v| v + by).collect());
+        let e = channel("e", record.input(), 0.0);
+        let moved = Record::new(record.sample_time(), e, channel("u", record.output(), level)).unwrap();
+        let clean = with_level.fit(std::slice::from_ref(&record)).unwrap();
+        let fit = with_level.fit(std::slice::from_ref(&moved)).unwrap();
+        // To what the searches leave open.
+        for (a, b) in clean.parameters().iter().zip(fit.parameters()) {
+            let (a, b) = (a.estimate, b.estimate);
+            let error = a.standard_error.unwrap_or(f64::INFINITY);
+            assert!(
+                (a.value - b.value).abs() < 0.02 * error,
+                "{}: {a} and {b}",
+                clean.start()
+            );
+        }
+        let (before, after) = (clean.level(&record).unwrap(), fit.level(&moved).unwrap());
+        let error = before.standard_error.unwrap();
+        assert!(
+            (after.value - before.value - level).abs() < 0.02 * error,
+            "{before} and {after}"
+        );
+        squares += (before.value / error).powi(2);
+        let bare = estimator(Form::Lead).fit(std::slice::from_ref(&record)).unwrap();
+        assert!(bare.level(&record).is_none());
+    }
+    // chi-square of 6: 0.68 to 18.5 at 0.5 % on each side.
+    assert!((0.68..18.5).contains(&squares), "{squares}");
 }
 
 /// The errors of `runs` fits over their standard errors; t_M and G where those are normal.

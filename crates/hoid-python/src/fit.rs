@@ -187,6 +187,16 @@ impl PyFit {
             .collect()
     }
 
+    /// The level of u in a record of the fit, by its number, as it was read.
+    fn level(&self, record: &Bound<'_, PyAny>, number: usize) -> Outcome<Option<Pair>> {
+        let record = arrays::record(record, Wanted::Only(&[]))?;
+        let fit = self
+            .grey_box
+            .as_ref()
+            .map_or(&self.fit, |found| found.polynomial_fit(number));
+        Ok(fit.level(&record).map(pair))
+    }
+
     fn remnant<'py>(&self, py: Python<'py>, discretisation: &str) -> Outcome<Option<Bound<'py, PyDict>>> {
         let how = names::remnant_discretisation(discretisation)?;
         if self.fit.orders().nd == 0 {

@@ -34,7 +34,7 @@ enum Found {
 /// Fits a model to records. The package has brought all options into plain form.
 #[pyfunction]
 #[pyo3(signature = (records, structure, *, orders, method, instruments, form, neuromuscular, prior, remnant_order, delay, individual, criterion, initial_state, start, fix,
-    bound, coefficient_prior, robust, focus, stable, search_method, max_iterations, tolerance, second_opinion, progress))]
+    bound, coefficient_prior, robust, focus, stable, search_method, max_iterations, tolerance, second_opinion, level, progress))]
 #[allow(clippy::too_many_arguments)]
 pub fn identify<'py>(
     py: Python<'py>,
@@ -62,6 +62,7 @@ pub fn identify<'py>(
     max_iterations: usize,
     tolerance: f64,
     second_opinion: bool,
+    level: bool,
     progress: Option<Bound<'py, PyAny>>,
 ) -> Outcome<Bound<'py, PyAny>> {
     let kind = names::kind(structure)?;
@@ -168,6 +169,7 @@ pub fn identify<'py>(
                     Some(name) => names::choice("form", name)?,
                 },
                 neuromuscular,
+                level,
                 prior: prior.map_or(Ok(usual.prior.clone()), PriorOfUser::prior)?,
                 nd,
                 constraints,

@@ -62,6 +62,8 @@ fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(describing::describing_function, module)?,
         wrap_pyfunction!(family::identify_operator, module)?,
         wrap_pyfunction!(faults::mend, module)?,
+        wrap_pyfunction!(faults::may_have_level, module)?,
+        wrap_pyfunction!(faults::without_level, module)?,
         wrap_pyfunction!(files::check_record, module)?,
         wrap_pyfunction!(files::detrended, module)?,
         wrap_pyfunction!(files::read, module)?,

@@ -97,6 +97,12 @@ impl PyTimeVaryingFit {
         Ok(all)
     }
 
+    /// The level of u in a record, where it was estimated.
+    fn level(&self, record: &Bound<'_, PyAny>) -> Outcome<Option<Pair>> {
+        let record = arrays::record(record, Wanted::Only(&[]))?;
+        Ok(self.fit.level(&record).map(pair))
+    }
+
     #[getter]
     fn initial<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         operator(py, self.fit.initial_operator())

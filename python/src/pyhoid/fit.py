@@ -106,6 +106,8 @@ class Fit:
         #: Faults of the records that were looked for: kind, channel, from, to, size, action.
         self.faults: list[dict[str, Any]] = []
         self._of_faults = Verdict("trustworthy", [], [])
+        #: Records with their level, where it was estimated.
+        self._as_read: tuple[Record, ...] = ()
 
     @property
     def structure(self) -> str:
@@ -201,6 +203,16 @@ class Fit:
         Empty for other fits.
         """
         return [None if found is None else Operator(found) for found in self._native.operators]
+
+    @property
+    def levels(self) -> list[Estimate | None]:
+        """The level of u of each record: the constant that is no response to e, in the unit of u.
+
+        Estimated of recorded data; empty for simulated runs and with ``faults="keep"``. None where
+        the model has no static gain.
+        """
+        pairs = [self._native.level(record, k) for k, record in enumerate(self._as_read)]
+        return [None if pair is None else Estimate(*pair) for pair in pairs]
 
     @property
     def remnant(self) -> Remnant | None:

@@ -196,7 +196,8 @@ def identify(
     faults : {"bridge", "cut", "report", "keep"}
         What is done about faults of the records (spikes, dropouts, frozen and idle stretches):
         bridge what lasts up to 0.1 s and cut at what is longer, cut all, report only, or look for
-        none. What was found is ``fit.faults``.
+        none. What was found is ``fit.faults``. Of recorded data a level of u is estimated too
+        (``fit.levels``), and ``fit.records`` are without their means; keep leaves data as they are.
     progress : bool or callable
         True shows on standard error how far a search is; a callable gets the number of
         candidates done and the number of all.
@@ -255,6 +256,12 @@ def identify(
     given = {key: value for key, (value, default) in usual.items() if value != default}
     _check(name, method.lower(), {**given, **orders})
     several, of_faults, says = _faults.mended(_options.as_records(records), faults)
+    # A constant of u: out of the data of a constant model, an unknown of one that changes.
+    as_read = several
+    level = faults != "keep" and _pyhoid.may_have_level(as_read)
+    without = _pyhoid.without_level(as_read, name) if level else None
+    if without is not None:
+        several = tuple(Record._of(parts) for parts in without)
     found = _pyhoid.identify(
         several,
         name,
@@ -287,6 +294,7 @@ def identify(
         max_iterations=int(max_iterations),
         tolerance=float(tolerance),
         second_opinion=faults != "keep",
+        level=level,
         progress=_options.reporter(progress, "candidates"),
     )
     if isinstance(found, _pyhoid.TimeVaryingFit):
@@ -295,4 +303,6 @@ def identify(
         return change
     fit = Fit(found, several, settings)
     fit.faults, fit._of_faults = of_faults, says
+    if without is not None:
+        fit._as_read = as_read
     return fit

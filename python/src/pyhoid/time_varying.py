@@ -100,6 +100,15 @@ class TimeVaryingFit:
         return self._native.change
 
     @property
+    def levels(self) -> list[Estimate | None]:
+        """The level of u of each record: the constant that is no response to e, in the unit of u.
+
+        None where it was not estimated: of simulated runs and with ``faults="keep"``.
+        """
+        pairs = [self._native.level(record) for record in self.records]
+        return [None if pair is None else Estimate(*pair) for pair in pairs]
+
+    @property
     def initial(self) -> Operator | None:
         """The operator before the change."""
         found = self._native.initial

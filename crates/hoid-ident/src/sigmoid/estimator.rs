@@ -18,6 +18,7 @@ use crate::{
     Constraint, IdentError, SearchOptions,
     family::OperatorPrior,
     informative_data::{check_record, common_sample_time},
+    level::without_level,
 };
 
 /// Lower minima that the walks along t_M and G may come upon before the fit is left at the last
@@ -32,6 +33,8 @@ pub struct SigmoidChange {
     pub form: Form,
     /// With the neuromuscular part. Default true.
     pub neuromuscular: bool,
+    /// A level of u in each record, estimated: of recorded data ([`SigmoidFit::level`]). Default false.
+    pub level: bool,
     /// What is known of the person before the data; that of T_L counts before and after the change.
     /// Default nothing.
     pub prior: OperatorPrior,
@@ -61,6 +64,7 @@ impl Default for SigmoidChange {
         Self {
             form: Form::Lead,
             neuromuscular: true,
+            level: false,
             prior: OperatorPrior::none(),
             nd: 1,
             delay_range_s: (0.05, 0.6),
@@ -150,10 +154,22 @@ impl SigmoidChange {
     ) -> Result<Vec<(String, Vec<f64>)>, IdentError> {
         Ok(match &self.start {
             Some(start) => vec![("given".to_owned(), self.given_start(criterion, start)?)],
-            None => starts::initial_guesses(criterion, records)
-                .into_iter()
-                .map(|s| (s.label, s.theta))
-                .collect(),
+            None => {
+                // The regressions that rank the starts know of no level.
+                let off_level = if self.level {
+                    without_level(records)
+                } else {
+                    records.to_vec()
+                };
+                let of_starts = ChangeCriterion {
+                    limits: criterion.limits.clone(),
+                    ..self.criterion(&off_level, criterion.sample_time)?
+                };
+                starts::initial_guesses(&of_starts, &off_level)
+                    .into_iter()
+                    .map(|s| (s.label, s.theta))
+                    .collect()
+            }
         })
     }
 
@@ -211,6 +227,7 @@ impl SigmoidChange {
             changes: true,
             weights: None,
             penalty: Vec::new(),
+            level: self.level,
         };
         for record in records {
             check_record(Structure::BoxJenkins, &orders, record, criterion.first)?;

@@ -47,6 +47,8 @@ pub struct SigmoidFit {
     layout: Layout,
     sample_time: SampleTime,
     first: usize,
+    /// u of each record has a level.
+    level: bool,
     /// With ln G and 1/T_I.
     theta: Vec<f64>,
     covariance: Option<Vec<f64>>,
@@ -88,6 +90,7 @@ impl SigmoidFit {
             layout: criterion.layout,
             sample_time: criterion.sample_time,
             first: criterion.first,
+            level: criterion.level,
             loss: squares / criterion.residuals() as f64,
             initial: known.end(0)?,
             last: known.end(1)?,
@@ -336,7 +339,23 @@ impl SigmoidFit {
         })
     }
 
+    /// The level of u in a record, in the unit of u, with its standard error; `None` where it was not
+    /// estimated ([`crate::SigmoidChange::level`]), and of an exact fit.
+    pub fn level(&self, record: &Record) -> Option<Estimate> {
+        let (criterion, covariance) = (self.criterion(self.layout, record).ok()?, self.covariance.as_ref()?);
+        let (value, variance) = criterion.level_of(&self.theta, 0, self.innovation_variance, covariance)?;
+        Some(Estimate::with_variance(value, variance))
+    }
+
     fn errors_of(&self, layout: Layout, theta: &[f64], record: &Record) -> Result<Series, IdentError> {
+        let criterion = self.criterion(layout, record)?;
+        let values = criterion.residuals_of(theta, 0).ok_or(IdentError::NoFiniteLoss)?;
+        let first = criterion.first;
+        Ok(Series { first, values })
+    }
+
+    /// The criterion of this fit over another record, without weights.
+    fn criterion<'a>(&self, layout: Layout, record: &'a Record) -> Result<ChangeCriterion<'a>, IdentError> {
         if !self.sample_time.matches(record.sample_time()) {
             return Err(IdentError::MixedSampling {
                 label: record.label().to_owned(),
@@ -351,7 +370,7 @@ impl SigmoidFit {
             record,
             first,
         )?;
-        let criterion = ChangeCriterion {
+        Ok(ChangeCriterion {
             layout,
             data: vec![Data {
                 e: record.input(),
@@ -365,8 +384,7 @@ impl SigmoidFit {
             changes: true,
             weights: None,
             penalty: Vec::new(),
-        };
-        let values = criterion.residuals_of(theta, 0).ok_or(IdentError::NoFiniteLoss)?;
-        Ok(Series { first, values })
+            level: self.level,
+        })
     }
 }

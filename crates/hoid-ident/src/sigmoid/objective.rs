@@ -23,10 +23,14 @@
 //! states, `psi' (I - Q Q') psi` (G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973)
 //! 413-432; L. Kaufman, *BIT* 15 (1975) 49-57).
 //!
+//! **Level.** Of recorded data u may have a level c that is no response to e ([`crate::Fit::level`]). It
+//! is one more linear unknown of each record, with a response of ones, eliminated in the same way. The
+//! means could not be taken out beforehand, as the response to that of e changes with the gains.
+//!
 //! **Prior.** What is known before the data stands beside them as squares of its own
 //! ([`super::prior`]).
 
-use hoid_model::{Form, SampleTime};
+use hoid_model::{Form, SampleTime, uncertainty::variance_along};
 
 use super::{instant::Instant, layout::Layout, unit_operator::UnitOperator};
 use crate::{
@@ -64,6 +68,8 @@ pub(crate) struct ChangeCriterion<'a> {
     pub weights: Option<Vec<Vec<f64>>>,
     /// What is known before the data.
     pub penalty: Vec<Penalty>,
+    /// True where u of each record has a level.
+    pub level: bool,
 }
 
 /// Signals of one record at one theta.
@@ -81,6 +87,8 @@ pub(crate) struct Pass {
     /// Weighted residuals.
     pub eps: Vec<f64>,
     basis: Vec<Vec<f64>>,
+    /// The level of u, and the length of its column off those of the states.
+    pub level: Option<(f64, f64)>,
 }
 
 /// `sum_i of(instant, i) y_i`, as long as the shortest y_i.
@@ -100,9 +108,9 @@ impl ChangeCriterion<'_> {
         self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
     }
 
-    /// Number of initial states over all records.
+    /// Number of initial states and levels over all records.
     pub fn states(&self) -> usize {
-        self.layout.order() * self.data.len()
+        (self.layout.order() + usize::from(self.level)) * self.data.len()
     }
 
     /// What the prior adds to the sum of squares.
@@ -194,7 +202,7 @@ impl ChangeCriterion<'_> {
 
         // Responses to the errors before the record, the oldest one first.
         let h: Vec<Vec<f64>> = (0..powers).map(|i| unit.impulse_response(i, input.len())).collect();
-        let free: Vec<Vec<f64>> = (0..past_errors)
+        let mut free: Vec<Vec<f64>> = (0..past_errors)
             .map(|age| {
                 let tails: Vec<&[f64]> = h.iter().map(|h| h.get(begin - oldest - age..).unwrap_or(&[])).collect();
                 let mut column = respond(&tails);
@@ -203,16 +211,21 @@ impl ChangeCriterion<'_> {
                 column
             })
             .collect();
+        if self.level {
+            free.push(vec![1.0; n - from]);
+        }
         let columns = free.iter().map(|x| self.whitened(theta, record, x)).collect();
-        let (basis, past) = eliminate(columns, &mut eps);
-        for (age, &x) in past.iter().enumerate() {
+        let (basis, taken) = eliminate(columns, &mut eps);
+        for (&(x, _), column) in taken.iter().zip(&free) {
+            add_scaled(&mut v, -x, column);
+        }
+        for (age, &(x, _)) in taken[..past_errors].iter().enumerate() {
             let place = oldest + age;
             input[place] += x;
             for (y, h) in y.iter_mut().zip(&h) {
                 let common = h.len().min(y.len() - place);
                 add_scaled(&mut y[place..], x, &h[..common]);
             }
-            add_scaled(&mut v, -x, &free[age]);
         }
         Some(Pass {
             unit,
@@ -222,7 +235,20 @@ impl ChangeCriterion<'_> {
             v,
             eps,
             basis,
+            level: taken.get(past_errors).copied(),
         })
+    }
+
+    /// The level of u in one record at a minimum, and its variance for this variance of the
+    /// innovations and covariance of theta: `sigma^2/r^2` for given theta, with r the length of its
+    /// column q r off those of the states, and what is not known of theta, along `dc/dtheta = -q' psi/r`.
+    pub fn level_of(&self, theta: &[f64], record: usize, variance: f64, covariance: &[f64]) -> Option<(f64, f64)> {
+        let pass = self.pass(theta, record)?;
+        let (value, length) = pass.level.filter(|(_, length)| *length > 0.0)?;
+        let q = pass.basis.last()?;
+        let columns = self.columns(theta, record, &pass);
+        let slope: Vec<f64> = columns.iter().map(|x| -dot(q, &x[..q.len()]) / length).collect();
+        Some((value, variance / (length * length) + variance_along(&slope, covariance)))
     }
 
     /// Columns of psi in one record, weighted, not projected.
@@ -283,9 +309,9 @@ impl ChangeCriterion<'_> {
     }
 }
 
-/// Takes the best combination of the columns out of eps; returns their orthonormal basis and how
-/// much of each was taken in.
-fn eliminate(columns: Vec<Vec<f64>>, eps: &mut [f64]) -> (Vec<Vec<f64>>, Vec<f64>) {
+/// Takes the best combination of the columns out of eps; returns their orthonormal basis and, of each
+/// column, how much was taken in and its length off those before.
+fn eliminate(columns: Vec<Vec<f64>>, eps: &mut [f64]) -> (Vec<Vec<f64>>, Vec<(f64, f64)>) {
     let count = columns.len();
     let mut basis: Vec<Vec<f64>> = Vec::with_capacity(count);
     // columns[j] = sum over l of basis[l] r[j][l].
@@ -326,9 +352,9 @@ fn eliminate(columns: Vec<Vec<f64>>, eps: &mut [f64]) -> (Vec<Vec<f64>>, Vec<f64
             taken[l] -= r[k][l] * taken[k];
         }
     }
-    let mut all = vec![0.0; count];
-    for (&j, &x) in kept.iter().zip(&taken) {
-        all[j] = x;
+    let mut all = vec![(0.0, 0.0); count];
+    for (k, (&j, &x)) in kept.iter().zip(&taken).enumerate() {
+        all[j] = (x, r[k][k]);
     }
     (basis, all)
 }

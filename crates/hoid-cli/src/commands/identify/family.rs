@@ -73,7 +73,9 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
     }
     let mut accounts = accounts.to_vec();
     if estimator.detrend == Detrend::Mean {
-        level::into_accounts(&mut accounts, records, |k| &fit.operator(k).polynomial_fit);
+        level::into_accounts(&mut accounts, records, |k, record| {
+            fit.operator(k).polynomial_fit.level(record)
+        });
     }
     let prepared: Vec<Record> = records.iter().map(|r| r.clone().detrended(estimator.detrend)).collect();
     let found = Found {

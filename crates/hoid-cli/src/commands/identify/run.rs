@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use hoid_ident::{
     Fit, MarginEstimates,
     judgement::second_opinion,
+    level::without_level,
     validation::{GoodnessOfFit, nrmse_fit, vaf},
 };
 use hoid_model::{ContinuousTransferFunction, Detrend, NotConvertible, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
@@ -44,13 +45,13 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         args.faults.faults,
     )?;
     if kind == ModelKind::TimeVarying {
-        return sigmoid::run(args, &files, &records, &accounts);
+        return sigmoid::run(args, &files, &records, &mut accounts);
     }
     if kind == ModelKind::Family {
         return family::run(args, &files, &records, &accounts);
     }
     let (records, as_read) = if level::is_estimated(args, with_input, &records) {
-        (level::without(&records), Some(records))
+        (without_level(&records), Some(records))
     } else {
         (records, None)
     };
@@ -66,7 +67,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         Some(path) => {
             let mut other = vec![reading::read(path, &args.read, with_input)?.0];
             if as_read.is_some() {
-                other = level::without(&other);
+                other = without_level(&other);
             }
             Some((path.display().to_string(), fit.quality(&other)?))
         }
@@ -75,8 +76,8 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let mut settings = chosen;
     if let Some(as_read) = &as_read {
         let of = |k: usize| grey_box.as_ref().map_or(&fit, |found| found.polynomial_fit(k));
-        level::into_accounts(&mut accounts, as_read, of);
-        settings.push(("level".to_owned(), "one constant of u a record, estimated".to_owned()));
+        level::into_accounts(&mut accounts, as_read, |k, record| of(k).level(record));
+        settings.push(level::setting());
     }
     settings.extend(common_settings(args, with_input));
     let operator = fit.operator();

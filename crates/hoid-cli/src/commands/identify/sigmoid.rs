@@ -10,7 +10,7 @@ use hoid_model::{Channel, Form, Record, Verdict};
 use hoid_report::numbers;
 use serde_json::{Map, Value, json};
 
-use super::{estimate::search, family::prior, settings::common_settings};
+use super::{estimate::search, family::prior, level, settings::common_settings};
 use crate::{
     args::IdentifyArgs,
     commands::{faults, reading::Account},
@@ -19,7 +19,12 @@ use crate::{
     orders, output, text,
 };
 
-pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: &[Account]) -> Result<(), CliError> {
+pub fn run(
+    args: &IdentifyArgs,
+    files: &[String],
+    records: &[Record],
+    accounts: &mut [Account],
+) -> Result<(), CliError> {
     if args.initial_state.is_some_and(|rule| rule != InitialState::Estimate) {
         return Err(CliError::Usage(
             "--initial-state: the time-varying fit estimates the initial states; give auto or estimate".to_owned(),
@@ -29,6 +34,7 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
     let mut estimator = SigmoidChange {
         form: args.form.unwrap_or(usual.form),
         neuromuscular: args.neuromuscular,
+        level: level::is_estimated(args, true, records),
         prior: args.prior.as_deref().map_or(Ok(usual.prior.clone()), prior)?,
         nd: noise_order(args)?,
         constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
@@ -51,6 +57,10 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
         ("orders".to_owned(), format!("nd={}", estimator.nd)),
         ("delay in s".to_owned(), format!("{low}..{high}")),
     ];
+    if estimator.level {
+        level::into_accounts(accounts, records, |_, record| fit.level(record));
+        settings.push(level::setting());
+    }
     settings.extend(common_settings(args, true));
     if let Some(path) = &args.trace {
         write_record(path, &trace(&fit, &records[0])?)?;

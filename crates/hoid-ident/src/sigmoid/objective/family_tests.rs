@@ -40,6 +40,7 @@ fn criterion<'a>(layout: Layout, e: &'a [f64], u: &'a [f64]) -> ChangeCriterion<
         changes: true,
         weights: None,
         penalty: Vec::new(),
+        level: false,
     }
 }
 

@@ -45,6 +45,7 @@ fn criterion<'a>(e: &'a [f64], u: &'a [f64], nd: usize) -> ChangeCriterion<'a> {
         changes: true,
         weights: None,
         penalty: Vec::new(),
+        level: false,
     }
 }
 
@@ -52,8 +53,9 @@ fn criterion<'a>(e: &'a [f64], u: &'a [f64], nd: usize) -> ChangeCriterion<'a> {
 fn gradient_agrees_with_finite_differences() {
     let (e, u) = record(1000);
     for nd in [0, 1, 2] {
-        for weighted in [false, true] {
+        for (weighted, level) in [(false, false), (true, false), (false, true), (true, true)] {
             let mut c = criterion(&e, &u, nd);
+            c.level = level;
             if weighted {
                 let rows = c.residuals();
                 c.weights = Some(vec![(0..rows).map(|t| if t < 500 { 1.3 } else { 0.7 }).collect()]);
@@ -73,7 +75,7 @@ fn gradient_agrees_with_finite_differences() {
                 // Rounding 1e-16 of the loss over h, truncation h^4.
                 assert!(
                     (slope + 2.0 * exact.descent[i]).abs() < 1e-8 * scale,
-                    "nd {nd} weighted {weighted} parameter {i}: {slope} and {}",
+                    "nd {nd} weighted {weighted} level {level} parameter {i}: {slope} and {}",
                     -2.0 * exact.descent[i]
                 );
             }
