@@ -33,5 +33,5 @@ pub(crate) mod residuals;
 pub mod second_opinion;
 mod sigmoid;
 
-pub use operator::{gain_findings, is_open, neuromuscular_finding, pole_findings};
+pub use operator::{gain_findings, is_open, leads_backwards, neuromuscular_finding, pole_findings};
 pub use operator_step::{OperatorStep, operator_step};

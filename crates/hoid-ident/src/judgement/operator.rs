@@ -22,7 +22,13 @@ pub fn is_open(e: &Estimate) -> bool {
         .is_some_and(|error| e.value.abs() < LEAST_ERRORS * error)
 }
 
-/// Gains and lead that are not determined. Each operator has a label, as ` of record 2`, empty for
+/// True where K_e and K_e_dot have opposite signs by two standard errors each: a negative lead.
+pub fn leads_backwards(o: &OperatorEstimate) -> bool {
+    let sign = |e: &Estimate| if is_open(e) { 0.0 } else { e.value.signum() };
+    sign(&o.k_e) * sign(&o.k_e_dot) < 0.0
+}
+
+/// Gains and lead that are not determined, and leads that nobody has. Each operator has a label, as ` of record 2`, empty for
 /// a single one; where K_e and K_e_dot of all of them are open, nothing is known of the response.
 pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
     let mut open = Vec::new();
@@ -39,7 +45,28 @@ pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
             "no gain stands two standard errors from zero: there is too little response to e",
         )];
     }
-    not_determined(&open).into_iter().collect()
+    let backwards = operators.iter().filter(|(_, o)| leads_backwards(o));
+    let negative: Vec<String> = backwards
+        .map(|(label, o)| format!("T_L{label} ({})", o.t_l_s))
+        .collect();
+    not_determined(&open)
+        .into_iter()
+        .chain(negative_lead(&negative))
+        .collect()
+}
+
+/// A lead below zero: nobody has one; a gain and a lead that stand for a lag do.
+fn negative_lead(negative: &[String]) -> Option<Finding> {
+    (!negative.is_empty()).then(|| {
+        Finding::doubt(
+            "negative-lead",
+            format!(
+                "{} below zero, by two standard errors of K_e and of K_e_dot: a gain and a lead are not the form of this \
+                 person, who may have a lag; only the response is theirs (--structure grey-box finds the form)",
+                negative.join(", ")
+            ),
+        )
+    })
 }
 
 /// omega_nm and zeta_nm that are not determined, or no person's.
@@ -156,6 +183,35 @@ mod tests {
         assert!(gain_findings(&[("", o)]).is_empty() && pole_findings(&o, ts()).is_empty());
         assert!(!is_open(&Estimate::fixed(0.0)));
         assert!(gain_findings(&[]).is_empty());
+    }
+
+    #[test]
+    fn a_lead_that_nobody_has_is_named() {
+        let e = |value: f64, error: f64| Estimate::with_variance(value, error * error);
+        let lag = OperatorEstimate {
+            t_l_s: e(-0.2, 0.05),
+            k_e_dot: e(-0.018, 0.004),
+            ..operator()
+        };
+        let found = gain_findings(&[(" of record 2", lag)]);
+        assert_eq!((found.len(), found[0].kind), (1, "negative-lead"));
+        assert!(
+            found[0].words.starts_with("T_L of record 2 (-0.20"),
+            "{}",
+            found[0].words
+        );
+        // Both channels the other way round: the lead is right.
+        let flipped = OperatorEstimate {
+            k_e: e(-0.09, 0.009),
+            k_e_dot: e(-0.036, 0.004),
+            ..operator()
+        };
+        assert!(!leads_backwards(&flipped));
+        let open = OperatorEstimate {
+            k_e_dot: e(-0.004, 0.004),
+            ..lag
+        };
+        assert!(!leads_backwards(&open));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate},
 };
 
-use super::{is_other, operators::leads_backwards};
+use super::is_other;
 use crate::tracker::Tracker;
 
 /// After a restart the estimate is doubtful for so long, s.
@@ -67,11 +67,7 @@ fn level_of_operator(operator: &OperatorEstimate, sample_time: SampleTime) -> Ve
     let open = gains.iter().any(|finding| finding.severity == Severity::Undetermined);
     if open {
         VerdictLevel::NotDetermined
-    } else if !gains.is_empty()
-        || senseless.is_some()
-        || leads_backwards(operator)
-        || !operator.parameters().is_stable()
-    {
+    } else if !gains.is_empty() || senseless.is_some() || !operator.parameters().is_stable() {
         VerdictLevel::Doubtful
     } else {
         VerdictLevel::Trustworthy

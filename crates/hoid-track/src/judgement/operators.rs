@@ -1,7 +1,7 @@
 //! The operators of the rows of a trace: how many there are, whether their gains are known and have
 //! a sign and a lead that a person has, and whether poles and delay are those of one.
 
-use hoid_ident::judgement::{is_open, neuromuscular_finding};
+use hoid_ident::judgement::{is_open, leads_backwards, neuromuscular_finding};
 use hoid_model::{
     Finding,
     uncertainty::{Estimate, OperatorEstimate},
@@ -89,15 +89,6 @@ fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
             ),
         )
     })
-}
-
-/// True where K_e and K_e_dot have opposite signs by two standard errors each: a negative lead.
-pub(super) fn leads_backwards(o: &OperatorEstimate) -> bool {
-    let sign = |e: &Estimate| match is_open(e) {
-        true => 0.0,
-        false => e.value.signum(),
-    };
-    sign(&o.k_e) * sign(&o.k_e_dot) < 0.0
 }
 
 /// A lead below zero: nobody has one; a gain and a lead that stand for a lag do.
