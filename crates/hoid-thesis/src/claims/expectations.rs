@@ -82,7 +82,8 @@ fn diminished(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 /// Share of runs whose error is beyond 100 %, or of which there is none.
 fn beyond(errors: &[Vec<f64>]) -> f64 {
     let all = errors.concat();
-    all.iter().filter(|error| !(**error <= 100.0)).count() as f64 / all.len() as f64
+    let far = all.iter().filter(|error| error.is_nan() || **error > 100.0);
+    far.count() as f64 / all.len() as f64
 }
 
 fn t_l_stable(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
