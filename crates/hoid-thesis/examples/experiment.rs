@@ -29,7 +29,11 @@ fn main() {
         )
         .unwrap();
     }
-    let plan = ExperimentPlan::parse(EXPERIMENT).unwrap();
+    // Tables of another plan, such as one with another remnant.
+    let text = std::env::args()
+        .nth(2)
+        .map(|path| std::fs::read_to_string(path).unwrap());
+    let plan = ExperimentPlan::parse(text.as_deref().unwrap_or(EXPERIMENT)).unwrap();
     let runs = experiment(&plan).unwrap();
     println!("## Table 3\n\n| subject | | N1 | N2 | N3 | N4 | N5 |\n|---|---|---|---|---|---|---|");
     for subject in 1..=plan.subjects {
@@ -92,7 +96,8 @@ fn main() {
                     100.0 * (middle(run, method, i, AFTER_S) / run.outcome.truth[1].operator[i] - 1.0)
                 };
                 let all: Vec<f64> = own.iter().map(error).filter(|x| x.is_finite()).collect();
-                format!("{:.0}", median(&all))
+                // Not -0.
+                format!("{:.0}", median(&all).round() + 0.0)
             };
             let cells: Vec<String> = (0..5).map(cell).collect();
             println!("| {condition} | {name} | {} |", cells.join(" | "));

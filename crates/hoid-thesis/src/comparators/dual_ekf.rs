@@ -28,7 +28,11 @@ use hoid_ident::{settings, settings::Bounds};
 use hoid_model::{OperatorParameters, SampleTime, second_order::HeldStates};
 use nalgebra::{DMatrix, DVector, RowDVector};
 
-use super::{About, Comparator, Followed, Task, pade, response_of, start::Start};
+use super::{
+    comparator::{About, Comparator, Followed, Task, response_of},
+    pade,
+    start::Start,
+};
 use crate::ThesisError;
 
 const NAME: &str = "dual-ekf";

@@ -24,7 +24,10 @@ use hoid_ident::{SigmoidChange, SigmoidFit, settings, settings::Bounds};
 use hoid_model::OperatorParameters;
 use hoid_sim::RunSeed;
 
-use super::{About, Comparator, Followed, Task, response_of, unit_responses::unit_responses};
+use super::{
+    comparator::{About, Comparator, Followed, Task, response_of},
+    unit_responses::unit_responses,
+};
 use crate::ThesisError;
 
 const NAME: &str = "genetic-sigmoid";

@@ -16,7 +16,11 @@
 use hoid_ident::{settings, settings::Bounds};
 use hoid_model::OperatorParameters;
 
-use super::{About, Comparator, Followed, Task, response_of, start::Start, unit_responses::unit_responses};
+use super::{
+    comparator::{About, Comparator, Followed, Task, response_of},
+    start::Start,
+    unit_responses::unit_responses,
+};
 use crate::ThesisError;
 
 const NAME: &str = "linear-network";

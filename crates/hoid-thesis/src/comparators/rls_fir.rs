@@ -25,7 +25,10 @@ use hoid_ident::{settings, settings::Bounds};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use super::{About, Comparator, Followed, Task, least_squares::NormalEquations};
+use super::{
+    comparator::{About, Comparator, Followed, Task},
+    least_squares::NormalEquations,
+};
 use crate::ThesisError;
 
 const NAME: &str = "rls-fir";

@@ -23,7 +23,10 @@ use hoid_ident::{settings, settings::Bounds};
 use hoid_model::{PolynomialModel, Record, Structure};
 use nalgebra::{Matrix5, Vector5};
 
-use super::{About, Comparator, Followed, Task, start::Start};
+use super::{
+    comparator::{About, Comparator, Followed, Task},
+    start::Start,
+};
 use crate::ThesisError;
 
 const NAME: &str = "rpem-by-vaf";

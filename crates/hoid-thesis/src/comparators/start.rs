@@ -4,7 +4,7 @@
 use hoid_ident::Estimator;
 use hoid_model::{Structure, uncertainty::OperatorEstimate};
 
-use super::Task;
+use super::comparator::Task;
 use crate::ThesisError;
 
 /// Operator and noise model of the first span.

@@ -10,7 +10,10 @@ use hoid_model::{
 use hoid_sim::{RunSeed, Simulator};
 use num_complex::Complex64;
 
-use super::{Task, comparators, response_of};
+use super::{
+    comparator::{Task, response_of},
+    comparators,
+};
 
 /// A record at 100 Hz.
 pub(super) fn record_of(e: &[f64], u: &[f64]) -> Record {

@@ -15,7 +15,7 @@
 use hoid_ident::{settings, settings::Bounds};
 use num_complex::Complex64;
 
-use super::{About, Comparator, Followed, Task};
+use super::comparator::{About, Comparator, Followed, Task};
 use crate::ThesisError;
 
 const NAME: &str = "wavelet";
