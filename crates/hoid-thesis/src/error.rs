@@ -1,7 +1,10 @@
 //! Why the reference text could not be reproduced.
 
+use hoid_ident::IdentError;
 use hoid_io::IoError;
+use hoid_model::{ModelError, NotConvertible};
 use hoid_report::ReportError;
+use hoid_sim::SimError;
 use hoid_study::StudyError;
 use thiserror::Error;
 
@@ -26,6 +29,42 @@ pub enum ThesisError {
     /// A study that failed.
     #[error(transparent)]
     Study(Box<StudyError>),
+    /// A comparator that a record does not serve.
+    #[error("{method}: {quantity} is {found}, expected {expected}")]
+    Unsuited {
+        /// The comparator.
+        method: &'static str,
+        /// What is wrong.
+        quantity: String,
+        /// As it was found.
+        found: String,
+        /// As it should be.
+        expected: String,
+    },
+    /// An estimator that failed, or an option that it does not have.
+    #[error(transparent)]
+    Estimator(Box<IdentError>),
+    /// A model that has no meaning.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A model that is no operator.
+    #[error(transparent)]
+    NotConvertible(#[from] NotConvertible),
+    /// A scenario that cannot be simulated.
+    #[error(transparent)]
+    Simulation(Box<SimError>),
+}
+
+impl From<IdentError> for ThesisError {
+    fn from(error: IdentError) -> Self {
+        Self::Estimator(Box::new(error))
+    }
+}
+
+impl From<SimError> for ThesisError {
+    fn from(error: SimError) -> Self {
+        Self::Simulation(Box::new(error))
+    }
 }
 
 impl From<ReportError> for ThesisError {

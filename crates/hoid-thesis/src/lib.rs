@@ -29,14 +29,20 @@
 //! |---|---|
 //! | [`plans`] | the studies of the text as named plans |
 //! | [`reproduction`] | tables, figures and claims in a directory, from the results of the studies |
+//! | [`comparators`] | the survey's other methods, to be compared with |
+//! | [`survey`] | all methods of the survey on the same runs |
+//! | [`experiment`] | the experiment of the text with virtual people |
 //! | [`claims`] | statements of the text, tested by the results of the named plans |
 //!
 //! Studies and reports know nothing of this crate.
 
 pub mod claims;
+pub mod comparators;
 mod error;
+pub mod experiment;
 pub mod plans;
 pub mod reproduction;
+pub mod survey;
 
 pub use error::ThesisError;
 pub use reproduction::{CLAIMS, Reproduction, ReproductionEvent, ReproductionSummary, reproduce};

@@ -19,6 +19,7 @@ pub const TEXT_PLANS: &[NamedPlan] = named![
     "initial-conditions",
     "recursive",
     "recursive-arx",
+    "recursive-starts",
     "decimation",
     "remnant-time-constant",
     "noise-definition",

@@ -16,7 +16,15 @@ const ALLOWED: [(&str, &[&str]); 14] = [
     ("hoid-io", &["hoid-model"]),
     (
         "hoid-thesis",
-        &["hoid-model", "hoid-io", "hoid-track", "hoid-study", "hoid-report"],
+        &[
+            "hoid-model",
+            "hoid-ident",
+            "hoid-sim",
+            "hoid-io",
+            "hoid-track",
+            "hoid-study",
+            "hoid-report",
+        ],
     ),
     (
         "hoid-study",

@@ -151,8 +151,18 @@ impl VirtualExperiment {
         Ok(())
     }
 
-    /// The person of a run, and the run.
-    fn run(&self, subject: u64, cell: u64, condition: Condition, run: u64) -> Result<(Scenario, Record), StudyError> {
+    /// The person of a run, and the run; the first subject and run are 1, a cell is a place in
+    /// `conditions`.
+    ///
+    /// # Errors
+    /// [`StudyError::Virtual`] for a subject without a stable loop.
+    pub fn run(
+        &self,
+        subject: u64,
+        cell: u64,
+        condition: Condition,
+        run: u64,
+    ) -> Result<(Scenario, Record), StudyError> {
         let deviates = |replication: u64| {
             let run_seed = RunSeed {
                 seed: self.seed,

@@ -160,6 +160,30 @@ impl<'a> Study<'a> {
         })
     }
 
+    /// Mean over a span of the interquartile range of the traces of a parameter over the runs, % of
+    /// the true value of the last state. Its error is that of the range of a normal sample, 1.166
+    /// of it over sqrt(M), as if all times of the span were in error alike.
+    pub fn trace_range(&self, query: &Query, parameter: &str, (from_s, to_s): (f64, f64)) -> Result<Value, String> {
+        let (traces, truth) = self.trace(query, parameter)?;
+        let Some(bands) = traces.parameters.get(parameter) else {
+            return Ok(NOTHING);
+        };
+        let replications = self.results.cells(query).first().map_or(1, |cell| cell.replications);
+        let within = traces
+            .times_s
+            .iter()
+            .enumerate()
+            .filter(|(_, t)| (from_s..to_s).contains(*t));
+        let ranges: Vec<f64> = within
+            .map(|(k, _)| 100.0 * (bands.upper_quartile[k] - bands.lower_quartile[k]) / truth[1].abs())
+            .collect();
+        let value = ranges.iter().sum::<f64>() / ranges.len() as f64;
+        Ok(Value {
+            value,
+            error: 1.166 * value / (replications as f64).sqrt(),
+        })
+    }
+
     /// Settling time of the median trace of a parameter, s. A trace that does not settle has the
     /// time to its end.
     pub fn settling(&self, query: &Query, parameter: &str) -> Result<Value, String> {

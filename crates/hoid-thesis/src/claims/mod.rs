@@ -9,9 +9,11 @@
 //! |---|---|
 //! | `batch_arx` | batch fits of ARX models |
 //! | `batch_bj`, `bj_against_arx` | batch fits of Box-Jenkins models |
+//! | `variance_and_zero` | innovation variance, b at a wrong delay, the zero in C2 |
 //! | `remnant_order` | the order of the noise model |
 //! | `initial_conditions` | where searches start |
 //! | `recursive_arx`, `recursive_bj` | RLS, and RPEM against RLS |
+//! | `expectations` | what Part II expects of the recursion |
 //! | `noise` | noise level, remnant time constant, sample time |
 //! | `elsewhere` | what is not tested here |
 //!
@@ -34,6 +36,7 @@ mod bj_against_arx;
 mod claim;
 mod elsewhere;
 mod evidence;
+mod expectations;
 mod finding;
 mod initial_conditions;
 mod noise;
@@ -45,6 +48,7 @@ mod settings;
 mod statistics;
 mod table;
 mod value;
+mod variance_and_zero;
 
 pub use claim::{Claim, Theme};
 pub use evidence::Evidence;
@@ -59,10 +63,12 @@ pub fn claims() -> Vec<Claim> {
         batch_arx::CLAIMS,
         batch_bj::CLAIMS,
         bj_against_arx::CLAIMS,
+        variance_and_zero::CLAIMS,
         remnant_order::CLAIMS,
         initial_conditions::CLAIMS,
         recursive_arx::CLAIMS,
         recursive_bj::CLAIMS,
+        expectations::CLAIMS,
         noise::CLAIMS,
         elsewhere::CLAIMS,
     ]

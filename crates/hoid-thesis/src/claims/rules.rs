@@ -32,6 +32,7 @@
 //! | close to zero, null on average, the same, not affected | within 5 points of % of the true value |
 //! | null without remnant | within 0.001 % |
 //! | heavily, highly reduced | less than a quarter remains |
+//! | much higher | at least one and a half times |
 //! | the same VAF | within 1 point of % |
 //! | slight, small, matters more | at least 0.1 points of % of the true value |
 //! | a linear trend | R^2 of the straight line at least 0.9 |
@@ -48,6 +49,8 @@ pub(super) const CLOSE: f64 = 5.0;
 pub(super) const MATTERS: f64 = 0.1;
 /// What remains of something that is heavily reduced.
 pub(super) const QUARTER: f64 = 0.25;
+/// The least ratio of something that is much higher.
+pub(super) const MUCH: f64 = 1.5;
 /// R^2 of a linear trend.
 pub(super) const LINEAR: f64 = 0.9;
 

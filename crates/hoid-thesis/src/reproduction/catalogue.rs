@@ -1,6 +1,6 @@
 //! All tables and figures, in the order of the text.
 
-use super::{bias, further, item::Item, orders, responses, setting, starts, traces};
+use super::{averages, bias, experiment, further, item::Item, orders, responses, setting, starts, traces};
 
 /// All tables and figures, in the order of the text.
 pub fn items() -> Vec<Item> {
@@ -10,6 +10,8 @@ pub fn items() -> Vec<Item> {
     all.extend(responses::items());
     all.extend(starts::items());
     all.extend(traces::items());
+    all.extend(averages::items());
+    all.extend(experiment::items());
     all.extend(further::items());
     all.sort_by_cached_key(|item| place(&item.name));
     all
@@ -25,7 +27,10 @@ fn place(name: &str) -> (u8, String, u32, String) {
         return (1, String::new(), number(n), String::new());
     }
     match name.split_once('.') {
-        Some((letter, n)) => (2, letter.to_owned(), n.parse().unwrap_or(0), String::new()),
+        Some((letter, n)) => {
+            let (n, more) = n.split_once('-').unwrap_or((n, ""));
+            (2, letter.to_owned(), n.parse().unwrap_or(0), more.to_owned())
+        }
         None => (3, String::new(), 0, name.to_owned()),
     }
 }

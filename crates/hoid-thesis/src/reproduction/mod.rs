@@ -8,6 +8,8 @@
 //! | `responses` | Figs. 10, D.1 to D.18: Bode plots of averaged models | `bias` |
 //! | `starts` | Figs. F.1 to F.8: other starts against the base | `initial-conditions` |
 //! | `traces` | Figs. 11, 12, G.1 to G.8, H.1 to H.12: recursive estimates | `recursive`, `recursive-arx` |
+//! | `averages` | Figs. H.1 to H.12 as the text draws them: averages, with medians beside | `recursive` |
+//! | `experiment` | Table 3, Figs. 13, 14, I.1 to I.18 with virtual people | its own |
 //! | `further` | what the text leaves for later | the other plans |
 //! | `catalogue` | all of them in the order of the text | |
 //! | `item`, `table_builder`, `axes` | what they are made of | |
@@ -18,9 +20,11 @@
 //! vermillion), its shade the noise level or the delay, black dashes the truth. Each figure comes
 //! with its data as a table.
 
+mod averages;
 mod axes;
 mod bias;
 mod catalogue;
+mod experiment;
 mod further;
 mod index;
 mod item;

@@ -1,0 +1,167 @@
+//! The five expectations of the recursive Box-Jenkins estimator with which Part II ends (6.2.2),
+//! held against what Part I and its setting give.
+
+use super::{
+    claim::{Claim, Source, Theme},
+    evidence::Evidence,
+    rules::{ACCEPTABLE, CLOSE, Part, QUARTER},
+    settings::{DISCRETE, LEVELS, ORDERS, RECURSIVE_LEVELS, Setting, settings, with_f},
+    value::Value,
+};
+use hoid_study::{OPERATOR, Query};
+
+const PLANS: &[&str] = &["recursive"];
+const PLACE: &str = "6.2.2";
+const GAINS: [&str; 3] = ["K_e", "T_L", "K_e_dot"];
+/// What follows the change at 40.96 s, s.
+const TRANSITION_S: (f64, f64) = (40.96, 51.2);
+/// Starts of the plan, with poles, gains or both beside the true values (Table 6.1).
+const STARTS: [&str; 9] = ["base", "IC1", "IC2", "IC3", "IC4", "IC5", "IC6", "IC7", "IC8"];
+
+pub(super) const CLAIMS: &[Claim] = &[
+    Claim {
+        id: "expect-diminished-at-m1",
+        theme: Theme::Recursive,
+        statement: "Recursive BJ is expected to \"Diminish the huge bias encountered in recursive ARX results for a first-order remnant filter\".",
+        place: PLACE,
+        measure: "Magnitude of the bias of the median trace over the last 30.72 s, RPEM less RLS, m0 = 1, C3 to C6, by coefficient and noise level, points of %.",
+        plans: PLANS,
+        source: Source::Data(diminished),
+    },
+    Claim {
+        id: "expect-t-l-stable",
+        theme: Theme::Recursive,
+        statement: "... to \"Solve the instabilities in T_L online estimation when the controlled element acts as a second-order integrator\".",
+        place: PLACE,
+        measure: "Share of runs with an RMS error of T_L beyond 100 %, or none, of RPEM over that of RLS, C2, by m0: less than a quarter remains.",
+        plans: PLANS,
+        source: Source::Data(t_l_stable),
+    },
+    Claim {
+        id: "expect-stable-transitions",
+        theme: Theme::Recursive,
+        statement: "... to \"Improve the stability of the transitions between estimations from controlled elements with first- to second-order integrator dynamics\".",
+        place: PLACE,
+        measure: "Mean interquartile range over runs of the trace in the 10.24 s after t_M, RPEM less RLS, C3 and C4, K_e, T_L and K_e_dot, by m0 and noise level, points of %.",
+        plans: PLANS,
+        source: Source::Data(transitions),
+    },
+    Claim {
+        id: "expect-low-error-at-high-orders",
+        theme: Theme::Recursive,
+        statement: "... to \"Provide online estimation results with a low error when high remnant filter orders are implemented in the simulation\".",
+        place: PLACE,
+        measure: "RPEM, m0 = 3 and 4, by operator parameter and noise level: magnitude of the bias of the median trace over the last 30.72 s, C3 to C6, and median RMS error of the trace, C1 and C2.",
+        plans: PLANS,
+        source: Source::Data(low_error),
+    },
+    Claim {
+        id: "expect-depends-on-start",
+        theme: Theme::Recursive,
+        statement: "... to \"Be quite dependent on the initial conditions of the discrete-time parameters\".",
+        place: "6.2.2; V.B makes it \"independent of initial conditions set by the user\"",
+        measure: "RPEM from the starts of Table 6.1 less RPEM from the batch fit of the first 30.72 s, C4, P_n = .1, by start, m0 and operator parameter: |median paired difference of the RMS error| and |difference of the bias over the last 30.72 s|, beyond 5 points.",
+        plans: &["recursive-starts"],
+        source: Source::Data(depends_on_start),
+    },
+];
+
+fn diminished(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut part = Part::new("|bias| of RPEM less that of RLS below 0");
+    for at in settings(&["C3", "C4", "C5", "C6"], &[1], &RECURSIVE_LEVELS) {
+        for name in DISCRETE {
+            let rls = study.trace_bias(&at.rls(""), name)?.abs();
+            let rpem = study.trace_bias(&at.rpem(""), &with_f(name))?.abs();
+            part.below(at.label(name), rpem.minus(rls), 0.0);
+        }
+    }
+    Ok(vec![part])
+}
+
+/// Share of runs whose error is beyond 100 %, or of which there is none.
+fn beyond(errors: &[Vec<f64>]) -> f64 {
+    let all = errors.concat();
+    let far = all.iter().filter(|error| error.is_nan() || **error > 100.0);
+    far.count() as f64 / all.len() as f64
+}
+
+fn t_l_stable(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut part = Part::new("share of runs with an RMS error of T_L beyond 100 %, RPEM over RLS, below 1/4");
+    for m0 in ORDERS {
+        let at = settings(&["C2"], &[m0], &RECURSIVE_LEVELS);
+        let of = |one: fn(Setting) -> Query| at.iter().map(|at| one(*at)).collect::<Vec<_>>();
+        let (rls, rpem) = (of(|at| at.rls("rms_T_L")), of(|at| at.rpem("rms_T_L")));
+        let ratio = study.of(&[rpem.clone(), rls.clone()].concat(), &|s| {
+            let (rpem, rls) = s.split_at(s.len() / 2);
+            beyond(rpem) / beyond(rls)
+        })?;
+        part.below(format!("C2, m0 = {m0}"), ratio, QUARTER);
+        for (name, queries) in [("RLS", rls), ("RPEM", rpem)] {
+            part.show(
+                format!("share of {name} at m0 = {m0}"),
+                study.of(&queries, &|s| beyond(s))?,
+            );
+        }
+    }
+    Ok(vec![part])
+}
+
+fn transitions(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut parts = Vec::new();
+    for name in GAINS {
+        let mut part = Part::new(&format!("{name}: interquartile range of RPEM less that of RLS below 0"));
+        for at in settings(&["C3", "C4"], &ORDERS, &RECURSIVE_LEVELS) {
+            let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.trace_range(&query, name, TRANSITION_S));
+            part.below(at.label(""), rpem?.minus(rls?), 0.0);
+        }
+        parts.push(part);
+    }
+    Ok(parts)
+}
+
+fn low_error(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive")?;
+    let mut bias = Part::new("|bias of the median trace| within 10 %");
+    for at in settings(&["C3", "C4", "C5", "C6"], &[3, 4], &RECURSIVE_LEVELS) {
+        for name in OPERATOR {
+            bias.below(at.label(name), study.trace_bias(&at.rpem(""), name)?.abs(), ACCEPTABLE);
+        }
+    }
+    let mut error = Part::new("median RMS error of the trace within 10 %");
+    for at in settings(&["C1", "C2"], &[3, 4], &RECURSIVE_LEVELS) {
+        for name in OPERATOR {
+            error.below(
+                at.label(name),
+                study.median(&at.rpem(&format!("rms_{name}")))?,
+                ACCEPTABLE,
+            );
+        }
+    }
+    Ok(vec![bias, error])
+}
+
+fn depends_on_start(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+    let study = evidence.study("recursive-starts")?;
+    let mut whole = Part::new("|difference of the RMS error from 10 s on| beyond 5 points");
+    let mut last = Part::new("|difference of the bias over the last 30.72 s| beyond 5 points");
+    for at in settings(&["C4"], &ORDERS, &LEVELS[..1]) {
+        for start in STARTS {
+            for name in OPERATOR {
+                let given = |quantity: &str| at.query(quantity).name("RPEM, given").start(start);
+                let fitted = |quantity: &str| at.query(quantity).name("RPEM");
+                let rms = format!("rms_{name}");
+                let label = at.label(&format!("{start}, {name}"));
+                let of_all = study.difference(&given(&rms), &fitted(&rms))?;
+                whole.above(label.clone(), of_all.abs(), CLOSE);
+                let end: Value = study
+                    .trace_bias(&given("loss"), name)?
+                    .minus(study.trace_bias(&fitted("loss"), name)?);
+                last.above(label, end.abs(), CLOSE);
+            }
+        }
+    }
+    Ok(vec![whole, last])
+}

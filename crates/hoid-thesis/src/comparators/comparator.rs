@@ -1,0 +1,113 @@
+//! What a comparator is: it follows a record, and says what the operator is at some times.
+
+use hoid_ident::settings::Settings;
+use hoid_model::{OperatorParameters, Record, SampleTime, delayed_operator};
+use num_complex::Complex64;
+
+use crate::ThesisError;
+
+/// What a comparator says of itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct About {
+    /// Its name in a plan.
+    pub name: &'static str,
+    /// What it does.
+    pub help: &'static str,
+    /// Author, year, place.
+    pub source: &'static str,
+    /// What it is told that a recursion is not, in words; empty for nothing.
+    pub told: &'static str,
+}
+
+/// A record and what is asked of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Task<'a> {
+    /// The record.
+    pub record: &'a Record,
+    /// Samples after which an estimate is asked for, in their order.
+    pub at: &'a [usize],
+    /// Frequencies of the lines of the forcing function, rad/s.
+    pub lines_rad_s: &'a [f64],
+    /// Frequencies at which the response is asked for, rad/s; some of the lines.
+    pub omega_rad_s: &'a [f64],
+    /// Span from which a start is fitted, s.
+    pub start_s: (f64, f64),
+    /// Delay of b0 in samples.
+    pub nk: usize,
+    /// A second run of the same person in the same task, where there is one.
+    pub validation: Option<&'a Record>,
+    /// When the controlled element changes, s, and how fast, 1/s; none where it does not.
+    pub change: Option<(f64, f64)>,
+}
+
+/// What a comparator found, one entry for each sample that was asked for.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Followed {
+    /// The response at each frequency.
+    pub response: Vec<Vec<Complex64>>,
+    /// The operator, where the method has one and it has a meaning.
+    pub operator: Vec<Option<OperatorParameters>>,
+}
+
+/// A method that is compared with others.
+pub trait Comparator: Settings + Send + Sync {
+    /// What it says of itself.
+    fn about(&self) -> About;
+
+    /// Follows a record.
+    ///
+    /// # Errors
+    /// [`ThesisError`] for a record that does not serve it.
+    fn follow(&self, task: &Task<'_>) -> Result<Followed, ThesisError>;
+}
+
+impl Task<'_> {
+    /// e and u, of which there are more than `least` samples.
+    pub(crate) fn signals(&self, method: &'static str, least: usize) -> Result<(&[f64], &[f64]), ThesisError> {
+        let (e, u) = (self.record.input(), self.record.output());
+        let unsuited = |quantity: &str, found: String, expected: &str| ThesisError::Unsuited {
+            method,
+            quantity: quantity.to_owned(),
+            found,
+            expected: expected.to_owned(),
+        };
+        if e.len() != u.len() {
+            return Err(unsuited("the input", "not there".to_owned(), "a record with e and u"));
+        }
+        if e.len() <= least {
+            let expected = format!("more than {least} for this method");
+            return Err(unsuited("the number of samples", e.len().to_string(), &expected));
+        }
+        if e.iter().all(|value| *value == 0.0) {
+            return Err(unsuited(
+                "the input",
+                "zero throughout".to_owned(),
+                "an error that moves",
+            ));
+        }
+        if let Some(k) = self.at.iter().find(|k| **k >= e.len()) {
+            return Err(unsuited(
+                "a sample that is asked for",
+                k.to_string(),
+                "one of the record",
+            ));
+        }
+        Ok((e, u))
+    }
+}
+
+/// The response of an operator with any delay, behind a zero-order hold, at some frequencies.
+pub(crate) fn response_of(
+    operator: &OperatorParameters,
+    sample_time: SampleTime,
+    omega_rad_s: &[f64],
+) -> Result<Vec<Complex64>, ThesisError> {
+    let parameters = delayed_operator::delayed_parameters(operator);
+    let held = delayed_operator::delayed_operator(parameters, sample_time)?;
+    let of = |omega: &f64| {
+        let z = |k: usize| Complex64::from_polar(1.0, -omega * sample_time.s() * k as f64);
+        let b: Complex64 = held.b.iter().enumerate().map(|(i, b)| b * z(held.nk + i)).sum();
+        b / (1.0 + held.f[0] * z(1) + held.f[1] * z(2))
+    };
+    Ok(omega_rad_s.iter().map(of).collect())
+}

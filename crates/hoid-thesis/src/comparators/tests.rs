@@ -1,0 +1,174 @@
+//! What the tests of comparators have in common, and tests of all of them.
+#![allow(clippy::unwrap_used)]
+
+use std::collections::BTreeSet;
+
+use hoid_model::{
+    Channel, OperatorParameters, Record, SampleTime,
+    scenario::{Condition, RemnantStrength, Scenario},
+};
+use hoid_sim::{RunSeed, Simulator};
+use num_complex::Complex64;
+
+use super::{
+    comparator::{Task, response_of},
+    comparators,
+};
+
+/// A record at 100 Hz.
+pub(super) fn record_of(e: &[f64], u: &[f64]) -> Record {
+    let channel = |name: &str, values: &[f64]| Channel::new(name, "deg", values.to_vec());
+    Record::new(SampleTime::new(0.01).unwrap(), channel("e", e), channel("u", u)).unwrap()
+}
+
+/// A task without lines.
+pub(super) fn task_of<'a>(record: &'a Record, at: &'a [usize], omega_rad_s: &'a [f64]) -> Task<'a> {
+    Task {
+        record,
+        at,
+        lines_rad_s: &[],
+        omega_rad_s,
+        start_s: (0.0, 30.72),
+        nk: 29,
+        validation: None,
+        change: None,
+    }
+}
+
+/// A run of a condition of the text, and what is true of it.
+pub(super) struct Run {
+    pub record: Record,
+    validation: Record,
+    pub at: Vec<usize>,
+    lines_rad_s: Vec<f64>,
+    change: Option<(f64, f64)>,
+}
+
+impl Run {
+    /// One replication, P_n and m0 as asked for.
+    pub fn of(condition: Condition, order: usize, level: f64) -> Self {
+        Self::replication(condition, order, level, 0)
+    }
+
+    pub fn replication(condition: Condition, order: usize, level: f64, replication: u64) -> Self {
+        let mut scenario = Scenario::condition(condition);
+        scenario.remnant.order = order;
+        if let RemnantStrength::Level { level: of, .. } = &mut scenario.remnant.strength {
+            *of = level;
+        }
+        let simulator = Simulator::new(&scenario).unwrap();
+        let run = |cell: u64| {
+            let seed = RunSeed {
+                seed: 101,
+                cell,
+                replication,
+            };
+            simulator.run(seed, false).unwrap()
+        };
+        Self {
+            record: run(0),
+            validation: run(1),
+            // Before the change and 24 s after it.
+            at: vec![2999, 6499],
+            lines_rad_s: scenario.forcing.sinusoids().iter().map(|s| s.omega_rad_s).collect(),
+            change: scenario.schedule.change_s().zip(scenario.schedule.rate_per_s()),
+        }
+    }
+
+    pub fn task(&self) -> Task<'_> {
+        Task {
+            record: &self.record,
+            at: &self.at,
+            lines_rad_s: &self.lines_rad_s,
+            omega_rad_s: &self.lines_rad_s[2..9],
+            start_s: (0.0, 30.72),
+            nk: 29,
+            validation: Some(&self.validation),
+            change: self.change,
+        }
+    }
+
+    /// The operator at a sample.
+    pub fn operator(&self, k: usize) -> OperatorParameters {
+        let of = |name: &str| self.record.channel(name).unwrap()[k];
+        OperatorParameters {
+            k_e: of("K_e"),
+            t_l_s: of("T_L"),
+            omega_nm_rad_s: of("omega_nm"),
+            zeta_nm: of("zeta_nm"),
+            tau_e_s: 0.28,
+        }
+    }
+
+    /// The true responses at the samples that are asked for.
+    pub fn responses(&self) -> Vec<Vec<Complex64>> {
+        let task = self.task();
+        let of = |k: &usize| response_of(&self.operator(*k), self.record.sample_time(), task.omega_rad_s).unwrap();
+        self.at.iter().map(of).collect()
+    }
+}
+
+/// Relative error over the frequencies, root mean square.
+pub(super) fn error(found: &[Complex64], expected: &[Complex64]) -> f64 {
+    let squares: f64 = found
+        .iter()
+        .zip(expected)
+        .map(|(h, h0)| (h / h0 - 1.0).norm_sqr())
+        .sum();
+    (squares / expected.len() as f64).sqrt()
+}
+
+#[test]
+fn names_lead_to_comparators_and_all_say_where_they_are_from() {
+    let all = comparators();
+    let names: BTreeSet<&str> = all.iter().map(|c| c.about().name).collect();
+    assert_eq!(names.len(), all.len());
+    for comparator in &all {
+        let about = comparator.about();
+        assert!(!about.help.is_empty() && !about.source.is_empty(), "{}", about.name);
+        assert!(
+            comparator.list().iter().all(|setting| !setting.help.is_empty()),
+            "{}",
+            about.name
+        );
+    }
+}
+
+/// All of them on one run with a small remnant: before the change and long after it the response is
+/// that of the operator within half of it, and what is no number is said to be none.
+#[test]
+fn all_follow_a_run_of_the_text() {
+    let run = Run::of(Condition::C4, 1, 0.01);
+    let truth = run.responses();
+    for comparator in comparators() {
+        let name = comparator.about().name;
+        let found = comparator
+            .follow(&run.task())
+            .unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!((found.response.len(), found.operator.len()), (2, 2), "{name}");
+        for (k, (found, expected)) in found.response.iter().zip(&truth).enumerate() {
+            let off = error(found, expected);
+            assert!(off < 0.5, "{name}, {k}: {off}");
+        }
+    }
+}
+
+#[test]
+fn silence_and_samples_beyond_the_record_are_refused_by_all() {
+    let silent = record_of(&[0.0; 4000], &[1.0; 4000]);
+    let moving = Run::of(Condition::C1, 1, 0.1);
+    let beyond = Task {
+        at: &[8192],
+        ..moving.task()
+    };
+    for comparator in comparators() {
+        let name = comparator.about().name;
+        let refused = comparator
+            .follow(&task_of(&silent, &[3999], &[1.0]))
+            .unwrap_err()
+            .to_string();
+        assert!(refused.contains(name) && refused.contains("zero"), "{refused}");
+        let refused = comparator.follow(&beyond).unwrap_err().to_string();
+        assert!(refused.contains("8192"), "{refused}");
+    }
+}

@@ -1,0 +1,167 @@
+//! The virtual people of the experiment.
+
+use hoid_model::{Record, scenario::Condition};
+use hoid_study::group::VirtualExperiment;
+use toml::{Table, Value};
+
+use crate::ThesisError;
+
+/// The plan that comes with the program.
+pub const EXPERIMENT: &str = include_str!("../../plans/experiment.toml");
+
+/// Who takes part, and what is done with their runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExperimentPlan {
+    /// Seed of all random streams.
+    pub seed: u64,
+    /// Number of subjects.
+    pub subjects: u64,
+    /// Runs of each subject and condition.
+    pub runs: u64,
+    /// How many of them, the last ones, are evaluated.
+    pub evaluated: u64,
+    /// Spread of the parameters between subjects, and between the runs of one.
+    pub spreads: (f64, f64),
+    /// Order of the remnant.
+    pub remnant_order: usize,
+    /// Noise level before it is spread.
+    pub noise_level: f64,
+    /// First and last delay that is tried, samples.
+    pub delays: (usize, usize),
+}
+
+fn wrong(key: &str, found: &str, expected: &str) -> ThesisError {
+    ThesisError::Unsuited {
+        method: "the plan of the experiment",
+        quantity: key.to_owned(),
+        found: found.to_owned(),
+        expected: expected.to_owned(),
+    }
+}
+
+impl ExperimentPlan {
+    /// The conditions of the text.
+    pub const CONDITIONS: [Condition; 6] = [
+        Condition::C1,
+        Condition::C2,
+        Condition::C3,
+        Condition::C4,
+        Condition::C5,
+        Condition::C6,
+    ];
+
+    /// Reads and checks the text of a plan.
+    ///
+    /// # Errors
+    /// [`ThesisError::Unsuited`] with the key and the remedy.
+    pub fn parse(text: &str) -> Result<Self, ThesisError> {
+        const KEYS: [&str; 9] = [
+            "seed",
+            "subjects",
+            "runs",
+            "evaluated",
+            "between_subjects",
+            "between_runs",
+            "remnant_order",
+            "noise_level",
+            "delays",
+        ];
+        let table: Table = text
+            .parse()
+            .map_err(|error: toml::de::Error| wrong("its text", error.message(), "TOML"))?;
+        if let Some(key) = table.keys().find(|key| !KEYS.contains(&key.as_str())) {
+            return Err(wrong("a key", key, &format!("one of {}", KEYS.join(", "))));
+        }
+        let shown = |key: &str| table.get(key).map_or("not there".to_owned(), Value::to_string);
+        let whole = |key: &str| {
+            let value = table.get(key).and_then(Value::as_integer);
+            let value = value.and_then(|n| u64::try_from(n).ok());
+            value.ok_or_else(|| wrong(key, &shown(key), "a whole number from 0 on"))
+        };
+        let number = |key: &str| {
+            let value = table.get(key).and_then(Value::as_float);
+            value.ok_or_else(|| wrong(key, &shown(key), "a number with a point"))
+        };
+        let delays: Vec<usize> = table
+            .get("delays")
+            .and_then(Value::as_array)
+            .into_iter()
+            .flatten()
+            .filter_map(|value| usize::try_from(value.as_integer()?).ok())
+            .collect();
+        let (first, last) = match delays.as_slice() {
+            [first, last] if 1 <= *first && first <= last => (*first, *last),
+            _ => return Err(wrong("delays", &shown("delays"), "[first, last], from 1 on")),
+        };
+        let plan = Self {
+            seed: whole("seed")?,
+            subjects: whole("subjects")?,
+            runs: whole("runs")?,
+            evaluated: whole("evaluated")?,
+            spreads: (number("between_subjects")?, number("between_runs")?),
+            remnant_order: whole("remnant_order")? as usize,
+            noise_level: number("noise_level")?,
+            delays: (first, last),
+        };
+        if plan.evaluated == 0 || plan.evaluated > plan.runs {
+            return Err(wrong("evaluated", &shown("evaluated"), "1 to the number of runs"));
+        }
+        Ok(plan)
+    }
+
+    /// A run of a subject in a condition.
+    ///
+    /// # Errors
+    /// [`ThesisError::Study`] for people without stable loops.
+    pub fn record(&self, subject: u64, condition: Condition, run: u64) -> Result<Record, ThesisError> {
+        let experiment = VirtualExperiment {
+            subjects: self.subjects,
+            conditions: Self::CONDITIONS.to_vec(),
+            runs: self.runs,
+            between_subjects: self.spreads.0,
+            between_runs: self.spreads.1,
+            remnant_order: self.remnant_order,
+            noise_level: self.noise_level,
+            seed: self.seed,
+            defects: Vec::new(),
+        };
+        let cell = Self::CONDITIONS.iter().position(|of| *of == condition).unwrap_or(0);
+        Ok(experiment.run(subject, cell as u64, condition, run)?.1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn the_plan_is_the_experiment_of_the_text() {
+        let plan = ExperimentPlan::parse(EXPERIMENT).unwrap();
+        assert_eq!((plan.subjects, plan.runs, plan.evaluated), (3, 7, 5));
+        for (from, to, named) in [
+            ("runs = 7", "runs = 3", "evaluated"),
+            ("delays = [20, 38]", "delays = [38, 20]", "delays"),
+            ("noise_level = 0.15", "noise_level = \"much\"", "noise_level"),
+            ("subjects = 3", "people = 3", "people"),
+            ("seed = 3006", "seed = -1", "seed"),
+        ] {
+            let refused = ExperimentPlan::parse(&EXPERIMENT.replace(from, to)).unwrap_err();
+            assert!(refused.to_string().contains(named), "{refused}");
+        }
+    }
+
+    #[test]
+    fn runs_of_one_subject_are_of_one_person_and_differ() {
+        let plan = ExperimentPlan::parse(EXPERIMENT).unwrap();
+        let gain = |subject, run| {
+            plan.record(subject, Condition::C1, run)
+                .unwrap()
+                .channel("K_e")
+                .unwrap()[0]
+        };
+        assert_ne!(gain(1, 6), gain(1, 7));
+        assert_ne!(gain(1, 7), gain(2, 7));
+        assert_eq!(gain(2, 7), gain(2, 7));
+    }
+}

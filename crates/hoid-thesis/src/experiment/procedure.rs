@@ -1,0 +1,286 @@
+//! What the text does with one run of the experiment.
+
+use hoid_ident::{Estimator, Fit, validation::vaf};
+use hoid_model::{
+    OperatorParameters, Orders, Record, Structure, remnant::RemnantDiscretisation, uncertainty::OperatorEstimate,
+};
+use hoid_track::{Method, StartAt, TrackOptions, track_from};
+
+use crate::ThesisError;
+
+/// Spans of the batch fits, s.
+pub const SPANS_S: [(f64, f64); 2] = [(0.0, 30.72), (51.2, 81.92)];
+/// Samples from one kept estimate to the next.
+const EVERY: usize = 32;
+/// Sizes of P0 and of the memory, as in section V.B.
+const SETTINGS: [(&str, &str); 2] = [("memory", "256"), ("covariance", "0.1")];
+
+/// Coefficients and operator of one moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State {
+    /// a1, a2 (f1, f2 of a Box-Jenkins model), b0, b1.
+    pub discrete: [f64; 4],
+    /// K_e, T_L, K_e_dot, omega_nm, zeta_nm; no numbers where the model does not convert.
+    pub operator: [f64; 5],
+}
+
+/// An estimate over time.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Course {
+    /// Times, s.
+    pub times_s: Vec<f64>,
+    /// Coefficients and operator at each.
+    pub states: Vec<State>,
+    /// Variances of a1, a2, b0, b1, and d1 where there is one.
+    pub variances: Vec<[f64; 5]>,
+}
+
+/// What was found in one run; entries by structure, ARX and Box-Jenkins, and by span.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunOutcome {
+    /// n_k*, samples.
+    pub nk: [usize; 2],
+    /// T_n* of the Box-Jenkins model, s; no number where neither span has one.
+    pub t_n_s: f64,
+    /// The true delay, in samples with that of the hold.
+    pub true_nk: usize,
+    /// Batch fits.
+    pub batch: [[State; 2]; 2],
+    /// RLS and RPEM.
+    pub courses: [Course; 2],
+    /// What was simulated, at the beginning and at the end.
+    pub truth: [State; 2],
+}
+
+/// The procedure of section VI on one run; delays from the first to the last are tried.
+///
+/// # Errors
+/// [`ThesisError::Estimator`] for a model that cannot be fitted or tracked.
+pub fn evaluate(record: &Record, delays: (usize, usize)) -> Result<RunOutcome, ThesisError> {
+    let span = |(from_s, to_s): (f64, f64)| record.span(from_s, to_s);
+    let spans = [span(SPANS_S[0])?, span(SPANS_S[1])?];
+    let arx = of_structure(record, &spans, Structure::Arx, delays)?;
+    let bj = of_structure(record, &spans, Structure::BoxJenkins, delays)?;
+    Ok(RunOutcome {
+        nk: [arx.nk, bj.nk],
+        t_n_s: bj.t_n_s,
+        true_nk: true_delay(record),
+        batch: [arx.batch, bj.batch],
+        courses: [arx.course, bj.course],
+        truth: [true_state(record, 0), true_state(record, record.len() - 1)],
+    })
+}
+
+/// What was found with one structure.
+struct OfStructure {
+    nk: usize,
+    t_n_s: f64,
+    batch: [State; 2],
+    course: Course,
+}
+
+fn of_structure(
+    record: &Record,
+    spans: &[Record; 2],
+    structure: Structure,
+    delays: (usize, usize),
+) -> Result<OfStructure, ThesisError> {
+    let best = [
+        best_delay(&spans[0], structure, delays)?,
+        best_delay(&spans[1], structure, delays)?,
+    ];
+    // Half a sample is rounded up.
+    let nk = (best[0].orders().nk + best[1].orders().nk).div_ceil(2);
+    let t_n_s = time_constant(&best);
+    let estimator = Estimator::new(structure, structure.operator_orders(nk));
+    let fits = [
+        estimator.fit(std::slice::from_ref(&spans[0]))?,
+        estimator.fit(std::slice::from_ref(&spans[1]))?,
+    ];
+    Ok(OfStructure {
+        nk,
+        t_n_s,
+        batch: fits.each_ref().map(state_of_fit),
+        course: course(record, &fits[0])?,
+    })
+}
+
+/// The fit of a span with the delay of the highest VAF, simulated as everywhere (eq. 39).
+fn best_delay(span: &Record, structure: Structure, (first, last): (usize, usize)) -> Result<Fit, ThesisError> {
+    let mut best: Option<(f64, Fit)> = None;
+    let mut failed = None;
+    for nk in first..=last {
+        let estimator = Estimator::new(structure, structure.operator_orders(nk));
+        let fit = match estimator.fit(std::slice::from_ref(span)) {
+            Ok(fit) => fit,
+            Err(error) => {
+                failed = Some(error);
+                continue;
+            }
+        };
+        let simulated = fit.simulate(span)?;
+        let found = vaf(&span.output()[simulated.first..], &simulated.values);
+        if best.as_ref().is_none_or(|(most, _)| found > *most) {
+            best = Some((found, fit));
+        }
+    }
+    match (best, failed) {
+        (Some((_, fit)), _) => Ok(fit),
+        (None, Some(error)) => Err(error.into()),
+        (None, None) => Err(ThesisError::Unsuited {
+            method: "the search of the delay",
+            quantity: "its range".to_owned(),
+            found: format!("{first} to {last}"),
+            expected: "a first delay that is not beyond the last".to_owned(),
+        }),
+    }
+}
+
+/// Mean of the time constants that there are, by backward Euler.
+fn time_constant(fits: &[Fit; 2]) -> f64 {
+    let of = |fit: &Fit| {
+        fit.remnant(RemnantDiscretisation::BackwardEuler)
+            .ok()
+            .map(|r| r.t_n_s.value)
+    };
+    let all: Vec<f64> = fits.iter().filter_map(of).collect();
+    all.iter().sum::<f64>() / all.len() as f64
+}
+
+/// RLS or RPEM from the fit of the first span.
+fn course(record: &Record, start: &Fit) -> Result<Course, ThesisError> {
+    let (structure, orders) = (start.model().structure(), start.orders());
+    let options = match structure {
+        Structure::BoxJenkins => {
+            let text = [("stable", "predictor-and-noise"), ("limit", "inf")];
+            TrackOptions::new(Method::rpem(), structure, orders).with(&text)?
+        }
+        _ => TrackOptions::new(Method::rls(), structure, orders),
+    };
+    let options = TrackOptions {
+        start: StartAt::Span(Some(SPANS_S[0])),
+        ..options.with(&SETTINGS)?
+    };
+    let trace = track_from(record, &options, EVERY, Some(start))?;
+    let places = places(&orders);
+    let mut course = Course::default();
+    for row in 0..trace.len() {
+        let theta = trace.theta(row);
+        let operator = trace.operator_values(row).ok().map(|found| found.parameters());
+        course.times_s.push(trace.times_s()[row]);
+        course.states.push(State {
+            discrete: std::array::from_fn(|i| places[i].map_or(f64::NAN, |p| theta[p])),
+            operator: values(operator),
+        });
+        let n = theta.len();
+        let covariance = trace.covariance(row);
+        let variance = |place: Option<usize>| match (place, &covariance) {
+            (Some(p), Some(all)) => all[p * n + p],
+            _ => f64::NAN,
+        };
+        course.variances.push(places.map(variance));
+    }
+    Ok(course)
+}
+
+/// Places of a1, a2 (or f1, f2), b0, b1 and d1 in theta.
+fn places(orders: &Orders) -> [Option<usize>; 5] {
+    let names = orders.parameter_names();
+    let of = |wanted: &[&str]| names.iter().position(|name| wanted.contains(&name.as_str()));
+    [
+        of(&["a1", "f1"]),
+        of(&["a2", "f2"]),
+        of(&["b0"]),
+        of(&["b1"]),
+        of(&["d1"]),
+    ]
+}
+
+fn state_of_fit(fit: &Fit) -> State {
+    let places = places(&fit.orders());
+    let theta = fit.model().theta();
+    State {
+        discrete: std::array::from_fn(|i| places[i].map_or(f64::NAN, |p| theta[p])),
+        operator: values(fit.operator().ok().map(|found| found.parameters())),
+    }
+}
+
+fn values(operator: Option<OperatorParameters>) -> [f64; 5] {
+    operator.map_or([f64::NAN; 5], |found| {
+        let rows = OperatorEstimate::from(found).rows();
+        [0, 1, 2, 3, 4].map(|i| rows[i].2.value)
+    })
+}
+
+/// The simulated operator of a sample.
+fn true_state(record: &Record, k: usize) -> State {
+    let of = |name: &str| record.channel(name).map_or(f64::NAN, |values| values[k]);
+    let operator = OperatorParameters {
+        k_e: of("K_e"),
+        t_l_s: of("T_L"),
+        omega_nm_rad_s: of("omega_nm"),
+        zeta_nm: of("zeta_nm"),
+        tau_e_s: of("tau_e"),
+    };
+    let held = operator.discretise(record.sample_time()).ok().map(|found| found.held);
+    State {
+        discrete: held.map_or([f64::NAN; 4], |h| [h.f1, h.f2, h.b0, h.b1]),
+        operator: values(Some(operator)),
+    }
+}
+
+fn true_delay(record: &Record) -> usize {
+    let tau_s = record.channel("tau_e").map_or(f64::NAN, |values| values[0]);
+    (tau_s / record.sample_time().s()).round() as usize + 1
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::scenario::{Condition, RemnantStrength, Scenario};
+    use hoid_sim::{RunSeed, Simulator};
+
+    use super::*;
+
+    fn run(level: f64) -> Record {
+        let mut scenario = Scenario::condition(Condition::C4);
+        scenario.remnant.order = 1;
+        if let RemnantStrength::Level { level: of, .. } = &mut scenario.remnant.strength {
+            *of = level;
+        }
+        let seed = RunSeed {
+            seed: 9,
+            ..RunSeed::default()
+        };
+        Simulator::new(&scenario).unwrap().run(seed, false).unwrap()
+    }
+
+    #[test]
+    fn without_remnant_the_procedure_finds_the_operator() {
+        let found = evaluate(&run(0.0), (27, 31)).unwrap();
+        assert_eq!((found.nk[0], found.true_nk), (29, 29));
+        for span in 0..2 {
+            for (a, b) in found.batch[0][span].discrete.iter().zip(found.truth[span].discrete) {
+                assert!((a - b).abs() < 1e-3, "{span}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_small_remnant_leaves_delay_and_time_constant() {
+        let found = evaluate(&run(0.05), (26, 32)).unwrap();
+        assert!((28..=30).contains(&found.nk[1]), "{:?}", found.nk);
+        // d1 is that of the remnant held exactly: T_n* by backward Euler .055; its error .006.
+        assert!((found.t_n_s - 0.055).abs() < 0.02, "{}", found.t_n_s);
+        let [rls, rpem] = &found.courses;
+        assert_eq!((rls.times_s.len(), rpem.times_s.len()), (256, 256));
+        assert!(rls.variances[0][4].is_nan() && rpem.variances[0][4] > 0.0);
+        let last = rpem.states[255].operator[2];
+        assert!((last / 0.084 - 1.0).abs() < 0.3, "{last}");
+    }
+
+    #[test]
+    fn a_range_without_delays_is_refused() {
+        assert!(evaluate(&run(0.05), (30, 29)).is_err());
+    }
+}

@@ -1,0 +1,146 @@
+//! Figs. H.1 to H.12 as the text draws them, *obtained values averaged from M realizations*: the
+//! averages over the runs with the medians beside.
+//!
+//! `T_L = K_e_dot/K_e` of one run in which K_e nearly vanishes decides the average of all, which is
+//! why the figures of the same number show the medians (`traces`).
+
+use hoid_study::{Query, Results};
+
+use super::{
+    axes::{REMNANT_ORDERS, order_titles},
+    item::{Item, ItemOutput},
+    table_builder::TableBuilder,
+};
+use hoid_report::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels};
+
+/// The noise level that is drawn: averages and medians of three levels would be twelve lines.
+const LEVEL: f64 = 0.1;
+/// Column of RLS, that of RPEM, name and unit of the panel.
+type Row = (&'static str, &'static str, &'static str, &'static str);
+const DISCRETE: [Row; 4] = [
+    ("a1", "f1", "a1", ""),
+    ("a2", "f2", "a2", ""),
+    ("b0", "b0", "b0", ""),
+    ("b1", "b1", "b1", ""),
+];
+const OPERATOR: [Row; 5] = [
+    ("K_e", "K_e", "K_e", "deg/deg"),
+    ("T_L", "T_L", "T_L", "s"),
+    ("K_e_dot", "K_e_dot", "K_e_dot", "s"),
+    ("omega_nm", "omega_nm", "omega_nm", "rad/s"),
+    ("zeta_nm", "zeta_nm", "zeta_nm", ""),
+];
+
+pub(super) fn items() -> Vec<Item> {
+    let mut all = Vec::new();
+    for (i, condition) in ["C1", "C2", "C3", "C4", "C5", "C6"].into_iter().enumerate() {
+        for (k, (rows, what)) in [(&DISCRETE[..], "discrete"), (&OPERATOR[..], "operator")]
+            .into_iter()
+            .enumerate()
+        {
+            all.push(Item::of_study(
+                format!("H.{}-average", 2 * i + k + 1),
+                format!("Average and median of recursive estimates, {what} parameters, condition {condition}, P_n = {LEVEL}"),
+                "Average (dark) over the runs at each time, as the text has it, and median (light). An ordinate that hides the average cuts it.",
+                "recursive",
+                move |item, results| make(item, results, condition, rows),
+            ));
+        }
+    }
+    all
+}
+
+fn make(item: &Item, results: &Results, condition: &str, rows: &[Row]) -> ItemOutput {
+    let mut data = TableBuilder::new(
+        &["parameter", "estimator"],
+        &["remnant_order", "t", "mean", "median", "sd"],
+    );
+    let mut panels = Vec::new();
+    for (of_rls, of_rpem, name, unit) in rows {
+        for m0 in REMNANT_ORDERS {
+            let cell = Query::default()
+                .condition(condition)
+                .remnant_order(m0)
+                .noise_level(LEVEL);
+            let mut curves = Vec::new();
+            for (method, (estimator, column)) in [("RLS", of_rls), ("RPEM", of_rpem)].into_iter().enumerate() {
+                let cells = results.cells(&cell);
+                let traces = cells.first().and_then(|cell| results.traces(cell.index, estimator));
+                let Some((traces, bands)) = traces.and_then(|of| Some((of, of.parameters.get(*column)?))) else {
+                    continue;
+                };
+                for (k, t) in traces.times_s.iter().enumerate() {
+                    let numbers = [m0 as f64, *t, bands.mean[k], bands.median[k], bands.sd[k]];
+                    data.row(&[name, estimator], &numbers);
+                }
+                for (level, values) in [&bands.median, &bands.mean].into_iter().enumerate() {
+                    curves.push(TraceCurve {
+                        kind: CurveKind::Estimate,
+                        method,
+                        level,
+                        times_s: traces.times_s.clone(),
+                        values: values.clone(),
+                        band: Vec::new(),
+                    });
+                }
+            }
+            panels.push(TracePanel {
+                name: (*name).to_owned(),
+                unit: (*unit).to_owned(),
+                ordinate: Ordinate::Robust,
+                curves,
+            });
+        }
+    }
+    let grid = TraceGrid {
+        panels,
+        columns: REMNANT_ORDERS.len(),
+        titles: order_titles(),
+        methods: ["ARX (RLS)", "BJ (RPEM)"].map(str::to_owned).to_vec(),
+        levels: ["median", "average"].map(str::to_owned).to_vec(),
+        shaded_s: Vec::new(),
+        marks_s: Vec::new(),
+        shared_ordinates: false,
+    };
+    ItemOutput {
+        svg: Some(trace_panels(&item.name, &item.title, &grid)),
+        data: data.table(&item.title),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_study::Plan;
+
+    use super::*;
+
+    #[test]
+    fn the_average_and_the_median_are_drawn_of_each_order() {
+        let text = r#"
+name = "recursive"
+replications = 1
+[keep]
+trace_every = 512
+[[scenarios]]
+condition = "C4"
+remnant = { order = [1, 2, 3, 4], noise_level = 0.1 }
+[[estimators]]
+name = "RLS"
+method = "rls"
+[[estimators]]
+name = "RPEM"
+method = "rpem"
+"#;
+        let plan = Plan::parse(text, "recursive.toml").unwrap();
+        let results = Results::synthetic(plan, &|_, _, _, _| 0.0);
+        let all = items();
+        assert_eq!(all.len(), 12);
+        let made = make(&all[7], &results, "C4", &OPERATOR);
+        assert!(made.svg.unwrap().contains("average"));
+        // Two estimators, five parameters, four orders.
+        let rows = made.data.columns[0].values.len();
+        assert_eq!(rows % 40, 0);
+        assert!(rows > 0);
+    }
+}

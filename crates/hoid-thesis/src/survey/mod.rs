@@ -1,0 +1,35 @@
+//! All methods of the survey on the same runs.
+//!
+//! Part II of the reference text describes the methods by which others have identified operators who
+//! change (section 2.4). A survey follows the same simulated runs with all of them: the recursive
+//! methods of `hoid_track`, as estimators of a plan, and the [`comparators`](crate::comparators). A
+//! plan of a survey is that of a study, and at its end tables of comparators:
+//!
+//! ```toml
+//! [[comparators]]
+//! name = "wavelets"         # in the table
+//! method = "wavelet"
+//! radians = 6
+//! ```
+//!
+//! What all methods give is the response `H(j omega, t)`, so that is what they are measured by
+//! ([`measure`]); the parameters only of those that have them.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | `plan` | [`SurveyPlan`] |
+//! | [`measure`] | errors of what a method found in one run |
+//! | `run` | [`survey()`]: runs and methods |
+//! | `table` | the tables of the page "The survey's methods" of the book |
+
+pub mod measure;
+mod plan;
+mod run;
+mod table;
+
+pub use plan::SurveyPlan;
+pub use run::{MethodErrors, survey};
+pub use table::survey_tables;
+
+/// The plan of the page "The survey's methods" of the book.
+pub const SURVEY: &str = include_str!("../../plans/survey.toml");

@@ -1,0 +1,144 @@
+//! The plan of a survey: that of a study, and comparators.
+
+use hoid_study::Plan;
+use toml::{Table, Value};
+
+use crate::{
+    ThesisError,
+    comparators::{Comparator, comparators},
+};
+
+/// Heading of the tables of comparators, which end a plan.
+const HEADING: &str = "[[comparators]]";
+
+/// A plan of a survey, checked.
+pub struct SurveyPlan {
+    /// Scenarios and estimators.
+    pub study: Plan,
+    /// Comparators by the names of their tables.
+    pub comparators: Vec<(String, Box<dyn Comparator>)>,
+}
+
+impl SurveyPlan {
+    /// Reads and checks the text of a plan.
+    ///
+    /// # Errors
+    /// [`ThesisError::Study`] for what is wrong with the study, [`ThesisError::Unsuited`] and
+    /// [`ThesisError::Estimator`] for a comparator or an option of one.
+    pub fn parse(text: &str, path: &str) -> Result<Self, ThesisError> {
+        let first = text.lines().position(|line| line.trim() == HEADING);
+        let lines: Vec<&str> = text.lines().collect();
+        let (study, own) = lines.split_at(first.unwrap_or(lines.len()));
+        let study = Plan::parse(&study.join("\n"), path)?;
+        let wrong = |quantity: &str, found: String, expected: String| ThesisError::Unsuited {
+            method: "a comparator of the plan",
+            quantity: quantity.to_owned(),
+            found,
+            expected,
+        };
+        let table: Table = own
+            .join("\n")
+            .parse()
+            .map_err(|error: toml::de::Error| wrong("its table", error.message().to_owned(), "TOML".to_owned()))?;
+        if let Some(key) = table.keys().find(|key| *key != "comparators") {
+            return Err(wrong(
+                "a key behind it",
+                key.clone(),
+                format!("{HEADING}, at the end of the plan"),
+            ));
+        }
+        let each = table.get("comparators").and_then(Value::as_array).into_iter().flatten();
+        let comparators = each
+            .map(|entry| {
+                let table = entry
+                    .as_table()
+                    .ok_or_else(|| wrong("its entry", entry.to_string(), "a table".to_owned()))?;
+                comparator(table, &wrong)
+            })
+            .collect::<Result<_, ThesisError>>()?;
+        Ok(Self { study, comparators })
+    }
+}
+
+fn comparator(
+    table: &Table,
+    wrong: &dyn Fn(&str, String, String) -> ThesisError,
+) -> Result<(String, Box<dyn Comparator>), ThesisError> {
+    let text = |key: &str| {
+        let value = table.get(key).and_then(Value::as_str);
+        value.ok_or_else(|| wrong(key, "not there".to_owned(), "a text".to_owned()))
+    };
+    let (name, method) = (text("name")?, text("method")?);
+    let all = comparators();
+    let known: Vec<&str> = all.iter().map(|of| of.about().name).collect();
+    let missing = || wrong("method", method.to_owned(), format!("one of {}", known.join(", ")));
+    let mut found = comparators()
+        .into_iter()
+        .find(|of| of.about().name == method)
+        .ok_or_else(missing)?;
+    for (key, value) in table
+        .iter()
+        .filter(|(key, _)| !["name", "method"].contains(&key.as_str()))
+    {
+        let text = match value {
+            Value::String(text) => text.clone(),
+            other => other.to_string(),
+        };
+        if !found.set(key, &text)? {
+            let keys: Vec<&str> = found.list().iter().map(|setting| setting.name).collect();
+            return Err(wrong("an option", key.clone(), format!("one of {}", keys.join(", "))));
+        }
+    }
+    Ok((name.to_owned(), found))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    const HEAD: &str = r#"
+name = "small"
+replications = 2
+[[scenarios]]
+condition = "C4"
+[[estimators]]
+name = "RLS"
+method = "rls"
+"#;
+
+    #[test]
+    fn the_plan_of_the_book_has_all_comparators() {
+        let plan = SurveyPlan::parse(super::super::SURVEY, "survey.toml").unwrap();
+        let methods: Vec<&str> = plan.comparators.iter().map(|(_, of)| of.about().name).collect();
+        for comparator in comparators() {
+            assert!(
+                methods.contains(&comparator.about().name),
+                "{}",
+                comparator.about().name
+            );
+        }
+    }
+
+    #[test]
+    fn options_are_set_and_what_is_unknown_is_refused_by_name() {
+        let parse = |tail: &str| SurveyPlan::parse(&format!("{HEAD}[[comparators]]\n{tail}"), "small.toml");
+        let plan = parse("name = \"FIR\"\nmethod = \"rls-fir\"\nnb = 64\n").unwrap();
+        assert_eq!(plan.comparators[0].1.get("nb").as_deref(), Some("64"));
+        assert!(SurveyPlan::parse(HEAD, "small.toml").unwrap().comparators.is_empty());
+        for (tail, named) in [
+            ("name = \"x\"\nmethod = \"lstm\"\n", "linear-network"),
+            ("name = \"x\"\nmethod = \"wavelet\"\nnb = 3\n", "radians"),
+            ("name = \"x\"\nmethod = \"wavelet\"\nradians = -1\n", "radians"),
+            ("method = \"wavelet\"\n", "name"),
+            ("name = \n", "TOML"),
+            (
+                "name = \"x\"\nmethod = \"wavelet\"\n[[estimators]]\nname = \"y\"\n",
+                "at the end",
+            ),
+        ] {
+            let Err(refused) = parse(tail) else { panic!("{tail}") };
+            assert!(refused.to_string().contains(named), "{refused}");
+        }
+    }
+}

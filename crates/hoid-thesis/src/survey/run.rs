@@ -1,0 +1,224 @@
+//! Runs of a survey and what each method finds in them.
+
+use std::time::Instant;
+
+use hoid_model::{PolynomialModel, Record};
+use hoid_sim::{RunSeed, Simulator};
+use hoid_study::plan::{Cell, EstimatorCell, Task as StudyTask};
+use hoid_track::{Trace, track};
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::{
+    measure::{Errors, LINES, errors},
+    plan::SurveyPlan,
+};
+use crate::{
+    ThesisError,
+    comparators::{Followed, Task},
+};
+
+/// Samples from one kept estimate to the next.
+const EVERY: usize = 32;
+/// First replication of the validation sets: no run of a survey has this number.
+const VALIDATION: u64 = 1 << 40;
+
+/// Errors of one method over the runs of one cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MethodErrors {
+    /// Number of the cell.
+    pub cell: u64,
+    /// Name of the method in the plan.
+    pub name: String,
+    /// What it was told beside e and u; empty for nothing.
+    pub told: &'static str,
+    /// Errors by run; why there are none where it failed.
+    pub runs: Vec<Result<Errors, String>>,
+    /// Processor time of one run, s, the median.
+    pub seconds: f64,
+}
+
+/// Follows all runs of a plan with all of its methods; cells in their order, and in each the
+/// estimators before the comparators. `each` is called after every run.
+///
+/// # Errors
+/// [`ThesisError`] for a scenario that cannot be simulated. A method that fails on a run says so in
+/// its errors.
+pub fn survey(plan: &SurveyPlan, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<MethodErrors>, ThesisError> {
+    let mut all = Vec::new();
+    for cell in &plan.study.cells {
+        let simulator = Simulator::new(cell.resolved.scenario())?;
+        let one = |replication: u64| {
+            let run = |replication: u64| {
+                let seed = RunSeed {
+                    seed: plan.study.seed,
+                    cell: cell.index,
+                    replication,
+                };
+                simulator.run(seed, false)
+            };
+            let found = methods_of(plan, cell, &run(replication)?, &run(VALIDATION + replication)?);
+            each(&format!("cell {}, run {replication}", cell.index));
+            Ok::<_, ThesisError>(found)
+        };
+        let runs: Vec<Vec<Found>> = (0..cell.replications)
+            .into_par_iter()
+            .map(one)
+            .collect::<Result<_, _>>()?;
+        for (i, first) in runs[0].iter().enumerate() {
+            let mut seconds: Vec<f64> = runs.iter().map(|run| run[i].seconds).collect();
+            seconds.sort_by(f64::total_cmp);
+            all.push(MethodErrors {
+                cell: cell.index,
+                name: first.name.clone(),
+                told: first.told,
+                runs: runs.iter().map(|run| run[i].errors.clone()).collect(),
+                seconds: seconds[seconds.len() / 2],
+            });
+        }
+    }
+    Ok(all)
+}
+
+/// What one method found in one run.
+struct Found {
+    name: String,
+    told: &'static str,
+    errors: Result<Errors, String>,
+    seconds: f64,
+}
+
+fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Record) -> Vec<Found> {
+    let scenario = cell.resolved.scenario();
+    let lines: Vec<f64> = scenario.forcing.sinusoids().iter().map(|s| s.omega_rad_s).collect();
+    let omega = &lines[LINES.start.min(lines.len())..LINES.end.min(lines.len())];
+    let at: Vec<usize> = (EVERY - 1..record.len()).step_by(EVERY).collect();
+    let task = Task {
+        record,
+        at: &at,
+        lines_rad_s: &lines,
+        omega_rad_s: omega,
+        start_s: (0.0, 0.375 * scenario.measurement_s),
+        nk: (scenario.initial.operator.tau_e_s / scenario.sample_time.s()).round() as usize + 1,
+        validation: Some(validation),
+        change: scenario.schedule.change_s().zip(scenario.schedule.rate_per_s()),
+    };
+    let measured = |name: &str, told: &'static str, follow: &dyn Fn() -> Result<Followed, ThesisError>| {
+        let begin = Instant::now();
+        let followed = follow();
+        let seconds = begin.elapsed().as_secs_f64();
+        let errors = followed.and_then(|found| errors(record, &at, omega, &found));
+        Found {
+            name: name.to_owned(),
+            told,
+            errors: errors.map_err(|error| error.to_string()),
+            seconds,
+        }
+    };
+    let estimators = plan.study.estimators_of(cell).map(|(_, estimator)| {
+        let follow = || of_estimator(estimator, cell, &task);
+        measured(&estimator.label, "", &follow)
+    });
+    let comparators = plan.comparators.iter().map(|(name, of)| {
+        let follow = || of.follow(&task);
+        measured(name, of.about().told, &follow)
+    });
+    estimators.chain(comparators).collect()
+}
+
+/// What an estimator of a study finds: a recursion at each time, a batch fit the same at all.
+fn of_estimator(estimator: &EstimatorCell, cell: &Cell, task: &Task<'_>) -> Result<Followed, ThesisError> {
+    match estimator.task_for(&cell.resolved) {
+        StudyTask::Track(options) => of_trace(&track(task.record, &options, EVERY)?, task),
+        StudyTask::Fit(options) => {
+            let (from_s, to_s) = estimator.span_s.unwrap_or((task.record.time_s(0), f64::INFINITY));
+            let span = task
+                .record
+                .span(from_s, to_s.min(task.record.time_s(task.record.len())))?;
+            let fit = options.fit(std::slice::from_ref(&span))?;
+            let operator = fit.operator().ok().map(|found| found.parameters());
+            let response = responses(fit.model(), task.omega_rad_s);
+            Ok(Followed {
+                response: vec![response; task.at.len()],
+                operator: vec![operator; task.at.len()],
+            })
+        }
+        StudyTask::Describe | StudyTask::GreyBox(_) => Err(ThesisError::Unsuited {
+            method: "a survey",
+            quantity: "an estimator".to_owned(),
+            found: estimator.method().to_owned(),
+            expected: "a recursive method or \"fit\"".to_owned(),
+        }),
+    }
+}
+
+fn of_trace(trace: &Trace, task: &Task<'_>) -> Result<Followed, ThesisError> {
+    let (options, mut found) = (trace.options(), Followed::default());
+    for row in 0..task.at.len().min(trace.len()) {
+        let theta = trace.theta(row).to_vec();
+        let model = PolynomialModel::new(options.structure, options.orders, trace.sample_time(), theta)?;
+        found.response.push(responses(&model, task.omega_rad_s));
+        found
+            .operator
+            .push(trace.operator_values(row).ok().map(|of| of.parameters()));
+    }
+    Ok(found)
+}
+
+fn responses(model: &PolynomialModel, omega_rad_s: &[f64]) -> Vec<Complex64> {
+    omega_rad_s.iter().map(|omega| model.response(*omega)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    const SMALL: &str = r#"
+name = "small"
+seed = 5
+replications = 2
+[[scenarios]]
+condition = "C4"
+remnant = { order = 1, noise_level = 0.01 }
+[[estimators]]
+name = "RLS"
+method = "rls"
+orders.nk = 29
+[[estimators]]
+name = "BJ"
+method = "fit"
+structure = "bj"
+orders.nk = 29
+span_s = [51.2, 81.92]
+[[comparators]]
+name = "network"
+method = "linear-network"
+[[comparators]]
+name = "lines"
+method = "fourier"
+"#;
+
+    #[test]
+    fn estimators_and_comparators_meet_on_the_same_runs() {
+        let plan = SurveyPlan::parse(SMALL, "small.toml").unwrap();
+        let found = survey(&plan, &|_| ()).unwrap();
+        let names: Vec<&str> = found.iter().map(|of| of.name.as_str()).collect();
+        assert_eq!(names, ["RLS", "BJ", "network", "lines"]);
+        let of = |name: &str, run: usize| {
+            let own = found.iter().find(|of| of.name == name).unwrap();
+            own.runs[run].clone().unwrap()
+        };
+        for run in 0..2 {
+            // The batch fit of the end is right there and wrong before the change.
+            let [before, _, after] = of("BJ", run).response;
+            assert!(after < 10.0 && before > 30.0, "{before} {after}");
+            // Fourier coefficients give no parameters.
+            assert!(of("lines", run).operator[0].is_nan() && of("lines", run).response[0] < 60.0);
+        }
+        // Runs differ, and the same plan gives the same numbers.
+        assert_ne!(of("network", 0), of("network", 1));
+        let again = survey(&plan, &|_| ()).unwrap();
+        assert_eq!(again[2].runs, found[2].runs);
+    }
+}

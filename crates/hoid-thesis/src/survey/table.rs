@@ -1,0 +1,135 @@
+//! The tables of a survey, as they stand on the page "The survey's methods" of the book.
+
+use std::collections::BTreeMap;
+
+use hoid_study::{plan::Cell, statistics::median};
+
+use super::{measure::Errors, plan::SurveyPlan, run::MethodErrors};
+
+/// What is shown of one run: three spans of the response, and K_e, K_e_dot and omega_nm.
+fn shown(errors: &Errors) -> [f64; 6] {
+    let ([before, through, after], o) = (errors.response, errors.operator);
+    [before, through, after, o[0], o[2], o[3]]
+}
+
+/// Two digits, a bar for nothing, and no more of what has left all bounds.
+fn digits(value: f64) -> String {
+    match value {
+        v if v.is_nan() => "–".to_owned(),
+        v if v >= 1000.0 => "> 1000".to_owned(),
+        v if v >= 10.0 => format!("{v:.0}"),
+        v => format!("{v:.1}"),
+    }
+}
+
+/// Medians over runs, where more than half of them give a number.
+fn medians(of: &MethodErrors) -> ([f64; 6], usize) {
+    let runs: Vec<[f64; 6]> = of.runs.iter().flatten().map(shown).collect();
+    let column = |i: usize| {
+        let finite: Vec<f64> = runs.iter().map(|run| run[i]).filter(|x| x.is_finite()).collect();
+        match 2 * finite.len() > of.runs.len() {
+            true => median(&finite),
+            false => f64::NAN,
+        }
+    };
+    (std::array::from_fn(column), of.runs.len() - runs.len())
+}
+
+fn heading(cell: &Cell) -> String {
+    let mut words = vec![cell.condition.clone()];
+    words.extend(cell.axes.iter().filter(|axis| axis.key != "condition").map(|axis| {
+        let name = match axis.key.as_str() {
+            "remnant_order" => "m0",
+            "remnant_noise_level" => "P_n",
+            other => other,
+        };
+        format!("{name} = {}", axis.value)
+    }));
+    words.join(", ")
+}
+
+/// A table of each cell, in Markdown, and one of all methods over the cells.
+pub fn survey_tables(plan: &SurveyPlan, found: &[MethodErrors]) -> String {
+    let mut text = String::new();
+    let mut everywhere: BTreeMap<&str, Vec<[f64; 6]>> = BTreeMap::new();
+    let mut first: Vec<&MethodErrors> = Vec::new();
+    let mut each = String::new();
+    for cell in &plan.study.cells {
+        each += &format!("\n### {}\n\n{}", heading(cell), head("failed"));
+        for of in found.iter().filter(|of| of.cell == cell.index) {
+            let (row, failed) = medians(of);
+            let cells: Vec<String> = row.iter().map(|value| digits(*value)).collect();
+            let failed = if failed > 0 { failed.to_string() } else { String::new() };
+            each += &format!("| {} | {} | {failed} |\n", of.name, cells.join(" | "));
+            if !everywhere.contains_key(of.name.as_str()) {
+                first.push(of);
+            }
+            everywhere.entry(&of.name).or_default().push(row);
+        }
+    }
+    text += &head("ms a run");
+    for of in first {
+        let rows = &everywhere[of.name.as_str()];
+        let column = |i: usize| {
+            let finite: Vec<f64> = rows.iter().map(|row| row[i]).filter(|x| x.is_finite()).collect();
+            digits(if finite.is_empty() { f64::NAN } else { median(&finite) })
+        };
+        let cells: Vec<String> = (0..6).map(column).collect();
+        let mark = if of.told.is_empty() { "" } else { " *" };
+        text += &format!(
+            "| {}{mark} | {} | {} |\n",
+            of.name,
+            cells.join(" | "),
+            digits(1e3 * of.seconds)
+        );
+    }
+    let told: Vec<String> = plan
+        .comparators
+        .iter()
+        .filter(|(_, of)| !of.about().told.is_empty())
+        .map(|(name, of)| format!("- *{name}*: {}.", of.about().told))
+        .collect();
+    format!(
+        "{text}\n\\* is told more than e, u and n_k:\n\n{}\n{each}",
+        told.join("\n")
+    )
+}
+
+fn head(last: &str) -> String {
+    format!("| method | H before | through | after | K_e | K_ė | ω_nm | {last} |\n|---|---|---|---|---|---|---|---|\n")
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn medians_are_of_the_runs_that_give_a_number() {
+        let errors = |before: f64, k_e: f64| {
+            Ok(Errors {
+                response: [before, 20.0, 30.0],
+                operator: [k_e, 1.0, 2.0, 3.0, 4.0],
+            })
+        };
+        let of = MethodErrors {
+            cell: 0,
+            name: "one".to_owned(),
+            told: "",
+            runs: vec![
+                errors(10.0, f64::NAN),
+                errors(12.0, f64::NAN),
+                errors(4000.0, 5.0),
+                Err("failed".to_owned()),
+            ],
+            seconds: 0.5,
+        };
+        let (row, failed) = medians(&of);
+        assert_eq!((row[0], row[1], failed), (12.0, 20.0, 1));
+        assert!(row[3].is_nan());
+        assert_eq!(
+            [digits(row[0]), digits(row[3]), digits(4e3), digits(9.96)],
+            ["12", "–", "> 1000", "10.0"]
+        );
+    }
+}
