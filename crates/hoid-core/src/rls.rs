@@ -110,9 +110,8 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
             psi[na] = x;
         }
         let w = dot(&theta[na..na + nb], &psi[na..]);
-        // As the predictor of the general model has it, which keeps u itself.
-        let from_past = dot(&theta[..na], &psi.map(|p| -p));
-        (psi, u + from_past - w)
+        // The same bits as the predictor of the general model has, which keeps u itself.
+        (psi, u - dot(&theta[..na], &psi) - w)
     }
 
     #[inline(always)]

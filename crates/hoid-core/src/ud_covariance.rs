@@ -101,10 +101,10 @@ impl<const N: usize> UdCovariance<N> {
             let alpha = before + f[j] * v[j];
             let inverse = 1.0 / alpha;
             self.u[j][j] = grown[j] * (before * inverse);
-            let along = -f[j] * inverse_before;
+            let along = f[j] * inverse_before;
             for i in 0..j {
                 let old = self.u[j][i];
-                self.u[j][i] = old + gain[i] * along;
+                self.u[j][i] = old - gain[i] * along;
                 gain[i] += old * v[j];
             }
             gain[j] = v[j];

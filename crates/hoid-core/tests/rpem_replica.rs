@@ -8,10 +8,10 @@ use hoid_core::{
     covariance::Covariance,
     error_bars::ErrorBars,
     innovation_variance::InnovationVariance,
-    predictor::Regressor,
+    predictor::{Predictor, Regressor},
     recursion::Stable,
     rpem::Rpem,
-    shape::{AnyShape, Shape},
+    shape::{AnyShape, FixedShape, Shape},
     ud_covariance::UdCovariance,
 };
 
@@ -114,4 +114,36 @@ fn a_cascade_is_another_recursion() {
         let same = ["armax", "oe", "ararx"].contains(&name.as_str());
         assert_eq!(difference < 1e-9, same, "{name}: {difference:e}");
     }
+}
+
+/// What the order of the two filters does while theta moves, by the page on recursive
+/// identification: with one pole and one zero the difference of the cascade and the direct form is
+/// `Delta(t) = -f(t) Delta(t-1) + [f(t) d(t-1) - d(t) f(t-1)] z(t-2)`, `z = x/F`.
+#[test]
+fn the_order_of_two_filters_differs_by_the_moves_of_theta() {
+    let shape = FixedShape::<0, 1, 0, 1, 1>;
+    let [mut direct, mut cascade] =
+        [Regressor::Gradient, Regressor::Cascade].map(|regressor| Predictor::<_, 3, 3>::new(shape, regressor).unwrap());
+    let (mut difference, mut largest) = (0.0, 0.0_f64);
+    let (mut z, mut before) = ([0.0; 2], [0.0; 2]);
+    for t in 0..400 {
+        let time = f64::from(t);
+        let (x, u) = ((0.3 * time).sin() + (0.7 * time).cos(), (0.2 * time).sin());
+        // d stays for the first half, and so does f.
+        let moving = (time - 200.0).max(0.0);
+        let (d, f) = (-0.8 + 0.1 * (0.3 * moving).sin(), -0.95 + 0.04 * (0.3 * moving).sin());
+        let theta = [0.1, d, f];
+        let [psi, psi_c] = [&mut direct, &mut cascade].map(|predictor| {
+            let (psi, _) = predictor.predict(&theta, x, u);
+            predictor.correct(&theta);
+            psi
+        });
+        difference = -f * difference + (f * before[0] - d * before[1]) * z[1];
+        assert!((psi_c[0] - psi[0] - difference).abs() < 1e-11, "{t}: {difference}");
+        assert!(t > 200 || difference.abs() < 1e-12, "theta stays: {difference}");
+        largest = largest.max(difference.abs() / psi[0].abs().max(1.0));
+        z = [x - f * z[0], z[0]];
+        before = [d, f];
+    }
+    assert!(largest > 0.1, "the order matters: {largest}");
 }

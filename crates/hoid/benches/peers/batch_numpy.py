@@ -166,11 +166,10 @@ def rls(e, u):
 def rpem(e, u):
     theta, p = np.array(RPEM_START), 0.1 * np.eye(5)
     history, x = np.empty((len(u), 5)), delayed(e, NK)
-    x1 = w1 = w2 = v1 = xf1 = xf2 = xd1 = wf1 = wf2 = wd1 = wd2 = 0.0
+    x1 = w1 = w2 = v1 = xd1 = xd2 = wd1 = wd2 = 0.0
     for t in range(len(u)):
         b0, b1, d1, f1, f2 = theta
-        xf = x[t] - f1 * xf1 - f2 * xf2
-        xd = xf + d1 * xf1
+        xd = x[t] + d1 * x1 - f1 * xd1 - f2 * xd2
         psi = np.array([xd, xd1, -v1, -wd1, -wd2])
         eps = u[t] - (b0 * x[t] + b1 * x1 - f1 * w1 - f2 * w2) + d1 * v1
         g = p @ psi
@@ -182,11 +181,9 @@ def rpem(e, u):
         p = (p - scale * np.outer(g, g)) / LAMBDA
         b0, b1, d1, f1, f2 = theta
         w = b0 * x[t] + b1 * x1 - f1 * w1 - f2 * w2
-        wf = w - f1 * wf1 - f2 * wf2
-        wd = wf + d1 * wf1
+        wd = w + d1 * w1 - f1 * wd1 - f2 * wd2
         x1, w2, w1, v1 = x[t], w1, w, u[t] - w
-        xf2, xf1, xd1 = xf1, xf, xd
-        wf2, wf1, wd2, wd1 = wf1, wf, wd1, wd
+        xd2, xd1, wd2, wd1 = xd1, xd, wd1, wd
         history[t] = theta
     return history
 

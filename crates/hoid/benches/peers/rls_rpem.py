@@ -70,14 +70,12 @@ def rpem(e, u, history):
     for i in range(n):
         p[i, i] = 0.1
     inverse = 1.0 / LAMBDA
-    # Past input, response, noise; input and response over F, and those times D.
+    # Past input, response, noise; input and response through D/F, in direct form.
     x1 = w1 = w2 = v1 = 0.0
-    xf1 = xf2 = wf1 = wf2 = 0.0
-    xd1 = wd1 = wd2 = 0.0
+    xd1 = xd2 = wd1 = wd2 = 0.0
     for t in range(len(u)):
         x = e[t - NK] if t >= NK else 0.0
-        xf = x - f1 * xf1 - f2 * xf2
-        xd = xf + d1 * xf1
+        xd = x + d1 * x1 - f1 * xd1 - f2 * xd2
         psi[0] = xd
         psi[1] = xd1
         psi[2] = -v1
@@ -114,17 +112,13 @@ def rpem(e, u, history):
             for j in range(i + 1):
                 p[i, j] = (p[i, j] - along * g[j]) * inverse
         w = b0 * x + b1 * x1 - f1 * w1 - f2 * w2
-        wf = w - f1 * wf1 - f2 * wf2
-        wd = wf + d1 * wf1
+        wd = w + d1 * w1 - f1 * wd1 - f2 * wd2
         x1 = x
         w2 = w1
         w1 = w
         v1 = u[t] - w
-        xf2 = xf1
-        xf1 = xf
+        xd2 = xd1
         xd1 = xd
-        wf2 = wf1
-        wf1 = wf
         wd2 = wd1
         wd1 = wd
         history[t, 0] = b0
