@@ -35,12 +35,9 @@ mod recording;
 mod tests;
 
 use hoid_ident::{Choice, IdentError};
-use hoid_model::{
-    Finding, NotConvertible, Record, Severity, Verdict,
-    uncertainty::{Estimate, OperatorEstimate},
-};
+use hoid_model::{Finding, Record, Severity, Verdict, uncertainty::Estimate};
 
-use self::operators::operator_findings;
+use self::operators::{Operator, operator_findings};
 use crate::trace::Trace;
 
 /// Rows that are looked at.
@@ -52,16 +49,6 @@ const SHORTENED: f64 = 0.05;
 const FAULTS: f64 = 0.1;
 /// Standard error over its median beyond which the covariance has blown up.
 const BLOWN_UP: f64 = 30.0;
-
-type Operator = Result<OperatorEstimate, NotConvertible>;
-
-/// True where the coefficients are not meant to be an operator.
-fn is_other(operator: &Operator) -> bool {
-    matches!(
-        operator,
-        Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. } | NotConvertible::OtherForm { .. })
-    )
-}
 
 impl Trace {
     /// What the trace is worth, on the record that it was made of and with the search that chose

@@ -6,7 +6,7 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate},
 };
 
-use super::is_other;
+use super::operators::is_other;
 use crate::tracker::Tracker;
 
 /// After a restart the estimate is doubtful for so long, s.

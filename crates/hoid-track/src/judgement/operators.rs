@@ -3,12 +3,22 @@
 
 use hoid_ident::judgement::{is_open, leads_backwards, neuromuscular_finding};
 use hoid_model::{
-    Finding,
+    Finding, NotConvertible,
     uncertainty::{Estimate, OperatorEstimate},
 };
 
-use super::{Operator, is_other};
 use crate::trace::Trace;
+
+/// Of one row, or why there is none.
+pub(super) type Operator = Result<OperatorEstimate, NotConvertible>;
+
+/// True where the coefficients are not meant to be an operator.
+pub(super) fn is_other(operator: &Operator) -> bool {
+    matches!(
+        operator,
+        Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. } | NotConvertible::OtherForm { .. })
+    )
+}
 
 /// Shares of the rows beyond which something is said.
 const NOT_CONVERTIBLE: f64 = 0.05;

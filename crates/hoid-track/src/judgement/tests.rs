@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used)]
 use hoid_model::{
-    Channel, Orders, Structure, VerdictLevel,
+    Channel, NotConvertible, Orders, Structure, VerdictLevel,
     scenario::{Condition, Scenario},
 };
 use hoid_sim::{RunSeed, Simulator};
