@@ -72,6 +72,7 @@ fn boxes(range: BoxRange, method: usize) -> BoxGrid {
                 name: format!("B_r({name})"),
                 unit: "%".to_owned(),
                 boxes: (0..5).map(|g| (0..4).map(|s| sample(g, s)).collect()).collect(),
+                ..BoxPanel::default()
             });
         }
     }
@@ -301,7 +302,7 @@ fn schedules() -> CurveGrid {
         }
     };
     let line = |(k, condition): (usize, &Condition)| {
-        let kind = if k % 2 == 0 { LineKind::Line } else { LineKind::Dashed };
+        let kind = if k % 2 == 0 { LineKind::Line } else { LineKind::Marked };
         let points = times.iter().map(|t| (*t, gain(*condition, *t)));
         curve(&format!("C{}", k + 1), kind, Shade::of_method(k), points)
     };
@@ -475,6 +476,24 @@ fn figures_are_whole_and_the_same_each_time() {
         );
         assert_eq!(svg.matches("<tspan").count(), svg.matches("</tspan>").count(), "{name}");
         assert!(svg == second, "{name} differs when drawn again");
+    }
+}
+
+/// 420 units are 85 mm in print, so that 7 pt are 12.2 of them.
+#[test]
+fn type_is_seven_points_in_print_but_for_subscripts() {
+    for (name, svg) in figures() {
+        let sizes = |tag: &str| -> Vec<f64> {
+            let tags = svg.split(tag).skip(1).filter_map(|rest| rest.split_once('>'));
+            let size = |(tag, _): (&str, &str)| tag.split_once("font-size=\"")?.1.split_once('"')?.0.parse().ok();
+            tags.filter_map(size).collect()
+        };
+        let text = sizes("<text ");
+        assert!(
+            !text.is_empty() && text.iter().all(|size| *size >= 12.2),
+            "{name}: {text:?}"
+        );
+        assert!(sizes("<tspan ").iter().all(|size| *size >= 11.0), "{name}");
     }
 }
 

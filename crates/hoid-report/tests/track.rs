@@ -126,7 +126,7 @@ fn three_methods_over_each_other_show_all_that_is_asked_for() {
     let operator = figure(&html, "operator");
     assert!(operator.contains(">truth<") && operator.contains(">batch fit<"));
     assert!(
-        figure(&html, "coefficients").contains("f<tspan"),
+        figure(&html, "coefficients").contains(", f</tspan><tspan"),
         "a and f share a panel"
     );
 

@@ -59,7 +59,7 @@ pub fn with_ordinate(
         let decades = (high / low).log10();
         let all = decades < 1.02 || height / decades > HIGH_DECADE;
         let format = move |v: f64| match labelled && (all || is_power_of_ten(v)) {
-            true => log_tick(v),
+            true => log_tick(v, (low, high)),
             false => String::new(),
         };
         return layout
@@ -78,13 +78,54 @@ pub fn with_ordinate(
         .with_y_tick_format(TickFormat::Custom(Arc::new(format)))
 }
 
+/// An ordinate that is linear up to a size and logarithmic beyond it, to both sides of zero: for
+/// numbers of either sign that differ by orders of magnitude.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bent {
+    /// Where the linear part ends; a decade beyond it is as high.
+    pub linear_within: f64,
+}
+
+impl Bent {
+    /// Height of a value, in decades.
+    pub fn height(self, value: f64) -> f64 {
+        let share = value / self.linear_within;
+        match share.abs() {
+            size if size <= 1.0 => share,
+            size => (1.0 + size.log10()).copysign(share),
+        }
+    }
+
+    /// The value at a whole height.
+    fn value(self, height: f64) -> f64 {
+        match height.abs() {
+            0.0 => 0.0,
+            decades => (self.linear_within * 10f64.powf(decades - 1.0)).copysign(height),
+        }
+    }
+
+    /// A layout with ticks at whole heights of a range of heights, over `height` units.
+    pub fn with_ordinate(self, layout: Layout, (low, high): (f64, f64), height: f64) -> Layout {
+        let step = ((high - low) * TICK_HEIGHT / height).ceil().max(1.0);
+        let range = (self.linear_within, self.value(low.abs().max(high.abs())));
+        let format = move |h: f64| match self.value(h.round()) {
+            0.0 => "0".to_owned(),
+            value if value < 0.0 => format!("-{}", log_tick(-value, range)),
+            value => log_tick(value, range),
+        };
+        layout
+            .with_y_tick_step(step)
+            .with_y_tick_format(TickFormat::Custom(Arc::new(format)))
+    }
+}
+
 /// A layout with the ticks of an abscissa of this width.
 pub fn with_abscissa(layout: Layout, (low, high): (f64, f64), logarithmic: bool, width: f64) -> Layout {
     if logarithmic {
         let decades = (high / low).log10();
         let all = decades < 1.02 || width / decades > WIDE_DECADE;
         let format = move |v: f64| match all || is_power_of_ten(v) {
-            true => log_tick(v),
+            true => log_tick(v, (low, high)),
             false => String::new(),
         };
         return layout
@@ -115,8 +156,9 @@ pub fn log_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     }
 }
 
-pub fn log_tick(value: f64) -> String {
-    if (1e-3..1e5).contains(&value) {
+/// A tick of a logarithmic axis over a range: all of one axis are decimals, or all powers of ten.
+pub fn log_tick(value: f64, (low, high): (f64, f64)) -> String {
+    if low > 0.999e-3 && high < 1e6 {
         return crate::numbers::plain(value);
     }
     format!("{value:.0e}")
@@ -153,8 +195,22 @@ mod tests {
         assert_eq!(tick(3e7, 1e7), "3e7");
         assert_eq!(one_two_five(0.003, false), 0.002);
         assert!((one_two_five(0.0051, true) - 0.01).abs() < 1e-12);
-        assert_eq!(log_tick(0.02), "0.02");
-        assert_eq!(log_tick(1e-5), "1e-5");
+        assert_eq!(log_tick(0.02, (0.01, 1e4)), "0.02");
+        assert_eq!(log_tick(0.02, (1e-5, 1.0)), "2e-2");
+        assert_eq!(log_tick(1e-5, (1e-5, 1.0)), "1e-5");
+    }
+
+    #[test]
+    fn a_bent_ordinate_is_smooth_enough_and_has_its_ticks_at_decades() {
+        let bent = Bent { linear_within: 10.0 };
+        assert_eq!(
+            [-1000.0, -10.0, -5.0, 0.0, 10.0, 100.0].map(|v| bent.height(v)),
+            [-3.0, -1.0, -0.5, 0.0, 1.0, 2.0]
+        );
+        assert!((bent.height(10.0 + 1e-9) - 1.0).abs() < 1e-9, "no step where it bends");
+        for height in [-3.0, -1.0, 0.0, 1.0, 4.0] {
+            assert_eq!(bent.height(bent.value(height)), height);
+        }
     }
 
     #[test]

@@ -18,6 +18,7 @@ use super::{
     legend::{Entry, Sample, add_legend},
     scale::Scale,
     style::{self, BLACK, MODEL_COLOURS},
+    svg,
 };
 use crate::numbers::Z_95;
 
@@ -180,7 +181,7 @@ pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueRespon
         entries.push(Entry::new(&set.name, colour, Sample::Point));
     }
     add_legend(&mut scene, &entries);
-    style::finish(id, "Frequency response with 95 % bands", &scene)
+    svg::finish(id, "Frequency response with 95 % bands", scene)
 }
 
 fn frequencies(models: &[BodeModel<'_>], points: &[BodePoints]) -> Vec<f64> {

@@ -8,23 +8,24 @@ use kuva::{
 
 use super::{
     BoxStatistics,
-    axes::with_ordinate,
+    axes::{Bent, with_ordinate},
     draw::{self, INK},
     frame::{self, Area, Frame, Ordinates},
     labels::{marked, panel_label},
     legend::{Entry, Sample, add_legend_by},
     palette::{Shade, is_dark},
     style::{self, BLACK, TEXT},
+    svg,
 };
 
 /// Height between the axes of a panel, and of one that is the whole figure.
 const HEIGHT: f64 = 112.0;
 const ALONE: f64 = 150.0;
-/// Space above a panel for the number of outliers beyond.
-const COUNTS: f64 = 10.0;
+/// Space above a panel for the number of outliers beyond, and for its note.
+const COUNTS: f64 = 13.0;
 /// The names of the groups below the axis, and a second row of them below the first.
 const NAMES_BELOW: f64 = 17.0;
-const SECOND: f64 = 9.5;
+const SECOND: f64 = 12.0;
 /// Part of the width of a group that its boxes take, and of its place that a box takes.
 const GROUP: f64 = 0.86;
 const BOX: f64 = 0.8;
@@ -61,6 +62,11 @@ pub struct BoxPanel {
     /// The boxes by group and, in each, by series; a place that is not there is one without a
     /// value.
     pub boxes: Vec<Vec<BoxStatistics>>,
+    /// Size up to which the ordinate is linear, and logarithmic beyond; linear throughout where it
+    /// is `None`.
+    pub linear_within: Option<f64>,
+    /// What stands above the panel, such as the largest of its numbers; empty for nothing.
+    pub note: String,
 }
 
 /// Panels of box plots with common groups and series.
@@ -71,7 +77,7 @@ pub struct BoxGrid {
     /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as
     /// a page.
     pub columns: usize,
-    /// Text above each column; empty for none.
+    /// Text above each column, or above each panel; empty for none.
     pub titles: Vec<String>,
     /// Name of what the groups differ in, such as `n_k^*`.
     pub abscissa: String,
@@ -105,16 +111,16 @@ pub fn box_plots(id: &str, title: &str, grid: &BoxGrid) -> String {
         grid.shared_ordinates,
     );
     let height = if n == 1 { ALONE } else { HEIGHT };
-    let above = match grid.range {
-        BoxRange::Full => 0.0,
-        BoxRange::Whiskers => COUNTS,
-    };
-    let titled = !grid.titles.is_empty();
-    let frame = Frame::with_space(n, columns, height, ordinates, titled, (above, 0.0));
+    let with_text = grid.range == BoxRange::Whiskers || grid.panels.iter().any(|p| !p.note.is_empty());
+    let above = if with_text { COUNTS } else { 0.0 };
+    let frame = Frame::with_space(n, columns, height, ordinates, grid.titles.len(), (above, 0.0));
     let groups = (0.5, grid.groups.len() as f64 + 0.5);
     let cell = |(i, panel): (usize, &BoxPanel)| {
         let layout = style::layout(groups, ranges[i], height);
-        let layout = with_ordinate(layout, ranges[i], &panel.unit, false, height, frame.has_ticks(i));
+        let layout = match panel.bent() {
+            Some(bent) => bent.with_ordinate(layout, ranges[i], height),
+            None => with_ordinate(layout, ranges[i], &panel.unit, false, height, frame.has_ticks(i)),
+        };
         let layout = frame
             .fitted(i, layout)
             .with_x_categories(vec![String::new(); grid.groups.len()]);
@@ -131,7 +137,18 @@ pub fn box_plots(id: &str, title: &str, grid: &BoxGrid) -> String {
         }
     }
     grid.add_legend(&mut scene, missing);
-    style::finish(id, title, &scene)
+    svg::finish(id, title, scene)
+}
+
+impl BoxPanel {
+    fn bent(&self) -> Option<Bent> {
+        self.linear_within.map(|linear_within| Bent { linear_within })
+    }
+
+    /// Height of a value on the ordinate, in units of that.
+    fn height(&self, value: f64) -> f64 {
+        self.bent().map_or(value, |bent| bent.height(value))
+    }
 }
 
 impl BoxGrid {
@@ -144,7 +161,7 @@ impl BoxGrid {
         if self.with_zero {
             values.push(0.0);
         }
-        let (low, high) = style::padded_range(values);
+        let (low, high) = style::padded_range(values.into_iter().map(|v| panel.height(v)));
         let (middle, reach) = (0.5 * (low + high), 0.5 * (high - low));
         if reach < self.least_reach {
             (middle - self.least_reach, middle + self.least_reach)
@@ -153,13 +170,12 @@ impl BoxGrid {
         }
     }
 
-    /// The names of the groups, smaller or in two rows where they are long.
+    /// The names of the groups, in two rows where they are long.
     fn add_names(&self, scene: &mut Scene, area: Area) {
         let names: Vec<String> = self.groups.iter().map(|g| marked(g)).collect();
         let pitch = area.width / names.len() as f64;
-        let widest = |size| names.iter().map(|n| draw::text_width(n, size)).fold(0.0, f64::max);
-        let size = if widest(TEXT) < pitch { TEXT } else { draw::SMALL };
-        let staggered = widest(size) > pitch;
+        let widest = names.iter().map(|n| draw::text_width(n, TEXT)).fold(0.0, f64::max);
+        let staggered = widest > pitch;
         for (k, name) in names.iter().enumerate() {
             let x = area.left + pitch * (k as f64 + 0.5);
             let y = area.bottom()
@@ -168,13 +184,14 @@ impl BoxGrid {
                 } else {
                     NAMES_BELOW
                 };
-            scene.add(draw::text(x, y, name.clone(), size, TextAnchor::Middle, None));
+            scene.add(draw::centred(x, y, name.clone(), None));
         }
     }
 
     /// Draws the boxes of a panel; true when one is missing.
     fn draw(&self, scene: &mut Scene, panel: &BoxPanel, area: Area, (low, high): (f64, f64)) -> bool {
-        let y_of = |v: f64| area.bottom() - (v.clamp(low, high) - low) / (high - low) * area.height;
+        let share = |v: f64| (panel.height(v).clamp(low, high) - low) / (high - low);
+        let y_of = |v: f64| area.bottom() - share(v) * area.height;
         if self.with_zero && low < 0.0 && high > 0.0 {
             let y = y_of(0.0);
             scene.add(draw::line((area.left, y), (area.right(), y), "#666666", 0.8, None));
@@ -205,15 +222,15 @@ impl BoxGrid {
                 };
                 let colour = series.shade.colour();
                 draw_box(scene, statistics, x, half, &colour, &y_of);
-                let over = statistics.outliers.iter().filter(|v| **v > high).count();
-                let under = statistics.outliers.iter().filter(|v| **v < low).count();
+                let over = statistics.outliers.iter().filter(|v| panel.height(**v) > high).count();
+                let under = statistics.outliers.iter().filter(|v| panel.height(**v) < low).count();
                 if over > 0 {
                     draw::triangle(scene, (x, area.top), half.clamp(2.0, 3.5), true, &colour);
                 }
                 if under > 0 {
                     draw::triangle(scene, (x, area.bottom()), half.clamp(2.0, 3.5), false, &colour);
                 }
-                let inside = |v: &&f64| (low..=high).contains(*v);
+                let inside = |v: &&f64| (low..=high).contains(&panel.height(**v));
                 let at: Vec<(f64, f64)> = statistics
                     .outliers
                     .iter()
@@ -231,6 +248,7 @@ impl BoxGrid {
             .iter()
             .filter(|t| t.0 > 0)
             .map(|(count, side)| format!("{count} {side}"))
+            .chain((!panel.note.is_empty()).then(|| panel.note.clone()))
             .collect();
         if !marks.is_empty() {
             let y = area.top - 3.0;
@@ -238,7 +256,7 @@ impl BoxGrid {
                 area.right(),
                 y,
                 marks.join(", "),
-                draw::SMALL,
+                TEXT,
                 TextAnchor::End,
                 None,
             ));
@@ -295,6 +313,7 @@ mod tests {
                 name: "B_r(b0)".to_owned(),
                 unit: "%".to_owned(),
                 boxes,
+                ..BoxPanel::default()
             }],
             groups: (0..groups).map(|g| format!("{}", 26 + g)).collect(),
             series: (0..series)
@@ -364,6 +383,30 @@ mod tests {
         let cut = box_plots("b", "t", &grid);
         assert!(cut.contains("2 above, 1 below") && !cut.contains(">2000<") && !cut.contains("NaN"));
         assert_eq!(cut, box_plots("b", "t", &grid));
+    }
+
+    #[test]
+    fn a_bent_ordinate_shows_small_and_large_boxes() {
+        let [small, large] = [1.0, 1e5].map(|v| BoxStatistics::of(&[v, 1.2 * v, 1.4 * v]));
+        let of = |linear_within| {
+            let mut grid = grid(vec![vec![small.clone()], vec![large.clone()]]);
+            grid.panels[0].linear_within = linear_within;
+            grid.panels[0].note = "at most 1.4e5".to_owned();
+            box_plots("b", "t", &grid)
+        };
+        let height_of_first = |svg: &str| -> f64 {
+            let of_box = svg.split("<rect ").find(|rest| {
+                rest.contains(&Shade::of_method(0).colour().to_lowercase())
+                    || rest.contains(&Shade::of_method(0).colour())
+            });
+            let (_, rest) = of_box.unwrap().split_once(" height=\"").unwrap();
+            rest.split_once('"').unwrap().0.parse().unwrap()
+        };
+        // Quartiles at 1.1 and 1.3: a fifth of a decade's height where the ordinate bends at 1, and
+        // nothing on a linear one.
+        assert!(height_of_first(&of(None)) < 0.01);
+        assert!(height_of_first(&of(Some(1.0))) > 1.5);
+        assert!(of(Some(1.0)).contains("at most 1.4e5") && of(Some(1.0)).contains(">1000</text>"));
     }
 
     #[test]

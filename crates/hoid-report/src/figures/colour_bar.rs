@@ -53,6 +53,21 @@ impl ColourScale {
         format!("#{r:02X}{g:02X}{b:02X}")
     }
 
+    /// Ticks of a bar of this height, at least three: the first in steps, their number, the step.
+    fn ticks(&self, height: f64) -> (f64, usize, f64) {
+        let mut most = (height / TICK_HEIGHT).max(2.0);
+        loop {
+            let step = tick_step(self.high - self.low, most);
+            let first = (self.low / step - 1e-9).ceil();
+            let last = (self.high / step + 1e-9).floor();
+            let many = (last - first + 1.0).clamp(0.0, 20.0) as usize;
+            if many >= 3 || most > 16.0 {
+                return (first, many, step);
+            }
+            most *= 1.5;
+        }
+    }
+
     /// A bar of the colours with ticks and the name of the value, at the right end of the figure.
     pub fn add_bar(&self, scene: &mut Scene, top: f64, bottom: f64, name: &str) {
         let left = scene.width - BESIDE + 2.0;
@@ -66,11 +81,8 @@ impl ColourScale {
             scene.add(draw::rectangle(corner, (BAR, step), &colour, Some((&colour, 0.4))));
         }
         scene.add(draw::rectangle((left, top), (BAR, height), "none", Some((BLACK, 0.8))));
-        let ticks = tick_step(self.high - self.low, (height / TICK_HEIGHT).max(2.0));
-        let first = (self.low / ticks - 1e-9).ceil();
-        let last = (self.high / ticks + 1e-9).floor();
-        let many = (last - first).clamp(0.0, 20.0) as usize;
-        for k in 0..=many {
+        let (first, many, ticks) = self.ticks(height);
+        for k in 0..many {
             let value = (first + k as f64) * ticks;
             let y = bottom - height * (value - self.low) / (self.high - self.low);
             scene.add(draw::line((left + BAR, y), (left + BAR + 4.0, y), BLACK, 1.0, None));
@@ -84,7 +96,36 @@ impl ColourScale {
                 None,
             ));
         }
-        let x = scene.width - 5.0;
+        // A subscript of a name that is written upwards reaches further to the right.
+        let x = scene.width - 9.0;
         scene.add(draw::centred(x, top + 0.5 * height, marked(name), Some(-90.0)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_bar_has_three_ticks() {
+        for colours in [MapColours::Sequential, MapColours::Diverging] {
+            for (low, high) in [
+                (-4.9, 4.9),
+                (-0.99, 0.99),
+                (0.1, 0.3),
+                (-2e-9, 3e-9),
+                (17.0, 1e6),
+                (0.0, 1.0),
+            ] {
+                for height in [78.0, 104.0, 400.0] {
+                    let scale = ColourScale { low, high, colours };
+                    let (first, many, step) = scale.ticks(height);
+                    let last = (first + (many - 1) as f64) * step;
+                    assert!((3..12).contains(&many), "{low} {high} {height}: {many}");
+                    assert!(first * step >= low - 1e-9 * step && last <= high + 1e-9 * step);
+                    assert!(height / (high - low) * step > TEXT.into(), "numbers apart");
+                }
+            }
+        }
     }
 }

@@ -7,6 +7,7 @@ use kuva::prelude::{LollipopPlot, ReferenceLine, ShadedRegion};
 use super::{
     labels,
     style::{self, BLUE, GREY, VERMILLION},
+    svg,
 };
 
 const HEIGHT: f64 = 220.0;
@@ -81,5 +82,5 @@ fn stems(id: &str, title: &str, ordinate: &str, correlation: &Correlation, sampl
                 .with_stroke_width(0.8)
                 .with_dasharray("none"),
         );
-    style::finish(id, title, &style::stacked(vec![(vec![stems.into()], layout, HEIGHT)]))
+    svg::finish(id, title, style::stacked(vec![(vec![stems.into()], layout, HEIGHT)]))
 }

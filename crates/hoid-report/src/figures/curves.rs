@@ -11,11 +11,12 @@ use super::{
     draw::{self, BAND_OPACITY},
     frame::{self, Frame, Ordinates},
     labels::panel_label,
-    legend::{Entry, Sample, add_legend},
+    legend::{Entry, Sample, add_legend_by},
     palette::Shade,
     scale::Scale,
     series::{runs, thinned_run},
     style::{self, BLACK},
+    svg,
 };
 
 /// Height between the axes of a panel, and of one that is the whole figure.
@@ -34,11 +35,9 @@ pub enum LineKind {
     /// Continuous, in its colour.
     #[default]
     Line,
-    /// Dashed, in its colour: what a recursion is compared with.
-    Dashed,
     /// Dashed and black: the truth, or what was demanded.
     Truth,
-    /// Continuous with a marker at each value.
+    /// Continuous with a marker at each value, whose form is that of the level.
     Marked,
     /// A marker at each value, no line.
     Points,
@@ -89,7 +88,7 @@ pub struct CurveGrid {
     /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as
     /// a page.
     pub columns: usize,
-    /// Text above each column; empty for none.
+    /// Text above each column, or above each panel; empty for none.
     pub titles: Vec<String>,
     /// Name and unit of the abscissa, such as `time (s)`.
     pub abscissa: String,
@@ -115,7 +114,7 @@ pub fn curves(id: &str, title: &str, grid: &CurveGrid) -> String {
         columns,
         grid.shared_ordinates,
     );
-    let frame = Frame::new(n, columns, height, ordinates, !grid.titles.is_empty());
+    let frame = Frame::new(n, columns, height, ordinates, grid.titles.len());
     let scale = |i: usize| Scale {
         area: frame.area(i),
         x: x_range,
@@ -144,8 +143,8 @@ pub fn curves(id: &str, title: &str, grid: &CurveGrid) -> String {
             curve.draw_marks(&mut scene, &scale(i));
         }
     }
-    add_legend(&mut scene, &grid.entries());
-    style::finish(id, title, &scene)
+    add_legend_by(&mut scene, &grid.entries(), grid.levels());
+    svg::finish(id, title, scene)
 }
 
 impl CurveGrid {
@@ -179,8 +178,8 @@ impl CurveGrid {
         for curve in all().filter(|c| !c.name.is_empty()) {
             let sample = match curve.kind {
                 LineKind::Line => Sample::Line,
-                LineKind::Dashed | LineKind::Truth => Sample::Dashed,
-                LineKind::Marked => Sample::LinePoint,
+                LineKind::Truth => Sample::Dashed,
+                LineKind::Marked => Sample::LineMark(curve.shade.mark()),
                 LineKind::Points | LineKind::Stems => Sample::Point,
             };
             let entry = Entry::new(&curve.name, &curve.colour(), sample);
@@ -188,7 +187,15 @@ impl CurveGrid {
                 entries.push(entry);
             }
         }
+        // The truth stands last, so that the levels of a method stay in one row.
+        entries.sort_by_key(|entry| entry.sample == Sample::Dashed);
         entries
+    }
+
+    /// Levels of the method that has most.
+    fn levels(&self) -> usize {
+        let curves = self.panels.iter().flat_map(|p| &p.curves);
+        curves.map(|c| c.shade.levels).max().unwrap_or(1)
     }
 }
 
@@ -267,7 +274,7 @@ impl Curve {
             let points = kept.map(|k| (self.x[k], scale.bounded(values[k])));
             let line = style::line(points, &self.colour(), LINE);
             match self.kind {
-                LineKind::Dashed | LineKind::Truth => line.with_dashed().into(),
+                LineKind::Truth => line.with_dashed().into(),
                 _ => line.into(),
             }
         };
@@ -309,7 +316,12 @@ impl Curve {
                 }
             }
         }
-        draw::points(scene, &at, RADIUS, &colour, None);
+        match self.kind {
+            LineKind::Marked => at
+                .iter()
+                .for_each(|at| draw::mark(scene, *at, RADIUS, self.shade.mark(), &colour)),
+            _ => draw::points(scene, &at, RADIUS, &colour, None),
+        }
     }
 }
 

@@ -6,14 +6,15 @@ use kuva::render::{
 };
 
 use super::{
-    labels::printed,
+    labels::{Level, parts},
+    palette::Mark,
     style::{GREY, TEXT},
 };
 
 /// Outlines, whiskers, and the marks of what is missing.
 pub const INK: &str = "#333333";
-/// Size of numbers inside a panel, and of labels that would be too long.
-pub const SMALL: u32 = 10;
+/// Size of labels that would be too long.
+const SMALL: u32 = 10;
 /// Of bands around lines.
 pub const BAND_OPACITY: f64 = 0.2;
 
@@ -70,6 +71,22 @@ pub fn cross(scene: &mut Scene, (x, y): (f64, f64), half: f64, colour: &str, wid
     scene.add(line((x - half, y + half), (x + half, y - half), colour, width, None));
 }
 
+/// A mark of this form around a place: all cover about the same area.
+pub fn mark(scene: &mut Scene, at: (f64, f64), radius: f64, form: Mark, colour: &str) {
+    let (x, y) = at;
+    let (side, tall, wide) = (0.9 * radius, 1.35 * radius, 1.3 * radius);
+    match form {
+        Mark::Circle => points(scene, &[at], radius, colour, None),
+        Mark::Square => scene.add(rectangle((x - side, y - side), (2.0 * side, 2.0 * side), colour, None)),
+        Mark::Up => triangle(scene, (x, y - tall), wide, true, colour),
+        Mark::Down => triangle(scene, (x, y + tall), wide, false, colour),
+        Mark::Diamond => {
+            triangle(scene, (x, y - tall), 0.8 * radius, true, colour);
+            triangle(scene, (x, y + tall), 0.8 * radius, false, colour);
+        }
+    }
+}
+
 /// A triangle that points up or down with its tip at a place.
 pub fn triangle(scene: &mut Scene, (x, y): (f64, f64), half: f64, up: bool, colour: &str) {
     let base = if up { y + 1.7 * half } else { y - 1.7 * half };
@@ -123,7 +140,7 @@ pub fn fitted(x: f64, y: f64, content: String, room: f64, rotate: Option<f64>) -
     text(x, y, content, size, TextAnchor::Middle, rotate)
 }
 
-/// Width of sans-serif text, a little more on average; the signs of subscripts have none.
+/// Width of sans-serif text, a little more on average.
 pub fn text_width(text: &str, size: u32) -> f64 {
     let of = |sign: char| match sign {
         ' ' | '.' | ',' | ':' | ';' | 'i' | 'j' | 'l' | '|' | '\'' | 'I' => 0.28,
@@ -132,7 +149,8 @@ pub fn text_width(text: &str, size: u32) -> f64 {
         'A'..='Z' => 0.7,
         _ => 0.56,
     };
-    f64::from(size) * printed(text).map(of).sum::<f64>()
+    let of_part = |(level, part): &(Level, String)| level.size() * part.chars().map(of).sum::<f64>();
+    f64::from(size) * parts(text).iter().map(of_part).sum::<f64>()
 }
 
 #[cfg(test)]

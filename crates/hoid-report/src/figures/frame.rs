@@ -1,5 +1,5 @@
 //! The grid that figures of several panels stand in: widths, heights and margins of its cells,
-//! labels of rows and titles of columns.
+//! labels of rows, titles of columns or panels.
 //!
 //! One column is as wide as a column of text, several as a page. Axes are equally wide in all
 //! columns. Only the lowest panel of a column has the ticks and the name of the abscissa.
@@ -15,6 +15,7 @@ use super::{
     draw,
     labels::marked,
     style::{self, LEFT, RIGHT, WIDTH},
+    svg,
 };
 
 /// Above the axes of a panel, and below where no abscissa stands.
@@ -29,8 +30,8 @@ const NARROW: f64 = 5.0;
 const TITLE: f64 = 18.0;
 /// Centre of the label of the ordinate.
 const LABEL_AT: f64 = 13.0;
-/// The name of the abscissa below its axis.
-const NAME_BELOW: f64 = 40.0;
+/// The name of the abscissa below its axis, and below two rows of names of places.
+const NAME_BELOW: f64 = 44.0;
 
 /// Which panels of a row have ticks and the label of the ordinate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,7 +88,7 @@ pub struct Frame {
     n: usize,
     columns: usize,
     ordinates: Ordinates,
-    titled: bool,
+    titles: usize,
     above: f64,
     axes_height: f64,
     widths: Vec<f64>,
@@ -95,9 +96,10 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Panels with axes of this height.
-    pub fn new(n: usize, columns: usize, axes_height: f64, ordinates: Ordinates, titled: bool) -> Self {
-        Self::with_space(n, columns, axes_height, ordinates, titled, (0.0, 0.0))
+    /// Panels with axes of this height, the first `titles` of them with a title: all, those of the
+    /// first row, or none.
+    pub fn new(n: usize, columns: usize, axes_height: f64, ordinates: Ordinates, titles: usize) -> Self {
+        Self::with_space(n, columns, axes_height, ordinates, titles, (0.0, 0.0))
     }
 
     /// Panels in a figure that leaves some units above each panel and at its right.
@@ -106,7 +108,7 @@ impl Frame {
         columns: usize,
         axes_height: f64,
         ordinates: Ordinates,
-        titled: bool,
+        titles: usize,
         (above, beside): (f64, f64),
     ) -> Self {
         let columns = columns.max(1);
@@ -115,7 +117,7 @@ impl Frame {
             n,
             columns,
             ordinates,
-            titled,
+            titles,
             above,
             axes_height,
             widths: Vec::new(),
@@ -147,7 +149,8 @@ impl Frame {
     }
 
     fn top(&self, row: usize) -> f64 {
-        SPACE + self.above + if row == 0 && self.titled { TITLE } else { 0.0 }
+        let titled = row * self.columns < self.titles;
+        SPACE + self.above + if titled { TITLE } else { 0.0 }
     }
 
     fn bottom(&self, row: usize) -> f64 {
@@ -201,8 +204,7 @@ impl Frame {
         layout.with_x_tick_format(TickFormat::Custom(Arc::new(|_| String::new())))
     }
 
-    /// The panels with the name of the abscissa, the labels of their ordinates and the titles of
-    /// the columns.
+    /// The panels with the name of the abscissa, the labels of their ordinates and the titles.
     pub fn drawn(
         &self,
         cells: Vec<(Vec<Plot>, Layout)>,
@@ -222,10 +224,10 @@ impl Frame {
             let (x, y) = (area.left + 0.5 * area.width, area.bottom() + NAME_BELOW);
             scene.add(draw::fitted(x, y, marked(abscissa), area.width + 2.0 * SPACE, None));
         }
-        for (column, title) in titles.iter().take(self.columns.min(self.n)).enumerate() {
-            let area = self.area(column);
-            let middle = area.left + 0.5 * area.width;
-            scene.add(draw::fitted(middle, TITLE, marked(title), area.width + SPACE, None));
+        for (i, title) in titles.iter().take(self.n.min(self.titles)).enumerate() {
+            let area = self.area(i);
+            let (middle, y) = (area.left + 0.5 * area.width, area.top - SPACE - self.above);
+            scene.add(draw::fitted(middle, y, marked(title), area.width + SPACE, None));
         }
         // The widths of the cells add up to it but for rounding.
         scene.width = (scene.width + beside).round();
@@ -235,7 +237,7 @@ impl Frame {
 
 /// A figure without a panel.
 pub fn empty(id: &str, title: &str) -> String {
-    style::finish(id, title, &Scene::new(WIDTH, 1.0))
+    svg::finish(id, title, Scene::new(WIDTH, 1.0))
 }
 
 /// The range of each panel, or for each the widest of its row.
@@ -259,7 +261,7 @@ mod tests {
     fn axes_are_equally_wide_and_fill_the_page() {
         for ordinates in [Ordinates::Each, Ordinates::Ticks, Ordinates::Shared] {
             for columns in [1, 2, 4] {
-                let frame = Frame::with_space(2 * columns, columns, 80.0, ordinates, true, (5.0, 30.0));
+                let frame = Frame::with_space(2 * columns, columns, 80.0, ordinates, columns, (5.0, 30.0));
                 let areas: Vec<Area> = (0..2 * columns).map(|i| frame.area(i)).collect();
                 assert!(areas.iter().all(|a| (a.width - areas[0].width).abs() < 1e-9));
                 let whole = if columns == 1 { WIDTH } else { 2.0 * WIDTH };
@@ -274,8 +276,19 @@ mod tests {
     }
 
     #[test]
+    fn titles_have_room_above_the_rows_that_have_them() {
+        let tops = |titles| {
+            let frame = Frame::new(5, 2, 80.0, Ordinates::Shared, titles);
+            [0, 2, 4].map(|i| frame.area(i).top)
+        };
+        let none = tops(0);
+        assert_eq!(tops(2), none.map(|top| top + TITLE));
+        assert_eq!(tops(5), [none[0] + TITLE, none[1] + 2.0 * TITLE, none[2] + 3.0 * TITLE]);
+    }
+
+    #[test]
     fn the_lowest_of_a_short_last_row_are_known() {
-        let frame = Frame::new(5, 2, 80.0, Ordinates::Shared, false);
+        let frame = Frame::new(5, 2, 80.0, Ordinates::Shared, 0);
         let lowest: Vec<bool> = (0..5).map(|i| frame.is_lowest(i)).collect();
         assert_eq!(lowest, [false, false, false, true, true]);
     }

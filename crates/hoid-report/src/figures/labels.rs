@@ -1,16 +1,48 @@
 //! Text of labels: names of parameters as symbols, subscripts and superscripts.
 //!
 //! The library that draws knows no subscripts. They are marked by characters of the private use
-//! area of Unicode, which become tags in the finished SVG ([`tagged`]).
+//! area of Unicode, which become tags in the finished SVG ([`tagged`]). What the readers of SVG
+//! agree on is little: they add up or replace the shifts of tags within tags, drop tags without
+//! text, trim spaces at the edges of a tag, and place each tag for itself where a text is centred.
+//! So the tags stand one after the other, each with text and with the whole step from the one
+//! before, and spaces at their edges do not break. Where a text with tags begins says `svg`.
 
-/// Stand in the text of labels for the begin and end of a subscript and of a superscript, and the
-/// end of the label; they become tags.
+/// Stand in the text of labels for the begin and end of a subscript and of a superscript; they
+/// become tags.
 const SUB: char = '\u{e000}';
 const BACK: char = '\u{e001}';
-const END: char = '\u{e002}';
 const SUPER: char = '\u{e003}';
 const DOWN: char = '\u{e004}';
-const SIGNS: [char; 5] = [SUB, BACK, END, SUPER, DOWN];
+const SIGNS: [char; 4] = [SUB, BACK, SUPER, DOWN];
+const NO_BREAK_SPACE: char = '\u{a0}';
+
+/// Where a part of a label stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Level {
+    Line,
+    Subscript,
+    Superscript,
+}
+
+impl Level {
+    /// How far below the line, in units of the figure.
+    fn below(self) -> i32 {
+        match self {
+            Self::Line => 0,
+            Self::Subscript => 3,
+            Self::Superscript => -4,
+        }
+    }
+
+    /// Size of the type, as a part of that of the line.
+    pub fn size(self) -> f64 {
+        if self == Self::Line { 1.0 } else { SMALLER }
+    }
+}
+
+/// Size of subscripts in units of the figure, and beside that of the line.
+const SUBSCRIPT: &str = "11";
+const SMALLER: f64 = 11.0 / 13.0;
 
 /// Text of the user: a dollar sign would open a formula.
 fn literal(text: &str) -> String {
@@ -23,28 +55,20 @@ pub fn axis_label(name: &str, unit: &str) -> String {
     literal(&plain(&format!("{name} ({unit})")))
 }
 
-/// Name and unit of a panel; several names are separated by commas. [`tagged`] completes it in the
-/// finished figure.
+/// Name and unit of a panel; several names are separated by commas.
 pub fn panel_label(name: &str, unit: &str) -> String {
     let names: Vec<String> = name.split(", ").map(symbol).collect();
     let unit = match unit {
         "" => String::new(),
         unit => format!(" ({})", marks(unit)),
     };
-    literal(&closed(&format!("{}{unit}", names.join(", "))))
+    literal(&format!("{}{unit}", names.join(", ")))
 }
 
 /// Text of a label with its subscripts and superscripts: `n_k^*`, `B_r(b_0^{d,0})`. After `_` or
 /// `^` stands one sign or several in braces; words such as `my_model` and `run_2` stay as they are.
-/// [`tagged`] completes it in the finished figure.
 pub fn marked(text: &str) -> String {
-    literal(&closed(&marks(text)))
-}
-
-/// What follows a subscript stands in a tag of its own, which ends with the label.
-fn closed(text: &str) -> String {
-    let ends = END.to_string().repeat(text.matches([BACK, DOWN]).count());
-    format!("{text}{ends}")
+    literal(&marks(text))
 }
 
 fn marks(text: &str) -> String {
@@ -79,20 +103,63 @@ fn marks(text: &str) -> String {
     result
 }
 
-/// The signs of a label that are printed.
-pub fn printed(text: &str) -> impl Iterator<Item = char> {
-    text.chars().filter(|c| !SIGNS.contains(c))
+/// The parts of a label and where they stand, none without text.
+pub fn parts(text: &str) -> Vec<(Level, String)> {
+    let mut parts: Vec<(Level, String)> = Vec::new();
+    let mut level = Level::Line;
+    for sign in text.chars() {
+        match (sign, parts.last_mut()) {
+            (SUB, _) => level = Level::Subscript,
+            (SUPER, _) => level = Level::Superscript,
+            (BACK | DOWN, _) => level = Level::Line,
+            (sign, Some((last, part))) if *last == level => part.push(sign),
+            (sign, _) => parts.push((level, sign.to_string())),
+        }
+    }
+    parts
 }
 
 /// A figure with the tags of its subscripts.
 pub fn tagged(svg: &str) -> String {
-    svg.replace(&format!("{BACK} "), "</tspan><tspan dy=\"-3\" dx=\"4\">")
-        .replace(&format!("{DOWN} "), "</tspan><tspan dy=\"4\" dx=\"4\">")
-        .replace(SUB, "<tspan dy=\"3\" font-size=\"10\">")
-        .replace(BACK, "</tspan><tspan dy=\"-3\">")
-        .replace(SUPER, "<tspan dy=\"-4\" font-size=\"10\">")
-        .replace(DOWN, "</tspan><tspan dy=\"4\">")
-        .replace(END, "</tspan>")
+    let mut result = String::with_capacity(svg.len());
+    let mut rest = svg;
+    while let Some(sign) = rest.find(SIGNS) {
+        let start = rest[..sign].rfind('>').map_or(0, |at| at + 1);
+        let end = rest[sign..].find('<').map_or(rest.len(), |at| sign + at);
+        result.push_str(&rest[..start]);
+        result.push_str(&with_tags(&rest[start..end]));
+        rest = &rest[end..];
+    }
+    result.push_str(rest);
+    result
+}
+
+fn with_tags(text: &str) -> String {
+    let mut result = String::new();
+    let mut above = Level::Line;
+    for (level, part) in parts(text) {
+        if level == above {
+            result.push_str(&part);
+            continue;
+        }
+        let step = level.below() - above.below();
+        let size = match level {
+            Level::Line => String::new(),
+            _ => format!(" font-size=\"{SUBSCRIPT}\""),
+        };
+        let part = match part.strip_prefix(' ') {
+            Some(after) => format!("{NO_BREAK_SPACE}{after}"),
+            None => part,
+        };
+        result.push_str(&format!("<tspan dy=\"{step}\"{size}>{part}</tspan>"));
+        above = level;
+    }
+    result
+}
+
+/// True for a text that will have tags.
+pub fn has_tags(text: &str) -> bool {
+    text.contains(SIGNS)
 }
 
 /// Text without the characters that become tags.
@@ -124,22 +191,28 @@ mod tests {
     #[test]
     fn subscripts_and_superscripts_are_found() {
         let shown = |text: &str| tagged(&marked(text));
-        let (sub, sup) = (
-            "<tspan dy=\"3\" font-size=\"10\">",
-            "<tspan dy=\"-4\" font-size=\"10\">",
-        );
         assert_eq!(
             shown("n_k^*"),
-            format!("n{sub}k</tspan><tspan dy=\"-3\">{sup}*</tspan><tspan dy=\"4\"></tspan></tspan>")
+            "n<tspan dy=\"3\" font-size=\"11\">k</tspan><tspan dy=\"-7\" font-size=\"11\">*</tspan>"
         );
         assert_eq!(
             shown("m^0 = 1"),
-            format!("m{sup}0</tspan><tspan dy=\"4\" dx=\"4\">= 1</tspan>")
+            "m<tspan dy=\"-4\" font-size=\"11\">0</tspan><tspan dy=\"4\">\u{a0}= 1</tspan>"
         );
-        assert_eq!(shown("b_{nm}"), format!("b{sub}nm</tspan><tspan dy=\"-3\"></tspan>"));
+        assert_eq!(shown("b_{nm}"), "b<tspan dy=\"3\" font-size=\"11\">nm</tspan>");
         for plain in ["my_model", "run_2", "_", "a_", "^2", "a_{b", "x_ y", ""] {
             assert_eq!(shown(plain), plain);
         }
-        assert_eq!(printed(&marked("P_n = 0.1")).collect::<String>(), "Pn = 0.1");
+        let of_line: String = parts(&marked("P_n = 0.1")).into_iter().map(|part| part.1).collect();
+        assert_eq!(of_line, "Pn = 0.1");
+    }
+
+    #[test]
+    fn only_the_texts_of_a_figure_are_tagged() {
+        let figure = format!("<text x=\"1\">{}</text><line/><text>b</text>", marked("K_e (s)"));
+        assert_eq!(
+            tagged(&figure),
+            "<text x=\"1\">K<tspan dy=\"3\" font-size=\"11\">e</tspan><tspan dy=\"-3\">\u{a0}(s)</tspan></text><line/><text>b</text>"
+        );
     }
 }

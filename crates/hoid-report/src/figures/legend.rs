@@ -5,6 +5,7 @@ use kuva::render::render::{Scene, TextAnchor};
 use super::{
     draw,
     labels::marked,
+    palette::Mark,
     style::{LEFT, TEXT},
 };
 
@@ -21,12 +22,14 @@ pub enum Sample {
     Line,
     /// A dashed line.
     Dashed,
+    /// A dotted line.
+    Dotted,
     /// A filled box.
     Box,
     /// A point.
     Point,
-    /// A line with a point.
-    LinePoint,
+    /// A line with a mark.
+    LineMark(Mark),
     /// A small cross.
     Cross,
     /// A hatched box.
@@ -114,6 +117,7 @@ fn add_sample(scene: &mut Scene, entry: &Entry, x: f64, y: f64) {
     match entry.sample {
         Sample::Line => scene.add(line(None)),
         Sample::Dashed => scene.add(line(Some("6 3"))),
+        Sample::Dotted => scene.add(line(Some("2 4"))),
         Sample::Box => scene.add(draw::rectangle(
             (x + 3.0, y - 5.0),
             (SAMPLE - 6.0, 10.0),
@@ -121,9 +125,9 @@ fn add_sample(scene: &mut Scene, entry: &Entry, x: f64, y: f64) {
             Some((draw::INK, 0.7)),
         )),
         Sample::Point => draw::points(scene, &[(middle, y)], 2.6, colour, None),
-        Sample::LinePoint => {
+        Sample::LineMark(mark) => {
             scene.add(line(None));
-            draw::points(scene, &[(middle, y)], 2.6, colour, None);
+            draw::mark(scene, (middle, y), 2.6, mark, colour);
         }
         Sample::Cross => draw::cross(scene, (middle, y), 3.5, colour, 1.3),
         Sample::Hatched => draw::hatched(scene, (x + 3.0, y - 5.0), (SAMPLE - 6.0, 10.0)),

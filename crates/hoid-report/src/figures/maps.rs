@@ -14,6 +14,7 @@ use super::{
     legend::{Entry, Sample, add_legend},
     palette::is_dark,
     style::{self, BLACK, TEXT},
+    svg,
 };
 
 /// Height of a cell, and the least of a panel.
@@ -44,7 +45,7 @@ pub struct MapGrid {
     /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as
     /// a page.
     pub columns: usize,
-    /// Text above each column; empty for none.
+    /// Text above each column, or above each panel; empty for none.
     pub titles: Vec<String>,
     /// Name of the abscissa, such as `n_k^*`; after `_` or `^` stands one sign, or several in
     /// braces.
@@ -77,14 +78,7 @@ pub fn maps(id: &str, title: &str, grid: &MapGrid) -> String {
         return frame::empty(id, title);
     }
     let height = (CELL * ny as f64).max(LEAST_HEIGHT);
-    let frame = Frame::with_space(
-        n,
-        columns,
-        height,
-        Ordinates::Shared,
-        !grid.titles.is_empty(),
-        (0.0, BESIDE),
-    );
+    let frame = Frame::with_space(n, columns, height, Ordinates::Shared, grid.titles.len(), (0.0, BESIDE));
     let (x_range, y_range) = ((0.5, nx as f64 + 0.5), (0.5, ny as f64 + 0.5));
     let x_names = grid.x_names(frame.area(0).width);
     let cell = |i: usize| {
@@ -130,7 +124,7 @@ pub fn maps(id: &str, title: &str, grid: &MapGrid) -> String {
         entries.push(Entry::new("no value", BLACK, Sample::Hatched));
     }
     add_legend(&mut scene, &entries);
-    style::finish(id, title, &scene)
+    svg::finish(id, title, scene)
 }
 
 impl MapGrid {
@@ -212,9 +206,9 @@ impl MapGrid {
                 if let Some(decimals) = decimals {
                     let mut text = draw::text(
                         corner.0 + 0.5 * width,
-                        corner.1 + 0.5 * height + 3.5,
+                        corner.1 + 0.5 * height + 4.5,
                         printed(value, decimals),
-                        draw::SMALL,
+                        TEXT,
                         TextAnchor::Middle,
                         None,
                     );
@@ -255,7 +249,7 @@ impl MapGrid {
             _ => 3,
         };
         let fits = |decimals: &usize| {
-            let widths = finite().map(|v| draw::text_width(&printed(v, *decimals), draw::SMALL));
+            let widths = finite().map(|v| draw::text_width(&printed(v, *decimals), TEXT));
             widths.fold(0.0, f64::max) <= width - 1.5
         };
         let least = usize::from(largest < 10.0);

@@ -3,13 +3,24 @@
 //!
 //! Hues are those of Okabe and Ito (*Color Universal Design*, 2008). Shades of one hue are spaced
 //! evenly in lightness `L*` (CIE 1976), light for the lowest level and dark for the highest, so
-//! that their order is kept in grey print as well.
+//! that their order is kept in grey print as well. Where points are marked, each level has a mark
+//! of its own.
 
 use super::style::MODEL_COLOURS;
 
 /// Lightness of the lowest and the highest of several levels.
 const LIGHTEST: f64 = 76.0;
 const DARKEST: f64 = 22.0;
+
+/// Form of the marks of a curve.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mark {
+    Circle,
+    Square,
+    Up,
+    Diamond,
+    Down,
+}
 
 /// Whose colour a curve or box has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,6 +41,12 @@ impl Shade {
             level: 0,
             levels: 1,
         }
+    }
+
+    /// Its mark, that of the level.
+    pub(super) fn mark(self) -> Mark {
+        const MARKS: [Mark; 5] = [Mark::Circle, Mark::Square, Mark::Up, Mark::Diamond, Mark::Down];
+        MARKS[self.level % MARKS.len()]
     }
 
     /// Its colour as `#rrggbb`.

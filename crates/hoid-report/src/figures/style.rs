@@ -1,13 +1,11 @@
-//! What all figures share: size, colours, fonts, and the last touches to the SVG text.
+//! What all figures share: size, colours and fonts.
 
 use std::sync::Arc;
 
 use kuva::{
-    prelude::{Figure, Layout, LinePlot, Plot, SvgBackend, Theme, TickFormat},
+    prelude::{Figure, Layout, LinePlot, Plot, Theme, TickFormat},
     render::render::Scene,
 };
-
-use super::labels::{plain, tagged};
 
 /// Width of every figure in units of the SVG.
 pub const WIDTH: f64 = 420.0;
@@ -127,54 +125,6 @@ pub fn in_grid(panels: Vec<(Vec<Plot>, Layout)>, widths: &[f64], heights: &[f64]
     figure.with_plots(plots).with_layouts(layouts).render()
 }
 
-/// SVG text with a view box (it scales with the page), a title for screen readers, and ids that
-/// begin with that of the figure.
-pub fn finish(id: &str, title: &str, scene: &Scene) -> String {
-    let raw = SvgBackend::new().render_scene(scene);
-    let Some((_, body)) = raw.split_once('>') else {
-        return raw;
-    };
-    let font = scene.font_family.as_deref().map(escaped).unwrap_or_default();
-    let (width, height) = (scene.width, scene.height);
-    let (id, title) = (escaped(id), escaped(&plain(title)));
-    // The generator's stamp would change the bytes with its version.
-    let body = match body.split_once("-->") {
-        Some((stamp, rest)) if stamp.trim_start().starts_with("<!--") => rest,
-        _ => body,
-    };
-    let body = tagged(&renumbered(body, "kuva-clip-", &format!("{id}-clip-")));
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
-         font-family=\"{font}\" fill=\"black\" role=\"img\" aria-labelledby=\"{id}-title\"><title id=\"{id}-title\">{title}</title>{body}"
-    )
-}
-
-/// Ids `from` + number as `to` + number, counted from 1 in the order in which they come. The
-/// library counts them over the whole life of the process: the same figure drawn twice would
-/// differ.
-fn renumbered(text: &str, from: &str, to: &str) -> String {
-    let mut known: Vec<&str> = Vec::new();
-    let mut parts = text.split(from);
-    let mut result = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        let digits = part.len() - part.trim_start_matches(|c: char| c.is_ascii_digit()).len();
-        let (number, rest) = part.split_at(digits);
-        let position = known.iter().position(|k| *k == number).unwrap_or_else(|| {
-            known.push(number);
-            known.len() - 1
-        });
-        result.push_str(&format!("{to}{}{rest}", position + 1));
-    }
-    result
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -193,25 +143,5 @@ mod tests {
         assert_eq!(padded_range([0.0, f64::NAN]), (-1.0, 1.0));
         assert_eq!(padded_range([2.0]), (1.8, 2.2));
         assert_eq!(padded_range([0.0, 1.0]), (-0.05, 1.05));
-    }
-
-    #[test]
-    fn ids_count_from_one() {
-        let text = "<a id=\"k-12\"/><b id=\"k-7\"/> url(#k-7) url(#k-12)";
-        assert_eq!(
-            renumbered(text, "k-", "f-"),
-            "<a id=\"f-1\"/><b id=\"f-2\"/> url(#f-2) url(#f-1)"
-        );
-    }
-
-    #[test]
-    fn text_of_the_user_stays_text() {
-        let plots = vec![line([(0.0, 0.0), (1.0, 1.0)], BLUE, 1.0).into()];
-        let layout = layout((0.0, 1.0), (0.0, 1.0), 200.0)
-            .with_x_label(super::super::labels::axis_label("a<b> & $x^2$", "\"s\""));
-        let svg = finish("f<1", "t & t", &stacked(vec![(plots, layout, 200.0)]));
-        assert!(svg.contains("a&lt;b&gt; &amp; $x^2$"), "{svg}");
-        assert!(svg.contains("f&lt;1-title") && svg.contains("t &amp; t"));
-        assert!(!svg.contains("kuva"));
     }
 }

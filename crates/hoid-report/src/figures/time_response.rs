@@ -9,6 +9,7 @@ use super::{
     legend::{Entry, Sample, add_legend},
     series::thinned,
     style::{self, BLUE, GREY, VERMILLION},
+    svg,
 };
 
 /// The close-up shows this part of a record, when that has samples enough to be worth it.
@@ -76,7 +77,7 @@ pub fn time_response(id: &str, record: &Record, validation: &Validation) -> Stri
         Entry::new("simulated", BLUE, Sample::Line),
     ];
     add_legend(&mut scene, &entries);
-    style::finish(id, "Measured, simulated and predicted output over time", &scene)
+    svg::finish(id, "Measured, simulated and predicted output over time", scene)
 }
 
 /// True when the record is long enough for a close-up of its middle.

@@ -18,12 +18,13 @@ use super::{
     panel::{CurveKind, Ordinate, TraceCurve, TracePanel},
     series::{runs, thinned_band, thinned_run, without_level},
     style::{self, BLACK, GREY},
+    svg,
 };
 
 /// Height between the axes of a panel.
 const HEIGHT: f64 = 84.0;
 
-const DASHES: &str = "#444444";
+const DOTS: &str = "#444444";
 
 /// Panels with a common time axis.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -33,7 +34,7 @@ pub struct TraceGrid {
     /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as
     /// a page.
     pub columns: usize,
-    /// Text above each column; empty for none.
+    /// Text above each column, or above each panel; empty for none.
     pub titles: Vec<String>,
     /// Names of the methods, for the legend; empty for none.
     pub methods: Vec<String>,
@@ -63,7 +64,7 @@ pub fn trace_panels(id: &str, title: &str, grid: &TraceGrid) -> String {
     );
     let labels = grid.panels.iter().map(|p| (p.name.as_str(), p.unit.as_str()));
     let ordinates = Ordinates::of(labels, columns, grid.shared_ordinates);
-    let frame = Frame::new(n, columns, HEIGHT, ordinates, !grid.titles.is_empty());
+    let frame = Frame::new(n, columns, HEIGHT, ordinates, grid.titles.len());
     let cell = |(i, panel): (usize, &TracePanel)| {
         let layout = style::layout(time, ranges[i], HEIGHT);
         let layout = with_abscissa(layout, time, false, frame.area(i).width);
@@ -79,7 +80,7 @@ pub fn trace_panels(id: &str, title: &str, grid: &TraceGrid) -> String {
     let label = |i: usize| panel_label(&grid.panels[i].name, &grid.panels[i].unit);
     let mut scene = frame.drawn(cells, "time (s)", label, &grid.titles, 0.0);
     grid.add_legend(&mut scene);
-    style::finish(id, title, &scene)
+    svg::finish(id, title, scene)
 }
 
 impl TraceGrid {
@@ -128,7 +129,7 @@ impl TraceGrid {
         }
         let has = |kind| self.panels.iter().flat_map(|p| &p.curves).any(|c| c.kind == kind);
         if has(CurveKind::Batch) {
-            entries.push(Entry::new("batch fit", DASHES, Sample::Dashed));
+            entries.push(Entry::new("batch fit", DOTS, Sample::Dotted));
         }
         if has(CurveKind::Truth) {
             entries.push(Entry::new("truth", BLACK, Sample::Dashed));
@@ -161,7 +162,7 @@ impl TracePanel {
                     CurveKind::Estimate => style::line(points, &curve.colour(levels), 1.2),
                     CurveKind::Truth => style::line(points, BLACK, 1.2).with_dashed(),
                     CurveKind::Bound => style::line(points, BLACK, 1.0),
-                    CurveKind::Batch => style::line(points, &curve.colour(levels), 1.8).with_dashed(),
+                    CurveKind::Batch => style::line(points, &curve.colour(levels), 2.0).with_dotted(),
                     CurveKind::Steps => style::line(points, &curve.colour(levels), 1.4).with_step(),
                 };
                 plots.push(line.into());
@@ -305,7 +306,7 @@ mod tests {
                 ..TraceGrid::default()
             },
         );
-        assert!(svg.contains("a<tspan dy=\"3\" font-size=\"10\">1</tspan>"), "{svg}");
+        assert!(svg.contains("a<tspan dy=\"3\" font-size=\"11\">1</tspan>"), "{svg}");
         assert!(svg.contains("(&lt;b&gt;)") && svg.contains("&lt;x&gt;"));
         assert_eq!(svg.matches("<tspan").count(), svg.matches("</tspan>").count());
     }

@@ -98,6 +98,15 @@ impl Parameters {
     }
 }
 
+/// Where the ordinate of what [`bends`] ends to be linear, %.
+const LINEAR_WITHIN: f64 = 10.0;
+
+/// True for biases of up to thousands of times the value: the noise of a model of first order that
+/// stands for a remnant of higher order is not that of the remnant.
+fn bends(model: Model, remnant_order: usize, letters: &str) -> bool {
+    model == Model::First && remnant_order > 1 && matches!(letters, "innovation variance" | "T_n" | "K_n")
+}
+
 pub(super) fn items() -> Vec<Item> {
     use Model::{Arx, First, Matched};
     use Parameters::{Discrete, Operator, Remnant};
@@ -133,6 +142,10 @@ fn item(name: &str, condition: &'static str, model: Model, parameters: Parameter
         caption.push_str(
             " T_n and K_n by the backward Euler form of the text (B.14, B.16); d1 and the innovation variance against those of the exactly held filter.",
         );
+        if model == Model::First {
+            caption
+                .push_str(" For m0 >= 2 the ordinates of the last three are linear up to 10 % and logarithmic beyond.");
+        }
     }
     Item::of_study(
         name,
@@ -200,6 +213,8 @@ fn make(item: &Item, results: &Results, condition: &str, model: Model, parameter
                 name: format!("B_r({symbol})"),
                 unit: "%".to_owned(),
                 boxes,
+                linear_within: bends(model, m0, letters).then_some(LINEAR_WITHIN),
+                ..BoxPanel::default()
             });
         }
     }

@@ -133,9 +133,9 @@ fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: Shown
         });
     }
     let grid = |panels: Vec<MapPanel>, titles: Vec<String>| MapGrid {
-        // Biases of b, a and the noise differ by an order of magnitude: a row and a colour bar for
-        // each pair.
-        columns: if shown == Shown::Bias { 2 } else { panels.len() },
+        // Two beside each other have cells that hold their numbers. Biases of b, a and the noise
+        // differ by an order of magnitude: a colour bar for each pair.
+        columns: 2,
         panels,
         titles,
         abscissa: "n_k^*".to_owned(),

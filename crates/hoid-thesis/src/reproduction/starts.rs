@@ -16,7 +16,8 @@ pub(super) fn items() -> Vec<Item> {
                 format!("F.{start}"),
                 format!("Bias from start IC{start} less that from the base start, Box-Jenkins with m* = m0, condition C1"),
                 "Deviation of the relative bias of each run from that of the same run searched from the base of Table 6.1, in percentage \
-                 points. Where both searches find the same minimum the deviation is the tolerance of the search.",
+                 points. A line at zero: both searches found the same minimum, but for the tolerance of the search. Above each panel stands \
+                 the largest deviation of its runs.",
                 "initial-conditions",
                 move |item, results| make(item, results, start),
             )
@@ -48,6 +49,7 @@ fn make(item: &Item, results: &Results, start: usize) -> ItemOutput {
     ] {
         for m0 in REMNANT_ORDERS {
             let mut boxes = Vec::new();
+            let mut most = 0.0_f64;
             for nk in DELAYS {
                 let of_level = |level: &f64| {
                     let query = Query::of(&format!("bias_{column}"))
@@ -63,6 +65,7 @@ fn make(item: &Item, results: &Results, start: usize) -> ItemOutput {
                 for (level, differences) in &group {
                     let s = BoxStatistics::of(differences);
                     let finite = || differences.iter().copied().filter(|v| v.is_finite());
+                    most = finite().fold(most, |most, v| most.max(v.abs()));
                     data.row(
                         &[letters],
                         &[
@@ -89,6 +92,11 @@ fn make(item: &Item, results: &Results, start: usize) -> ItemOutput {
                 name: format!("\u{394}B_{{r}}({symbol})"),
                 unit: "%".to_owned(),
                 boxes,
+                note: match most {
+                    small if small < 0.01 => format!("at most {small:.0e}"),
+                    large => format!("at most {large:.2}"),
+                },
+                ..BoxPanel::default()
             });
         }
     }

@@ -33,7 +33,8 @@ const RLS: Curves = (0, "RLS", &[("OLS first", 0.0, 30.72), ("OLS last", 51.2, 8
 const RPEM: Curves = (1, "RPEM", &[("PEM first", 0.0, 30.72), ("PEM last", 51.2, 81.92)]);
 
 const CAPTION: &str = "Median over the runs at each time: the text averages, but one run in which K_e nearly vanishes would decide the average of \
-                       T_L. Dashed in colour: batch fits of [0, 30.72] and [51.20, 81.92] s; dashed black: the simulated operator.";
+                       T_L. Dots in colour: batch fits of [0, 30.72] and [51.20, 81.92] s; black dashes: the simulated operator. The range of a panel \
+                       is that from 15 s on; what the start takes beyond it is cut.";
 
 pub(super) fn items() -> Vec<Item> {
     let mut all = vec![
@@ -63,7 +64,7 @@ pub(super) fn items() -> Vec<Item> {
                 format!("G.{}", first + m0 - 1),
                 format!("RLS with a forgetting matrix, {what}, condition C3, m0 = {m0}"),
                 "Median over the runs at each time, by noise level; a1 and a2 forget nothing, b0 and b1 remember 256 samples. Dashed: the \
-                 simulated operator.",
+                 simulated operator. The range of a panel is that from 15 s on.",
                 "recursive-arx",
                 move |item, results| {
                     let levels = [0.0, 0.1, 0.2, 0.3];
@@ -199,9 +200,11 @@ fn make(
         }
     }
     let alone = orders.len() == 1;
+    // Two beside each other where that leaves no panel alone in the last row.
+    let of_one = if panels.len().is_multiple_of(2) { 2 } else { 1 };
     let grid = TraceGrid {
         panels,
-        columns: if alone { 2 } else { orders.len() },
+        columns: if alone { of_one } else { orders.len() },
         titles: if alone { Vec::new() } else { order_titles() },
         methods: estimators
             .iter()
@@ -218,12 +221,18 @@ fn make(
     }
 }
 
-/// Every curve but for its highest and lowest three per cent: no estimator is missing because
-/// another is better.
+/// From where on the estimates set the range of their panels, s: before, they leave their start.
+const SETTLED_S: f64 = 15.0;
+
+/// Every curve from [`SETTLED_S`] on but for its highest and lowest three per cent: no estimator is
+/// missing because another is better.
 fn ordinate(curves: &[TraceCurve]) -> Ordinate {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for curve in curves {
-        let mut sorted: Vec<f64> = curve.values.iter().copied().filter(|v| v.is_finite()).collect();
+        let settled = |t: f64| t >= SETTLED_S || curve.kind != CurveKind::Estimate;
+        let rows = curve.times_s.iter().zip(&curve.values);
+        let kept = rows.filter(|(t, v)| settled(**t) && v.is_finite()).map(|row| *row.1);
+        let mut sorted: Vec<f64> = kept.collect();
         sorted.sort_by(f64::total_cmp);
         let share = if curve.kind == CurveKind::Estimate { 0.03 } else { 0.0 };
         for p in [share, 1.0 - share] {

@@ -74,6 +74,7 @@ pub(super) fn boxes(
                 name: label.clone(),
                 unit: "%".to_owned(),
                 boxes: of_panel,
+                ..BoxPanel::default()
             });
         }
     }

@@ -58,15 +58,15 @@ fn decimation(item: &Item, results: &Results) -> ItemOutput {
                     points.push((0.01 * k as f64, row));
                 }
             }
-            // Blue for ARX, shades of vermillion for Box-Jenkins, green for the grey box.
+            // Blue for ARX, vermillion and orange for Box-Jenkins with a whole and a fractional
+            // delay, shades of purple for those of Pade, green for the grey box.
+            let of = |method, level, levels| Shade { method, level, levels };
             let shade = match i {
-                0 => Shade::of_method(0),
-                6 => Shade::of_method(2),
-                i => Shade {
-                    method: 1,
-                    level: i - 1,
-                    levels: 5,
-                },
+                0 => of(0, 0, 1),
+                1 => of(1, 1, 1),
+                2 => of(4, 2, 1),
+                3..=5 => of(3, i - 3, 3),
+                _ => of(2, 3, 1),
             };
             drawn.push(with_quartiles(name, shade, &points));
         }

@@ -15,7 +15,7 @@ pub(super) fn items() -> Vec<Item> {
     vec![Item::of_study(
         "lead-change",
         "How well a change of T_L by 20 % shows within 5 s",
-        "Distance of the medians of T_L at 45.9 and 40.6 s in their spreads (interquartile range / 1.349, mean of both), the change is at 40.96 s. At 2.5 a threshold \
+        "Distance of the medians of T_L at 45.9 and 40.6 s in their spreads (interquartile range / 1.349, mean of both), the change is at 40.96 s. At 2.5, dashed, a threshold \
              with 5 % false alarms finds 80 % of the changes.",
         "lead-change",
         lead_change,
@@ -87,7 +87,7 @@ fn lead_change(item: &Item, results: &Results) -> ItemOutput {
             });
         }
         drawn.push(Curve {
-            name: "80 % found at 5 % false alarms".to_owned(),
+            name: "80 % found".to_owned(),
             kind: LineKind::Truth,
             shade: Shade::of_method(0),
             x: vec![0.01, 0.3],

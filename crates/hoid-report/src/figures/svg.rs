@@ -1,0 +1,138 @@
+//! The last touches to a figure as SVG text.
+
+use kuva::{
+    prelude::SvgBackend,
+    render::render::{Primitive, Scene, TextAnchor},
+};
+
+use super::{
+    draw,
+    labels::{has_tags, plain, tagged},
+};
+
+/// SVG text with a view box (it scales with the page), a title for screen readers, and ids that
+/// begin with that of the figure.
+pub fn finish(id: &str, title: &str, scene: Scene) -> String {
+    let scene = anchored(scene);
+    let raw = SvgBackend::new().render_scene(&scene);
+    let Some((_, body)) = raw.split_once('>') else {
+        return raw;
+    };
+    let font = scene.font_family.as_deref().map(escaped).unwrap_or_default();
+    let (width, height) = (scene.width, scene.height);
+    let (id, title) = (escaped(id), escaped(&plain(title)));
+    // The generator's stamp would change the bytes with its version.
+    let body = match body.split_once("-->") {
+        Some((stamp, rest)) if stamp.trim_start().starts_with("<!--") => rest,
+        _ => body,
+    };
+    let body = tagged(&renumbered(body, "kuva-clip-", &format!("{id}-clip-")));
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
+         font-family=\"{font}\" fill=\"black\" role=\"img\" aria-labelledby=\"{id}-title\"><title id=\"{id}-title\">{title}</title>{body}"
+    )
+}
+
+/// Ids `from` + number as `to` + number, counted from 1 in the order in which they come. The
+/// library counts them over the whole life of the process: the same figure drawn twice would
+/// differ.
+fn renumbered(text: &str, from: &str, to: &str) -> String {
+    let mut known: Vec<&str> = Vec::new();
+    let mut parts = text.split(from);
+    let mut result = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let digits = part.len() - part.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+        let (number, rest) = part.split_at(digits);
+        let position = known.iter().position(|k| *k == number).unwrap_or_else(|| {
+            known.push(number);
+            known.len() - 1
+        });
+        result.push_str(&format!("{to}{}{rest}", position + 1));
+    }
+    result
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}
+
+/// A scene whose texts with tags begin at their place, wherever they were anchored: readers of SVG
+/// do not agree on where the tags of a centred text stand.
+fn anchored(mut scene: Scene) -> Scene {
+    for element in &mut scene.elements {
+        let Primitive::Text {
+            x,
+            y,
+            content,
+            size,
+            anchor,
+            rotate,
+            ..
+        } = element
+        else {
+            continue;
+        };
+        let share = match anchor {
+            TextAnchor::Start => 0.0,
+            TextAnchor::Middle => 0.5,
+            TextAnchor::End => 1.0,
+        };
+        if share > 0.0 && has_tags(content) {
+            let before = share * draw::text_width(content, *size);
+            let (sine, cosine) = rotate.unwrap_or(0.0).to_radians().sin_cos();
+            *x -= before * cosine;
+            *y -= before * sine;
+            *anchor = TextAnchor::Start;
+        }
+    }
+    scene
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        super::{
+            labels::{axis_label, marked},
+            style::{BLUE, layout, line, stacked},
+        },
+        *,
+    };
+
+    #[test]
+    fn ids_count_from_one() {
+        let text = "<a id=\"k-12\"/><b id=\"k-7\"/> url(#k-7) url(#k-12)";
+        assert_eq!(
+            renumbered(text, "k-", "f-"),
+            "<a id=\"f-1\"/><b id=\"f-2\"/> url(#f-2) url(#f-1)"
+        );
+    }
+
+    #[test]
+    fn text_of_the_user_stays_text() {
+        let plots = vec![line([(0.0, 0.0), (1.0, 1.0)], BLUE, 1.0).into()];
+        let layout = layout((0.0, 1.0), (0.0, 1.0), 200.0).with_x_label(axis_label("a<b> & $x^2$", "\"s\""));
+        let svg = finish("f<1", "t & t", stacked(vec![(plots, layout, 200.0)]));
+        assert!(svg.contains("a&lt;b&gt; &amp; $x^2$"), "{svg}");
+        assert!(svg.contains("f&lt;1-title") && svg.contains("t &amp; t"));
+        assert!(!svg.contains("kuva"));
+    }
+
+    #[test]
+    fn a_text_with_tags_begins_where_it_would_if_it_were_centred() {
+        let mut scene = Scene::new(100.0, 100.0);
+        for (content, rotate) in [("m_0", None), ("m_0", Some(-90.0)), ("m", None)] {
+            scene.add(draw::text(50.0, 50.0, marked(content), 13, TextAnchor::Middle, rotate));
+        }
+        let half = 0.5 * draw::text_width(&marked("m_0"), 13);
+        let expected = [(50.0 - half, 50.0), (50.0, 50.0 + half), (50.0, 50.0)];
+        for (element, (left, top)) in anchored(scene).elements.iter().zip(expected) {
+            let Primitive::Text { x, y, .. } = element else {
+                panic!("a text")
+            };
+            assert!((x - left).abs() < 1e-9 && (y - top).abs() < 1e-9, "{x} {y}");
+        }
+    }
+}
