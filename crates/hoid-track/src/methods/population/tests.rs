@@ -20,28 +20,6 @@ fn options() -> TrackOptions {
 }
 
 #[test]
-fn the_map_finds_a_gain_and_a_lead() {
-    // (K_e + K_e_dot s)(T_I s + 1) over T_I is in the span: theta = [K_e/T_I, K_e_dot/T_I + K_e,
-    // K_e_dot] before the scaling.
-    let point = Point {
-        tau: 0.28,
-        omega: 8.0,
-        zeta: 0.4,
-        lag: 3.0,
-    };
-    let basis = Basis::new(point, 0.01).unwrap();
-    let (k_e, k_e_dot) = (0.09, 0.07);
-    let raw = [k_e / 3.0, k_e_dot / 3.0 + k_e, k_e_dot];
-    let theta: Vec<f64> = raw.iter().zip(basis.scale()).map(|(r, s)| r / s).collect();
-    let map = gain_and_lead(&basis);
-    for (row, expected) in map.iter().zip([k_e, k_e_dot]) {
-        let found: f64 = row.iter().zip(&theta).map(|(m, t)| m * t).sum();
-        // The straight line between samples: (omega Ts)^2/12 at 4 rad/s.
-        assert!((found - expected).abs() < 1e-3 * expected, "{found} {expected}");
-    }
-}
-
-#[test]
 fn it_starts_without_a_fit_and_finds_a_steady_person() {
     let record = record(Condition::C1);
     let trace = track(&record, &options(), 100).unwrap();
