@@ -75,3 +75,55 @@ fn options_that_make_no_sense_are_refused() {
     };
     assert!(rare.threshold() > PopulationOptions::default().threshold());
 }
+
+#[test]
+fn a_trace_tells_gain_and_phase_with_bands() {
+    let record = record(Condition::C1);
+    let at_rad_s = vec![1.0, 2.5];
+    for method in [Method::population(), Method::rls()] {
+        let usual = TrackOptions {
+            at_rad_s: at_rad_s.clone(),
+            ..TrackOptions::usual(method, 29)
+        };
+        let trace = track(&record, &usual, 512).unwrap();
+        let span = usual
+            .start_span(&record)
+            .and_then(|(from, to)| record.span(from, to).ok());
+        let mut tracker = Tracker::new(&usual, span.as_ref(), record.sample_time()).unwrap();
+        for k in 0..record.len() {
+            let sample = Sample {
+                e: record.input()[k],
+                u: record.output()[k],
+                reference: None,
+            };
+            tracker.update(sample, record.time_s(k) >= trace.updated_from_s() - 0.005);
+        }
+        let columns = trace.estimate_columns(&trace.operators());
+        let of = |name: &str| columns.iter().find(|(n, _)| n == name).unwrap().1.clone();
+        for omega in &at_rad_s {
+            let told = tracker.response(*omega).unwrap();
+            for (name, expected) in [("gain_db", told.gain_db()), ("phase_deg", told.phase_deg())] {
+                let (values, errors) = (of(&format!("{name}@{omega}")), of(&format!("{name}@{omega}_se")));
+                assert_eq!(values.len(), trace.len());
+                assert!(
+                    (values[trace.len() - 1] - expected.value).abs() < 1e-9,
+                    "{name} {omega}"
+                );
+                assert!((errors[trace.len() - 1] - expected.standard_error.unwrap()).abs() < 1e-9);
+            }
+        }
+        assert!(trace.response(0, 2).is_none());
+        let averaged = trace.clone().moving_average(2);
+        let (a, b) = (trace.response(9, 0).unwrap(), trace.response(10, 0).unwrap());
+        let mean = averaged.response(10, 0).unwrap();
+        if usual.method == Method::population() {
+            assert!((mean.value[0] - 0.5 * (a.value[0] + b.value[0])).abs() < 1e-12);
+        }
+        assert!(mean.covariance[0][0] > 0.0);
+    }
+    let refused = TrackOptions {
+        at_rad_s: vec![0.0],
+        ..options()
+    };
+    assert!(refused.check().unwrap_err().to_string().contains("rad/s"));
+}
