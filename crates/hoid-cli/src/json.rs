@@ -10,7 +10,7 @@ use hoid_model::{
     margins::Margins,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
-use hoid_track::{Change, TrackFault};
+use hoid_track::{Change, Response, TrackFault};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -27,6 +27,19 @@ pub fn optional(value: Option<f64>) -> Value {
 
 pub fn estimate(e: &Estimate) -> Value {
     json!({"value": number(e.value), "standard_error": optional(e.standard_error)})
+}
+
+/// Gain and phase at frequencies in rad/s, each where there is an estimate.
+pub fn responses(at_rad_s: &[f64], of: impl Fn(usize, f64) -> Option<Response>) -> Value {
+    let each = at_rad_s.iter().enumerate().map(|(place, omega)| {
+        let response = of(place, *omega);
+        json!({
+            "omega_rad_s": omega,
+            "gain_db": response.map(|r| estimate(&r.gain_db())),
+            "phase_deg": response.map(|r| estimate(&r.phase_deg())),
+        })
+    });
+    Value::Array(each.collect())
 }
 
 /// The same with its interval of 95 %, null where there is none.

@@ -71,6 +71,7 @@ impl Plan {
         let options = TrackOptions {
             start,
             largest: args.largest,
+            at_rad_s: args.at.clone(),
             ..TrackOptions::new(method, structure, largest)
         };
         let plan =

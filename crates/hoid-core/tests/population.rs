@@ -3,7 +3,7 @@
 
 use hoid_core::{
     population::{
-        DRIFTS, GAINS, POINTS, PopulationFilter, PopulationPrior,
+        DRIFTS, GAINS, PopulationFilter, PopulationPrior, STATES,
         basis::{Basis, Point},
         detector::Detection,
         errors_needed,
@@ -14,22 +14,28 @@ use hoid_core::{
 
 const TS: f64 = 0.02;
 /// Drift that stands for "nothing changes", and those of people who vary.
-const DRIFT: [f64; DRIFTS] = [0.005, 0.07, 0.3];
+const DRIFT: [f64; DRIFTS] = [0.0005, 0.07, 0.3];
 
 fn prior(threshold: f64) -> PopulationPrior {
     PopulationPrior {
         gains: GainPrior {
             drifts: DRIFT,
+            shares: [0.9, 0.05, 0.05],
+            newborn: [0.1, 0.5],
+            odds: 0.01,
+            life: 2.0,
             freedom: 5.0,
             limit: 3.5,
-            forgotten: [TS / 60.0, TS / 15.0],
+            forgotten: [TS / 60.0, TS / 5.0],
+            held: [0.3, 0.5, 0.02],
             sample_time: TS,
         },
         order: 8,
         noise_memory: 40.0,
         level_memory: [5.0, 10.0],
-        offset_drift: 0.02,
+        offset_drift: [0.005, 0.01],
         hold: 1.0,
+        reopen: 6.0,
         jump: 0.3,
         detection: Detection {
             frequency: 2.5,
@@ -43,22 +49,22 @@ fn prior(threshold: f64) -> PopulationPrior {
     }
 }
 
-fn points() -> [Basis; POINTS] {
-    [0.2, 0.12, 0.16, 0.24, 0.28, 0.34, 0.4].map(|tau| {
-        let point = Point {
-            tau,
-            omega: 11.0,
-            zeta: 0.25,
-            lag: 3.0,
-        };
-        Basis::new(point, TS).expect("a sound point")
-    })
+fn usual() -> Point {
+    Point {
+        tau: 0.2,
+        omega: 11.0,
+        zeta: 0.25,
+        lag: 3.0,
+    }
+}
+
+fn basis(point: Point) -> Basis {
+    Basis::new(point, TS).expect("a sound point")
 }
 
 fn filter(threshold: f64) -> PopulationFilter<Vec<f64>> {
-    let points = points();
-    let errors = vec![0.0; errors_needed(&points)];
-    PopulationFilter::new(points, prior(threshold), errors).expect("a sound prior")
+    let errors = vec![0.0; errors_needed(TS)];
+    PopulationFilter::new(basis(usual()), prior(threshold), errors).expect("a sound prior")
 }
 
 /// Nearly normal numbers of a fixed stream: sums of twelve uniform ones.
@@ -78,7 +84,7 @@ impl Stream {
     }
 }
 
-/// Someone with the gains of the first point and an autoregressive remnant of order 2.
+/// Someone with the gains of a basis and an autoregressive remnant of order 2.
 struct Person {
     stream: Stream,
     basis: Basis,
@@ -89,7 +95,11 @@ struct Person {
 
 impl Person {
     fn new(seed: u64) -> Self {
-        let basis = points()[0].clone();
+        Self::at(seed, usual())
+    }
+
+    fn at(seed: u64, point: Point) -> Self {
+        let basis = basis(point);
         Self {
             stream: Stream(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) + 1),
             past: vec![0.0; basis.delay() + 3],
@@ -105,7 +115,8 @@ impl Person {
         self.past.rotate_right(1);
         self.past[0] = self.e;
         let l = self.basis.delay();
-        let x = self.basis.step([self.past[l], self.past[l + 1], self.past[l + 2]]);
+        let z = self.basis.step([self.past[l], self.past[l + 1], self.past[l + 2]]);
+        let x = self.basis.regressors(&z).x;
         let v = 1.6 * self.v[0] - 0.63 * self.v[1] + remnant * self.stream.normal();
         self.v = [v, self.v[0]];
         let w: f64 = gains.iter().zip(x).map(|(g, x)| g * x).sum();
@@ -116,18 +127,20 @@ impl Person {
 const GAINS_OF_A_PERSON: [f64; GAINS] = [1.2, 1.8, 0.9];
 
 fn response(basis: &Basis, gains: [f64; GAINS], omega: f64) -> [f64; 2] {
-    let h = basis.response(omega);
+    let h = basis.response(omega, basis.point());
     [0, 1].map(|part| (0..GAINS).map(|i| gains[i] * h[i][part]).sum())
 }
 
 /// The estimate at a frequency, real and imaginary part, with their variances.
 fn estimate(filter: &PopulationFilter<Vec<f64>>, omega: f64) -> ([f64; 2], [f64; 2]) {
-    let maps = std::array::from_fn(|i| {
-        let h = filter.bases()[i].response(omega);
-        [h.map(|h| h[0]), h.map(|h| h[1])]
-    });
-    let (mean, c) = filter.gains().moments(&maps);
-    (mean, [c[0][0], c[1][1]])
+    let (value, by) = filter.response_with_derivatives(omega);
+    let c = filter.gains().covariance();
+    let variance = |row: &[f64; STATES]| -> f64 {
+        (0..STATES)
+            .map(|i| (0..STATES).map(|j| row[i] * c[i][j] * row[j]).sum::<f64>())
+            .sum()
+    };
+    (value, [variance(&by[0]), variance(&by[1])])
 }
 
 #[test]
@@ -162,6 +175,28 @@ fn bands_cover_and_precision_grows() {
     // After 100 s against 10 s: ten times the data.
     let ratio = (squares[1] / squares[0]).sqrt();
     assert!(ratio < 0.5, "{ratio}");
+}
+
+#[test]
+fn neuromuscular_system_and_delay_are_found() {
+    // So far from what is usual that the basis has to move.
+    let point = Point {
+        tau: 0.22,
+        omega: 13.0,
+        zeta: 0.35,
+        ..usual()
+    };
+    for seed in 0..3 {
+        let (mut person, mut filter) = (Person::at(300 + seed, point), filter(1e9));
+        for _ in 0..6000 {
+            let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.02);
+            filter.step(e, u);
+        }
+        let found = filter.held();
+        let near = |found: f64, truth: f64, by: f64| (found - truth).abs() < by;
+        let all = near(found.omega, 13.0, 0.4) && near(found.zeta, 0.35, 0.04) && near(found.tau, 0.22, 0.004);
+        assert!(all && filter.basis().point().omega > 12.0, "{seed}: {found:?}");
+    }
 }
 
 #[test]
@@ -271,12 +306,15 @@ fn an_outlier_hardly_moves_the_estimate() {
 
 #[test]
 fn what_makes_no_sense_is_refused() {
-    let errors = || vec![0.0; errors_needed(&points())];
-    assert!(PopulationFilter::new(points(), prior(27.0), vec![0.0; 3]).is_none());
+    let errors = || vec![0.0; errors_needed(TS)];
+    assert!(PopulationFilter::new(basis(usual()), prior(27.0), vec![0.0; 3]).is_none());
+    let late = Point { tau: 1.0, ..usual() };
+    assert!(PopulationFilter::new(basis(late), prior(27.0), errors()).is_none());
     let sound = prior(27.0);
     for wrong in [
         PopulationPrior { order: 1, ..sound },
         PopulationPrior { hold: 0.0, ..sound },
+        PopulationPrior { reopen: 0.5, ..sound },
         PopulationPrior {
             level_memory: [5.0, f64::NAN],
             ..sound
@@ -296,6 +334,9 @@ fn what_makes_no_sense_is_refused() {
             ..sound
         },
     ] {
-        assert!(PopulationFilter::new(points(), wrong, errors()).is_none(), "{wrong:?}");
+        assert!(
+            PopulationFilter::new(basis(usual()), wrong, errors()).is_none(),
+            "{wrong:?}"
+        );
     }
 }

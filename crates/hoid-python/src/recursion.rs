@@ -63,6 +63,7 @@ pub fn plan(options: &Bound<'_, PyDict>, sample_time: SampleTime) -> Outcome<Tra
     let track_options = TrackOptions {
         start,
         largest: get(options, "largest")?.unwrap_or(defaults.largest),
+        at_rad_s: get(options, "at")?.unwrap_or_default(),
         ..defaults
     };
     let criterion = names::criterion(&text("criterion")?.unwrap_or_else(|| "bic".to_owned()))?;

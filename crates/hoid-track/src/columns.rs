@@ -5,7 +5,7 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate},
 };
 
-use crate::{OPERATOR_COLUMNS, Trace};
+use crate::{OPERATOR_COLUMNS, Response, Trace};
 
 /// Named columns of one length.
 pub type Columns = Vec<(String, Vec<f64>)>;
@@ -25,7 +25,8 @@ impl Trace {
         names
     }
 
-    /// `t`, each coefficient and each parameter of the operator, with their standard errors behind
+    /// `t`, each coefficient, each parameter of the operator, and gain in dB and phase in degrees at the
+    /// frequencies of the options (`gain_db@2.5`, `phase_deg@2.5`), with their standard errors behind
     /// each (`_se`). NaN stands where a row has no operator, or a value no standard error.
     /// `operators` are those of [`Trace::operators`].
     pub fn estimate_columns(&self, operators: &[Result<OperatorEstimate, NotConvertible>]) -> Columns {
@@ -44,6 +45,14 @@ impl Trace {
         for name in self.operator_columns() {
             let each: Vec<Option<Estimate>> = operators.iter().map(|o| value_of(o, name)).collect();
             add(name, &each);
+        }
+        for (place, omega) in self.options().at_rad_s.iter().enumerate() {
+            let responses: Vec<_> = (0..self.len()).map(|row| self.response(row, place)).collect();
+            let each = |of: fn(&Response) -> Estimate| -> Vec<Option<Estimate>> {
+                responses.iter().map(|response| response.as_ref().map(of)).collect()
+            };
+            add(&format!("gain_db@{omega}"), &each(Response::gain_db));
+            add(&format!("phase_deg@{omega}"), &each(Response::phase_deg));
         }
         columns
     }

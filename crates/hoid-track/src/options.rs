@@ -29,6 +29,8 @@ pub struct TrackOptions {
     pub search: SearchOptions,
     /// Magnitude of e or u beyond which a sample is taken for a fault. Default 1e6.
     pub largest: f64,
+    /// Frequencies at which a trace tells gain and phase, rad/s. Default none.
+    pub at_rad_s: Vec<f64>,
 }
 
 impl TrackOptions {
@@ -42,6 +44,7 @@ impl TrackOptions {
             update_from_s: None,
             search: SearchOptions::default(),
             largest: 1e6,
+            at_rad_s: Vec::new(),
         }
     }
 
@@ -178,6 +181,14 @@ impl TrackOptions {
                 "the largest magnitude",
                 self.largest.to_string(),
                 "a positive number",
+            ));
+        }
+        let wrong = self.at_rad_s.iter().find(|w| !(w.is_finite() && **w > 0.0));
+        if let Some(wrong) = wrong {
+            return Err(bad(
+                "a frequency of the response",
+                format!("{wrong} rad/s"),
+                "positive frequencies in rad/s, as 0.5,1,2.5",
             ));
         }
         Ok(())

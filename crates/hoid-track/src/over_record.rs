@@ -7,6 +7,7 @@ use crate::{
     idle::idle_head,
     options::TrackOptions,
     recursion::Sample,
+    response::Response,
     smoother,
     trace::{self, Trace, pack},
     tracker::Tracker,
@@ -87,6 +88,12 @@ pub fn track_from(
         }
         pack(&covariance, p, &mut trace.covariance);
         trace.operator.extend(tracker.recursion.operator());
+        if options.method.starts_itself() {
+            for omega in &options.at_rad_s {
+                let told = tracker.response(*omega).map(|response| response.packed());
+                trace.responses.extend(told.unwrap_or([f64::NAN; Response::NUMBERS]));
+            }
+        }
         trace.innovation.push(outcome.innovation.unwrap_or(f64::NAN));
         trace.innovation_variance.push(tracker.innovation_variance());
         trace.shortened.push(tracker.counts.shortened);

@@ -66,6 +66,11 @@ impl Reported {
         }
     }
 
+    /// Sample time, s.
+    pub(crate) fn sample_time_s(&self) -> f64 {
+        self.sample_time_s
+    }
+
     pub(crate) fn theta(&self) -> &[f64] {
         &self.theta
     }

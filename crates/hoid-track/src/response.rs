@@ -23,6 +23,25 @@ pub struct Response {
 }
 
 impl Response {
+    /// Numbers of a response.
+    pub(crate) const NUMBERS: usize = 5;
+
+    /// Real and imaginary part, and the upper triangle of their covariance.
+    pub(crate) fn packed(&self) -> [f64; Self::NUMBERS] {
+        let ([re, im], [[a, b], [_, c]]) = (self.value, self.covariance);
+        [re, im, a, b, c]
+    }
+
+    /// Of the numbers of [`Response::packed`]; `None` where they are none.
+    pub(crate) fn unpacked(numbers: &[f64]) -> Option<Self> {
+        let &[re, im, a, b, c] = numbers else { return None };
+        let sound = re.is_finite() && im.is_finite();
+        sound.then_some(Self {
+            value: [re, im],
+            covariance: [[a, b], [b, c]],
+        })
+    }
+
     /// |H| in dB.
     pub fn gain_db(&self) -> Estimate {
         let [re, im] = self.value;

@@ -5,7 +5,7 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate, operator_estimate},
 };
 
-use crate::{Change, Counts, TrackFault, options::TrackOptions};
+use crate::{Change, Counts, TrackFault, options::TrackOptions, response::Response};
 use hoid_ident::{Fit, IdentError};
 
 /// The estimate at every sample that was kept, with its uncertainty.
@@ -21,6 +21,8 @@ pub struct Trace {
     pub(crate) covariance: Vec<f64>,
     /// The operator itself, for a recursion in physical parameters.
     pub(crate) operator: Vec<OperatorEstimate>,
+    /// The responses that are not those of the polynomials, at each frequency of the options.
+    pub(crate) responses: Vec<f64>,
     pub(crate) innovation: Vec<f64>,
     pub(crate) innovation_variance: Vec<f64>,
     pub(crate) shortened: Vec<u64>,
@@ -62,6 +64,7 @@ impl Trace {
             theta: Vec::with_capacity(rows * p),
             covariance: Vec::with_capacity(rows * packed_len(p)),
             operator: Vec::new(),
+            responses: Vec::new(),
             innovation: Vec::with_capacity(rows),
             innovation_variance: Vec::with_capacity(rows),
             shortened: Vec::with_capacity(rows),
@@ -188,6 +191,26 @@ impl Trace {
         }
     }
 
+    /// The response of a row at the frequency of that place in [`TrackOptions::at_rad_s`]; `None` while
+    /// there is no estimate, and where there is no such frequency.
+    pub fn response(&self, row: usize, place: usize) -> Option<Response> {
+        let count = self.options.at_rad_s.len();
+        let omega_rad_s = *self.options.at_rad_s.get(place)?;
+        if self.responses.is_empty() {
+            let (orders, covariance) = (self.options.polynomial_orders(), self.covariance(row));
+            let (theta, whole) = (self.theta(row), covariance.as_deref());
+            return Some(Response::of_polynomials(
+                &orders,
+                theta,
+                whole,
+                omega_rad_s,
+                self.sample_time,
+            ));
+        }
+        let from = (row * count + place) * Response::NUMBERS;
+        Response::unpacked(&self.responses[from..from + Response::NUMBERS])
+    }
+
     /// A-priori innovation of each row.
     pub fn innovation(&self) -> &[f64] {
         &self.innovation
@@ -285,6 +308,10 @@ impl Trace {
         }
         self.theta = causal_mean(&self.theta, p, rows);
         self.covariance = causal_mean(&self.covariance, packed_len(p), rows);
+        let width = Response::NUMBERS * self.options.at_rad_s.len();
+        if !self.responses.is_empty() {
+            self.responses = causal_mean(&self.responses, width, rows);
+        }
         let numbers: Vec<f64> = self
             .operator
             .iter()

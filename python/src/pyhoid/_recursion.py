@@ -53,6 +53,8 @@ def plain(arguments: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str
         else _options.numbers("start", start),
         "from_nothing": start == "nothing",
         "largest": float(given["largest"]),
+        # What is said of a row, so that a tracker has none.
+        "at": [float(omega) for omega in arguments.get("at", ())],
         "settings": {
             # Python keeps the word lambda for itself.
             "lambda" if name == "forgetting_factor" else name: text

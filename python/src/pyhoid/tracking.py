@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,6 +36,7 @@ def track(
     criterion: str = "bic",
     start: Mapping[str, float] | str | None = None,
     largest: float = 1e6,
+    at: Sequence[float] = (),
     start_span: tuple[float, float] | None = None,
     update_from: float | None = None,
     moving_average: float | None = None,
@@ -63,6 +64,9 @@ def track(
         All coefficients; default a batch fit of the start span.
     largest : float
         Magnitude of e or u beyond which a sample is a fault.
+    at : sequence of float
+        Frequencies in rad/s at which gain in dB and phase in degrees are columns of the trace
+        (``gain_db@2.5``, ``phase_deg@2.5``), with standard errors.
     start_span : (float, float), optional
         Span of the start fit in s; default the first third.
     update_from : float, optional

@@ -43,6 +43,9 @@ pub struct RecursionArgs {
     /// Magnitude of e or u beyond which a sample is taken for a fault and skipped
     #[arg(long, value_name = "X", default_value = "1e6")]
     pub largest: f64,
+    /// Frequencies in rad/s at which gain and phase are told, with errors, as 0.5,1,2.5
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub at: Vec<f64>,
 }
 
 #[derive(Debug, Args)]

@@ -3,7 +3,7 @@
 /// `ln(1 + x)` for x that is not negative, in a third of the time where x is small: with
 /// `z = x/(2 + x)`, `2 (z + z^3/3 + z^5/5 + ...)`, whose next term is below 1e-16 of the first.
 #[inline(always)]
-pub(super) fn log1p(x: f64) -> f64 {
+pub(crate) fn log1p(x: f64) -> f64 {
     if x > 0.25 {
         return libm::log1p(x);
     }
@@ -19,7 +19,7 @@ pub(super) fn log1p(x: f64) -> f64 {
 /// `e^x` without a call, to 4e-16 between -700 and 700 and libm's beyond: `2^k e^r` with
 /// `|r| <= ln(2)/2`, by Taylor's series.
 #[inline(always)]
-pub(super) fn exp(x: f64) -> f64 {
+pub(crate) fn exp(x: f64) -> f64 {
     if x.abs() >= 700.0 || x.is_nan() {
         return libm::exp(x);
     }

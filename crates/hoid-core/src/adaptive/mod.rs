@@ -47,6 +47,6 @@ pub mod response;
 pub mod signal_ring;
 
 mod adaptive_filter;
-mod elementary;
+pub(crate) mod elementary;
 
 pub use adaptive_filter::AdaptiveFilter;

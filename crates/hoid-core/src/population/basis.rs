@@ -1,10 +1,20 @@
 //! The responses of `s^i omega^2/((s + a)(s^2 + 2 zeta omega s + omega^2)) e^{-tau s}`, i = 0, 1, 2,
-//! with `a = 1/T_I`, to an error that is straight between samples.
+//! with `a = 1/T_I`, and their derivatives by omega, zeta and tau, to an error that is straight
+//! between samples.
 //!
-//! In controllable canonical form `z' = A z + B e(t - tau)` all three are states of one filter,
-//! `x_i = z_i`. With `tau = l Ts + delta`, `0 <= delta < Ts`, the delayed error is over a sample
-//! straight in two pieces, up to delta and from there on. With `G(h) = int e^{A(h-s)} B ds` and
-//! `R(h) = int e^{A(h-s)} B s ds`, both columns of the exponential of `[A B 0; 0 0 1; 0 0 0] h`,
+//! With `Q = s^2 + 2 zeta omega s + omega^2` and the signals `z_i` of `s^i/((s + a) Q^2) e^{-tau s}`,
+//! i = 0 to 5,
+//!
+//! `x_i = omega^2 (z_{i+2} + 2 zeta omega z_{i+1} + omega^2 z_i)`,
+//! `dx_i/domega = 2 x_i/omega - 2 omega^2 (zeta z_{i+1} + omega z_i)`,
+//! `dx_i/dzeta = -2 omega^3 z_{i+1}`,
+//! `dx_i/dtau = -omega^2 (z_{i+3} + 2 zeta omega z_{i+2} + omega^2 z_{i+1})`.
+//!
+//! `z_0 .. z_4` are the states of one filter in controllable canonical form, `z' = A z + B e(t - tau)`,
+//! and z_5 is the derivative of the last. With `tau = l Ts + delta`, `0 <= delta < Ts`, the delayed
+//! error is over a sample straight in two pieces, up to delta and from there on. With
+//! `G(h) = int e^{A(h-s)} B ds` and `R(h) = int e^{A(h-s)} B s ds`, both columns of the exponential of
+//! `[A B 0; 0 0 1; 0 0 0] h`,
 //!
 //! `z(k+1) = Phi z(k) + T_0 e(k-l+1) + T_1 e(k-l) + T_2 e(k-l-1)`,
 //! `T_0 = R(h)/Ts`,
@@ -13,20 +23,26 @@
 //!
 //! (K. J. Åström and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2; the triangle
 //! hold of G. F. Franklin, J. D. Powell and M. Workman, *Digital Control of Dynamic Systems*, 1998,
-//! section 6.3). Exact for a straight error and any delay.
+//! section 6.3). Exact for a straight error and any delay. The response to a sampled sine is the
+//! operator's times that of the hold, `(sin(omega Ts/2)/(omega Ts/2))^2`, but for aliases.
 //!
 //! Each x_i is divided by its gain at [`REFERENCE`], so that all gains are in units of |Y| there.
 
-use super::sizes::GAINS;
+use super::sizes::{GAINS, HELD, SIGNALS, STATES};
 
 /// Frequency at which each response has a gain of one, rad/s.
 pub const REFERENCE: f64 = 2.0;
 
-/// Matrix of the exponential: three states, a step, a ramp.
-type Square = [[f64; 5]; 5];
+/// States of the filter.
+const N: usize = SIGNALS - 1;
+/// Size of the exponential: the states, a step, a ramp.
+const M: usize = N + 2;
+type Square = [[f64; M]; M];
 
 /// A complex number, real and imaginary part.
 pub type Complex = [f64; 2];
+/// `z_0 .. z_5`.
+pub type Signals = [f64; SIGNALS];
 
 /// What is held of a person: delay in s, natural frequency in rad/s and damping of the
 /// neuromuscular system, lag in s.
@@ -42,69 +58,151 @@ pub struct Point {
     pub lag: f64,
 }
 
+crate::state!([] Point { tau, omega, zeta, lag });
+
+impl Point {
+    /// Moved by corrections of omega, zeta and tau.
+    pub fn moved(self, [omega, zeta, tau]: [f64; HELD]) -> Self {
+        Self {
+            tau: self.tau + tau,
+            omega: self.omega + omega,
+            zeta: self.zeta + zeta,
+            lag: self.lag,
+        }
+    }
+}
+
+/// The responses of a sample, and their derivatives by omega, zeta and tau.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Regressors {
+    /// x_i.
+    pub x: [f64; GAINS],
+    /// Derivatives.
+    pub by: [[f64; GAINS]; HELD],
+}
+
 /// The filter of a point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Basis {
     point: Point,
     sample_time: f64,
-    phi: [[f64; GAINS]; GAINS],
-    taps: [[f64; GAINS]; 3],
+    phi: [[f64; N]; N],
+    taps: [[f64; N]; 3],
+    monic: [f64; N],
     delay: usize,
+    part: f64,
     scale: [f64; GAINS],
-    z: [f64; GAINS],
+    z: [f64; N],
 }
 
-crate::state!([] Basis { z });
+crate::state!([] Basis { point, phi, taps, monic, delay, part, z });
 
 impl Basis {
     /// At rest. Ts in s. `None` for numbers that are not positive (the delay: negative), or not
     /// finite, or poles so fast that nothing is left of them.
     pub fn new(point: Point, sample_time: f64) -> Option<Self> {
-        let Point { tau, omega, zeta, lag } = point;
-        let ts = sample_time;
         let positive = |x: f64| x > 0.0 && x < 1e6;
-        if !([omega, zeta, lag, ts].into_iter().all(positive) && (0.0..1e3).contains(&tau)) {
+        let Point { tau, omega, zeta, lag } = point;
+        if !([omega, zeta, lag, sample_time].into_iter().all(positive) && (0.0..1e3).contains(&tau)) {
             return None;
         }
+        let mut basis = Self {
+            point,
+            sample_time,
+            phi: [[0.0; N]; N],
+            taps: [[0.0; N]; 3],
+            monic: [0.0; N],
+            delay: 0,
+            part: 0.0,
+            scale: [1.0; GAINS],
+            z: [0.0; N],
+        };
+        basis.discretise();
+        let at = basis.response(REFERENCE, point);
+        basis.scale = at.map(|[re, im]| 1.0 / libm::hypot(re, im));
+        let sound = basis
+            .scale
+            .iter()
+            .chain(basis.phi.iter().flatten())
+            .all(|s| s.is_finite());
+        sound.then_some(basis)
+    }
+
+    fn discretise(&mut self) {
+        let Point { tau, omega, zeta, lag } = self.point;
+        let ts = self.sample_time;
         // A delay of whole samples must not become a sample less by rounding.
         let whole = libm::floor(tau / ts + 1e-9);
         let delta = (tau - whole * ts).max(0.0);
-        let (a, square) = (1.0 / lag, omega * omega);
-        let middle = 2.0 * zeta * omega;
-        let monic = [a * square, square + middle * a, middle + a];
+        let (a, p, q) = (1.0 / lag, 2.0 * zeta * omega, omega * omega);
+        // Q^2, without its s^4.
+        let square = [q * q, 2.0 * p * q, p * p + 2.0 * q, 2.0 * p];
+        self.monic = [
+            a * square[0],
+            a * square[1] + square[0],
+            a * square[2] + square[1],
+            a * square[3] + square[2],
+            a + square[3],
+        ];
         let held = |h: f64| {
-            let mut m = [[0.0; 5]; 5];
-            (m[0][1], m[1][2]) = (h, h);
-            for (entry, d) in m[2].iter_mut().zip(monic) {
+            let mut m = [[0.0; M]; M];
+            for i in 0..N - 1 {
+                m[i][i + 1] = h;
+            }
+            for (entry, d) in m[N - 1].iter_mut().zip(self.monic) {
                 *entry = -d * h;
             }
-            (m[2][3], m[3][4]) = (square * h, h);
+            (m[N - 1][N], m[N][N + 1]) = (h, h);
             exponential(&m)
         };
         let (first, second) = (held(delta), held(ts - delta));
         let phi = product(&second, &first);
-        let through = |v: [f64; GAINS]| -> [f64; GAINS] {
-            core::array::from_fn(|i| (0..GAINS).map(|j| second[i][j] * v[j]).sum())
-        };
+        let through = |v: [f64; N]| -> [f64; N] { core::array::from_fn(|i| (0..N).map(|j| second[i][j] * v[j]).sum()) };
         let part = delta / ts;
-        let early = through(core::array::from_fn(|i| first[i][3] * (1.0 - part) + first[i][4] / ts));
-        let late = through(core::array::from_fn(|i| first[i][3] * part - first[i][4] / ts));
-        let mut basis = Self {
-            point,
-            sample_time,
-            phi: core::array::from_fn(|i| core::array::from_fn(|j| phi[i][j])),
-            taps: [
-                core::array::from_fn(|i| second[i][4] / ts),
-                core::array::from_fn(|i| early[i] + second[i][3] - second[i][4] / ts),
-                late,
-            ],
-            delay: whole as usize,
-            scale: [1.0; GAINS],
-            z: [0.0; GAINS],
-        };
-        let at = basis.response(REFERENCE);
-        basis.scale = at.map(|[re, im]| 1.0 / libm::hypot(re, im));
-        basis.scale.iter().all(|s| s.is_finite()).then_some(basis)
+        let early = through(core::array::from_fn(|i| {
+            first[i][N] * (1.0 - part) + first[i][N + 1] / ts
+        }));
+        let late = through(core::array::from_fn(|i| first[i][N] * part - first[i][N + 1] / ts));
+        self.phi = core::array::from_fn(|i| core::array::from_fn(|j| phi[i][j]));
+        self.taps = [
+            core::array::from_fn(|i| second[i][N + 1] / ts),
+            core::array::from_fn(|i| early[i] + second[i][N] - second[i][N + 1] / ts),
+            late,
+        ];
+        (self.delay, self.part) = (whole as usize, part);
+    }
+
+    /// One at another point with the same lag and the same scale, whose slow mode goes on from here:
+    /// `g = 1/(s + a) e` is `Q^2 z_0` in the states of both. The fast modes begin at rest; they need
+    /// some `1/(zeta omega)` until they are what they would be. `error` is the delayed error of now.
+    pub fn moved(&self, point: Point, error: f64) -> Option<Self> {
+        let sound = point.omega > 0.0 && point.zeta > 0.0 && point.tau >= 0.0 && point.lag == self.point.lag;
+        if !sound {
+            return None;
+        }
+        let mut other = Self { point, ..self.clone() };
+        other.discretise();
+        let (a, p, q) = (
+            1.0 / point.lag,
+            2.0 * self.point.zeta * self.point.omega,
+            self.point.omega * self.point.omega,
+        );
+        let square = [q * q, 2.0 * p * q, p * p + 2.0 * q, 2.0 * p, 1.0];
+        let g: f64 = square.iter().zip(self.z).map(|(c, z)| c * z).sum();
+        let g = g - (point.tau - self.point.tau) * (error - a * g);
+        let at_pole = a * a - 2.0 * point.zeta * point.omega * a + point.omega * point.omega;
+        let mut z = g / (at_pole * at_pole);
+        for state in &mut other.z {
+            *state = z;
+            z *= -a;
+        }
+        other
+            .phi
+            .iter()
+            .flatten()
+            .chain(&other.z)
+            .all(|x| x.is_finite())
+            .then_some(other)
     }
 
     /// What is held.
@@ -112,7 +210,7 @@ impl Basis {
         self.point
     }
 
-    /// Whole samples of the delay: the responses of a sample need the error of so many samples ago,
+    /// Whole samples of the delay: the signals of a sample need the error of so many samples ago,
     /// and the two before it.
     pub fn delay(&self) -> usize {
         self.delay
@@ -123,52 +221,119 @@ impl Basis {
         self.scale
     }
 
-    /// The responses of a sample from the errors of `delay`, `delay + 1` and `delay + 2` samples ago.
+    /// The delayed error, from those of `delay` and `delay + 1` samples ago.
     #[inline(always)]
-    pub fn step(&mut self, errors: [f64; 3]) -> [f64; GAINS] {
+    pub fn delayed(&self, [now, before]: [f64; 2]) -> f64 {
+        now * (1.0 - self.part) + before * self.part
+    }
+
+    /// The signals of a sample from the errors of `delay`, `delay + 1` and `delay + 2` samples ago.
+    #[inline(always)]
+    pub fn step(&mut self, errors: [f64; 3]) -> Signals {
         let z = self.z;
-        for i in 0..GAINS {
+        let mut last = self.delayed([errors[0], errors[1]]);
+        let mut signals = [0.0; SIGNALS];
+        for i in 0..N {
             let mut sum = 0.0;
-            for j in 0..GAINS {
-                sum += self.phi[i][j] * z[j] + self.taps[j][i] * errors[j];
+            for j in 0..N {
+                sum += self.phi[i][j] * z[j];
+            }
+            for j in 0..3 {
+                sum += self.taps[j][i] * errors[j];
             }
             self.z[i] = sum;
+            signals[i] = sum;
+            last -= self.monic[i] * sum;
         }
-        core::array::from_fn(|i| self.scale[i] * self.z[i])
+        signals[N] = last;
+        signals
+    }
+
+    /// The responses that the signals are, and their derivatives.
+    #[inline(always)]
+    pub fn regressors(&self, z: &Signals) -> Regressors {
+        let Point { omega, zeta, .. } = self.point;
+        let (p, q) = (2.0 * zeta * omega, omega * omega);
+        let through: [f64; LINKS] = core::array::from_fn(|i| z[i + 2] + p * z[i + 1] + q * z[i]);
+        let mut r = Regressors {
+            x: [0.0; GAINS],
+            by: [[0.0; GAINS]; HELD],
+        };
+        for i in 0..GAINS {
+            let s = self.scale[i] * q;
+            r.x[i] = s * through[i];
+            r.by[0][i] = 2.0 / omega * r.x[i] - 2.0 * s * (zeta * z[i + 1] + omega * z[i]);
+            r.by[1][i] = -2.0 * omega * s * z[i + 1];
+            r.by[2][i] = -s * through[i + 1];
+        }
+        r
+    }
+
+    /// The weights of the signals in `sum_i theta_i (x_i + sum_j c_j dx_i/dj)`, theta and c in a state.
+    pub fn weights(&self, state: &[f64; STATES]) -> Signals {
+        let Point { omega, zeta, .. } = self.point;
+        let (p, q) = (2.0 * zeta * omega, omega * omega);
+        let [_, _, _, _, of_omega, of_zeta, of_tau] = *state;
+        let mut weights = [0.0; SIGNALS];
+        for i in 0..GAINS {
+            let a = state[i] * self.scale[i] * q;
+            let b = a * (1.0 + 2.0 * of_omega / omega);
+            weights[i] += b * q - 2.0 * a * omega * of_omega;
+            weights[i + 1] += b * p - 2.0 * a * (zeta * of_omega + omega * of_zeta) - a * of_tau * q;
+            weights[i + 2] += b - a * of_tau * p;
+            weights[i + 3] -= a * of_tau;
+        }
+        weights
     }
 
     /// Brings the filter to rest.
     pub fn reset(&mut self) {
-        self.z = [0.0; GAINS];
+        self.z = [0.0; N];
     }
 
-    /// Response of each x_i to sampled errors at a frequency in rad/s: with `z = e^{j omega Ts}`,
-    /// `(z I - Phi)^-1 (T_0 z + T_1 + T_2/z) z^-l`, by Cramer's rule.
-    pub fn response(&self, omega: f64) -> [Complex; GAINS] {
-        let angle = omega * self.sample_time;
-        let (sin, cos) = libm::sincos(angle);
-        let (p, t) = (&self.phi, &self.taps);
-        let mut m = [[[0.0; 2]; GAINS]; GAINS];
-        for i in 0..GAINS {
-            for j in 0..GAINS {
-                m[i][j][0] = -p[i][j];
-            }
-            m[i][i] = [cos - p[i][i], sin];
-        }
-        let right: [Complex; GAINS] =
-            core::array::from_fn(|i| [(t[0][i] + t[2][i]) * cos + t[1][i], (t[0][i] - t[2][i]) * sin]);
-        let whole = determinant(&m);
-        let (late_sin, late_cos) = libm::sincos(-angle * self.delay as f64);
+    /// Response of each x_i at a frequency in rad/s, were it held at this point.
+    pub fn response(&self, omega_rad_s: f64, at: Point) -> [Complex; GAINS] {
+        let w = omega_rad_s;
+        let square = at.omega * at.omega;
+        let poles = times(
+            [1.0 / self.point.lag, w],
+            [square - w * w, 2.0 * at.zeta * at.omega * w],
+        );
+        let half = 0.5 * w * self.sample_time;
+        let hold = if half == 0.0 { 1.0 } else { libm::sin(half) / half };
+        let (sin, cos) = libm::sincos(-at.tau * w);
+        let size = square * hold * hold;
+        let common = over([size * cos, size * sin], poles);
+        let mut power = [1.0, 0.0];
         core::array::from_fn(|i| {
-            let mut with = m;
-            for (row, r) in with.iter_mut().zip(right) {
-                row[i] = r;
-            }
-            let [re, im] = times(over(determinant(&with), whole), [late_cos, late_sin]);
-            [self.scale[i] * re, self.scale[i] * im]
+            let h = times(common, power).map(|h| h * self.scale[i]);
+            power = times(power, [0.0, w]);
+            h
         })
     }
+
+    /// K_e and K_e_dot of the gain and lead that is nearest to `N(s)/(s + a)` at some frequencies in
+    /// rad/s, by least squares in `K_e + K_e_dot j omega`: linear in the gains, and whatever poles and
+    /// delay are.
+    pub fn gain_and_lead(&self, at_rad_s: &[f64]) -> [[f64; GAINS]; 2] {
+        let (a, count) = (1.0 / self.point.lag, at_rad_s.len() as f64);
+        let squares: f64 = at_rad_s.iter().map(|w| w * w).sum();
+        let mut map = [[0.0; GAINS]; 2];
+        for w in at_rad_s {
+            let mut power = [1.0, 0.0];
+            for i in 0..GAINS {
+                let [re, im] = over(power, [a, *w]);
+                map[0][i] += self.scale[i] * re / count;
+                map[1][i] += self.scale[i] * w * im / squares;
+                power = times(power, [0.0, *w]);
+            }
+        }
+        map
+    }
 }
+
+/// Products `Q z_i` that the responses and their derivatives by the delay need.
+const LINKS: usize = SIGNALS - 2;
 
 pub(super) fn times(a: Complex, b: Complex) -> Complex {
     [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
@@ -180,21 +345,8 @@ pub(super) fn over(a: Complex, b: Complex) -> Complex {
     [re / square, im / square]
 }
 
-fn determinant(m: &[[Complex; GAINS]; GAINS]) -> Complex {
-    let minor = |i: usize, j: usize| {
-        let (a, b) = (times(m[1][i], m[2][j]), times(m[1][j], m[2][i]));
-        [a[0] - b[0], a[1] - b[1]]
-    };
-    let (a, b, c) = (
-        times(m[0][0], minor(1, 2)),
-        times(m[0][1], minor(0, 2)),
-        times(m[0][2], minor(0, 1)),
-    );
-    [a[0] - b[0] + c[0], a[1] - b[1] + c[1]]
-}
-
 fn product(a: &Square, b: &Square) -> Square {
-    core::array::from_fn(|i| core::array::from_fn(|j| (0..5).map(|k| a[i][k] * b[k][j]).sum()))
+    core::array::from_fn(|i| core::array::from_fn(|j| (0..M).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
 /// By scaling to a norm below 1/4, the series of Taylor to the 14th power, and squaring: the rest of
@@ -211,8 +363,8 @@ fn exponential(m: &Square) -> Square {
         halvings += 1;
     }
     let scaled: Square = m.map(|row| row.map(|x| x * scale));
-    let mut sum = [[0.0; 5]; 5];
-    (0..5).for_each(|i| sum[i][i] = 1.0);
+    let mut sum = [[0.0; M]; M];
+    (0..M).for_each(|i| sum[i][i] = 1.0);
     let mut term = sum;
     for k in 1..=14 {
         term = product(&term, &scaled).map(|row| row.map(|x| x / f64::from(k)));
@@ -229,99 +381,4 @@ fn exponential(m: &Square) -> Square {
 }
 
 #[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-    use std::vec::Vec;
-
-    fn point() -> Point {
-        Point {
-            tau: 0.213,
-            omega: 11.0,
-            zeta: 0.25,
-            lag: 3.0,
-        }
-    }
-
-    /// The transfer function itself, divided by its gain at the reference.
-    fn continuous(i: usize, omega: f64) -> Complex {
-        let p = point();
-        let raw = |w: f64| {
-            let s = [0.0, w];
-            let numerator = match i {
-                0 => [p.omega * p.omega, 0.0],
-                1 => [0.0, w * p.omega * p.omega],
-                _ => [-w * w * p.omega * p.omega, 0.0],
-            };
-            let second = [p.omega * p.omega - w * w, 2.0 * p.zeta * p.omega * w];
-            let delay = libm::sincos(-p.tau * w);
-            times(over(numerator, times([1.0 / p.lag, s[1]], second)), [delay.1, delay.0])
-        };
-        let at = raw(REFERENCE);
-        let size = libm::hypot(at[0], at[1]);
-        raw(omega).map(|x| x / size)
-    }
-
-    #[test]
-    fn response_is_that_of_the_operator() {
-        for ts in [1.0 / 60.0, 0.01, 0.001] {
-            let basis = Basis::new(point(), ts).unwrap();
-            for omega in [0.3, 1.0, 4.0, 9.0] {
-                for (i, h) in basis.response(omega).into_iter().enumerate() {
-                    let expected = continuous(i, omega);
-                    let error = libm::hypot(h[0] - expected[0], h[1] - expected[1]);
-                    let size = libm::hypot(expected[0], expected[1]);
-                    // A straight line between samples loses (omega Ts)^2/12 of a sine, as at the
-                    // reference.
-                    let line = ((omega * ts).powi(2) + (REFERENCE * ts).powi(2)) / 10.0;
-                    assert!(error < (line + 1e-9) * size, "{ts} {omega} {i}: {error} of {size}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn filter_and_response_agree() {
-        let ts = 0.01;
-        let mut basis = Basis::new(point(), ts).unwrap();
-        let omega = 3.0;
-        let h = basis.response(omega);
-        let e = |k: i64| libm::sin(omega * k as f64 * ts);
-        let delay = basis.delay() as i64;
-        for k in 1..20_000_i64 {
-            let errors = core::array::from_fn(|j| e(k - 1 - (delay - 1 + j as i64)));
-            let x = basis.step(errors);
-            if k > 15_000 {
-                let (sin, cos) = libm::sincos(omega * k as f64 * ts);
-                for i in 0..GAINS {
-                    assert!((x[i] - (h[i][0] * sin + h[i][1] * cos)).abs() < 1e-7, "{i} at {k}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn delay_is_continuous_and_what_makes_no_sense_is_refused() {
-        let at = |tau: f64| Basis::new(Point { tau, ..point() }, 0.01).unwrap().response(5.0);
-        for (a, b) in at(0.21 - 1e-11).iter().flatten().zip(at(0.21 + 1e-11).iter().flatten()) {
-            assert!((a - b).abs() < 1e-8);
-        }
-        let bad: Vec<Point> = [
-            Point { tau: -0.1, ..point() },
-            Point { omega: 0.0, ..point() },
-            Point {
-                zeta: f64::NAN,
-                ..point()
-            },
-            Point {
-                lag: f64::INFINITY,
-                ..point()
-            },
-        ]
-        .to_vec();
-        assert!(bad.into_iter().all(|p| Basis::new(p, 0.01).is_none()));
-        assert!(Basis::new(point(), 0.0).is_none());
-        let mut still = Basis::new(point(), 0.01).unwrap();
-        assert_eq!(still.step([0.0; 3]), [0.0; 3]);
-    }
-}
+mod tests;

@@ -21,7 +21,7 @@
 use super::{
     basis::Complex,
     cholesky,
-    sizes::{GAINS, STATES},
+    sizes::{GAINS, LINEAR},
 };
 
 /// Blocks that there is room for.
@@ -40,7 +40,7 @@ const MOST: f64 = 3.0;
 /// Share of the diagonal that is added to it.
 const RIDGE: f64 = 1e-3;
 /// Products of the upper triangle.
-const PRODUCTS: usize = STATES * (STATES + 1) / 2;
+const PRODUCTS: usize = LINEAR * (LINEAR + 1) / 2;
 
 /// What the detector looks at.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,7 +65,7 @@ pub struct Detection {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Block {
     products: [f64; PRODUCTS],
-    with_output: [f64; STATES],
+    with_output: [f64; LINEAR],
     square: f64,
     samples: f64,
     /// Squares of the innovations as they are.
@@ -76,7 +76,7 @@ crate::state!([] Block { products, with_output, square, samples, power });
 
 const EMPTY: Block = Block {
     products: [0.0; PRODUCTS],
-    with_output: [0.0; STATES],
+    with_output: [0.0; LINEAR],
     square: 0.0,
     samples: 0.0,
     power: 0.0,
@@ -86,9 +86,9 @@ const EMPTY: Block = Block {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Span {
     /// Gains and level.
-    pub state: [f64; STATES],
+    pub state: [f64; LINEAR],
     /// Their covariance.
-    pub covariance: [[f64; STATES]; STATES],
+    pub covariance: [[f64; LINEAR]; LINEAR],
     /// Variance of eps.
     pub variance: f64,
     /// Samples.
@@ -116,7 +116,7 @@ pub struct Detector {
 }
 
 crate::state!([] Detector {
-    block, blocks, count, level, levels, statistic, above, since, spans, declared,
+    response, block, blocks, count, level, levels, statistic, above, since, spans, declared,
 });
 
 impl Detector {
@@ -144,12 +144,12 @@ impl Detector {
     /// Takes a sample: regressors and limited output behind the whitening filter, the innovation, and
     /// the variance of eps. True where a change is declared.
     #[inline]
-    pub fn update(&mut self, r: &[f64; STATES], y: f64, innovation: f64, variance: f64) -> bool {
+    pub fn update(&mut self, r: &[f64; LINEAR], y: f64, innovation: f64, variance: f64) -> bool {
         self.declared = false;
         let weight = 1.0 / variance;
         let block = &mut self.block;
         let mut k = 0;
-        for i in 0..STATES {
+        for i in 0..LINEAR {
             let a = weight * r[i];
             for r in &r[i..] {
                 block.products[k] += a * r;
@@ -205,6 +205,11 @@ impl Detector {
             self.blocks.copy_within(before..self.count, 0);
             self.count = self.what.recent;
         }
+    }
+
+    /// The response of the gains at the frequency is this from now on.
+    pub fn look_at(&mut self, response: [Complex; GAINS]) {
+        self.response = response;
     }
 
     /// T; `None` where the spans say nothing of the frequency.
@@ -270,29 +275,29 @@ fn fit(blocks: &[Block]) -> Option<Span> {
         sum.power += block.power;
     }
     let n = sum.samples;
-    if n <= STATES as f64 {
+    if n <= LINEAR as f64 {
         return None;
     }
-    let mut matrix = [[0.0; STATES]; STATES];
+    let mut matrix = [[0.0; LINEAR]; LINEAR];
     let mut k = 0;
-    for i in 0..STATES {
-        for j in i..STATES {
+    for i in 0..LINEAR {
+        for j in i..LINEAR {
             (matrix[i][j], matrix[j][i]) = (sum.products[k], sum.products[k]);
             k += 1;
         }
         matrix[i][i] *= 1.0 + RIDGE / n;
     }
-    if !cholesky::factor(&mut matrix, STATES) {
+    if !cholesky::factor(&mut matrix, LINEAR) {
         return None;
     }
     let mut state = sum.with_output;
-    cholesky::solve(&matrix, STATES, &mut state);
+    cholesky::solve(&matrix, LINEAR, &mut state);
     let explained: f64 = state.iter().zip(sum.with_output).map(|(s, b)| s * b).sum();
-    let variance = ((sum.square - explained) / (n - STATES as f64)).max(1e-12);
-    let mut covariance = [[0.0; STATES]; STATES];
+    let variance = ((sum.square - explained) / (n - LINEAR as f64)).max(1e-12);
+    let mut covariance = [[0.0; LINEAR]; LINEAR];
     for (i, row) in covariance.iter_mut().enumerate() {
         row[i] = variance;
-        cholesky::solve(&matrix, STATES, row);
+        cholesky::solve(&matrix, LINEAR, row);
     }
     Some(Span {
         state,

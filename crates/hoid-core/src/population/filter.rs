@@ -1,11 +1,12 @@
 //! The recursion: basis, noise model, gains and detector.
 
 use super::{
-    basis::{Basis, REFERENCE},
+    basis::{Basis, Complex, Point, REFERENCE, Regressors, Signals},
     detector::{Detection, Detector},
-    gains::{GainPrior, Gains},
+    gains::{Around, GainPrior, Gains},
     noise::NoiseModel,
-    sizes::{GAINS, LARGEST_ORDER, POINTS, STATES},
+    place::Place,
+    sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, STATES},
 };
 use crate::{
     recursion::Step,
@@ -23,6 +24,16 @@ const SETTLED_S: f64 = 5.0;
 /// noise model, s.
 const UNIT_S: f64 = 5.0;
 const SOLVE_S: f64 = 0.13;
+/// Corrections of omega and zeta (shares of theirs) and tau (s) from which the basis moves; the
+/// farthest it moves at once; and where it may be: omega in rad/s, zeta, tau in s.
+const NEAR: [f64; HELD] = [0.04, 0.1, 0.006];
+const FAR: [f64; HELD] = [0.4, 0.6, 0.04];
+const RANGE: [[f64; 2]; HELD] = [[3.0, 40.0], [0.05, 1.5], [0.0, LATEST_S]];
+/// Longest delay, s.
+const LATEST_S: f64 = 0.9;
+/// Time between two looks at whether it should, and time that a move takes, s.
+const LOOK_S: f64 = 1.0;
+const MOVE_S: f64 = 4.0;
 
 /// What is supposed of a person and their changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,11 +46,15 @@ pub struct PopulationPrior {
     pub noise_memory: f64,
     /// Time constants of the variance of eps for the gains and for the detector, s.
     pub level_memory: [f64; 2],
-    /// Drift of the level of u in one second, over the root mean square of u.
-    pub offset_drift: f64,
+    /// Drifts of the level of u in one second, over the root mean square of u: of the filter whose
+    /// gains hardly move, and of the others.
+    pub offset_drift: [f64; 2],
     /// Time after which the estimate begins, s: the ratio of u to e in it gives the prior of the
     /// gains.
     pub hold: f64,
+    /// Time after which what is held is corrected, s. What was learnt before counts no more than the
+    /// prior then: the noise model was not known.
+    pub reopen: f64,
     /// What a declared change adds to the gains, over |Y| at the reference.
     pub jump: f64,
     /// The detector.
@@ -50,18 +65,16 @@ pub struct PopulationPrior {
 #[derive(Debug, Clone, PartialEq)]
 pub struct PopulationFilter<E> {
     prior: PopulationPrior,
-    bases: [Basis; POINTS],
-    /// Response of each basis at the reference.
-    at_reference: [[[f64; GAINS]; 2]; POINTS],
+    place: Place,
     noise: NoiseModel,
     gains: Gains,
     detector: Detector,
     errors: E,
     newest: usize,
     u: [f64; LARGEST_ORDER],
-    x: [[[f64; GAINS]; POINTS]; LARGEST_ORDER],
     samples: u64,
     began: bool,
+    reopened: bool,
     powers: [f64; 2],
     variance: [f64; 2],
     unit: f64,
@@ -73,15 +86,15 @@ impl<E: AsMut<[f64]>> State for PopulationFilter<E> {
         self.errors.as_mut().visit(each);
         visit_all(
             &mut [
-                &mut self.bases,
+                &mut self.place,
                 &mut self.noise,
                 &mut self.gains,
                 &mut self.detector,
                 &mut self.newest,
                 &mut self.u,
-                &mut self.x,
                 &mut self.samples,
                 &mut self.began,
+                &mut self.reopened,
                 &mut self.powers,
                 &mut self.variance,
                 &mut self.unit,
@@ -92,38 +105,42 @@ impl<E: AsMut<[f64]>> State for PopulationFilter<E> {
     }
 }
 
+/// A sample behind the whitening filter.
+struct Whitened {
+    y: f64,
+    regressors: Regressors,
+    level: f64,
+}
+
 impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
-    /// At rest. The first point is the one in which changes are looked for. `errors` is memory for
-    /// [`errors_needed`] numbers. `None` for numbers that make no sense, or too little memory.
-    pub fn new(points: [Basis; POINTS], prior: PopulationPrior, mut errors: E) -> Option<Self> {
+    /// At rest. `errors` is memory for [`errors_needed`] numbers. `None` for numbers that make no
+    /// sense, or too little memory.
+    pub fn new(basis: Basis, prior: PopulationPrior, mut errors: E) -> Option<Self> {
         let ts = prior.gains.sample_time;
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let sound = prior.level_memory.iter().all(|m| positive(*m))
             && positive(prior.hold)
-            && prior.offset_drift >= 0.0
-            && prior.jump >= 0.0;
-        if !sound || errors.as_ref().len() < errors_needed(&points) {
+            && prior.reopen >= prior.hold
+            && prior.offset_drift.iter().all(|d| *d >= 0.0)
+            && prior.jump >= 0.0
+            && basis.point().tau <= LATEST_S;
+        if !sound || errors.as_ref().len() < errors_needed(ts) {
             return None;
         }
         errors.as_mut().fill(0.0);
-        let parts = |basis: &Basis| {
-            let h = basis.response(REFERENCE);
-            [h.map(|h| h[0]), h.map(|h| h[1])]
-        };
-        let response = points[0].response(prior.detection.frequency);
+        let response = basis.response(prior.detection.frequency, basis.point());
         Some(Self {
-            at_reference: core::array::from_fn(|i| parts(&points[i])),
             noise: NoiseModel::new(prior.order, prior.noise_memory, ts)?,
-            gains: Gains::new(prior.gains, POINTS)?,
+            gains: Gains::new(prior.gains, &basis)?,
             detector: Detector::new(prior.detection, response, ts)?,
-            bases: points,
+            place: Place::new(basis),
             prior,
             errors,
             newest: 0,
             u: [0.0; LARGEST_ORDER],
-            x: [[[0.0; GAINS]; POINTS]; LARGEST_ORDER],
             samples: 0,
             began: false,
+            reopened: false,
             powers: [0.0; 2],
             variance: [0.0; 2],
             unit: 0.0,
@@ -133,9 +150,11 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
 
     /// Takes a sample. Both must be finite.
     pub fn step(&mut self, e: f64, u: f64) -> Step {
-        let x = self.respond(e);
-        let (y, r) = self.whitened(u, &x);
-        if !(y.abs() < LARGEST && r.iter().flatten().all(|r| r.abs() < LARGEST)) {
+        self.respond(e);
+        let white = self.whitened(u);
+        let sound = |x: &f64| x.abs() < LARGEST;
+        let Regressors { x, by } = &white.regressors;
+        if !(sound(&white.y) && x.iter().chain(by.iter().flatten()).all(sound)) {
             self.rest();
             return Step {
                 innovation: 0.0,
@@ -146,11 +165,11 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
         self.powers[0] += e * e;
         self.powers[1] += u * u;
         let innovation = if self.began {
-            self.learn(y, u, &r, &x)
+            self.learn(u, &white)
         } else {
-            self.begin(y)
+            self.begin(white.y)
         };
-        self.remember(u, x);
+        self.remember(u);
         Step {
             innovation,
             shortened: false,
@@ -159,11 +178,11 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
 
     /// As [`PopulationFilter::step`], but the estimate stays: only the filters move on.
     pub fn step_without_update(&mut self, e: f64, u: f64) -> Step {
-        let x = self.respond(e);
-        let (y, r) = self.whitened(u, &x);
+        self.respond(e);
+        let white = self.whitened(u);
         self.detector.skip();
-        let innovation = self.gains.innovation(y, &r);
-        self.keep(u, x, innovation);
+        let innovation = self.foretold(&white);
+        self.keep(u, innovation);
         Step {
             innovation,
             shortened: false,
@@ -173,52 +192,55 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
     /// As [`PopulationFilter::step_without_update`] where the output is missing: the one-step
     /// prediction takes its place.
     pub fn bridge(&mut self, e: f64) {
-        let x = self.respond(e);
-        let (y, r) = self.whitened(0.0, &x);
+        self.respond(e);
+        let white = self.whitened(0.0);
         self.detector.skip();
-        let u = -self.gains.innovation(y, &r);
-        self.keep(u, x, u);
+        let u = -self.foretold(&white);
+        self.keep(u, u);
     }
 
-    fn keep(&mut self, u: f64, x: [[f64; GAINS]; POINTS], innovation: f64) {
+    fn foretold(&self, white: &Whitened) -> f64 {
+        self.gains.innovation(white.y, &white.regressors, white.level)
+    }
+
+    fn keep(&mut self, u: f64, innovation: f64) {
         if innovation.abs() < LARGEST && u.abs() < LARGEST {
-            self.remember(u, x);
+            self.remember(u);
         } else {
             self.rest();
         }
     }
 
-    /// The responses of all points.
+    /// The signals of a sample.
     #[inline(always)]
-    fn respond(&mut self, e: f64) -> [[f64; GAINS]; POINTS] {
+    fn respond(&mut self, e: f64) {
         let errors = self.errors.as_mut();
         let n = errors.len();
-        self.newest = if self.newest + 1 == n { 0 } else { self.newest + 1 };
+        self.newest = if self.newest + 1 >= n { 0 } else { self.newest + 1 };
         errors[self.newest] = e;
         let newest = self.newest;
-        let at = |age: usize| errors[if age <= newest { newest - age } else { newest + n - age }];
-        let mut x = [[0.0; GAINS]; POINTS];
-        for (x, basis) in x.iter_mut().zip(&mut self.bases) {
-            let l = basis.delay();
-            *x = basis.step([at(l), at(l + 1), at(l + 2)]);
-        }
-        x
+        let at = |age: usize| {
+            let age = age.min(n - 1);
+            errors[if age <= newest { newest - age } else { newest + n - age }]
+        };
+        self.place.step(at);
     }
 
-    /// `D u`, and D times the responses and the level.
+    /// `D u`, D times the responses, and D at zero.
     #[inline(always)]
-    fn whitened(&self, u: f64, x: &[[f64; GAINS]; POINTS]) -> (f64, [[f64; STATES]; POINTS]) {
-        let (mut y, mut through) = (u, *x);
-        for (j, d) in self.noise.d().iter().enumerate() {
-            y += d * self.u[j];
-            for (through, past) in through.iter_mut().zip(&self.x[j]) {
-                for i in 0..GAINS {
-                    through[i] += d * past[i];
-                }
+    fn whitened(&self, u: f64) -> Whitened {
+        let (mut y, mut z): (f64, Signals) = (u, *self.place.signals());
+        for ((d, u), past) in self.noise.d().iter().zip(&self.u).zip(self.place.past()) {
+            y += d * u;
+            for (z, past) in z.iter_mut().zip(past) {
+                *z += d * past;
             }
         }
-        let level = self.noise.sum();
-        (y, through.map(|[a, b, c]| [a, b, c, level]))
+        Whitened {
+            y,
+            regressors: self.place.basis().regressors(&z),
+            level: self.noise.sum(),
+        }
     }
 
     /// Counts the first samples, and begins when they are enough and not all zero.
@@ -235,69 +257,120 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
         y
     }
 
-    fn learn(&mut self, y: f64, u: f64, r: &[[f64; STATES]; POINTS], x: &[[f64; GAINS]; POINTS]) -> f64 {
-        let p = &self.prior;
+    fn learn(&mut self, u: f64, white: &Whitened) -> f64 {
+        let p = self.prior;
         let (ts, n) = (p.gains.sample_time, self.samples as f64);
         let power = self.powers[1] / n;
-        let offset = p.offset_drift * p.offset_drift * power;
-        let variance = self.variance[0];
-        let eps = self.gains.update(y, r, variance, self.unit, offset);
+        let point = self.place.basis().point();
+        if !self.reopened && n * ts >= p.reopen {
+            self.reopened = true;
+            self.gains.reopen(self.unit, libm::sqrt(power), point);
+        }
+        let around = Around {
+            variance: self.variance[0],
+            unit: self.unit,
+            level: p.offset_drift.map(|drift| drift * drift * power),
+        };
+        let eps = self
+            .gains
+            .update(white.y, &white.regressors, white.level, point, &around);
         for (variance, memory) in self.variance.iter_mut().zip(p.level_memory) {
             let share = ts / memory.min(n * ts).max(4.0 * ts);
             let square = LOST * (eps * eps).min(CLIPPED * *variance);
             // What is foretold without an error leaves a level that is still positive.
             *variance = (*variance + share * (square - *variance)).max(1e-20 * power);
         }
-        let most = p.gains.limit * libm::sqrt(self.variance[1]);
-        let limited = y - eps + eps.clamp(-most, most);
-        let settled = n * ts >= SETTLED_S;
-        if settled && self.detector.update(&r[0], limited, eps, self.variance[1]) {
+        let state = self.gains.state();
+        if n * ts >= SETTLED_S && self.is_changed(white, eps, &state) {
             self.gains.open(p.jump * self.unit);
         }
-        self.follow_noise(u, eps, x);
-        let every = libm::round(SOLVE_S / ts).max(1.0) as u64;
-        if self.samples.is_multiple_of(every) {
+        self.follow_noise(u, eps, &state);
+        let every = |seconds: f64| libm::round(seconds / ts).max(1.0) as u64;
+        if self.samples.is_multiple_of(every(SOLVE_S)) {
             self.noise.solve();
-            let ([re, im], _) = self.gains.moments(&self.at_reference);
-            let share = (every as f64 * ts / UNIT_S).min(1.0);
+            self.detector.look_at(self.responses(p.detection.frequency));
+            let [re, im] = self.response(REFERENCE);
+            let share = (every(SOLVE_S) as f64 * ts / UNIT_S).min(1.0);
             self.unit += share * (libm::hypot(re, im) - self.unit);
+        }
+        if self.reopened && self.samples.is_multiple_of(every(LOOK_S)) {
+            self.look(&state, every(MOVE_S));
         }
         eps
     }
 
+    /// What the detector says of a sample, with the responses where the corrections point.
+    fn is_changed(&mut self, white: &Whitened, eps: f64, state: &[f64; STATES]) -> bool {
+        let most = self.prior.gains.limit * libm::sqrt(self.variance[1]);
+        let limited = white.y - eps + eps.max(-most).min(most);
+        let mut r = [0.0; LINEAR];
+        for i in 0..GAINS {
+            r[i] = white.regressors.x[i];
+            for j in 0..HELD {
+                r[i] += state[LINEAR + j] * white.regressors.by[j][i];
+            }
+        }
+        r[GAINS] = white.level;
+        self.detector.update(&r, limited, eps, self.variance[1])
+    }
+
     /// v with all its lags by the gains of now.
-    fn follow_noise(&mut self, u: f64, eps: f64, x: &[[f64; GAINS]; POINTS]) {
+    fn follow_noise(&mut self, u: f64, eps: f64, state: &[f64; STATES]) {
         let order = self.noise.order();
         if self.samples <= order as u64 {
             return;
         }
-        let point = self.gains.likeliest();
-        let [a, b, c, level] = self.gains.state(point);
-        let left = |u: f64, x: &[f64; GAINS]| u - level - a * x[0] - b * x[1] - c * x[2];
+        let weights = self.place.basis().weights(state);
+        let left = |u: f64, z: &Signals| {
+            let response: f64 = weights.iter().zip(z).map(|(w, z)| w * z).sum();
+            u - state[GAINS] - response
+        };
         let mut v = [0.0; LARGEST_ORDER + 1];
-        v[0] = left(u, &x[point]);
-        for j in 0..order {
-            v[j + 1] = left(self.u[j], &self.x[j][point]);
+        v[0] = left(u, self.place.signals());
+        for ((v, u), z) in v[1..=order].iter_mut().zip(&self.u).zip(self.place.past()) {
+            *v = left(*u, z);
         }
         let variance = self.variance[0];
         let excess = (eps * eps / (CLIPPED * variance)).max(1.0);
         self.noise.update(&v, 1.0 / (variance * excess));
     }
 
-    fn remember(&mut self, u: f64, x: [[f64; GAINS]; POINTS]) {
-        let order = self.noise.order();
-        self.u.copy_within(0..order - 1, 1);
-        self.x.copy_within(0..order - 1, 1);
+    /// Moves the basis where the corrections have grown.
+    fn look(&mut self, state: &[f64; STATES], after: u64) {
+        let Point { tau, omega, zeta, lag } = self.place.basis().point();
+        let (of, mut to) = ([omega, zeta, 1.0], [omega, zeta, tau]);
+        let mut is_far = false;
+        for (i, to) in to.iter_mut().enumerate() {
+            let correction = state[LINEAR + i];
+            is_far |= correction.abs() > NEAR[i] * of[i];
+            let most = FAR[i] * of[i];
+            let [low, high] = RANGE[i];
+            *to = (*to + correction.max(-most).min(most)).max(low).min(high);
+        }
+        if is_far && !self.place.is_moving() {
+            let [omega, zeta, tau] = to;
+            let l = self.place.basis().delay();
+            let errors = self.errors.as_ref();
+            let at = |age: usize| errors[(self.newest + errors.len() - age.min(errors.len())) % errors.len()];
+            let delayed = self.place.basis().delayed([at(l), at(l + 1)]);
+            self.place
+                .begin_to_move(Point { tau, omega, zeta, lag }, delayed, after);
+        }
+    }
+
+    fn remember(&mut self, u: f64) {
+        self.u.copy_within(0..LARGEST_ORDER - 1, 1);
         self.u[0] = u;
-        self.x[0] = x;
+        if let Some(by) = self.place.remember() {
+            self.gains.moved(by);
+        }
     }
 
     /// Brings the filters to rest where a signal has overflowed.
     fn rest(&mut self) {
-        self.bases.iter_mut().for_each(Basis::reset);
+        self.place.rest();
         self.errors.as_mut().fill(0.0);
         self.u = [0.0; LARGEST_ORDER];
-        self.x = [[[0.0; GAINS]; POINTS]; LARGEST_ORDER];
         self.detector.skip();
         self.restarts += 1;
     }
@@ -307,14 +380,74 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
         self.began
     }
 
-    /// The points of the basis.
-    pub fn bases(&self) -> &[Basis; POINTS] {
-        &self.bases
+    /// The basis.
+    pub fn basis(&self) -> &Basis {
+        self.place.basis()
     }
 
     /// The gains.
     pub fn gains(&self) -> &Gains {
         &self.gains
+    }
+
+    /// Where what is held is now, the corrections included: never outside of where the basis may be.
+    pub fn held(&self) -> Point {
+        self.corrected(&self.gains.state())
+    }
+
+    fn corrected(&self, state: &[f64; STATES]) -> Point {
+        let at = self.place.basis().point();
+        let Point { tau, omega, zeta, lag } = at.moved([state[LINEAR], state[LINEAR + 1], state[LINEAR + 2]]);
+        let within = |x: f64, [low, high]: [f64; 2]| x.max(low).min(high);
+        Point {
+            omega: within(omega, RANGE[0]),
+            zeta: within(zeta, RANGE[1]),
+            tau: within(tau, RANGE[2]),
+            lag,
+        }
+    }
+
+    /// The response of each gain at a frequency in rad/s, for what is held now.
+    pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAINS] {
+        self.place.basis().response(omega_rad_s, self.held())
+    }
+
+    /// Y at a frequency in rad/s.
+    pub fn response(&self, omega_rad_s: f64) -> Complex {
+        self.response_of(&self.gains.state(), omega_rad_s)
+    }
+
+    fn response_of(&self, state: &[f64; STATES], omega_rad_s: f64) -> Complex {
+        let h = self.place.basis().response(omega_rad_s, self.corrected(state));
+        [0, 1].map(|part| (0..GAINS).map(|i| state[i] * h[i][part]).sum())
+    }
+
+    /// Y at a frequency in rad/s, with the derivatives of its real and its imaginary part by gains,
+    /// level and corrections: exact by the gains, differences by the corrections.
+    pub fn response_with_derivatives(&self, omega_rad_s: f64) -> (Complex, [[f64; STATES]; 2]) {
+        let state = self.gains.state();
+        let point = self.corrected(&state);
+        let h = self.place.basis().response(omega_rad_s, point);
+        let mut by = [[0.0; STATES]; 2];
+        for part in 0..2 {
+            for i in 0..GAINS {
+                by[part][i] = h[i][part];
+            }
+        }
+        for (j, size) in [point.omega, point.zeta, 0.1].into_iter().enumerate() {
+            let step = 1e-5 * size;
+            let at = |sign: f64| {
+                let mut by = [0.0; HELD];
+                by[j] = sign * step;
+                let h = self.place.basis().response(omega_rad_s, point.moved(by));
+                [0, 1].map(|part| (0..GAINS).map(|i| state[i] * h[i][part]).sum::<f64>())
+            };
+            let (up, down) = (at(1.0), at(-1.0));
+            for part in 0..2 {
+                by[part][LINEAR + j] = (up[part] - down[part]) / (2.0 * step);
+            }
+        }
+        (self.response_of(&state, omega_rad_s), by)
     }
 
     /// The detector.
@@ -343,7 +476,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
     }
 }
 
-/// Errors that the bases need.
-pub fn errors_needed(points: &[Basis]) -> usize {
-    points.iter().map(Basis::delay).max().unwrap_or(0) + 3
+/// Errors that are kept, for a sample time in s: those of the longest delay.
+pub fn errors_needed(sample_time: f64) -> usize {
+    libm::ceil(LATEST_S / sample_time) as usize + 4
 }

@@ -1,19 +1,26 @@
-//! The gains at every point of the basis, by Kalman filters that differ in their drift.
+//! Gains, level and corrections of what is held, by Kalman filters that differ in what they suppose.
 //!
-//! Behind the whitening filter, `y = r' s + eps` with `s = [theta, level]`. A filter says that the
-//! gains walk at random with a given variance in a second. Its innovation has the variance
-//! `S = r' P r + sigma^2`, and with the Student distribution of nu degrees of freedom
+//! - **Forms.** The numerator is any, or that of a gain with a lead, `(K_e + K_e_dot s)(s + a)`: the
+//!   second is the first with a covariance of the gains that leaves them no other direction, in what
+//!   is not known at the beginning and in every drift.
+//! - **Drifts.** Of each form one filter says that the gains hardly move, others that they walk at
+//!   random. A filter whose weight has fallen below [`LEAST`] takes over the state of the best.
+//! - **Newborns.** Others say that the gains have just changed: they begin as the first, with a
+//!   variance added, and walk at random. After their life they are born again; one that foretells
+//!   better than the first then takes its place. So a change is followed at once, and what comes
+//!   after it is learnt as steadily as what was before.
 //!
-//! `w = min(1, (nu + 1)/(nu + eps^2/S))`, `g = P r/(r' P r + sigma^2/w)`,
-//! `s <- s + g eps`, `P <- P - g (P r)'`
-//!
-//! with eps limited to some standard deviations. The logarithm of its weight grows by that of the
-//! Student density and is forgotten with a time constant, so that weights speak of the last seconds:
-//! short among the drifts, long among the points, since a person's gains may be steady or not from
-//! one moment to the next, their delay not. A filter whose weight has fallen below `LEAST` takes
-//! over the state of the best at its point.
+//! Weights follow the likelihood and are forgotten towards what is supposed of them, with a time
+//! constant: short among the drifts, for a person's gains may be steady or not from one moment to the
+//! next; long among the forms. (D. T. Magill, IEEE Trans. Automatic Control 10 (1965) 434-439; P. Andersson,
+//! Int. J. Control 42 (1985) 1175-1193, of filters that are born where a change is supposed.)
 
-use super::sizes::{DRIFTS, GAINS, POINTS, STATES};
+use super::{
+    basis::{Basis, Point, Regressors},
+    kalman::{Kalman, Seen},
+    sizes::{DRIFTS, FILTERS, FORMS, GAINS, HELD, LINEAR, NEWBORNS, STATES},
+};
+use crate::adaptive::elementary::exp;
 
 /// Logarithm of the weight from which a filter starts again from the best, and that with which it
 /// does.
@@ -21,340 +28,320 @@ const LEAST: f64 = -7.0;
 const AGAIN: f64 = -3.5;
 /// Weight below which a filter is left out of means.
 const NOTHING: f64 = 1e-9;
+/// Share of the square of a move that is added to the variance of a correction.
+const OPEN_AGAIN: f64 = 0.3;
+/// K_e_dot of the form with a lead is supposed to be so much of K_e, s.
+const LEAD_S: f64 = 0.5;
 
 /// What all filters share.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GainPrior {
     /// Standard deviation of a gain's drift in one second, over |Y| at the reference.
     pub drifts: [f64; DRIFTS],
+    /// What is supposed of their weights.
+    pub shares: [f64; DRIFTS],
+    /// The newborns: drift in one second and added standard deviation, over |Y| at the reference.
+    pub newborn: [f64; 2],
+    /// Their weight at birth, over that of the first filter.
+    pub odds: f64,
+    /// Their life, s.
+    pub life: f64,
     /// Degrees of freedom of the Student distribution.
     pub freedom: f64,
     /// Standard deviations beyond which an innovation moves the estimate no further.
     pub limit: f64,
-    /// Shares of the logarithms of the weights that a sample forgets, among points and drifts.
+    /// Shares of the logarithms of the weights that a sample forgets, among forms and drifts.
     pub forgotten: [f64; 2],
+    /// Standard deviations of omega and zeta, as shares of theirs, and of tau, s.
+    pub held: [f64; HELD],
     /// Sample time, s.
     pub sample_time: f64,
 }
 
-/// One filter.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Filter {
-    state: [f64; STATES],
-    covariance: [[f64; STATES]; STATES],
-    log_weight: f64,
+impl GainPrior {
+    fn is_sound(&self) -> bool {
+        let sizes = self.drifts.iter().chain(&self.newborn).chain(&self.held);
+        sizes.into_iter().all(|d| *d >= 0.0)
+            && self.shares.iter().all(|s| *s > 0.0 && *s <= 1.0)
+            && self.odds > 0.0
+            && self.life > 0.0
+            && self.freedom > 0.0
+            && self.limit > 0.0
+            && self.sample_time > 0.0
+            && self.forgotten.iter().all(|f| (0.0..=1.0).contains(f))
+    }
 }
 
-crate::state!([] Filter { state, covariance, log_weight });
+/// What surrounds a sample: units and drifts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Around {
+    /// Variance of eps.
+    pub variance: f64,
+    /// |Y| at the reference.
+    pub unit: f64,
+    /// Variances of the level's drift in one second: of the first filter, of the others.
+    pub level: [f64; 2],
+}
 
 /// All filters with their weights.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gains {
     prior: GainPrior,
-    filters: [[Filter; DRIFTS]; POINTS],
-    log_weights: [f64; POINTS],
-    count: usize,
+    shapes: [[[f64; GAINS]; GAINS]; FORMS],
+    filters: [[Kalman; FILTERS]; FORMS],
+    log_weights: [f64; FORMS],
+    samples: u64,
 }
 
-crate::state!([] Gains { filters, log_weights });
+crate::state!([] Gains { filters, log_weights, samples });
 
 impl Gains {
-    /// For the first `count` points, with gains of zero and nothing known of them.
-    pub fn new(prior: GainPrior, count: usize) -> Option<Self> {
-        let sound = (1..=POINTS).contains(&count)
-            && prior.drifts.iter().all(|d| *d >= 0.0)
-            && prior.freedom > 0.0
-            && prior.limit > 0.0
-            && prior.forgotten.iter().all(|f| (0.0..=1.0).contains(f));
-        let filter = Filter {
+    /// With gains of zero and nothing known of them. The basis gives the scale of the gains. `None`
+    /// for numbers that make no sense.
+    pub fn new(prior: GainPrior, basis: &Basis) -> Option<Self> {
+        let nobody = Kalman {
             state: [0.0; STATES],
             covariance: [[0.0; STATES]; STATES],
-            log_weight: -libm::log(DRIFTS as f64),
+            log_weight: 0.0,
         };
-        sound.then_some(Self {
+        let mut gains = Self {
             prior,
-            filters: [[filter; DRIFTS]; POINTS],
-            log_weights: [-libm::log(count as f64); POINTS],
-            count,
-        })
+            shapes: shapes(basis),
+            filters: [[nobody; FILTERS]; FORMS],
+            log_weights: [-libm::log(FORMS as f64); FORMS],
+            samples: 0,
+        };
+        gains.weigh_anew();
+        prior.is_sound().then_some(gains)
     }
 
-    /// Begins with gains of zero and these standard deviations of gains and level.
-    pub fn begin(&mut self, gain: f64, level: f64) {
-        for filter in self.filters.iter_mut().flatten() {
-            filter.state = [0.0; STATES];
-            filter.covariance = [[0.0; STATES]; STATES];
-            for i in 0..GAINS {
-                filter.covariance[i][i] = gain * gain;
-            }
-            filter.covariance[GAINS][GAINS] = level * level;
-            filter.log_weight = -libm::log(DRIFTS as f64);
+    fn supposed(&self, filter: usize) -> f64 {
+        let share = self.prior.shares.get(filter);
+        libm::log(share.copied().unwrap_or(self.prior.odds * self.prior.shares[0]))
+    }
+
+    fn weigh_anew(&mut self) {
+        self.log_weights = [-libm::log(FORMS as f64); FORMS];
+        for k in 0..FILTERS {
+            let log_weight = self.supposed(k);
+            self.filters.iter_mut().for_each(|form| form[k].log_weight = log_weight);
         }
-        self.log_weights = [-libm::log(self.count as f64); POINTS];
+        for filters in &mut self.filters {
+            normalise(filters);
+        }
+    }
+
+    /// Begins with gains of zero and these standard deviations of gains and level; what is held is
+    /// as it is.
+    pub fn begin(&mut self, gain: f64, level: f64) {
+        for (filters, shape) in self.filters.iter_mut().zip(&self.shapes) {
+            for filter in filters {
+                filter.state = [0.0; STATES];
+                filter.reopen(shape, gain, level, [0.0; HELD]);
+            }
+        }
+        self.weigh_anew();
+    }
+
+    /// Goes on from the gains of now, as if nothing were known of how good they are, and lets what is
+    /// held be corrected from here on.
+    pub fn reopen(&mut self, gain: f64, level: f64, point: Point) {
+        let [omega, zeta, tau] = self.prior.held;
+        let held = [omega * point.omega, zeta * point.zeta, tau];
+        for (filters, shape) in self.filters.iter_mut().zip(&self.shapes) {
+            filters.iter_mut().for_each(|f| f.reopen(shape, gain, level, held));
+        }
     }
 
     /// Lets the gains be anything within this standard deviation more than they were.
     pub fn open(&mut self, gain: f64) {
+        for (filters, shape) in self.filters.iter_mut().zip(&self.shapes) {
+            filters.iter_mut().for_each(|f| f.open_gains(shape, gain * gain));
+        }
+    }
+
+    /// The basis was moved by these corrections. What was of first order before was wrong by some of
+    /// that: the corrections are opened by a share of it.
+    pub fn moved(&mut self, by: [f64; HELD]) {
         for filter in self.filters.iter_mut().flatten() {
-            for i in 0..GAINS {
-                filter.covariance[i][i] += gain * gain;
+            for (i, by) in (LINEAR..STATES).zip(by) {
+                filter.state[i] -= by;
+                filter.covariance[i][i] += OPEN_AGAIN * by * by;
             }
         }
     }
 
-    /// Takes a sample behind the whitening filter. `variance` is that of eps, `unit` |Y| at the
-    /// reference, `level` the variance of the level's drift in one second. Returns the innovation of
-    /// the mixture.
-    pub fn update(&mut self, y: f64, r: &[[f64; STATES]; POINTS], variance: f64, unit: f64, level: f64) -> f64 {
+    /// Takes a sample behind the whitening filter; `level` is D(1), `point` that of the basis. Returns
+    /// the innovation of the mixture.
+    pub fn update(&mut self, y: f64, regressors: &Regressors, level: f64, point: Point, around: &Around) -> f64 {
         let prior = self.prior;
-        let mut innovation = 0.0;
-        let mut highest = f64::NEG_INFINITY;
-        for (point, r) in r.iter().enumerate().take(self.count) {
-            let share = libm::exp(self.log_weights[point]);
-            let filters = &mut self.filters[point];
-            let mut density = 0.0;
-            for (filter, drift) in filters.iter_mut().zip(prior.drifts) {
-                let weight = libm::exp(filter.log_weight);
-                let walk = (drift * unit) * (drift * unit) * prior.sample_time;
-                let (eps, log_density) = filter.update(y, r, variance, walk, level * prior.sample_time, &prior);
-                innovation += share * weight * eps;
-                density += weight * libm::exp(log_density);
-                filter.log_weight = (1.0 - prior.forgotten[1]) * filter.log_weight + log_density;
+        let ts = prior.sample_time;
+        let seen = Seen {
+            y,
+            regressors,
+            level,
+            variance: around.variance,
+            point,
+            tails: [prior.freedom, prior.limit],
+        };
+        let walks: [f64; FILTERS] = core::array::from_fn(|k| {
+            let drift = prior.drifts.get(k).copied().unwrap_or(prior.newborn[0]) * around.unit;
+            drift * drift * ts
+        });
+        let [among_forms, among_drifts] = prior.forgotten;
+        let supposed: [f64; FILTERS] = core::array::from_fn(|k| self.supposed(k));
+        let (mut innovation, mut total) = (0.0, 0.0);
+        for form in 0..FORMS {
+            let share = exp(self.log_weights[form]);
+            let filters = &mut self.filters[form];
+            for (k, filter) in filters.iter_mut().enumerate() {
+                filter.open_gains(&self.shapes[form], walks[k]);
+                filter.covariance[GAINS][GAINS] += around.level[usize::from(k > 0)] * ts;
+                let weight = share * exp(filter.log_weight);
+                let (eps, log_density) = filter.update(&seen);
+                innovation += weight * eps;
+                total += weight;
+                if k < DRIFTS {
+                    filter.log_weight += among_drifts * (supposed[k] - filter.log_weight);
+                }
+                filter.log_weight += log_density;
             }
-            normalise(filters);
-            // A density of zero by underflow says no more than a very small one.
-            self.log_weights[point] =
-                (1.0 - prior.forgotten[0]) * self.log_weights[point] + libm::log(density.max(f64::MIN_POSITIVE));
-            highest = highest.max(self.log_weights[point]);
+            let log_density = normalise(filters);
+            let even = -libm::log(FORMS as f64);
+            self.log_weights[form] += among_forms * (even - self.log_weights[form]) + log_density;
         }
-        let logs = &mut self.log_weights[..self.count];
-        let sum: f64 = logs.iter().map(|l| libm::exp(l - highest)).sum();
-        logs.iter_mut().for_each(|l| *l -= highest + libm::log(sum));
-        innovation
+        let log_sum = log_sum(&self.log_weights);
+        self.log_weights.iter_mut().for_each(|l| *l -= log_sum);
+        self.samples += 1;
+        self.renew(around.unit);
+        innovation / total
+    }
+
+    /// Filters that are out of the question start again, and the newborns whose life is over are born
+    /// again.
+    fn renew(&mut self, unit: f64) {
+        let life = libm::round(self.prior.life / self.prior.sample_time).max(NEWBORNS as f64) as u64;
+        let jump = self.prior.newborn[1] * unit;
+        let odds = libm::log(self.prior.odds);
+        for (filters, shape) in self.filters.iter_mut().zip(&self.shapes) {
+            let best = best_of(filters);
+            for k in 0..DRIFTS {
+                if filters[k].log_weight < LEAST {
+                    filters[k] = Kalman {
+                        log_weight: AGAIN,
+                        ..best
+                    };
+                }
+            }
+            for i in 0..NEWBORNS {
+                if !(self.samples + i as u64 * life / NEWBORNS as u64).is_multiple_of(life) {
+                    continue;
+                }
+                if filters[DRIFTS + i].log_weight > filters[0].log_weight {
+                    filters[0] = filters[DRIFTS + i];
+                }
+                let mut child = filters[0];
+                child.open_gains(shape, jump * jump);
+                child.log_weight += odds;
+                filters[DRIFTS + i] = child;
+            }
+        }
     }
 
     /// The innovation of the mixture, without an update.
-    pub fn innovation(&self, y: f64, r: &[[f64; STATES]; POINTS]) -> f64 {
-        let mut innovation = 0.0;
-        for (point, filter, weight) in self.weighted() {
-            let predicted: f64 = filter.state.iter().zip(&r[point]).map(|(s, r)| s * r).sum();
-            innovation += weight * (y - predicted);
-        }
-        innovation
+    pub fn innovation(&self, y: f64, regressors: &Regressors, level: f64) -> f64 {
+        let (mut innovation, mut total) = (0.0, 0.0);
+        self.each(|filter, weight| {
+            innovation += weight * (y - filter.predicted(regressors, level).0);
+            total += weight;
+        });
+        innovation / total
     }
 
-    /// Point, filter and weight of all that count.
-    fn weighted(&self) -> impl Iterator<Item = (usize, &Filter, f64)> {
-        self.filters[..self.count]
-            .iter()
-            .enumerate()
-            .flat_map(move |(point, filters)| {
-                let share = self.log_weights[point];
-                filters
-                    .iter()
-                    .map(move |f| (point, f, libm::exp(share + f.log_weight)))
-                    .filter(|(_, _, weight)| *weight > NOTHING)
-            })
-    }
-
-    /// The likeliest point.
-    pub fn likeliest(&self) -> usize {
-        let logs = &self.log_weights[..self.count];
-        let best = logs.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
-        best.map_or(0, |(point, _)| point)
-    }
-
-    /// Probability of a point.
-    pub fn probability(&self, point: usize) -> f64 {
-        if point < self.count {
-            libm::exp(self.log_weights[point])
-        } else {
-            0.0
+    /// All that count, with their weights.
+    fn each(&self, mut of: impl FnMut(&Kalman, f64)) {
+        for (filters, share) in self.filters.iter().zip(self.log_weights) {
+            for filter in filters {
+                let weight = exp(share + filter.log_weight);
+                if weight > NOTHING {
+                    of(filter, weight);
+                }
+            }
         }
     }
 
-    /// Mean of gains and level at a point, over the drifts.
-    pub fn state(&self, point: usize) -> [f64; STATES] {
-        let mut mean = [0.0; STATES];
-        for filter in &self.filters[point] {
-            let weight = libm::exp(filter.log_weight);
+    /// Probability of a form.
+    pub fn probability(&self, form: usize) -> f64 {
+        self.log_weights.get(form).map_or(0.0, |l| exp(*l))
+    }
+
+    /// Mean of gains, level and corrections.
+    pub fn state(&self) -> [f64; STATES] {
+        let (mut mean, mut total) = ([0.0; STATES], 0.0);
+        self.each(|filter, weight| {
+            total += weight;
             for (m, s) in mean.iter_mut().zip(filter.state) {
                 *m += weight * s;
             }
-        }
-        mean
+        });
+        mean.map(|m| m / total)
     }
 
-    /// Mean and covariance of `M theta` over the mixture, with a matrix M for each point: the
-    /// differences between the filters are part of the covariance.
-    pub fn moments<const K: usize>(&self, maps: &[[[f64; GAINS]; K]; POINTS]) -> ([f64; K], [[f64; K]; K]) {
-        let (mut mean, mut second, mut total) = ([0.0; K], [[0.0; K]; K], 0.0);
-        // About the likeliest, so that nothing cancels.
-        let about = apply(&maps[self.likeliest()], &self.state(self.likeliest()));
-        for (point, filter, weight) in self.weighted() {
-            let map = &maps[point];
-            let value = apply(map, &filter.state);
+    /// Covariance of the mixture: the differences between the filters are part of it.
+    pub fn covariance(&self) -> [[f64; STATES]; STATES] {
+        let mean = self.state();
+        let (mut sum, mut total) = ([[0.0; STATES]; STATES], 0.0);
+        self.each(|filter, weight| {
             total += weight;
-            for i in 0..K {
-                let a = value[i] - about[i];
-                mean[i] += weight * a;
-                for j in 0..K {
-                    let mut sum = a * (value[j] - about[j]);
-                    for k in 0..GAINS {
-                        for l in 0..GAINS {
-                            sum += map[i][k] * filter.covariance[k][l] * map[j][l];
-                        }
-                    }
-                    second[i][j] += weight * sum;
+            for i in 0..STATES {
+                let a = filter.state[i] - mean[i];
+                for j in 0..STATES {
+                    sum[i][j] += weight * (filter.covariance[i][j] + a * (filter.state[j] - mean[j]));
                 }
             }
-        }
-        let mean = mean.map(|m| m / total);
-        let covariance = core::array::from_fn(|i| core::array::from_fn(|j| second[i][j] / total - mean[i] * mean[j]));
-        (core::array::from_fn(|i| about[i] + mean[i]), covariance)
+        });
+        sum.map(|row| row.map(|c| c / total))
     }
 }
 
-fn apply<const K: usize>(map: &[[f64; GAINS]; K], state: &[f64; STATES]) -> [f64; K] {
-    core::array::from_fn(|i| map[i].iter().zip(state).map(|(m, s)| m * s).sum())
-}
-
-/// Makes the weights of a point sum to one, and starts those that are out of the question again.
-fn normalise(filters: &mut [Filter; DRIFTS]) {
-    let mut best = 0;
-    for i in 1..DRIFTS {
-        if filters[i].log_weight > filters[best].log_weight {
-            best = i;
-        }
-    }
-    let highest = filters[best].log_weight;
-    let sum: f64 = filters.iter().map(|f| libm::exp(f.log_weight - highest)).sum();
-    let log_sum = highest + libm::log(sum);
-    let source = filters[best];
-    for filter in filters {
-        filter.log_weight -= log_sum;
-        if filter.log_weight < LEAST {
-            *filter = Filter {
-                log_weight: AGAIN,
-                ..source
-            };
-        }
-    }
-}
-
-impl Filter {
-    /// Innovation, and logarithm of its density.
-    #[inline(always)]
-    fn update(
-        &mut self,
-        y: f64,
-        r: &[f64; STATES],
-        variance: f64,
-        walk: f64,
-        level: f64,
-        prior: &GainPrior,
-    ) -> (f64, f64) {
-        let (mut through, mut spread, mut eps) = ([0.0; STATES], 0.0, y);
-        for i in 0..STATES {
-            self.covariance[i][i] += if i < GAINS { walk } else { level };
-            eps -= self.state[i] * r[i];
-        }
-        for i in 0..STATES {
-            for j in 0..STATES {
-                through[i] += self.covariance[i][j] * r[j];
-            }
-            spread += through[i] * r[i];
-        }
-        let (total, nu) = (spread + variance, prior.freedom);
-        let square = eps * eps / total;
-        let weight = ((nu + 1.0) / (nu + square)).min(1.0);
-        let log_density = -0.5 * (libm::log(total) + (nu + 1.0) * libm::log1p(square / nu));
-        let most = prior.limit * libm::sqrt(total);
-        let limited = eps.clamp(-most, most);
-        let gain = 1.0 / (spread + variance / weight);
-        for i in 0..STATES {
-            self.state[i] += through[i] * gain * limited;
-            for j in 0..STATES {
-                self.covariance[i][j] -= through[i] * gain * through[j];
+/// The covariances of the gains of each form, for a |Y| of one.
+fn shapes(basis: &Basis) -> [[[f64; GAINS]; GAINS]; FORMS] {
+    let mut shapes = [[[0.0; GAINS]; GAINS]; FORMS];
+    (0..GAINS).for_each(|i| shapes[0][i][i] = 1.0);
+    let a = 1.0 / basis.point().lag;
+    for column in [[a, 1.0, 0.0], [0.0, LEAD_S * a, LEAD_S]] {
+        let scaled: [f64; GAINS] = core::array::from_fn(|i| column[i] / basis.scale()[i]);
+        for i in 0..GAINS {
+            for j in 0..GAINS {
+                shapes[1][i][j] += scaled[i] * scaled[j];
             }
         }
-        (eps, log_density)
     }
+    shapes
+}
+
+fn best_of(filters: &[Kalman; FILTERS]) -> Kalman {
+    let mut best = filters[0];
+    for filter in &filters[1..] {
+        if filter.log_weight > best.log_weight {
+            best = *filter;
+        }
+    }
+    best
+}
+
+/// `ln sum e^x`. Densities of zero by underflow say no more than very small ones.
+fn log_sum(logs: &[f64]) -> f64 {
+    let highest = logs.iter().copied().fold(-1e300, f64::max);
+    highest + libm::log(logs.iter().map(|l| exp((l - highest).max(-700.0))).sum())
+}
+
+/// Makes the weights of a form sum to one; returns the logarithm of what they summed to.
+fn normalise(filters: &mut [Kalman; FILTERS]) -> f64 {
+    let sum = log_sum(&filters.each_ref().map(|f| f.log_weight));
+    filters.iter_mut().for_each(|f| f.log_weight -= sum);
+    sum
 }
 
 #[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-    use crate::population::cholesky;
-
-    const PRIOR: GainPrior = GainPrior {
-        drifts: [0.0; DRIFTS],
-        freedom: 1e300,
-        limit: f64::INFINITY,
-        forgotten: [0.0; 2],
-        sample_time: 0.01,
-    };
-
-    fn sample(t: u32) -> (f64, [f64; STATES]) {
-        let wave = |by: u32| f64::from((t * t * by + 3 * t) % 101) / 50.0 - 1.0;
-        let r = [wave(1), wave(7), wave(13), 0.3];
-        let y = 1.5 * r[0] - 0.7 * r[1] + 0.2 * r[2] + 0.1 + 0.2 * wave(29);
-        (y, r)
-    }
-
-    #[test]
-    fn without_drift_it_is_weighted_least_squares() {
-        let mut gains = Gains::new(PRIOR, POINTS).unwrap();
-        gains.begin(2.0, 0.5);
-        // (sum r r'/sigma^2 + P_0^-1) s = sum r y/sigma^2, with a variance that changes.
-        let (mut a, mut b) = ([[0.0; STATES]; STATES], [0.0; STATES]);
-        for i in 0..STATES {
-            a[i][i] = if i < GAINS { 0.25 } else { 4.0 };
-        }
-        for t in 0..300 {
-            let (y, r) = sample(t);
-            let variance = if t < 150 { 0.02 } else { 0.1 };
-            gains.update(y, &[r; POINTS], variance, 1.0, 0.0);
-            for i in 0..STATES {
-                b[i] += r[i] * y / variance;
-                for j in 0..STATES {
-                    a[i][j] += r[i] * r[j] / variance;
-                }
-            }
-        }
-        assert!(cholesky::factor(&mut a, STATES));
-        cholesky::solve(&a, STATES, &mut b);
-        for (s, b) in gains.state(3).iter().zip(b) {
-            assert!((s - b).abs() < 1e-9, "{s} {b}");
-        }
-        // The covariance of the mixture of equals is the inverse of the same matrix.
-        let mut unit = [[[0.0; GAINS]; GAINS]; POINTS];
-        unit.iter_mut().for_each(|m| (0..GAINS).for_each(|i| m[i][i] = 1.0));
-        let (mean, covariance) = gains.moments(&unit);
-        for i in 0..GAINS {
-            let mut column = [0.0; STATES];
-            column[i] = 1.0;
-            cholesky::solve(&a, STATES, &mut column);
-            assert!((mean[i] - b[i]).abs() < 1e-9);
-            for j in 0..GAINS {
-                assert!((covariance[i][j] - column[j]).abs() < 1e-9 * column[i].abs());
-            }
-        }
-    }
-
-    #[test]
-    fn the_point_that_foretells_wins() {
-        let mut gains = Gains::new(PRIOR, POINTS).unwrap();
-        gains.begin(2.0, 0.5);
-        for t in 0..300 {
-            let (y, r) = sample(t);
-            let mut wrong = [sample(t + 1).1; POINTS];
-            wrong[4] = r;
-            gains.update(y, &wrong, 0.02, 1.0, 0.0);
-        }
-        assert_eq!(gains.likeliest(), 4);
-        assert!(gains.probability(4) > 0.999 && gains.probability(POINTS) == 0.0);
-        assert!(Gains::new(PRIOR, 0).is_none() && Gains::new(PRIOR, POINTS + 1).is_none());
-    }
-}
+mod tests;

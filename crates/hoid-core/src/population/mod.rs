@@ -7,25 +7,25 @@
 //!
 //! (D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249). Data of
 //! seconds determine the numerator; poles, lag and delay they do not, and they are nearly the same
-//! for everybody. So those are held, at a few points around what is usual ([`basis`]), and with the
-//! responses x_i of `s^i/(..)` to the error
+//! for everybody. So those begin at what is usual ([`basis`]), and with the responses x_i of
+//! `s^i/(..)` to the error
 //!
 //! `u = sum_i theta_i x_i + level + v`, `D(q^-1) v = eps`,
 //!
-//! which is linear in the gains. A gain with a lead but without a lag is in the span: then
-//! `N = (K_e + K_e_dot s)(T_I s + 1)`.
+//! which is linear in the gains. Data of a minute do determine omega, zeta and tau: corrections of
+//! them are estimated with the gains, to first order, and where they have grown the basis moves
+//! there (`place`). The lag stays. A gain with a lead but without a lag is in the span: then
+//! `N = (K_e + K_e_dot s)(T_I s + 1)`, and is weighed against any numerator.
 //!
 //! - **Noise** ([`noise`]). D is a long autoregression by least squares with a slow memory. At each
 //!   sample all its lags are made with the same gains, so that a move of the gains leaves no step in
 //!   it. The level of eps follows with a time constant of its own: a remnant that grows makes the
 //!   gains slower, not faster.
-//! - **Gains** ([`gains`]). For each point of the basis there are Kalman filters of
-//!   `[theta, level]` that differ in how much the gains drift: hardly, somewhat, much. Weights follow
-//!   the likelihood, forgotten slowly. While nothing changes the one that hardly drifts wins, and
-//!   the precision grows; where it fails it takes over the state of the best. (D. T. Magill, IEEE
-//!   Trans. Automatic Control 10 (1965) 434-439.) The likelihood and the gain are those of a Student
-//!   distribution, so that an outlier says little (J. Meinhold and N. Singpurwalla, JASA 84 (1989)
-//!   479-486).
+//! - **Gains** ([`gains`]). Extended Kalman filters of `[theta, level, corrections]` differ in form and
+//!   in how much the gains drift: hardly, somewhat, much, or just changed. Weights follow the
+//!   likelihood, forgotten slowly. While nothing changes the one that hardly drifts wins, and the
+//!   precision grows. (D. T. Magill, IEEE Trans. Automatic Control 10 (1965) 434-439.) The likelihood
+//!   and the gain are those of a Student distribution, so that an outlier says little.
 //! - **Changes** ([`detector`]). Declared from the difference of Y at one frequency between the last
 //!   seconds and the time before, each fitted by least squares with a variance of its own (G. C.
 //!   Chow, Econometrica 28 (1960) 591-605; unequal variances: B. L. Welch, Biometrika 34 (1947)
@@ -41,7 +41,9 @@ pub mod noise;
 
 mod cholesky;
 mod filter;
+mod kalman;
+mod place;
 mod sizes;
 
 pub use filter::{PopulationFilter, PopulationPrior, errors_needed};
-pub use sizes::{DRIFTS, GAINS, LARGEST_ORDER, POINTS, STATES};
+pub use sizes::{DRIFTS, FORMS, GAINS, HELD, LARGEST_ORDER, LINEAR, STATES};

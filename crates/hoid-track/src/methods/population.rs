@@ -2,20 +2,22 @@
 //! recursion: what is usual of people, in seconds.
 //!
 //! It needs no start fit. The usual person (lag 3 s, neuromuscular system of 11 rad/s and .25, their
-//! form `(T_L s + 1)^2/(T_I s + 1)`) is what recorded people have been found to be, and the delays
-//! stand around that of nk, .2 s where nothing is said. All other numbers were set on simulated
-//! people whose operator has a lag, whose delay is no whole number of samples, and whose remnant is
-//! an autoregression with a level that may change; none on recorded people.
+//! form `(T_L s + 1)^2/(T_I s + 1)`) is what recorded people have been found to be; the delay begins at
+//! that of nk, .2 s where nothing is said, and at half a sample more, for an error that is held. All
+//! other numbers were set on simulated people: those whose operator has a lag, whose delay is no whole
+//! number of samples, and whose remnant is an autoregression with a level that may change, and those of
+//! the conditions C1 to C6, seed 9000; none on recorded people.
 //!
 //! **What it reports.** Gains of the basis are no parameters of an operator. K_e and K_e_dot are those
 //! of the gain and lead that are nearest to it at [`NEAR_RAD_S`], by least squares in
 //! `K_e + K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`;
-//! exactly those of a person who has a gain and a lead. The polynomials are the hold of that.
+//! exactly those of a person who has a gain and a lead. The polynomials are the hold of that, with the
+//! delay of nk.
 
 use hoid_core::{
     adaptive::prior::OPERATOR,
     population::{
-        DRIFTS, GAINS, POINTS, PopulationFilter, PopulationPrior,
+        DRIFTS, GAINS, HELD, LINEAR, PopulationFilter, PopulationPrior, STATES,
         basis::{Basis, Point},
         detector::{BLOCK_S, Detection, Span},
         errors_needed,
@@ -45,26 +47,34 @@ use crate::{
 const LAG_S: f64 = 3.0;
 const OMEGA_RAD_S: f64 = 11.0;
 const ZETA: f64 = 0.25;
-/// Delays of the points, from that of nk on, s.
-const DELAYS_S: [f64; POINTS] = [0.0, -0.08, -0.04, 0.04, 0.08, 0.14, 0.2];
-/// Standard deviations of the gains' drift in one second, over |Y| at 2 rad/s.
-const DRIFT: [f64; DRIFTS] = [0.005, 0.07, 0.3];
+/// How far people are from that: shares of omega and zeta, and s for the delay.
+const SPREAD: [f64; HELD] = [0.3, 0.5, 0.02];
+/// Standard deviations of the gains' drift in one second, over |Y| at 2 rad/s, and what is supposed
+/// of their weights.
+const DRIFT: [f64; DRIFTS] = [0.0005, 0.07, 0.3];
+const SHARES: [f64; DRIFTS] = [0.9, 0.05, 0.05];
+/// Those who have just changed: their drift, the size of the change, their odds, and their life, s.
+const NEWBORN: [f64; 2] = [0.1, 0.5];
+const ODDS: f64 = 0.01;
+const LIFE_S: f64 = 2.0;
 /// Degrees of freedom of the innovations, and limit in standard deviations.
 const FREEDOM: f64 = 5.0;
 const LIMIT: f64 = 3.5;
-/// Time constants with which the weights of points and of drifts are forgotten, s.
-const POINT_MEMORY_S: f64 = 60.0;
-const DRIFT_MEMORY_S: f64 = 15.0;
+/// Time constants with which the weights of forms and of drifts are forgotten, s.
+const FORM_MEMORY_S: f64 = 60.0;
+const DRIFT_MEMORY_S: f64 = 5.0;
 /// Order of the noise model when none is named, and the largest; its memory, s.
 const USUAL_ND: usize = 16;
 const LARGEST_ND: usize = hoid_core::population::LARGEST_ORDER;
 const NOISE_MEMORY_S: f64 = 40.0;
 /// Time constants of the innovations' variance for the gains and for the detector, s.
 const LEVEL_MEMORY_S: [f64; 2] = [5.0, 10.0];
-/// Drift of the level of u in one second, over the root mean square of u.
-const OFFSET_DRIFT: f64 = 0.02;
-/// Time after which the estimate begins, s.
+/// Drifts of the level of u in one second, over the root mean square of u: where the gains hardly
+/// move, and else.
+const OFFSET_DRIFT: [f64; 2] = [0.005, 0.01];
+/// Times after which the estimate begins, and neuromuscular system and delay are corrected, s.
 const HOLD_S: f64 = 1.0;
+const REOPEN_S: f64 = 6.0;
 /// What a declared change adds to the gains, over |Y| at 2 rad/s.
 const JUMP: f64 = 0.3;
 /// Frequency in which changes are looked for, rad/s; seconds that are now, and seconds before, at
@@ -185,9 +195,14 @@ fn prior(options: &PopulationOptions, setup: &Setup, ts: f64) -> PopulationPrior
     PopulationPrior {
         gains: GainPrior {
             drifts: DRIFT,
+            shares: SHARES,
+            newborn: NEWBORN,
+            odds: ODDS,
+            life: LIFE_S,
             freedom: FREEDOM,
             limit: options.limit(),
-            forgotten: [POINT_MEMORY_S, DRIFT_MEMORY_S].map(|memory| (ts / memory).min(1.0)),
+            forgotten: [FORM_MEMORY_S, DRIFT_MEMORY_S].map(|memory| (ts / memory).min(1.0)),
+            held: SPREAD,
             sample_time: ts,
         },
         // A structure without a noise model, or with one pole, does not say how it is coloured.
@@ -199,6 +214,7 @@ fn prior(options: &PopulationOptions, setup: &Setup, ts: f64) -> PopulationPrior
         level_memory: LEVEL_MEMORY_S,
         offset_drift: OFFSET_DRIFT,
         hold: HOLD_S,
+        reopen: REOPEN_S,
         jump: JUMP,
         detection: Detection {
             frequency: CHANGE_RAD_S,
@@ -212,31 +228,12 @@ fn prior(options: &PopulationOptions, setup: &Setup, ts: f64) -> PopulationPrior
     }
 }
 
-type Maps = [[[f64; GAINS]; 2]; POINTS];
-
-/// The matrices that take the gains of each point to `[K_e, K_e_dot]`.
-fn gain_and_lead(basis: &Basis) -> [[f64; GAINS]; 2] {
-    let Point { tau, omega, zeta, .. } = basis.point();
-    let squares: f64 = NEAR_RAD_S.iter().map(|w| w * w).sum();
-    let mut map = [[0.0; GAINS]; 2];
-    for w in NEAR_RAD_S {
-        let share = w / omega;
-        let (second, first) = (1.0 - share * share, 2.0 * zeta * share);
-        let (sin, cos) = (tau * w).sin_cos();
-        // What a delay and a neuromuscular system took away.
-        let [re, im] = [second * cos - first * sin, second * sin + first * cos];
-        for (i, [a, b]) in basis.response(w).into_iter().enumerate() {
-            map[0][i] += (a * re - b * im) / NEAR_RAD_S.len() as f64;
-            map[1][i] += w * (a * im + b * re) / squares;
-        }
-    }
-    map
-}
+/// What is told of an operator: K_e, K_e_dot, omega, zeta and tau, of gains, level and corrections.
+const TOLD: usize = OPERATOR + 1;
 
 /// The filter with its report.
 struct PopulationRecursion {
     model: Box<PopulationFilter<Vec<f64>>>,
-    maps: Maps,
     reported: Reported,
 }
 
@@ -249,52 +246,60 @@ impl PopulationRecursion {
     ) -> Result<Self, IdentError> {
         let ts = sample_time.s();
         let nk = setup.orders.nk;
-        let about = (nk as f64 - 1.0) * ts;
-        let mut bases = Vec::with_capacity(POINTS);
-        for later in DELAYS_S {
-            let point = Point {
-                tau: (about + later).max(0.0),
-                omega: OMEGA_RAD_S,
-                zeta: ZETA,
-                lag: LAG_S,
-            };
-            bases.push(Basis::new(point, ts).ok_or_else(|| unusable(&format!("a delay of {} s", point.tau)))?);
-        }
-        let bases: [Basis; POINTS] = bases.try_into().map_err(|_| unusable("its delays"))?;
-        let errors = vec![0.0; errors_needed(&bases)];
-        let maps = std::array::from_fn(|i| gain_and_lead(&bases[i]));
-        let model = PopulationFilter::new(bases, prior(options, setup, ts), errors)
-            .ok_or_else(|| unusable("its sample time or options"))?;
+        let point = Point {
+            tau: (nk as f64 - 0.5) * ts,
+            omega: OMEGA_RAD_S,
+            zeta: ZETA,
+            lag: LAG_S,
+        };
+        let basis = Basis::new(point, ts).ok_or_else(|| unusable(&format!("a delay of {} s", point.tau)))?;
+        let model = PopulationFilter::new(basis, prior(options, setup, ts), vec![0.0; errors_needed(ts)])
+            .ok_or_else(|| unusable("its delay, sample time or options"))?;
         Ok(Self {
             model: Box::new(model),
-            maps,
             reported: Reported::new(from, nk, sample_time),
         })
     }
 
-    fn report(&mut self) {
-        let ([k_e, k_e_dot], _) = self.model.gains().moments(&self.maps);
-        self.reported.set([k_e, k_e_dot, OMEGA_RAD_S, ZETA]);
-        self.reported.set_noise(self.model.d());
+    /// K_e, K_e_dot, omega_nm, zeta_nm, tau_e.
+    fn told(&self) -> [f64; TOLD] {
+        let (map, state, held) = (
+            self.model.basis().gain_and_lead(&NEAR_RAD_S),
+            self.model.gains().state(),
+            self.model.held(),
+        );
+        let gain = |i: usize| (0..GAINS).map(|k| map[i][k] * state[k]).sum();
+        // The error of a sample is held: half a sample of the delay is the hold's.
+        let hold = 0.5 * self.reported.sample_time_s();
+        [gain(0), gain(1), held.omega, held.zeta, (held.tau - hold).max(0.0)]
     }
 
-    /// Mean and variance of the delay over the points, that of the steps between them included.
-    fn delay(&self) -> Estimate {
-        let (mut mean, mut square, mut total) = (0.0, 0.0, 0.0);
-        for (i, basis) in self.model.bases().iter().enumerate() {
-            let (probability, tau) = (self.model.gains().probability(i), basis.point().tau);
-            total += probability;
-            mean += probability * tau;
-            square += probability * tau * tau;
+    /// Their covariance.
+    fn spread(&self) -> [[f64; TOLD]; TOLD] {
+        let (map, c) = (
+            self.model.basis().gain_and_lead(&NEAR_RAD_S),
+            self.model.gains().covariance(),
+        );
+        let mut rows = [[0.0; STATES]; TOLD];
+        for (row, gains) in rows.iter_mut().zip(map) {
+            row[..GAINS].copy_from_slice(&gains);
         }
-        let mean = mean / total;
-        let step = DELAYS_S[3];
-        Estimate::with_variance(mean, (square / total - mean * mean).max(0.0) + step * step / 12.0)
+        for j in 0..HELD {
+            rows[2 + j][LINEAR + j] = 1.0;
+        }
+        through(&rows, &c)
+    }
+
+    fn report(&mut self) {
+        let [k_e, k_e_dot, omega, zeta, _] = self.told();
+        self.reported.set([k_e, k_e_dot, omega, zeta]);
+        self.reported.set_noise(self.model.d());
     }
 
     /// K_e and K_e_dot of one of the spans that were compared.
     fn of_span(&self, span: &Span) -> [Estimate; 2] {
-        self.maps[0].map(|row| {
+        let map = self.model.basis().gain_and_lead(&NEAR_RAD_S);
+        map.map(|row| {
             let value: f64 = row.iter().zip(span.state).map(|(m, s)| m * s).sum();
             let mut variance = 0.0;
             for (i, a) in row.iter().enumerate() {
@@ -306,6 +311,15 @@ impl PopulationRecursion {
             Estimate::with_variance(value, variance * self.model.detector().usual_level())
         })
     }
+}
+
+/// `M C M'`.
+fn through<const K: usize>(rows: &[[f64; STATES]; K], c: &[[f64; STATES]; STATES]) -> [[f64; K]; K] {
+    let of = |a: &[f64; STATES], b: &[f64; STATES]| -> f64 {
+        let each = (0..STATES).map(|i| a[i] * (0..STATES).map(|j| c[i][j] * b[j]).sum::<f64>());
+        each.sum()
+    };
+    std::array::from_fn(|i| std::array::from_fn(|j| of(&rows[i], &rows[j])))
 }
 
 /// T that makes `E (K_e_dot - T K_e)^2` least, and its variance.
@@ -353,11 +367,8 @@ impl Recursion for PopulationRecursion {
         if !self.model.began() {
             return false;
         }
-        let (_, c) = self.model.gains().moments(&self.maps);
-        let mut whole = [[0.0; OPERATOR]; OPERATOR];
-        for i in 0..2 {
-            whole[i][..2].copy_from_slice(&c[i]);
-        }
+        let c = self.spread();
+        let whole = std::array::from_fn(|i| std::array::from_fn(|j| c[i][j]));
         self.reported.covariance(&whole, into);
         match self.model.noise().covariance() {
             Some(of_d) => self.reported.set_covariance_of_noise(&of_d, into),
@@ -371,9 +382,11 @@ impl Recursion for PopulationRecursion {
     }
 
     fn operator(&self) -> Option<OperatorEstimate> {
-        let (values, covariance) = self.model.gains().moments(&self.maps);
+        let (values, covariance) = (self.told(), self.spread());
+        let [k_e, k_e_dot, ..] = values;
+        let of_gains = [0, 1].map(|i| [0, 1].map(|j| covariance[i][j]));
         let [lead, lead_variance] = match self.model.began() {
-            true => lead_time(values, &covariance),
+            true => lead_time([k_e, k_e_dot], &of_gains),
             false => [f64::NAN; 2],
         };
         let of = |i: usize| Estimate::with_variance(values[i], covariance[i][i]);
@@ -381,9 +394,9 @@ impl Recursion for PopulationRecursion {
             k_e: of(0),
             t_l_s: Estimate::with_variance(lead, lead_variance),
             k_e_dot: of(1),
-            omega_nm_rad_s: Estimate::fixed(OMEGA_RAD_S),
-            zeta_nm: Estimate::fixed(ZETA),
-            tau_e_s: self.delay(),
+            omega_nm_rad_s: of(2),
+            zeta_nm: of(3),
+            tau_e_s: of(4),
         })
     }
 
@@ -404,15 +417,16 @@ impl Recursion for PopulationRecursion {
         };
         let log_variance = 2.0 / before.samples + 2.0 / after.samples;
         let level = (after.variance / before.variance).ln() / (log_variance * detector.usual_level()).sqrt();
-        let same = |e: Estimate| [e, e];
+        let values = self.told();
+        let same = |i: usize| [Estimate::fixed(values[i]); 2];
         Some(Change {
             seconds_ago: NOW_S,
             odds: detector.statistic() / 2.0,
             k_e: [k_e, now_k_e],
             k_e_dot: [k_e_dot, now_k_e_dot],
-            omega_nm_rad_s: same(Estimate::fixed(OMEGA_RAD_S)),
-            zeta_nm: same(Estimate::fixed(ZETA)),
-            tau_e_s: same(self.delay()),
+            omega_nm_rad_s: same(2),
+            zeta_nm: same(3),
+            tau_e_s: same(4),
             t_l_s: [k_e_dot.value / k_e.value, now_k_e_dot.value / now_k_e.value],
             innovation_variance: [before.variance, after.variance],
             z: [z(k_e, now_k_e), z(k_e_dot, now_k_e_dot), 0.0, 0.0, level, 0.0],
@@ -423,13 +437,11 @@ impl Recursion for PopulationRecursion {
         if !self.model.began() {
             return None;
         }
-        let bases = self.model.bases();
-        let maps: Maps = std::array::from_fn(|i| {
-            let h = bases[i].response(omega_rad_s);
-            [h.map(|h| h[0]), h.map(|h| h[1])]
-        });
-        let (value, covariance) = self.model.gains().moments(&maps);
-        Some(Response { value, covariance })
+        let (value, by) = self.model.response_with_derivatives(omega_rad_s);
+        Some(Response {
+            value,
+            covariance: through(&by, &self.model.gains().covariance()),
+        })
     }
 }
 

@@ -36,6 +36,8 @@ struct Line<'a> {
     t: Option<f64>,
     parameters: Option<Parameters<'a>>,
     operator: Option<Operator>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    response: Option<Value>,
     level: &'static str,
     innovation: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -167,6 +169,10 @@ impl Standing<'_> {
             operator: operator.and_then(|o| match o {
                 Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. }) => None,
                 other => Some(Operator(other)),
+            }),
+            response: tracker.filter(|t| !t.options().at_rad_s.is_empty()).map(|t| {
+                let at = &t.options().at_rad_s;
+                json::responses(at, |_, omega_rad_s| t.response(omega_rad_s))
             }),
             innovation: self.innovation,
             change: tracker.and_then(Tracker::change_odds).map(|odds| ChangeLine {

@@ -118,6 +118,7 @@ impl Tracked<'_> {
             "t": number(trace.times_s()[row]),
             "parameters": parameters,
             "operator": json::operator(&self.operators[row]),
+            "response": json::responses(&trace.options().at_rad_s, |place, _| trace.response(row, place)),
             "innovation": number(trace.innovation()[row]),
             "innovation_variance": number(trace.innovation_variance()[row]),
         })

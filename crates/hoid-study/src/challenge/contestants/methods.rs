@@ -1,17 +1,17 @@
 //! The methods of `hoid_track` with their default options.
 //!
 //! Where the delay is told, it is given; where it is not, it is searched on the start span over the
-//! range that the program searches, the other orders as they are. H is that of the polynomials of a
-//! row, its covariance `g' C g` with the gradient g of [`PolynomialModel`].
+//! range that the program searches, the other orders as they are. H is the response that a row or a
+//! tracker tells.
 
 use hoid_ident::{
     OrderRanges,
     order_selection::{Criterion, default_operator_ranges},
 };
-use hoid_model::PolynomialModel;
-use hoid_track::{Change, Method, Sample, StartAt, TrackOptions, TrackPlan, Tracker, track};
+use hoid_model::{Complex64, uncertainty::OperatorEstimate};
+use hoid_track::{Change, Method, Response, Sample, StartAt, TrackOptions, TrackPlan, Tracker, track};
 
-use super::super::contestant::{Alarm, Answer, Contestant, Said, Task, of_complex};
+use super::super::contestant::{Alarm, Answer, Contestant, Said, Task};
 
 /// A method.
 pub(super) struct OfMethod(pub Method);
@@ -31,15 +31,8 @@ impl Contestant for OfMethod {
                 let row = |t_s: &f64| ((t_s / task.sample_time.s() / every as f64 + 1e-6) as usize).max(1) - 1;
                 let rows = task.asked_s.iter().map(|t_s| row(t_s).min(trace.len() - 1));
                 let said = rows.map(|row| {
-                    let covariance = trace.covariance(row);
-                    let operator = trace.operator(row).ok();
-                    said(
-                        task,
-                        &options,
-                        trace.theta(row),
-                        covariance.as_deref(),
-                        operator.as_ref(),
-                    )
+                    let each = (0..task.lines_rad_s.len()).map(|place| trace.response(row, place));
+                    said(each.collect(), trace.operator(row).ok().as_ref())
                 });
                 let verdict = trace.verdict(&record, None).map_err(|e| e.to_string())?;
                 Ok(Answer {
@@ -57,6 +50,7 @@ impl OfMethod {
     fn options(&self, task: &Task) -> Result<TrackOptions, String> {
         let with = |nk| TrackOptions {
             start: StartAt::Span(Some(task.start_s)),
+            at_rad_s: task.lines_rad_s.clone(),
             ..TrackOptions::usual(self.0.clone(), nk)
         };
         if let Some(nk) = task.nk {
@@ -105,9 +99,8 @@ fn over_samples(task: &Task, options: &TrackOptions) -> Result<Answer, String> {
         changes.extend(tracker.change().map(|change| (t_s, change)));
         // The last sample before the time, as the rows of a trace have it.
         while task.asked_s.get(next).is_some_and(|t| task.sample(*t) <= k + 1) {
-            let (covariance, operator) = (tracker.covariance(), tracker.operator().ok());
-            let said = said(task, options, tracker.theta(), covariance.as_deref(), operator.as_ref());
-            answer.said.push(said);
+            let each = task.lines_rad_s.iter().map(|omega| tracker.response(*omega));
+            answer.said.push(said(each.collect(), tracker.operator().ok().as_ref()));
             next += 1;
         }
     }
@@ -115,22 +108,15 @@ fn over_samples(task: &Task, options: &TrackOptions) -> Result<Answer, String> {
     Ok(answer)
 }
 
-fn said(
-    task: &Task,
-    options: &TrackOptions,
-    theta: &[f64],
-    covariance: Option<&[f64]>,
-    operator: Option<&hoid_model::uncertainty::OperatorEstimate>,
-) -> Said {
-    let Ok(model) = PolynomialModel::new(options.structure, options.orders, task.sample_time, theta.to_vec()) else {
+/// What is said at a time; nothing while one of the responses is not there.
+fn said(responses: Option<Vec<Response>>, operator: Option<&OperatorEstimate>) -> Said {
+    let Some(responses) = responses else {
         return Said::default();
     };
-    let each: Vec<_> = task
-        .lines_rad_s
-        .iter()
-        .map(|w| model.response_and_gradient(*w))
-        .collect();
-    let covariance = covariance.map(|c| each.iter().map(|(_, g)| of_complex(g, c)).collect());
+    let covariance = responses.iter().map(|r| {
+        let [[re, both], [_, im]] = r.covariance;
+        re.is_finite().then_some([re, im, both])
+    });
     let parameters = operator.map_or_else(Vec::new, |o| {
         [
             ("K_e", o.k_e),
@@ -143,8 +129,11 @@ fn said(
         .into()
     });
     Said {
-        response: each.into_iter().map(|(h, _)| h).collect(),
-        covariance,
+        response: responses
+            .iter()
+            .map(|r| Complex64::new(r.value[0], r.value[1]))
+            .collect(),
+        covariance: covariance.collect(),
         parameters,
     }
 }

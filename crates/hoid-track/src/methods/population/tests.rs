@@ -20,28 +20,6 @@ fn options() -> TrackOptions {
 }
 
 #[test]
-fn the_map_finds_a_gain_and_a_lead() {
-    // (K_e + K_e_dot s)(T_I s + 1) over T_I is in the span: theta = [K_e/T_I, K_e_dot/T_I + K_e,
-    // K_e_dot] before the scaling.
-    let point = Point {
-        tau: 0.28,
-        omega: 8.0,
-        zeta: 0.4,
-        lag: 3.0,
-    };
-    let basis = Basis::new(point, 0.01).unwrap();
-    let (k_e, k_e_dot) = (0.09, 0.07);
-    let raw = [k_e / 3.0, k_e_dot / 3.0 + k_e, k_e_dot];
-    let theta: Vec<f64> = raw.iter().zip(basis.scale()).map(|(r, s)| r / s).collect();
-    let map = gain_and_lead(&basis);
-    for (row, expected) in map.iter().zip([k_e, k_e_dot]) {
-        let found: f64 = row.iter().zip(&theta).map(|(m, t)| m * t).sum();
-        // The straight line between samples: (omega Ts)^2/12 at 4 rad/s.
-        assert!((found - expected).abs() < 1e-3 * expected, "{found} {expected}");
-    }
-}
-
-#[test]
 fn it_starts_without_a_fit_and_finds_a_steady_person() {
     let record = record(Condition::C1);
     let trace = track(&record, &options(), 100).unwrap();
@@ -96,4 +74,56 @@ fn options_that_make_no_sense_are_refused() {
         ..PopulationOptions::default()
     };
     assert!(rare.threshold() > PopulationOptions::default().threshold());
+}
+
+#[test]
+fn a_trace_tells_gain_and_phase_with_bands() {
+    let record = record(Condition::C1);
+    let at_rad_s = vec![1.0, 2.5];
+    for method in [Method::population(), Method::rls()] {
+        let usual = TrackOptions {
+            at_rad_s: at_rad_s.clone(),
+            ..TrackOptions::usual(method, 29)
+        };
+        let trace = track(&record, &usual, 512).unwrap();
+        let span = usual
+            .start_span(&record)
+            .and_then(|(from, to)| record.span(from, to).ok());
+        let mut tracker = Tracker::new(&usual, span.as_ref(), record.sample_time()).unwrap();
+        for k in 0..record.len() {
+            let sample = Sample {
+                e: record.input()[k],
+                u: record.output()[k],
+                reference: None,
+            };
+            tracker.update(sample, record.time_s(k) >= trace.updated_from_s() - 0.005);
+        }
+        let columns = trace.estimate_columns(&trace.operators());
+        let of = |name: &str| columns.iter().find(|(n, _)| n == name).unwrap().1.clone();
+        for omega in &at_rad_s {
+            let told = tracker.response(*omega).unwrap();
+            for (name, expected) in [("gain_db", told.gain_db()), ("phase_deg", told.phase_deg())] {
+                let (values, errors) = (of(&format!("{name}@{omega}")), of(&format!("{name}@{omega}_se")));
+                assert_eq!(values.len(), trace.len());
+                assert!(
+                    (values[trace.len() - 1] - expected.value).abs() < 1e-9,
+                    "{name} {omega}"
+                );
+                assert!((errors[trace.len() - 1] - expected.standard_error.unwrap()).abs() < 1e-9);
+            }
+        }
+        assert!(trace.response(0, 2).is_none());
+        let averaged = trace.clone().moving_average(2);
+        let (a, b) = (trace.response(9, 0).unwrap(), trace.response(10, 0).unwrap());
+        let mean = averaged.response(10, 0).unwrap();
+        if usual.method == Method::population() {
+            assert!((mean.value[0] - 0.5 * (a.value[0] + b.value[0])).abs() < 1e-12);
+        }
+        assert!(mean.covariance[0][0] > 0.0);
+    }
+    let refused = TrackOptions {
+        at_rad_s: vec![0.0],
+        ..options()
+    };
+    assert!(refused.check().unwrap_err().to_string().contains("rad/s"));
 }
