@@ -93,6 +93,38 @@ def test_tables(fit: pyhoid.Fit, c1: pyhoid.Record, c4: pyhoid.Record) -> None:
     assert trace.to_xarray().K_e.attrs["units"] == "deg/deg"
 
 
+def test_tables_with_instants_and_durations(c1: pyhoid.Record) -> None:
+    pd = pytest.importorskip("pandas")
+    pl = pytest.importorskip("polars")
+    short = c1.span(0, 5)
+    frame = short.to_pandas()
+    for index in (
+        pd.date_range("2026-03-01 12:00", periods=len(frame), freq="10ms"),
+        pd.date_range("2026-03-01 12:00", periods=len(frame), freq="10ms", tz="Europe/Berlin"),
+        pd.timedelta_range("0s", periods=len(frame), freq="10ms"),
+    ):
+        made = pyhoid.Record.from_pandas(frame.set_index(index))
+        assert made.sample_time == 0.01 and made.start_time == 0.0
+        assert np.array_equal(made.u, short.u)
+    late = frame.set_index(pd.timedelta_range("2s", periods=len(frame), freq="10ms"))
+    assert pyhoid.Record.from_pandas(late).start_time == 2.0
+    uneven = frame.drop(frame.index[7])
+    with pytest.raises(pyhoid.DataError, match="uneven"):
+        pyhoid.Record.from_pandas(
+            uneven.set_index(pd.to_datetime(np.asarray(uneven.index), unit="s"))
+        )
+    table = short.to_polars()
+    assert table.columns[:3] == ["t", "e", "u"]
+    made = pyhoid.Record.from_polars(table)
+    assert made.sample_time == 0.01 and np.array_equal(made["f_t"], short["f_t"])
+    made = pyhoid.Record.from_polars(
+        table.with_columns(t=pl.duration(milliseconds=pl.col("t") * 1000))
+    )
+    assert made.sample_time == 0.01
+    with pytest.raises(pyhoid.DataError, match="did you mean f_t"):
+        pyhoid.Record.from_polars(table, input="ft")
+
+
 def test_control_there_and_back(fit: pyhoid.Fit) -> None:
     import control
 

@@ -178,10 +178,11 @@ def test_other_errors(c1: pyhoid.Record, tmp_path: Path) -> None:
         pyhoid.read(tmp_path / "text.csv")
 
 
-def test_arrays_are_not_copied() -> None:
-    """Where the layout allows: records and spans are views, and an update reads the arrays."""
+def test_arrays_that_nobody_can_change_are_not_copied() -> None:
+    """Records and spans of them are views, and an update reads the arrays."""
     n = 2_000_000
     e, u = (np.random.default_rng(k).normal(size=n) for k in (0, 1))
+    e.flags.writeable = u.flags.writeable = False
     tracker = pyhoid.Tracker("rls", structure="arx", na=1, nb=1, nk=1, start="nothing")
     tracemalloc.start()
     try:
@@ -200,6 +201,7 @@ def test_arrays_are_not_copied() -> None:
         "e, u = (numpy.random.default_rng(k).normal(size=4_000_000) for k in (0, 1))\n"
         "t = pyhoid.Tracker('rls', structure='arx', na=1, nb=1, nk=1, start='nothing')\n"
         "t.update(e[:9], u[:9])\n"
+        "e.flags.writeable = u.flags.writeable = False\n"
         "before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
         "pyhoid.Record(e=e, u=u, sample_time=0.01)\n"
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)\n"
@@ -216,6 +218,19 @@ def test_arrays_are_not_copied() -> None:
     assert made < 1e6
     # The innovations alone, which are new.
     assert updated < 1.2 * e.nbytes
+
+
+def test_nothing_changes_behind_the_back_of_a_record() -> None:
+    e, u = values(), values(1)
+    record = pyhoid.Record(e=e, u=u, sample_time=0.01, d=e)
+    before = np.array(record.e)
+    e[:] = 0.0
+    assert record.e is not None and (record.e == before).all()
+    assert (record["d"] == before).all()
+    for array in (record.u, record.e, record["d"], record.span(0, 0.1).u):
+        assert not array.flags.writeable
+        with pytest.raises(ValueError, match="WRITEABLE"):
+            array.flags.writeable = True
 
 
 def test_a_record_does_not_change_under_a_fit(c1: pyhoid.Record) -> None:

@@ -1,7 +1,7 @@
 //! An operator of the family that polynomials stand for, shown to people and to programs.
 
 use hoid_ident::family::{FamilyConversion, PoleRole};
-use hoid_model::NotConvertible;
+use hoid_model::{GainUnit, NotConvertible};
 use serde_json::{Map, Value, json};
 
 use crate::{json, text};
@@ -38,16 +38,14 @@ pub fn to_json(found: &Converted) -> Value {
 }
 
 /// The same as a table and sentences.
-pub fn to_text(found: &Converted) -> String {
+pub fn to_text(found: &Converted, gain: &GainUnit) -> String {
     let found = match found {
         Ok(found) => found,
         Err(reason) => return format!("Operator parameters: not convertible: {reason}.\n"),
     };
-    let mut rows = text::table(&["operator", "value", "standard error", "unit"]);
-    for (name, unit, e) in found.parameters() {
-        let (value, error) = text::with_uncertainty(&e);
-        rows.add_row([name.to_owned(), value, error, unit.to_owned()]);
-    }
+    let all = found.parameters();
+    let named = all.iter().map(|(name, unit, e)| (*name, gain.unit(name, unit), *e));
+    let rows = text::estimates("operator", named);
     let mut page = format!("Form {}.\n{rows}\n", found.operator.form());
     for pole in &found.real_poles {
         let words = match pole.role {

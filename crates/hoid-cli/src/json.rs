@@ -271,6 +271,24 @@ pub struct Identified<'a> {
 }
 
 impl Identified<'_> {
+    /// The answer in words.
+    pub fn sentence(&self) -> Option<String> {
+        let of = self.operator.as_ref().ok().filter(|_| self.has_operator());
+        let named = of.iter().flat_map(|o| o.rows()).map(|(name, _, e)| (name, e.value));
+        let margins = self.margins;
+        hoid_report::sentence(
+            named,
+            margins.and_then(|m| m.crossover_rad_s),
+            margins.and_then(|m| m.phase_margin_deg),
+        )
+    }
+
+    /// Whether the parameters of an operator were found, of a gain with a lead or of another form.
+    pub fn has_operator(&self) -> bool {
+        let of_family = self.family.as_ref().map(|found| found["convertible"] == json!(true));
+        of_family.unwrap_or(self.operator.is_ok()) && self.fit.model().structure().has_input()
+    }
+
     pub fn to_json(&self) -> Value {
         let fit = self.fit;
         let parameters: Vec<Value> = fit.parameters().iter().map(|(name, e)| named(name, e)).collect();

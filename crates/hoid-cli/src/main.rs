@@ -21,7 +21,7 @@ mod text;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::FromArgMatches;
 
 use crate::{
     args::{Cli, Command},
@@ -30,7 +30,11 @@ use crate::{
 
 fn main() -> ExitCode {
     interrupt::catch();
-    let cli = match Cli::try_parse() {
+    let mut command = args::command();
+    let parsed = command
+        .try_get_matches_from_mut(std::env::args_os())
+        .and_then(|matches| Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command)));
+    let cli = match parsed {
         Ok(cli) => cli,
         // Help and version are results as well.
         Err(said) if !said.use_stderr() => return exit(output::printed(said.print())),
@@ -50,11 +54,14 @@ fn main() -> ExitCode {
         Command::SimulateGroup(args) => commands::group::simulate(&args),
         Command::Reproduce(args) => commands::reproduce::run(&args),
         Command::Study(command) => commands::study::run_command(&command),
+        Command::Completions(args) => commands::shell::completions(&args),
+        Command::Man(args) => commands::shell::man(&args),
     };
     exit(outcome)
 }
 
 fn exit(outcome: Result<(), CliError>) -> ExitCode {
+    output::tell_notices();
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

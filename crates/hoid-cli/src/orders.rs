@@ -28,6 +28,45 @@ pub fn parse_range(text: &str) -> Result<RangeInclusive<usize>, String> {
     }
 }
 
+/// A delay as typed: of b0 in samples, or the dead time in s.
+#[derive(Debug, Clone, PartialEq)]
+pub enum DelayRange {
+    Samples(RangeInclusive<usize>),
+    Seconds(f64, f64),
+}
+
+impl DelayRange {
+    /// nk of both ends: tau_e = (nk - 1) Ts.
+    pub fn samples(&self, sample_time: SampleTime) -> RangeInclusive<usize> {
+        let nk = |delay_s: f64| (delay_s / sample_time.s()).round() as usize + 1;
+        match self {
+            Self::Samples(range) => range.clone(),
+            Self::Seconds(low, high) => nk(*low)..=nk(*high),
+        }
+    }
+}
+
+/// `N` or `LO..HI` in samples, or with an s behind one or both ends in seconds.
+pub fn parse_delay(text: &str) -> Result<DelayRange, String> {
+    if !text.trim_end().ends_with('s') {
+        return parse_range(text)
+            .map(DelayRange::Samples)
+            .map_err(|e| format!("{e}, or seconds as 0.28s"));
+    }
+    let wrong = || format!("{text:?} is no delay; write samples (29, 20..40) or seconds (0.28s, 0.1s..0.4s)");
+    let number = |part: &str| {
+        let part = part.trim();
+        let value = part.strip_suffix('s').unwrap_or(part).trim_end().parse::<f64>().ok();
+        value.filter(|s| s.is_finite() && *s >= 0.0).ok_or_else(wrong)
+    };
+    let (low, high) = text.split_once("..").unwrap_or((text, text));
+    let (low, high) = (number(low)?, number(high)?);
+    if low > high {
+        return Err(format!("the range {text} is empty; write the smaller number first"));
+    }
+    Ok(DelayRange::Seconds(low, high))
+}
+
 /// Most samples ahead of a prediction that is judged.
 const MOST_AHEAD: usize = 1_000_000;
 
@@ -66,7 +105,7 @@ pub fn parse_numbers(text: &str) -> Result<Vec<(String, f64)>, String> {
 pub fn ranges(
     structure: Structure,
     orders: Option<&str>,
-    nk: Option<&RangeInclusive<usize>>,
+    nk: Option<&DelayRange>,
     sample_time: SampleTime,
 ) -> Result<OrderRanges, CliError> {
     let mut ranges = hoid_ident::order_selection::default_operator_ranges(structure, sample_time);
@@ -93,7 +132,7 @@ pub fn ranges(
         *place = range;
     }
     if let Some(nk) = nk {
-        ranges.nk = nk.clone();
+        ranges.nk = nk.samples(sample_time);
     }
     let orders = [
         ("na", &ranges.na),
@@ -210,6 +249,20 @@ pub fn theta(orders: &Orders, text: &str) -> Result<Vec<f64>, CliError> {
 
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn delays_as_typed() {
+        let ts = SampleTime::new(0.01).unwrap();
+        let nk = |text: &str| parse_delay(text).unwrap().samples(ts);
+        assert_eq!((nk("29"), nk("0.28s"), nk(" 0.28 s")), (29..=29, 29..=29, 29..=29));
+        assert_eq!(
+            (nk("20..40"), nk("0.1s..0.4s"), nk("0.1..0.4s")),
+            (20..=40, 11..=41, 11..=41)
+        );
+        for bad in ["", "s", "0.28", "-0.1s", "0.4s..0.1s", "NaNs", "infs", "0.2ms", "a..bs"] {
+            assert!(parse_delay(bad).is_err(), "{bad}");
+        }
+    }
+
     use super::*;
 
     #[test]
@@ -227,10 +280,16 @@ mod tests {
         let ts = SampleTime::HUNDREDTH;
         let all = ranges(Structure::BoxJenkins, None, None, ts).unwrap();
         assert_eq!((all.nk.clone(), all.nd.clone(), all.nb.clone()), (6..=61, 1..=4, 2..=2));
-        let some = ranges(Structure::BoxJenkins, Some("nd=2, nc=1"), Some(&(29..=29)), ts).unwrap();
+        let some = ranges(
+            Structure::BoxJenkins,
+            Some("nd=2, nc=1"),
+            Some(&DelayRange::Samples(29..=29)),
+            ts,
+        )
+        .unwrap();
         assert_eq!((some.nk, some.nd, some.nc, some.nf), (29..=29, 2..=2, 1..=1, 2..=2));
         assert!(ranges(Structure::Arx, Some("nx=2"), None, ts).is_err());
-        assert!(ranges(Structure::Arx, Some("nk=2"), Some(&(3..=3)), ts).is_err());
+        assert!(ranges(Structure::Arx, Some("nk=2"), Some(&DelayRange::Samples(3..=3)), ts).is_err());
     }
 
     #[test]

@@ -3,8 +3,11 @@
 //! cannot be written, such as a full disk, is an error.
 
 use std::{
-    io::{self, ErrorKind, Write},
-    sync::atomic::{AtomicBool, Ordering},
+    io::{self, ErrorKind, IsTerminal, Write},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -17,6 +20,96 @@ use crate::error::CliError;
 /// [`CliError::Output`] for what the system says, but not for a pipe that its reader has closed.
 pub fn print(text: &str) -> Result<(), CliError> {
     printed(io::stdout().lock().write_all(text.as_bytes()))
+}
+
+/// Writes a page for people to standard output, its sentences wrapped at the width of the screen.
+///
+/// # Errors
+/// As [`print`].
+pub fn show(page: &str) -> Result<(), CliError> {
+    print(&width().map_or_else(|| page.to_owned(), |width| wrapped(page, width)))
+}
+
+/// Narrowest and widest line of a page: below, words are cut; above, the eye loses the line.
+const WIDTHS: (usize, usize) = (60, 110);
+
+/// Columns of the screen: those of `COLUMNS`, else of the terminal; none where a page goes into a
+/// file, which keeps its lines whole.
+pub fn width() -> Option<usize> {
+    let told = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
+    let asked = || {
+        let terminal = io::stdout().is_terminal().then(terminal_size::terminal_size)?;
+        terminal.map(|(columns, _)| usize::from(columns.0))
+    };
+    told.or_else(asked).map(|columns| columns.clamp(WIDTHS.0, WIDTHS.1))
+}
+
+/// A page with the lines of its sentences wrapped; tables have the width that they were made with.
+/// What continues a point of a list stands below its words.
+fn wrapped(page: &str, width: usize) -> String {
+    let mut text = String::with_capacity(page.len() + page.len() / 16);
+    for line in page.split_inclusive('\n') {
+        let (body, end) = line.strip_suffix('\n').map_or((line, ""), |body| (body, "\n"));
+        let indent = body.len() - body.trim_start_matches([' ', '-']).len();
+        if body.chars().count() <= width || body.contains('\u{2500}') || indent > width / 2 {
+            text.push_str(line);
+            continue;
+        }
+        let mut column = indent;
+        text.push_str(&body[..indent]);
+        for (k, word) in body[indent..].split(' ').enumerate() {
+            let length = word.chars().count();
+            if k > 0 && column + 1 + length > width {
+                text.push('\n');
+                text.push_str(&" ".repeat(indent));
+                column = indent;
+            } else if k > 0 {
+                text.push(' ');
+                column += 1;
+            }
+            text.push_str(word);
+            column += length;
+        }
+        text.push_str(end);
+    }
+    text
+}
+
+/// What is said after the answer: words, and what they are said of.
+static NOTICES: Mutex<Vec<(String, Vec<String>)>> = Mutex::new(Vec::new());
+
+/// What stands before a remark that speaks of trouble.
+const WARNING: &str = "warning: ";
+
+/// Keeps a warning, as [`notice`].
+pub fn warning(of: &str, words: &str) {
+    notice(of, format!("{WARNING}{words}"));
+}
+
+/// Keeps a remark until the answer is printed; what is said of several files is said once.
+pub fn notice(of: &str, words: String) {
+    let mut all = NOTICES.lock().unwrap_or_else(PoisonError::into_inner);
+    match all.iter_mut().find(|(known, _)| *known == words) {
+        Some((_, files)) if files.iter().any(|file| file == of) => {}
+        Some((_, files)) => files.push(of.to_owned()),
+        None => all.push((words, vec![of.to_owned()])),
+    }
+}
+
+/// Writes the remarks that were kept to standard error.
+pub fn tell_notices() {
+    let all = std::mem::take(&mut *NOTICES.lock().unwrap_or_else(PoisonError::into_inner));
+    for (words, files) in all {
+        let (kind, words) = words
+            .strip_prefix(WARNING)
+            .map_or(("", words.as_str()), |words| (WARNING, words));
+        let of = match files.as_slice() {
+            [first, others @ ..] if !others.is_empty() => format!("{first} and {} more: ", others.len()),
+            [only] if !only.is_empty() => format!("{only}: "),
+            _ => String::new(),
+        };
+        message(&format!("{kind}{of}{words}"));
+    }
 }
 
 /// What became of something that was written to standard output.
@@ -58,4 +151,18 @@ pub fn progress(total: usize, what: &str) -> ProgressBar {
         bar.set_style(style);
     }
     bar
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sentences_are_wrapped_and_points_hang() {
+        let page = "- one two three four\nshort\n\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\nend of it all";
+        let expected = "- one two\n  three four\nshort\n\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\nend of it\nall";
+        assert_eq!(wrapped(page, 12), expected);
+        assert_eq!(wrapped("averylongwordthatstays\n", 12), "averylongwordthatstays\n");
+        assert_eq!(wrapped("", 12), "");
+    }
 }

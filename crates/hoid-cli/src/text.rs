@@ -1,18 +1,18 @@
 //! Results as tables for people.
 
-use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
+use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 use hoid_ident::{
     Choice, Fit, GreyBoxFit, MarginEstimates,
     order_selection::Criterion,
     validation::{GoodnessOfFit, Validation},
 };
 use hoid_model::{
-    NotConvertible, Record, Verdict,
+    GainUnit, NotConvertible, Record, Verdict,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
 use hoid_report::numbers;
 
-use crate::commands::reading::Account;
+use crate::{commands::reading::Account, output};
 
 /// Rows of a search that are printed; all of them are in the JSON.
 const CANDIDATES_SHOWN: usize = 8;
@@ -33,6 +33,10 @@ pub fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(STYLE);
     table.set_header(header.to_vec());
+    if let Some(width) = output::width().and_then(|columns| u16::try_from(columns).ok()) {
+        table.set_content_arrangement(ContentArrangement::Dynamic);
+        table.set_width(width);
+    }
     for column in table.column_iter_mut().skip(1) {
         column.set_cell_alignment(CellAlignment::Right);
     }
@@ -49,8 +53,17 @@ pub fn verdict(verdict: &Verdict) -> String {
     format!("{verdict}\n\n")
 }
 
+/// What is behind the page.
+pub const MORE: &str = "More with -v: what else was tried, tests, every setting; --report DIR writes a page.\n";
+
+/// The same where only settings are.
+pub const MORE_SETTINGS: &str = "More with -v: every setting.\n";
+
+/// Records that are named one by one.
+const RECORDS_SHOWN: usize = 4;
+
 /// The records in use, and what was done to them.
-pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> String {
+pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbose: bool) -> String {
     let line = |((file, record), account): ((&String, &Record), &Account)| {
         let mut lines = format!(
             "{file}: {} samples of {} s from t = {:.4} s\n",
@@ -67,12 +80,39 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> St
         if account.faults.len() > FAULTS_SHOWN {
             lines.push_str(&format!("  and {} more faults\n", account.faults.len() - FAULTS_SHOWN));
         }
-        if let Some(level) = &account.level {
-            lines.push_str(&format!("  level of u beside its response to e: {level}\n"));
-        }
         lines
     };
-    files.iter().zip(records).zip(accounts).map(line).collect()
+    let shown = if records.len() > RECORDS_SHOWN {
+        1
+    } else {
+        RECORDS_SHOWN
+    };
+    let all = files.iter().zip(records).zip(accounts);
+    let quiet = |account: &Account| account.steps.is_empty() && account.faults.is_empty();
+    let mut text = String::new();
+    for (k, one) in all.enumerate() {
+        // What was done to a record is always said.
+        if verbose || k < shown || !quiet(one.1) {
+            text.push_str(&line(one));
+        }
+    }
+    if !verbose && records.len() > shown {
+        text.push_str(&format!(
+            "{} records in all, to {}\n",
+            records.len(),
+            files[files.len() - 1]
+        ));
+    }
+    text
+}
+
+/// The constants of u that were estimated with a fit.
+pub fn levels(files: &[String], accounts: &[Account]) -> String {
+    let line = |(file, account): (&String, &Account)| {
+        let level = account.level.as_ref()?;
+        Some(format!("{file}: level of u beside its response to e: {level}\n"))
+    };
+    files.iter().zip(accounts).filter_map(line).collect()
 }
 
 /// Every option that shaped the result.
@@ -104,38 +144,41 @@ pub fn remnant_orders(grey_box: &GreyBoxFit) -> String {
 }
 
 /// The operators of the records behind the first, where a grey box has parameters for each.
-pub fn other_records(grey_box: &GreyBoxFit, files: &[String]) -> String {
+pub fn other_records(grey_box: &GreyBoxFit, files: &[String], gain: &GainUnit) -> String {
     let differs = |k: &usize| grey_box.operator_parameters(*k) != grey_box.operator_parameters(0);
     let mut text = String::new();
     for k in (1..files.len()).filter(differs) {
-        text.push_str(&format!("{}:\n{}", files[k], operator(&grey_box.operator(k))));
+        text.push_str(&format!("{}:\n{}", files[k], operator(&grey_box.operator(k), gain)));
     }
     text
 }
 
-/// The model in a line, and its coefficients.
-pub fn model(fit: &Fit) -> String {
-    let mut coefficients = table(&[
-        if fit.is_grey_box() { "parameter" } else { "coefficient" },
-        "value",
-        "standard error",
-    ]);
-    for (name, e) in fit.parameters() {
-        let (value, error) = with_uncertainty(&e);
-        coefficients.add_row([name, value, error]);
-    }
+/// The coefficients of a model.
+pub fn coefficients(fit: &Fit) -> String {
+    let what = if fit.is_grey_box() { "parameter" } else { "coefficient" };
+    let all = fit.parameters();
+    let named = all.iter().map(|(name, e)| (name.as_str(), String::new(), *e));
+    format!("{}\n", estimates(what, named))
+}
+
+/// How the search ended.
+pub fn search(fit: &Fit) -> String {
     let t = fit.termination();
-    let mut text = format!(
-        "{}\n{coefficients}\nSearch: {}, {}, start: {}.\n",
-        fit.title(),
+    format!(
+        "Search: {}, {}, start: {}.\n",
         t.reason,
         steps(t.iterations),
-        fit.start(),
-    );
-    if !fit.model().is_stable() {
-        text.push_str("The model from e to u is not stable (a pole outside the unit circle).\n");
+        fit.start()
+    )
+}
+
+/// What is wrong with the model itself; nothing mostly.
+pub fn instability(fit: &Fit) -> &'static str {
+    if fit.model().is_stable() {
+        ""
+    } else {
+        "The model from e to u is not stable (a pole outside the unit circle).\n"
     }
-    text
 }
 
 /// A number of steps in words.
@@ -144,6 +187,18 @@ pub fn steps(n: usize) -> String {
         "1 step".to_owned()
     } else {
         format!("{n} steps")
+    }
+}
+
+/// How much of u the model tells, in a line.
+pub fn fit_line(fit: &Fit, q: &GoodnessOfFit) -> String {
+    if fit.model().structure().has_input() {
+        format!(
+            "Fit: VAF of the prediction {:.2} %, of the simulation {:.2} %.\n",
+            q.vaf_prediction, q.vaf_simulation
+        )
+    } else {
+        format!("Fit: VAF of the prediction {:.2} %.\n", q.vaf_prediction)
     }
 }
 
@@ -175,15 +230,52 @@ pub fn quality(fit: &Fit, q: &GoodnessOfFit) -> String {
     text
 }
 
+/// Half the width of an interval of 95 % of a normal distribution, in standard errors.
+const NORMAL_95: f64 = 1.959_963_984_540_054;
+
+/// The ends of the interval of 95 % by the standard error, with three digits; empty without one.
+pub fn interval(e: &Estimate) -> (String, String) {
+    let end = |sign: f64| {
+        let error = e.standard_error.filter(|error| error.is_finite());
+        error.map_or_else(String::new, |error| significant(e.value + sign * NORMAL_95 * error))
+    };
+    (end(-1.0), end(1.0))
+}
+
+/// Three digits: an interval has no more.
+pub fn significant(value: f64) -> String {
+    hoid_model::numbers::significant(value, 3)
+}
+
+/// `value ± standard error`.
+pub fn plus_minus(e: &Estimate) -> String {
+    match with_uncertainty(e) {
+        (value, error) if error == numbers::DASH => value,
+        (value, error) => format!("{value} ± {error}"),
+    }
+}
+
+/// Name, value ± standard error, interval of 95 % and unit of parameters, a row each.
+pub fn estimates<'a>(what: &str, all: impl IntoIterator<Item = (&'a str, String, Estimate)>) -> Table {
+    let all: Vec<(&str, String, Estimate)> = all.into_iter().collect();
+    let with_units = all.iter().any(|(_, unit, _)| !unit.is_empty());
+    let mut header = vec![what, "value", "95 % from", "to"];
+    header.extend(with_units.then_some("unit"));
+    let mut rows = table(&header);
+    for (name, unit, e) in all {
+        let (low, high) = interval(&e);
+        let cells = [name.to_owned(), plus_minus(&e), low, high];
+        rows.add_row(cells.into_iter().chain(with_units.then_some(unit)));
+    }
+    rows
+}
+
 /// The operator's parameters, or why there are none.
-pub fn operator(found: &Result<OperatorEstimate, NotConvertible>) -> String {
+pub fn operator(found: &Result<OperatorEstimate, NotConvertible>, gain: &GainUnit) -> String {
     match found {
         Ok(o) => {
-            let mut rows = table(&["operator", "value", "standard error", "unit"]);
-            for (name, unit, e) in o.rows() {
-                let (value, error) = with_uncertainty(&e);
-                rows.add_row([name.to_owned(), value, error, unit.to_owned()]);
-            }
+            let named = o.rows().map(|(name, unit, e)| (name, gain.unit(name, unit), e));
+            let rows = estimates("operator", named);
             let warning = if o.parameters().is_stable() {
                 ""
             } else {
@@ -330,6 +422,19 @@ pub fn residual_tests(files: &[String], validations: &[Validation]) -> String {
     text
 }
 
+/// How well the delay is known, of a search over nk: tau_e = (nk - 1) Ts.
+pub fn delay(choice: &Choice) -> String {
+    let ts = choice.fit.model().sample_time().s();
+    let seconds = |nk: usize| significant((nk as f64 - 1.0).max(0.0) * ts);
+    choice.delay_interval().map_or_else(String::new, |(low, high)| {
+        format!(
+            "Delay: nk = {low} to {high} (dead time {} to {} s) by the 95 % likelihood interval.\n",
+            seconds(low),
+            seconds(high)
+        )
+    })
+}
+
 /// The best candidates of a search.
 pub fn candidates(choice: &Choice) -> String {
     let mut good: Vec<_> = choice
@@ -367,11 +472,6 @@ pub fn candidates(choice: &Choice) -> String {
         "Searched {} candidates, smallest {key} first; all on the same samples.\n{rows}\n",
         choice.candidates.len()
     );
-    if let Some((low, high)) = choice.delay_interval() {
-        text.push_str(&format!(
-            "Delay: nk = {low} to {high} lie within the 95 % likelihood interval around the smallest loss.\n"
-        ));
-    }
     if failed > 0 {
         text.push_str(&format!(
             "{failed} candidates could not be fitted; --json lists the reasons.\n"

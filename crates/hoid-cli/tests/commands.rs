@@ -107,7 +107,7 @@ fn a_range_is_searched_and_its_table_is_part_of_the_result() {
     assert_eq!(found["orders"]["nd"], 1);
     let text = good(
         directory.path(),
-        &["identify", "c1.csv", "--structure", "arx", "--nk", "27..31"],
+        &["identify", "c1.csv", "--structure", "arx", "--nk", "27..31", "-v"],
     );
     assert!(text.contains("Searched 5 candidates"), "{text}");
 }

@@ -97,7 +97,7 @@ fn simulated_runs_have_their_loop() {
     );
     assert!(share < ratio && (0.07..0.13).contains(&ratio), "{share} {ratio}");
     // The same without naming what is found anyway, for people.
-    let page = good(at, &[&["describe"], &names[..], &options[2..]].concat());
+    let page = good(at, &[&["describe", "-v"], &names[..], &options[2..]].concat());
     assert!(page.starts_with("Verdict: trustworthy\n"), "{page}");
     for text in [
         "10 lines, over 4 runs of one period of 81.92 s",

@@ -69,7 +69,7 @@ fn files(directory: &Path) -> Vec<(String, Vec<u8>)> {
 fn a_virtual_experiment_is_analysed_and_reported() {
     let directory = experiment();
     let at = directory.path();
-    let said = good(at, &["group", "people", "--out", "out", "--csv"]);
+    let said = good(at, &["group", "people", "--out", "out", "--csv", "-v"]);
     assert!(said.starts_with("Verdict: "), "{said}");
     // What failed and what is doubtful comes before the numbers.
     let at_operators = said.find("Operators").unwrap();
@@ -185,15 +185,81 @@ fn a_group_that_was_killed_goes_on_to_the_same_bytes() {
 }
 
 #[test]
+fn init_looks_at_the_files_and_says_what_it_saw() {
+    let directory = TempDir::new().unwrap();
+    let at = directory.path();
+    let people = [
+        "simulate-group",
+        "--people",
+        "--subjects",
+        "1",
+        "--runs",
+        "1",
+        "--plants",
+        "integrator",
+    ];
+    good(at, &[&people[..], &["--out", "people"]].concat());
+    fs::remove_file(at.join("people/group.toml")).unwrap();
+    let said = good(at, &["group", "init", "people", "--controlled-element", "1/s"]);
+    assert!(said.contains("1 runs") && said.contains("d has"), "{said}");
+    let text = fs::read_to_string(at.join("people/group.toml")).unwrap();
+    let manifest: toml::Table = toml::from_str(&text).unwrap();
+    let condition = &manifest["conditions"]["integrator"];
+    assert_eq!(condition["excitation"].as_str(), Some("d"));
+    assert!(
+        (condition["period_s"].as_float().unwrap() - 20.0).abs() < 1e-6,
+        "{text}"
+    );
+    assert_eq!(condition["controlled_element"].as_str(), Some("1/s"));
+    assert_eq!(condition["offset_samples"].as_float(), Some(0.0));
+    assert_eq!(manifest["read"]["input"].as_str(), Some("e"));
+    // Each stands below its evidence.
+    for (evidence, line) in [
+        ("# the tracking error, by its name", "input = "),
+        ("# d has", "excitation = "),
+        ("# at the lines y follows the controlled element", "offset_samples = "),
+        ("# of the first run BIC chooses nd", "nd = "),
+        ("# of the first run alone the form is", "form = "),
+    ] {
+        let at_evidence = text.find(evidence).unwrap_or_else(|| panic!("{evidence}: {text}"));
+        let next = text[at_evidence..].lines().nth(1).unwrap();
+        assert!(next.starts_with(line), "{next}: {text}");
+    }
+    // What is known is taken as it is.
+    let known = [
+        "--input",
+        "-e",
+        "--excitation",
+        "none",
+        "--from",
+        "5",
+        "--offset",
+        "1",
+        "--out",
+        "-",
+    ];
+    let other = good(at, &[&["group", "init", "people"][..], &known].concat());
+    let manifest: toml::Table = toml::from_str(&other).unwrap();
+    assert_eq!(manifest["read"]["input"].as_str(), Some("-e"));
+    assert_eq!(manifest["read"]["from_s"].as_float(), Some(5.0));
+    assert_eq!(
+        manifest["conditions"]["integrator"]["offset_samples"].as_float(),
+        Some(1.0)
+    );
+    assert!(
+        manifest["conditions"]["integrator"].get("excitation").is_none(),
+        "{other}"
+    );
+}
+
+#[test]
 fn a_manifest_is_made_from_names_and_mistakes_are_named() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     good(at, &["simulate", "--condition", "C1", "--out", "anna_C1_1.csv"]);
     fs::write(at.join("notes.txt"), "nothing").unwrap();
-    let said = good(
-        at,
-        &["group", "init", ".", "--pattern", "{subject}_{condition}_{run}.csv"],
-    );
+    let by_name = ["group", "init", ".", "--pattern", "{subject}_{condition}_{run}.csv"];
+    let said = good(at, &[&by_name[..], &["--excitation", "none"]].concat());
     assert!(said.contains("1 runs") && said.contains("notes.txt"), "{said}");
     let (code, message) = bad(
         at,

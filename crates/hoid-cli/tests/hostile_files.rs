@@ -13,7 +13,7 @@ use std::{
 
 use tempfile::TempDir;
 
-use common::{bad, good, hoid};
+use common::{bad, good};
 
 /// A simulated run as text.
 fn run(directory: &Path) -> String {
@@ -77,21 +77,29 @@ fn gains_without_units_are_not_in_degrees() {
         "--orders",
         "nd=1",
     ];
-    for (units, said) in [
-        ("# units: t s, e deg, u deg\n", None),
-        ("# units: t s, e deg, u V\n", Some("K_e is in V/deg")),
-        ("", Some("no unit is given for e and u")),
-        ("# units: e deg\n", Some("no unit is given for u")),
+    for (units, declared, said) in [
+        ("# units: t s, e deg, u deg\n", None, Some("deg/deg")),
+        ("# units: t s, e deg, u V\n", None, Some("V/deg")),
+        ("", None, None),
+        ("# units: e deg\n", None, None),
+        ("# units: e deg\n", Some("u=V"), Some("V/deg")),
+        ("", Some("e=mm,u=deg"), Some("deg/mm")),
     ] {
         let rest: String = text.lines().skip(1).map(|line| format!("{line}\n")).collect();
         fs::write(d.join("run.csv"), format!("{units}{rest}")).unwrap();
-        let output = hoid(d, &identify);
-        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        let mut arguments = identify.to_vec();
+        arguments.extend(declared.iter().flat_map(|units| ["--unit", units]));
+        let page = good(d, &arguments);
+        let gain = page.lines().find(|line| line.trim_start().starts_with("K_e ")).unwrap();
         match said {
-            Some(said) => assert!(message.contains(said), "{units}: {message}"),
-            None => assert!(!message.contains("K_e is in"), "{message}"),
+            Some(said) => assert!(gain.contains(said), "{units}: {gain}"),
+            None => assert!(!gain.contains("deg"), "{gain}"),
         }
     }
+    fs::write(d.join("run.csv"), text.replace("e deg", "e rad")).unwrap();
+    let wrong = [&identify[..], &["--unit", "e=deg"]].concat();
+    let (code, message) = bad(d, &wrong);
+    assert!(code == 1 && message.contains("--scale e=rad:deg"), "{message}");
 }
 
 #[test]

@@ -118,7 +118,7 @@ fn a_person_is_found_by_default() {
 
     let page = good(
         at,
-        &[&arguments[..], &["--figure", "person.svg", "--report", "out"]].concat(),
+        &[&arguments[..], &["--figure", "person.svg", "--report", "out", "-v"]].concat(),
     );
     assert!(page.starts_with("Verdict: "), "{page}");
     for part in [
@@ -172,6 +172,18 @@ fn what_nobody_answers_is_not_determined() {
     assert_eq!(code, 1, "{message}");
     let (code, _) = bad(at, &["identify", "noise.csv", "--individual", "K_q"]);
     assert_eq!(code, 2);
-    let (code, message) = bad(at, &["identify", "noise.csv", "--figure", "a.svg"]);
+    // Without lines there is still a response to draw; what changes has none.
+    let output = hoid(at, &["identify", "noise.csv", "--figure", "a.svg"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(std::fs::read_to_string(at.join("a.svg")).unwrap().starts_with("<svg"));
+    let changing = [
+        "identify",
+        "noise.csv",
+        "--structure",
+        "time-varying",
+        "--figure",
+        "b.svg",
+    ];
+    let (code, message) = bad(at, &changing);
     assert_eq!(code, 2, "{message}");
 }

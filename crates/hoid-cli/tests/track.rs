@@ -170,6 +170,7 @@ fn the_page_reads_well() {
     let d = directory.path();
     let mut arguments = vec!["track", "c.csv", "--out", "trace.csv"];
     arguments.extend(KNOWN_ORDERS);
+    arguments.push("-v");
     let page = good(d, &arguments);
     for part in [
         "8192 samples of 0.01 s",

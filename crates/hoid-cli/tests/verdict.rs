@@ -55,7 +55,8 @@ fn a_clean_run_is_trustworthy_on_the_page_and_in_json() {
     arguments.extend(BOX_JENKINS);
     let page = good(d, &arguments);
     assert!(
-        page.starts_with("Verdict: trustworthy\n\nc.csv: 8192 samples"),
+        page.starts_with("Verdict: trustworthy\n\nBJ(nb=2, nd=1, nf=2, nk=29)\n")
+            && page.contains("c.csv: 8192 samples"),
         "{page}"
     );
     arguments.push("--json");

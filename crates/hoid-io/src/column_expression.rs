@@ -8,7 +8,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use crate::IoError;
-use crate::wording::list;
+use crate::wording::{did_you_mean, list};
 
 /// A column, its negative, or the difference of two columns. It is text until the columns of a file
 /// are known.
@@ -93,14 +93,12 @@ impl ColumnExpression {
                     [(left, right)] => vec![*left, *right],
                     _ => vec![self.text.strip_prefix('-').unwrap_or(&self.text)],
                 };
-                let missing: Vec<String> = parts
-                    .into_iter()
-                    .filter(|part| find(part).is_none())
-                    .map(|part| format!("\"{}\"", part.trim()))
-                    .collect();
+                let unknown: Vec<&str> = parts.into_iter().filter(|part| find(part).is_none()).collect();
+                let missing: Vec<String> = unknown.iter().map(|part| format!("\"{}\"", part.trim())).collect();
                 Err(IoError::NoSuchColumn {
                     file: file.to_owned(),
                     missing: missing.join(" and no "),
+                    meant: did_you_mean(&unknown, names),
                     asked: self.text.clone(),
                     available: list(names),
                 })

@@ -155,7 +155,7 @@ pub enum IoError {
     },
     /// A column that the file does not have.
     #[error(
-        "{file} has no column {missing} (asked for: {asked}); it has {available}; choose by --input and --output with NAME, -NAME or NAME-NAME"
+        "{file} has no column {missing} (asked for: {asked}{meant}); it has {available}; choose by --input and --output with NAME, -NAME or NAME-NAME"
     )]
     NoSuchColumn {
         /// The file.
@@ -164,6 +164,8 @@ pub enum IoError {
         missing: String,
         /// The whole expression.
         asked: String,
+        /// "; did you mean "u"?", empty where no name is near.
+        meant: String,
         /// The names that exist.
         available: String,
     },

@@ -98,7 +98,17 @@ fn make(directory: &Path) -> io::Result<NamedTempFile> {
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(directory)
+    builder.tempfile_in(directory).map_err(without_path)
+}
+
+/// The error of the system without the name of the part, which is nobody's business: the message
+/// names the place that was asked for.
+fn without_path(error: io::Error) -> io::Error {
+    let text = error.to_string();
+    match text.split_once(" at path ") {
+        Some((what, _)) => io::Error::new(error.kind(), what.to_owned()),
+        None => error,
+    }
 }
 
 /// Sweeps a directory the first time that this process writes into it.
@@ -150,6 +160,14 @@ mod tests {
         assert!(!left.contains(&".hoid-dead01.part".to_owned()));
         living.persist(file, &path("whole"), None).unwrap();
         assert!(path("whole").exists());
+    }
+
+    #[test]
+    fn an_error_does_not_name_the_part() {
+        let dir = tempfile::tempdir().unwrap();
+        let error = Part::create_in(&dir.path().join("none")).err().unwrap();
+        assert_eq!(error.kind(), io::ErrorKind::NotFound);
+        assert!(!error.to_string().contains(PREFIX), "{error}");
     }
 
     #[test]

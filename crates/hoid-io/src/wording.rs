@@ -56,6 +56,28 @@ pub(crate) fn told(what: &str) -> String {
     line.chars().take(200).collect::<String>().escape_debug().to_string()
 }
 
+/// How near a name has to be to be offered: as near as the command line wants a flag.
+const NEAR: f64 = 0.7;
+
+/// "; did you mean "u"?" for names that are not there: of each the one that differs in capitals
+/// alone, else the nearest by Jaro's measure (M. A. Jaro, J. Am. Stat. Assoc. 84 (1989) 414-420).
+/// Empty where none is near.
+pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
+    let of = |asked: &&str| {
+        let asked = asked.trim().to_lowercase();
+        let score = |name: &str| (strsim::jaro(&asked, &name.trim().to_lowercase()), name.to_owned());
+        let known = names.iter().filter(|name| !name.is_empty()).map(|name| score(name));
+        let best = known.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (best.0 > NEAR).then(|| format!("\"{}\"", named(&best.1)))
+    };
+    let near: Vec<String> = unknown.iter().filter_map(of).collect();
+    if near.is_empty() {
+        String::new()
+    } else {
+        format!("; did you mean {}?", near.join(" and "))
+    }
+}
+
 /// Names for a message: all of them, unless there are very many.
 pub(crate) fn list(names: &[&str]) -> String {
     const SHOWN: usize = 40;
@@ -92,5 +114,23 @@ pub(crate) fn counted(n: usize, what: &str) -> String {
         format!("1 {what}")
     } else {
         format!("{n} {what}s")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn near_names_are_offered_and_far_ones_are_not() {
+        let names = ["t", "error", "stick", "", "E"];
+        assert_eq!(did_you_mean(&["eror"], &names), "; did you mean \"error\"?");
+        assert_eq!(did_you_mean(&["e"], &names), "; did you mean \"E\"?");
+        assert_eq!(
+            did_you_mean(&["Stik", "errror"], &names),
+            "; did you mean \"stick\" and \"error\"?"
+        );
+        assert_eq!(did_you_mean(&["q"], &names), "");
+        assert_eq!(did_you_mean(&["q"], &[]), "");
     }
 }

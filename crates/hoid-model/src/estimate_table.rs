@@ -78,7 +78,7 @@ mod tests {
             tau_e_s: Estimate::fixed(0.28),
         };
         let expected = "\
-K_e        0.0901 ± 0.0012   deg/deg
+K_e        0.0901 ± 0.0012
 T_L         0.402 ± 0.010    s
 K_e_dot   0.03624 ± 0.00052  s
 omega_nm    11.25 ± 0.10     rad/s

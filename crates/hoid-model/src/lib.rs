@@ -57,6 +57,7 @@
 //! | [`held_system`] | exact zero-order hold of any rational transfer function |
 //! | [`margins`] | crossover frequency, phase and gain margin |
 //! | [`remnant_gain`] | the gain K_n that gives a demanded noise level |
+//! | [`GainUnit`] | the units of gains, of what the channels are measured in |
 //! | [`Finding`], [`Verdict`] | what makes a result doubtful, and what it is worth |
 //! | [`named_choice!`], [`NamedChoice`] | the names that users type |
 
@@ -64,6 +65,7 @@ mod error;
 mod estimate;
 mod fault;
 mod finding;
+mod gain_unit;
 mod named_choice;
 
 pub mod controlled_element;
@@ -96,6 +98,7 @@ pub use error::{ModelError, NotConvertible};
 pub use family_scenario::{FamilyScenario, FamilyState};
 pub use fault::{Fault, FaultAction, FaultHandling, FaultKind, MOST_MENDED, fault_findings};
 pub use finding::{Finding, Severity, Verdict, VerdictLevel};
+pub use gain_unit::GainUnit;
 pub use named_choice::{NamedChoice, UnknownName};
 pub use num_complex::Complex64;
 pub use operator::{DiscreteOperator, OperatorParameters};

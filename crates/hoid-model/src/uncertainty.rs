@@ -20,7 +20,7 @@ pub use crate::estimate::Estimate;
 /// The operator with the uncertainty of each parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OperatorEstimate {
-    /// Error gain K_e, deg/deg.
+    /// Error gain K_e, in the unit of u by that of e.
     pub k_e: Estimate,
     /// Lead time constant T_L, s.
     pub t_l_s: Estimate,
@@ -61,10 +61,11 @@ impl OperatorEstimate {
         }
     }
 
-    /// Name, unit and estimate of each parameter, in the order of the tables.
+    /// Name, unit and estimate of each parameter, in the order of the tables; gains as
+    /// [`GainUnit`](crate::GainUnit) takes them.
     pub fn rows(&self) -> [(&'static str, &'static str, Estimate); 6] {
         [
-            ("K_e", "deg/deg", self.k_e),
+            ("K_e", "", self.k_e),
             ("T_L", "s", self.t_l_s),
             ("K_e_dot", "s", self.k_e_dot),
             ("omega_nm", "rad/s", self.omega_nm_rad_s),
@@ -81,7 +82,7 @@ impl fmt::Display for OperatorEstimate {
     /// # use hoid_model::{OperatorParameters, uncertainty::OperatorEstimate};
     /// let operator = OperatorParameters { k_e: 0.09, t_l_s: 0.4, omega_nm_rad_s: 11.25, zeta_nm: 0.35, tau_e_s: 0.28 };
     /// let table = OperatorEstimate::from(operator).to_string();
-    /// assert!(table.starts_with("K_e        0.09  deg/deg\n"));
+    /// assert!(table.starts_with("K_e        0.09\nT_L"));
     /// ```
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write_rows(f, self.rows().map(|(name, unit, estimate)| (name, estimate, unit)))

@@ -51,6 +51,7 @@ pub fn read<'py>(
         repair: Repair { resample, fill },
     };
     let preparation = Preparation {
+        units: std::collections::BTreeMap::new(),
         scale: parsed(scale)?,
         offset: parsed(offset)?,
         rate: match (decimate, new_sampling_frequency) {

@@ -324,6 +324,7 @@ impl PyFit {
                     margins,
                 }],
                 notes: Vec::new(),
+                answer: None,
                 pictures: Vec::new(),
             };
             write_report(&directory, &report.to_html()?)

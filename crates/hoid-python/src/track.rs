@@ -226,6 +226,7 @@ impl PyTrace {
                     trace,
                     batch: fits.iter().map(|(span, fit)| line((*span, fit))).collect(),
                 }],
+                verdict: None,
                 notes: missing
                     .map(|error| format!("There is no batch fit of the last third: {error}."))
                     .into_iter()

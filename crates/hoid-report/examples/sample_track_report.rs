@@ -51,6 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             section("RPEM, BJ", &traces[1], lines(&bj)),
             section("physical", &traces[2], Vec::new()),
         ],
+        verdict: None,
         notes: Vec::new(),
     };
     std::fs::write(path, report.to_html()?)?;

@@ -9,15 +9,20 @@ pub fn html(text: impl Into<String>) -> Value {
     Value::from_safe_string(text.into())
 }
 
-/// Name and unit of an operator parameter for the page.
+/// Name and unit of an operator parameter for the page; gains have units only where the record says
+/// them, as [`hoid_model::GainUnit`] tells.
 pub fn symbol(name: &str) -> (Value, &'static str) {
     let (symbol, unit) = match name {
-        "K_e" => ("<i>K</i><sub>e</sub>", "deg/deg"),
+        "K_e" => ("<i>K</i><sub>e</sub>", ""),
         "T_L" => ("<i>T</i><sub>L</sub>", "s"),
         "K_e_dot" => ("<i>K</i><sub>\u{117}</sub>", "s"),
         "omega_nm" => ("<i>\u{3c9}</i><sub>nm</sub>", "rad/s"),
         "zeta_nm" => ("<i>\u{3b6}</i><sub>nm</sub>", "-"),
         "tau_e" => ("<i>\u{3c4}</i><sub>e</sub>", "s"),
+        "K" => ("<i>K</i>", ""),
+        "K_I" => ("<i>K</i><sub>I</sub>", "1/s"),
+        "K_over_T_I" => ("<i>K</i>/<i>T</i><sub>I</sub>", "1/s"),
+        "T_I" => ("<i>T</i><sub>I</sub>", "s"),
         other => return (Value::from(other), ""),
     };
     (html(symbol), unit)

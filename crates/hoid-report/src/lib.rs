@@ -26,6 +26,7 @@
 //!         margins: None,
 //!     }],
 //!     notes: Vec::new(),
+//!     answer: None,
 //!     pictures: Vec::new(),
 //! };
 //! let page = report.to_html()?;
@@ -36,15 +37,17 @@
 //!
 //! | module | what it holds |
 //! |---|---|
+//! | [`Answer`], [`sentence`] | the head of a page: verdict, the answer in words, parameters with errors |
 //! | [`Report`], [`ModelSection`] | one self-contained HTML page about one or several fitted models |
 //! | [`TrackReport`], [`TraceSection`], [`BatchLine`], [`batch_fit`], [`default_batch_fits`] | one such page about recursive estimates over a record |
-//! | [`GroupReport`], [`GroupTables`], [`write_group_pages`] | one such page about a group of recorded runs |
+//! | [`GroupReport`], [`GroupTables`], [`write_group_pages`], [`group_figures`] | one such page about a group of recorded runs |
 //! | [`figures`] | the figures of these pages, each as an SVG text of its own |
 //! | [`numbers`] | numbers with as many digits as their standard error allows |
 //! | [`render_with`], [`write_page`], [`write_report`] | templates of one's own in the same style, and pages into files |
 //!
 //! Nothing here prints, and the same data give the same bytes.
 
+mod answer;
 mod cells;
 mod error;
 pub mod figures;
@@ -55,8 +58,11 @@ mod report;
 mod tables;
 mod track;
 
+pub use answer::{Answer, AnswerRow, sentence};
 pub use error::ReportError;
-pub use group::{FrequencyTables, GroupReport, GroupTables, PeopleTable, people_table, write_group_pages};
+pub use group::{
+    FrequencyTables, GroupReport, GroupTables, PeopleTable, group_figures, people_table, write_group_pages,
+};
 pub use hoid_model::numbers;
 pub use model_section::{ModelSection, known_operator};
 pub use page::{render_with, write_page, write_report};

@@ -8,7 +8,7 @@ use hoid_model::Record;
 use minijinja::{Value, context};
 
 use crate::{
-    ReportError, cells,
+    Answer, ReportError, cells,
     figures::{self, BodeModel, TrueResponse},
     model_section::{ModelSection, known_operator},
     page, tables,
@@ -28,6 +28,8 @@ pub struct Report<'a> {
     pub models: Vec<ModelSection<'a>>,
     /// Remarks for the reader, such as warnings of the command.
     pub notes: Vec<String>,
+    /// What the fit says, on top of the page.
+    pub answer: Option<Answer>,
     /// Figures that answer what was asked, before all others.
     pub pictures: Vec<Picture>,
 }
@@ -59,6 +61,7 @@ impl<'a> Report<'a> {
                 margins: None,
             }],
             notes: Vec::new(),
+            answer: None,
             pictures: Vec::new(),
         }
     }
@@ -93,6 +96,7 @@ impl Report<'_> {
             title => self.title.clone(),
             settings => page::facts(&self.settings),
             notes => self.notes.clone(),
+            answer => self.answer.as_ref().map(Answer::to_value),
             pictures => self.pictures.iter().map(Picture::to_value).collect::<Vec<Value>>(),
             comparison => tables::comparison(&self.models, &qualities),
             bode => Value::from_safe_string(self.bode()),
@@ -168,7 +172,7 @@ fn section(index: usize, model: &ModelSection<'_>, validations: &[Result<Validat
         exact => fit.covariance().is_none(),
         grey_box => fit.is_grey_box(),
         coefficients => tables::coefficients(fit),
-        operator => tables::operator(fit, model.truth.as_ref()),
+        operator => tables::operator(fit, model.truth.as_ref(), &tables::gain_unit(model.records)),
         remnant => tables::remnant(fit),
         no_remnant => tables::no_remnant(fit),
         course => tables::course(fit, model.records),

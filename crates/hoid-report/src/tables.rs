@@ -6,7 +6,7 @@ use hoid_ident::{
     order_selection::Criterion,
     validation::{GoodnessOfFit, Validation},
 };
-use hoid_model::{OperatorParameters, Record, remnant::RemnantDiscretisation};
+use hoid_model::{GainUnit, OperatorParameters, Record, remnant::RemnantDiscretisation};
 use minijinja::{Value, context};
 
 use crate::{
@@ -64,6 +64,7 @@ pub fn comparison(models: &[ModelSection<'_>], qualities: &[Result<GoodnessOfFit
     rows.push(row(Value::from("BIC"), "-", criterion(&Fit::bic), None));
     let operators: Vec<_> = models.iter().map(|m| m.fit.operator()).collect();
     let truth = common_truth(models);
+    let gain = models.first().map(|m| gain_unit(m.records)).unwrap_or_default();
     for (i, name) in OPERATOR_NAMES.into_iter().enumerate() {
         let cells = operators
             .iter()
@@ -73,8 +74,9 @@ pub fn comparison(models: &[ModelSection<'_>], qualities: &[Result<GoodnessOfFit
             })
             .collect();
         let (label, unit) = symbol(name);
+        let unit = gain.unit(name, unit);
         let truth = truth.and_then(|t| true_value(name, &t)).map(plain);
-        rows.push(row(label, unit, cells, truth));
+        rows.push(row(label, &unit, cells, truth));
     }
     let mut remarks: Vec<String> = Vec::new();
     for ((model, operator), quality) in models.iter().zip(&operators).zip(qualities) {
@@ -144,7 +146,7 @@ pub fn coefficients(fit: &Fit) -> Vec<Value> {
 }
 
 /// The operator's parameters, or why there are none.
-pub fn operator(fit: &Fit, truth: Option<&OperatorParameters>) -> Value {
+pub fn operator(fit: &Fit, truth: Option<&OperatorParameters>, gain: &GainUnit) -> Value {
     let estimate = match fit.operator() {
         Ok(estimate) => estimate,
         Err(reason) => return context! { reason => reason.to_string() },
@@ -154,6 +156,7 @@ pub fn operator(fit: &Fit, truth: Option<&OperatorParameters>) -> Value {
         .into_iter()
         .map(|(name, _, e)| {
             let (label, unit) = symbol(name);
+            let unit = gain.unit(name, unit);
             let (value, error) = with_uncertainty(e.value, e.standard_error);
             let truth = truth.and_then(|t| true_value(name, t));
             let relative = truth.map(|t| 100.0 * (e.value / t - 1.0));
@@ -166,6 +169,11 @@ pub fn operator(fit: &Fit, truth: Option<&OperatorParameters>) -> Value {
         })
         .collect();
     context! { rows, has_truth => truth.is_some() }
+}
+
+/// The units of gains, of what the records are measured in.
+pub fn gain_unit(records: &[Record]) -> GainUnit {
+    records.first().map(GainUnit::of).unwrap_or_default()
 }
 
 /// T_n and K_n by each discretisation, or why not.

@@ -59,6 +59,7 @@ fn page<'a>(models: Vec<ModelSection<'a>>) -> String {
         settings: vec![("seed".to_owned(), "5".to_owned())],
         models,
         notes: Vec::new(),
+        answer: None,
         pictures: Vec::new(),
     };
     report.to_html().unwrap()
@@ -167,6 +168,7 @@ fn text_of_the_user_is_escaped() {
         settings: vec![(hostile.to_owned(), hostile.to_owned())],
         models: vec![section(hostile, &fit, &records)],
         notes: vec![hostile.to_owned()],
+        answer: None,
         pictures: Vec::new(),
     };
     let html = report.to_html().unwrap();
@@ -284,7 +286,7 @@ fn candidates_are_sorted_and_cut() {
     });
     let html = page(vec![model]);
     check_page(&html);
-    let table = &html[html.find("Candidates</h3>").unwrap()..];
+    let table = &html[html.find("Candidates</summary>").unwrap()..];
     assert_eq!(table.matches("<tr><th>nb=2").count(), 30);
     assert!(table.contains("33 candidates") && table.contains("3 more candidates are not shown"));
     let first = &table[table.find("<tr><th>nb=2").unwrap()..];
@@ -301,6 +303,7 @@ fn a_report_without_models_is_an_error() {
         settings: Vec::new(),
         models: Vec::new(),
         notes: Vec::new(),
+        answer: None,
         pictures: Vec::new(),
     };
     assert!(matches!(report.to_html(), Err(ReportError::NoModels)));

@@ -53,6 +53,7 @@ fn report<'a>(record: &'a Record, traces: Vec<TraceSection<'a>>) -> TrackReport<
         settings: vec![("seed".to_owned(), "5".to_owned())],
         record,
         traces,
+        verdict: None,
         notes: vec!["a note".to_owned()],
     }
 }

@@ -29,6 +29,10 @@ def from_control(system: control.TransferFunction | Any) -> Conversion:
     ------
     NotConvertibleError
         For a transfer function of another form.
+
+    Examples
+    --------
+    >>> found = pyhoid.from_control(control.tf([0.044, -0.043], [1, -1.91, 0.92], 0.01))
     """
     if not system.isdtime(strict=True) or not isinstance(system.dt, float) or system.dt <= 0:
         raise NotConvertibleError(

@@ -17,6 +17,10 @@ class Conversion(NamedTuple):
     """An operator in both forms.
 
     The discrete form is ``B q^-nk / F`` with ``B = b0 + b1 q^-1``, ``F = 1 + f1 q^-1 + f2 q^-2``.
+
+    Examples
+    --------
+    >>> pyhoid.convert(f=(-1.91, 0.92), b=(0.044, -0.043), nk=29).operator
     """
 
     f: tuple[float, float]
@@ -27,7 +31,12 @@ class Conversion(NamedTuple):
 
 
 class DiscreteTransferFunction(NamedTuple):
-    """Numerator and denominator by ascending powers of q^-1."""
+    """Numerator and denominator by ascending powers of q^-1.
+
+    Examples
+    --------
+    >>> pyhoid.discretise([90.0], [1.0, 6.0, 0.0], 0.01).den
+    """
 
     num: FloatArray
     den: FloatArray
@@ -73,6 +82,10 @@ def convert(
     ------
     OptionError
         When both or neither are given, or a parameter is missing.
+
+    Examples
+    --------
+    >>> pyhoid.convert(f=(-1.91, 0.92), b=(0.044, -0.043), nk=29, sample_time=0.01).operator
     """
     if operator is not None:
         if f is not None or b is not None:
@@ -121,6 +134,10 @@ def discretise(
     -------
     DiscreteTransferFunction
         Numerator and denominator by ascending powers of q^-1.
+
+    Examples
+    --------
+    >>> num, den = pyhoid.discretise([90.0], [1.0, 6.0, 0.0], 0.01)
     """
     if method == "prewarped" and prewarp is None:
         raise OptionError('method="prewarped" needs prewarp, a frequency in rad/s')

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
+from ._pickling import Call, recalled, state_of
 from .estimates import Estimate, estimates
 from .record import Record
 
@@ -19,17 +20,33 @@ if TYPE_CHECKING:
 __all__ = ["DescribingFunction", "Description", "describe", "describing_function"]
 
 
+#: What a pickle keeps of the native side.
+_ANSWERS = ("per_run", "remnant_spectrum", "figures")
+
+
 class DescribingFunction:
     """The response of a person at the lines of the excitation. `describing_function` makes it.
 
     Columns are read by name, and have one value for each line: ``omega`` (rad/s), ``harmonic``,
     ``response`` (complex), ``response_se``, ``coherence``, ``magnitude_db``, ``phase_deg``, with
     ``_se`` for standard errors (NaN where there is only one run).
+
+    Examples
+    --------
+    >>> found = pyhoid.describing_function(records, channel="f_t")
+    >>> found.omega, found.response
     """
 
-    def __init__(self, native: _pyhoid.DescribingFunction) -> None:
+    def __init__(self, native: _pyhoid.DescribingFunction, call: Call | None = None) -> None:
         self._native = native
+        self._call = call
         self.columns: dict[str, npt.NDArray[Any]] = native.columns()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return state_of(self, _ANSWERS)
+
+    def __setstate__(self, state: Any) -> None:
+        recalled(self, state, _ANSWERS)
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         return self.columns[name]
@@ -182,11 +199,18 @@ def describing_function(
     ------
     DataError
         When the span does not hold whole periods, or a line has no power.
+
+    Examples
+    --------
+    >>> found = pyhoid.describing_function(records, channel="f_t")
+    >>> found["magnitude_db"], found["coherence"]
     """
+    settings = {name: value for name, value in locals().items() if name != "records"}
     given = harmonics is not None or omega is not None
+    several = tuple(_options.as_records(records))
     return DescribingFunction(
         _pyhoid.describing_function(
-            _options.as_records(records),
+            several,
             harmonics=None if harmonics is None else [int(h) for h in harmonics],
             omega=None if omega is None else [float(w) for w in omega],
             period=period,
@@ -200,7 +224,8 @@ def describing_function(
             offset_samples=offset_samples,
             detrend=detrend,
             smoothing_bins=smoothing_bins,
-        )
+        ),
+        Call("describing_function", several, settings),
     )
 
 
@@ -226,10 +251,14 @@ class Description:
         The channel that the average refers to.
     period : float
         Period of the excitation, s.
+
+    Examples
+    --------
+    >>> pyhoid.describe(records, excitation="f_t").remnant_share
     """
 
-    def __init__(self, native: _pyhoid.Description) -> None:
-        self.function = DescribingFunction(native.function())
+    def __init__(self, native: _pyhoid.Description, call: Call | None = None) -> None:
+        self.function = DescribingFunction(native.function(), call)
         self.phase_deg: FloatArray = native.phase_deg
         found = native.open_loop
         self.open_loop: dict[str, Estimate | None] | None = (
@@ -296,13 +325,20 @@ def describe(
         When no channel holds an excitation, or the lines are none of the period.
     DataError
         When the span does not hold whole periods, or a line has no power.
+
+    Examples
+    --------
+    >>> found = pyhoid.describe(records, excitation="f_t", controlled_element="90/(s(s+6))")
+    >>> found.open_loop["phase_margin_deg"]
     """
+    settings = {name: value for name, value in locals().items() if name != "records"}
+    several = tuple(_options.as_records(records))
     element = None
     if controlled_element is not None:
         element = _options.controlled_element(controlled_element)
     return Description(
         _pyhoid.describe(
-            _options.as_records(records),
+            several,
             excitation=excitation,
             lines=None if lines is None else [float(w) for w in lines],
             period=period,
@@ -311,5 +347,6 @@ def describe(
             stop=stop,
             offset_samples=offset_samples,
             detrend=detrend,
-        )
+        ),
+        Call("describe", several, settings),
     )

@@ -33,6 +33,10 @@ class Estimate(NamedTuple):
     """A value and its standard error.
 
     The standard error is None where there is none: for a delay of whole samples, or an exact fit.
+
+    Examples
+    --------
+    >>> fit.operator.K_e.value, fit.operator.K_e.standard_error
     """
 
     value: float
@@ -143,6 +147,10 @@ class Operator(_Converted):
     reason : str or None
     stable : bool
         Whether zeta_nm is positive.
+
+    Examples
+    --------
+    >>> fit.operator.T_L
     """
 
     _what = "the operator"
@@ -161,6 +169,10 @@ class Remnant(_Converted):
     order : int
     discretisation : str
         The discretisation that was inverted, ``"zoh"`` or ``"backward-euler"``.
+
+    Examples
+    --------
+    >>> fit.remnant.T_n
     """
 
     _what = "the remnant"

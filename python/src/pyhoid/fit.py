@@ -15,6 +15,7 @@ from ._arrays import FloatArray, signal
 from .errors import DataError, NotConvertibleError
 from .estimates import UNITS, Estimate, Operator, Remnant, estimates
 from .record import Record
+from ._pickling import Call, recalled, state_of
 from .verdict import Verdict
 
 if TYPE_CHECKING:
@@ -30,6 +31,10 @@ class Series(NamedTuple):
     """Values on the time axis of a record, from sample `first` on.
 
     ``record.u[first:]`` has the same times as `values`.
+
+    Examples
+    --------
+    >>> first, values = fit.predict(record)
     """
 
     first: int
@@ -40,6 +45,10 @@ class FrequencyResponse(NamedTuple):
     """Frequency response from e to u with its standard errors.
 
     All arrays have shape (n,). Standard errors are NaN where there are none.
+
+    Examples
+    --------
+    >>> fit.frequency_response([0.5, 1.0, 2.0]).magnitude_db
     """
 
     omega: FloatArray
@@ -67,7 +76,12 @@ class Correlation(NamedTuple):
 
 
 class Validation(NamedTuple):
-    """A model validated on a record: simulation, prediction, and tests of the residuals."""
+    """A model validated on a record: simulation, prediction, and tests of the residuals.
+
+    Examples
+    --------
+    >>> fit.validate(record).quality["vaf_prediction"]
+    """
 
     first: int
     simulated: FloatArray
@@ -81,8 +95,31 @@ class Validation(NamedTuple):
     feedback: bool
 
 
+#: What a pickle keeps of the native side.
+_ANSWERS = (
+    "structure",
+    "title",
+    "orders",
+    "sample_time",
+    "parameters",
+    "covariance",
+    "polynomials",
+    "figures",
+    "termination",
+    "stable",
+    "operator",
+    "operators",
+    "roots",
+    "candidates",
+    "criterion",
+    "delay_interval",
+)
+
+
 class Fit:
     """A fitted model. `identify` makes it.
+
+    It can be pickled: see `pyhoid._pickling`.
 
     Attributes
     ----------
@@ -90,6 +127,11 @@ class Fit:
         The records that the model was fitted to.
     settings : dict
         The keywords of the call, defaults included.
+
+    Examples
+    --------
+    >>> fit = pyhoid.identify(record, "bj", nk=29, nd=1)
+    >>> fit.parameters, fit.standard_errors, fit.verdict
     """
 
     def __init__(
@@ -97,8 +139,10 @@ class Fit:
         native: _pyhoid.Fit,
         records: Sequence[Record],
         settings: Mapping[str, Any] | None = None,
+        call: Call | None = None,
     ) -> None:
         self._native = native
+        self._call = call
         self.records: tuple[Record, ...] = tuple(records)
         self.settings: dict[str, Any] = dict(settings or {})
         self._quality: dict[str, float] | None = None
@@ -108,6 +152,15 @@ class Fit:
         self._of_faults = Verdict("trustworthy", [], [])
         #: Records with their level, where it was estimated.
         self._as_read: tuple[Record, ...] = ()
+
+    def __getstate__(self) -> dict[str, Any]:
+        if self.records:
+            # What a summary shows is said before it is stored.
+            _ = self.quality, self.verdict
+        return state_of(self, _ANSWERS)
+
+    def __setstate__(self, state: Any) -> None:
+        recalled(self, state, _ANSWERS)
 
     @property
     def structure(self) -> str:

@@ -43,6 +43,11 @@ def group(
     Raises
     ------
     FileError, OptionError, StudyStateError
+
+    Examples
+    --------
+    >>> found = pyhoid.group("runs", "results")
+    >>> found["people"].to_pandas()
     """
     file = Path(manifest)
     file = file / "group.toml" if file.is_dir() else file
@@ -67,6 +72,10 @@ def group_manifest(
     """The manifest of a directory, as TOML text, and the files that are not in it.
 
     The manifest lists the files whose names match the pattern.
+
+    Examples
+    --------
+    >>> text, others = pyhoid.group_manifest("runs", "{subject}_{condition}_{run}.csv")
     """
     return _pyhoid.group_manifest(Path(directory), pattern)
 
@@ -116,6 +125,10 @@ def simulate_group(
         For an experiment that is not valid.
     StudyStateError
         When the directory already holds an experiment.
+
+    Examples
+    --------
+    >>> pyhoid.simulate_group("runs", subjects=5, conditions=["C1", "C4"])
     """
     return _pyhoid.simulate_group(
         Path(directory),
@@ -185,6 +198,10 @@ def simulate_people(
         For an experiment that is not valid.
     StudyStateError
         When the directory already holds an experiment.
+
+    Examples
+    --------
+    >>> pyhoid.simulate_people("runs", subjects=3, plants=["integrator"])
     """
     return _pyhoid.simulate_people(
         Path(directory),

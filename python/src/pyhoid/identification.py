@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 from . import _faults, _options, _pyhoid
 from ._options import Order, Progress
+from ._pickling import Call
 from .errors import OptionError
 from .fit import Fit
 from .operator_fit import prior_of
@@ -56,6 +57,17 @@ def _check(structure: str, method: str, given: Mapping[str, object]) -> None:
 if TYPE_CHECKING:
     from typing_extensions import TypedDict, Unpack
 
+    from ._literals import (
+        BatchMethod,
+        Criterion,
+        Faults,
+        Focus,
+        Form,
+        InitialState,
+        ModelStructure,
+        SearchMethod,
+    )
+
     class IdentifyOptions(TypedDict, total=False):
         """The keywords of `identify`."""
 
@@ -65,32 +77,32 @@ if TYPE_CHECKING:
         nd: Order | None
         nf: Order | None
         nk: Order | None
-        method: str
+        method: BatchMethod
         instruments: str | None
-        form: str | None
+        form: Form | None
         neuromuscular: bool
         prior: Any
         remnant_order: Order | None
         delay: tuple[float, float] | None
         individual: Sequence[str]
-        criterion: str
-        initial_state: str
+        criterion: Criterion
+        initial_state: InitialState
         start: Mapping[str, float] | None
         fix: Mapping[str, float] | None
         bound: Mapping[str, tuple[float | None, float | None]] | None
         coefficient_prior: Mapping[str, tuple[float, float]] | None
         robust: float | bool | None
-        focus: str
+        focus: Focus
         stable: bool
-        search_method: str
+        search_method: SearchMethod
         max_iterations: int
         tolerance: float
-        faults: str
+        faults: Faults
         progress: Progress
 
 
 @overload
-def identify(  # type: ignore[overload-overlap]
+def identify(
     records: Record | Sequence[Record],
     structure: Literal["time-varying", "time_varying"],
     **options: Unpack[IdentifyOptions],
@@ -98,12 +110,12 @@ def identify(  # type: ignore[overload-overlap]
 @overload
 def identify(
     records: Record | Sequence[Record],
-    structure: str | None = None,
+    structure: ModelStructure | None = None,
     **options: Unpack[IdentifyOptions],
 ) -> Fit: ...
 def identify(
     records: Record | Sequence[Record],
-    structure: str | None = None,
+    structure: ModelStructure | Literal["time-varying", "time_varying"] | None = None,
     *,
     na: Order | None = None,
     nb: Order | None = None,
@@ -111,27 +123,27 @@ def identify(
     nd: Order | None = None,
     nf: Order | None = None,
     nk: Order | None = None,
-    method: str = "pem",
+    method: BatchMethod = "pem",
     instruments: str | None = None,
-    form: str | None = None,
+    form: Form | None = None,
     neuromuscular: bool = True,
     prior: Any = None,
     remnant_order: Order | None = None,
     delay: tuple[float, float] | None = None,
     individual: Sequence[str] = (),
-    criterion: str = "bic",
-    initial_state: str = "auto",
+    criterion: Criterion = "bic",
+    initial_state: InitialState = "auto",
     start: Mapping[str, float] | None = None,
     fix: Mapping[str, float] | None = None,
     bound: Mapping[str, tuple[float | None, float | None]] | None = None,
     coefficient_prior: Mapping[str, tuple[float, float]] | None = None,
     robust: float | bool | None = None,
-    focus: str = "prediction",
+    focus: Focus = "prediction",
     stable: bool = False,
-    search_method: str = "auto",
+    search_method: SearchMethod = "auto",
     max_iterations: int = 100,
     tolerance: float = 1e-12,
-    faults: str = "bridge",
+    faults: Faults = "bridge",
     progress: Progress = False,
 ) -> Fit | TimeVaryingFit:
     """Identify a model and the operator's parameters from one or several records.
@@ -297,11 +309,14 @@ def identify(
         level=level,
         progress=_options.reporter(progress, "candidates"),
     )
+    # The records are mended already: what is looked for in them again is not taken out.
+    again = settings | {"faults": "keep" if faults == "keep" else "report"}
+    call = Call("identify", several, again)
     if isinstance(found, _pyhoid.TimeVaryingFit):
-        change = TimeVaryingFit(found, several, settings)
+        change = TimeVaryingFit(found, several, settings, call)
         change.faults, change._of_faults = of_faults, says
         return change
-    fit = Fit(found, several, settings)
+    fit = Fit(found, several, settings, call)
     fit.faults, fit._of_faults = of_faults, says
     if without is not None:
         fit._as_read = as_read

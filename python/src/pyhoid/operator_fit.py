@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from . import _faults, _options, _pyhoid, _text
 from ._arrays import FloatArray
 from ._options import Order
+from ._pickling import Call, recalled, state_of
 from .errors import FormatError, OptionError
 from .estimates import Estimate, Named, estimates
 from .fit import Fit
@@ -19,6 +20,8 @@ from .verdict import Verdict
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from ._literals import Faults, Form, InitialState, SearchMethod
 
 __all__ = ["OperatorFit", "OperatorParameter", "OperatorParameters", "identify_operator"]
 
@@ -43,6 +46,10 @@ class OperatorParameter(NamedTuple):
     determined : bool
         Whether the data determine the parameter.
     unit : str
+
+    Examples
+    --------
+    >>> fit.parameters["T_L"].interval
     """
 
     value: float
@@ -101,6 +108,10 @@ _HEADER = ["parameter", "value", "95 % from", "to", "of it prior", ""]
 
 def _end(value: float) -> str:
     return "open" if value in (float("inf"), float("-inf")) else _text.number(value, 3)
+
+
+#: What a pickle keeps of the native side, beside what is read from it at once.
+_ANSWERS = ("title", "parameters", "figures")
 
 
 class OperatorFit:
@@ -174,6 +185,11 @@ class OperatorFit:
         deviations, action, words.
     settings : dict
         The keywords of the call, defaults included.
+
+    Examples
+    --------
+    >>> fit = pyhoid.identify_operator(records, controlled_element="90/(s(s+6))")
+    >>> fit.verdict.level, fit.parameters, fit.open_loop
     """
 
     def __init__(
@@ -181,8 +197,10 @@ class OperatorFit:
         native: _pyhoid.OperatorFit,
         records: Sequence[Record],
         settings: Mapping[str, Any] | None = None,
+        call: Call | None = None,
     ) -> None:
         self._native = native
+        self._call = call
         self.settings: dict[str, Any] = dict(settings or {})
         self.records: tuple[Record, ...] = tuple(one.detrended("mean") for one in records)
         self.form, self.neuromuscular = native.form
@@ -246,9 +264,20 @@ class OperatorFit:
         self.termination = native.termination
         several = len(self.operators) > 1
         self.fits: tuple[Fit, ...] = tuple(
-            Fit(native.fit(k), self.records[k : k + 1] if several else self.records, self.settings)
+            Fit(
+                native.fit(k),
+                self.records[k : k + 1] if several else self.records,
+                self.settings,
+                call and call.to(k),
+            )
             for k in range(len(self.operators))
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        return state_of(self, _ANSWERS)
+
+    def __setstate__(self, state: Any) -> None:
+        recalled(self, state, _ANSWERS)
 
     @property
     def fit(self) -> Fit:
@@ -423,7 +452,7 @@ def prior_of(prior: Any) -> str | _Entries | _OfFit:
 def identify_operator(
     records: Record | Sequence[Record],
     *,
-    form: str = "auto",
+    form: Form = "auto",
     neuromuscular: bool = True,
     prior: str
     | PathLike[str]
@@ -438,11 +467,11 @@ def identify_operator(
     nc: Order = 0,
     nd: Order | None = None,
     run_to_run: float | None = None,
-    initial_state: str = "auto",
-    search_method: str = "auto",
+    initial_state: InitialState = "auto",
+    search_method: SearchMethod = "auto",
     max_iterations: int = 100,
     tolerance: float = 1e-9,
-    faults: str = "bridge",
+    faults: Faults = "bridge",
 ) -> OperatorFit:
     """The operator of a recorded person: form, parameters with errors that hold, and a verdict.
 
@@ -535,6 +564,7 @@ def identify_operator(
         tolerance=float(tolerance),
         second_opinion=faults != "keep",
     )
-    fit = OperatorFit(found, several, settings)
+    again = settings | {"faults": "keep" if faults == "keep" else "report"}
+    fit = OperatorFit(found, several, settings, Call("identify_operator", several, again))
     fit.faults, fit.verdict = of_faults, _faults.joined(fit.verdict, says)
     return fit

@@ -83,7 +83,13 @@ SYMBOLS: Mapping[str, str] = {
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Draw in the style of the reports: ``with pyhoid.plots.style(): ...``."""
+    """Draw in the style of the reports: ``with pyhoid.plots.style(): ...``.
+
+    Examples
+    --------
+    >>> with pyhoid.plots.style():
+    ...     pyhoid.plots.bode(fit)
+    """
     # Only the style's settings: matplotlib.rc_context would also take back what the backend of a
     # notebook sets at the first figure.
     settings: Any = rcParams
@@ -132,6 +138,10 @@ def time_response(
         Default the first record of the first fit.
     predict : bool
         Show the one-step prediction instead of the simulation.
+
+    Examples
+    --------
+    >>> pyhoid.plots.time_response(fit, record)
     """
     named = _fits(fits)
     record = record or next(iter(named.values())).records[0]
@@ -182,6 +192,10 @@ def bode(
     """Bode plot from e to u with bands of `deviations` standard errors.
 
     `axes` are two, for magnitude and phase.
+
+    Examples
+    --------
+    >>> pyhoid.plots.bode({"BJ": fit, "ARX": other})
     """
     with style():
         pair = _pair(axes)
@@ -226,7 +240,12 @@ def describing(
     *,
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:
-    """The describing function as points with error bars, over the Bode plot of the models."""
+    """The describing function as points with error bars, over the Bode plot of the models.
+
+    Examples
+    --------
+    >>> pyhoid.plots.describing(pyhoid.describe(records))
+    """
     with style():
         pair = _pair(axes)
         if model is not None:
@@ -260,6 +279,10 @@ def residual_tests(
     """Autocorrelation of the residuals and their cross-correlation with e.
 
     The grey bands are the bounds that 99 % of white residuals stay within.
+
+    Examples
+    --------
+    >>> pyhoid.plots.residual_tests(fit, record)
     """
     record = record or fit.records[0]
     found = fit.validate(record)
@@ -307,6 +330,10 @@ def trace(
         Columns to show; default the operator's parameters.
     truth : bool
         Draw the true values in black where the record has them.
+
+    Examples
+    --------
+    >>> pyhoid.plots.trace(pyhoid.track(record))
     """
     if isinstance(traces, Trace):
         named = {traces.method: traces}
@@ -394,6 +421,10 @@ def box_plots(
         The true value, drawn as a dashed line.
     label : str
         Label of the ordinate; a parameter's name becomes its symbol and unit.
+
+    Examples
+    --------
+    >>> pyhoid.plots.box_plots({"ARX": [0.08, 0.09, 0.11], "BJ": [0.09, 0.10]}, truth=0.09)
     """
     with style():
         ax = _axes(ax)
@@ -435,6 +466,10 @@ def reference(name: str, directory: str | PathLike[str]) -> Figure:
     ------
     FileMissingError
         When the figure has not been reproduced there.
+
+    Examples
+    --------
+    >>> pyhoid.plots.reference("fig-11", "reproduction")
     """
     from . import _reference
 

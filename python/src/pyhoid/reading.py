@@ -8,12 +8,15 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from . import _pyhoid
+from ._other_files import readable
 from .record import Record
 
 __all__ = ["info", "read", "read_segments", "write"]
 
 if TYPE_CHECKING:
     from typing_extensions import TypedDict, Unpack
+
+    from ._literals import Detrending
 
     class ReadOptions(TypedDict, total=False):
         """The keywords of `read`."""
@@ -31,7 +34,7 @@ if TYPE_CHECKING:
         decimate: int | None
         new_sampling_frequency: float | None
         run_in: float
-        detrend: str
+        detrend: Detrending
 
 
 def read(
@@ -50,9 +53,11 @@ def read(
     decimate: int | None = None,
     new_sampling_frequency: float | None = None,
     run_in: float = 0.0,
-    detrend: str = "none",
+    detrend: Detrending = "none",
 ) -> Record:
     """Read a record from a CSV, Parquet, NPZ, NPY, MATLAB .mat or XDF file.
+
+    Packed text (``.csv.gz``), Arrow and Feather (by polars) and Excel (by pandas) are read too.
 
     Parameters
     ----------
@@ -101,6 +106,10 @@ def read(
     UserWarning
         What a person should know about the file: columns left out, trouble with the sampling.
         `Record.steps` lists what was done to the numbers.
+
+    Examples
+    --------
+    >>> record = pyhoid.read("run1.csv", input="r-y", output="stick", start=5.0, stop=45.0)
     """
     (record,) = _read(
         path,
@@ -183,25 +192,26 @@ def _read(
     run_in: float = 0.0,
     detrend: str = "none",
 ) -> list[Record]:
-    found = _pyhoid.read(
-        path,
-        input=input,
-        output=output,
-        sampling_frequency=sampling_frequency,
-        start=start,
-        stop=stop,
-        resample=resample,
-        fill=fill,
-        detrend=detrend,
-        drop_repeated=drop_repeated,
-        scale={name: _written(value) for name, value in (scale or {}).items()},
-        offset={name: _written(value) for name, value in (offset or {}).items()},
-        decimate=decimate,
-        new_sampling_frequency=new_sampling_frequency,
-        run_in=float(run_in),
-        mask=list(mask),
-        shortest=float(shortest),
-    )
+    with readable(path) as file:
+        found = _pyhoid.read(
+            file,
+            input=input,
+            output=output,
+            sampling_frequency=sampling_frequency,
+            start=start,
+            stop=stop,
+            resample=resample,
+            fill=fill,
+            detrend=detrend,
+            drop_repeated=drop_repeated,
+            scale={name: _written(value) for name, value in (scale or {}).items()},
+            offset={name: _written(value) for name, value in (offset or {}).items()},
+            decimate=decimate,
+            new_sampling_frequency=new_sampling_frequency,
+            run_in=float(run_in),
+            mask=list(mask),
+            shortest=float(shortest),
+        )
     records = []
     for parts, steps, notes in found:
         for note in notes:
@@ -224,6 +234,10 @@ def write(path: str | PathLike[str], record: Record) -> None:
     Raises
     ------
     FileError, FormatError
+
+    Examples
+    --------
+    >>> pyhoid.write("run1.parquet", record)
     """
     _pyhoid.write(path, record)
 
@@ -241,5 +255,11 @@ def info(path: str | PathLike[str]) -> dict[str, Any]:
     Raises
     ------
     FileError, FormatError
+
+    Examples
+    --------
+    >>> [column["name"] for column in pyhoid.info("run1.csv")["columns"]]
     """
-    return _pyhoid.info(path)
+    with readable(path) as file:
+        found = _pyhoid.info(file)
+    return found

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from . import _pyhoid, _text
 from ._arrays import FloatArray, signal
@@ -13,21 +15,62 @@ from .errors import DataError, OptionError
 
 if TYPE_CHECKING:
     import pandas as pd
+    import polars as pl
     import xarray as xr
+
+    from ._literals import Detrending
 
 __all__ = ["Record"]
 
 
+def _is_frozen(array: FloatArray) -> bool:
+    """Whether nobody can write into an array: it owns its numbers or looks at such a one, and none
+    of them is writeable."""
+    at: Any = array
+    while isinstance(at, np.ndarray):
+        if at.flags.writeable:
+            return False
+        at = at.base
+    return at is None or isinstance(at, bytes)
+
+
 def _read_only(array: FloatArray) -> FloatArray:
-    view = array.view()
-    view.flags.writeable = False
-    return view
+    """The array as nobody can change it: a copy, unless it is so already."""
+    if _is_frozen(array):
+        return array
+    own = np.array(array, dtype=np.float64, copy=True)
+    own.flags.writeable = False
+    # A view of it cannot be made writeable.
+    return own.view()
+
+
+def _is_instant(times: npt.NDArray[Any] | None) -> bool:
+    return times is not None and times.dtype.kind in "mM"
+
+
+def _seconds(times: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Times in s: durations as they are, dates from the first on."""
+    if times.dtype.kind not in "mM":
+        return times
+    if np.isnat(times).any():
+        row = int(np.flatnonzero(np.isnat(times))[0])
+        raise DataError(f"the time of row {row} is missing; fill it, or give sample_time")
+    elapsed = times - times[0] if times.dtype.kind == "M" else times
+    return np.asarray(elapsed.astype("timedelta64[ns]").astype(np.int64) * 1e-9, dtype=np.float64)
+
+
+def _own(array: FloatArray) -> FloatArray:
+    """An array that nobody else holds, frozen as it is."""
+    array.flags.writeable = False
+    return array.view()
 
 
 class Record:
     """The signals of one run, with one value for each sample.
 
-    Contiguous arrays of float64 are not copied: do not change them afterwards.
+    The numbers are the record's own: arrays that others can write into are copied, so that nothing
+    changes behind its back; arrays that nobody can write into (such as those of another record) are
+    not.
 
     Parameters
     ----------
@@ -92,15 +135,17 @@ class Record:
         channels: dict[str, FloatArray],
         input_name: str = "e",
         output_name: str = "u",
+        own: bool = False,
     ) -> None:
-        self.e: FloatArray | None = None if e is None else _read_only(e)
-        self.u: FloatArray = _read_only(u)
+        kept = _own if own else _read_only
+        self.e: FloatArray | None = None if e is None else kept(e)
+        self.u: FloatArray = kept(u)
         self.sample_time: float = sample_time
         self.start_time: float = start_time
         self.label: str = label
         self.units: dict[str, str] = units
         self.channels: dict[str, FloatArray] = {
-            name: _read_only(values) for name, values in channels.items()
+            name: kept(values) for name, values in channels.items()
         }
         self.input_name: str = input_name
         self.output_name: str = output_name
@@ -110,7 +155,7 @@ class Record:
     @classmethod
     def _of(cls, parts: Mapping[str, Any]) -> Record:
         record = cls.__new__(cls)
-        record._fill(**parts)
+        record._fill(**parts, own=True)
         return record
 
     @classmethod
@@ -124,17 +169,66 @@ class Record:
     ) -> Record:
         """Make a record from a table; other columns with numbers become channels.
 
-        The sample time is `sample_time`, or that of a column ``t`` or an index of times in s, which
-        must be even.
+        The sample time is `sample_time`, or that of a column ``t`` or an index: times in s, a
+        DatetimeIndex (whose first time becomes 0) or a TimedeltaIndex. They must be even.
+
+        Examples
+        --------
+        >>> record = pyhoid.Record.from_pandas(pandas.read_csv("run1.csv"), input="error")
         """
         columns = {str(name): frame[name].to_numpy() for name in frame.columns}
+        index = frame.index
+        if index.dtype.kind in "mM" or "datetime64" in str(index.dtype):
+            # Times with a zone are those of UTC.
+            times = index.to_numpy(dtype="datetime64[ns]" if index.dtype.kind != "m" else None)
+        else:
+            times = np.asarray(index)
+            times = times if times.dtype.kind == "f" else None
+        return cls._of_table(columns, times, input=input, output=output, sample_time=sample_time)
+
+    @classmethod
+    def from_polars(
+        cls,
+        frame: pl.DataFrame,
+        *,
+        input: str | None = "e",
+        output: str = "u",
+        sample_time: float | None = None,
+    ) -> Record:
+        """Make a record from a table of polars; other columns with numbers become channels.
+
+        The sample time is `sample_time`, or that of a column ``t``: times in s, dates with times, or
+        durations.
+
+        Examples
+        --------
+        >>> record = pyhoid.Record.from_polars(polars.read_ipc("run1.arrow"), input="error")
+        """
+        columns = {name: frame[name].to_numpy() for name in frame.columns}
+        return cls._of_table(columns, None, input=input, output=output, sample_time=sample_time)
+
+    @classmethod
+    def _of_table(
+        cls,
+        columns: dict[str, npt.NDArray[Any]],
+        index: npt.NDArray[Any] | None,
+        *,
+        input: str | None,
+        output: str,
+        sample_time: float | None,
+    ) -> Record:
+        """A record from columns by name, and from the times beside them where there is no column t."""
         for name in (input, output):
             if name is not None and name not in columns:
-                raise DataError(f"the table has no column {name}; it has {', '.join(columns)}")
+                near = get_close_matches(name, columns, 1, 0.6)
+                meant = f"; did you mean {near[0]}?" if near else ""
+                raise DataError(
+                    f"the table has no column {name}{meant}; it has {', '.join(columns)}"
+                )
         times = columns.pop("t", None)
-        if times is None and sample_time is None:
-            index = np.asarray(frame.index)
-            times = index if index.dtype.kind == "f" else None
+        if times is None and (sample_time is None or _is_instant(index)):
+            times = index
+        times = None if times is None else _seconds(times)
         start = 0.0
         if sample_time is None:
             if times is None or len(times) < 2:
@@ -231,10 +325,11 @@ class Record:
             channels={name: values[first:end] for name, values in self.channels.items()},
             input_name=self.input_name,
             output_name=self.output_name,
+            own=True,
         )
         return record
 
-    def detrended(self, how: str = "mean") -> Record:
+    def detrended(self, how: Detrending = "mean") -> Record:
         """The record with the ``"mean"`` or the ``"linear"`` trend of input and output removed."""
         return Record._of(_pyhoid.detrended(self, how))
 
@@ -247,6 +342,12 @@ class Record:
             index=pd.Index(self.time, name="t"),
             copy=False,
         )
+
+    def to_polars(self) -> pl.DataFrame:
+        """All channels as a table of polars, behind the time in s as column ``t``."""
+        import polars as pl
+
+        return pl.DataFrame({"t": self.time, **{name: self[name] for name in self.names}})
 
     def to_xarray(self) -> xr.Dataset:
         """All channels over the coordinate ``t`` (s), with their units."""
@@ -303,4 +404,7 @@ class Record:
 
 
 def _record_of(parts: Mapping[str, Any]) -> Record:
-    return Record._of(parts)
+    """A record out of its pickle, checked as one that is made by hand."""
+    record = Record._of(parts)
+    _pyhoid.check_record(record)
+    return record

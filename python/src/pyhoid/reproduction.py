@@ -16,7 +16,12 @@ __all__ = ["Reproduction", "reproduce"]
 
 
 class Reproduction(NamedTuple):
-    """What `reproduce` has made."""
+    """What `reproduce` has made.
+
+    Examples
+    --------
+    >>> pyhoid.reproduce("out", only=["fig-5"]).figures["fig-5"]
+    """
 
     #: The page that shows all of it.
     page: Path
@@ -64,6 +69,10 @@ def reproduce(
         For an unknown name.
     StudyStateError
         When the directory holds studies with another number of replications.
+
+    Examples
+    --------
+    >>> made = pyhoid.reproduce("out", only=["fig-5", "table-2"], replications=10)
     """
     if isinstance(only, str):
         only = [only]

@@ -73,6 +73,10 @@ def simulate(
     Raises
     ------
     OptionError
+
+    Examples
+    --------
+    >>> record = pyhoid.simulate("C4", remnant_order=1, noise_level=0.1, seed=0)
     """
     parts = _pyhoid.simulate(
         **_base(condition, scenario),
@@ -116,6 +120,10 @@ def margins(
         ``crossover_rad_s``, ``phase_margin_deg``, ``gain_margin_db``, ``phase_crossover_rad_s``
         (None where there is none), and ``remnant_gain``, a list of dicts with ``remnant_order``,
         ``noise_level``, ``definition`` and ``K_n``.
+
+    Examples
+    --------
+    >>> pyhoid.margins("C1")["phase_margin_deg"]
     """
     return _pyhoid.margins(
         **_base(condition, scenario),

@@ -31,6 +31,11 @@ class Table(Mapping[str, Any]):
     ----------
     path : path
         The file; it is read when a column is first asked for.
+
+    Examples
+    --------
+    >>> table = pyhoid.results("out")["fits"]
+    >>> table["K_e"]
     """
 
     def __init__(self, path: str | PathLike[str]) -> None:
@@ -100,6 +105,10 @@ class Results(Mapping[str, Table]):
         Number of estimates that this run made.
     pages : list of Path
         The pages beside the tables, for a group.
+
+    Examples
+    --------
+    >>> pyhoid.results("out").fits.to_pandas()
     """
 
     def __init__(
@@ -152,6 +161,10 @@ def plan(source: str | PathLike[str] | Plan, *, replications: int | None = None)
     ------
     OptionError
         For a plan that is not valid; the message names the line.
+
+    Examples
+    --------
+    >>> pyhoid.plan("plan.toml", replications=10).estimates
     """
     if isinstance(source, Plan):
         return source if replications is None else Plan(text=source.text, replications=replications)
@@ -166,7 +179,12 @@ def plan(source: str | PathLike[str] | Plan, *, replications: int | None = None)
 
 
 def plans() -> dict[str, str]:
-    """Names and titles of the plans that come with hoid."""
+    """Names and titles of the plans that come with hoid.
+
+    Examples
+    --------
+    >>> pyhoid.plans()
+    """
     return dict(_pyhoid.plan_names())
 
 
@@ -213,6 +231,10 @@ def study(
         For a plan that is not valid.
     StudyStateError
         When the directory holds a study and `resume` is False.
+
+    Examples
+    --------
+    >>> results = pyhoid.study("plan.toml", "out", replications=10)
     """
     found = plan(source, replications=replications)
     share = f"{shard[0]}/{shard[1]}" if isinstance(shard, tuple) else shard
@@ -241,6 +263,10 @@ def merge(
     ------
     StudyStateError
         For shards of different plans, and when a shard is missing or there twice.
+
+    Examples
+    --------
+    >>> pyhoid.merge(["shard-1", "shard-2"], "out")
     """
     finished, estimates, _ = _pyhoid.merge_shards(
         [Path(shard) for shard in shards], Path(directory), csv
@@ -255,6 +281,10 @@ def results(directory: str | PathLike[str]) -> Results:
     ------
     StudyStateError
         When there are none.
+
+    Examples
+    --------
+    >>> pyhoid.results("out")["fits"].to_pandas()
     """
     found = Results(directory)
     if not found:

@@ -11,6 +11,7 @@ from . import _faults, _pyhoid, _text
 from ._arrays import FloatArray, signal
 from .estimates import Estimate, Operator
 from .fit import Series
+from ._pickling import Call, recalled, state_of
 from .record import Record
 from .verdict import Verdict
 
@@ -20,10 +21,28 @@ if TYPE_CHECKING:
 __all__ = ["TimeVaryingFit"]
 
 
+#: What a pickle keeps of the native side.
+_ANSWERS = (
+    "form",
+    "parameters",
+    "covariance",
+    "figures",
+    "termination",
+    "change",
+    "initial",
+    "last",
+)
+
+
 class TimeVaryingFit:
     """A fitted operator whose gains change once, along a sigmoid.
 
     `identify` makes it with ``structure="time-varying"``.
+
+    Examples
+    --------
+    >>> fit = pyhoid.identify(record, "time-varying", nd=2)
+    >>> fit.change, fit.initial, fit.last
     """
 
     def __init__(
@@ -31,13 +50,21 @@ class TimeVaryingFit:
         native: _pyhoid.TimeVaryingFit,
         records: Sequence[Record],
         settings: Mapping[str, Any] | None = None,
+        call: Call | None = None,
     ) -> None:
         self._native = native
+        self._call = call
         self.records: tuple[Record, ...] = tuple(records)
         self.settings: dict[str, Any] = dict(settings or {})
         #: Faults of the records that were looked for: kind, channel, from, to, size, action.
         self.faults: list[dict[str, Any]] = []
         self._of_faults = Verdict("trustworthy", [], [])
+
+    def __getstate__(self) -> dict[str, Any]:
+        return state_of(self, _ANSWERS)
+
+    def __setstate__(self, state: Any) -> None:
+        recalled(self, state, _ANSWERS)
 
     structure = "time-varying"
 

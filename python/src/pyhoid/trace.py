@@ -13,6 +13,7 @@ import numpy.typing as npt
 from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
 from .estimates import UNITS, Estimate, Operator
+from ._pickling import Call, recalled, state_of
 from .fit import Fit
 from .record import Record
 from .verdict import Verdict
@@ -24,6 +25,23 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["Trace"]
+
+
+#: What a pickle keeps of the native side.
+_ANSWERS = (
+    "len",
+    "method",
+    "structure",
+    "orders",
+    "parameter_names",
+    "operator_names",
+    "updated_from",
+    "counts",
+    "faults",
+    "changes",
+    "failures",
+    "innovation_variance",
+)
 
 
 class Trace:
@@ -38,16 +56,34 @@ class Trace:
         The record that was tracked.
     settings : dict
         The keywords of the call, defaults included.
+
+    Examples
+    --------
+    >>> trace = pyhoid.track(record)
+    >>> trace.time, trace["K_e"], trace["K_e_se"]
     """
 
     def __init__(
-        self, native: _pyhoid.Trace, record: Record, settings: Mapping[str, Any] | None = None
+        self,
+        native: _pyhoid.Trace,
+        record: Record,
+        settings: Mapping[str, Any] | None = None,
+        call: Call | None = None,
     ) -> None:
         self._native = native
+        self._call = call
         self.record = record
         self.settings: dict[str, Any] = dict(settings or {})
         self._columns: dict[str, npt.NDArray[Any]] | None = None
         self._verdict: Verdict | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        # What a table and a summary show is said before it is stored.
+        _ = self.columns, self.verdict
+        return state_of(self, _ANSWERS)
+
+    def __setstate__(self, state: Any) -> None:
+        recalled(self, state, _ANSWERS)
 
     @property
     def columns(self) -> dict[str, npt.NDArray[Any]]:
@@ -145,7 +181,7 @@ class Trace:
         native = self._native.start
         if native is None:
             return None
-        return Fit(native, [self.record])
+        return Fit(native, [self.record], call=self._call and self._call.to("start"))
 
     def operator(self, row: int = -1) -> Operator | None:
         """The operator of a row, by default the last."""

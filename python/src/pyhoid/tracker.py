@@ -15,6 +15,7 @@ from .record import Record
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
+    from ._literals import Criterion
     from ._settings import MethodSettings, RecursiveMethod, Structure
 
 __all__ = ["Tracker"]
@@ -61,7 +62,7 @@ class Tracker(_pyhoid.Tracker):
         nd: Order | None = None,
         nf: Order | None = None,
         nk: Order | None = None,
-        criterion: str = "bic",
+        criterion: Criterion = "bic",
         start: Mapping[str, float] | str | None = None,
         largest: float = 1e6,
         **settings: Unpack[MethodSettings],

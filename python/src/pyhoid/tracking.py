@@ -10,6 +10,7 @@ import numpy as np
 from . import _options, _pyhoid, _recursion
 from ._options import Order, Progress
 from ._settings import METHODS, SETTINGS
+from ._pickling import Call
 from .errors import DataError, OptionError
 from .record import Record
 from .trace import Trace
@@ -17,6 +18,7 @@ from .trace import Trace
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
+    from ._literals import Criterion
     from ._settings import MethodSettings, RecursiveMethod, Structure
 
 __all__ = ["track"]
@@ -33,7 +35,7 @@ def track(
     nd: Order | None = None,
     nf: Order | None = None,
     nk: Order | None = None,
-    criterion: str = "bic",
+    criterion: Criterion = "bic",
     start: Mapping[str, float] | str | None = None,
     largest: float = 1e6,
     at: Sequence[float] = (),
@@ -87,6 +89,11 @@ def track(
     Raises
     ------
     OptionError, DataError, EstimationError
+
+    Examples
+    --------
+    >>> trace = pyhoid.track(record, "rpem", nk=29, nd=1)
+    >>> trace["T_L"]
     """
     shared = {
         name: value
@@ -125,7 +132,7 @@ def track(
         every=int(every),
         progress=_options.reporter(progress, "candidates"),
     )
-    return Trace(native, record, shared | settings)
+    return Trace(native, record, shared | settings, Call("track", (record,), shared | settings))
 
 
 track.__doc__ = (track.__doc__ or "").format(methods=METHODS, settings=SETTINGS)

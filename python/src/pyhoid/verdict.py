@@ -12,6 +12,10 @@ class Verdict(NamedTuple):
 
     `level` is ``"trustworthy"``, ``"doubtful"`` or ``"not determined"``; `reasons` say what speaks
     against the result, `notes` what is worth knowing besides.
+
+    Examples
+    --------
+    >>> level, reasons, notes = fit.verdict
     """
 
     level: str

@@ -8,14 +8,14 @@ pub fn choice_of<T: NamedChoice + Send + Sync>(choices: &'static [T]) -> impl Ty
     by_name(choices.iter().map(|choice| (choice.choice_name(), *choice)))
 }
 
-/// One of some values by its name.
+/// One of some values by its name, in capitals or not where the option takes both.
 pub fn by_name<T: Clone + Send + Sync + 'static>(
     values: impl IntoIterator<Item = (&'static str, T)>,
 ) -> impl TypedValueParser<Value = T> {
     let values: Vec<(&str, T)> = values.into_iter().collect();
     let names: Vec<&'static str> = values.iter().map(|(name, _)| *name).collect();
     PossibleValuesParser::new(names).try_map(move |typed| {
-        let found = values.iter().find(|(name, _)| *name == typed);
+        let found = values.iter().find(|(name, _)| name.eq_ignore_ascii_case(&typed));
         found
             .map(|(_, value)| value.clone())
             .ok_or("not among the possible values")

@@ -8,14 +8,15 @@ use super::{
     group::{GroupArgs, SimulateGroupArgs},
     identify::IdentifyArgs,
     recursion::{StreamArgs, TrackArgs},
+    shell::{CompletionsArgs, ManArgs},
     simulate::{DemoArgs, MarginsArgs, SimulateArgs},
     study::{ReproduceArgs, StudyCommand},
 };
 
 /// Human-operator identification: finds out how a person controls a machine.
 ///
-/// From the tracking error e and the control output u it identifies gain, lead, delay and
-/// neuromuscular dynamics, with ARX and Box-Jenkins models and standard errors.
+/// From the tracking error e and the control output u: gain, lead, delay, neuromuscular dynamics and
+/// remnant, with standard errors and a verdict on what they are worth.
 #[derive(Debug, Parser)]
 #[command(name = "hoid", version, max_term_width = 110)]
 pub struct Cli {
@@ -25,53 +26,78 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// The whole path on a simulated run: simulate, identify, write a report
+    /// The whole path on a simulated run, with a report
+    ///
+    /// Simulates a run in which the controlled element changes, identifies, tracks, and writes reports.
     Demo(DemoArgs),
-    /// Simulate one closed-loop run and write it as CSV, Parquet, NPZ or .mat
+    /// Simulate one closed-loop run into a file
     Simulate(SimulateArgs),
-    /// Identify a model and the operator's parameters from one or several records
+    /// Gain, lead, delay ... of the person, from whole records
+    ///
+    /// Fits a model to one or several records, and says what the result is worth.
     Identify(Box<IdentifyArgs>),
-    /// How a person responds at the lines of a periodic excitation, without a model: describing
-    /// function, crossover, margins, remnant
+    /// Gain and phase at the lines of the excitation, without a model
+    ///
+    /// How a person responds at the lines of a periodic excitation: describing function, crossover,
+    /// margins, remnant.
     Describe(Box<DescribeArgs>),
-    /// Track a model and the operator's parameters over a record, sample by sample
+    /// The person over a record, sample by sample
+    ///
+    /// Tracks a model and the operator's parameters over a record, and finds changes.
     Track(Box<TrackArgs>),
-    /// Track live: samples as lines on standard input, one JSON line a sample on standard output
+    /// The same live: samples in, one JSON line a sample out
+    ///
+    /// Reads samples as lines on standard input and writes one JSON line a sample on standard output.
     Stream(Box<StreamArgs>),
-    /// Show what is inside of a file: columns, sampling, ranges, what is suspicious, and a sketch
-    /// of each
+    /// What is inside of a file, and what is wrong with it
+    ///
+    /// Shows columns, sampling, ranges, what is suspicious, and a sketch of each column.
     Info(InfoArgs),
-    /// Take discrete coefficients to operator parameters or back, or discretise a transfer function
+    /// Coefficients to operator parameters and back
+    ///
+    /// Takes discrete coefficients to operator parameters or back, or discretises a transfer function.
     Convert(ConvertArgs),
-    /// Crossover frequency, phase and gain margin of a scenario, and its remnant gains
+    /// Crossover and margins of a scenario
+    ///
+    /// Crossover frequency, phase and gain margin of a scenario, and its remnant gains.
     Margins(MarginsArgs),
-    /// Analyse many recorded runs by subject and condition
+    /// Many recorded runs by subject and condition
+    ///
+    /// `hoid group init DIR` looks at the files and writes a manifest; `hoid group DIR --out OUT` fits
+    /// each run, and each person in each condition, and writes tables and pages.
     Group(GroupArgs),
-    /// Simulate a virtual experiment for `hoid group`: subjects, conditions and runs, with the
-    /// truth beside them
+    /// A virtual experiment for `hoid group`
+    ///
+    /// Simulates subjects, conditions and runs, with the truth beside them.
     SimulateGroup(SimulateGroupArgs),
     /// Monte Carlo studies: run a plan, join shards, list plans
     #[command(subcommand)]
     Study(StudyCommand),
-    /// The tables, figures and claims of the reference text, each from a named study
+    /// The reference text: tables, figures, claims
+    ///
+    /// The tables, figures and claims of the reference text, each from a named study.
     Reproduce(ReproduceArgs),
+    /// Completions for bash, zsh, fish, PowerShell, Elvish
+    ///
+    /// Writes the completions of a shell to standard output.
+    Completions(CompletionsArgs),
+    /// Manual pages
+    ///
+    /// Writes a manual page for the program and one for each command.
+    Man(ManArgs),
 }
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
-    use super::*;
-
     #[test]
     fn the_definitions_do_not_contradict_each_other() {
-        Cli::command().debug_assert();
+        crate::args::command().debug_assert();
     }
 
     /// The help pages as a page of the book.
     fn reference_page() -> String {
         let mut page = "# Command line\n\nThe help pages of the program, word for word.\n".to_owned();
-        let mut cli = Cli::command().term_width(110);
+        let mut cli = crate::args::command().term_width(110);
         cli.build();
         for command in cli.get_subcommands_mut().filter(|c| c.get_name() != "help") {
             let help = command.render_long_help().to_string();

@@ -8,8 +8,9 @@ use hoid_io::readable_endings;
 use hoid_model::ContinuousTransferFunction;
 
 use super::{
-    parse::parse_width,
+    figure::FigureArgs,
     reading::{FaultArgs, MaskArgs, ReadArgs},
+    show::ShowArgs,
 };
 
 #[derive(Debug, Args)]
@@ -41,13 +42,8 @@ pub struct DescribeArgs {
     /// adds crossover frequency and margins
     #[arg(long, value_name = "ELEMENT", allow_hyphen_values = true)]
     pub controlled_element: Option<ContinuousTransferFunction>,
-    /// Draw magnitude, phase and coherence with error bars into this file (.svg)
-    #[arg(long, value_name = "FILE")]
-    pub figure: Option<PathBuf>,
-    /// Width of the figure, as 85mm, 17cm or 3.3in [default: 420 pixels]
-    #[arg(long, value_name = "WIDTH", value_parser = parse_width, requires = "figure")]
-    pub width: Option<f64>,
-    /// Print one JSON object instead of tables
-    #[arg(long)]
-    pub json: bool,
+    #[command(flatten)]
+    pub picture: FigureArgs,
+    #[command(flatten)]
+    pub show: ShowArgs,
 }

@@ -13,10 +13,12 @@ use hoid_model::{ContinuousTransferFunction, Form, Structure, remnant::RemnantDi
 
 use super::{
     choices::{by_name, choice_of},
-    parse::{parse_span, parse_width},
+    figure::FigureArgs,
+    parse::parse_span,
     reading::{FaultArgs, MaskArgs, ReadArgs},
+    show::ShowArgs,
 };
-use crate::orders::{parse_horizon, parse_range};
+use crate::orders::{DelayRange, parse_delay, parse_horizon, parse_range};
 
 #[derive(Debug, Args)]
 pub struct IdentifyArgs {
@@ -68,8 +70,8 @@ pub struct IdentifyArgs {
     pub trace: Option<PathBuf>,
     #[arg(long, help = about("orders"), value_name = "LIST")]
     pub orders: Option<String>,
-    #[arg(long, help = about("nk"), value_name = "N|LO..HI", value_parser = parse_range)]
-    pub nk: Option<RangeInclusive<usize>>,
+    #[arg(long, help = format!("{}; or dead time in s: 0.28s, 0.2s..0.4s", about("nk")), value_name = "N|Ss|LO..HI", value_parser = parse_delay)]
+    pub nk: Option<DelayRange>,
     /// What decides between candidates when something is searched
     #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_of(&Criterion::ALL))]
     pub criterion: Criterion,
@@ -102,12 +104,8 @@ pub struct IdentifyArgs {
     /// adds crossover frequency and margins
     #[arg(long, value_name = "ELEMENT", allow_hyphen_values = true)]
     pub controlled_element: Option<ContinuousTransferFunction>,
-    /// Draw the describing function with the fitted operator through it into this file (.svg)
-    #[arg(long, value_name = "FILE")]
-    pub figure: Option<PathBuf>,
-    /// Width of the figure, as 85mm, 17cm or 3.3in [default: 420 pixels]
-    #[arg(long, value_name = "WIDTH", value_parser = parse_width, requires = "figure")]
-    pub width: Option<f64>,
+    #[command(flatten)]
+    pub picture: FigureArgs,
     /// Also judge the prediction K samples ahead
     #[arg(long, value_name = "K", value_parser = parse_horizon)]
     pub horizon: Option<usize>,
@@ -117,9 +115,8 @@ pub struct IdentifyArgs {
     /// Write a report (HTML) into this directory
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
-    /// Print one JSON object instead of tables
-    #[arg(long)]
-    pub json: bool,
+    #[command(flatten)]
+    pub show: ShowArgs,
 }
 
 /// What `identify` fits.

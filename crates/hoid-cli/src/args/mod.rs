@@ -9,18 +9,26 @@
 //! | `recursion`, `settings` | `hoid track`, `hoid stream`; the options of the methods, from the registry |
 //! | `reading` | all commands that read records |
 //! | `convert` | `hoid convert`, `hoid info` |
+//! | `figure` | figures as files |
+//! | `show` | how results are shown |
+//! | `shell` | `hoid completions`, `hoid man` |
+//! | `help` | all commands: what `-h` shows, headings, examples |
 //! | `group`, `study` | `hoid group`, `hoid simulate-group`; `hoid study`, `hoid reproduce` |
 
 mod choices;
 mod cli;
 mod convert;
 mod describe;
+mod figure;
 mod group;
+mod help;
 mod identify;
 mod parse;
 mod reading;
 mod recursion;
 mod settings;
+mod shell;
+mod show;
 mod simulate;
 mod study;
 
@@ -28,6 +36,7 @@ pub use cli::{Cli, Command};
 pub use convert::{ConvertArgs, InfoArgs};
 pub use describe::DescribeArgs;
 pub use group::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs};
+pub use help::command;
 pub use identify::{IdentifyArgs, ModelKind, estimators_with};
 pub use parse::parse_span;
 pub use reading::{MaskArgs, ReadArgs};
@@ -35,5 +44,6 @@ pub use recursion::{RecursionArgs, StreamArgs, TrackArgs};
 #[cfg(test)]
 pub use settings::with_settings;
 pub use settings::{flag, methods_with};
+pub use shell::{CompletionsArgs, ManArgs};
 pub use simulate::{DemoArgs, MarginsArgs, ScenarioChoice, SimulateArgs, StateName};
 pub use study::{ReproduceArgs, StudyCommand, StudyMergeArgs, StudyRunArgs};

@@ -40,6 +40,10 @@ pub struct ReadArgs {
 /// What is done to a record before it is used, in this order.
 #[derive(Debug, Clone, Args)]
 pub struct PrepareArgs {
+    /// Units that the file does not say, as e=deg,u=deg: units are printed only where they are
+    /// declared
+    #[arg(long, value_name = "CHANNEL=UNIT", value_parser = parse_unit, value_delimiter = ',')]
+    pub unit: Vec<(String, String)>,
     /// Drop rows that are there twice, time included
     #[arg(long)]
     pub drop_repeated: bool,
@@ -102,6 +106,14 @@ fn pair(text: &str) -> Result<(String, &str), String> {
     Ok((name.trim().to_owned(), value))
 }
 
+fn parse_unit(text: &str) -> Result<(String, String), String> {
+    let (name, unit) = pair(text)?;
+    match unit.trim() {
+        "" => Err(format!("{text:?} names no unit; write CHANNEL=UNIT, as e=deg")),
+        unit => Ok((name, unit.to_owned())),
+    }
+}
+
 pub fn parse_scale(text: &str) -> Result<(String, Scaling), String> {
     let (name, value) = pair(text)?;
     Ok((name, value.parse().map_err(|e: hoid_io::IoError| e.to_string())?))
@@ -124,5 +136,7 @@ mod tests {
             assert!(parse_scale(bad).is_err(), "{bad}");
         }
         assert!(parse_offset("u=1 sample").is_err());
+        assert_eq!(parse_unit("e = deg").unwrap(), ("e".to_owned(), "deg".to_owned()));
+        assert!(parse_unit("e=").is_err() && parse_unit("deg").is_err());
     }
 }

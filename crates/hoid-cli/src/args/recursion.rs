@@ -1,18 +1,18 @@
 //! The options of `hoid track` and `hoid stream`.
 
-use std::{ops::RangeInclusive, path::PathBuf};
+use std::path::PathBuf;
 
 use clap::{
     Args,
-    builder::{PossibleValue, PossibleValuesParser},
+    builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
 };
 use hoid_ident::{order_selection::Criterion, settings::MethodSpec};
 use hoid_io::{Scaling, readable_endings, writable_endings};
 use hoid_model::Structure;
 use hoid_track::Method;
 
-use super::{ReadArgs, choices::choice_of, parse_span, settings::SettingArgs};
-use crate::orders::parse_range;
+use super::{ReadArgs, choices::choice_of, figure::FigureArgs, parse_span, settings::SettingArgs, show::ShowArgs};
+use crate::orders::{DelayRange, parse_delay};
 
 /// What is tracked, and how.
 #[derive(Debug, Args)]
@@ -27,10 +27,10 @@ pub struct RecursionArgs {
     /// [default: the operator's: bj nb=2,nd=1..4,nf=2, for adaptive nd=6; arx na=2,nb=2]
     #[arg(long, value_name = "LIST")]
     pub orders: Option<String>,
-    /// Delay of b0 in samples, a number or a range to search on the start span
-    /// [default: 0.05 to 0.6 s]
-    #[arg(long, value_name = "N|LO..HI", value_parser = parse_range)]
-    pub nk: Option<RangeInclusive<usize>>,
+    /// Delay of b0 in samples (29), or dead time in s (0.28s); a number or a range (20..40,
+    /// 0.1s..0.4s) to search on the start span [default: 0.05 to 0.6 s]
+    #[arg(long, value_name = "N|Ss|LO..HI", value_parser = parse_delay)]
+    pub nk: Option<DelayRange>,
     /// What decides between candidates when something is searched
     #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_of(&Criterion::ALL))]
     pub criterion: Criterion,
@@ -79,13 +79,14 @@ pub struct TrackArgs {
     /// standard errors
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
+    #[command(flatten)]
+    pub picture: FigureArgs,
     /// Spans in s whose batch fits the report draws as dashed lines, as 0..30.72,51.2..81.92
     /// [default: the start span and the last third]
     #[arg(long, value_name = "S..S", value_parser = parse_span, value_delimiter = ',', allow_hyphen_values = true)]
     pub batch: Vec<(f64, f64)>,
-    /// Print one JSON object instead of tables
-    #[arg(long)]
-    pub json: bool,
+    #[command(flatten)]
+    pub show: ShowArgs,
 }
 
 #[derive(Debug, Args)]
@@ -114,9 +115,9 @@ pub struct StreamArgs {
 }
 
 /// The recursive methods, each with its line of help.
-fn method_names() -> PossibleValuesParser {
+fn method_names() -> impl TypedValueParser<Value = String> {
     let value = |spec: MethodSpec| PossibleValue::new(spec.name).help(spec.help);
-    PossibleValuesParser::new(Method::registry().into_iter().map(value))
+    PossibleValuesParser::new(Method::registry().into_iter().map(value)).map(|name| name.to_lowercase())
 }
 
 fn parse_count(text: &str) -> Result<usize, String> {

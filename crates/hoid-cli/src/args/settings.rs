@@ -3,9 +3,11 @@
 
 use std::collections::BTreeSet;
 
-use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, builder::PossibleValuesParser};
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use hoid_ident::settings::{Kind, MethodSpec, Setting};
 use hoid_track::Method;
+
+use super::choices::by_name;
 
 /// What was typed: name and text, in the order of the registry.
 #[derive(Debug, Clone, Default)]
@@ -49,7 +51,10 @@ fn argument(setting: &Setting, methods: &[MethodSpec]) -> Arg {
         .allow_hyphen_values(setting.kind != Kind::Flag);
     match setting.kind {
         Kind::Flag => arg.action(ArgAction::SetTrue),
-        Kind::Choice(words) => arg.value_name("NAME").value_parser(PossibleValuesParser::new(words)),
+        Kind::Choice(words) => {
+            let words = words.iter().map(|word| (*word, (*word).to_owned()));
+            arg.value_name("NAME").value_parser(by_name(words))
+        }
         Kind::Count => arg.value_name("N"),
         Kind::Number => arg.value_name("X"),
         Kind::Memory => arg.value_name("N|Ss|inf"),

@@ -3,8 +3,8 @@
 
 use hoid_ident::family::family_of_polynomials;
 use hoid_model::{
-    ContinuousTransferFunction, DiscreteOperator, OperatorParameters, Orders, PolynomialModel, SampleTime, Structure,
-    discretise::discretise, second_order::HeldSecondOrder, uncertainty::OperatorEstimate,
+    ContinuousTransferFunction, DiscreteOperator, GainUnit, OperatorParameters, Orders, PolynomialModel, SampleTime,
+    Structure, discretise::discretise, second_order::HeldSecondOrder, uncertainty::OperatorEstimate,
 };
 use hoid_report::numbers;
 use serde_json::{Map, Value, json};
@@ -110,7 +110,7 @@ fn to_family(args: &ConvertArgs, f: &[f64], b: &[f64], sample_time: SampleTime) 
             "operator": family_operator::to_json(&found),
         }))?;
     } else {
-        output::print(&family_operator::to_text(&found))?;
+        output::print(&family_operator::to_text(&found, &GainUnit::default()))?;
     }
     Ok(())
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use hoid_ident::{Choice, Estimator, Fit, choose_orders, order_selection};
 use hoid_io::{make_directory, write_record};
 use hoid_model::{
-    Record, Structure,
+    GainUnit, Record, Structure,
     scenario::{Condition, Scenario},
     uncertainty::OperatorEstimate,
 };
@@ -14,7 +14,12 @@ use hoid_report::{BatchLine, ModelSection, Report, TraceSection, TrackReport, kn
 use hoid_sim::{RunSeed, Simulator};
 use hoid_track::{Method, OPERATOR_COLUMNS, StartAt, Trace, TrackOptions, track};
 
-use crate::{args::DemoArgs, commands::track::relative_errors, error::CliError, output, text};
+use crate::{
+    args::DemoArgs,
+    commands::{places, track::relative_errors},
+    error::CliError,
+    output, text,
+};
 
 /// The spans of the reference text (V.B) that lie wholly before and wholly after the change, s.
 const SPANS: [(&str, f64, f64); 2] = [("before", 0.0, 30.72), ("after", 51.2, 81.92)];
@@ -27,6 +32,7 @@ struct Stage {
 }
 
 pub fn run(args: &DemoArgs) -> Result<(), CliError> {
+    places::check(&[], &[], &[Some(&args.out)])?;
     let scenario = Scenario::condition(Condition::C4);
     let run_seed = RunSeed {
         seed: args.seed,
@@ -150,6 +156,7 @@ fn report_of_traces(
                 batch: batch(name),
             })
             .collect(),
+        verdict: None,
         notes: Vec::new(),
     };
     Ok(write_report(&args.out.join("tracking"), &report.to_html()?)?)
@@ -188,6 +195,7 @@ fn table(stages: &[Stage]) -> String {
         ));
         let mut rows = text::table(&["operator", "true", "ARX", "Box-Jenkins", "standard error", "unit"]);
         let truth = known_operator(std::slice::from_ref(&stage.record));
+        let gain = GainUnit::of(&stage.record);
         let (arx, bj) = (stage.arx.operator(), bj.operator());
         match (&bj, truth) {
             (Ok(bj), Some(t)) => {
@@ -198,11 +206,12 @@ fn table(stages: &[Stage]) -> String {
                         Ok(o) => numbers::plain(o.rows()[i].2.value),
                         Err(_) => "not convertible".to_owned(),
                     };
-                    rows.add_row([name, &numbers::plain(truth[i].2.value), &by_arx, &value, &error, unit]);
+                    let unit = gain.unit(name, unit);
+                    rows.add_row([name, &numbers::plain(truth[i].2.value), &by_arx, &value, &error, &unit]);
                 }
                 text.push_str(&format!("{rows}\n\n"));
             }
-            _ => text.push_str(&text::operator(&bj)),
+            _ => text.push_str(&text::operator(&bj, &gain)),
         }
     }
     text
@@ -237,6 +246,7 @@ fn report(args: &DemoArgs, stages: &[Stage]) -> Result<PathBuf, CliError> {
             setting("hoid", env!("CARGO_PKG_VERSION").to_owned()),
         ],
         models,
+        answer: None,
         pictures: Vec::new(),
         notes: vec![
             "Before: 0 to 30.72 s. After: 51.20 to 81.92 s. Delay and order of the noise model are searched for Box-Jenkins; \

@@ -87,14 +87,12 @@ fn read_with(
 }
 
 fn with_account(path: &Path, read: ReadRecord) -> (Record, Account) {
+    let file = path.display().to_string();
     for note in &read.notes {
-        output::message(&format!("{}: {note}", path.display()));
-    }
-    if let Some(note) = unit_of_gains(&read.record) {
-        output::message(&format!("{}: {note}", path.display()));
+        output::notice(&file, note.to_string());
     }
     for issue in &read.quality_issues {
-        output::message(&format!("warning: {}: {issue}", path.display()));
+        output::warning(&file, &issue.to_string());
     }
     let account = Account {
         steps: read.steps,
@@ -102,27 +100,6 @@ fn with_account(path: &Path, read: ReadRecord) -> (Record, Account) {
         ..Account::default()
     };
     (read.record, account)
-}
-
-/// What the gains are measured in, where that is not deg/deg as results say.
-fn unit_of_gains(record: &Record) -> Option<String> {
-    let (input, output) = (record.input_channel()?, record.output_channel());
-    match (input.unit.as_str(), output.unit.as_str()) {
-        (e, u) if !e.is_empty() && !u.is_empty() => {
-            (e != u).then(|| format!("e is in {e} and u in {u}: K_e is in {u}/{e}, where results say deg/deg"))
-        }
-        (e, _) => {
-            let which = match (e.is_empty(), output.unit.is_empty()) {
-                (true, true) => "e and u",
-                (true, false) => "e",
-                _ => "u",
-            };
-            Some(format!(
-                "no unit is given for {which}: K_e is in units of u by units of e, deg/deg as results say only where both are \
-                 the same"
-            ))
-        }
-    }
 }
 
 fn options(args: &ReadArgs, with_input: bool) -> Result<ReadOptions, CliError> {
@@ -142,6 +119,7 @@ fn options(args: &ReadArgs, with_input: bool) -> Result<ReadOptions, CliError> {
 fn preparation(args: &ReadArgs) -> Result<Preparation, CliError> {
     let prepare = &args.prepare;
     Ok(Preparation {
+        units: by_channel("--unit", &prepare.unit)?,
         scale: by_channel("--scale", &prepare.scale)?,
         offset: by_channel("--offset", &prepare.offset)?,
         rate: match (prepare.decimate, prepare.new_fs) {

@@ -7,7 +7,7 @@ use hoid_thesis::{
     reproduction::{CLAIMS, Reproduction, ReproductionEvent, items, reproduce},
 };
 
-use super::study::stop_at_interrupt;
+use super::{places, study::stop_at_interrupt};
 use crate::{args::ReproduceArgs, error::CliError, output};
 
 pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
@@ -23,6 +23,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
         output::print(&lines.collect::<String>())?;
         return Ok(());
     }
+    places::check(&[], &[], &[Some(&args.out)])?;
     let wanted = Reproduction {
         only: args.only.clone(),
         replications: args.replications,

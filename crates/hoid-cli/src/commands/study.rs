@@ -49,6 +49,9 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
     if let Some(replications) = args.replications {
         plan = plan.with_replications(replications)?;
     }
+    if !args.resume {
+        hoid_io::check_output_directory(&args.out, &[])?;
+    }
     let options = RunOptions {
         shard: args.shard,
         jobs: args.jobs.map(usize::from),
@@ -104,7 +107,7 @@ pub fn run_with_progress(plan: &Plan, directory: &Path, options: &RunOptions) ->
 /// What the user should know of a directory, as warnings.
 pub fn say(directory: &Path, notes: &[String]) {
     for note in notes {
-        output::message(&format!("warning: {}: {note}", directory.display()));
+        output::warning(&directory.display().to_string(), note);
     }
 }
 

@@ -14,6 +14,7 @@ pub fn hoid(directory: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args(arguments)
         .current_dir(directory)
+        .env_remove("COLUMNS")
         .output()
         .unwrap()
 }

@@ -60,7 +60,7 @@ impl GreyBoxFit {
     }
 
     /// Name, value and standard error of each parameter that was fitted, in the coordinates of the
-    /// fit: K_e (deg/deg), K_e_dot (s) or T_L (s) where that is constrained, omega_nm (rad/s),
+    /// fit: K_e, K_e_dot (s) or T_L (s) where that is constrained, omega_nm (rad/s),
     /// zeta_nm, tau_e (s), T_n (s). Individual parameters carry the number of their record.
     pub fn parameters(&self) -> Vec<(String, Estimate)> {
         self.layout

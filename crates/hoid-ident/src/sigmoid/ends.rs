@@ -150,11 +150,7 @@ impl Known<'_> {
                 }
                 NamedEstimate {
                     name: parameter.name,
-                    unit: if parameter.name == "K_e" {
-                        "deg/deg"
-                    } else {
-                        parameter.unit
-                    },
+                    unit: parameter.unit,
                     estimate: match self.covariance {
                         Some(covariance) => estimate(value, variance_along(&whole, covariance) + beside),
                         None => Estimate::fixed(value),

@@ -18,8 +18,8 @@ use hoid_model::{
 /// Names of the parameters of an operator of a gain and a lead before the coefficients d1, d2 ... of
 /// the noise model, with their units; those of other forms: [`crate::SigmoidChange::names`].
 pub const SIGMOID_NAMES: [(&str, &str); 9] = [
-    ("K_e1", "deg/deg"),
-    ("K_e2", "deg/deg"),
+    ("K_e1", ""),
+    ("K_e2", ""),
     ("T_L1", "s"),
     ("T_L2", "s"),
     ("t_M", "s"),
@@ -192,10 +192,6 @@ impl Layout {
     }
 
     fn unit(&self, name: &str) -> &'static str {
-        // Its error and control are angles by the reference text.
-        if name == "K_e" {
-            return "deg/deg";
-        }
         PARAMETERS
             .iter()
             .find(|(other, _)| *other == name)

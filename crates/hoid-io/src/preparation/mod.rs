@@ -4,6 +4,7 @@
 //!
 //! | step | module | what it does |
 //! |---|---|---|
+//! | units | `scaling` | units that the file does not say |
 //! | scale | `scaling` | a channel times a factor, or from one unit to another |
 //! | offset | `offset` | channels that were recorded late are put beside the others |
 //! | rate | `rate` | every M-th sample, or a new sampling frequency, behind a low-pass filter |

@@ -17,6 +17,8 @@ use crate::IoError;
 /// are called.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Preparation {
+    /// Units by channel that the file does not say.
+    pub units: BTreeMap<String, String>,
     /// Factors and units by channel.
     pub scale: BTreeMap<String, Scaling>,
     /// By how much channels were recorded later than they happened.
@@ -41,6 +43,7 @@ impl Preparation {
     pub fn apply(&self, record: Record) -> Result<(Record, Vec<Step>), IoError> {
         let begin_s = record.time_s(0);
         let mut parts = RecordParts::new(record);
+        parts.declare_units(&self.units)?;
         parts.scale(&self.scale)?;
         parts.offset(&self.offset)?;
         parts.rate(self.rate)?;

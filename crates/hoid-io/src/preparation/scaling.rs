@@ -135,6 +135,25 @@ fn refused(found: &str, expected: &str) -> IoError {
 }
 
 impl RecordParts {
+    /// Units that are declared beside the file; what the file says is not overruled.
+    pub(super) fn declare_units(&mut self, units: &std::collections::BTreeMap<String, String>) -> Result<(), IoError> {
+        const STEP: &str = "unit";
+        let named = units.iter().map(|(name, unit)| (name.clone(), unit.as_str()));
+        for (channel, unit) in self.find(STEP, named)? {
+            let known = self.channels[channel].unit.clone();
+            if !known.is_empty() && known != unit {
+                let name = &self.channels[channel].name;
+                return Err(self.error(
+                    STEP,
+                    format!("{name} is in {known} by its file, and declared to be in {unit}"),
+                    format!("the unit of the file; --scale {name}={known}:{unit} changes it"),
+                ));
+            }
+            unit.clone_into(&mut self.channels[channel].unit);
+        }
+        Ok(())
+    }
+
     pub(super) fn scale(&mut self, scale: &std::collections::BTreeMap<String, Scaling>) -> Result<(), IoError> {
         const STEP: &str = "scale";
         let named = scale.iter().map(|(name, scaling)| (name.clone(), scaling));

@@ -35,6 +35,10 @@ const POINTS: usize = 240;
 /// of each decade.
 const LOWEST_RAD_S: f64 = 0.1;
 const HIGHEST_RAD_S: f64 = 50.0;
+/// Phases that are shown, deg: below, a dead time alone turns on without end, and nothing of a loop
+/// is decided there.
+const PHASE_SHOWN_DEG: (f64, f64) = (-540.0, 270.0);
+
 /// A model in the figure.
 #[derive(Debug, Clone, Copy)]
 pub struct BodeModel<'a> {
@@ -96,7 +100,7 @@ pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueRespon
     for is_phase in [false, true] {
         let series = |c: &Curve| {
             if is_phase {
-                c.phase_deg.clone()
+                c.phase_deg.iter().map(|p| (shown(p.0), p.1)).collect()
             } else {
                 c.magnitude_db.clone()
             }
@@ -182,6 +186,16 @@ pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueRespon
     }
     add_legend(&mut scene, &entries);
     svg::finish(id, "Frequency response with 95 % bands", scene)
+}
+
+/// A phase that is shown; the others are gaps.
+fn shown(phase_deg: f64) -> f64 {
+    let (low, high) = PHASE_SHOWN_DEG;
+    if (low..=high).contains(&phase_deg) {
+        phase_deg
+    } else {
+        f64::NAN
+    }
 }
 
 fn frequencies(models: &[BodeModel<'_>], points: &[BodePoints]) -> Vec<f64> {
@@ -292,6 +306,22 @@ mod tests {
     use hoid_model::scenario::OperatingState;
 
     use super::*;
+
+    #[test]
+    fn a_long_dead_time_does_not_stretch_the_axis() {
+        let truth = |tau_e_s: f64| TrueResponse {
+            operator: OperatorParameters {
+                tau_e_s,
+                ..OperatingState::s1().operator
+            },
+            sample_time: SampleTime::HUNDREDTH,
+        };
+        // 0.5 s at 50 rad/s are four turns.
+        let figure = bode("b", &[], &[truth(0.5)]);
+        let has = |tick: &str| figure.contains(&format!(">{tick}<"));
+        assert!(has("-540") && !has("-720") && !has("-900"), "{figure}");
+        assert!(bode("b", &[], &[truth(0.1)]).contains("<path"));
+    }
 
     #[test]
     fn the_truth_behind_its_hold_is_the_continuous_operator_at_low_frequency() {

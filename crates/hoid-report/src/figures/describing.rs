@@ -140,9 +140,13 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
     curves(id, title, &grid)
 }
 
+/// Half of the longest error bar, dB or deg: a phase that is known no better than half a turn is not
+/// known, and a longer bar would press all others together.
+const LONGEST_BAR: f64 = 180.0;
+
 /// Ends of an error bar; none where there is no error.
 fn bar(v: &Estimate) -> (f64, f64) {
-    let half = v.standard_error.map_or(f64::NAN, |s| Z_95 * s);
+    let half = v.standard_error.map_or(f64::NAN, |s| (Z_95 * s).min(LONGEST_BAR));
     (v.value - half, v.value + half)
 }
 

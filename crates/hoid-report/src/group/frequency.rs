@@ -65,6 +65,14 @@ impl GroupReport<'_> {
     /// Bode points of the describing functions, a figure for each condition with a column for each
     /// subject.
     pub(super) fn describing_functions(&self) -> Vec<Value> {
+        let figures = self.describing_figures().into_iter();
+        figures
+            .map(|(condition, figure)| context! { condition, figure })
+            .collect()
+    }
+
+    /// The same as pairs of condition and SVG text.
+    pub(super) fn describing_figures(&self) -> Vec<(String, String)> {
         let Some(lines) = self.tables.frequencies.map(|f| f.lines) else {
             return Vec::new();
         };
@@ -114,7 +122,7 @@ impl GroupReport<'_> {
                     &format!("Describing functions, condition {condition}"),
                     &BodeGrid { columns },
                 );
-                context! { condition => *condition, figure }
+                (condition.to_string(), figure)
             })
             .collect()
     }

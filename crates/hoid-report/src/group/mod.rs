@@ -19,7 +19,7 @@ mod people;
 mod report;
 mod tables;
 
-pub use pages::write_group_pages;
+pub use pages::{group_figures, write_group_pages};
 pub use people::{PeopleTable, people_table};
 pub use report::GroupReport;
 pub use tables::{FrequencyTables, GroupTables};

@@ -17,6 +17,77 @@ use crate::{ReportError, page};
 /// Runs whose preparation and trouble the pages list.
 const MOST_LISTED: usize = 24;
 
+/// The tables in the directory of a group.
+struct Tables {
+    estimates: OutputTable,
+    averages: OutputTable,
+    delays: OutputTable,
+    traces: OutputTable,
+    settling: OutputTable,
+    responses: OutputTable,
+    /// Lines, margins and agreement, where there was a periodic excitation.
+    frequencies: Option<[OutputTable; 3]>,
+}
+
+impl Tables {
+    fn read(out: &Path) -> Result<Self, ReportError> {
+        let read = |name: &str| read_table(&out.join(format!("{name}.parquet")));
+        let described = out.join("frequency-margins.parquet").exists();
+        let of_lines = || -> Result<_, hoid_io::IoError> {
+            Ok([
+                read("describing-functions")?,
+                read("frequency-margins")?,
+                read("agreement")?,
+            ])
+        };
+        Ok(Self {
+            estimates: read("estimates")?,
+            averages: read("averages")?,
+            delays: read("delays")?,
+            traces: read("trace-averages")?,
+            settling: read("settling")?,
+            responses: read("response-averages")?,
+            frequencies: described.then(of_lines).transpose()?,
+        })
+    }
+
+    fn all(&self) -> GroupTables<'_> {
+        GroupTables {
+            estimates: &self.estimates,
+            averages: &self.averages,
+            delays: &self.delays,
+            traces: &self.traces,
+            settling: &self.settling,
+            responses: &self.responses,
+            frequencies: self
+                .frequencies
+                .as_ref()
+                .map(|[lines, margins, agreement]| FrequencyTables {
+                    lines,
+                    margins,
+                    agreement,
+                }),
+        }
+    }
+}
+
+/// The describing functions of a finished group with the operators through them, a figure for each
+/// condition: its name and the SVG text. None where no condition has a periodic excitation.
+///
+/// # Errors
+/// As [`write_group_pages`].
+pub fn group_figures(manifest: &Manifest, out: &Path) -> Result<Vec<(String, String)>, ReportError> {
+    let tables = Tables::read(out)?;
+    let report = GroupReport {
+        manifest,
+        summary: &GroupSummary::read(manifest, out)?,
+        tables: tables.all(),
+        settings: Vec::new(),
+        subject: None,
+    };
+    Ok(report.describing_figures())
+}
+
 /// Writes the page of the group and one for each subject into the directory of its tables; `path`
 /// is where the manifest was read.
 ///
@@ -24,31 +95,8 @@ const MOST_LISTED: usize = 24;
 /// [`ReportError::Io`], [`ReportError::Study`] for tables that are not there and pages that cannot be written;
 /// [`ReportError::Template`] for a defect of this crate.
 pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let read = |name: &str| read_table(&out.join(format!("{name}.parquet")));
-    let (estimates, averages, delays) = (read("estimates")?, read("averages")?, read("delays")?);
-    let (traces, settling, responses) = (read("trace-averages")?, read("settling")?, read("response-averages")?);
-    let frequencies = if out.join("frequency-margins.parquet").exists() {
-        Some([
-            read("describing-functions")?,
-            read("frequency-margins")?,
-            read("agreement")?,
-        ])
-    } else {
-        None
-    };
-    let tables = GroupTables {
-        estimates: &estimates,
-        averages: &averages,
-        delays: &delays,
-        traces: &traces,
-        settling: &settling,
-        responses: &responses,
-        frequencies: frequencies.as_ref().map(|[lines, margins, agreement]| FrequencyTables {
-            lines,
-            margins,
-            agreement,
-        }),
-    };
+    let read = Tables::read(out)?;
+    let tables = read.all();
     let summary = GroupSummary::read(manifest, out)?;
     let counting: Vec<_> = manifest.runs.iter().filter(|run| run.counts).collect();
     let mut subjects: Vec<&str> = Vec::new();
@@ -78,7 +126,8 @@ pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result
             format!("{} to {}", manifest.analysis.nd.0, manifest.analysis.nd.1),
         ),
     ];
-    settings.extend(account(&read("preparation")?, &read("trouble")?));
+    let table = |name: &str| read_table(&out.join(format!("{name}.parquet")));
+    settings.extend(account(&table("preparation")?, &table("trouble")?));
     let names = page_names(&subjects);
     let mut pages = Vec::new();
     let of_subjects = subjects.iter().zip(names).map(|(subject, name)| (Some(*subject), name));

@@ -43,7 +43,6 @@ pub fn operator_names(traces: &[Evaluated<'_>]) -> Vec<&'static str> {
 
 pub fn unit(name: &str) -> &'static str {
     match name {
-        "K_e" => "deg/deg",
         "T_L" | "K_e_dot" | "tau_e" => "s",
         "omega_nm" => "rad/s",
         "zeta_nm" => "-",

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use hoid_model::{
-    Record,
+    GainUnit, Record,
     uncertainty::{Estimate, OperatorEstimate},
 };
 use hoid_track::StartAt;
@@ -107,6 +107,7 @@ pub fn operator_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
 }
 
 fn operator_panels(traces: &[Evaluated<'_>], record: &Record, shown: Shown) -> Vec<TracePanel> {
+    let gain = GainUnit::of(record);
     let panel = |name: &'static str| {
         let mut curves = Vec::new();
         for (method, t) in traces.iter().enumerate() {
@@ -125,7 +126,7 @@ fn operator_panels(traces: &[Evaluated<'_>], record: &Record, shown: Shown) -> V
         }
         TracePanel {
             name: name.to_owned(),
-            unit: unit(name).to_owned(),
+            unit: gain.unit(name, unit(name)),
             curves,
             ordinate: ordinate(shown),
         }

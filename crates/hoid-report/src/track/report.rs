@@ -1,11 +1,11 @@
 //! The page of recursive estimates, from its sections.
 
-use hoid_model::Record;
+use hoid_model::{GainUnit, Record, Verdict};
 use minijinja::{Value, context};
 
 use super::{evaluated::Evaluated, panels, section::TraceSection, tables};
 use crate::{
-    ReportError,
+    ReportError, answer,
     figures::{self, TraceGrid},
     page, tables as of_fits,
 };
@@ -25,6 +25,8 @@ pub struct TrackReport<'a> {
     pub record: &'a Record,
     /// One to four estimates of that record, drawn over each other.
     pub traces: Vec<TraceSection<'a>>,
+    /// What the traces are worth, on top of the page.
+    pub verdict: Option<Verdict>,
     /// Remarks for the reader, such as warnings of the command.
     pub notes: Vec<String>,
 }
@@ -49,6 +51,7 @@ impl TrackReport<'_> {
             |id: &str, title: &str, grid: &TraceGrid| Value::from_safe_string(figures::trace_panels(id, title, grid));
         let values = context! {
             title => self.title.clone(),
+            answer => self.verdict.as_ref().map(|v| context! { verdict => answer::verdict(v) }),
             settings => page::facts(&self.settings),
             notes => self.notes.clone(),
             names => self.traces.iter().map(|t| t.name.clone()).collect::<Vec<_>>(),
@@ -116,7 +119,7 @@ impl TrackReport<'_> {
                 title => fit.title(),
                 converged => fit.termination().converged(),
                 coefficients => of_fits::coefficients(fit),
-                operator => of_fits::operator(fit, None),
+                operator => of_fits::operator(fit, None, &GainUnit::of(self.record)),
             }),
             watched => !trace.section.trace.change_odds().is_empty(),
             changes => tables::changes(trace),

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`Manifest`] | which file is which run of which subject, and what is done with it |
 //! | [`ReadSettings`], [`PreparationSettings`], [`AnalysisSettings`], [`ConditionSettings`] | its tables: how runs are read, prepared and analysed, and what is known of a condition |
+//! | [`inspect`], [`commented`] | a manifest completed by what the files say, with the evidence |
 //! | [`Pattern`] | subject, condition and run from names of files |
 //! | [`run_group`] | the analysis in a directory, part by part |
 //! | `reading` | runs from files, and what was done to them |
@@ -33,6 +34,7 @@ mod block;
 mod condition_settings;
 mod family_fits;
 mod frequency;
+mod inspection;
 mod join;
 mod manifest;
 mod pattern;
@@ -56,6 +58,7 @@ mod windows;
 
 pub use analysis_settings::AnalysisSettings;
 pub use condition_settings::ConditionSettings;
+pub use inspection::{Evidence, Known, commented, inspect};
 pub use manifest::{MANIFEST, Manifest, RunEntry};
 pub use pattern::{FileNameParts, Pattern};
 pub use person::{Person, PersonStatus};

@@ -10,9 +10,6 @@ use serde_json::{Map, Value, json};
 
 use crate::{commands::reading::Account, json, text};
 
-/// Files that are named one by one.
-const FILES_SHOWN: usize = 4;
-
 /// A description with what it was made from.
 pub struct Described<'a> {
     pub files: &'a [String],
@@ -60,23 +57,10 @@ impl Described<'_> {
         })
     }
 
-    /// The page: what it is worth first.
-    pub fn page(&self) -> String {
+    /// The page: what it is worth first; with `verbose` every setting.
+    pub fn page(&self, verbose: bool) -> String {
         let (found, function) = (self.found, &self.found.function);
-        let mut page = format!("{}\n\n", found.verdict);
-        if self.files.len() <= FILES_SHOWN {
-            page.push_str(&text::records(self.files, self.records, self.accounts));
-        } else if let (Some(first), Some(last), Some(record)) =
-            (self.files.first(), self.files.last(), self.records.first())
-        {
-            page.push_str(&format!(
-                "{} records, {first} to {last}: the first has {} samples of {} s from t = {:.4} s\n",
-                self.files.len(),
-                record.len(),
-                numbers::plain(record.sample_time().s()),
-                record.time_s(0)
-            ));
-        }
+        let mut page = text::verdict(&found.verdict);
         let mut rows = text::table(&[
             "frequency (rad/s)",
             "gain (dB)",
@@ -99,7 +83,7 @@ impl Described<'_> {
                 line.coherence.map_or("-".to_owned(), |c| format!("{c:.2}")),
             ]);
         }
-        page.push_str(&format!("\n{}\n{rows}\n", self.title()));
+        page.push_str(&format!("{}\n{rows}\n", self.title()));
         if let (Some(margins), Some(element)) = (self.margins(), self.element) {
             page.push_str(&format!("Open loop with {element}: {}", text::margins(&margins)));
         }
@@ -116,7 +100,12 @@ impl Described<'_> {
             percent(&function.noise_ratio),
         ));
         page.push_str(&format!("RMS: input {}, output {}.\n", function.rms_e, function.rms_u));
-        page.push_str(&text::settings(&self.settings));
+        page.push_str(&text::records(self.files, self.records, self.accounts, verbose));
+        if verbose {
+            page.push_str(&text::settings(&self.settings));
+        } else {
+            page.push_str(text::MORE_SETTINGS);
+        }
         page
     }
 

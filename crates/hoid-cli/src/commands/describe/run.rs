@@ -3,15 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use hoid_ident::frequency::{Description, DescriptionOptions, describe_runs};
-use hoid_io::{Offset, write_atomically};
+use hoid_io::Offset;
 use hoid_model::{Detrend, Record};
-use hoid_report::figures::{describing, with_width_mm};
+use hoid_report::figures::describing;
 
 use super::form::Described;
 use crate::{
     args::{DescribeArgs, ReadArgs},
     commands::{
-        faults, places,
+        faults, figure, places,
         reading::{self, ReadAll},
     },
     error::CliError,
@@ -19,11 +19,11 @@ use crate::{
 };
 
 pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
-    if let Some(path) = &args.figure {
-        check_figure(path)?;
+    if let Some(path) = &args.picture.figure {
+        figure::check(path)?;
     }
     let inputs: Vec<&Path> = args.records.iter().map(PathBuf::as_path).collect();
-    places::check(&inputs, &[args.figure.as_deref()], &[])?;
+    places::check(&inputs, &[args.picture.figure.as_deref()], &[])?;
     let (read, offsets) = without_offsets(&args.read);
     let ReadAll {
         files,
@@ -57,30 +57,19 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
         settings: settings(args, &options, &found),
         element: args.controlled_element.as_ref(),
     };
-    if let Some(path) = &args.figure {
-        let svg = describing("describing", &described.title(), &found, &[]);
-        let svg = args.width.map_or(svg.clone(), |mm| with_width_mm(&svg, mm));
-        write_atomically(path, |file| file.write_all(svg.as_bytes()))?;
-        output::message(&format!("figure: {}", path.display()));
+    if let Some(path) = &args.picture.figure {
+        figure::write(
+            path,
+            &describing("describing", &described.title(), &found, &[]),
+            args.picture.width,
+        )?;
     }
-    if args.json {
+    if args.show.json {
         json::print(&described.to_json())?;
     } else {
-        output::print(&described.page())?;
+        output::show(&described.page(args.show.verbose))?;
     }
     CliError::of_verdict(&found.verdict)
-}
-
-/// Figures are SVG: known before anything is read.
-pub fn check_figure(path: &Path) -> Result<(), CliError> {
-    match path.extension() {
-        Some(ending) if ending.eq_ignore_ascii_case("svg") => Ok(()),
-        _ => Err(CliError::Usage(format!(
-            "--figure {}: figures are written as .svg; name the file so, and convert it to PDF or PNG with a program such as \
-             Inkscape or a browser",
-            path.display()
-        ))),
-    }
 }
 
 /// How to read without moving rows, and the offsets. A row that is cut would leave less than whole

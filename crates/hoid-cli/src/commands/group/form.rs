@@ -18,7 +18,7 @@ pub struct Finished<'a> {
 
 impl Finished<'_> {
     /// The page: what failed and what is doubtful first, then the people.
-    pub fn page(&self) -> String {
+    pub fn page(&self, verbose: bool) -> String {
         let GroupSummary {
             runs,
             failures,
@@ -43,9 +43,17 @@ impl Finished<'_> {
                 columns_of(&table, &parameters),
             ));
         }
-        page.push_str("\nFiles:\n");
-        for file in self.pages.iter().chain(&self.tables) {
-            page.push_str(&format!("  {file}\n"));
+        if verbose {
+            page.push_str("\nFiles:\n");
+            for file in self.pages.iter().chain(&self.tables) {
+                page.push_str(&format!("  {file}\n"));
+            }
+        } else if let Some(first) = self.pages.first() {
+            page.push_str(&format!(
+                "Report: {first}; {} pages and {} tables beside it, named by -v.\n",
+                self.pages.len() - 1,
+                self.tables.len()
+            ));
         }
         page
     }

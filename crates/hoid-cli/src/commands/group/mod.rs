@@ -9,19 +9,22 @@ use std::{
 };
 
 use hoid_model::{SampleTime, VerdictLevel};
-use hoid_report::write_group_pages;
+use hoid_report::{group_figures, write_group_pages};
 use hoid_sim::people::{Population, Range};
 use hoid_study::{
     RunOptions,
     group::{
-        GroupSummary, MANIFEST, Manifest, Pattern, PeopleExperiment, VirtualExperiment, run_group, simulate_group,
-        simulate_people,
+        GroupSummary, Known, MANIFEST, Manifest, Pattern, PeopleExperiment, VirtualExperiment, commented, inspect,
+        run_group, simulate_group, simulate_people,
     },
 };
 
 use form::Finished;
 
-use super::study::{say, stop_at_interrupt};
+use super::{
+    figure, places,
+    study::{say, stop_at_interrupt},
+};
 use crate::{
     args::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs},
     error::CliError,
@@ -103,7 +106,25 @@ fn people(args: &SimulateGroupArgs) -> Result<PeopleExperiment, CliError> {
 
 fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
     let pattern = Pattern::new(&args.pattern)?;
+    let path = args.out.clone().unwrap_or_else(|| args.directory.join(MANIFEST));
+    let piped = path.as_os_str() == "-";
+    if !piped && path.exists() {
+        return Err(CliError::Usage(format!(
+            "{} is there already; remove it or name another with --out",
+            path.display()
+        )));
+    }
     let (mut manifest, others) = Manifest::of_directory(&args.directory, &pattern)?;
+    let known = Known {
+        input: args.input.clone(),
+        output: args.output.clone(),
+        excitation: args.excitation.clone(),
+        controlled_element: args.controlled_element.clone(),
+        from_s: args.from,
+        to_s: args.to,
+        offset_samples: args.offset,
+    };
+    let evidence = inspect(&mut manifest, &args.directory, &known)?;
     if args.out.is_some() {
         // The files are named from where the manifest is.
         let directory = args.directory.canonicalize().unwrap_or_else(|_| args.directory.clone());
@@ -111,17 +132,10 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
             run.file = directory.join(&run.file);
         }
     }
-    let text = manifest.text();
-    let path = args.out.clone().unwrap_or_else(|| args.directory.join(MANIFEST));
-    if path.as_os_str() == "-" {
+    let text = commented(&manifest.text(), &evidence);
+    if piped {
         output::print(&text)?;
         return Ok(());
-    }
-    if path.exists() {
-        return Err(CliError::Usage(format!(
-            "{} is there already; remove it or name another with --out",
-            path.display()
-        )));
     }
     hoid_io::write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
     let mut said = format!("{} runs in {}\n", manifest.runs.len(), path.display());
@@ -133,8 +147,18 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
             others[0]
         ));
     }
-    output::print(&said)?;
-    Ok(())
+    for one in &evidence {
+        let place = [one.table.as_str(), one.key].join(" ");
+        let place = place.trim();
+        let colon = if place.is_empty() { "" } else { ": " };
+        said.push_str(&format!("- {place}{colon}{}\n", one.words));
+    }
+    said.push_str(&format!(
+        "Look {} through, then: hoid group {} --out results\n",
+        path.display(),
+        path.display()
+    ));
+    output::show(&said)
 }
 
 fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError> {
@@ -148,6 +172,10 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
             "there is no {}; `hoid group init DIR` writes one",
             path.display()
         )));
+    }
+    if let Some(figure) = &args.picture.figure {
+        figure::check(figure)?;
+        places::check(&[&path], &[Some(figure)], &[])?;
     }
     let manifest = Manifest::read(&path)?;
     // What goes on writes no manifest.
@@ -187,20 +215,46 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     }
     let summary = GroupSummary::read(&manifest, out)?;
     let pages = shown(&write_group_pages(&manifest, &path, out)?);
+    if let Some(place) = &args.picture.figure {
+        draw(&group_figures(&manifest, out)?, place, args.picture.width)?;
+    }
     let finished = Finished {
         name: &manifest.name,
         summary: &summary,
         tables: shown(&outcome.tables),
         pages,
     };
-    if args.json {
+    if args.show.json {
         json::print(&finished.to_json())?;
     } else {
-        output::print(&finished.page())?;
+        output::show(&finished.page(args.show.verbose))?;
     }
     if summary.verdict.level == VerdictLevel::NotDetermined {
         let reasons: Vec<&str> = summary.verdict.reasons().take(REASONS_OF_EXIT).collect();
         return Err(CliError::NotDetermined(reasons.join("; ")));
+    }
+    Ok(())
+}
+
+/// A file for each condition: the name as it is typed for one, with the condition behind it for
+/// several.
+fn draw(figures: &[(String, String)], place: &Path, width_mm: Option<f64>) -> Result<(), CliError> {
+    if figures.is_empty() {
+        output::notice(
+            "",
+            "no figure: it shows describing functions, and no condition of the manifest names its excitation"
+                .to_owned(),
+        );
+    }
+    for (condition, svg) in figures {
+        let stem = place.file_stem().unwrap_or_default().to_string_lossy();
+        let ending = place.extension().unwrap_or_default().to_string_lossy();
+        let of_condition = condition.replace(|c: char| !c.is_ascii_alphanumeric() && c != '-' && c != '_', "-");
+        let own = match figures.len() {
+            1 => place.to_owned(),
+            _ => place.with_file_name(format!("{stem}-{of_condition}.{ending}")),
+        };
+        figure::write(&own, svg, width_mm)?;
     }
     Ok(())
 }

@@ -128,9 +128,9 @@ fn misplaced(args: &IdentifyArgs, kind: ModelKind) -> Option<(String, String)> {
             "a structure with an input",
         ),
         (
-            args.figure.is_some() && kind != ModelKind::Family,
+            args.picture.figure.is_some() && (changing || !input),
             "--figure",
-            "--structure grey-box without --remnant-order",
+            "a model that does not change, of a structure with an input",
         ),
         (args.trace.is_some() && !changing, "--trace", "--structure time-varying"),
         (args.validate.is_some() && changing, "--validate", steady),

@@ -5,24 +5,28 @@ use std::path::Path;
 use hoid_ident::{
     IdentError, SearchOptions,
     family::{FamilyEstimator, HIGHEST_NOISE_ORDER, OperatorPrior},
-    frequency::{Description, DescriptionOptions, describe_runs},
+    frequency::Description,
     judgement::second_opinion,
 };
-use hoid_io::{read_text, write_atomically};
+use hoid_io::read_text;
 use hoid_model::{Detrend, Record, VerdictLevel, operator_family::Coordinate, uncertainty::Estimate};
 use hoid_report::{
     ModelSection, Picture, Report,
-    figures::{ModelCurve, describing, with_width_mm},
+    figures::{ModelCurve, describing},
     write_report,
 };
 use serde_json::Value;
 
-use super::{family_form::Found, level, settings::common_settings};
+use super::{
+    family_form::Found,
+    level,
+    picture::{description, of_polynomials},
+    settings::common_settings,
+};
 use crate::{
     args::IdentifyArgs,
     commands::{
-        describe::{check_figure, offset_of_output, without_offsets},
-        faults,
+        faults, figure,
         reading::{self, Account},
     },
     error::CliError,
@@ -30,9 +34,6 @@ use crate::{
 };
 
 pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: &[Account]) -> Result<(), CliError> {
-    if let Some(path) = &args.figure {
-        check_figure(path)?;
-    }
     let mut estimator = estimator(args)?;
     let described = description(args, records);
     // What was found, or what was named: instruments need no lines.
@@ -87,58 +88,26 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
         validation: validation.as_ref().map(|(file, q)| (file.as_str(), *q)),
         settings: &settings,
     };
-    if let Some(path) = &args.figure {
-        let Some(described) = &described else {
-            return Err(CliError::Usage(
-                "--figure draws the operator through the describing function, which needs a recorded periodic excitation: name \
-                 its column by --excitation, and take a span of whole periods by --from and --to"
-                    .to_owned(),
-            ));
+    if let Some(path) = &args.picture.figure {
+        let svg = match &described {
+            Some(described) => picture(&found, described),
+            None => of_polynomials(&fit.operator(0).polynomial_fit, &prepared, None),
         };
-        let svg = picture(&found, described);
-        let svg = args.width.map_or(svg.clone(), |mm| with_width_mm(&svg, mm));
-        write_atomically(path, |file| file.write_all(svg.as_bytes()))?;
-        output::message(&format!("figure: {}", path.display()));
+        figure::write(path, &svg, args.picture.width)?;
     }
     if let Some(directory) = &args.report {
         report(&found, described.as_ref(), directory)?;
     }
-    if args.json {
+    if args.show.json {
         json::print(&found.to_json()?)?;
     } else {
-        output::print(&found.page()?)?;
+        output::show(&found.page(args.show.verbose)?)?;
     }
     if fit.verdict.level == VerdictLevel::NotDetermined {
         let reasons: Vec<&str> = fit.verdict.reasons().collect();
         return Err(CliError::NotDetermined(reasons.join("; ")));
     }
     Ok(())
-}
-
-/// The describing function of the records without the offset of u, which is a phase of it: moved
-/// rows would leave less than whole periods.
-fn description(args: &IdentifyArgs, records: &[Record]) -> Result<Description, CliError> {
-    let (read, offsets) = without_offsets(&args.read);
-    let unmoved;
-    let (records, offset_samples) = if offsets.is_empty() {
-        (records, 0.0)
-    } else {
-        let again = reading::read_again(&args.records, &read, &args.mask)?;
-        unmoved = faults::mended_again(again, args.faults.faults)?;
-        let late = unmoved.first().map_or(Ok(0.0), |r| offset_of_output(r, &offsets))?;
-        (unmoved.as_slice(), late)
-    };
-    if args.excitation.as_deref() == Some("none") {
-        return Err(CliError::Usage("no excitation was asked for".to_owned()));
-    }
-    let options = DescriptionOptions {
-        excitation: args.excitation.clone(),
-        period_s: args.period,
-        offset_samples,
-        detrend: Detrend::None,
-        ..DescriptionOptions::default()
-    };
-    Ok(describe_runs(records, &options)?)
 }
 
 fn estimator(args: &IdentifyArgs) -> Result<FamilyEstimator, CliError> {
@@ -348,13 +317,14 @@ fn report(found: &Found<'_>, described: Option<&Description>, directory: &Path) 
             truth: None,
             margins: found.margins(),
         }],
-        notes: found.notes(),
+        notes: Vec::new(),
+        answer: Some(found.answer_of_page()),
         pictures: described
             .map(|d| through_describing_function(found, d))
             .into_iter()
             .collect(),
     };
     let page = write_report(directory, &report.to_html()?)?;
-    output::message(&format!("report: {}", page.display()));
+    output::notice("", format!("report: {}", page.display()));
     Ok(())
 }

@@ -8,8 +8,8 @@ use hoid_ident::{
     },
     validation::GoodnessOfFit,
 };
-use hoid_model::{ContinuousTransferFunction, FamilyOperator, Record, uncertainty::Estimate};
-use hoid_report::numbers;
+use hoid_model::{ContinuousTransferFunction, FamilyOperator, GainUnit, Record, uncertainty::Estimate};
+use hoid_report::{Answer, AnswerRow, numbers, sentence};
 use serde_json::{Map, Value, json};
 
 use crate::{
@@ -32,12 +32,36 @@ pub struct Found<'a> {
 }
 
 impl Found<'_> {
-    /// The verdict and its reasons, a remark each.
-    pub fn notes(&self) -> Vec<String> {
-        let verdict = &self.fit.verdict;
-        let mut notes = vec![format!("Verdict: {}.", verdict.level)];
-        notes.extend(verdict.reasons().chain(verdict.notes()).map(str::to_owned));
-        notes
+    /// The answer in words.
+    fn sentence(&self) -> Option<String> {
+        let of = self.fit.operator(0);
+        let known = of.parameters.iter().filter(|p| p.determined);
+        let here = self.element.and_then(|element| self.fit.loop_measures(0, element));
+        sentence(
+            known.map(|p| (p.name.as_str(), p.value)),
+            here.as_ref().map(|m| m.crossover_rad_s),
+            here.as_ref().map(|m| m.phase_margin_deg),
+        )
+    }
+
+    /// The head of a page.
+    pub fn answer_of_page(&self) -> Answer {
+        let gain = self.records.first().map(GainUnit::of).unwrap_or_default();
+        let row = |p: &Parameter| AnswerRow {
+            name: p.name.clone(),
+            unit: gain.unit(&p.name, p.unit),
+            estimate: p.determined.then_some(Estimate {
+                value: p.value,
+                standard_error: p.standard_error,
+            }),
+            interval: p.interval,
+            remark: remark(p),
+        };
+        Answer {
+            verdict: self.fit.verdict.clone(),
+            sentence: self.sentence(),
+            parameters: self.fit.operator(0).parameters.iter().map(row).collect(),
+        }
     }
 
     /// Crossover and margin in the form of all reports.
@@ -59,50 +83,70 @@ impl Found<'_> {
         Ok(GoodnessOfFit::pooled(self.records.iter().zip(&validations)))
     }
 
-    pub fn page(&self) -> Result<String, CliError> {
+    /// The answer, and with `verbose` what is behind it.
+    pub fn page(&self, verbose: bool) -> Result<String, CliError> {
+        let mut page = self.answer()?;
+        if !verbose {
+            page.push_str(text::MORE);
+            return Ok(page);
+        }
+        page.push_str(&self.methods());
+        if self.fit.forms.len() > 1 {
+            page.push_str(&format!("\n{}\n", forms(&self.fit.forms, self.fit.form.name())));
+        }
+        page.push_str(&self.about()?);
+        page.push_str(&text::levels(self.files, self.accounts));
+        page.push_str(&text::settings(self.settings));
+        Ok(page)
+    }
+
+    /// Verdict, parameters with their intervals, loop, fit, and what they are of.
+    fn answer(&self) -> Result<String, CliError> {
         let fit = self.fit;
-        let mut page = format!("{}\n\n", fit.verdict);
+        let gain = self.records.first().map(GainUnit::of).unwrap_or_default();
+        let mut page = text::verdict(&fit.verdict);
         page.push_str(&self.fit.title());
         page.push('\n');
+        if let Some(words) = self.sentence() {
+            page.push_str(&format!("{words}\n"));
+        }
         for (k, of) in fit.operators.iter().enumerate() {
             if fit.operators.len() > 1 {
                 page.push_str(&format!("{}:\n", self.files[k]));
             }
-            page.push_str(&parameters(of));
+            page.push_str(&parameters(of, &gain));
             page.push('\n');
         }
         if let Some(element) = self.element {
             let here = fit.loop_measures(0, element);
             page.push_str(&format!("Open loop with {element}: {}\n", measures(here.as_ref())));
-            if fit.lines.is_some() {
-                let at_lines = fit.loop_measures_at_lines(element);
-                page.push_str(&format!("  of the fit at the lines: {}\n", measures(at_lines.as_ref())));
-            }
-            if fit.instrumental.as_ref().is_some_and(|i| i.termination.converged()) {
-                let by_instruments = fit.loop_measures_by_instruments(element);
-                page.push_str(&format!("  by RIV-BJ: {}\n", measures(by_instruments.as_ref())));
-            }
         }
-        page.push_str(&self.methods());
-        if fit.forms.len() > 1 {
-            page.push_str(&format!("\n{}\n", forms(&fit.forms, fit.form.name())));
-        }
-        page.push_str(&self.about()?);
-        page.push('\n');
-        page.push_str(&text::records(self.files, self.records, self.accounts));
+        let quality = self.quality()?;
+        let coherence = fit.coherent_share;
+        page.push_str(&format!(
+            "Fit: VAF of the prediction {:.2} %{}{}.\n",
+            quality.vaf_prediction,
+            coherence.map_or_else(String::new, |share| format!(
+                "; coherence of u with the excitation {share:.2}"
+            )),
+            fit.agreement
+                .as_ref()
+                .map_or_else(String::new, |a| format!("; methods agree with p = {:.2}", a.p_value)),
+        ));
         if let Some((file, q)) = &self.validation {
             page.push_str(&format!(
                 "On {file}: VAF simulation {:.2} %, prediction {:.2} %.\n",
                 q.vaf_simulation, q.vaf_prediction
             ));
         }
-        page.push_str(&text::settings(self.settings));
+        page.push_str(&text::records(self.files, self.records, self.accounts, false));
         Ok(page)
     }
 
     /// The methods side by side.
     fn methods(&self) -> String {
         let fit = self.fit;
+        let gain = self.records.first().map(GainUnit::of).unwrap_or_default();
         let lines = fit.lines.as_ref().map(|lines| lines.parameters());
         let instrumental = (fit.instrumental.as_ref())
             .filter(|found| found.termination.converged())
@@ -121,12 +165,25 @@ impl Found<'_> {
             let beside = others.iter().filter_map(|(_, of)| of.get(k));
             let beside = beside.map(|(_, there)| with_error(there.value, there.standard_error));
             rows.add_row(
-                [named(here), with_error(here.value, here.standard_error)]
+                [named(here, &gain), with_error(here.value, here.standard_error)]
                     .into_iter()
                     .chain(beside),
             );
         }
         let mut page = format!("\n{rows}\n");
+        if let Some(element) = self.element {
+            if fit.lines.is_some() {
+                let at_lines = fit.loop_measures_at_lines(element);
+                page.push_str(&format!(
+                    "Open loop by the fit at the lines: {}\n",
+                    measures(at_lines.as_ref())
+                ));
+            }
+            if fit.instrumental.as_ref().is_some_and(|i| i.termination.converged()) {
+                let by_instruments = fit.loop_measures_by_instruments(element);
+                page.push_str(&format!("Open loop by RIV-BJ: {}\n", measures(by_instruments.as_ref())));
+            }
+        }
         if let Some(lines) = &fit.lines {
             let reduced = lines.reduced_chi_squared();
             page.push_str(&format!(
@@ -364,11 +421,10 @@ fn all_named(parameters: &[(&'static str, Estimate)]) -> Value {
     parameters.iter().map(|(name, e)| json::named(name, e)).collect()
 }
 
-fn named(p: &Parameter) -> String {
-    if p.unit.is_empty() {
-        p.name.clone()
-    } else {
-        format!("{} ({})", p.name, p.unit)
+fn named(p: &Parameter, gain: &GainUnit) -> String {
+    match gain.unit(&p.name, p.unit) {
+        unit if unit.is_empty() => p.name.clone(),
+        unit => format!("{} ({unit})", p.name),
     }
 }
 
@@ -386,15 +442,34 @@ fn with_error(value: f64, error: Option<f64>) -> String {
     }
 }
 
+/// What a parameter is that the data do not determine.
+fn undetermined(p: &Parameter) -> &'static str {
+    match (p.determined, p.prior_share > 0.5) {
+        (true, _) => "",
+        (false, true) => "the prior alone",
+        (false, false) => "not determined",
+    }
+}
+
+/// The same with the share of the prior.
+fn remark(p: &Parameter) -> String {
+    let words = undetermined(p);
+    match (words, p.prior_share > 0.01) {
+        (_, false) => words.to_owned(),
+        ("", true) => format!("{:.0} % of it prior", 100.0 * p.prior_share),
+        (_, true) => format!("{words}, {:.0} % of it prior", 100.0 * p.prior_share),
+    }
+}
+
 /// Parameters with interval, prior share and whether they are determined.
-fn parameters(of: &OperatorOfRecord) -> String {
-    let mut rows = text::table(&["parameter", "value", "95 % from", "to", "of it prior", ""]);
+fn parameters(of: &OperatorOfRecord, gain: &GainUnit) -> String {
+    let mut rows = text::table(&["parameter", "value", "95 % from", "to", "of it prior"]);
     for p in &of.parameters {
         let end = |v: f64| {
             if v.is_infinite() {
                 "open".to_owned()
             } else {
-                significant(v)
+                text::significant(v)
             }
         };
         let (low, high) = p
@@ -405,24 +480,13 @@ fn parameters(of: &OperatorOfRecord) -> String {
         } else {
             String::new()
         };
-        let words = match (p.determined, p.prior_share > 0.5) {
-            (true, _) => "",
-            (false, true) => "the prior alone",
-            (false, false) => "not determined",
+        let value = match undetermined(p) {
+            "" => with_error(p.value, p.standard_error),
+            why => why.to_owned(),
         };
-        let value = if p.determined || p.prior_share > 0.5 {
-            with_error(p.value, p.standard_error)
-        } else {
-            String::new()
-        };
-        rows.add_row([named(p), value, low, high, share, words.to_owned()]);
+        rows.add_row([named(p, gain), value, low, high, share]);
     }
     rows.to_string()
-}
-
-/// Three digits: an interval has no more.
-fn significant(value: f64) -> String {
-    hoid_model::numbers::significant(value, 3)
 }
 
 fn measures(found: Option<&LoopMeasures>) -> String {
@@ -430,7 +494,7 @@ fn measures(found: Option<&LoopMeasures>) -> String {
         return "no crossover".to_owned();
     };
     let interval = |of: Option<(f64, f64)>| match of {
-        Some((low, high)) => format!(" (95 %: {} to {})", numbers::plain(low), numbers::plain(high)),
+        Some((low, high)) => format!(" (95 %: {} to {})", text::significant(low), text::significant(high)),
         None => String::new(),
     };
     format!(

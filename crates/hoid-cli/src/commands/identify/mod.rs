@@ -4,6 +4,7 @@ mod estimate;
 mod family;
 mod family_form;
 mod level;
+mod picture;
 mod run;
 mod settings;
 mod sigmoid;

@@ -8,19 +8,22 @@ use hoid_ident::{
     level::without_level,
     validation::{GoodnessOfFit, nrmse_fit, vaf},
 };
-use hoid_model::{ContinuousTransferFunction, Detrend, NotConvertible, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
-use hoid_report::{ModelSection, Report, known_operator, write_report};
+use hoid_model::{
+    ContinuousTransferFunction, Detrend, GainUnit, NotConvertible, Record, margins::MANUAL_CONTROL_RANGE_RAD_S,
+};
+use hoid_report::{Answer, ModelSection, Report, known_operator, write_report};
 
 use super::{
     estimate::{self, Estimated, FittedBy},
     family, level,
+    picture::{description, for_page, of_polynomials},
     settings::common_settings,
     sigmoid,
 };
 use crate::{
     args::{IdentifyArgs, ModelKind},
     commands::{
-        faults, places,
+        faults, figure, places,
         reading::{self, ReadAll},
     },
     error::CliError,
@@ -32,6 +35,9 @@ use crate::{
 pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let kind = estimate::kind(args)?;
     check_places(args)?;
+    if let Some(path) = &args.picture.figure {
+        figure::check(path)?;
+    }
     let with_input = match kind {
         ModelKind::Polynomial(structure) => structure.has_input(),
         ModelKind::Family | ModelKind::GreyBox | ModelKind::TimeVarying => true,
@@ -132,6 +138,15 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         validation: validation.as_ref().map(|(file, q)| (file.as_str(), *q)),
         settings: &settings,
     };
+    let pictured = with_input && (args.report.is_some() || args.picture.figure.is_some());
+    let described = pictured.then(|| description(args, &records).ok()).flatten();
+    if let Some(path) = &args.picture.figure {
+        figure::write(
+            path,
+            &of_polynomials(&fit, &records, described.as_ref()),
+            args.picture.width,
+        )?;
+    }
     if let Some(directory) = &args.report {
         let title = match records.as_slice() {
             [only] => format!("Identification of {}", only.label()),
@@ -155,15 +170,20 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
                 margins,
             }],
             notes: Vec::new(),
-            pictures: Vec::new(),
+            answer: Some(Answer {
+                verdict: verdict.clone(),
+                sentence: identified.sentence(),
+                parameters: Vec::new(),
+            }),
+            pictures: for_page(&fit, &records, described.as_ref()).into_iter().collect(),
         };
         let page = write_report(directory, &report.to_html()?)?;
-        output::message(&format!("report: {}", page.display()));
+        output::notice("", format!("report: {}", page.display()));
     }
-    if args.json {
+    if args.show.json {
         json::print(&identified.to_json())?;
     } else {
-        output::print(&page(&identified, family.as_ref()))?;
+        output::show(&page(&identified, family.as_ref(), args.show.verbose))?;
     }
     CliError::of_verdict(&verdict)
 }
@@ -175,7 +195,7 @@ fn check_places(args: &IdentifyArgs) -> Result<(), CliError> {
     inputs.extend(args.prior.as_deref().map(Path::new));
     places::check(
         &inputs,
-        &[args.figure.as_deref(), args.trace.as_deref()],
+        &[args.picture.figure.as_deref(), args.trace.as_deref()],
         &[args.report.as_deref()],
     )
 }
@@ -198,32 +218,45 @@ fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> MarginEstima
     fit.margins(|omega| element.response(omega), (low, high))
 }
 
-fn page(found: &Identified<'_>, family: Option<&Converted>) -> String {
+/// The answer, and with `verbose` what is behind it.
+fn page(found: &Identified<'_>, family: Option<&Converted>, verbose: bool) -> String {
+    let mut page = answer(found, family);
+    if verbose {
+        page.push_str(&details(found));
+    } else {
+        page.push_str(text::MORE);
+    }
+    page
+}
+
+/// Verdict, parameters with their intervals, fit, and what they are of.
+fn answer(found: &Identified<'_>, family: Option<&Converted>) -> String {
     let fit = found.fit;
+    let gain = found.records.first().map(GainUnit::of).unwrap_or_default();
     let mut page = text::verdict(found.verdict);
-    page.push_str(&text::records(found.files, found.records, found.accounts));
-    page.push('\n');
-    if let Some(choice) = found.choice {
-        page.push_str(&text::candidates(choice));
-        page.push('\n');
+    page.push_str(&format!("{}\n", fit.title()));
+    if let Some(words) = found.sentence() {
+        page.push_str(&format!("{words}\n"));
     }
+    let operator = match family {
+        _ if !fit.model().structure().has_input() => None,
+        Some(family) => Some(family_operator::to_text(family, &gain)),
+        None => Some(text::operator(found.operator, &gain)),
+    };
+    // Where there is no operator the coefficients are the answer.
+    if !found.has_operator() {
+        page.push_str(&text::coefficients(fit));
+    }
+    page.push_str(&operator.unwrap_or_default());
+    page.push_str(text::instability(fit));
     if let Some(grey_box) = found.grey_box {
-        page.push_str(&text::remnant_orders(grey_box));
-    }
-    page.push_str(&text::model(fit));
-    page.push_str(&text::quality(fit, &found.quality));
-    if fit.model().structure().has_input() {
-        page.push('\n');
-        page.push_str(&match family {
-            Some(family) => family_operator::to_text(family),
-            None => text::operator(found.operator),
-        });
-    }
-    if let Some(grey_box) = found.grey_box {
-        page.push_str(&text::other_records(grey_box, found.files));
+        page.push_str(&text::other_records(grey_box, found.files, &gain));
     }
     if let Some(remnant) = found.remnant {
         page.push_str(&text::remnant(remnant));
+    }
+    if let Some(choice) = found.choice {
+        page.push_str(&text::delay(choice));
     }
     if let Some(m) = found.margins {
         let whose = match found.grey_box {
@@ -235,12 +268,7 @@ fn page(found: &Identified<'_>, family: Option<&Converted>) -> String {
             text::margins(m)
         ));
     }
-    page.push('\n');
-    page.push_str(&text::roots(fit));
-    // Residuals that are rounding say nothing.
-    if fit.covariance().is_some() {
-        page.push_str(&text::residual_tests(found.files, found.validations));
-    }
+    page.push_str(&text::fit_line(fit, &found.quality));
     if let Some((k, vaf, nrmse)) = found.ahead {
         page.push_str(&format!(
             "Prediction {k} samples ahead: VAF {vaf:.2} %, NRMSE fit {nrmse:.2} %.\n"
@@ -252,6 +280,33 @@ fn page(found: &Identified<'_>, family: Option<&Converted>) -> String {
             q.vaf_simulation, q.vaf_prediction, q.nrmse_simulation, q.nrmse_prediction
         ));
     }
+    page.push_str(&text::records(found.files, found.records, found.accounts, false));
+    page
+}
+
+/// What was tried, coefficients, roots, tests of the residuals, settings.
+fn details(found: &Identified<'_>) -> String {
+    let fit = found.fit;
+    let mut page = "\n".to_owned();
+    if let Some(choice) = found.choice {
+        page.push_str(&text::candidates(choice));
+        page.push('\n');
+    }
+    if let Some(grey_box) = found.grey_box {
+        page.push_str(&text::remnant_orders(grey_box));
+    }
+    if found.has_operator() {
+        page.push_str(&text::coefficients(fit));
+    }
+    page.push_str(&text::search(fit));
+    page.push_str(&text::quality(fit, &found.quality));
+    page.push('\n');
+    page.push_str(&text::roots(fit));
+    // Residuals that are rounding say nothing.
+    if fit.covariance().is_some() {
+        page.push_str(&text::residual_tests(found.files, found.validations));
+    }
+    page.push_str(&text::levels(found.files, found.accounts));
     page.push_str(&text::settings(found.settings));
     page
 }

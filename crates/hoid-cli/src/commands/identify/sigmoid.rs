@@ -6,7 +6,7 @@ use hoid_ident::{
     validation::{LjungBox, whiteness},
 };
 use hoid_io::write_record;
-use hoid_model::{Channel, Form, Record, Verdict};
+use hoid_model::{Channel, Form, GainUnit, Record, Verdict};
 use hoid_report::numbers;
 use serde_json::{Map, Value, json};
 
@@ -86,10 +86,10 @@ pub fn run(
         tests: &tests,
         settings: &settings,
     };
-    if args.json {
+    if args.show.json {
         json::print(&found.to_json())?;
     } else {
-        output::print(&found.page())?;
+        output::show(&found.page(args.show.verbose))?;
     }
     CliError::of_verdict(&verdict)
 }
@@ -169,7 +169,8 @@ struct Found<'a> {
 }
 
 impl Found<'_> {
-    fn page(&self) -> String {
+    /// The answer, and with `verbose` what is behind it.
+    fn page(&self, verbose: bool) -> String {
         let Self {
             fit,
             verdict,
@@ -180,19 +181,20 @@ impl Found<'_> {
             settings,
         } = *self;
         let mut page = text::verdict(verdict);
-        page.push_str(&text::records(files, records, accounts));
-        let mut rows = text::table(&["parameter", "value", "standard error", "unit", ""]);
+        let gain = records.first().map(GainUnit::of).unwrap_or_default();
+        let mut rows = text::table(&["parameter", "value", "95 % from", "to", "unit", ""]);
         for p in fit.parameters() {
-            let (value, error) = text::with_uncertainty(&p.estimate);
+            let (low, high) = text::interval(&p.estimate);
             let remark = p.remark.map(|r| r.to_string()).unwrap_or_default();
-            rows.add_row([p.name, value, error, p.unit.to_owned(), remark]);
+            let unit = gain.unit(&p.name, p.unit);
+            rows.add_row([p.name.clone(), text::plus_minus(&p.estimate), low, high, unit, remark]);
         }
         let of_form = match fit.form() {
             Form::Lead => String::new(),
             form => format!(" of the form {form}"),
         };
         page.push_str(&format!(
-            "\nOperator{of_form} whose gains change once (sigmoid)\n{rows}\n"
+            "Operator{of_form} whose gains change once (sigmoid)\n{rows}\n"
         ));
         if fit.form() != Form::Lead && fit.change_found() {
             page.push_str(&format!("{}\n", before_and_after(fit)));
@@ -215,9 +217,14 @@ impl Found<'_> {
         if !fit.change_found() {
             page.push_str("The records show no change.\n");
         }
+        page.push_str(&text::records(files, records, accounts, false));
+        if !verbose {
+            page.push_str(text::MORE);
+            return page;
+        }
         let t = fit.termination();
         page.push_str(&format!(
-            "Search: {}, {}, start: {}.\n",
+            "\nSearch: {}, {}, start: {}.\n",
             t.reason,
             text::steps(t.iterations),
             fit.start()

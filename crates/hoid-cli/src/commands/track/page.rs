@@ -1,6 +1,6 @@
 //! A summary of a trace for people.
 
-use hoid_model::uncertainty::Estimate;
+use hoid_model::{GainUnit, uncertainty::Estimate};
 use hoid_report::numbers;
 use hoid_track::value_of;
 
@@ -14,32 +14,12 @@ const ROWS_SHOWN: usize = 8;
 const COEFFICIENTS_SHOWN: usize = 6;
 
 impl Tracked<'_> {
-    /// A summary for people.
+    /// A summary for people, and with `verbose` what is behind it.
     ///
     /// # Errors
     /// Those of the quality of the start fit.
-    pub fn page(&self) -> Result<String, CliError> {
+    pub fn page(&self, verbose: bool) -> Result<String, CliError> {
         let mut page = text::verdict(self.verdict);
-        page.push_str(&text::records(
-            std::slice::from_ref(&self.file),
-            std::slice::from_ref(self.record),
-            std::slice::from_ref(self.account),
-        ));
-        if let Some(choice) = self.choice {
-            page.push('\n');
-            page.push_str(&text::candidates(choice));
-        }
-        if let (Some(fit), Some(span)) = (self.trace.start(), &self.span) {
-            let q = fit.quality(std::slice::from_ref(span))?;
-            page.push_str(&format!(
-                "\nStart: batch fit of {:.2} to {:.2} s, {}; VAF simulation {:.2} %, prediction {:.2} %.\n",
-                span.time_s(0),
-                span.time_s(span.len()),
-                fit.title(),
-                q.vaf_simulation,
-                q.vaf_prediction
-            ));
-        }
         page.push_str(&self.rows_shown());
         let errors = self.relative_errors();
         if !errors.is_empty() {
@@ -55,8 +35,43 @@ impl Tracked<'_> {
         }
         page.push_str(&self.changes());
         page.push_str(&self.counts());
-        page.push_str(&text::settings(self.settings));
+        if let Some(choice) = self.choice {
+            page.push_str(&text::delay(choice));
+        }
+        page.push_str(&text::records(
+            std::slice::from_ref(&self.file),
+            std::slice::from_ref(self.record),
+            std::slice::from_ref(self.account),
+            verbose,
+        ));
         page.push_str(&format!("Trace: {}\n", self.out));
+        if verbose {
+            page.push_str(&self.details()?);
+        } else {
+            page.push_str(text::MORE);
+        }
+        Ok(page)
+    }
+
+    /// What was tried, the start fit, settings.
+    fn details(&self) -> Result<String, CliError> {
+        let mut page = String::new();
+        if let Some(choice) = self.choice {
+            page.push('\n');
+            page.push_str(&text::candidates(choice));
+        }
+        if let (Some(fit), Some(span)) = (self.trace.start(), &self.span) {
+            let q = fit.quality(std::slice::from_ref(span))?;
+            page.push_str(&format!(
+                "\nStart: batch fit of {:.2} to {:.2} s, {}; VAF simulation {:.2} %, prediction {:.2} %.\n",
+                span.time_s(0),
+                span.time_s(span.len()),
+                fit.title(),
+                q.vaf_simulation,
+                q.vaf_prediction
+            ));
+        }
+        page.push_str(&text::settings(self.settings));
         Ok(page)
     }
 
@@ -73,16 +88,14 @@ impl Tracked<'_> {
             .collect();
         picked.dedup();
         let with_operator = self.has_operator();
-        let units = ["deg/deg", "s", "s", "rad/s", "", "s"];
+        let gain = GainUnit::of(self.record);
+        let units = ["", "s", "s", "rad/s", "", "s"];
         let mut header = vec!["t in s".to_owned()];
         if with_operator {
             let named = self.trace.operator_columns().into_iter().zip(units);
-            header.extend(named.map(|(n, u)| {
-                if u.is_empty() {
-                    n.to_owned()
-                } else {
-                    format!("{n} ({u})")
-                }
+            header.extend(named.map(|(n, u)| match gain.unit(n, u) {
+                unit if unit.is_empty() => n.to_owned(),
+                unit => format!("{n} ({unit})"),
             }));
         } else {
             header.extend(trace.parameter_names().into_iter().take(COEFFICIENTS_SHOWN));
@@ -100,7 +113,7 @@ impl Tracked<'_> {
             rows.add_row(cells);
         }
         format!(
-            "\nEstimate by {} with one standard error; the trace has all {} rows.\n{rows}\n",
+            "Estimate by {} with one standard error; the trace has all {} rows.\n{rows}\n",
             trace.options().method.name(),
             trace.len()
         )
@@ -159,11 +172,5 @@ impl Tracked<'_> {
 }
 
 fn plus_minus(e: Option<Estimate>) -> String {
-    match e {
-        None => numbers::DASH.to_owned(),
-        Some(e) => match text::with_uncertainty(&e) {
-            (value, error) if error == numbers::DASH => value,
-            (value, error) => format!("{value} ± {error}"),
-        },
-    }
+    e.map_or_else(|| numbers::DASH.to_owned(), |e| text::plus_minus(&e))
 }

@@ -2,16 +2,24 @@
 
 use std::path::PathBuf;
 
-use hoid_report::{BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, default_batch_fits, write_report};
+use hoid_report::{
+    BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, default_batch_fits, figures::trace_panels, write_report,
+};
 
 use super::result::Tracked;
-use crate::{args::TrackArgs, commands::reading::accounts, error::CliError, output};
+use crate::{
+    args::TrackArgs,
+    commands::{figure, reading::accounts},
+    error::CliError,
+    output,
+};
 
-/// Writes the page into the directory of `--report`; nothing without it.
+/// Writes the page into the directory of `--report` and the parameters over time into the file of
+/// `--figure`; nothing without them.
 pub fn write(args: &TrackArgs, tracked: &Tracked<'_>, batch: &[BatchFit]) -> Result<Option<PathBuf>, CliError> {
-    let Some(directory) = &args.report else {
+    if args.report.is_none() && args.picture.figure.is_none() {
         return Ok(None);
-    };
+    }
     let line = |((from_s, to_s), fit)| BatchLine { from_s, to_s, fit };
     let batch: Vec<BatchLine<'_>> = batch.iter().map(|(span, fit)| line((*span, fit))).collect();
     let mut settings = vec![
@@ -33,7 +41,19 @@ pub fn write(args: &TrackArgs, tracked: &Tracked<'_>, batch: &[BatchFit]) -> Res
             trace: tracked.trace,
             batch,
         }],
+        verdict: Some(tracked.verdict.clone()),
         notes: Vec::new(),
+    };
+    if let Some(path) = &args.picture.figure {
+        let grid = if tracked.has_operator() {
+            report.operator_grid()?
+        } else {
+            report.coefficient_grid()?
+        };
+        figure::write(path, &trace_panels("tracked", &report.title, &grid), args.picture.width)?;
+    }
+    let Some(directory) = &args.report else {
+        return Ok(None);
     };
     Ok(Some(write_report(directory, &report.to_html()?)?))
 }
@@ -55,7 +75,7 @@ pub fn batch_fits(args: &TrackArgs, tracked: &Tracked<'_>) -> Result<Vec<BatchFi
     }
     let (all, missing) = default_batch_fits(trace, record);
     if let Some(error) = missing {
-        output::message(&format!("the report has no batch fit of the last third: {error}"));
+        output::notice("", format!("the report has no batch fit of the last third: {error}"));
     }
     Ok(all)
 }

@@ -60,7 +60,7 @@ impl Tracked<'_> {
         );
         let mut comments = vec![
             format!("hoid {} track {}", env!("CARGO_PKG_VERSION"), self.file),
-            "units: t s, K_e deg/deg, T_L s, K_e_dot s, omega_nm rad/s; _se are standard errors".to_owned(),
+            "units: t s, T_L s, omega_nm rad/s; gains are u by e; _se are standard errors".to_owned(),
         ];
         comments.extend(self.settings.iter().map(|(k, v)| format!("{k}: {v}")));
         comments.extend(

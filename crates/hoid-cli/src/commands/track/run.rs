@@ -7,7 +7,7 @@ use hoid_track::{StartAt, TrackOptions, track, usual_start_span};
 use super::{report, result::Tracked};
 use crate::{
     args::TrackArgs,
-    commands::{places, reading},
+    commands::{figure, places, reading},
     error::CliError,
     json, output, recursion,
     recursion::Plan,
@@ -18,7 +18,14 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     if !args.batch.is_empty() && args.report.is_none() {
         return Err(CliError::Usage("--batch belongs to --report".to_owned()));
     }
-    places::check(&[&args.record], &[Some(&args.out)], &[args.report.as_deref()])?;
+    if let Some(path) = &args.picture.figure {
+        figure::check(path)?;
+    }
+    places::check(
+        &[&args.record],
+        &[Some(&args.out), args.picture.figure.as_deref()],
+        &[args.report.as_deref()],
+    )?;
     let with_input = recursion::structure(&args.recursion)?.has_input();
     let (record, account) = reading::read(&args.record, &args.read, with_input)?;
     let plan = Plan::new(&args.recursion, record.sample_time())?;
@@ -88,12 +95,12 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     let batch = report::batch_fits(args, &tracked)?;
     write_table(&args.out, &tracked.table())?;
     if let Some(page) = report::write(args, &tracked, &batch)? {
-        output::message(&format!("report: {}", page.display()));
+        output::notice("", format!("report: {}", page.display()));
     }
-    if args.json {
+    if args.show.json {
         json::print(&tracked.to_json()?)?;
     } else {
-        output::print(&tracked.page()?)?;
+        output::show(&tracked.page(args.show.verbose)?)?;
     }
     CliError::of_verdict(&verdict)
 }

@@ -1,0 +1,17 @@
+//! Options of a figure, the same for all commands that draw one.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::parse::parse_width;
+
+#[derive(Debug, Args)]
+pub struct FigureArgs {
+    /// Draw what was found into this file (.svg)
+    #[arg(long, value_name = "FILE")]
+    pub figure: Option<PathBuf>,
+    /// Width of the figure, as 85mm, 17cm or 3.3in [default: 420 pixels]
+    #[arg(long, value_name = "WIDTH", value_parser = parse_width, requires = "figure")]
+    pub width: Option<f64>,
+}

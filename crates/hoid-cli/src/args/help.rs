@@ -1,0 +1,379 @@
+//! What help shows: `hoid -h` lists the commands by what they are for; `hoid COMMAND -h` shows the
+//! options that most people need, under headings, and two examples; `--help` shows everything.
+//!
+//! The tables here hold names of commands and options alone: what an option does is said where it is
+//! defined. A test holds them to the definitions, and parses every example.
+
+use clap::{Arg, Command, CommandFactory};
+
+use super::Cli;
+
+/// What help says of a command besides its options.
+struct Help {
+    command: &'static str,
+    examples: &'static [&'static str],
+    /// Options of `-h`; all where it names none.
+    shown: &'static [&'static str],
+}
+
+/// The commands by what they are for, in the order of the first page.
+const GROUPS: [(&str, &[&str]); 5] = [
+    (
+        "Recordings",
+        &["info", "identify", "describe", "track", "stream", "group"],
+    ),
+    ("Simulation", &["demo", "simulate", "simulate-group"]),
+    ("Models", &["convert", "margins"]),
+    ("Studies", &["study", "reproduce"]),
+    ("This program", &["completions", "man", "help"]),
+];
+
+const HELP: [Help; 15] = [
+    Help {
+        command: "info",
+        examples: &["hoid info run.csv", "hoid info run.mat --json"],
+        shown: &[],
+    },
+    Help {
+        command: "identify",
+        examples: &[
+            "hoid identify run.csv --controlled-element '90/(s(s+6))' --figure bode.svg",
+            "hoid identify run1.csv run2.csv --structure bj --nk 0.2s..0.4s --report out",
+        ],
+        shown: &[
+            "input",
+            "output",
+            "fs",
+            "from",
+            "to",
+            "unit",
+            "structure",
+            "orders",
+            "nk",
+            "excitation",
+            "controlled_element",
+            "figure",
+            "report",
+            "verbose",
+            "json",
+        ],
+    },
+    Help {
+        command: "describe",
+        examples: &[
+            "hoid describe run1.csv run2.csv --excitation f_t",
+            "hoid describe run.csv --controlled-element '90/(s(s+6))' --figure bode.svg --width 85mm",
+        ],
+        shown: &[
+            "input",
+            "output",
+            "fs",
+            "from",
+            "to",
+            "faults",
+            "excitation",
+            "period",
+            "controlled_element",
+            "figure",
+            "width",
+            "verbose",
+            "json",
+        ],
+    },
+    Help {
+        command: "track",
+        examples: &[
+            "hoid track run.csv --out trace.csv",
+            "hoid track run.csv --method rpem --nk 0.28s --out trace.parquet --report out",
+        ],
+        shown: &[
+            "input",
+            "output",
+            "fs",
+            "from",
+            "to",
+            "unit",
+            "method",
+            "structure",
+            "orders",
+            "nk",
+            "memory",
+            "start_span",
+            "out",
+            "figure",
+            "report",
+            "verbose",
+            "json",
+        ],
+    },
+    Help {
+        command: "stream",
+        examples: &[
+            "recorder | hoid stream --fs 100 --every 10",
+            "hoid stream --fs 100 --method rls --memory 2s < run.csv",
+        ],
+        shown: &[
+            "fs",
+            "input",
+            "output",
+            "method",
+            "structure",
+            "orders",
+            "nk",
+            "memory",
+            "warm_up",
+            "every",
+        ],
+    },
+    Help {
+        command: "group",
+        examples: &["hoid group init runs", "hoid group runs --out results"],
+        shown: &[],
+    },
+    Help {
+        command: "demo",
+        examples: &["hoid demo", "hoid demo --out first --seed 2"],
+        shown: &[],
+    },
+    Help {
+        command: "simulate",
+        examples: &[
+            "hoid simulate --condition C4 --out run.csv",
+            "hoid simulate --scenario mine.toml --seed 3 --out run.parquet",
+        ],
+        shown: &[
+            "condition",
+            "scenario",
+            "remnant_order",
+            "noise_level",
+            "sample_time",
+            "seed",
+            "out",
+        ],
+    },
+    Help {
+        command: "simulate-group",
+        examples: &[
+            "hoid simulate-group --people --out runs",
+            "hoid simulate-group --subjects 5 --conditions C1,C4 --out runs",
+        ],
+        shown: &["out", "people", "subjects", "conditions", "runs", "seed"],
+    },
+    Help {
+        command: "convert",
+        examples: &[
+            "hoid convert --f -1.91,0.92 --b 0.044,-0.043 --nk 29",
+            "hoid convert --operator K_e=.09,T_L=.4,omega_nm=11.25,zeta_nm=.35,tau_e=.28",
+        ],
+        shown: &[],
+    },
+    Help {
+        command: "margins",
+        examples: &[
+            "hoid margins --condition C1",
+            "hoid margins --scenario mine.toml --state last",
+        ],
+        shown: &[],
+    },
+    Help {
+        command: "study",
+        examples: &["hoid study check plan.toml", "hoid study run plan.toml --out results"],
+        shown: &[],
+    },
+    Help {
+        command: "reproduce",
+        examples: &[
+            "hoid reproduce --replications 10",
+            "hoid reproduce --only fig-5,table-2 --out figures",
+        ],
+        shown: &[],
+    },
+    Help {
+        command: "completions",
+        examples: &["hoid completions bash > hoid.bash", "hoid completions zsh > _hoid"],
+        shown: &[],
+    },
+    Help {
+        command: "man",
+        examples: &["hoid man man1", "man -l man1/hoid-identify.1"],
+        shown: &[],
+    },
+];
+
+/// The headings of options that several commands share; what is left stands under the model.
+const HEADINGS: [(&str, &[&str]); 2] = [
+    (
+        "Data",
+        &[
+            "input",
+            "output",
+            "fs",
+            "from",
+            "to",
+            "unit",
+            "resample",
+            "fill",
+            "drop_repeated",
+            "scale",
+            "offset",
+            "decimate",
+            "new_fs",
+            "run_in",
+            "detrend",
+            "mask",
+            "shortest",
+            "faults",
+            "excitation",
+            "period",
+            "lines",
+            "largest",
+        ],
+    ),
+    (
+        "Results",
+        &[
+            "controlled_element",
+            "validate",
+            "horizon",
+            "figure",
+            "width",
+            "trace",
+            "out",
+            "report",
+            "batch",
+            "every",
+            "moving_average",
+            "verbose",
+            "json",
+        ],
+    ),
+];
+
+/// The commands whose options stand under headings.
+const WITH_HEADINGS: [&str; 4] = ["identify", "describe", "track", "stream"];
+
+/// The program as it is parsed and as it explains itself.
+pub fn command() -> Command {
+    let mut program = Cli::command().mut_subcommands(explained);
+    let page = first_page(&mut program);
+    program.help_template(page)
+}
+
+fn explained(command: Command) -> Command {
+    let name = command.get_name().to_owned();
+    let Some(help) = HELP.iter().find(|help| help.command == name) else {
+        return command;
+    };
+    let examples: String = help.examples.iter().map(|line| format!("  {line}\n")).collect();
+    let command = command.after_help(format!("Examples:\n{examples}"));
+    let command = command.mut_subcommands(|inner| inner.mut_args(in_any_case));
+    command.mut_args(|arg| argument(arg, help))
+}
+
+/// Choices are taken in capitals too.
+fn in_any_case(arg: Arg) -> Arg {
+    let takes_value = arg.get_action().takes_values();
+    arg.ignore_case(takes_value)
+}
+
+/// What most people do not need is shown by `--help` alone.
+fn argument(arg: Arg, help: &Help) -> Arg {
+    let id = arg.get_id().as_str().to_owned();
+    let hidden = !arg.is_positional() && !help.shown.is_empty() && !help.shown.contains(&id.as_str());
+    let arg = in_any_case(arg).hide_short_help(hidden);
+    if !WITH_HEADINGS.contains(&help.command) || arg.is_positional() {
+        return arg;
+    }
+    let heading = HEADINGS.iter().find(|(_, ids)| ids.contains(&id.as_str()));
+    arg.help_heading(heading.map_or("Model", |(heading, _)| heading))
+}
+
+/// The list of commands by what they are for.
+fn first_page(program: &mut Command) -> String {
+    let about = |name: &str| {
+        let command = program.get_subcommands().find(|c| c.get_name() == name);
+        let text = command.and_then(Command::get_about).map(ToString::to_string);
+        text.unwrap_or_else(|| "Help of a command".to_owned())
+    };
+    let mut page = "{about-with-newline}\n{usage-heading} {usage}\n".to_owned();
+    for (heading, commands) in GROUPS {
+        page.push_str(&format!("\n{heading}:\n"));
+        for name in commands {
+            page.push_str(&format!("  {name:<15} {}\n", about(name)));
+        }
+    }
+    page.push_str("\nOptions:\n{options}\n\nExamples:\n  hoid demo\n  hoid identify run.csv --input e --output u\n");
+    page
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    /// The words of an example behind the program's name, as a shell would hand them over.
+    fn words(example: &str) -> Vec<String> {
+        let (_, typed) = example.split_once("hoid ").unwrap();
+        let typed = typed.split([' ']).take_while(|word| !["<", ">", "|"].contains(word));
+        std::iter::once("hoid".to_owned())
+            .chain(typed.map(|word| word.replace('\'', "")))
+            .collect()
+    }
+
+    #[test]
+    fn the_tables_name_what_there_is() {
+        let program = Cli::command();
+        let known: BTreeSet<&str> = program.get_subcommands().map(Command::get_name).collect();
+        let grouped: BTreeSet<&str> = GROUPS.iter().flat_map(|(_, names)| names.iter().copied()).collect();
+        assert_eq!(
+            grouped
+                .into_iter()
+                .filter(|name| *name != "help")
+                .collect::<BTreeSet<_>>(),
+            known
+        );
+        assert_eq!(HELP.iter().map(|help| help.command).collect::<BTreeSet<_>>(), known);
+        for help in &HELP {
+            let command = program.find_subcommand(help.command).unwrap();
+            let ids: Vec<&str> = command.get_arguments().map(|arg| arg.get_id().as_str()).collect();
+            for id in help.shown {
+                assert!(ids.contains(id), "{} has no option {id}", help.command);
+            }
+        }
+    }
+
+    #[test]
+    fn every_example_parses() {
+        for help in &HELP {
+            assert_eq!(help.examples.len(), 2, "{}", help.command);
+            for example in help.examples.iter().filter(|example| !example.starts_with("man ")) {
+                let parsed = command().try_get_matches_from(words(example));
+                assert!(parsed.is_ok(), "{example}: {}", parsed.unwrap_err());
+            }
+        }
+    }
+
+    #[test]
+    fn short_help_is_short() {
+        let mut program = command().term_width(80);
+        program.build();
+        let lines = program.render_help().to_string().lines().count();
+        assert!(lines <= 40, "{lines}");
+        for inner in program.get_subcommands_mut() {
+            let help = inner.render_help().to_string();
+            assert!(
+                help.lines().count() <= 75,
+                "{} has {} lines",
+                inner.get_name(),
+                help.lines().count()
+            );
+        }
+    }
+
+    #[test]
+    fn choices_are_taken_in_capitals() {
+        let typed = "hoid identify run.csv --structure BJ --criterion Aic --method PEM";
+        assert!(command().try_get_matches_from(typed.split(' ')).is_ok());
+    }
+}

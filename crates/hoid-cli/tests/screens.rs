@@ -1,0 +1,165 @@
+//! What the screen shows: the answer first and on one page, details on demand, remarks after it and
+//! once, at any width; help, completions and manual pages.
+
+mod common;
+
+use std::{fs, path::Path, process::Command};
+
+use common::{bad, good};
+use tempfile::TempDir;
+
+fn simulated() -> TempDir {
+    let directory = TempDir::new().unwrap();
+    for name in ["1.csv", "2.csv"] {
+        good(directory.path(), &["simulate", "--condition", "C1", "--out", name]);
+    }
+    directory
+}
+
+const FIT: [&str; 8] = [
+    "identify",
+    "1.csv",
+    "--structure",
+    "bj",
+    "--nk",
+    "29",
+    "--orders",
+    "nd=1",
+];
+
+/// Standard output on a screen of so many columns.
+fn at_width(directory: &Path, columns: &str, arguments: &[&str]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
+        .args(arguments)
+        .current_dir(directory)
+        .env("COLUMNS", columns)
+        .output()
+        .unwrap();
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn the_answer_comes_first_and_fits_on_a_screen() {
+    let directory = simulated();
+    let d = directory.path();
+    let page = good(d, &FIT);
+    assert!(page.starts_with("Verdict: "), "{page}");
+    let lines = page.lines().count();
+    assert!(lines <= 24, "{lines} lines:\n{page}");
+    for part in [
+        "K_e",
+        "95 % from",
+        "deg/deg",
+        "VAF of the prediction",
+        "1.csv: 8192 samples",
+    ] {
+        assert!(page.contains(part), "{part}: {page}");
+    }
+    assert!(!page.contains("Settings:") && !page.contains("Ljung-Box"), "{page}");
+    let all = good(d, &[&FIT[..], &["-v"]].concat());
+    for part in ["Settings: ", "Ljung-Box", "noise pole (D)", "coefficient"] {
+        assert!(all.contains(part), "{part}: {all}");
+    }
+    // The answer is the same.
+    let answer = page.split("More with -v").next().unwrap();
+    assert!(all.starts_with(answer), "{all}");
+}
+
+#[test]
+fn pages_keep_to_the_width_of_the_screen() {
+    let directory = simulated();
+    for columns in [60_usize, 80] {
+        let text = at_width(directory.path(), &columns.to_string(), &[&FIT[..], &["-v"]].concat());
+        let widest = text.lines().map(|line| line.chars().count()).max().unwrap();
+        assert!(widest <= columns, "{widest} columns on a screen of {columns}:\n{text}");
+    }
+}
+
+#[test]
+fn what_is_said_of_several_files_is_said_once_and_after_the_answer() {
+    let directory = simulated();
+    let d = directory.path();
+    // The same row twice in both files.
+    for name in ["1.csv", "2.csv"] {
+        let text = fs::read_to_string(d.join(name)).unwrap();
+        let row = text.lines().nth(4000).unwrap();
+        fs::write(d.join(name), text.replace(row, &format!("{row}\n{row}"))).unwrap();
+    }
+    let all = [
+        "identify",
+        "1.csv",
+        "2.csv",
+        "--structure",
+        "arx",
+        "--nk",
+        "29",
+        "--drop-repeated",
+    ];
+    let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
+        .args(all)
+        .current_dir(d)
+        .output()
+        .unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    let of_rows: Vec<&str> = said
+        .lines()
+        .filter(|line| line.contains("twice") || line.contains("repeated"))
+        .collect();
+    assert!(of_rows.iter().all(|line| line.contains("1.csv and 1 more: ")), "{said}");
+    assert_eq!(of_rows.len(), 1, "{said}");
+}
+
+#[test]
+fn mistakes_are_answered_with_what_was_meant() {
+    let directory = simulated();
+    let d = directory.path();
+    let (code, message) = bad(d, &["identify", "1.csv", "--input", "F_T"]);
+    assert!(code == 1 && message.contains("did you mean \"f_t\"?"), "{message}");
+    let (code, message) = bad(d, &["simulate", "--condition", "C1", "--out", "none/x.csv"]);
+    assert!(code == 1 && !message.contains(".part"), "{message}");
+    // Before any work, and nothing is left behind.
+    fs::write(d.join("file"), "").unwrap();
+    for arguments in [
+        &["demo", "--out", "file/x"][..],
+        &["reproduce", "--only", "fig-5", "--out", "file/x"],
+        &["man", "file/x"],
+    ] {
+        let (code, message) = bad(d, arguments);
+        assert!(
+            code == 1 && message.contains("cannot be written"),
+            "{arguments:?}: {message}"
+        );
+    }
+}
+
+#[test]
+fn choices_and_delays_as_people_type_them() {
+    let directory = simulated();
+    let d = directory.path();
+    let page = |arguments: &[&str]| good(d, &[&["identify", "1.csv", "--orders", "nd=1"], arguments].concat());
+    let usual = page(&["--structure", "bj", "--nk", "29"]);
+    assert_eq!(page(&["--structure", "BJ", "--nk", "0.28s"]), usual);
+    assert!(page(&["--nk", "0.27s..0.29s"]).contains("BJ(nb=2, nd=1, nf=2, nk=29)"));
+}
+
+#[test]
+fn help_has_no_colour_where_none_is_wanted_and_shells_have_completions() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    let help = good(d, &["-h"]);
+    assert!(help.contains("Recordings:") && !help.contains('\u{1b}'), "{help}");
+    let short = good(d, &["identify", "-h"]);
+    let long = good(d, &["identify", "--help"]);
+    assert!(!short.contains("--search-method") && long.contains("--search-method"));
+    assert!(
+        short.contains("Examples:") && short.contains("Data:") && short.contains("Results:"),
+        "{short}"
+    );
+    for shell in ["bash", "zsh", "fish", "powershell"] {
+        let text = good(d, &["completions", shell]);
+        assert!(text.contains("controlled-element"), "{shell}");
+    }
+    let said = good(d, &["man", "pages"]);
+    let page = fs::read_to_string(d.join("pages/hoid-identify.1")).unwrap();
+    assert!(page.contains(".TH") && page.contains("controlled\\-element"), "{said}");
+}

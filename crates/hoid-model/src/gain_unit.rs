@@ -1,0 +1,58 @@
+//! Units of an operator's gains.
+//!
+//! A gain is a ratio of the output u to the input e, so that its unit is that of u by that of e. It
+//! is told only where both channels say theirs; a recording without units has gains without units.
+//! An operator `K (1 + T_L s) / (1 + T_I s)` has the gain `K` in u/e, the gain of the rate of the
+//! error `K_e_dot = K T_L` in u s/e, and the ratio `K / T_I` in u/(e s).
+
+use crate::Record;
+
+/// The units of the channels from which a gain goes, and to which.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct GainUnit(Option<(String, String)>);
+
+impl GainUnit {
+    /// The units of a record: none where one of the two is not declared.
+    pub fn of(record: &Record) -> Self {
+        let units = record
+            .input_channel()
+            .map(|e| (e.unit.trim(), record.output_channel().unit.trim()));
+        let declared = units.filter(|(e, u)| !e.is_empty() && !u.is_empty());
+        Self(declared.map(|(e, u)| (e.to_owned(), u.to_owned())))
+    }
+
+    /// Unit of a parameter, of its name and of the unit `own` that it has beside that of the gain
+    /// ("s" of K_e_dot, "1/s" of K/T_I, "deg/deg" or "" of K). What is no gain keeps its own.
+    ///
+    /// ```
+    /// # use hoid_model::{Channel, GainUnit, Record, SampleTime};
+    /// let channel = |name: &str, unit: &str| Channel::new(name, unit, vec![0.0; 4]);
+    /// let record = Record::new(SampleTime::new(0.01)?, channel("e", "mm"), channel("u", "deg"))?;
+    /// let unit = GainUnit::of(&record);
+    /// assert_eq!(unit.unit("K_e", ""), "deg/mm");
+    /// assert_eq!(unit.unit("K_over_T_I", "1/s"), "deg/(mm s)");
+    /// assert_eq!(unit.unit("T_L", "s"), "s");
+    /// assert_eq!(GainUnit::default().unit("K_e_dot", "s"), "");
+    /// # Ok::<(), hoid_model::ModelError>(())
+    /// ```
+    pub fn unit(&self, parameter: &str, own: &str) -> String {
+        if !is_gain(parameter) {
+            return own.to_owned();
+        }
+        match (&self.0, own) {
+            (None, _) => String::new(),
+            // Of like units a ratio has none, and time is left.
+            (Some((e, u)), "s" | "1/s") if e == u => own.to_owned(),
+            (Some((e, u)), "s") => format!("{u} s/{e}"),
+            (Some((e, u)), "1/s") => format!("{u}/({e} s)"),
+            (Some((e, u)), _) => format!("{u}/{e}"),
+        }
+    }
+}
+
+/// Whether a parameter scales with u/e. The gain of the remnant K_n does not: it is a ratio of u to
+/// white noise.
+fn is_gain(parameter: &str) -> bool {
+    let name = parameter.trim_end_matches(|c: char| c.is_ascii_digit());
+    matches!(name, "K" | "K_e" | "K_e_dot" | "K_over_T_I" | "K_I")
+}

@@ -1,0 +1,162 @@
+//! The excitation of a run: the channel whose power stands in single lines over a span of whole
+//! periods, and the longest such span.
+//!
+//! Over a whole number of periods `T` a periodic signal has its power in the bins `n / T` of its
+//! Fourier transform, and in no other; over any other span it leaks into all bins. The spans between
+//! whole seconds are tried, from the longest down, until nearly all the power stands in single bins
+//! ([`Excitation::found_in`]).
+
+use hoid_ident::frequency::{Excitation, LineSearch, USUAL_EXCITATIONS};
+use hoid_model::Record;
+
+use super::Known;
+
+/// Longest part of a record at either end that a span may leave out, s, and its share of the record.
+const MOST_CUT_S: f64 = 20.0;
+const MOST_CUT_SHARE: f64 = 0.4;
+/// Fewest lines that excite a person: of a sine a person knows what comes.
+const FEWEST_LINES: usize = 3;
+
+/// The excitation of a run.
+pub struct Periods {
+    pub channel: String,
+    pub period_s: f64,
+    pub span_s: (f64, f64),
+    pub excitation: Excitation,
+    pub words: String,
+}
+
+/// The excitation in the channel that was named, else in the first of the usual ones that has lines,
+/// else in any other.
+pub fn search(record: &Record, known: &Known) -> Result<Periods, String> {
+    let channels: Vec<&str> = record.channels().map(|channel| channel.name.as_str()).collect();
+    let candidates: Vec<&str> = match known.excitation.as_deref() {
+        Some("none") => return Err("as asked for".to_owned()),
+        Some(name) => vec![name],
+        None => {
+            // Error, control and output follow the excitation: they have its lines, and more.
+            let answers = channels.iter().take(2).copied().chain(["y", "x", "n", "e", "u"]);
+            let answers: Vec<&str> = answers.collect();
+            let usual = USUAL_EXCITATIONS.into_iter().filter(|name| channels.contains(name));
+            let others = channels.iter().copied();
+            let others = others.filter(|name| !answers.contains(name) && !USUAL_EXCITATIONS.contains(name));
+            usual.chain(others).collect()
+        }
+    };
+    if let Some(missing) = candidates.iter().find(|name| record.channel(name).is_none()) {
+        return Err(format!(
+            "there is no column {missing}; there are {}",
+            channels.join(", ")
+        ));
+    }
+    let found = candidates.iter().find_map(|channel| in_channel(record, channel, known));
+    found.ok_or_else(|| {
+        format!(
+            "no column among {} has its power in lines over whole periods; name one by --excitation and its span by --from and --to",
+            if candidates.is_empty() { "none besides e and u".to_owned() } else { candidates.join(", ") }
+        )
+    })
+}
+
+/// The longest span of whole periods of a channel.
+fn in_channel(record: &Record, channel: &str, known: &Known) -> Option<Periods> {
+    spans(record, known).into_iter().find_map(|(from_s, to_s)| {
+        let span = record.span(from_s, to_s).ok()?;
+        let excitation = Excitation::found_in(&span, channel, &LineSearch::default()).ok()?;
+        if excitation.harmonics().len() < FEWEST_LINES {
+            return None;
+        }
+        let (omega, period_s) = (excitation.omega_rad_s(), excitation.period_s());
+        let words = format!(
+            "{channel} has {} lines from {:.3} to {:.3} rad/s, harmonics of {period_s:.4} s, over {from_s:.3} to {to_s:.3} s",
+            omega.len(),
+            omega.first().copied().unwrap_or_default(),
+            omega.last().copied().unwrap_or_default()
+        );
+        Some(Periods {
+            channel: channel.to_owned(),
+            period_s,
+            span_s: (from_s, to_s),
+            excitation,
+            words,
+        })
+    })
+}
+
+/// The spans that are tried, the longest first, of equal ones the latest: a person settles in.
+fn spans(record: &Record, known: &Known) -> Vec<(f64, f64)> {
+    let (begin, end) = (record.time_s(0), record.time_s(record.len()));
+    let most = MOST_CUT_S.min(MOST_CUT_SHARE * (end - begin));
+    let whole = |from: f64, to: f64| (from.ceil() as i64..=to.floor() as i64).map(|t| t as f64);
+    let begins: Vec<f64> = match known.from_s {
+        Some(t) => vec![t],
+        None => std::iter::once(begin).chain(whole(begin, begin + most)).collect(),
+    };
+    let ends: Vec<f64> = match known.to_s {
+        Some(t) => vec![t],
+        None => std::iter::once(end).chain(whole(end - most, end)).collect(),
+    };
+    let mut all: Vec<(f64, f64)> = begins
+        .iter()
+        .flat_map(|from| ends.iter().map(move |to| (*from, *to)))
+        .collect();
+    all.retain(|(from, to)| to > from);
+    all.sort_by(|a, b| (b.1 - b.0).total_cmp(&(a.1 - a.0)).then(b.0.total_cmp(&a.0)));
+    all.dedup();
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use hoid_model::{Channel, SampleTime};
+
+    use super::*;
+
+    /// Noise-like error and control, and a disturbance of period 10 s that begins at 3 s.
+    fn record(lines: &[f64]) -> Record {
+        let ts = SampleTime::new(0.02).unwrap();
+        let n = 1300;
+        let at = |k: usize| k as f64 * 0.02;
+        let d = |k: usize| {
+            let of = |n: &f64| (TAU * n * at(k) / 10.0 + n).sin();
+            if at(k) < 3.0 {
+                0.3 * at(k)
+            } else {
+                lines.iter().map(of).sum()
+            }
+        };
+        let noise = |k: usize| ((k * 7919 % 1013) as f64 / 1013.0) - 0.5;
+        let channel = |name: &str, f: &dyn Fn(usize) -> f64| Channel::new(name, "", (0..n).map(f).collect());
+        Record::new(ts, channel("e", &noise), channel("u", &|k| noise(k + 3)))
+            .unwrap()
+            .with_channel(channel("d", &d))
+            .unwrap()
+    }
+
+    #[test]
+    fn the_longest_span_of_whole_periods_is_found() {
+        let found = search(&record(&[1.0, 3.0, 7.0, 12.0]), &Known::default()).ok().unwrap();
+        assert_eq!((found.channel.as_str(), found.span_s), ("d", (6.0, 26.0)));
+        assert!((found.period_s - 10.0).abs() < 1e-9, "{}", found.period_s);
+        assert_eq!(found.excitation.harmonics(), [1, 3, 7, 12]);
+    }
+
+    #[test]
+    fn what_is_no_excitation_is_said() {
+        let sine = search(&record(&[2.0]), &Known::default()).err().unwrap();
+        assert!(sine.contains("no column among d"), "{sine}");
+        let known = |excitation: &str| Known {
+            excitation: Some(excitation.to_owned()),
+            ..Known::default()
+        };
+        assert!(
+            search(&record(&[1.0, 3.0, 7.0]), &known("q"))
+                .err()
+                .unwrap()
+                .contains("there is no column q")
+        );
+        assert!(search(&record(&[1.0, 3.0, 7.0]), &known("none")).is_err());
+    }
+}

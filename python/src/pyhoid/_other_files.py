@@ -1,0 +1,136 @@
+"""Files that Python reads and hoid does not: packed text, Arrow and Feather, Excel.
+
+They are read by the packages that people have for them, and handed over as a file of the same name
+that hoid reads, so that every option of `read` and every check of the data is the same. A message
+names the file that was given.
+"""
+
+from __future__ import annotations
+
+import gzip
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from .errors import Error, FileError, FileMissingError, FormatError
+
+__all__ = ["readable"]
+
+#: Largest file that a packed one may become: a gigabyte of text is 10 million samples.
+_MOST_BYTES = 1 << 30
+
+#: What to do about formats that neither reads.
+_ADVICE = {
+    "mcap": "read its topics by the package mcap and make a pyhoid.Record of them",
+    "bag": "read its topics by the package rosbags and make a pyhoid.Record of them",
+    "edf": "read it by the package pyedflib or mne and make a pyhoid.Record of it",
+    "bdf": "read it by the package mne and make a pyhoid.Record of it",
+    "c3d": "read it by the package ezc3d and make a pyhoid.Record of it",
+    "tdms": "read it by the package nptdms and make a pyhoid.Record of it",
+    "mf4": "read it by the package asammdf and make a pyhoid.Record of it",
+    "sav": "read it by pandas.read_spss and give the table to Record.from_pandas",
+    "rds": "write it as CSV or Parquet in R",
+    "mlx": "save the variables in MATLAB: save run1.mat e u t",
+}
+
+
+def _unpacked(path: Path, place: Path) -> Path:
+    made = place / path.stem
+    written = 0
+    try:
+        with gzip.open(path, "rb") as packed, made.open("wb") as text:
+            while block := packed.read(1 << 20):
+                written += len(block)
+                if written > _MOST_BYTES:
+                    raise FormatError(
+                        f"{path} unpacks to more than {_MOST_BYTES >> 20} MB, expected a recording;"
+                        " unpack it and take a part of it"
+                    )
+                text.write(block)
+    except (EOFError, gzip.BadGzipFile) as error:
+        raise FormatError(f"{path} is cut or damaged: {error}; pack it again") from error
+    return made
+
+
+def _written(table: Any, path: Path, place: Path) -> Path:
+    made = place / f"{path.stem}.parquet"
+    table.write_parquet(made, compression="snappy")
+    return made
+
+
+def _arrow(path: Path, place: Path) -> Path:
+    try:
+        import polars
+    except ModuleNotFoundError:
+        raise FormatError(
+            f"{path}: Arrow and Feather are read by polars, which is not installed:"
+            " pip install polars"
+        ) from None
+    try:
+        table = polars.read_ipc(path)
+    except Exception as error:
+        raise FormatError(f"{path} cannot be read as Arrow: {error}") from error
+    return _written(table, path, place)
+
+
+def _excel(path: Path, place: Path) -> Path:
+    try:
+        import pandas
+
+        table = pandas.read_excel(path)
+    except ImportError as error:
+        raise FormatError(
+            f"{path}: Excel is read by pandas and a package of its format ({error});"
+            " install them, or save the sheet as CSV"
+        ) from None
+    except Exception as error:
+        raise FormatError(f"{path} cannot be read as Excel: {error}") from error
+    made = place / f"{path.stem}.csv"
+    table.to_csv(made, index=False)
+    return made
+
+
+#: Who reads what, by the last ending.
+_READERS: dict[str, Callable[[Path, Path], Path]] = {
+    "gz": _unpacked,
+    "arrow": _arrow,
+    "feather": _arrow,
+    "ipc": _arrow,
+    "xlsx": _excel,
+    "xls": _excel,
+    "ods": _excel,
+}
+
+
+@contextmanager
+def readable(path: str | PathLike[str]) -> Iterator[str | PathLike[str]]:
+    """The file, or one with the same content that hoid reads, for as long as it is needed."""
+    ending = Path(fspath(path)).suffix.lower().lstrip(".")
+    if ending in _ADVICE:
+        raise FormatError(f"{path}: .{ending} is not read by hoid: {_ADVICE[ending]}")
+    reader = _READERS.get(ending)
+    if reader is None:
+        yield path
+        return
+    given = Path(fspath(path))
+    if not given.exists():
+        raise FileMissingError(f"{path} cannot be read: there is no such file; check the name")
+    place = Path(tempfile.mkdtemp(prefix="hoid-"))
+    try:
+        try:
+            made = reader(given, place)
+        except OSError as error:
+            if isinstance(error, Error):
+                raise
+            raise FileError(f"{path} cannot be read: {error}; check the permissions") from error
+        try:
+            yield made
+        except Error as error:
+            # The message names what was given.
+            raise type(error)(str(error).replace(str(made), str(path))) from None
+    finally:
+        shutil.rmtree(place, ignore_errors=True)

@@ -1,0 +1,80 @@
+"""Results that travel: pickle, joblib's way of calling, damaged pickles."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyhoid
+from pyhoid import _pickling
+
+
+def again(result: Any) -> Any:
+    return pickle.loads(pickle.dumps(result))
+
+
+def test_a_fit_comes_back_with_its_digits(fit: pyhoid.Fit, c1: pyhoid.Record) -> None:
+    back = again(fit)
+    assert back.parameters == fit.parameters and back.orders == fit.orders
+    assert back.standard_errors == fit.standard_errors
+    assert np.array_equal(back.covariance, fit.covariance)
+    assert back.verdict == fit.verdict and back.quality == fit.quality
+    assert back._native._made is None, "nothing of this needs the fit itself"
+    assert repr(back) == repr(fit) and back.summary() == fit.summary()
+    # What was not said before is computed again, with the same digits.
+    assert np.array_equal(back.predict(c1).values, fit.predict(c1).values)
+    assert back._native._made is not None
+    assert again(back).parameters == fit.parameters
+    assert copy.deepcopy(fit).parameters == fit.parameters
+
+
+def test_a_trace_and_its_start_come_back(c4: pyhoid.Record) -> None:
+    trace = pyhoid.track(c4, "physical", nk=29, nd=1, every=16)
+    back = again(trace)
+    assert len(back) == len(trace) and list(back.columns) == list(trace.columns)
+    for name, values in trace.columns.items():
+        assert np.array_equal(back[name], values, equal_nan=True), name
+    assert repr(back) == repr(trace) and back.counts == trace.counts
+    start, own = back.start, trace.start
+    assert start is not None and own is not None and again(start).parameters == own.parameters
+
+
+def test_the_other_results_come_back(c1: pyhoid.Record) -> None:
+    described = pyhoid.describe(c1, excitation="f_t")
+    back = again(described)
+    assert repr(back) == repr(described)
+    assert np.array_equal(back.function.response, described.function.response)
+    assert back.function.gain_lead_delay() == described.function.gain_lead_delay()
+    operator = pyhoid.identify_operator(c1, form="lead", nd=2, excitation="none")
+    other = again(operator)
+    assert repr(other) == repr(operator) and other.parameters == operator.parameters
+    assert other.fit.parameters == operator.fit.parameters
+    record = again(c1)
+    assert np.array_equal(record.u, c1.u) and not record.u.flags.writeable
+
+
+def test_damaged_pickles_are_refused(fit: pyhoid.Fit, c1: pyhoid.Record) -> None:
+    state = fit.__getstate__()
+    empty = pyhoid.Fit.__new__(pyhoid.Fit)
+    changed = {**state, "answers": {**state["answers"], "parameters": [("b0", (1.0, None))]}}
+    with pytest.raises(pyhoid.DataError, match="was changed"):
+        empty.__setstate__(changed)
+    less = {key: value for key, value in state["answers"].items() if key != "orders"}
+    with pytest.raises(pyhoid.DataError, match="lacks orders"):
+        empty.__setstate__({**state, "answers": less})
+    with pytest.raises(pyhoid.DataError, match="no pickle of a Fit"):
+        empty.__setstate__({"parameters": 1})
+    # Sealed as it should be, but of other data.
+    call = fit.__dict__["_call"]
+    other = pyhoid.simulate("C1", seed=99)
+    strange = _pickling.Recalled(state["answers"], call._replace(records=(other,)))
+    with pytest.raises(pyhoid.DataError, match="cannot be made again"):
+        strange.predict(c1, 1)
+    parts = dict(c1.__reduce__()[1][0])
+    parts["u"] = np.full(len(c1), np.nan)
+    with pytest.raises(pyhoid.DataError):
+        c1.__reduce__()[0](parts)
