@@ -1,6 +1,8 @@
 //! What the screen shows: the answer first and on one page, details on demand, remarks after it and
 //! once, at any width; help, completions and manual pages.
 
+#![allow(clippy::unwrap_used)]
+
 mod common;
 
 use std::{fs, path::Path, process::Command};

@@ -7,7 +7,7 @@ use hoid_ident::{
 };
 use hoid_model::{Record, Structure};
 
-use super::Evidence;
+use super::evidence::Evidence;
 
 /// Orders of the noise model that are tried.
 const ORDERS: std::ops::RangeInclusive<usize> = 1..=6;

@@ -6,12 +6,14 @@
 //!
 //! | file | what it finds |
 //! |---|---|
+//! | `evidence` | what is known already, and what was found |
 //! | `columns` | error and control by the names that people give them |
 //! | `periods` | the excitation, its period and lines, and the longest span of whole periods |
 //! | `lag` | by how many samples the control was recorded later than the output of the controlled element |
 //! | `first_fit` | form and order of the noise model of the first run |
 
 mod columns;
+mod evidence;
 mod first_fit;
 mod lag;
 mod periods;
@@ -19,50 +21,12 @@ mod periods;
 use std::path::Path;
 
 use hoid_io::{ReadOptions, read_record, survey};
-use hoid_model::{ContinuousTransferFunction, Record};
+use hoid_model::Record;
+
+pub use evidence::{Evidence, Known};
 
 use super::{condition_settings::ConditionSettings, manifest::Manifest};
 use crate::StudyError;
-
-/// What is known already, and therefore not looked for.
-#[derive(Debug, Clone, Default)]
-pub struct Known {
-    /// Column of the input, or a difference.
-    pub input: Option<String>,
-    /// Column of the output.
-    pub output: Option<String>,
-    /// Column of the excitation; `none` where there is none.
-    pub excitation: Option<String>,
-    /// The controlled element, as it was typed, and as it is meant.
-    pub controlled_element: Option<(String, ContinuousTransferFunction)>,
-    /// Begin of the span that counts, s.
-    pub from_s: Option<f64>,
-    /// End of the span that counts, s.
-    pub to_s: Option<f64>,
-    /// Samples by which the output is recorded later than the input that it answers.
-    pub offset_samples: Option<f64>,
-}
-
-/// What was found, for the line of the manifest that begins with `key`: below the table `table`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Evidence {
-    /// Table of the manifest, as `[read]`; empty for its head.
-    pub table: String,
-    /// Key in that table; empty for the table itself.
-    pub key: &'static str,
-    /// What was found, and how.
-    pub words: String,
-}
-
-impl Evidence {
-    fn new(table: impl Into<String>, key: &'static str, words: impl Into<String>) -> Self {
-        Self {
-            table: table.into(),
-            key,
-            words: words.into(),
-        }
-    }
-}
 
 /// Completes a manifest by what its files say: the first run of each condition is looked at.
 ///

@@ -9,7 +9,7 @@
 use hoid_ident::frequency::{Excitation, LineSearch, USUAL_EXCITATIONS};
 use hoid_model::Record;
 
-use super::Known;
+use super::evidence::Known;
 
 /// Longest part of a record at either end that a span may leave out, s, and its share of the record.
 const MOST_CUT_S: f64 = 20.0;
