@@ -4,7 +4,7 @@
 //!   second is the first with a covariance of the gains that leaves them no other direction, in what
 //!   is not known at the beginning and in every drift.
 //! - **Drifts.** Of each form one filter says that the gains hardly move, others that they walk at
-//!   random. A filter whose weight has fallen below [`LEAST`] takes over the state of the best.
+//!   random. A filter whose weight has fallen below `LEAST` takes over the state of the best.
 //! - **Newborns.** Others say that the gains have just changed: they begin as the first, with a
 //!   variance added, and walk at random. After their life they are born again; one that foretells
 //!   better than the first then takes its place. So a change is followed at once, and what comes
