@@ -88,19 +88,23 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
         RECORDS_SHOWN
     };
     let all = files.iter().zip(records).zip(accounts);
-    let quiet = |account: &Account| account.steps.is_empty() && account.faults.is_empty();
+    let quiet = |account: &Account| {
+        account.faults.is_empty() && (account.steps.is_empty() || account.steps == accounts[0].steps)
+    };
     let mut text = String::new();
     for (k, one) in all.enumerate() {
-        // What was done to a record is always said.
+        // What was done to a record is always said, of records alike once.
         if verbose || k < shown || !quiet(one.1) {
             text.push_str(&line(one));
         }
     }
     if !verbose && records.len() > shown {
+        let alike = !accounts[0].steps.is_empty() && accounts.iter().all(quiet);
         text.push_str(&format!(
-            "{} records in all, to {}\n",
+            "{} records in all, to {}{}\n",
             records.len(),
-            files[files.len() - 1]
+            files[files.len() - 1],
+            if alike { ", prepared alike" } else { "" }
         ));
     }
     text
