@@ -30,6 +30,10 @@ pub fn warn(py: Python<'_>, notes: &[String]) -> PyResult<()> {
 }
 
 /// A plan of Monte Carlo runs.
+///
+/// Examples
+/// --------
+/// >>> pyhoid.Plan(name="bias", replications=10).estimates
 #[pyclass(name = "Plan", module = "pyhoid._pyhoid", frozen)]
 pub struct PyPlan {
     plan: Plan,
