@@ -49,6 +49,16 @@ pub struct Followed {
     pub operator: Vec<Option<OperatorParameters>>,
 }
 
+impl Followed {
+    /// Of a method that gives a response alone.
+    pub fn without_operator(response: Vec<Vec<Complex64>>) -> Self {
+        Self {
+            operator: vec![None; response.len()],
+            response,
+        }
+    }
+}
+
 /// A method that is compared with others.
 pub trait Comparator: Settings + Send + Sync {
     /// What it says of itself.

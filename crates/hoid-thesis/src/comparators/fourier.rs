@@ -81,10 +81,7 @@ impl Comparator for FourierCoefficients {
             };
             response.push(task.omega_rad_s.iter().map(at_line).collect());
         }
-        Ok(Followed {
-            operator: vec![None; response.len()],
-            response,
-        })
+        Ok(Followed::without_operator(response))
     }
 }
 

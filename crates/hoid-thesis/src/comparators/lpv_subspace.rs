@@ -202,10 +202,7 @@ impl Comparator for LpvSubspace {
             task.omega_rad_s.iter().map(of).collect()
         };
         let response: Vec<Vec<Complex64>> = task.at.iter().map(at).collect();
-        Ok(Followed {
-            operator: vec![None; response.len()],
-            response,
-        })
+        Ok(Followed::without_operator(response))
     }
 }
 

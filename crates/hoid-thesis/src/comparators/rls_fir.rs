@@ -118,10 +118,7 @@ impl Comparator for RlsFir {
             task.omega_rad_s.iter().map(at).collect()
         };
         let all = self.impulse_responses(task)?;
-        Ok(Followed {
-            response: all.iter().map(of).collect(),
-            operator: vec![None; all.len()],
-        })
+        Ok(Followed::without_operator(all.iter().map(of).collect()))
     }
 }
 

@@ -70,10 +70,7 @@ impl Comparator for WaveletRatio {
             task.omega_rad_s.iter().map(ratio).collect()
         };
         let response: Vec<Vec<Complex64>> = task.at.iter().map(of).collect();
-        Ok(Followed {
-            operator: vec![None; response.len()],
-            response,
-        })
+        Ok(Followed::without_operator(response))
     }
 }
 

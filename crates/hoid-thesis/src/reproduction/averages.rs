@@ -10,26 +10,12 @@ use super::{
     axes::{REMNANT_ORDERS, order_titles},
     item::{Item, ItemOutput},
     table_builder::TableBuilder,
+    traces::{DISCRETE, OPERATOR, Row},
 };
 use hoid_report::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels};
 
 /// The noise level that is drawn: averages and medians of three levels would be twelve lines.
 const LEVEL: f64 = 0.1;
-/// Column of RLS, that of RPEM, name and unit of the panel.
-type Row = (&'static str, &'static str, &'static str, &'static str);
-const DISCRETE: [Row; 4] = [
-    ("a1", "f1", "a1", ""),
-    ("a2", "f2", "a2", ""),
-    ("b0", "b0", "b0", ""),
-    ("b1", "b1", "b1", ""),
-];
-const OPERATOR: [Row; 5] = [
-    ("K_e", "K_e", "K_e", "deg/deg"),
-    ("T_L", "T_L", "T_L", "s"),
-    ("K_e_dot", "K_e_dot", "K_e_dot", "s"),
-    ("omega_nm", "omega_nm", "omega_nm", "rad/s"),
-    ("zeta_nm", "zeta_nm", "zeta_nm", ""),
-];
 
 pub(super) fn items() -> Vec<Item> {
     let mut all = Vec::new();

@@ -10,15 +10,15 @@ use super::{
 use hoid_report::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels};
 
 /// Which parameters a figure shows: the column of RLS, that of RPEM, name and unit of the panel.
-type Row = (&'static str, &'static str, &'static str, &'static str);
+pub(super) type Row = (&'static str, &'static str, &'static str, &'static str);
 
-const DISCRETE: [Row; 4] = [
+pub(super) const DISCRETE: [Row; 4] = [
     ("a1", "f1", "a1", ""),
     ("a2", "f2", "a2", ""),
     ("b0", "b0", "b0", ""),
     ("b1", "b1", "b1", ""),
 ];
-const OPERATOR: [Row; 5] = [
+pub(super) const OPERATOR: [Row; 5] = [
     ("K_e", "K_e", "K_e", "deg/deg"),
     ("T_L", "T_L", "T_L", "s"),
     ("K_e_dot", "K_e_dot", "K_e_dot", "s"),
