@@ -58,6 +58,7 @@ pub(crate) fn assembled_fit(
         robust: false,
         instrumented: false,
         physical: None,
+        searched_delay: None,
     })
 }
 

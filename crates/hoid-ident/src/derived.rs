@@ -12,7 +12,7 @@
 //! `d phi_m = d arg L/d theta + (d arg L/d omega) d omega_c`,
 //!
 //! and where `arg L = -180 deg` stays so, with the parts of phase and gain exchanged, for the gain
-//! margin.
+//! margin. A searched delay turns the phase by `-omega d tau` besides (`searched_delay.rs`).
 
 use hoid_model::{
     Complex64, margins::Margins, margins::margins, polynomial, polynomial_model::monic, uncertainty::Estimate,
@@ -124,9 +124,9 @@ impl Fit {
         let open_loop = |omega: f64| self.model().response(omega) * controlled_element(omega);
         let found = margins(open_loop, range_rad_s);
         let mut estimates = MarginEstimates::from(found);
-        let Some(covariance) = self.covariance() else {
+        if self.covariance().is_none() {
             return estimates;
-        };
+        }
         // d ln L / d omega by a central difference: L is smooth, so that the step costs about 1e-10
         // of it.
         let slope = |omega: f64| {
@@ -138,8 +138,8 @@ impl Fit {
             let (response, gradient) = self.model().response_and_gradient(omega);
             gradient.iter().map(|g| g / response).collect()
         };
-        let with = |value: Option<f64>, gradient: Vec<f64>| {
-            value.map(|v| Estimate::with_variance(v, variance_along(&gradient, covariance)))
+        let with = |value: Option<f64>, by_theta: Vec<f64>, by_delay: f64| {
+            Some(Estimate::with_variance(value?, self.variance_of(&by_theta, by_delay)?))
         };
         if let Some(omega) = found.crossover_rad_s {
             let (along, by_theta) = (slope(omega), relative(omega));
@@ -149,20 +149,22 @@ impl Fit {
                 .zip(&moved)
                 .map(|(g, d)| (g.im + along.im * d).to_degrees())
                 .collect();
-            estimates.crossover_rad_s = with(found.crossover_rad_s, moved);
-            estimates.phase_margin_deg = with(found.phase_margin_deg, phase);
+            // The delay turns the phase and leaves the magnitude.
+            estimates.crossover_rad_s = with(found.crossover_rad_s, moved, 0.0);
+            estimates.phase_margin_deg = with(found.phase_margin_deg, phase, -omega.to_degrees());
         }
         if let Some(omega) = found.phase_crossover_rad_s {
             let (along, by_theta) = (slope(omega), relative(omega));
             let moved: Vec<f64> = by_theta.iter().map(|g| -g.im / along.im).collect();
+            let by_delay = omega / along.im;
             let to_db = 20.0 / std::f64::consts::LN_10;
             let gain = by_theta
                 .iter()
                 .zip(&moved)
                 .map(|(g, d)| -to_db * (g.re + along.re * d))
                 .collect();
-            estimates.phase_crossover_rad_s = with(found.phase_crossover_rad_s, moved);
-            estimates.gain_margin_db = with(found.gain_margin_db, gain);
+            estimates.phase_crossover_rad_s = with(found.phase_crossover_rad_s, moved, by_delay);
+            estimates.gain_margin_db = with(found.gain_margin_db, gain, -to_db * along.re * by_delay);
         }
         estimates
     }
@@ -202,6 +204,7 @@ mod tests {
             robust: false,
             instrumented: false,
             physical: None,
+            searched_delay: None,
         }
     }
 

@@ -5,12 +5,13 @@ use hoid_model::{
     polynomial::product,
     polynomial_model::monic,
     remnant::RemnantDiscretisation,
-    uncertainty::{Estimate, OperatorEstimate, RemnantEstimate, operator_estimate, remnant_estimate, variance_along},
+    uncertainty::{Estimate, OperatorEstimate, RemnantEstimate, operator_estimate, remnant_estimate},
 };
 
 use crate::{
     IdentError, InitialState, Termination,
     criterion::{Criterion, Data, Workspace, first_residual},
+    searched_delay::SearchedDelay,
 };
 
 /// A fitted model.
@@ -35,6 +36,8 @@ pub struct Fit {
     pub(crate) instrumented: bool,
     /// The physical parameters that theta was computed from, for a grey box.
     pub(crate) physical: Option<Box<Physical>>,
+    /// Where nk was searched, and its error counts.
+    pub(crate) searched_delay: Option<SearchedDelay>,
 }
 
 /// What a grey box fitted: theta is a function of these.
@@ -81,8 +84,9 @@ impl Fit {
         self.model.orders()
     }
 
-    /// Covariance of theta by rows, `sigma^2 (psi' psi)^-1` with the initial states eliminated;
-    /// `None` for an exact fit, whose residuals carry no information about the noise.
+    /// Covariance of theta by rows, `sigma^2 (psi' psi)^-1` with the initial states eliminated, and
+    /// with what a searched delay adds for an operator (`searched_delay.rs`); `None` for an exact fit,
+    /// whose residuals carry no information about the noise.
     pub fn covariance(&self) -> Option<&[f64]> {
         self.covariance.as_deref()
     }
@@ -225,10 +229,14 @@ impl Fit {
             return physical.operator.clone();
         }
         let p = self.model.theta().len();
-        match &self.covariance {
+        let mut found = match &self.covariance {
             Some(covariance) => operator_estimate(&self.model, covariance),
             None => operator_estimate(&self.model, &vec![f64::NAN; p * p]),
+        }?;
+        if let Some(delay) = &self.searched_delay {
+            found.tau_e_s = Estimate::with_variance(found.tau_e_s.value, delay.variance_s2);
         }
+        Ok(found)
     }
 
     /// True for a fit by a robust loss.
@@ -342,7 +350,7 @@ impl Fit {
     }
 
     /// Frequency response with standard errors by the delta method: with `dH` the gradient,
-    /// `d ln|H| = Re(dH/H)` and `d arg H = Im(dH/H)`.
+    /// `d ln|H| = Re(dH/H)` and `d arg H = Im(dH/H) - omega d tau`.
     pub fn frequency_response(&self, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
         let to_db = 20.0 / std::f64::consts::LN_10;
         omega_rad_s
@@ -350,16 +358,21 @@ impl Fit {
             .map(|&omega| {
                 let (h, gradient) = self.model.response_and_gradient(omega);
                 let relative: Vec<_> = gradient.iter().map(|g| g / h).collect();
-                let estimate = |value: f64, direction: Vec<f64>| match &self.covariance {
-                    Some(c) => Estimate::with_variance(value, variance_along(&direction, c)),
-                    None => Estimate::fixed(value),
+                let estimate = |value: f64, by_theta: Vec<f64>, by_delay: f64| {
+                    let variance = self.variance_of(&by_theta, by_delay);
+                    variance.map_or(Estimate::fixed(value), |v| Estimate::with_variance(value, v))
                 };
                 ResponsePoint {
                     omega_rad_s: omega,
-                    magnitude_db: estimate(to_db * h.norm().ln(), relative.iter().map(|r| to_db * r.re).collect()),
+                    magnitude_db: estimate(
+                        to_db * h.norm().ln(),
+                        relative.iter().map(|r| to_db * r.re).collect(),
+                        0.0,
+                    ),
                     phase_deg: estimate(
                         h.arg().to_degrees(),
                         relative.iter().map(|r| r.im.to_degrees()).collect(),
+                        -omega.to_degrees(),
                     ),
                 }
             })

@@ -100,6 +100,7 @@ mod optimize;
 pub mod order_selection;
 mod pem;
 mod registry;
+mod searched_delay;
 pub mod settings;
 mod sigmoid;
 mod summary;

@@ -3,7 +3,8 @@
 //! Every combination of the given ranges is fitted on the same samples (the residuals of all
 //! candidates start where the most demanding one can), and the criterion decides: the loss for the
 //! delay alone, BIC where the number of parameters differs. The chosen model is then fitted once
-//! more on all the samples that its own orders leave.
+//! more on all the samples that its own orders leave, and its error bars count the search of the
+//! delay (`searched_delay.rs`).
 
 use std::{fmt, ops::RangeInclusive};
 
@@ -321,7 +322,10 @@ pub fn choose_orders_with(
         }
     };
     Ok(Choice {
-        fit: template.with_orders(orders).fit(records)?,
+        fit: template
+            .with_orders(orders)
+            .fit(records)?
+            .with_searched_delay(records, delays),
         candidates,
         criterion,
     })

@@ -30,8 +30,8 @@ pub struct OperatorEstimate {
     pub omega_nm_rad_s: Estimate,
     /// Neuromuscular damping zeta_nm.
     pub zeta_nm: Estimate,
-    /// Delay tau_e = (nk - 1) Ts, s: a whole number of samples that was given or searched, without
-    /// a standard error.
+    /// Delay tau_e = (nk - 1) Ts, s: a whole number of samples, without a standard error where it was
+    /// given.
     pub tau_e_s: Estimate,
 }
 

@@ -159,8 +159,8 @@ pub fn identify_operator(
         };
         let mut found = estimator.fit_beside(&records, of_lines)?;
         if second_opinion {
-            let opinion = of_family(&estimator, &found, &records, of_opinion.as_ref());
-            found.verdict = found.verdict.and(opinion);
+            let opinions = of_family(&estimator, &found, &records, of_opinion.as_ref());
+            found.verdict = found.verdict.and(opinions);
         }
         Ok::<_, IdentError>((found, channel))
     };

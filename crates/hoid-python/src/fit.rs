@@ -28,7 +28,7 @@ pub struct PyFit {
     /// Number of records that the model was fitted to.
     records: usize,
     /// What a second fit says of it.
-    opinion: Option<Finding>,
+    opinions: Vec<Finding>,
 }
 
 impl PyFit {
@@ -38,13 +38,13 @@ impl PyFit {
             choice,
             grey_box,
             records,
-            opinion: None,
+            opinions: Vec::new(),
         }
     }
 
     /// With what a second fit says of it.
-    pub fn with_opinion(self, opinion: Option<Finding>) -> Self {
-        Self { opinion, ..self }
+    pub fn with_opinions(self, opinions: Vec<Finding>) -> Self {
+        Self { opinions, ..self }
     }
 
     fn margins_with(&self, element: &ControlledElement) -> Outcome<MarginEstimates> {
@@ -218,7 +218,7 @@ impl PyFit {
             Some(grey_box) => grey_box.verdict(&records),
             None => self.fit.verdict(&records, self.choice.as_ref()),
         })?;
-        Ok(figures::verdict(&found.and(self.opinion.clone())))
+        Ok(figures::verdict(&found.and(self.opinions.clone())))
     }
 
     fn predict<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>, horizon: usize) -> Outcome<SeriesParts<'py>> {

@@ -27,7 +27,7 @@ const LONG: usize = 50_000;
 
 /// What a fit gave.
 enum Found {
-    Model(Box<(Fit, Option<Choice>, Option<GreyBoxFit>)>, Option<Finding>),
+    Model(Box<(Fit, Option<Choice>, Option<GreyBoxFit>)>, Vec<Finding>),
     Change(Box<SigmoidFit>, Option<Finding>),
 }
 
@@ -125,8 +125,11 @@ pub fn identify<'py>(
                     .fit(&records)?;
                 }
                 let by_squares = by_instruments.is_none() && estimator.loss == Loss::Quadratic;
-                let opinion = (second_opinion && by_squares).then(|| of_polynomials(&estimator, &fit, &records, None));
-                Ok(Found::Model(Box::new((fit, choice, None)), opinion.flatten()))
+                let opinions = (second_opinion && by_squares).then(|| of_polynomials(&estimator, &fit, &records, None));
+                Ok(Found::Model(
+                    Box::new((fit, choice, None)),
+                    opinions.unwrap_or_default(),
+                ))
             });
             (work, combinations.len())
         }
@@ -144,9 +147,9 @@ pub fn identify<'py>(
             }
             let work: Work = Box::new(move |_| {
                 let found = estimator.fit(&records)?;
-                let opinion = second_opinion.then(|| of_grey_box(&estimator, &found, &records, None));
+                let opinions = second_opinion.then(|| of_grey_box(&estimator, &found, &records, None));
                 let model = Box::new((found.polynomial_fit(0).clone(), None, Some(found)));
-                Ok(Found::Model(model, opinion.flatten()))
+                Ok(Found::Model(model, opinions.unwrap_or_default()))
             });
             (work, 10)
         }
@@ -193,9 +196,9 @@ pub fn identify<'py>(
         interrupt::run(py, models as u64, progress.as_ref(), false, work)?
     };
     Ok(match found {
-        Found::Model(found, opinion) => {
+        Found::Model(found, opinions) => {
             let (fit, choice, grey_box) = *found;
-            Bound::new(py, PyFit::new(fit, choice, grey_box, count).with_opinion(opinion))?.into_any()
+            Bound::new(py, PyFit::new(fit, choice, grey_box, count).with_opinions(opinions))?.into_any()
         }
         Found::Change(fit, opinion) => Bound::new(py, PyTimeVaryingFit::new(*fit, opinion))?.into_any(),
     })

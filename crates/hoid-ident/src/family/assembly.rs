@@ -336,7 +336,7 @@ fn constancy(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace
         run_to_run,
         sample_time_s: layout.sample_time.s(),
     }
-    .finding()
+    .change()
 }
 
 /// Mean squared coherence of the lines.

@@ -191,6 +191,7 @@ pub(super) fn operator_of(
         output_variance: output_variance(&fit.criterion.data, fit.criterion.first),
         robust: false,
         instrumented: false,
+        searched_delay: None,
         physical: Some(Box::new(Physical {
             title: title(layout.form, layout.neuromuscular, (layout.nc, layout.nd)),
             parameters: parameters.iter().map(|q| (q.name.clone(), estimate(q))).collect(),

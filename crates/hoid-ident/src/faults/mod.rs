@@ -12,6 +12,7 @@
 //! | `interpolation` | | the samples that those around them make most likely, and what they explain |
 //! | `direction` | input and output exchanged, the wrong sign | lags at which each answers the other |
 //! | `resistant` | | a record that no single sample can carry, for a second opinion |
+//! | `slow` | | a record without drifts and steps of a sensor, for a second opinion |
 //! | `search`, `mending`, `limits` | | their order, and what becomes of the record |
 //! | `autoregression`, `robust` | | fits and scales that faults cannot carry |
 //!
@@ -35,6 +36,7 @@ mod mending;
 mod resistant;
 mod robust;
 mod search;
+mod slow;
 mod spikes;
 #[cfg(test)]
 mod test_signals;
@@ -43,4 +45,5 @@ mod tests;
 
 pub use limits::{BRIDGED_S, MOST_SPIKES, SHORTEST_S};
 pub use mending::{Mended, mend};
-pub use resistant::{held, resistant, second_opinion};
+pub use resistant::{held, resistant};
+pub use slow::without_slow;

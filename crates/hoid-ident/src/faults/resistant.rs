@@ -8,12 +8,11 @@
 //! its neighbours, and they would be moved in its place. Whatever a sample is, what it brings
 //! into any filter behind is bounded, in e as in u, and so is its leverage on theta. c = [`HELD`]: of a
 //! normal channel one sample in 16 000 is moved. A fit to this record that is another than that to the
-//! record itself says that few samples carry the fit, and names the parameters
-//! ([`second_opinion`]); where no sample is moved the two are one.
+//! record itself says that few samples carry the fit; where no sample is moved the two are one.
 
 use std::{cmp::Ordering, collections::BinaryHeap};
 
-use hoid_model::{Channel, Finding, Record};
+use hoid_model::{Channel, Record};
 
 use super::{
     autoregression::{Autoregression, FLOOR},
@@ -23,8 +22,6 @@ use super::{
 
 /// Deviations of the interpolation error to which a sample is held.
 const HELD: f64 = 4.0;
-/// Standard errors by which two fits differ.
-const DIFFERENT: f64 = 3.0;
 
 /// The record with its samples held; `None` where none is moved.
 pub fn resistant(record: &Record) -> Option<Record> {
@@ -135,29 +132,6 @@ pub fn held(records: &[Record]) -> Option<Vec<Record>> {
     })
 }
 
-/// What a fit to the held record says of that to the record: a doubt that names the parameters that
-/// differ by more than 3 standard errors; each is given by its name, value and standard
-/// error, and its value in the other fit.
-pub fn second_opinion<'a>(pairs: impl IntoIterator<Item = (&'a str, f64, Option<f64>, f64)>) -> Option<Finding> {
-    let differ: Vec<String> = pairs
-        .into_iter()
-        .filter_map(|(name, value, error, other)| {
-            let off = (value - other).abs() / error.filter(|e| *e > 0.0)?;
-            (off > DIFFERENT).then(|| format!("{name} by {off:.1}"))
-        })
-        .collect();
-    (!differ.is_empty()).then(|| {
-        Finding::doubt(
-            "leverage",
-            format!(
-                "few samples carry the fit: with each held to its neighbours it differs in {} standard errors; look at the \
-                 recording",
-                differ.join(", ")
-            ),
-        )
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use hoid_model::SampleTime;
@@ -194,17 +168,5 @@ mod tests {
             .map_or(0, |r| r.input().iter().zip(&clean).filter(|(a, b)| a != b).count());
         assert!(moved <= 2, "{moved}");
         assert!(resistant(&record(vec![1.0; 3000])).is_none_or(|r| r.input() == vec![1.0; 3000]));
-    }
-
-    #[test]
-    fn fits_that_differ_are_named() {
-        let found = second_opinion([
-            ("K_e", 1.0, Some(0.1), 1.5),
-            ("T_L", 1.0, Some(0.1), 1.1),
-            ("x", 1.0, None, 9.0),
-        ]);
-        let words = found.unwrap().words;
-        assert!(words.contains("K_e by 5.0 standard errors"), "{words}");
-        assert!(second_opinion([("K_e", 1.0, Some(0.1), 1.2)]).is_none());
     }
 }

@@ -264,6 +264,7 @@ impl GreyBox {
                 robust: false,
                 instrumented: false,
                 physical: None,
+                searched_delay: None,
             });
         }
         let mut fit = GreyBoxFit {

@@ -33,7 +33,7 @@ impl Fit {
         // Residuals that are rounding say nothing.
         if self.covariance.is_some() {
             all.extend(self.residual_findings(&self.residual_measures(records)?));
-            all.extend(self.constancy_finding(records));
+            all.extend(self.constancy_findings(records));
         }
         Ok(Verdict::of(all))
     }

@@ -40,7 +40,7 @@ impl GreyBoxFit {
         all.extend(self.operator_findings());
         if self.covariance().is_some() {
             all.extend(self.residual_measures(records)?.findings());
-            all.extend(self.constancy_finding(records));
+            all.extend(self.constancy_findings(records).unwrap_or_default());
         }
         Ok(Verdict::of(all))
     }
@@ -87,8 +87,8 @@ impl GreyBoxFit {
         all
     }
 
-    /// A doubt where the operator is not the same throughout the records.
-    fn constancy_finding(&self, records: &[Record]) -> Option<Finding> {
+    /// Doubts where the operator is not the same throughout the records, or a stretch carries it.
+    fn constancy_findings(&self, records: &[Record]) -> Option<Vec<Finding>> {
         let layout = &self.layout;
         let initial = self.polynomial_fit(0).initial_state();
         let first = first_residual(&layout::orders(layout.order, layout.longest_nk().ok()?), initial);
@@ -112,14 +112,14 @@ impl GreyBoxFit {
             }
         };
         let of_operator = self.free.iter().filter(|place| layout.slots[**place] != TIME_CONSTANT);
-        Constancy {
+        let constancy = Constancy {
             blocks: &blocks,
             directions: &of_operator.map(direction).collect::<Vec<_>>(),
             variance: self.innovation_variance(),
             run_to_run: USUAL_RUN_TO_RUN,
             sample_time_s: layout.sample_time.s(),
-        }
-        .finding()
+        };
+        Some(constancy.findings())
     }
 
     fn residual_measures(&self, records: &[Record]) -> Result<ResidualMeasures, IdentError> {

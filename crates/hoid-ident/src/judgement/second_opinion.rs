@@ -1,23 +1,90 @@
-//! A second fit to the records with each sample held to its neighbours, and what it says of the first.
+//! Second fits to the records with something taken out, and what they say of the first.
 //!
-//! [`crate::faults::held`] bounds what any sample brings into the filters of a fit, in e as in u.
-//! Where the same estimator says something else of the held records, by more than three standard
-//! errors in a parameter, in the crossover or in the phase margin, few samples carry the fit. Where no
-//! sample is held the second fit would be the first, and is not made.
+//! | without | where the fit differs, this carries it | finding |
+//! |---|---|---|
+//! | what no neighbour of a sample bears out ([`crate::faults::held`]), in e as in u: what it brings into the filters of a fit is bounded | few samples | `leverage` |
+//! | what is slower than 20 s ([`crate::faults::without_slow`]) | a drift or a step of a sensor, which the person does not follow | `slow` |
+//!
+//! Two fits differ where a parameter, the crossover or the phase margin does by more than three standard
+//! errors: those of the first fit or, where the second knows less, of what it has lost, `sqrt(se'^2 -
+//! se^2)`. Where nothing is taken out the second fit would be the first, and is not made.
 
-use hoid_model::{ContinuousTransferFunction, Detrend, Finding, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
+use hoid_model::{
+    ContinuousTransferFunction, Detrend, Finding, Record,
+    margins::MANUAL_CONTROL_RANGE_RAD_S,
+    uncertainty::{Estimate, OperatorEstimate},
+};
 
 use crate::{
     Estimator, Fit, GreyBox, GreyBoxFit, SigmoidChange, SigmoidFit,
-    family::{FamilyEstimator, FamilyFit},
-    faults::{held, second_opinion},
+    family::{FamilyEstimator, FamilyFit, Parameter},
+    faults::{held, without_slow},
 };
 
+/// Standard errors by which two fits differ.
+const DIFFERENT: f64 = 3.0;
 /// Standard errors by which a level may move a parameter.
 const LEVEL: f64 = 2.0;
 
-/// Name, value and standard error of a quantity, and its value in the other fit.
-type Beside = (String, f64, Option<f64>, f64);
+/// Name of a quantity, and its estimates by the first fit and by the other.
+type Beside = (String, Estimate, Estimate);
+
+/// What is taken out of the records.
+#[derive(Debug, Clone, Copy)]
+enum Without {
+    SamplesThatStandOut,
+    WhatIsSlow,
+}
+
+impl Without {
+    const ALL: [Self; 2] = [Self::SamplesThatStandOut, Self::WhatIsSlow];
+
+    /// The records without it; `None` where they have none of it.
+    fn records(self, records: &[Record]) -> Option<Vec<Record>> {
+        match self {
+            Self::SamplesThatStandOut => held(records),
+            Self::WhatIsSlow => without_slow(records),
+        }
+    }
+
+    /// A doubt where fits differ in any of these.
+    fn finding(self, pairs: impl IntoIterator<Item = Beside>) -> Option<Finding> {
+        let differ: Vec<String> = pairs
+            .into_iter()
+            .filter_map(|(name, first, other)| {
+                let error = first.standard_error.filter(|e| *e > 0.0)?;
+                let lost = (other.standard_error.unwrap_or(0.0).powi(2) - error * error)
+                    .max(0.0)
+                    .sqrt();
+                let off = (first.value - other.value).abs() / error.max(lost);
+                (off > DIFFERENT && off.is_finite()).then(|| format!("{name} by {off:.1}"))
+            })
+            .collect();
+        let differ = (!differ.is_empty()).then(|| differ.join(", "))?;
+        Some(match self {
+            Self::SamplesThatStandOut => Finding::doubt(
+                "leverage",
+                format!(
+                    "few samples carry the fit: with each held to its neighbours it differs in {differ} standard errors; \
+                     look at the recording"
+                ),
+            ),
+            Self::WhatIsSlow => Finding::doubt(
+                "slow",
+                format!(
+                    "a drift or a step that the person does not follow carries the fit: without what is slower than 20 s it \
+                     differs in {differ} standard errors; look at the recording, or take a span without it"
+                ),
+            ),
+        })
+    }
+}
+
+/// What the same fit to the records without each of `all` says; `again` gives the quantities of both fits.
+fn opinions(all: &[Without], records: &[Record], again: impl Fn(&[Record]) -> Option<Vec<Beside>>) -> Vec<Finding> {
+    let asked = |without: &Without| without.finding(again(&without.records(records)?)?);
+    all.iter().filter_map(asked).collect()
+}
 
 /// Of a fit of polynomials, by the estimator that made it; with its loop where the controlled element is
 /// known.
@@ -26,10 +93,13 @@ pub fn of_polynomials(
     fit: &Fit,
     records: &[Record],
     element: Option<&ContinuousTransferFunction>,
-) -> Option<Finding> {
-    let other = again(estimator, fit, &held(records)?)?;
-    let pairs = parameters_beside(fit, &other).into_iter();
-    said(pairs.chain(loops_beside(fit, &other, element)))
+) -> Vec<Finding> {
+    opinions(&Without::ALL, records, |others| {
+        let other = again(estimator, fit, others)?;
+        let mut pairs = parameters_beside(fit, &other);
+        pairs.extend(loops_beside(fit, &other, element));
+        Some(pairs)
+    })
 }
 
 /// Of a grey box: the order of its remnant stays.
@@ -38,61 +108,70 @@ pub fn of_grey_box(
     fit: &GreyBoxFit,
     records: &[Record],
     element: Option<&ContinuousTransferFunction>,
-) -> Option<Finding> {
-    let held = held(records)?;
-    let other = GreyBox {
+) -> Vec<Finding> {
+    let estimator = GreyBox {
         order: fit.order()..=fit.order(),
         ..estimator.clone()
     };
-    let other = other.fit(&held).ok()?;
-    let pairs = fit.parameters().into_iter().zip(other.parameters());
-    let pairs = pairs.map(|((name, a), (_, b))| (name, a.value, a.standard_error, b.value));
-    said(pairs.chain(loops_beside(fit.polynomial_fit(0), other.polynomial_fit(0), element)))
+    opinions(&Without::ALL, records, |others| {
+        let other = estimator.fit(others).ok()?;
+        let mut pairs = beside(fit.parameters(), other.parameters());
+        pairs.extend(loops_beside(fit.polynomial_fit(0), other.polynomial_fit(0), element));
+        Some(pairs)
+    })
 }
 
-/// Of an operator of the family: its form and the orders of its noise model stay.
+/// Of an operator of the family: its form and the orders of its noise model stay. A fit at the lines of a
+/// recorded excitation stands beside it already, and knows nothing of what is slow.
 pub fn of_family(
     estimator: &FamilyEstimator,
     fit: &FamilyFit,
     records: &[Record],
     element: Option<&ContinuousTransferFunction>,
-) -> Option<Finding> {
+) -> Vec<Finding> {
     let (nc, nd) = fit.noise_orders;
-    let other = FamilyEstimator {
+    let again = FamilyEstimator {
         forms: vec![fit.form],
         nc: nc..=nc,
         nd: nd..=nd,
         excitation: None,
         ..estimator.clone()
     };
-    let other = other.fit_beside(&held(records)?, None).ok()?;
-    let parameters = fit.operators.iter().zip(&other.operators).flat_map(|(one, two)| {
-        let both = one.parameters.iter().zip(&two.parameters);
-        both.filter(|(a, _)| a.determined)
-            .map(|(a, b)| (a.name.clone(), a.value, a.standard_error, b.value))
-    });
+    let asked = match &fit.lines {
+        Some(_) => &Without::ALL[..1],
+        None => &Without::ALL,
+    };
     let measures = |of: &FamilyFit| of.loop_measures(0, element?);
-    let loops = measures(fit).zip(measures(&other)).map_or(Vec::new(), |(a, b)| {
-        [
-            ("the crossover", a.crossover_rad_s, b.crossover_rad_s),
-            ("the phase margin", a.phase_margin_deg, b.phase_margin_deg),
-        ]
-        .map(|(name, a, b)| (name.to_owned(), a.value, a.standard_error, b.value))
-        .to_vec()
-    });
-    said(parameters.chain(loops))
+    let estimate = |p: &Parameter| Estimate {
+        value: p.value,
+        standard_error: p.standard_error,
+    };
+    opinions(asked, records, |others| {
+        let other = again.fit_beside(others, None).ok()?;
+        let parameters = fit.operators.iter().zip(&other.operators).flat_map(|(one, two)| {
+            let both = one.parameters.iter().zip(&two.parameters);
+            both.filter(|(a, _)| a.determined)
+                .map(|(a, b)| (a.name.clone(), estimate(a), estimate(b)))
+        });
+        let mut pairs: Vec<Beside> = parameters.collect();
+        if let Some((a, b)) = measures(fit).zip(measures(&other)) {
+            pairs.push(("the crossover".to_owned(), a.crossover_rad_s, b.crossover_rad_s));
+            pairs.push(("the phase margin".to_owned(), a.phase_margin_deg, b.phase_margin_deg));
+        }
+        Some(pairs)
+    })
 }
 
-/// Of an operator whose gains change once. One fit that finds a change where the other finds none is a
-/// difference whatever its size.
+/// Of an operator whose gains change once, without samples that stand out. One fit that finds a change
+/// where the other finds none is a difference whatever its size.
 pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record]) -> Option<Finding> {
-    let held = held(records)?;
+    let without = Without::SamplesThatStandOut;
     let other = SigmoidChange {
         likelihood_intervals: false,
         start: Some(fit.parameters().iter().map(|p| p.estimate.value).collect()),
         ..estimator.clone()
     };
-    let other = other.fit(&held).ok()?;
+    let other = other.fit(&without.records(records)?).ok()?;
     if fit.change_found() != other.change_found() {
         return Some(Finding::doubt(
             "leverage",
@@ -100,20 +179,15 @@ pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record
              look at the recording",
         ));
     }
-    if !fit.change_found() {
-        let (one, two) = (fit.constant_operator(), other.constant_operator());
-        let pairs = one.parameters.iter().zip(&two.parameters);
-        return said(pairs.map(|(a, b)| {
-            (
-                a.name.to_owned(),
-                a.estimate.value,
-                a.estimate.standard_error,
-                b.estimate.value,
-            )
-        }));
+    if fit.change_found() {
+        let named = |of: &SigmoidFit| of.parameters().into_iter().map(|p| (p.name, p.estimate)).collect();
+        return without.finding(beside(named(fit), named(&other)));
     }
-    let pairs = fit.parameters().into_iter().zip(other.parameters());
-    said(pairs.map(|(a, b)| (a.name, a.estimate.value, a.estimate.standard_error, b.estimate.value)))
+    let constant = |of: &SigmoidFit| {
+        let found = &of.constant_operator().parameters;
+        found.iter().map(|p| (p.name.to_owned(), p.estimate)).collect()
+    };
+    without.finding(beside(constant(fit), constant(&other)))
 }
 
 /// What a level that is left in e and u does to a fit of polynomials, by a fit without their means: a
@@ -123,8 +197,8 @@ pub fn of_level(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<
     let other = again(estimator, fit, &without)?;
     let moved: Vec<String> = parameters_beside(fit, &other)
         .into_iter()
-        .filter_map(|(name, value, error, other)| {
-            let off = (value - other).abs() / error.filter(|e| *e > 0.0)?;
+        .filter_map(|(name, first, other)| {
+            let off = (first.value - other.value).abs() / first.standard_error.filter(|e| *e > 0.0)?;
             (off > LEVEL).then(|| format!("{name} by {off:.1}"))
         })
         .collect();
@@ -152,19 +226,16 @@ fn again(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Fit> {
 fn parameters_beside(fit: &Fit, other: &Fit) -> Vec<Beside> {
     match (fit.operator(), other.operator()) {
         (Ok(one), Ok(two)) => {
-            let (one, two) = (one.rows(), two.rows());
-            let pairs = one.iter().zip(&two);
-            pairs
-                .map(|((name, _, a), (_, _, b))| ((*name).to_owned(), a.value, a.standard_error, b.value))
-                .collect()
+            let named = |of: OperatorEstimate| of.rows().map(|(name, _, estimate)| (name.to_owned(), estimate)).into();
+            beside(named(one), named(two))
         }
-        _ => {
-            let pairs = fit.parameters().into_iter().zip(other.parameters());
-            pairs
-                .map(|((name, a), (_, b))| (name, a.value, a.standard_error, b.value))
-                .collect()
-        }
+        _ => beside(fit.parameters(), other.parameters()),
     }
+}
+
+fn beside(one: Vec<(String, Estimate)>, two: Vec<(String, Estimate)>) -> Vec<Beside> {
+    let pairs = one.into_iter().zip(two);
+    pairs.map(|((name, first), (_, other))| (name, first, other)).collect()
 }
 
 /// Crossover and phase margin of two fits with the same controlled element.
@@ -181,17 +252,7 @@ fn loops_beside(fit: &Fit, other: &Fit, element: Option<&ContinuousTransferFunct
         ("the phase margin", one.phase_margin_deg, two.phase_margin_deg),
     ];
     let pairs = both.into_iter().filter_map(|(name, a, b)| Some((name, a?, b?)));
-    pairs
-        .map(|(name, a, b)| (name.to_owned(), a.value, a.standard_error, b.value))
-        .collect()
-}
-
-fn said(pairs: impl IntoIterator<Item = Beside>) -> Option<Finding> {
-    let all: Vec<Beside> = pairs.into_iter().collect();
-    second_opinion(
-        all.iter()
-            .map(|(name, value, error, other)| (name.as_str(), *value, *error, *other)),
-    )
+    pairs.map(|(name, a, b)| (name.to_owned(), a, b)).collect()
 }
 
 #[cfg(test)]
@@ -225,13 +286,13 @@ mod tests {
         let element = Some(&element);
         let bj = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29));
         let of_bj = |records: &[Record]| of_polynomials(&bj, &bj.fit(records).unwrap(), records, element);
-        assert_eq!(of_bj(&clean), None);
-        let words = of_bj(&bad).unwrap().words;
+        assert_eq!(of_bj(&clean), []);
+        let words = &of_bj(&bad)[0].words;
         assert!(words.contains("T_L by"), "{words}");
         let grey = GreyBox::new(1..=1);
         let of_grey = |records: &[Record]| of_grey_box(&grey, &grey.fit(records).unwrap(), records, element);
-        assert_eq!(of_grey(&clean), None);
-        assert!(of_grey(&bad).is_some());
+        assert_eq!(of_grey(&clean), []);
+        assert_eq!(of_grey(&bad)[0].kind, "leverage");
     }
 
     #[test]

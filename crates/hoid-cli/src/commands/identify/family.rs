@@ -50,12 +50,10 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
         Err(_) => None,
     };
     let mut fit = estimator.fit_beside(records, of_lines)?;
-    let opinion = args
-        .faults
-        .looks()
-        .then(|| second_opinion::of_family(&estimator, &fit, records, args.controlled_element.as_ref()))
-        .flatten();
-    fit.verdict = faults::judged(fit.verdict, files, accounts).and(opinion);
+    let asked = args.faults.looks();
+    let opinions =
+        asked.then(|| second_opinion::of_family(&estimator, &fit, records, args.controlled_element.as_ref()));
+    fit.verdict = faults::judged(fit.verdict, files, accounts).and(opinions.into_iter().flatten());
     let described = described.ok();
     let validation = match &args.validate {
         Some(path) => {

@@ -104,11 +104,11 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         None => fit.verdict(&records, choice.as_ref())?,
     };
     let element = args.controlled_element.as_ref();
-    let opinion = match (&estimator, &grey_box) {
-        _ if !args.faults.looks() => None,
+    let opinions = match (&estimator, &grey_box) {
+        _ if !args.faults.looks() => Vec::new(),
         (Some(FittedBy::Polynomials(e)), _) => second_opinion::of_polynomials(e, &fit, &records, element),
         (Some(FittedBy::GreyBox(e)), Some(found)) => second_opinion::of_grey_box(e, found, &records, element),
-        _ => None,
+        _ => Vec::new(),
     };
     let level = match &estimator {
         // Where the level is not estimated it may matter.
@@ -119,7 +119,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         }
         _ => None,
     };
-    let verdict = faults::judged(verdict, &files, &accounts).and(opinion).and(level);
+    let verdict = faults::judged(verdict, &files, &accounts).and(opinions).and(level);
     let identified = Identified {
         verdict: &verdict,
         files: &files,

@@ -33,11 +33,13 @@
 //! | `critical` | p-values of a supremum |
 //! | `polynomials` | the scores of a fit of polynomials, with that of the delay |
 //! | `search` | all changes, and the one that stands out |
+//! | `stretch` | the block that carries the fit |
 
 mod blocks;
 mod critical;
 mod polynomials;
 mod search;
+mod stretch;
 #[cfg(test)]
 mod tests;
 
@@ -46,6 +48,7 @@ use hoid_model::Finding;
 pub(crate) use blocks::{physical_blocks, score_blocks};
 use search::{Change, strongest};
 pub(crate) use search::{Constancy, Direction};
+use stretch::carrying;
 
 /// p-value below which a parameter counts as changed, for the delay and for all others.
 const LEVEL: f64 = 5e-4;
@@ -53,8 +56,40 @@ const LEVEL: f64 = 5e-4;
 pub(crate) const USUAL_RUN_TO_RUN: f64 = 0.06;
 
 impl Constancy<'_> {
+    /// Doubts: a change, and a stretch that carries the fit (where the error bars are those of the model, and not of
+    /// the scatter of stretches).
+    pub fn findings(&self) -> Vec<Finding> {
+        self.change().into_iter().chain(self.stretch()).collect()
+    }
+
+    fn stretch(&self) -> Option<Finding> {
+        let found = carrying(self)?;
+        let time = |sample: usize| sample as f64 * self.sample_time_s;
+        let to = found.to.map_or("the end".to_owned(), |to| format!("{:.0} s", time(to)));
+        let records = self.blocks.last().map_or(0, |block| block.record + 1);
+        let record = if records > 1 {
+            format!(" of record {}", found.record + 1)
+        } else {
+            String::new()
+        };
+        let moves: Vec<String> = found
+            .moves
+            .iter()
+            .map(|(name, by)| format!("{name} by {by:.1}"))
+            .collect();
+        Some(Finding::doubt(
+            "stretch",
+            format!(
+                "the stretch from {:.0} s to {to}{record} carries the fit: without it {} standard errors elsewhere; look at \
+                 the recording there",
+                time(found.from),
+                moves.join(", ")
+            ),
+        ))
+    }
+
     /// A doubt that says what changes and about when.
-    pub fn finding(&self) -> Option<Finding> {
+    pub fn change(&self) -> Option<Finding> {
         let records = self.blocks.last().map_or(0, |block| block.record + 1);
         let of = |delay: bool| strongest(self, delay).filter(|change| change.p_value < LEVEL);
         let mut found: Vec<Change> = [of(true), of(false)].into_iter().flatten().collect();

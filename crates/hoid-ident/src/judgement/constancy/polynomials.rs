@@ -1,9 +1,8 @@
 //! The scores of a fit of polynomials, with that of the delay.
 //!
-//! nk is a whole number, but the residual has a slope along the delay too: with `x = (D/C) w = sum_j
-//! b_j psi_bj` the response of the model, `-d eps/d tau = (x(t-1) - x(t+1))/(2 Ts)`, the central
-//! difference of a signal that is known one sample ahead. Its score need not sum to zero, as nk has
-//! no minimum between two samples; the step to the minimum is taken out with the others.
+//! nk is a whole number, but the residual has a slope along the delay too
+//! ([`searched_delay`](crate::searched_delay)). Its score need not sum to zero, as nk has no minimum
+//! between two samples; the step to the minimum is taken out with the others.
 
 use hoid_model::{
     Finding, Record,
@@ -17,6 +16,7 @@ use super::{
 use crate::{
     Fit,
     criterion::{Criterion, Data, Workspace, first_residual},
+    searched_delay::along_the_delay,
 };
 
 /// Residuals of a robust fit are held to so many of its scales, as its loss holds their slope.
@@ -26,9 +26,13 @@ const CLIPPED: f64 = 1.345;
 const MOST_OFF: f64 = 3.0;
 
 impl Fit {
-    /// A doubt where the operator is not the same throughout the records. Nothing is said of models
+    /// Doubts where the operator is not the same throughout the records, or a stretch carries it. Nothing is said of models
     /// without an input or without noise, and of fits whose scores are not those of the squares.
-    pub(in crate::judgement) fn constancy_finding(&self, records: &[Record]) -> Option<Finding> {
+    pub(in crate::judgement) fn constancy_findings(&self, records: &[Record]) -> Vec<Finding> {
+        self.constancy(records).unwrap_or_default()
+    }
+
+    fn constancy(&self, records: &[Record]) -> Option<Vec<Finding>> {
         let apart = self.instrumented || self.physical.is_some();
         if apart || self.covariance.is_none() || !self.model.structure().has_input() {
             return None;
@@ -67,14 +71,14 @@ impl Fit {
         if (0..p).any(|i| !self.held[i] && off(i)) {
             return None;
         }
-        Constancy {
+        let constancy = Constancy {
             blocks: &blocks,
             directions: &self.directions(),
             variance: self.innovation_variance,
             run_to_run: USUAL_RUN_TO_RUN,
             sample_time_s: ts.s(),
-        }
-        .finding()
+        };
+        Some(constancy.findings())
     }
 
     /// The delay, and the operator's parameters or, where there is no operator, the coefficients.
@@ -136,16 +140,4 @@ impl Fit {
         };
         Some(named.into_iter().enumerate().map(of).collect())
     }
-}
-
-/// `-d eps/d tau` from the columns of psi for the coefficients of B.
-fn along_the_delay(b: &[f64], of_b: &[Vec<f64>], sample_time_s: f64) -> Vec<f64> {
-    let n = of_b.first().map_or(0, Vec::len);
-    let x = |t: usize| -> f64 { b.iter().zip(of_b).map(|(b, column)| b * column[t]).sum() };
-    (0..n)
-        .map(|t| {
-            let (before, behind) = (t.saturating_sub(1), (t + 1).min(n - 1));
-            (x(before) - x(behind)) / ((behind - before).max(1) as f64 * sample_time_s)
-        })
-        .collect()
 }

@@ -188,7 +188,7 @@ fn tested(
 }
 
 /// The inverse over what the data determine, in units of a unit diagonal.
-fn pseudo_inverse(whole: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+pub(super) fn pseudo_inverse(whole: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let p = whole.nrows();
     let scale = DVector::from_fn(p, |i, _| {
         if whole[(i, i)] > 0.0 {

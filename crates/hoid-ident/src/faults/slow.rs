@@ -1,0 +1,101 @@
+//! A record without what is slow, for a second opinion on a fit.
+//!
+//! A step or a drift of a sensor is no fault that its neighbours could tell, and a level does not hold
+//! it. The person does not follow it, so that e has power at low frequencies that u does not answer,
+//! and the gain of the fit comes out too low with small error bars. Both channels lose their line and
+//! the cosines `cos(pi k (t + 1/2)/N)`, `k = 1 .. 2 T/`[`PERIOD_S`], so all that is slower than
+//! that period. The two lose it by the same linear operation, so that what leads from e to u stays. A
+//! fit to the rest has lost the information of low frequencies, and differs from the first by chance
+//! with a variance of `var' - var` where nothing is wrong (J. A. Hausman, *Econometrica* 46 (1978)
+//! 1251-1271); where it differs by more, what is slow carries the fit.
+
+use std::f64::consts::PI;
+
+use hoid_model::{Detrend, Record};
+
+/// What is slower than this is taken out, s.
+const PERIOD_S: f64 = 20.0;
+/// Most cosines, so that the time stays in proportion to a record's length.
+const MOST: usize = 64;
+
+/// The records without what is slow; `None` where they are too short for anything slow.
+pub fn without_slow(records: &[Record]) -> Option<Vec<Record>> {
+    let count = |r: &Record| ((2.0 * r.len() as f64 * r.sample_time().s() / PERIOD_S) as usize).min(MOST);
+    records.iter().any(|r| count(r) > 0).then(|| {
+        let each = records.iter().map(|record| {
+            let (input, output, others) = record.clone().detrended(Detrend::Linear).into_channels();
+            let mut channels = input.into_iter().chain([output]).map(|mut channel| {
+                take_out(&mut channel.values, count(record));
+                channel
+            });
+            let whole = match (channels.next(), channels.next()) {
+                (Some(input), Some(output)) => Record::new(record.sample_time(), input, output),
+                (Some(output), None) => Record::of_output(record.sample_time(), output),
+                _ => return record.clone(),
+            };
+            let with_others = |whole: Record| {
+                let whole = whole.labelled(record.label()).starting_at(record.time_s(0));
+                others.iter().cloned().try_fold(whole, Record::with_channel)
+            };
+            whole.and_then(with_others).unwrap_or_else(|_| record.clone())
+        });
+        each.collect()
+    })
+}
+
+fn take_out(values: &mut [f64], count: usize) {
+    let n = values.len() as f64;
+    for k in 1..=count {
+        let wave = |t: usize| (PI * k as f64 * (t as f64 + 0.5) / n).cos();
+        let size = values.iter().enumerate().map(|(t, v)| v * wave(t)).sum::<f64>() * 2.0 / n;
+        values.iter_mut().enumerate().for_each(|(t, v)| *v -= size * wave(t));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::{Channel, SampleTime};
+
+    use super::*;
+
+    fn record(n: usize, e: impl Fn(f64) -> f64) -> Record {
+        let values = |gain: f64| (0..n).map(|t| gain * e(t as f64 * 0.01)).collect();
+        let ts = SampleTime::new(0.01).unwrap();
+        Record::new(
+            ts,
+            Channel::new("e", "", values(1.0)),
+            Channel::new("u", "", values(0.3)),
+        )
+        .unwrap()
+    }
+
+    fn rms(values: &[f64]) -> f64 {
+        (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn what_is_slow_goes_and_what_is_fast_stays() {
+        let gone = |e: &dyn Fn(f64) -> f64| {
+            let before = record(8000, e);
+            let after = &without_slow(std::slice::from_ref(&before)).unwrap()[0];
+            // u is .3 e before and behind.
+            let same = after.input().iter().zip(after.output());
+            assert!(same.clone().all(|(e, u)| (0.3 * e - u).abs() < 1e-9));
+            rms(after.input()) / rms(before.input())
+        };
+        assert!(gone(&|t| 3.0 + 0.2 * t) < 1e-9);
+        assert!(gone(&|t| (2.0 * PI * t / 60.0).sin()) < 0.1);
+        // A step keeps its edge.
+        assert!(gone(&|t| f64::from(u8::from(t > 31.0))) < 0.25);
+        for period in [10.0, 2.0, 0.5] {
+            let left = gone(&|t| (2.0 * PI * t / period + 0.3).sin());
+            assert!((left - 1.0).abs() < 0.05, "{period} s: {left}");
+        }
+    }
+
+    #[test]
+    fn a_short_record_has_nothing_slow() {
+        assert!(without_slow(&[record(900, f64::sin)]).is_none());
+        assert!(without_slow(&[]).is_none());
+    }
+}

@@ -1,0 +1,273 @@
+//! What a searched delay adds to the error bars of a fit.
+//!
+//! Where nk is searched it is estimated from the data as theta is, and theta moves with it. The
+//! residual has a slope along the delay too: with `x = (D/C) w = sum_j b_j psi_bj` the response of the
+//! model, `d(t) = -d eps/d tau = (x(t-1) - x(t+1))/(2 Ts)`, the central difference of a signal that is
+//! known one sample ahead. With `G = psi' psi` the estimate of theta for another delay moves along
+//!
+//! `s = d theta/d tau = -G^-1 psi' d`
+//!
+//! and what `d` has beside psi tells the delay: `var tau = sigma^2/(d'd - d' psi G^-1 psi' d) + Ts^2/12`
+//! (the corner of the inverse of the information of theta and tau together: L. Ljung, *System
+//! Identification*, 1999, section 9.4; the second part is that nk is a whole number: W. F. Sheppard,
+//! *Proc. London Math. Soc.* 29 (1898) 353-380). It is no more than that of all delays that were
+//! searched being equally likely. The covariance of theta becomes `P + s s' var tau`, and what depends
+//! on theta by the gradient g and on the delay by h has the variance
+//!
+//! `g' P g + (g' s + h)^2 var tau`.
+//!
+//! The two parts of `g' s + h` work against each other in the frequency response: a longer delay goes
+//! with faster muscles.
+
+use hoid_model::{Record, uncertainty::variance_along};
+use nalgebra::{DMatrix, DVector};
+
+use crate::{
+    Fit,
+    criterion::{Criterion, Data, Workspace, first_residual},
+    linalg::least_squares::dot,
+};
+
+/// How a searched delay is known, and how theta moves with it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SearchedDelay {
+    /// Variance of the delay, s^2.
+    pub variance_s2: f64,
+    /// `d theta/d tau`, 1/s.
+    pub slope: Vec<f64>,
+}
+
+impl Fit {
+    /// The same fit with the delay counted as estimated over a range of `delays` values of nk. Models
+    /// that stand for no operator are left as they are: with many coefficients of B a shift of one
+    /// sample renames them.
+    pub(crate) fn with_searched_delay(self, records: &[Record], delays: usize) -> Self {
+        match self.delay_from(records, delays) {
+            None => self,
+            Some(delay) => {
+                let p = delay.slope.len();
+                let spread = |k: usize| delay.variance_s2 * delay.slope[k / p] * delay.slope[k % p];
+                let covariance = self.covariance.as_ref();
+                let covariance = covariance.map(|c| c.iter().enumerate().map(|(k, c)| c + spread(k)).collect());
+                Self {
+                    covariance,
+                    searched_delay: Some(delay),
+                    ..self
+                }
+            }
+        }
+    }
+
+    fn delay_from(&self, records: &[Record], delays: usize) -> Option<SearchedDelay> {
+        let apart = self.instrumented || self.physical.is_some();
+        if apart || delays < 2 || self.covariance.is_none() || self.operator().is_err() {
+            return None;
+        }
+        let (orders, theta, ts) = (self.orders(), self.model.theta(), self.model.sample_time().s());
+        let free: Vec<usize> = (0..theta.len()).filter(|i| !self.held[*i]).collect();
+        let n = free.len();
+        let mut gram = DMatrix::<f64>::zeros(n, n);
+        let mut along = DVector::<f64>::zeros(n);
+        let mut own = 0.0;
+        let mut workspace = Workspace::of_thread();
+        for data in Data::of(records) {
+            let criterion = Criterion {
+                orders,
+                data: vec![data],
+                initial: self.initial_state,
+                first: first_residual(&orders, self.initial_state),
+                weights: None,
+            };
+            let psi = criterion.jacobian(theta, 0, &mut workspace);
+            let d = along_the_delay(self.model.b(), &psi[orders.na..], ts);
+            own += dot(&d, &d);
+            for (i, &at) in free.iter().enumerate() {
+                along[i] += dot(&psi[at], &d);
+                for (j, &other) in free.iter().enumerate() {
+                    gram[(i, j)] += dot(&psi[at], &psi[other]);
+                }
+            }
+        }
+        let a = gram.cholesky()?.solve(&along);
+        // What the range of delays says without the data.
+        let most = (delays as f64 * ts).powi(2) / 12.0;
+        let known = own - along.dot(&a);
+        let from_data = if known > 0.0 {
+            self.innovation_variance / known
+        } else {
+            most
+        };
+        let variance_s2 = (from_data + ts * ts / 12.0).min(most);
+        let mut slope: Vec<f64> = vec![0.0; theta.len()];
+        for (&at, a) in free.iter().zip(a.iter()) {
+            slope[at] = -a;
+        }
+        let finite = variance_s2.is_finite() && slope.iter().all(|s| s.is_finite());
+        finite.then_some(SearchedDelay { variance_s2, slope })
+    }
+
+    /// Variance of what has the gradient `by_theta` and changes with the delay by `by_delay` (1/s);
+    /// `None` without a covariance.
+    pub(crate) fn variance_of(&self, by_theta: &[f64], by_delay: f64) -> Option<f64> {
+        let covariance = self.covariance.as_ref()?;
+        // The covariance holds (g's)^2 var tau already.
+        let with_delay = self.searched_delay.as_ref().map_or(0.0, |delay| {
+            let moved = dot(by_theta, &delay.slope);
+            delay.variance_s2 * by_delay * (2.0 * moved + by_delay)
+        });
+        Some(variance_along(by_theta, covariance) + with_delay)
+    }
+}
+
+/// `-d eps/d tau` from the columns of psi for the coefficients of B.
+pub(crate) fn along_the_delay(b: &[f64], of_b: &[Vec<f64>], sample_time_s: f64) -> Vec<f64> {
+    let n = of_b.first().map_or(0, Vec::len);
+    let x = |t: usize| -> f64 { b.iter().zip(of_b).map(|(b, column)| b * column[t]).sum() };
+    (0..n)
+        .map(|t| {
+            let (before, behind) = (t.saturating_sub(1), (t + 1).min(n - 1));
+            (x(before) - x(behind)) / ((behind - before).max(1) as f64 * sample_time_s)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::{
+        Complex64, Orders, PolynomialModel, Structure,
+        scenario::{Condition, Scenario},
+    };
+    use hoid_sim::{RunSeed, Simulator};
+
+    use super::*;
+    use crate::{
+        Estimator,
+        order_selection::{Choice, Criterion, OrderRanges, choose_orders},
+    };
+
+    fn run(replication: u64) -> Record {
+        let streams = RunSeed {
+            seed: 271,
+            replication,
+            ..RunSeed::default()
+        };
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        simulator.run(streams, false).unwrap().span(0.0, 40.0).unwrap()
+    }
+
+    fn searched(record: &Record) -> Choice {
+        let orders = Structure::BoxJenkins.operator_orders(29);
+        let mut ranges = OrderRanges::from(orders);
+        ranges.nk = 25..=33;
+        let template = Estimator::new(Structure::BoxJenkins, orders);
+        choose_orders(&template, &ranges, Criterion::Loss, std::slice::from_ref(record)).unwrap()
+    }
+
+    #[test]
+    fn theta_moves_with_the_delay_as_its_slope_says() {
+        // Twin: the fits one sample to either side, a chord of 20 ms.
+        let record = run(0);
+        let fit = searched(&record).fit;
+        let slope = &fit.searched_delay.as_ref().unwrap().slope;
+        let nk = fit.orders().nk;
+        let at = |nk: usize| {
+            let orders = Orders { nk, ..fit.orders() };
+            let estimator = Estimator::new(Structure::BoxJenkins, orders);
+            estimator
+                .fit(std::slice::from_ref(&record))
+                .unwrap()
+                .model()
+                .theta()
+                .to_vec()
+        };
+        let (before, behind) = (at(nk - 1), at(nk + 1));
+        let b = fit.model().b()[0];
+        for (i, slope) in slope.iter().enumerate() {
+            let chord = (behind[i] - before[i]) / (2.0 * record.sample_time().s());
+            // Within a fifth of the largest.
+            assert!(
+                (slope - chord).abs() < 0.2 * chord.abs().max(0.2 * b / 0.01),
+                "{i}: {slope} and {chord}"
+            );
+        }
+    }
+
+    #[test]
+    fn errors_hold_where_the_delay_is_searched() {
+        let truth = Scenario::condition(Condition::C1).initial.operator;
+        let omega = 12.0;
+        let response = {
+            let held = truth.discretise(run(0).sample_time()).unwrap();
+            let theta = vec![held.held.b0, held.held.b1, held.held.f1, held.held.f2];
+            let orders = Structure::OutputError.operator_orders(held.nk);
+            let model = PolynomialModel::new(Structure::OutputError, orders, held.sample_time, theta);
+            model.unwrap().response(omega)
+        };
+        let runs = 40;
+        let (mut z2, mut without) = ([0.0; 3], 0.0);
+        for k in 0..runs {
+            let fit = searched(&run(k)).fit;
+            let found = fit.operator().unwrap();
+            let z = |value: f64, truth: f64, error: Option<f64>| ((value - truth) / error.unwrap()).powi(2);
+            z2[0] += z(
+                found.omega_nm_rad_s.value,
+                truth.omega_nm_rad_s,
+                found.omega_nm_rad_s.standard_error,
+            );
+            z2[1] += z(found.tau_e_s.value, truth.tau_e_s, found.tau_e_s.standard_error);
+            let phase = fit.frequency_response(&[omega])[0].phase_deg;
+            let off = (Complex64::from_polar(1.0, phase.value.to_radians()) / response).arg();
+            z2[2] += z(off.to_degrees(), 0.0, phase.standard_error);
+            // As if nk were known: the part of the delay taken out again.
+            let delay = fit.searched_delay.clone().unwrap();
+            let p = delay.slope.len();
+            let mut bare = fit.clone();
+            let covariance = bare.covariance.as_mut().unwrap();
+            for (k, c) in covariance.iter_mut().enumerate() {
+                *c -= delay.variance_s2 * delay.slope[k / p] * delay.slope[k % p];
+            }
+            bare.searched_delay = None;
+            let bare = bare.operator().unwrap().omega_nm_rad_s;
+            without += z(bare.value, truth.omega_nm_rad_s, bare.standard_error);
+        }
+        let n = runs as f64;
+        // Mean squares of 40 standard normals are 1 ± .22.
+        assert!(z2.iter().all(|s| (0.4..1.6).contains(&(s / n))), "{z2:?}");
+        assert!(without / n > 1.5, "{without}");
+    }
+
+    #[test]
+    fn a_delay_that_is_given_or_belongs_to_no_operator_adds_nothing() {
+        let record = run(1);
+        let given = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29));
+        let fit = given.fit(std::slice::from_ref(&record)).unwrap();
+        assert_eq!(fit.operator().unwrap().tau_e_s.standard_error, None);
+        let orders = Orders {
+            nb: 30,
+            nk: 20,
+            ..Orders::default()
+        };
+        let mut ranges = OrderRanges::from(orders);
+        ranges.nk = 20..=22;
+        let template = Estimator::new(Structure::Fir, orders);
+        let choice = choose_orders(&template, &ranges, Criterion::Loss, std::slice::from_ref(&record)).unwrap();
+        assert_eq!(choice.fit.searched_delay, None);
+    }
+
+    #[test]
+    fn no_delay_is_less_certain_than_its_range() {
+        // e alone, far from u: the delay says nothing.
+        let record = run(2);
+        let delays = 3;
+        let fit = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29))
+            .fit(std::slice::from_ref(&record))
+            .unwrap();
+        let poor = Fit {
+            innovation_variance: 1e6,
+            ..fit
+        };
+        let found = poor.with_searched_delay(std::slice::from_ref(&record), delays);
+        let most = (3.0 * 0.01_f64).powi(2) / 12.0;
+        assert!((found.searched_delay.unwrap().variance_s2 - most).abs() < 1e-15);
+    }
+}
