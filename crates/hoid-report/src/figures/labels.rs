@@ -41,8 +41,8 @@ impl Level {
 }
 
 /// Size of subscripts in units of the figure, and beside that of the line.
-const SUBSCRIPT: &str = "11";
-const SMALLER: f64 = 11.0 / 13.0;
+const SUBSCRIPT: &str = "12.2";
+const SMALLER: f64 = 12.2 / 13.0;
 
 /// Text of the user: a dollar sign would open a formula.
 fn literal(text: &str) -> String {
@@ -193,13 +193,13 @@ mod tests {
         let shown = |text: &str| tagged(&marked(text));
         assert_eq!(
             shown("n_k^*"),
-            "n<tspan dy=\"3\" font-size=\"11\">k</tspan><tspan dy=\"-7\" font-size=\"11\">*</tspan>"
+            "n<tspan dy=\"3\" font-size=\"12.2\">k</tspan><tspan dy=\"-7\" font-size=\"12.2\">*</tspan>"
         );
         assert_eq!(
             shown("m^0 = 1"),
-            "m<tspan dy=\"-4\" font-size=\"11\">0</tspan><tspan dy=\"4\">\u{a0}= 1</tspan>"
+            "m<tspan dy=\"-4\" font-size=\"12.2\">0</tspan><tspan dy=\"4\">\u{a0}= 1</tspan>"
         );
-        assert_eq!(shown("b_{nm}"), "b<tspan dy=\"3\" font-size=\"11\">nm</tspan>");
+        assert_eq!(shown("b_{nm}"), "b<tspan dy=\"3\" font-size=\"12.2\">nm</tspan>");
         for plain in ["my_model", "run_2", "_", "a_", "^2", "a_{b", "x_ y", ""] {
             assert_eq!(shown(plain), plain);
         }
@@ -212,7 +212,7 @@ mod tests {
         let figure = format!("<text x=\"1\">{}</text><line/><text>b</text>", marked("K_e (s)"));
         assert_eq!(
             tagged(&figure),
-            "<text x=\"1\">K<tspan dy=\"3\" font-size=\"11\">e</tspan><tspan dy=\"-3\">\u{a0}(s)</tspan></text><line/><text>b</text>"
+            "<text x=\"1\">K<tspan dy=\"3\" font-size=\"12.2\">e</tspan><tspan dy=\"-3\">\u{a0}(s)</tspan></text><line/><text>b</text>"
         );
     }
 }

@@ -36,7 +36,7 @@ pub struct TraceGrid {
     pub columns: usize,
     /// Text above each column, or above each panel; empty for none.
     pub titles: Vec<String>,
-    /// Names of the methods, for the legend; empty for none.
+    /// Names of the methods, for the legend, which names those that are drawn; empty for none.
     pub methods: Vec<String>,
     /// Names of the levels of each method, such as those of the noise, from the lowest; empty for
     /// none. They are shades of the colour of the method.
@@ -114,7 +114,9 @@ impl TraceGrid {
 
     fn add_legend(&self, scene: &mut Scene) {
         let mut entries = Vec::new();
-        for (method, name) in self.methods.iter().enumerate() {
+        let curves = || self.panels.iter().flat_map(|p| &p.curves);
+        let drawn = |method| curves().any(|c| c.method == method && c.kind != CurveKind::Truth);
+        for (method, name) in self.methods.iter().enumerate().filter(|(method, _)| drawn(*method)) {
             if self.levels.is_empty() {
                 entries.push(Entry::new(name, &shade(method, 0, 1), Sample::Line));
             }
@@ -127,7 +129,7 @@ impl TraceGrid {
                 entries.push(Entry::new(&name, &colour, Sample::Line));
             }
         }
-        let has = |kind| self.panels.iter().flat_map(|p| &p.curves).any(|c| c.kind == kind);
+        let has = |kind| curves().any(|c| c.kind == kind);
         if has(CurveKind::Batch) {
             entries.push(Entry::new("batch fit", DOTS, Sample::Dotted));
         }
@@ -306,7 +308,7 @@ mod tests {
                 ..TraceGrid::default()
             },
         );
-        assert!(svg.contains("a<tspan dy=\"3\" font-size=\"11\">1</tspan>"), "{svg}");
+        assert!(svg.contains("a<tspan dy=\"3\" font-size=\"12.2\">1</tspan>"), "{svg}");
         assert!(svg.contains("(&lt;b&gt;)") && svg.contains("&lt;x&gt;"));
         assert_eq!(svg.matches("<tspan").count(), svg.matches("</tspan>").count());
     }
@@ -325,7 +327,7 @@ mod tests {
         let grid = TraceGrid {
             panels: vec![panel(curves.clone()), panel(curves)],
             columns: 2,
-            methods: vec!["RLS".to_owned()],
+            methods: vec!["RLS".to_owned(), "none".to_owned()],
             levels: vec!["low".to_owned(), "high".to_owned()],
             ..TraceGrid::default()
         };
@@ -333,7 +335,7 @@ mod tests {
         // In each panel and in the legend, which shows the batch fit in grey.
         let lines = |level| svg.matches(&format!("STROKE=\"{}\"", shade(0, level, 2))).count();
         assert_eq!((lines(0), lines(1)), (3, 5));
-        assert!(svg.contains("RLS, LOW") && svg.contains("RLS, HIGH"));
+        assert!(svg.contains("RLS, LOW") && svg.contains("RLS, HIGH") && !svg.contains("NONE, LOW"));
         assert_eq!(svg.matches("ROTATE(-90").count(), 1);
     }
 
