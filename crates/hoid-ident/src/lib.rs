@@ -76,6 +76,7 @@
 //! | `multistart` | searches from several starts |
 //! | `initial_guess` | where a search begins |
 //! | `pem` | bounds, priors, robust loss, focus; fits of one record or of many side by side |
+//! | `searched_delay` | what the search of nk adds to the error bars |
 
 mod assembled_fit;
 mod constraint;
