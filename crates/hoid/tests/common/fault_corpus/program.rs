@@ -28,6 +28,7 @@ pub enum Way {
     GreyBox,
     /// `identify --structure bj`.
     BoxJenkins,
+    Population,
     Adaptive,
     Physical,
     Rls,
@@ -35,9 +36,10 @@ pub enum Way {
 }
 
 impl Way {
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::GreyBox,
         Self::BoxJenkins,
+        Self::Population,
         Self::Adaptive,
         Self::Physical,
         Self::Rls,
@@ -48,6 +50,7 @@ impl Way {
         match self {
             Self::GreyBox => "grey-box",
             Self::BoxJenkins => "bj",
+            Self::Population => "population",
             Self::Adaptive => "adaptive",
             Self::Physical => "physical",
             Self::Rls => "rls",
@@ -60,9 +63,9 @@ impl Way {
     }
 
     /// Those that a run is evaluated by: the grey box knows all operators, the others a gain with a
-    /// lead; of people, by the two that are meant for them.
+    /// lead; of people, by the three that are meant for them.
     pub fn of(base: &Base) -> &'static [Self] {
-        const LEAD: [Way; 3] = [Way::GreyBox, Way::Adaptive, Way::Physical];
+        const LEAD: [Way; 4] = [Way::GreyBox, Way::Population, Way::Adaptive, Way::Physical];
         match (base.who, base.form) {
             (Who::C1 | Who::C2, _) => &Self::ALL,
             (Who::Person, hoid::model::Form::Lead) => &LEAD,
