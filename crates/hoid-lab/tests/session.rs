@@ -148,10 +148,13 @@ fn corrupt(stem: &Stem, end: &str, line: usize, cell: usize, with: impl Fn(f64) 
     fs::write(&path, lines.join("\n") + "\n").unwrap();
 }
 
+/// What is made of a number.
+type Change<'a> = &'a dyn Fn(f64) -> f64;
+
 #[test]
 fn what_is_changed_makes_a_run_unverified_for_its_own_reason() {
     let last_bit = |v: f64| f64::from_bits(v.to_bits() ^ 1);
-    let cases: [(&str, usize, &dyn Fn(f64) -> f64, &str); 8] = [
+    let cases: [(&str, usize, Change<'_>, &str); 8] = [
         ("events.csv", 3, &|raw| raw + 1.0, "lab-input"),
         ("events.csv", 1, &|stamp| stamp + 5.0, "lab-event"),
         ("events.csv", 1, &|stamp| stamp - 200.0, "lab-event"),

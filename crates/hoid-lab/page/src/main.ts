@@ -305,7 +305,7 @@ async function data(number: number): Promise<RunData | null> {
   return answer.ok ? answer.json() : null;
 }
 
-const digits = (v: number) => v.toFixed(Math.abs(v) < 10 ? 2 : 0);
+const digits = (v: number) => v.toFixed(Math.abs(v) < 1 ? 3 : Math.abs(v) < 10 ? 2 : 0);
 
 /** The last live estimate of a run, for the person. */
 async function estimate(number: number): Promise<void> {
