@@ -7,8 +7,9 @@
 //! | `cargo xtask check` | formatting, crates that are used, lints, documentation of the crates and the book, as continuous integration does |
 //! | `cargo xtask crates` | licences, bans and versions of the crates that are used, alone (module `crates`) |
 //! | `cargo xtask book` | the book in `docs/`, into `docs/book/` (needs mdbook) |
+//! | `cargo xtask lab` | that the page of `hoid lab` is what its sources build, and the page in a browser (module `lab`) |
 //! | `cargo xtask bench [OPTION...]` | the tasks of the page "Speed beside others" beside the peers that are installed, or how cost grows (module `bench`) |
-//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `kills`, `challenge`, `challenge-people` |
+//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `kills`, `lab`, `challenge`, `challenge-people` |
 //!
 //! Little but the standard library: a chore must start at once on a fresh machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
@@ -16,6 +17,7 @@
 mod bench;
 mod counts;
 mod crates;
+mod lab;
 mod process;
 mod python;
 
@@ -27,7 +29,7 @@ use std::{
 use counts::Counts;
 use process::{cargo, cargo_command, each_line, run};
 
-const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | crates | book | bench [OPTION...] | slow NAME [ARGUMENT...]";
+const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | crates | book | lab | bench [OPTION...] | slow NAME [ARGUMENT...]";
 
 fn main() -> ExitCode {
     let mut arguments = env::args().skip(1);
@@ -38,6 +40,7 @@ fn main() -> ExitCode {
         Some("crates") => crates::check(),
         Some("book") => book(),
         Some("bench") => bench::bench(&arguments.collect::<Vec<_>>()),
+        Some("lab") => lab::lab(),
         Some("slow") => slow(&arguments.collect::<Vec<_>>()),
         _ => Err(USAGE.to_owned()),
     };
@@ -93,7 +96,7 @@ const fn slow_of(name: &'static str, package: &'static str, example: &'static st
     }
 }
 
-const SLOW: [Slow; 8] = [
+const SLOW: [Slow; 9] = [
     slow_of("people-coverage", "hoid", "people_coverage"),
     Slow {
         program: Some("hoid-cli"),
@@ -109,6 +112,7 @@ const SLOW: [Slow; 8] = [
         program: Some("hoid-cli"),
         ..slow_of("kills", "hoid-cli", "kills")
     },
+    slow_of("lab", "hoid-lab", "lab"),
     slow_of("challenge", "hoid-study", "challenge"),
     slow_of("challenge-people", "hoid-study", "challenge_people"),
 ];

@@ -43,9 +43,24 @@ pub enum CliError {
     Sim(#[from] SimError),
     #[error(transparent)]
     Report(#[from] ReportError),
+    /// An experiment that cannot be set up or shown.
+    #[cfg(feature = "lab")]
+    #[error(transparent)]
+    Lab(Box<hoid_lab::LabError>),
     /// The reproduction cannot be made.
     #[error(transparent)]
     Thesis(#[from] ThesisError),
+}
+
+#[cfg(feature = "lab")]
+impl From<hoid_lab::LabError> for CliError {
+    /// A configuration that cannot be used is wrong usage.
+    fn from(error: hoid_lab::LabError) -> Self {
+        match error {
+            hoid_lab::LabError::Config { .. } => Self::Usage(error.to_string()),
+            _ => Self::Lab(Box::new(error)),
+        }
+    }
 }
 
 impl CliError {

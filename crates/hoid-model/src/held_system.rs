@@ -99,6 +99,21 @@ impl HeldSystem {
         self.order
     }
 
+    /// The transition of the state over one sample, by rows.
+    pub fn transition(&self) -> &[f64] {
+        &self.transition
+    }
+
+    /// What the input v(k) adds to the state; all of it where the input is not late.
+    pub fn input(&self) -> &[f64] {
+        &self.now
+    }
+
+    /// The row C of the output.
+    pub fn output_row(&self) -> &[f64] {
+        &self.output
+    }
+
     /// The part of the input that passes at once.
     pub fn direct(&self) -> f64 {
         self.direct

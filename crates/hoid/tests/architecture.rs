@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, process::Command};
 use serde_json::Value;
 
 /// What each crate may depend on within the workspace.
-const ALLOWED: [(&str, &[&str]); 14] = [
+const ALLOWED: [(&str, &[&str]); 15] = [
     ("hoid-core", &[]),
     ("hoid-model", &["hoid-core"]),
     ("hoid-ident", &["hoid-core", "hoid-lanes", "hoid-model"]),
@@ -35,6 +35,17 @@ const ALLOWED: [(&str, &[&str]); 14] = [
         &["hoid-model", "hoid-ident", "hoid-io", "hoid-study", "hoid-track"],
     ),
     (
+        "hoid-lab",
+        &[
+            "hoid-model",
+            "hoid-ident",
+            "hoid-sim",
+            "hoid-io",
+            "hoid-track",
+            "hoid-study",
+        ],
+    ),
+    (
         "hoid",
         &[
             "hoid-core",
@@ -60,6 +71,7 @@ const ALLOWED: [(&str, &[&str]); 14] = [
             "hoid-thesis",
             "hoid-track",
             "hoid-report",
+            "hoid-lab",
         ],
     ),
     (

@@ -7,6 +7,7 @@ use super::{
     describe::DescribeArgs,
     group::{GroupArgs, SimulateGroupArgs},
     identify::IdentifyArgs,
+    lab::LabArgs,
     recursion::{StreamArgs, TrackArgs},
     shell::{CompletionsArgs, ManArgs},
     simulate::{DemoArgs, MarginsArgs, SimulateArgs},
@@ -61,6 +62,12 @@ pub enum Command {
     ///
     /// Crossover frequency, phase and gain margin of a scenario, and its remnant gains.
     Margins(MarginsArgs),
+    /// A tracking experiment in the browser
+    ///
+    /// Serves a page on this computer in which a person tracks, identifies them while they do, and
+    /// checks every run to the last bit. Prints the address of the page. Part of release binaries;
+    /// others are built with --features lab.
+    Lab(LabArgs),
     /// Many recorded runs by subject and condition
     ///
     /// `hoid group init DIR` looks at the files and writes a manifest; `hoid group DIR --out OUT` fits

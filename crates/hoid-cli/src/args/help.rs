@@ -20,7 +20,7 @@ struct Help {
 const GROUPS: [(&str, &[&str]); 5] = [
     (
         "Recordings",
-        &["info", "identify", "describe", "track", "stream", "group"],
+        &["info", "identify", "describe", "track", "stream", "lab", "group"],
     ),
     ("Simulation", &["demo", "simulate", "simulate-group"]),
     ("Models", &["convert", "margins"]),
@@ -28,7 +28,12 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("This program", &["completions", "man", "help"]),
 ];
 
-const HELP: [Help; 15] = [
+const HELP: [Help; 16] = [
+    Help {
+        command: "lab",
+        examples: &["hoid lab --open", "hoid lab --config lab.toml --out study"],
+        shown: &[],
+    },
     Help {
         command: "info",
         examples: &["hoid info run.csv", "hoid info run.mat --json"],

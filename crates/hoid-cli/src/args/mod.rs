@@ -11,6 +11,7 @@
 //! | `convert` | `hoid convert`, `hoid info` |
 //! | `figure` | figures as files |
 //! | `show` | how results are shown |
+//! | `lab` | `hoid lab` |
 //! | `shell` | `hoid completions`, `hoid man` |
 //! | `help` | all commands: what `-h` shows, headings, examples |
 //! | `group`, `study` | `hoid group`, `hoid simulate-group`; `hoid study`, `hoid reproduce` |
@@ -23,6 +24,7 @@ mod figure;
 mod group;
 mod help;
 mod identify;
+mod lab;
 mod parse;
 mod reading;
 mod recursion;
@@ -38,6 +40,7 @@ pub use describe::DescribeArgs;
 pub use group::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs};
 pub use help::command;
 pub use identify::{IdentifyArgs, ModelKind, estimators_with};
+pub use lab::LabArgs;
 pub use parse::parse_span;
 pub use reading::{MaskArgs, ReadArgs};
 pub use recursion::{RecursionArgs, StreamArgs, TrackArgs};

@@ -8,6 +8,7 @@ pub mod figure;
 pub mod group;
 pub mod identify;
 pub mod info;
+pub mod lab;
 pub mod margins;
 mod places;
 pub mod reading;

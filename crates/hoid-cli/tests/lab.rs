@@ -1,0 +1,16 @@
+//! `hoid lab` of a program that was built without it.
+#![cfg(not(feature = "lab"))]
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::bad;
+
+#[test]
+fn without_its_feature_it_says_how_to_build_it() {
+    let directory = tempfile::TempDir::new().unwrap();
+    let (code, said) = bad(directory.path(), &["lab"]);
+    assert_eq!(code, 2);
+    assert!(said.contains("--features lab"), "{said}");
+    assert!(!directory.path().join("hoid-lab").exists());
+}

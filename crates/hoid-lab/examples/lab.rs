@@ -1,0 +1,196 @@
+//! `cargo xtask slow lab [RUNS] [SEEDS]`: the page's plant against Rust over 10 000 runs, and
+//! simulated operators who track through the page's engine in injected time and are identified.
+//!
+//! Three operators: those of C1 and C2, and one with a lag before 4/s, each with a remnant of first
+//! order whose variance is a tenth of that of u. The operator sees e at each tick; the record has every
+//! tenth, which estimators take for held: their delay is half a sample shorter. Told: bias of each
+//! parameter in percent with its standard error, and the part of the intervals of 95 % that hold the
+//! truth.
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+#[path = "../tests/common/page.rs"]
+mod page;
+
+use std::process::ExitCode;
+
+use data_encoding::BASE64;
+use hoid_ident::family::{FamilyEstimator, OperatorPrior};
+use hoid_lab::{
+    config::{Condition, Signal},
+    plant::{InputMap, Plant},
+    task::{TICK_S, Task},
+};
+use hoid_model::{
+    Channel, ContinuousTransferFunction, FamilyOperator, Form, Record, SampleTime, held_system::HeldSystem,
+    operator_family::Coordinate, scenario::OperatingState,
+};
+use hoid_sim::RunSeed;
+use serde_json::{Value, json};
+
+/// Wide enough that nobody reaches an end.
+const MAP: InputMap = InputMap {
+    centre: 0.0,
+    span: 1000.0,
+    dead: 0.0,
+    gain: 1000.0,
+};
+const REMNANT_S: f64 = 0.06;
+const SHARE: f64 = 0.1;
+
+struct Person {
+    name: &'static str,
+    form: Form,
+    /// Parameters in the order of the form, tau last.
+    coordinates: Vec<f64>,
+    element: String,
+}
+
+fn people() -> Vec<Person> {
+    let of_state = |name, state: OperatingState| {
+        let (o, c) = (state.operator, state.controlled_element);
+        Person {
+            name,
+            form: Form::Lead,
+            coordinates: vec![o.k_e, o.t_l_s, o.omega_nm_rad_s.ln(), o.zeta_nm.ln(), o.tau_e_s],
+            element: c.transfer_function().unwrap().to_string(),
+        }
+    };
+    vec![
+        of_state("C1", OperatingState::s1()),
+        of_state("C2", OperatingState::s2()),
+        Person {
+            name: "4/s, lag",
+            form: Form::Lag,
+            // K/T_I = 1.2, 1/T_I = 1.
+            coordinates: vec![1.2, 1.0, 12f64.ln(), 0.4f64.ln(), 0.18],
+            element: "4/s".to_owned(),
+        },
+    ]
+}
+
+fn bytes(values: &[f64]) -> String {
+    BASE64.encode(&values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>())
+}
+
+fn values(answer: &Value) -> Vec<f64> {
+    let bytes = BASE64.decode(answer.as_str().unwrap().as_bytes()).unwrap();
+    bytes
+        .chunks_exact(8)
+        .map(|eight| f64::from_le_bytes(eight.try_into().unwrap()))
+        .collect()
+}
+
+fn variance(values: &[f64]) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64
+}
+
+/// u and e at each tick, with a remnant of a standard deviation.
+fn tracked(engine: &mut page::Engine, person: &Person, seed: u64, remnant: f64) -> (Task, Vec<f64>, Vec<f64>) {
+    let condition = Condition {
+        controlled_element: person.element.clone(),
+        target: Some(Signal::default()),
+        ..Condition::default()
+    };
+    let task = Task::new(&condition, 0, seed).unwrap();
+    let operator = FamilyOperator::new(person.form, true, &person.coordinates).unwrap();
+    let transfer: ContinuousTransferFunction = operator.transfer_function().unwrap();
+    let held = HeldSystem::new(transfer.num(), transfer.den(), 0.0, SampleTime::new(TICK_S).unwrap()).unwrap();
+    let plant = Plant {
+        a: held.transition().to_vec(),
+        b: held.input().to_vec(),
+        c: held.output_row().to_vec(),
+        d: held.direct(),
+    };
+    let a = (-TICK_S / REMNANT_S).exp();
+    let mut n = 0.0;
+    let white = RunSeed {
+        seed,
+        cell: 7,
+        replication: 0,
+    }
+    .white_noise(task.ticks);
+    let noise: Vec<f64> = white
+        .iter()
+        .map(|w| {
+            n = a * n + remnant * (1.0 - a * a).sqrt() * w;
+            n
+        })
+        .collect();
+    // An event is taken by the tick behind it: one of the delay.
+    let delay = (operator.tau_e_s() / TICK_S).round() as usize - 1;
+    let answer = engine.ask(
+        &json!({"phases": task.phases, "ticks": task.ticks, "map": MAP, "target": bytes(&task.target),
+        "operator": {"plant": plant, "delay": delay}, "noise": bytes(&noise)}),
+    );
+    (task, values(&answer["u"]), values(&answer["e"]))
+}
+
+fn main() -> ExitCode {
+    let number = |k: usize, usual: u32| std::env::args().nth(k).map_or(usual, |text| text.parse().unwrap());
+    let (runs, seeds) = (number(1, 10_000), number(2, 100));
+    let Some(mut engine) = page::Engine::start() else {
+        println!("skipped: there is no node");
+        return ExitCode::SUCCESS;
+    };
+    let differing = (1..=runs).filter(|seed| !page::same_bits(&mut engine, *seed)).count();
+    println!("{differing} of {runs} runs of the page's plant differ from Rust in a bit");
+    let mut wrong = differing > 0;
+    println!("operator\tparameter\ttruth\tbias %\tits error %\tcoverage %\truns");
+    for person in people() {
+        let quiet = tracked(&mut engine, &person, 0, 0.0).1;
+        let remnant = (SHARE * variance(&quiet[10_000..])).sqrt();
+        let kinds = person.form.coordinates(true);
+        let mut found: Vec<Vec<(f64, f64)>> = vec![Vec::new(); kinds.len()];
+        for seed in 1..=u64::from(seeds) {
+            let (task, u, e) = tracked(&mut engine, &person, seed, remnant);
+            let every = |signal: &[f64]| signal[task.run_in..].iter().copied().step_by(10).collect::<Vec<f64>>();
+            let channel = |name: &str, signal: &[f64]| Channel::new(name, "", every(signal));
+            let record = Record::new(SampleTime::HUNDREDTH, channel("e", &e), channel("u", &u)).unwrap();
+            let estimator = FamilyEstimator {
+                forms: vec![person.form],
+                prior: OperatorPrior::none(),
+                run_to_run: 0.0,
+                ..FamilyEstimator::default()
+            };
+            let Ok(fit) = estimator.fit(&[record]) else { continue };
+            for (place, kind) in found.iter_mut().zip(&kinds) {
+                let estimate = fit.coordinate(0, *kind);
+                if let Some(estimate) = estimate
+                    && let Some(error) = estimate.standard_error
+                {
+                    place.push((estimate.value, error));
+                }
+            }
+        }
+        for ((kind, truth), all) in kinds.iter().zip(&person.coordinates).zip(&found) {
+            let truth = if *kind == Coordinate::Delay {
+                truth - 0.005
+            } else {
+                *truth
+            };
+            let n = all.len().max(1) as f64;
+            let estimates: Vec<f64> = all.iter().map(|(value, _)| *value).collect();
+            let bias = estimates.iter().sum::<f64>() / n - truth;
+            let error = (variance(&estimates) / n).sqrt();
+            let covered = all
+                .iter()
+                .filter(|(value, error)| (value - truth).abs() <= 1.96 * error)
+                .count();
+            // Of a logarithm the difference is the relative one.
+            let log = matches!(kind, Coordinate::LogOmega | Coordinate::LogZeta);
+            let share = if log { 100.0 } else { 100.0 / truth.abs() };
+            println!(
+                "{}\t{}\t{truth:.4}\t{:.2}\t{:.2}\t{:.1}\t{}",
+                person.name,
+                kind.parameter(),
+                bias * share,
+                error * share,
+                100.0 * covered as f64 / n,
+                all.len()
+            );
+            wrong |= all.len() < seeds as usize;
+        }
+    }
+    if wrong { ExitCode::FAILURE } else { ExitCode::SUCCESS }
+}

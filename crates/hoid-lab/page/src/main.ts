@@ -1,0 +1,491 @@
+// The screens of the person, the experimenter and of a session that is shown again.
+
+import { Surface } from "./display";
+import { button, h, show } from "./dom";
+import { inputOf } from "./engine";
+import { DEVICES, type Device, type Settings, keep, listen, mapOf, settings } from "./input";
+import { Plots, linesOf } from "./plots";
+import { type Given, start } from "./session";
+import { time } from "./time";
+import { type Condition, type Done, type FromServer, type LiveLine, type Measures, type RunMessage, type State, Wire } from "./wire";
+
+const looksOn = location.pathname.endsWith("/experimenter");
+let state: State | null = null;
+let own: Settings = settings();
+/** What the person sees now; a message of the server leaves some screens as they are. */
+let screen: "start" | "settings" | "ready" | "run" | "result" | "other" = "start";
+let waiting: RunMessage | null = null;
+let verdict: { done: Done; measures: Measures } | null = null;
+let broken = "";
+/** The session goes on in another window. */
+let elsewhere = false;
+const plotsCanvas = h("canvas", { class: "plots", role: "img", "aria-label": "The estimate over time, with bands of two standard errors" });
+const livePlots = new Plots(plotsCanvas);
+
+const wire = new Wire(hear, tables, gone);
+wire.opened(() => wire.say({ type: "hello", role: looksOn ? "experimenter" : "person", browser: browser() }));
+show("", h("p", {}, "Connecting ..."));
+
+function browser(): Record<string, string> {
+  return {
+    user_agent: navigator.userAgent.slice(0, 500),
+    language: navigator.language,
+    screen: `${window.screen.width} x ${window.screen.height}`,
+    window: `${innerWidth} x ${innerHeight}`,
+    pixel_ratio: String(devicePixelRatio),
+    isolated: String(crossOriginIsolated),
+    raw_events: String("onpointerrawupdate" in window),
+    clock: time.clock,
+  };
+}
+
+function gone(): void {
+  screen = "other";
+  show(
+    "",
+    h("h1", {}, "The program has ended"),
+    h("p", {}, "Start it again and open the address that it prints. Everything up to the last second is stored, and the session goes on with the next run."),
+  );
+}
+
+function hear(message: FromServer): void {
+  switch (message.type) {
+    case "state":
+      if (elsewhere) return;
+      state = message;
+      if (state.phase === "replay") return replay();
+      if (looksOn) return experimenter();
+      return person();
+    case "run":
+      waiting = message;
+      return;
+    case "verdict":
+      verdict = message;
+      if (!looksOn && screen === "result") result();
+      return;
+    case "live":
+      return live(message.number, message.line);
+    case "refused":
+      if (message.elsewhere) {
+        elsewhere = true;
+        show("", h("h1", {}, "This window looks on"), h("p", {}, message.words), button("Try here", () => location.reload()));
+      } else if (screen !== "run") {
+        document.getElementById("refused")?.remove();
+        document.getElementById("main")?.prepend(h("p", { class: "box bad", id: "refused", role: "alert" }, message.words));
+      }
+  }
+}
+
+function tables(numbers: Float64Array): void {
+  const message = waiting;
+  waiting = null;
+  if (!message || screen === "run") return;
+  screen = "run";
+  verdict = null;
+  broken = "";
+  const given: Given = { message, tables: numbers };
+  start(wire, given, own, (_, words) => {
+    broken = words;
+    screen = "result";
+    result();
+  });
+}
+
+// --- The person ---
+
+function person(): void {
+  if (!state) return;
+  if (screen === "run" || screen === "settings") return;
+  if (state.phase === "consent") return consent();
+  if (screen === "result" && state.phase === "runs") return result();
+  if (state.phase === "finished") return finished();
+  if (screen === "start") return state.done.length > 0 ? ready() : setUp();
+  ready();
+}
+
+function consent(): void {
+  if (!state) return;
+  const s = state;
+  screen = "start";
+  if (document.getElementById("subject")) return;
+  const name = h("input", { type: "text", id: "subject", value: s.calibrate ? "calibration" : "P01", maxlength: "20", autocomplete: "off" });
+  const agree = h("input", { type: "checkbox", id: "agree", change: () => (go.disabled = !agree.checked) });
+  const cc0 = h("input", { type: "checkbox", id: "cc0" });
+  const go = button("Begin", () => wire.say({ type: "consent", subject: name.value.trim(), agreed: agree.checked, cc0: cc0.checked }), {
+    disabled: true,
+    id: "begin",
+  });
+  const open = s.open.map((session) =>
+    button(`Go on with ${session}`, () => wire.say({ type: "resume", session }), { class: "quiet" }),
+  );
+  show(
+    "",
+    h("h1", {}, s.name),
+    open.length > 0 && h("div", { class: "box" }, h("p", {}, "A session was not finished."), ...open),
+    h("p", {}, s.consent),
+    h("label", {}, "Made-up name (letters and digits)", name),
+    h("label", { class: "check" }, agree, h("span", {}, s.calibrate ? "Start it." : "I have read this and take part.")),
+    !s.calibrate && h("label", { class: "check" }, cc0, h("span", {}, "My data may be given to everybody without conditions (CC0). Leave this empty if you are not sure.")),
+    go,
+    !s.calibrate && h("p", { class: "soft" }, h("a", { href: "experimenter", target: "_blank" }, "Window for the experimenter")),
+  );
+}
+
+let stopTest = () => {};
+
+function setUp(): void {
+  screen = "settings";
+  if (state?.calibrate) {
+    own = { device: "mouse", sensitivity: 1, reversed: false, dead: 0 };
+    return ready();
+  }
+  stopTest();
+  const pick = h("select", { id: "device", change: () => change({ device: pick.value as Device }) });
+  for (const [value, text] of DEVICES) pick.append(h("option", { value, selected: value === own.device }, text));
+  const range = (key: "sensitivity" | "dead", least: string, most: string) => {
+    const slider = h("input", { type: "range", id: key, min: least, max: most, step: "0.01", value: String(own[key]) });
+    slider.addEventListener("input", () => change({ [key]: Number(slider.value) }));
+    return slider;
+  };
+  const reversed = h("input", { type: "checkbox", id: "reversed", checked: own.reversed, change: () => change({ reversed: reversed.checked }) });
+  const canvas = h("canvas", { class: "test", role: "img", "aria-label": "Where your hand is" });
+  show(
+    "",
+    h("h1", {}, "How you steer"),
+    h("label", {}, "With", pick),
+    h("p", {}, "Move here from side to side: the ring follows your hand. Both ends should be easy to reach."),
+    canvas,
+    h("label", {}, "Sensitivity", range("sensitivity", "0.3", "3")),
+    h("label", {}, "Dead zone in the middle (for sticks that do not rest at zero)", range("dead", "0", "0.3")),
+    h("label", { class: "check" }, reversed, h("span", {}, "Left and right reversed")),
+    button("Done", () => {
+      stopTest();
+      ready();
+    }),
+  );
+  const surface = new Surface(canvas);
+  surface.hand(0);
+  const hear = () => {
+    stopTest();
+    stopTest = listen(canvas, own.device, (event) => surface.hand(inputOf(mapOf(own, canvas.getBoundingClientRect(), 1), event.raw)));
+  };
+  function change(part: Partial<Settings>): void {
+    own = { ...own, ...part };
+    keep(own);
+    hear();
+  }
+  hear();
+  const sized = () => {
+    if (!canvas.isConnected) return removeEventListener("resize", sized);
+    surface.fit();
+    surface.hand(0);
+  };
+  addEventListener("resize", sized);
+}
+
+/** Asks for the next run by a button or the space bar. */
+function startButton(text: string): HTMLButtonElement {
+  const go = button(text, () => wire.say({ type: "next" }), { id: "start" });
+  return go;
+}
+
+addEventListener("keydown", (event) => {
+  const start = document.getElementById("start") as HTMLButtonElement | null;
+  const typing = document.activeElement instanceof HTMLInputElement || document.activeElement instanceof HTMLButtonElement;
+  if (event.key === " " && start && !start.disabled && !typing) {
+    event.preventDefault();
+    start.click();
+  }
+});
+
+const DISPLAYS: Record<Condition["display"], string> = {
+  compensatory: "The ring in the middle is you, the line is where to be. Move to the side where the line is.",
+  pursuit: "The ring is you, the line is where to be. Bring the ring onto the line.",
+  preview: "The ring is you. The line comes down to you: you see ahead where it will be.",
+};
+
+function ready(): void {
+  if (!state?.condition) return;
+  screen = "ready";
+  const { condition, planned, next, training } = state;
+  const last = state.done[state.done.length - 1];
+  show(
+    "",
+    h("h1", {}, `Run ${(next ?? 0) + 1} of ${planned.length}${training ? " (training)" : ""}`),
+    last?.how === "interrupted" && h("p", { class: "box" }, "The last run was broken off. It is made again."),
+    h("p", {}, condition.text),
+    h("p", {}, DISPLAYS[condition.display]),
+    h("p", { class: "soft" }, h("kbd", {}, "Space"), " starts, ", h("kbd", {}, "Esc"), " ends a run early. A countdown of three seconds comes first. Keep this window in front."),
+    startButton("Start"),
+    button("How I steer", setUp, { class: "quiet" }),
+  );
+}
+
+const percent = (v: number) => `${Math.round(v)} of 100`;
+
+function worth(done: Done): HTMLElement {
+  const good = done.verdict === "verified";
+  return h(
+    "span",
+    {},
+    h("span", { class: good ? "good" : "bad" }, done.verdict),
+    done.reasons ? `: ${done.reasons}` : "",
+    done.notes ? ` (${done.notes})` : "",
+  );
+}
+
+let rest = 0;
+
+function result(): void {
+  if (!state) return;
+  if (broken) {
+    clearInterval(rest);
+    show("", h("h1", {}, "The run was ended early"), h("p", {}, broken), state.phase === "finished" ? null : startButton("Start again"));
+    return;
+  }
+  if (!verdict) {
+    show("", h("h1", {}, "Checking the run ..."));
+    return;
+  }
+  const { done, measures } = verdict;
+  if (state.phase === "finished") return finished();
+  const pause = h("p", { "aria-live": "polite" }, "");
+  const go = startButton("Next run");
+  // The break is that of the condition that was just done.
+  let left = Math.round(state.condition?.break_s ?? 0);
+  clearInterval(rest);
+  const tell = () => {
+    pause.textContent = left > 0 ? `Rest for ${left} s.` : "";
+    go.disabled = left > 0;
+    if (left-- <= 0) clearInterval(rest);
+  };
+  rest = window.setInterval(tell, 1000);
+  show(
+    "",
+    h("h1", {}, `Score: ${percent(done.score)}`),
+    ...facts(done, measures),
+    h("div", { id: "person" }),
+    pause,
+    go,
+    button("How I steer", setUp, { class: "quiet" }),
+  );
+  tell();
+  if (state.live !== "never") void estimate(done.number);
+}
+
+function facts(done: Done, measures: Measures): HTMLElement[] {
+  return [
+    h("p", {}, "This run is ", worth(done), "."),
+    h(
+      "p",
+      { class: "soft" },
+      `Frames of ${measures.frame_ms.toFixed(1)} ms, the longest ${measures.longest_frame_ms.toFixed(1)} ms, ${measures.missed_frames} missed; ` +
+        `${measures.input_hz.toFixed(0)} events a second, ${measures.input_age_ms.toFixed(1)} ms old when they came.`,
+    ),
+  ];
+}
+
+interface RunData {
+  number: number;
+  condition: Condition;
+  start_s: number;
+  step_s: number;
+  e: number[];
+  u: number[];
+  y: number[];
+  f: number[] | null;
+  live: (number | null)[][];
+  verdict: string;
+  reasons: string;
+}
+
+async function data(number: number): Promise<RunData | null> {
+  const base = location.pathname.replace(/experimenter$/, "");
+  const answer = await fetch(`${base}data/${number}.json`);
+  return answer.ok ? answer.json() : null;
+}
+
+const digits = (v: number) => v.toFixed(Math.abs(v) < 1 ? 3 : Math.abs(v) < 10 ? 2 : 0);
+
+/** The last live estimate of a run, for the person. */
+async function estimate(number: number): Promise<void> {
+  const place = document.getElementById("person");
+  const found = await data(number);
+  const lines = linesOf(found?.live ?? []);
+  const last = lines[lines.length - 1];
+  if (!place || !last) return;
+  const cell = (name: string, told: [number | null, number | null], unit: string) =>
+    h("div", {}, name, h("b", {}, told[0] === null ? "–" : `${digits(told[0])} ${unit}`), told[1] === null ? "" : `± ${digits(told[1])}`);
+  place.replaceChildren(
+    h("h2", {}, "You, as the program sees you"),
+    h(
+      "div",
+      { class: "numbers" },
+      cell("Gain", last.gain, ""),
+      cell("Lead", last.lead_s, "s"),
+      cell("Delay", last.delay_s, "s"),
+      cell("Crossover", last.crossover_rad_s, "rad/s"),
+      cell("Phase margin", last.phase_margin_deg, "deg"),
+    ),
+  );
+}
+
+function runsTable(done: Done[], pick?: (number: number) => void): HTMLElement {
+  const row = (d: Done) =>
+    h(
+      "tr",
+      {},
+      h("td", {}, pick ? button(`Run ${d.number}`, () => pick(d.number), { class: "quiet" }) : String(d.number)),
+      h("td", {}, d.condition + (d.training ? " (training)" : "")),
+      h("td", {}, d.how === "finished" ? percent(d.score) : "ended early"),
+      h("td", {}, worth(d)),
+    );
+  const head = ["Run", "Task", "Score", "Worth"].map((text) => h("th", { scope: "col" }, text));
+  return h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ...head)), h("tbody", {}, ...done.map(row))));
+}
+
+function links(): HTMLElement {
+  const s = state as State;
+  const all = s.reports.map(([text, place]) => h("li", {}, h("a", { href: place, target: "_blank" }, text)));
+  return h(
+    "div",
+    {},
+    h("h2", {}, "Reports"),
+    s.reporting && h("p", { class: "soft" }, "Reports are being made; this takes a minute or two."),
+    all.length > 0 ? h("ul", {}, ...all) : !s.reporting && h("p", { class: "soft" }, "There are none yet."),
+  );
+}
+
+function finished(): void {
+  const s = state as State;
+  clearInterval(rest);
+  screen = "other";
+  const shownDone = s.done[s.done.length - 1];
+  show(
+    "",
+    h("h1", {}, s.calibrate ? "Calibrated" : "Done. Thank you."),
+    ...(s.calibration.length > 0
+      ? [h("table", {}, ...s.calibration.map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value)))),
+         h("p", { class: "soft" }, "This latency stands in every delay that is identified here. Screen and device add to it what only a light sensor can measure.")]
+      : []),
+    runsTable(s.done),
+    h("div", { id: "person" }),
+    !s.calibrate && links(),
+    h("p", {}, h("a", { class: "button quiet", href: "export.zip", download: `${(s.session ?? "session").replace("/", "_")}.zip` }, "All data as one archive")),
+  );
+  if (!s.calibrate && s.live !== "never" && shownDone) void estimate(shownDone.number);
+}
+
+// --- The experimenter ---
+
+let shownRun = 0;
+
+function experimenter(): void {
+  const s = state as State;
+  show(
+    "wide",
+    h("h1", {}, `${s.name}: ${s.session ?? "no session yet"}`),
+    h("p", { id: "status", "aria-live": "polite" }, s.running ? `Run ${s.running} goes on.` : s.phase === "finished" ? "The session is done." : `${s.done.length} runs ended, ${s.planned.length} planned.`),
+    h("p", { id: "waiting", class: "soft" }),
+    plotsCanvas,
+    s.done.length > 0 && runsTable(s.done),
+    s.phase === "finished" && links(),
+  );
+  livePlots.draw();
+}
+
+let due = false;
+addEventListener("resize", () => {
+  if (plotsCanvas.isConnected) livePlots.draw();
+});
+
+function live(number: number, line: LiveLine): void {
+  if (number !== shownRun) {
+    shownRun = number;
+    livePlots.begin(line.t, line.t + 30);
+  }
+  livePlots.add(line);
+  (globalThis as { hoidLive?: unknown }).hoidLive = { t: line.t, at: performance.timeOrigin + performance.now() };
+  const reason = document.getElementById("waiting");
+  if (reason) reason.textContent = line.waiting ? `No estimate yet: ${line.waiting}` : "";
+  if (due || !plotsCanvas.isConnected) return;
+  due = true;
+  requestAnimationFrame(() => {
+    due = false;
+    livePlots.draw();
+  });
+}
+
+// --- A session shown again ---
+
+let stopReplay = () => {};
+
+function replay(): void {
+  const s = state as State;
+  if (document.getElementById("replay")) return;
+  const place = h("div", { id: "replay" });
+  show("wide", h("h1", {}, `${s.name}: ${s.session}`), runsTable(s.done, (number) => void play(number, place)), place, links());
+  const first = s.done.find((d) => d.how === "finished") ?? s.done[0];
+  if (first) void play(first.number, place);
+}
+
+async function play(number: number, place: HTMLElement): Promise<void> {
+  stopReplay();
+  const run = await data(number);
+  if (!run) {
+    place.replaceChildren(h("p", {}, "This run has no data."));
+    return;
+  }
+  const canvas = h("canvas", { class: "replay", role: "img", "aria-label": "The task as it was shown" });
+  const curves = h("canvas", { class: "plots", role: "img", "aria-label": "The estimate over time" });
+  const slider = h("input", { type: "range", min: "0", max: String(run.e.length - 1), step: "1", value: "0", "aria-label": "Time" });
+  const speed = h("select", { "aria-label": "Speed" });
+  for (const factor of ["1", "2", "5", "10"]) speed.append(h("option", { value: factor, selected: factor === "2" }, `${factor} times as fast`));
+  const clock = h("p", { class: "soft" });
+  const toggle = button("Pause", () => {
+    going = !going;
+    toggle.textContent = going ? "Pause" : "Play";
+  });
+  place.replaceChildren(
+    h("h2", {}, `Run ${number}: ${run.condition.name}`),
+    h("p", {}, "Recomputed now: ", h("span", { class: run.verdict === "verified" ? "good" : "bad" }, run.verdict), run.reasons ? `: ${run.reasons}` : "."),
+    canvas,
+    slider,
+    clock,
+    toggle,
+    speed,
+    curves,
+  );
+  const surface = new Surface(canvas);
+  const estimates = new Plots(curves);
+  estimates.set(linesOf(run.live), run.start_s, run.start_s + run.e.length * run.step_s);
+  let going = true;
+  let over = false;
+  let at = 0;
+  let before = performance.now();
+  let drawn = 0;
+  let shownWidth = canvas.clientWidth;
+  slider.addEventListener("input", () => (at = Number(slider.value)));
+  stopReplay = () => (over = true);
+  const frame = (now: number) => {
+    if (over) return;
+    if (canvas.clientWidth !== shownWidth) {
+      shownWidth = canvas.clientWidth;
+      surface.fit();
+    }
+    requestAnimationFrame(frame);
+    if (going) at = Math.min(run.e.length - 1, at + ((now - before) / 1000 / run.step_s) * Number(speed.value));
+    before = now;
+    const k = Math.floor(at);
+    const f = (i: number) => run.f?.[Math.min(i, run.e.length - 1)] ?? 0;
+    surface.task(run.condition, { e: run.e[k], y: run.y[k], f: f(k), ahead: (ticks) => f(k + Math.round(ticks / 10)) });
+    slider.value = String(k);
+    const t = run.start_s + k * run.step_s;
+    clock.textContent = `${t.toFixed(1)} s${t < 0 ? " (run-in)" : ""}`;
+    if (now - drawn > 100) {
+      drawn = now;
+      estimates.draw(t);
+    }
+  };
+  requestAnimationFrame(frame);
+}

@@ -1,0 +1,129 @@
+// What page and server say to each other; wire.rs has the same.
+
+import type { Batch, InputMap, Phase, SimulatedOperator } from "./engine";
+
+export interface Condition {
+  name: string;
+  text: string;
+  display: "compensatory" | "pursuit" | "preview";
+  half_width: number;
+  preview_s: number;
+  full_deflection: number;
+  break_s: number;
+}
+
+export interface Done {
+  number: number;
+  condition: string;
+  training: boolean;
+  how: "finished" | "interrupted";
+  verdict: "verified" | "unverified";
+  reasons: string;
+  notes: string;
+  rms_e: number;
+  score: number;
+}
+
+export interface Measures {
+  frames: number;
+  frame_ms: number;
+  longest_frame_ms: number;
+  missed_frames: number;
+  input_hz: number;
+  input_age_ms: number;
+}
+
+export interface State {
+  type: "state";
+  phase: "consent" | "runs" | "finished" | "replay";
+  name: string;
+  consent: string;
+  live: "after" | "during" | "never";
+  calibrate: boolean;
+  session: string | null;
+  open: string[];
+  done: Done[];
+  planned: string[];
+  next: number | null;
+  condition: Condition | null;
+  training: boolean;
+  running: number | null;
+  reporting: boolean;
+  reports: [string, string][];
+  calibration: [string, string][];
+}
+
+export interface RunMessage {
+  type: "run";
+  number: number;
+  condition: Condition;
+  training: boolean;
+  run_in: number;
+  ticks: number;
+  phases: Phase[];
+  tables: [number, number, number];
+  operator: SimulatedOperator | null;
+}
+
+export type Told = [number | null, number | null];
+
+export interface LiveLine {
+  t: number;
+  gain: Told;
+  lead_s: Told;
+  omega_nm_rad_s: Told;
+  delay_s: Told;
+  crossover_rad_s: Told;
+  phase_margin_deg: Told;
+  changed_s: number | null;
+  waiting: string | null;
+}
+
+export type FromServer =
+  | State
+  | RunMessage
+  | { type: "verdict"; done: Done; measures: Measures }
+  | { type: "live"; number: number; line: LiveLine }
+  | { type: "refused"; words: string; elsewhere: boolean };
+
+export type FromPage =
+  | { type: "hello"; role: "person" | "experimenter"; browser: Record<string, string> }
+  | { type: "consent"; subject: string; agreed: boolean; cc0: boolean }
+  | { type: "resume"; session: string }
+  | { type: "next" }
+  | {
+      type: "begin";
+      number: number;
+      input: InputMap;
+      device: string;
+      clock: string;
+      refresh_ms: number;
+      zero_ms: number;
+    }
+  | { type: "batch"; number: number; batch: Batch }
+  | { type: "finish"; number: number; counted: Record<string, number> }
+  | { type: "abort"; number: number }
+  | { type: "reports" };
+
+export class Wire {
+  private readonly socket: WebSocket;
+
+  constructor(hear: (message: FromServer) => void, tables: (numbers: Float64Array) => void, gone: () => void) {
+    const base = location.pathname.replace(/experimenter$/, "");
+    this.socket = new WebSocket(`ws://${location.host}${base}socket`);
+    this.socket.binaryType = "arraybuffer";
+    this.socket.onmessage = (event) => {
+      if (typeof event.data === "string") hear(JSON.parse(event.data));
+      else tables(new Float64Array(event.data));
+    };
+    this.socket.onclose = gone;
+  }
+
+  opened(then: () => void): void {
+    this.socket.onopen = then;
+  }
+
+  say(message: FromPage): void {
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
+  }
+}

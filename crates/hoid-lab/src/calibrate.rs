@@ -1,0 +1,173 @@
+//! What the loop of page and events adds to a delay.
+//!
+//! A simulated operator takes the place of the person: in the page, in real time, seeing what is
+//! drawn and answering by events of a pointer. Its gain, neuromuscular system and delay tau are known;
+//! what `hoid identify` finds on the run beyond tau is the latency of page, frames and events, as it
+//! stands in every delay that is identified on this machine. It holds neither the screen (from the
+//! buffer to the light) nor the device (from the hand to the event): these need a sensor.
+
+use std::path::Path;
+
+use hoid_ident::family::{FamilyEstimator, OperatorPrior};
+use hoid_model::{Form, Record, SampleTime, held_system::HeldSystem, operator_family::Coordinate};
+use hoid_sim::RunSeed;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    LabError,
+    config::{Condition, Config, Signal},
+    plant::Plant,
+    session::Logged,
+    task::{TICK_S, Task},
+    utc,
+    wire::SimulatedOperator,
+};
+
+/// The simulated operator: gain, natural frequency in rad/s, damping, delay in ticks.
+const GAIN: f64 = 0.75;
+const OMEGA_RAD_S: f64 = 14.0;
+const ZETA: f64 = 0.5;
+const DELAY: usize = 150;
+/// Standard deviation of the remnant, and the time constant that makes it smooth, s.
+const REMNANT: f64 = 0.05;
+const REMNANT_S: f64 = 0.1;
+/// How well the neuromuscular system is known: to rounding of its hold.
+const KNOWN: f64 = 0.01;
+
+/// What a calibration found; kept in `calibration.toml` of the experiment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Calibration {
+    /// When, in UTC.
+    pub utc: String,
+    /// Latency of page, frames and events, s.
+    pub latency_s: f64,
+    /// Its standard error, s.
+    pub latency_se_s: f64,
+    /// Standard deviation of the time from an event to the tick that takes it, ms.
+    pub input_jitter_ms: f64,
+    /// Standard deviation of the time from frame to frame, ms.
+    pub frame_jitter_ms: f64,
+}
+
+impl Calibration {
+    /// In words for the page.
+    pub fn rows(&self) -> Vec<(String, String)> {
+        let ms = 1e3;
+        vec![
+            (
+                "Latency of page, frames and events".to_owned(),
+                format!("{:.1} ± {:.1} ms", ms * self.latency_s, ms * self.latency_se_s),
+            ),
+            (
+                "Jitter of the input".to_owned(),
+                format!("{:.2} ms", self.input_jitter_ms),
+            ),
+            (
+                "Jitter of the frames".to_owned(),
+                format!("{:.2} ms", self.frame_jitter_ms),
+            ),
+        ]
+    }
+}
+
+#[derive(Default, Serialize, Deserialize)]
+struct Kept {
+    #[serde(default)]
+    calibration: Vec<Calibration>,
+}
+
+/// The experiment of a calibration: one run of 40 s.
+pub fn config() -> Config {
+    Config {
+        name: "Calibration".to_owned(),
+        consent: "A simulated operator tracks for 45 s in place of a person. Keep this window in front and leave the \
+mouse alone."
+            .to_owned(),
+        condition: vec![Condition {
+            name: "calibration".to_owned(),
+            text: "A simulated operator tracks. Leave the mouse alone.".to_owned(),
+            target: Some(Signal::default()),
+            measurement_s: 40.0,
+            run_in_s: 5.0,
+            ..Condition::default()
+        }],
+        ..Config::default()
+    }
+}
+
+/// The operator, and the noise of a run at each tick.
+///
+/// # Errors
+/// [`LabError::Model`].
+pub fn operator(task: &Task, seed: u64) -> Result<(SimulatedOperator, Vec<f64>), LabError> {
+    let square = OMEGA_RAD_S * OMEGA_RAD_S;
+    let tick = SampleTime::new(TICK_S)?;
+    let system = HeldSystem::new(&[GAIN * square], &[1.0, 2.0 * ZETA * OMEGA_RAD_S, square], 0.0, tick)?;
+    let plant = Plant {
+        a: system.transition().to_vec(),
+        b: system.input().to_vec(),
+        c: system.output_row().to_vec(),
+        d: system.direct(),
+    };
+    let white = RunSeed {
+        seed,
+        cell: 0,
+        replication: 1,
+    }
+    .white_noise(task.ticks);
+    // First order, of that variance: n <- a n + sqrt(1 - a^2) sigma w.
+    let a = (-TICK_S / REMNANT_S).exp();
+    let (drive, mut n) = (REMNANT * (1.0 - a * a).sqrt(), 0.0);
+    let noise = white.iter().map(|w| {
+        n = a * n + drive * w;
+        n
+    });
+    Ok((SimulatedOperator { plant, delay: DELAY }, noise.collect()))
+}
+
+/// What the run of a calibration says; kept in the experiment.
+///
+/// # Errors
+/// [`LabError::Ident`] for a run that cannot be identified, those of files.
+pub fn judge(out: &Path, record: &Record, logged: &Logged) -> Result<Calibration, LabError> {
+    let measured = record.span(0.0, record.time_s(record.len()))?;
+    let estimator = FamilyEstimator {
+        forms: vec![Form::Gain],
+        prior: format!("omega_nm={OMEGA_RAD_S}:{KNOWN},zeta_nm={ZETA}:{KNOWN}").parse::<OperatorPrior>()?,
+        run_to_run: 0.0,
+        ..FamilyEstimator::default()
+    };
+    let fit = estimator.fit(&[measured])?;
+    let delay = fit.coordinate(0, Coordinate::Delay);
+    let (value, error) = delay.map_or((f64::NAN, f64::NAN), |d| {
+        (d.value, d.standard_error.unwrap_or(f64::NAN))
+    });
+    let waits: Vec<f64> = logged.events.iter().map(|event| event.tick - event.stamp_ms).collect();
+    let frames: Vec<f64> = logged
+        .frames
+        .windows(2)
+        .map(|two| two[1].drawn_ms - two[0].drawn_ms)
+        .collect();
+    let found = Calibration {
+        utc: utc::now(),
+        latency_s: value - DELAY as f64 * TICK_S,
+        latency_se_s: error,
+        input_jitter_ms: deviation(&waits),
+        frame_jitter_ms: deviation(&frames),
+    };
+    let path = out.join("calibration.toml");
+    let mut kept: Kept = match hoid_io::read_text(&path) {
+        Ok(text) => toml::from_str(&text).map_err(|error| LabError::damaged(&path, error.message()))?,
+        Err(_) => Kept::default(),
+    };
+    kept.calibration.push(found.clone());
+    let text = toml::to_string(&kept).map_err(|error| LabError::damaged(&path, error.to_string()))?;
+    hoid_io::write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
+    Ok(found)
+}
+
+fn deviation(values: &[f64]) -> f64 {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+}

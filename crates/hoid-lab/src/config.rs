@@ -1,0 +1,555 @@
+//! What an experiment is: `lab.toml`.
+//!
+//! ```toml
+//! name = "First try"
+//! order = "latin"                  # or "given"
+//!
+//! [[condition]]
+//! name = "rate"
+//! controlled_element = "4/s"
+//! display = "compensatory"         # or "pursuit", "preview"
+//! target = { rms = 1.5 }
+//! training = 1
+//!
+//! [[condition]]
+//! name = "change"
+//! scenario = "C4"                  # a condition of hoid, or a scenario file
+//! ```
+
+use std::path::Path;
+
+use hoid_model::{
+    ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, SampleTime,
+    family_scenario::{Excitation, MultiSine},
+    forcing::ForcingFunction,
+    scenario::Condition as Reference,
+    schedule::Schedule,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::{LabError, plant::MOST_STATES};
+
+/// An experiment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// Its name.
+    pub name: String,
+    /// What a person confirms before anything is measured.
+    pub consent: String,
+    /// The order of the conditions.
+    pub order: Order,
+    /// When the person sees the live estimate; the experimenter's window always shows it.
+    pub live: LiveFor,
+    /// The recursive method of the live estimate, as `hoid track --method` has it.
+    pub method: String,
+    /// What makes a run unverified besides a bit that differs.
+    pub limits: Limits,
+    /// What is tracked, and how often.
+    pub condition: Vec<Condition>,
+}
+
+/// The order of the conditions of a session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Order {
+    /// That of the person's row of a balanced Latin square.
+    #[default]
+    Latin,
+    /// That of the file.
+    Given,
+}
+
+/// When the person sees the live estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LiveFor {
+    /// After each run.
+    #[default]
+    After,
+    /// During the run too.
+    During,
+    /// Never.
+    Never,
+}
+
+/// How the task is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Display {
+    /// The error alone.
+    #[default]
+    Compensatory,
+    /// Target and output.
+    Pursuit,
+    /// Output, target, and the target to come.
+    Preview,
+}
+
+/// What makes a run unverified besides a bit that differs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Limits {
+    /// Longest time between two frames, ms.
+    pub frame_ms: f64,
+    /// Longest time from an input event to the tick that takes it, ms.
+    pub input_ms: f64,
+}
+
+impl Default for Limits {
+    /// 100 ms: six frames of 60 Hz, half of the delay of a person.
+    fn default() -> Self {
+        Self {
+            frame_ms: 100.0,
+            input_ms: 100.0,
+        }
+    }
+}
+
+/// One task.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Condition {
+    /// Letters and digits: it is part of file names.
+    pub name: String,
+    /// What the person reads before a run.
+    pub text: String,
+    /// A condition C1 to C6, or a scenario file; it stands in place of the keys from
+    /// `controlled_element` to `disturbance`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scenario: Option<String>,
+    /// The text of that file, kept with the session.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scenario_text: Option<String>,
+    /// What is controlled, in s.
+    pub controlled_element: String,
+    /// What it becomes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub last_element: Option<String>,
+    /// Time of the change, s from the start of the measurement.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub change_s: Option<f64>,
+    /// Rate of the change, 1/s.
+    pub rate_per_s: f64,
+    /// From one change to the next, back and forth, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interval_s: Option<f64>,
+    /// Measurement, s.
+    pub measurement_s: f64,
+    /// Run-in before it, s.
+    pub run_in_s: f64,
+    /// What the person follows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target: Option<Signal>,
+    /// What disturbs the controlled element at its input.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub disturbance: Option<Signal>,
+    /// Seed of the phases; each run draws its own from it.
+    pub seed: u64,
+    /// Half of the width of the display, in the unit of e.
+    pub half_width: f64,
+    /// How it is shown.
+    pub display: Display,
+    /// How far ahead a preview shows the target, s.
+    pub preview_s: f64,
+    /// u at full deflection of the device.
+    pub full_deflection: f64,
+    /// Training runs before the runs that count.
+    pub training: usize,
+    /// Runs that count.
+    pub runs: usize,
+    /// Rest after each run, s.
+    pub break_s: f64,
+}
+
+/// A sum of sines at prime multiples of one frequency, phases drawn by the seed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Signal {
+    /// Period, s: all sines fit it a whole number of times.
+    pub period_s: f64,
+    /// The largest multiple of one over the period.
+    pub largest: u32,
+    /// Root mean square.
+    pub rms: f64,
+}
+
+impl Default for Signal {
+    /// 20 s, up to the 31st multiple, 1.5.
+    fn default() -> Self {
+        let usual = MultiSine::default();
+        Self {
+            period_s: usual.period_s,
+            largest: usual.largest,
+            rms: 1.5,
+        }
+    }
+}
+
+impl Signal {
+    fn excitation(&self) -> Result<Excitation, ModelError> {
+        MultiSine {
+            period_s: self.period_s,
+            largest: self.largest,
+            rms: self.rms,
+        }
+        .excitation()
+    }
+}
+
+impl Default for Condition {
+    /// A rate control of 4/s, compensatory, 80 s after 10 s of run-in.
+    fn default() -> Self {
+        Self {
+            name: "rate".to_owned(),
+            text: "The farther you move from the middle, the faster it goes; in the middle it stays where it is."
+                .to_owned(),
+            scenario: None,
+            scenario_text: None,
+            controlled_element: "4/s".to_owned(),
+            last_element: None,
+            change_s: None,
+            rate_per_s: 100.0,
+            interval_s: None,
+            measurement_s: 80.0,
+            run_in_s: 10.0,
+            target: None,
+            disturbance: None,
+            seed: 1,
+            half_width: 6.0,
+            display: Display::Compensatory,
+            preview_s: 1.0,
+            full_deflection: 3.0,
+            training: 0,
+            runs: 1,
+            break_s: 10.0,
+        }
+    }
+}
+
+/// The recursive method of the live estimate: it needs no start fit, so that there is something to see
+/// from the first seconds on.
+const USUAL_METHOD: &str = "population";
+
+/// What a person confirms where the file says nothing else.
+const CONSENT: &str = "You will follow a moving target by hand for a few short runs. The program stores where your \
+hand was, what was on the screen and when, under a made-up name, on this computer only. It stores no name, no picture \
+and no sound. You may stop at any time by the key Escape or by closing the window; what was stored can be deleted with \
+its folder. Do not take part if moving patterns make you unwell.";
+
+impl Default for Config {
+    /// A try of two minutes: a short training run, then one run that counts.
+    fn default() -> Self {
+        Self {
+            name: "First try".to_owned(),
+            consent: CONSENT.to_owned(),
+            order: Order::default(),
+            live: LiveFor::default(),
+            method: USUAL_METHOD.to_owned(),
+            limits: Limits::default(),
+            condition: vec![Condition {
+                target: Some(Signal::default()),
+                ..Condition::default()
+            }],
+        }
+    }
+}
+
+/// The task of a condition: what of a scenario is not the person.
+#[derive(Debug, Clone)]
+pub enum Course {
+    /// Of one of the conditions C1 to C6, or near one.
+    Reference(Box<hoid_model::scenario::ResolvedScenario>),
+    /// Of any controlled element.
+    Family(Box<hoid_model::family_scenario::ResolvedFamilyScenario>),
+}
+
+impl Config {
+    /// Reads and checks a configuration; scenario files are named from its directory.
+    ///
+    /// # Errors
+    /// [`LabError::Config`] with the place, what was found and expected.
+    pub fn read(path: &Path) -> Result<Self, LabError> {
+        let text = hoid_io::read_text(path)?;
+        let place = path.display().to_string();
+        let mut config: Self = toml::from_str(&text).map_err(|error| {
+            let line = error
+                .span()
+                .map_or(1, |span| 1 + text[..span.start].matches('\n').count());
+            LabError::Config {
+                place: format!("{place}, line {line}"),
+                reason: hoid_io::printable(error.message().trim_end()),
+            }
+        })?;
+        let directory = path.parent().unwrap_or_else(|| Path::new("."));
+        for condition in &mut config.condition {
+            condition.load(directory)?;
+        }
+        config.check(&place)?;
+        Ok(config)
+    }
+
+    /// Checks everything that can be known before there is a person.
+    ///
+    /// # Errors
+    /// [`LabError::Config`].
+    pub fn check(&self, place: &str) -> Result<(), LabError> {
+        let wrong = |reason: String| {
+            Err(LabError::Config {
+                place: place.to_owned(),
+                reason,
+            })
+        };
+        if self.condition.is_empty() {
+            return wrong("it has no [[condition]], expected at least one".to_owned());
+        }
+        if self.consent.trim().is_empty() {
+            return wrong("consent is empty, expected the text that a person confirms".to_owned());
+        }
+        if let Err(error) = self.method.parse::<hoid_track::Method>() {
+            return wrong(format!("method: {error}"));
+        }
+        for (name, ms) in [
+            ("limits.frame_ms", self.limits.frame_ms),
+            ("limits.input_ms", self.limits.input_ms),
+        ] {
+            if !(1.0..=10_000.0).contains(&ms) {
+                return wrong(format!("{name} is {ms}, expected 1 to 10000 ms"));
+            }
+        }
+        for (k, condition) in self.condition.iter().enumerate() {
+            if self.condition[..k].iter().any(|other| other.name == condition.name) {
+                return wrong(format!(
+                    "two conditions are called {:?}: give each its own name",
+                    condition.name
+                ));
+            }
+            condition.check().map_err(|error| LabError::Config {
+                place: format!("{place}, condition {:?}", condition.name),
+                reason: error.to_string(),
+            })?;
+        }
+        Ok(())
+    }
+
+    /// As TOML.
+    ///
+    /// # Errors
+    /// [`LabError::Config`], which no configuration that was read gives.
+    pub fn text(&self) -> Result<String, LabError> {
+        toml::to_string(self).map_err(|error| LabError::Config {
+            place: "the configuration".to_owned(),
+            reason: error.to_string(),
+        })
+    }
+}
+
+/// Longest run, s.
+const LONGEST_S: f64 = 1800.0;
+
+impl Condition {
+    /// Takes in the text of its scenario file.
+    fn load(&mut self, directory: &Path) -> Result<(), LabError> {
+        let Some(name) = &self.scenario else { return Ok(()) };
+        if self.scenario_text.is_some() {
+            return Ok(());
+        }
+        self.scenario_text = Some(match name.parse::<Reference>() {
+            Ok(condition) => format!("condition = {:?}\n", condition.name()),
+            Err(_) => hoid_io::read_text(&directory.join(name))?,
+        });
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), LabError> {
+        let wrong = |reason: String| Err(LabError::Message(reason));
+        let name = &self.name;
+        if name.is_empty() || name.len() > 40 || !name.bytes().all(|b| b.is_ascii_alphanumeric()) {
+            return wrong(format!(
+                "name is {name:?}, expected 1 to 40 letters and digits: it is part of file names"
+            ));
+        }
+        if !(1..=100).contains(&self.runs) || self.training > 100 {
+            return wrong(format!(
+                "runs = {} and training = {}, expected 1 to 100 runs and at most 100 for training",
+                self.runs, self.training
+            ));
+        }
+        for (key, value, least, most) in [
+            ("half_width", self.half_width, 1e-6, 1e6),
+            ("preview_s", self.preview_s, 0.05, 10.0),
+            ("break_s", self.break_s, 0.0, 3600.0),
+        ] {
+            if !(least..=most).contains(&value) {
+                return wrong(format!("{key} is {value}, expected {least} to {most}"));
+            }
+        }
+        if !(self.full_deflection.is_finite() && self.full_deflection != 0.0) {
+            return wrong(format!(
+                "full_deflection is {}, expected a number other than zero",
+                self.full_deflection
+            ));
+        }
+        let course = self.course()?;
+        let (run_in, measured) = course.times_s();
+        if run_in + measured > LONGEST_S {
+            return wrong(format!(
+                "a run lasts {} s, expected at most {LONGEST_S}",
+                run_in + measured
+            ));
+        }
+        for (k, s) in [run_in, measured].into_iter().enumerate() {
+            if ((s * 100.0).round() / 100.0 - s).abs() > 1e-9 {
+                let key = ["run_in_s", "measurement_s"][k];
+                return wrong(format!("{key} is {s}, expected whole hundredths of a second"));
+            }
+        }
+        let states = course.element_at(0.0)?.den().len() - 1;
+        if states > MOST_STATES {
+            return wrong(format!(
+                "the controlled element has {states} states, expected at most {MOST_STATES}"
+            ));
+        }
+        if course.excitations().iter().all(|e| e.function.sinusoids().is_empty()) {
+            return wrong(
+                "neither a target nor a disturbance: the person would have nothing to do; give one".to_owned(),
+            );
+        }
+        Ok(())
+    }
+
+    /// Its task.
+    ///
+    /// # Errors
+    /// [`LabError::Scenario`], [`LabError::Model`].
+    pub fn course(&self) -> Result<Course, LabError> {
+        if let Some(text) = &self.scenario_text {
+            let name = self.scenario.as_deref().unwrap_or(&self.name);
+            return Ok(match hoid_io::parse_any_scenario(text, name, &self.name)? {
+                hoid_io::AnyScenario::Reference(scenario) => Course::Reference(Box::new(scenario.resolve()?)),
+                hoid_io::AnyScenario::Family(scenario) => Course::Family(Box::new(scenario.resolve()?)),
+            });
+        }
+        let element: ContinuousTransferFunction = self.controlled_element.parse()?;
+        let state = |controlled_element| -> Result<FamilyState, ModelError> {
+            Ok(FamilyState {
+                // The person sits before the screen; the scenario asks for someone.
+                operator: FamilyOperator::new(Form::Gain, false, &[1.0, 0.2])?,
+                controlled_element,
+            })
+        };
+        let mut scenario = FamilyScenario::new(state(element)?, SampleTime::HUNDREDTH);
+        scenario.name.clone_from(&self.name);
+        (scenario.measurement_s, scenario.run_in_s) = (self.measurement_s, self.run_in_s);
+        if let Some(last) = &self.last_element {
+            scenario.last = state(last.parse()?)?;
+            let (rate_per_s, midpoint_s) = (self.rate_per_s, self.change_s.unwrap_or(self.measurement_s / 2.0));
+            scenario.schedule = match self.interval_s {
+                Some(interval_s) => Schedule::Alternating {
+                    rate_per_s,
+                    midpoint_s,
+                    interval_s,
+                },
+                None => Schedule::Sigmoid { rate_per_s, midpoint_s },
+            };
+        }
+        let excitation =
+            |signal: &Option<Signal>| signal.as_ref().map_or(Ok(Excitation::default()), Signal::excitation);
+        scenario.target = excitation(&self.target)?;
+        scenario.disturbance = excitation(&self.disturbance)?;
+        Ok(Course::Family(Box::new(scenario.resolve()?)))
+    }
+}
+
+impl Course {
+    /// Run-in and measurement, s.
+    pub fn times_s(&self) -> (f64, f64) {
+        match self {
+            Self::Reference(course) => (course.scenario().run_in_s, course.scenario().measurement_s),
+            Self::Family(course) => (course.scenario().run_in_s, course.scenario().measurement_s),
+        }
+    }
+
+    /// What is controlled at a time from the start of the measurement.
+    pub fn element_at(&self, t_s: f64) -> Result<ContinuousTransferFunction, ModelError> {
+        match self {
+            Self::Reference(course) => course.parameters_at(t_s).controlled_element.transfer_function(),
+            Self::Family(course) => Ok(course.state_at(t_s)?.controlled_element),
+        }
+    }
+
+    /// Target and disturbance.
+    pub fn excitations(&self) -> [Excitation; 2] {
+        let fixed = |function: &ForcingFunction| Excitation {
+            function: function.clone(),
+            random_phases: false,
+        };
+        match self {
+            Self::Reference(course) => [fixed(&course.scenario().forcing), Excitation::default()],
+            Self::Family(course) => [course.scenario().target.clone(), course.scenario().disturbance.clone()],
+        }
+    }
+
+    /// Where the leading gain stands.
+    pub fn realisation(&self) -> hoid_model::scenario::Realisation {
+        match self {
+            Self::Reference(course) => course.scenario().realisation,
+            Self::Family(course) => course.scenario().realisation,
+        }
+    }
+
+    /// The time of the change, s, where there is one.
+    pub fn change_s(&self) -> Option<f64> {
+        match self {
+            Self::Reference(course) => course.scenario().schedule.change_s(),
+            Self::Family(course) => course.scenario().schedule.change_s(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn the_usual_experiment_is_sound_and_survives_its_text() {
+        let config = Config::default();
+        config.check("usual").unwrap();
+        let again: Config = toml::from_str(&config.text().unwrap()).unwrap();
+        assert_eq!(again, config);
+    }
+
+    #[test]
+    fn what_cannot_be_run_is_refused_by_name() {
+        let refused = |change: fn(&mut Config)| {
+            let mut config = Config::default();
+            change(&mut config);
+            config.check("lab.toml").unwrap_err().to_string()
+        };
+        assert!(refused(|c| c.condition.clear()).contains("no [[condition]]"));
+        assert!(refused(|c| c.consent = " ".to_owned()).contains("consent"));
+        assert!(refused(|c| c.method = "guess".to_owned()).contains("method"));
+        assert!(refused(|c| c.condition[0].name = "a/b".to_owned()).contains("letters and digits"));
+        assert!(refused(|c| c.condition[0].target = None).contains("nothing to do"));
+        assert!(refused(|c| c.condition[0].measurement_s = 3000.0).contains("1800"));
+        assert!(refused(|c| c.condition[0].full_deflection = 0.0).contains("full_deflection"));
+        assert!(refused(|c| c.condition.push(c.condition[0].clone())).contains("two conditions"));
+        assert!(refused(|c| c.condition[0].controlled_element = "4/s(s".to_owned()).contains("transfer function"));
+        assert!(refused(|c| c.limits.frame_ms = f64::NAN).contains("frame_ms"));
+    }
+
+    #[test]
+    fn conditions_of_hoid_are_taken_by_name() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("lab.toml");
+        std::fs::write(&path, "[[condition]]\nname = \"c4\"\nscenario = \"C4\"\n").unwrap();
+        let config = Config::read(&path).unwrap();
+        let course = config.condition[0].course().unwrap();
+        assert_eq!(course.times_s(), (10.0, 81.92));
+        assert_eq!(course.change_s(), Some(40.96));
+        std::fs::write(&path, "nme = \"x\"\n").unwrap();
+        let said = Config::read(&path).unwrap_err().to_string();
+        assert!(said.contains("line 1") && said.contains("nme"), "{said}");
+    }
+}

@@ -1,0 +1,96 @@
+//! Why an experiment cannot go on.
+
+use std::path::Path;
+
+use hoid_ident::IdentError;
+use hoid_io::{IoError, ScenarioFileError};
+use hoid_model::ModelError;
+use hoid_study::StudyError;
+use thiserror::Error;
+
+/// Why an experiment cannot be set up, run, checked or shown.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum LabError {
+    /// A configuration that contradicts itself or cannot be read.
+    #[error("{place}: {reason}")]
+    Config {
+        /// The file and what of it.
+        place: String,
+        /// What was found, what was expected and the remedy.
+        reason: String,
+    },
+    /// A message of a page that is not one.
+    #[error("a message of the page was refused: {0}")]
+    Message(String),
+    /// A step at the wrong time.
+    #[error("{0}")]
+    Order(String),
+    /// A file of a session that the system does not give or take.
+    #[error("{file}: {source}; check the place and the permissions")]
+    File {
+        /// The file.
+        file: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// A file of a session that is not as it was written.
+    #[error("{file}: {reason}")]
+    Damaged {
+        /// The file.
+        file: String,
+        /// What was found and expected.
+        reason: String,
+    },
+    /// No port, or no random numbers.
+    #[error("the server cannot start: {0}")]
+    Server(String),
+    /// A page of results that could not be made.
+    #[error("{0}")]
+    Report(String),
+    /// A file of a recording or a table.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// A scenario file.
+    #[error(transparent)]
+    Scenario(Box<ScenarioFileError>),
+    /// A number that has no meaning.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// An estimate that cannot be made.
+    #[error(transparent)]
+    Ident(Box<IdentError>),
+    /// A manifest of a group.
+    #[error(transparent)]
+    Study(Box<StudyError>),
+}
+
+impl LabError {
+    /// What the system says of a file.
+    pub(crate) fn file(path: &Path, source: std::io::Error) -> Self {
+        Self::File {
+            file: path.display().to_string(),
+            source,
+        }
+    }
+
+    pub(crate) fn damaged(path: &Path, reason: impl Into<String>) -> Self {
+        Self::Damaged {
+            file: path.display().to_string(),
+            reason: reason.into(),
+        }
+    }
+}
+
+macro_rules! boxed {
+    ($($error:ident => $variant:ident),+) => {
+        $(impl From<$error> for LabError {
+            fn from(error: $error) -> Self {
+                Self::$variant(Box::new(error))
+            }
+        })+
+    };
+}
+
+// Large ones are kept apart, so that a result without an error stays small.
+boxed! { ScenarioFileError => Scenario, IdentError => Ident, StudyError => Study }

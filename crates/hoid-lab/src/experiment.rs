@@ -1,0 +1,161 @@
+//! What stands beside the sessions of an experiment: what it is, who took part, and the manifest of
+//! `hoid group`.
+
+use std::{collections::BTreeMap, path::Path};
+
+use hoid_study::group::{ConditionSettings, MANIFEST, Manifest, ReadSettings, RunEntry};
+use serde_json::json;
+
+use crate::{
+    LabError,
+    config::{Condition, Config},
+    session::{How, Session},
+};
+
+const README: &str = "\
+A tracking experiment by `hoid lab`.
+
+sub-P01/ses-01/             one session of one person, who has a made-up name
+  lab.toml                  the experiment, its order, browser and screen
+  runs.csv                  each run that ended: verified, or unverified and why
+  ..._run.json              the task of a run and its settings, written before it began
+  ..._forcing.parquet       target and disturbance at each tick of 1 ms
+  ..._ticks.csv             u (hand) and e (error) at each tick
+  ..._events.csv            input events: the tick that took them, their own time stamp, when the page
+                            had them (ms from tick 0), what the device said
+  ..._frames.csv            frames: their time, when they were drawn (ms from tick 0), the tick and the
+                            error that they show
+  ..._live.csv              the estimate while the run went on
+  ..._end.json              how the run ended, SHA-256 of ticks, events and frames
+  ..._beh.parquet           the run at 100 Hz: t, e, u, f_t (target), d (disturbance), y (output),
+                            e_shown (error on the screen)
+
+Check and see a session again:  hoid lab --replay sub-P01/ses-01
+One run:                        hoid identify sub-P01/ses-01/..._beh.parquet --from 0
+All people:                     hoid group group.toml --out results
+
+Names follow BIDS where it has names; it has none for tracking experiments, so that a validator of
+BIDS need not accept the folder.
+";
+
+/// Writes the texts, where there are none yet.
+///
+/// # Errors
+/// [`LabError::Io`].
+pub fn describe(out: &Path, config: &Config) -> Result<(), LabError> {
+    let description = json!({
+        "Name": config.name,
+        "BIDSVersion": "1.10.0",
+        "DatasetType": "raw",
+        "License": "",
+        "GeneratedBy": [{"Name": "hoid lab", "Version": env!("CARGO_PKG_VERSION")}],
+    });
+    once(&out.join("README"), README)?;
+    once(&out.join("dataset_description.json"), &format!("{description:#}\n"))
+}
+
+fn once(path: &Path, text: &str) -> Result<(), LabError> {
+    if path.exists() { Ok(()) } else { write(path, text) }
+}
+
+fn write(path: &Path, text: &str) -> Result<(), LabError> {
+    hoid_io::write_atomically(path, |file| file.write_all(text.as_bytes()))?;
+    Ok(())
+}
+
+/// Writes who took part.
+///
+/// # Errors
+/// Those of files.
+pub fn list(out: &Path) -> Result<(), LabError> {
+    let mut people: BTreeMap<String, (usize, String)> = BTreeMap::new();
+    for folder in Session::folders(out)? {
+        let facts = Session::read(&folder)?.facts;
+        let entry = people.entry(facts.subject).or_default();
+        entry.0 += 1;
+        entry.1 = facts.licence;
+    }
+    let mut text = "participant_id\tsessions\tlicense\n".to_owned();
+    for (subject, (sessions, licence)) in people {
+        let licence = if licence.is_empty() { "n/a" } else { &licence };
+        text.push_str(&format!("sub-{subject}\t{sessions}\t{licence}\n"));
+    }
+    write(&out.join("participants.tsv"), &text)
+}
+
+/// Writes the manifest of all runs that were finished; those that are unverified or training do not
+/// count. Nothing while none counts.
+///
+/// # Errors
+/// Those of files.
+pub fn manifest(out: &Path) -> Result<(), LabError> {
+    let mut runs = Vec::new();
+    let mut conditions: BTreeMap<String, Condition> = BTreeMap::new();
+    for folder in Session::folders(out)? {
+        let session = Session::read(&folder)?;
+        let facts = &session.facts;
+        for done in session.done.iter().filter(|done| done.how == How::Finished) {
+            let path = session.stem(&done.condition, done.number).file("beh.parquet");
+            if !path.exists() {
+                continue;
+            }
+            runs.push(RunEntry {
+                file: path.strip_prefix(out).unwrap_or(&path).to_owned(),
+                then: None,
+                subject: facts.subject.clone(),
+                condition: done.condition.clone(),
+                run: format!("{}-{}", facts.session, done.number),
+                counts: !done.training && done.verdict == "verified",
+            });
+            let own = facts
+                .config
+                .condition
+                .iter()
+                .find(|condition| condition.name == done.condition);
+            if let Some(own) = own {
+                conditions.insert(own.name.clone(), own.clone());
+            }
+        }
+    }
+    if !runs.iter().any(|run| run.counts) {
+        return Ok(());
+    }
+    let manifest = Manifest {
+        name: out
+            .file_name()
+            .map_or("lab".to_owned(), |name| name.to_string_lossy().into_owned()),
+        read: ReadSettings {
+            from_s: Some(0.0),
+            ..ReadSettings::default()
+        },
+        prepare: Default::default(),
+        analysis: Default::default(),
+        conditions: conditions
+            .iter()
+            .map(|(name, own)| Ok((name.clone(), known(own)?)))
+            .collect::<Result<_, LabError>>()?,
+        runs,
+    };
+    write(&out.join(MANIFEST), &manifest.text())
+}
+
+/// What is known of a condition.
+fn known(condition: &Condition) -> Result<ConditionSettings, LabError> {
+    let course = condition.course()?;
+    let lines = course
+        .excitations()
+        .map(|excitation| !excitation.function.sinusoids().is_empty());
+    Ok(ConditionSettings {
+        controlled_element: match course.change_s() {
+            None => Some(course.element_at(0.0)?.to_string()),
+            Some(_) => None,
+        },
+        excitation: match lines {
+            [true, _] => Some("f_t".to_owned()),
+            [false, true] => Some("d".to_owned()),
+            _ => None,
+        },
+        change_s: course.change_s(),
+        ..ConditionSettings::default()
+    })
+}

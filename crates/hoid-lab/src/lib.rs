@@ -1,0 +1,45 @@
+//! A tracking experiment in the browser, identified while it runs, that proves itself.
+//!
+//! The page computes the controlled element at 1 ms from tables that are made here, logs every input
+//! event, tick and frame, and sends them in batches. Here they are appended to the folder of the
+//! session, followed by the tracker, and behind the run recomputed to the last bit.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`config`] | [`Config`](config::Config): the experiment, `lab.toml` |
+//! | [`order`] | the order of the runs, by Latin squares |
+//! | [`task`] | [`Task`](task::Task): a run as tables, and its recomputation |
+//! | [`plant`] | the arithmetic of a tick, twin of the page's |
+//! | [`session`] | the folder: what is appended, what is written at once, how a session goes on |
+//! | [`verify`] | [`check`](verify::check): verified, or unverified and why |
+//! | [`record`] | a run as a record for all commands of hoid |
+//! | [`live`] | the estimate while the run goes on |
+//! | [`wire`] | what page and server say to each other |
+//! | [`lab`] | [`Lab`]: the experiment as its pages see it |
+//! | [`server`] | [`Server`]: HTTP and sockets on 127.0.0.1 |
+//! | `experiment`, `export`, `replay`, `reports` | what stands beside the sessions; archives; runs shown again; pages |
+//! | [`calibrate`] | what the loop of page and events adds to a delay |
+
+pub mod calibrate;
+pub mod config;
+mod error;
+mod experiment;
+mod export;
+pub mod lab;
+pub mod live;
+pub mod order;
+pub mod plant;
+pub mod record;
+mod replay;
+mod reports;
+pub mod server;
+pub mod session;
+pub mod task;
+mod utc;
+pub mod verify;
+pub mod wire;
+
+pub use config::Config;
+pub use error::LabError;
+pub use lab::{Lab, Mode};
+pub use server::Server;

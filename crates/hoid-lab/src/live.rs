@@ -1,0 +1,331 @@
+//! The estimate while the run goes on.
+//!
+//! A recursion of `hoid track` takes e and u of every tenth tick on a thread of its own, fed by the
+//! batches of the page; nothing of it is in the loop. With the controlled element P known, the open
+//! loop is `L = Y P`, the crossover frequency the lowest with `|L| = 1` and the phase margin there
+//! `180 deg + arg L`. With `d ln Y = g + j p` of covariance matrix S, the first order is
+//!
+//! `d omega_c = -g / s_g`,  `d phi_m = p - (s_p/s_g) g`,
+//!
+//! `s_g` and `s_p` the slopes of `ln |L|` and `arg L` along omega.
+
+use std::{
+    fs::OpenOptions,
+    io::Write as _,
+    path::PathBuf,
+    sync::mpsc::{Receiver, Sender, channel},
+    thread,
+};
+
+use hoid_ident::order_selection::{Criterion, default_operator_ranges};
+use hoid_model::{Complex64, ContinuousTransferFunction, SampleTime, uncertainty::Estimate};
+use hoid_track::{Live, Method, Response, Sample, TrackOptions, TrackPlan};
+use serde::Serialize;
+
+use crate::{
+    LabError,
+    config::Course,
+    session::Stem,
+    task::{TICK_S, TICKS_PER_SAMPLE},
+};
+
+/// Warm-up of methods that need one, s.
+const WARM_UP_S: f64 = 20.0;
+/// Delay that a method begins at, samples of 10 ms.
+const USUAL_NK: usize = 21;
+/// Where the crossover is looked for, rad/s, and in how many steps of one factor.
+const CROSSOVERS: (f64, f64, usize) = (0.3, 15.0, 40);
+/// Relative step of the slopes.
+const SLOPE: f64 = 1e-3;
+
+/// A number with its standard error; none where it is not known.
+type Told = (Option<f64>, Option<f64>);
+
+/// The estimate at an instant.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct LiveLine {
+    /// Time from the start of the measurement, s.
+    pub t: f64,
+    /// Gain K_e.
+    pub gain: Told,
+    /// Lead T_L, s.
+    pub lead_s: Told,
+    /// Natural frequency of the neuromuscular system, rad/s.
+    pub omega_nm_rad_s: Told,
+    /// Delay, s.
+    pub delay_s: Told,
+    /// Crossover frequency, rad/s.
+    pub crossover_rad_s: Told,
+    /// Phase margin, deg.
+    pub phase_margin_deg: Told,
+    /// When the person changed, s, where a change was declared at this instant.
+    pub changed_s: Option<f64>,
+    /// Why there is no estimate yet.
+    pub waiting: Option<String>,
+}
+
+/// Samples on their way to the estimate.
+pub type Samples = Vec<Sample>;
+
+/// The recursion of one run.
+pub struct LiveRun {
+    live: Live,
+    plan: TrackPlan,
+    course: Course,
+    t_s: f64,
+    ts: SampleTime,
+}
+
+impl LiveRun {
+    /// Of a method by its name, for a task.
+    ///
+    /// # Errors
+    /// [`LabError::Ident`] for a method that cannot run live.
+    pub fn new(method: &str, course: Course) -> Result<Self, LabError> {
+        let ts = SampleTime::new(TICK_S * TICKS_PER_SAMPLE as f64)?;
+        let method: Method = method.parse()?;
+        let options = TrackOptions::usual(method, USUAL_NK);
+        let ranges = default_operator_ranges(options.structure, ts);
+        let plan = TrackPlan::new(options, ranges, Criterion::Bic, ts)?;
+        Ok(Self {
+            live: Live::new(plan.options(), (WARM_UP_S / ts.s()).round() as usize, ts)?,
+            plan,
+            t_s: -course.times_s().0,
+            course,
+            ts,
+        })
+    }
+
+    /// Takes samples, and says how it stands behind the last of them.
+    pub fn take(&mut self, samples: &[Sample]) -> LiveLine {
+        let mut changed_s = None;
+        for sample in samples {
+            let plan = &self.plan;
+            self.live.update(*sample, &|record| plan.choose(record, &|| ()));
+            if let Live::Tracking(tracker) = &self.live
+                && let Some(change) = tracker.change()
+            {
+                changed_s = Some(self.t_s - change.seconds_ago);
+            }
+            self.t_s += self.ts.s();
+        }
+        let mut line = LiveLine {
+            t: self.t_s,
+            changed_s,
+            ..LiveLine::default()
+        };
+        let tracker = match &self.live {
+            Live::Tracking(tracker) => tracker,
+            Live::Collecting(warm_up) => {
+                let left = warm_up.needed.saturating_sub(warm_up.collected) as f64 * self.ts.s();
+                line.waiting = Some(format!("the first {WARM_UP_S} s are collected, {left:.0} s to go"));
+                return line;
+            }
+        };
+        match tracker.operator() {
+            Ok(operator) => {
+                line.gain = told(operator.k_e);
+                line.lead_s = told(operator.t_l_s);
+                line.omega_nm_rad_s = told(operator.omega_nm_rad_s);
+                line.delay_s = told(operator.tau_e_s);
+            }
+            Err(reason) => line.waiting = Some(reason.to_string()),
+        }
+        if let Ok(element) = self.course.element_at(self.t_s)
+            && let Some((crossover, margin)) = crossover(&|omega| tracker.response(omega), &element)
+        {
+            (line.crossover_rad_s, line.phase_margin_deg) = (told(crossover), told(margin));
+        }
+        line
+    }
+}
+
+fn told(estimate: Estimate) -> Told {
+    let finite = |v: f64| v.is_finite().then_some(v);
+    (finite(estimate.value), estimate.standard_error.and_then(finite))
+}
+
+/// Crossover frequency in rad/s and phase margin in degrees, to first order; none where `|L|` does
+/// not cross one from above.
+fn crossover(
+    response: &dyn Fn(f64) -> Option<Response>,
+    element: &ContinuousTransferFunction,
+) -> Option<(Estimate, Estimate)> {
+    let open = |omega: f64| -> Option<Complex64> {
+        let [re, im] = response(omega)?.value;
+        Some(Complex64::new(re, im) * element.response(omega))
+    };
+    let (low, high, steps) = CROSSOVERS;
+    let at = |k: usize| low * (high / low).powf(k as f64 / steps as f64);
+    let mut above = None;
+    let mut found = None;
+    for k in 0..=steps {
+        let omega = at(k);
+        let gain = open(omega)?.norm();
+        if let (Some(last), true) = (above, gain <= 1.0) {
+            found = Some((last, omega));
+            break;
+        }
+        above = (gain > 1.0).then_some(omega);
+    }
+    let (mut from, mut to) = found?;
+    for _ in 0..30 {
+        let middle = (from + to) / 2.0;
+        if open(middle)?.norm() > 1.0 {
+            from = middle;
+        } else {
+            to = middle;
+        }
+    }
+    let omega = (from + to) / 2.0;
+    let own = response(omega)?;
+    let ratio = open(omega * (1.0 + SLOPE))? / open(omega * (1.0 - SLOPE))?;
+    let width = 2.0 * SLOPE * omega;
+    let (slope_gain, slope_phase) = (ratio.norm().ln() / width, ratio.arg() / width);
+    // d ln Y of d Re, d Im: (dRe + j dIm)/Y.
+    let [re, im] = own.value;
+    let square = re * re + im * im;
+    let (gain, phase) = ([re / square, im / square], [-im / square, re / square]);
+    let covariance = |a: [f64; 2], b: [f64; 2]| {
+        let c = &own.covariance;
+        a[0] * (c[0][0] * b[0] + c[0][1] * b[1]) + a[1] * (c[1][0] * b[0] + c[1][1] * b[1])
+    };
+    let r = slope_phase / slope_gain;
+    let margin = [phase[0] - r * gain[0], phase[1] - r * gain[1]];
+    let degrees = 180.0 / std::f64::consts::PI;
+    let mut phi = 180.0 + open(omega)?.arg() * degrees;
+    if phi > 180.0 {
+        phi -= 360.0;
+    }
+    Some((
+        Estimate::with_variance(omega, covariance(gain, gain) / (slope_gain * slope_gain)),
+        Estimate::with_variance(phi, degrees * degrees * covariance(margin, margin)),
+    ))
+}
+
+/// Starts the thread of a run: it takes samples until its sender is dropped, tells each line and
+/// appends it to `live.csv`.
+pub fn start(mut run: LiveRun, stem: &Stem, tell: impl Fn(&LiveLine) + Send + 'static) -> Sender<Samples> {
+    let (sender, receiver): (Sender<Samples>, Receiver<Samples>) = channel();
+    let path: PathBuf = stem.file("live.csv");
+    thread::spawn(move || {
+        let mut file = OpenOptions::new().append(true).create(true).open(&path).ok();
+        let mut write = |text: &str| {
+            // The estimate is made again from the record at any time: a disk that is full is the
+            // business of the log.
+            if let Some(file) = &mut file {
+                let _ = file.write_all(text.as_bytes());
+            }
+        };
+        write(HEADER);
+        while let Ok(mut samples) = receiver.recv() {
+            // What waits besides is taken at once.
+            while let Ok(more) = receiver.try_recv() {
+                samples.extend(more);
+            }
+            let line = run.take(&samples);
+            write(&row(&line));
+            tell(&line);
+        }
+    });
+    sender
+}
+
+const HEADER: &str = "t,K_e,K_e_se,T_L,T_L_se,omega_nm,omega_nm_se,tau_e,tau_e_se,crossover_rad_s,\
+crossover_rad_s_se,phase_margin_deg,phase_margin_deg_se,changed_s\n";
+
+fn row(line: &LiveLine) -> String {
+    let cell = |v: Option<f64>| v.map_or(String::new(), |v| v.to_string());
+    let pairs = [
+        line.gain,
+        line.lead_s,
+        line.omega_nm_rad_s,
+        line.delay_s,
+        line.crossover_rad_s,
+        line.phase_margin_deg,
+    ];
+    let mut text = line.t.to_string();
+    for (value, error) in pairs {
+        text.push_str(&format!(",{},{}", cell(value), cell(error)));
+    }
+    text.push_str(&format!(",{}\n", cell(line.changed_s)));
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::scenario::{Condition as Reference, Scenario};
+    use hoid_sim::{RunSeed, Simulator};
+
+    use super::*;
+    use crate::config::Condition;
+
+    #[test]
+    fn a_simulated_person_is_found_while_they_track() {
+        let condition = Condition {
+            scenario: Some("C1".to_owned()),
+            scenario_text: Some("condition = \"C1\"\n".to_owned()),
+            ..Condition::default()
+        };
+        let mut run = LiveRun::new("population", condition.course().unwrap()).unwrap();
+        let simulator = Simulator::new(&Scenario::condition(Reference::C1)).unwrap();
+        let noise = RunSeed {
+            seed: 3,
+            ..RunSeed::default()
+        }
+        .white_noise(simulator.samples());
+        let signals = simulator.signals(&noise).unwrap();
+        let samples: Vec<Sample> = (signals.e.iter().zip(&signals.u))
+            .map(|(e, u)| Sample {
+                e: *e,
+                u: *u,
+                reference: None,
+            })
+            .collect();
+        let mut last = LiveLine::default();
+        for five in samples.chunks(5) {
+            last = run.take(five);
+        }
+        assert!((last.t - 81.92).abs() < 1e-6, "{}", last.t);
+        // The margins of C1 by its formulas: the loop of s1.
+        let scenario = Scenario::condition(Reference::C1);
+        let open = scenario.initial.operator.transfer_function().unwrap();
+        let open = open.series(&scenario.initial.controlled_element.transfer_function().unwrap());
+        let truth = hoid_model::margins::margins(|omega| open.response(omega), (0.3, 15.0));
+        let within = |told: Told, truth: f64| {
+            let (value, error) = (told.0.unwrap(), told.1.unwrap());
+            assert!(
+                (value - truth).abs() < 4.0 * error + 0.05 * truth.abs(),
+                "{value} {error} {truth}"
+            );
+        };
+        within(last.crossover_rad_s, truth.crossover_rad_s.unwrap());
+        within(last.phase_margin_deg, truth.phase_margin_deg.unwrap());
+        assert!(last.waiting.is_none());
+    }
+
+    #[test]
+    fn margins_are_those_of_the_formula() {
+        // Y = 1 exactly, P = 3 e^{-0.2 s}/s: omega_c = 3, phi_m = 90 - 0.6 rad; a variance of ln|Y|
+        // moves omega_c by 3 and phi_m by slope -0.2.
+        let element: ContinuousTransferFunction = "3/s".parse().unwrap();
+        let y = |omega: f64| {
+            let (sin, cos) = (-0.2 * omega).sin_cos();
+            // Covariance along Y (gain) alone: 0.01^2.
+            let v = 1e-4;
+            Some(Response {
+                value: [cos, sin],
+                covariance: [[v * cos * cos, v * cos * sin], [v * cos * sin, v * sin * sin]],
+            })
+        };
+        let (omega, margin) = crossover(&y, &element).unwrap();
+        assert!((omega.value - 3.0).abs() < 1e-6);
+        assert!((margin.value - (90.0 - 0.6 * 180.0 / std::f64::consts::PI)).abs() < 1e-4);
+        assert!((omega.standard_error.unwrap() - 0.03).abs() < 1e-4);
+        let expected = 0.2 * 0.03 * 180.0 / std::f64::consts::PI;
+        assert!((margin.standard_error.unwrap() - expected).abs() < 1e-3, "{margin}");
+        let weak: ContinuousTransferFunction = "0.1/s".parse().unwrap();
+        assert!(crossover(&y, &weak).is_none());
+    }
+}

@@ -1,0 +1,93 @@
+//! The order of the runs of a session.
+//!
+//! Row r of a balanced Latin square of n conditions is, by E. J. Williams (*Australian Journal of
+//! Scientific Research* A 2 (1949) 149-168), `r, r+1, r-1, r+2, r-2, ...` modulo n: each condition
+//! stands once in each place and follows each other one equally often. For an odd n a second square,
+//! the first in reverse, is needed for that: 2n rows.
+
+use serde::{Deserialize, Serialize};
+
+use crate::config::{Config, Order};
+
+/// One run that is to be.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Planned {
+    /// Place of its condition in the configuration.
+    pub condition: usize,
+    /// Whether it is a training run, which does not count.
+    pub training: bool,
+    /// Which of its condition, from 1.
+    pub run: usize,
+}
+
+/// The conditions of row `row` of a balanced square of `n`.
+pub fn latin_row(n: usize, row: usize) -> Vec<usize> {
+    let rows = if n.is_multiple_of(2) { n } else { 2 * n };
+    let row = row % rows.max(1);
+    let mut order: Vec<usize> = (0..n)
+        .map(|place| {
+            let step = place.div_ceil(2);
+            let shift = if place.is_multiple_of(2) { n - step } else { step };
+            (row + shift) % n
+        })
+        .collect();
+    if row >= n {
+        order.reverse();
+    }
+    order
+}
+
+/// All runs of a session: condition after condition, its training runs first.
+pub fn plan(config: &Config, row: usize) -> Vec<Planned> {
+    let n = config.condition.len();
+    let order = match config.order {
+        Order::Given => (0..n).collect(),
+        Order::Latin => latin_row(n, row),
+    };
+    let runs = |condition: usize| {
+        let own = &config.condition[condition];
+        (0..own.training + own.runs).map(move |k| Planned {
+            condition,
+            training: k < own.training,
+            run: k + 1,
+        })
+    };
+    order.into_iter().flat_map(runs).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn squares_are_balanced() {
+        for n in 1..8 {
+            let rows = if n % 2 == 0 { n } else { 2 * n };
+            let (mut places, mut pairs) = (vec![0; n * n], vec![0; n * n]);
+            for row in 0..rows {
+                let order = latin_row(n, row);
+                for (place, condition) in order.iter().enumerate() {
+                    places[place * n + condition] += 1;
+                }
+                for pair in order.windows(2) {
+                    pairs[pair[0] * n + pair[1]] += 1;
+                }
+            }
+            assert!(places.iter().all(|count| *count == rows / n), "{n} {places:?}");
+            for a in 0..n {
+                for b in (0..n).filter(|b| *b != a) {
+                    assert_eq!(pairs[a * n + b], rows / n, "{n}: {a} then {b}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn training_comes_first_and_is_not_counted() {
+        let mut config = Config::default();
+        config.condition[0].training = 2;
+        let plan = plan(&config, 5);
+        assert_eq!(plan.iter().map(|p| p.training).collect::<Vec<_>>(), [true, true, false]);
+        assert_eq!(plan.iter().map(|p| p.run).collect::<Vec<_>>(), [1, 2, 3]);
+    }
+}

@@ -1,0 +1,154 @@
+//! The controlled element at one tick, and what the hand does to it. The page has the same
+//! arithmetic (`page/src/plant.ts`), operation by operation, so that both give the same bits.
+//!
+//! At tick k, with the held input u of the hand, disturbance d and target f,
+//!
+//! `v = u + d`, `y = C x + D v`, `e = f - y`, then `x <- A x + B v`.
+//!
+//! Sums run from the first term to the last, each product rounded before it is added: IEEE 754 in
+//! double precision leaves no freedom, neither in Rust nor in ECMAScript. There is no other operation
+//! and no transcendental function: matrices and signals are tables.
+
+use serde::{Deserialize, Serialize};
+
+/// Matrices of a controlled element over one tick.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Plant {
+    /// A by rows.
+    pub a: Vec<f64>,
+    /// B.
+    pub b: Vec<f64>,
+    /// C.
+    pub c: Vec<f64>,
+    /// D.
+    pub d: f64,
+}
+
+impl Plant {
+    /// Number of states.
+    pub fn order(&self) -> usize {
+        self.b.len()
+    }
+
+    /// y, of the state and v.
+    pub fn output(&self, x: &[f64], v: f64) -> f64 {
+        let mut y = 0.0;
+        for i in 0..self.order() {
+            y += self.c[i] * x[i];
+        }
+        y + self.d * v
+    }
+
+    /// The state one tick on.
+    pub fn step(&self, x: &mut [f64], v: f64) {
+        let n = self.order();
+        let mut next = [0.0; MOST_STATES];
+        for i in 0..n {
+            let mut sum = 0.0;
+            for j in 0..n {
+                sum += self.a[i * n + j] * x[j];
+            }
+            next[i] = sum + self.b[i] * v;
+        }
+        x.copy_from_slice(&next[..n]);
+    }
+}
+
+/// Most states of a controlled element.
+pub const MOST_STATES: usize = 16;
+
+/// From what a device says to u.
+///
+/// `w = (raw - centre)/span`, within -1 to 1; `|w| <= dead` gives 0, what is beyond is stretched so
+/// that the ends stay; `u = gain w`. The gain holds sensitivity, direction and the full deflection.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InputMap {
+    /// What the device says at rest: pixels from the left edge, or 0 of a gamepad.
+    pub centre: f64,
+    /// From there to the full deflection.
+    pub span: f64,
+    /// Part of the way that does nothing, 0 to below 1.
+    pub dead: f64,
+    /// u at full deflection; below zero for the other direction.
+    pub gain: f64,
+}
+
+impl InputMap {
+    /// u of what the device says.
+    pub fn u(&self, raw: f64) -> f64 {
+        let w = ((raw - self.centre) / self.span).clamp(-1.0, 1.0);
+        let size = if w < 0.0 { -w } else { w };
+        if size <= self.dead {
+            return 0.0;
+        }
+        let moved = (size - self.dead) / (1.0 - self.dead);
+        if w < 0.0 {
+            -(self.gain * moved)
+        } else {
+            self.gain * moved
+        }
+    }
+
+    /// What is wrong with it.
+    pub fn fault(&self) -> Option<String> {
+        let finite = [self.centre, self.span, self.dead, self.gain]
+            .iter()
+            .all(|v| v.is_finite());
+        let sound = finite && self.span > 0.0 && (0.0..1.0).contains(&self.dead);
+        (!sound).then(|| {
+            format!(
+                "input settings {self:?}, expected finite numbers, a span above zero and a dead zone from 0 to below 1"
+            )
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_integrator_sums_what_is_held() {
+        let plant = Plant {
+            a: vec![1.0],
+            b: vec![1e-3],
+            c: vec![4.0],
+            d: 0.5,
+        };
+        let mut x = [0.0];
+        for _ in 0..1000 {
+            plant.step(&mut x, 2.0);
+        }
+        // 1000 sums of 2e-3, each rounded.
+        assert!((plant.output(&x, 2.0) - 9.0).abs() < 1e-11);
+    }
+
+    #[test]
+    fn the_dead_zone_keeps_the_ends() {
+        let map = InputMap {
+            centre: 400.0,
+            span: 200.0,
+            dead: 0.1,
+            gain: -3.0,
+        };
+        for (raw, u) in [
+            (400.0, 0.0),
+            (419.0, 0.0),
+            (600.0, -3.0),
+            (900.0, -3.0),
+            (200.0, 3.0),
+            (510.0, -1.5),
+        ] {
+            assert!((map.u(raw) - u).abs() < 1e-15, "{raw}");
+        }
+        assert_eq!(map.fault(), None);
+        for bad in [
+            InputMap { span: 0.0, ..map },
+            InputMap { dead: 1.0, ..map },
+            InputMap { gain: f64::NAN, ..map },
+        ] {
+            assert!(bad.fault().is_some());
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! A run as a record that all commands of hoid read: every tenth tick, e and u of that instant,
+//! target, disturbance and output besides, and e as it stood on the screen. t = 0 is the start of the
+//! measurement.
+
+use hoid_model::{Channel, Record, SampleTime};
+
+use crate::{
+    LabError,
+    session::{Begun, Logged},
+    task::{TICK_S, TICKS_PER_SAMPLE, Task},
+};
+
+/// The record of a run, with its run-in.
+///
+/// # Errors
+/// [`LabError::Model`] for a run without a sample.
+pub fn record(begun: &Begun, task: &Task, logged: &Logged) -> Result<Record, LabError> {
+    let n = logged.signals.e.len();
+    let every = |values: &[f64]| {
+        values[..n]
+            .iter()
+            .copied()
+            .step_by(TICKS_PER_SAMPLE)
+            .collect::<Vec<f64>>()
+    };
+    let channel = |name: &str, values: Vec<f64>| Channel::new(name, "", values);
+    let mut shown = Vec::with_capacity(n / TICKS_PER_SAMPLE + 1);
+    let (mut frames, mut e) = (logged.frames.iter().peekable(), 0.0);
+    for k in (0..n).step_by(TICKS_PER_SAMPLE) {
+        while let Some(frame) = frames.next_if(|frame| frame.drawn_ms <= k as f64) {
+            e = frame.e;
+        }
+        shown.push(e);
+    }
+    let y: Vec<f64> = task.target.iter().zip(&logged.signals.e).map(|(f, e)| f - e).collect();
+    let mut record = Record::new(
+        SampleTime::new(TICK_S * TICKS_PER_SAMPLE as f64)?,
+        channel("e", every(&logged.signals.e)),
+        channel("u", every(&logged.signals.u)),
+    )?
+    .starting_at(-(begun.run_in as f64) * TICK_S);
+    for (name, values) in [("f_t", &task.target), ("d", &task.disturbance)] {
+        if values.iter().any(|v| *v != 0.0) {
+            record = record.with_channel(channel(name, every(values)))?;
+        }
+    }
+    Ok(record
+        .with_channel(channel("y", every(&y)))?
+        .with_channel(channel("e_shown", shown))?)
+}

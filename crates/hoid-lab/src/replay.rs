@@ -1,0 +1,55 @@
+//! A run as the page draws it again: its signals at 100 Hz, its live estimate, and what it is worth
+//! now.
+
+use serde_json::{Value, json};
+
+use crate::{
+    LabError,
+    record::record,
+    session::{Begun, Logged, Stem},
+    verify::check,
+};
+
+/// The run as JSON.
+///
+/// # Errors
+/// Those of files.
+pub fn data(stem: &Stem) -> Result<Vec<u8>, LabError> {
+    let begun = Begun::read(stem)?;
+    let task = begun.task(stem)?;
+    let logged = Logged::read(stem)?;
+    let checked = check(stem)?;
+    let record = record(&begun, &task, &logged)?;
+    let channel = |name: &str| record.channel(name).map(rounded);
+    let data = json!({
+        "number": begun.number,
+        "condition": begun.condition,
+        "training": begun.training,
+        "start_s": record.time_s(0),
+        "step_s": record.sample_time().s(),
+        "e": channel("e"),
+        "u": channel("u"),
+        "y": channel("y"),
+        "f": channel("f_t"),
+        "live": live(stem),
+        "verdict": checked.word(),
+        "reasons": checked.reasons(),
+        "measures": checked.measures,
+    });
+    serde_json::to_vec(&data).map_err(|error| LabError::damaged(&stem.file("beh.parquet"), error.to_string()))
+}
+
+/// A picture needs no more than six digits.
+fn rounded(values: &[f64]) -> Vec<f64> {
+    values.iter().map(|v| (v * 1e6).round() / 1e6).collect()
+}
+
+/// The rows of the live estimate, numbers or null, without its header; none where there was none.
+fn live(stem: &Stem) -> Vec<Vec<Value>> {
+    let text = hoid_io::read_text(&stem.file("live.csv")).unwrap_or_default();
+    let cell = |cell: &str| cell.parse::<f64>().map_or(Value::Null, Value::from);
+    text.lines()
+        .skip(1)
+        .map(|line| line.split(',').map(cell).collect())
+        .collect()
+}

@@ -1,0 +1,193 @@
+//! Pages about a session, made by the program `hoid` itself: what `identify`, `track` and `describe`
+//! say of each run, and what `group` says of all people so far. It runs as a process of its own, on
+//! one core, so that nothing of it can end or hold up an experiment.
+
+use std::{
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use hoid_study::group::MANIFEST;
+
+use crate::{
+    LabError,
+    config::Config,
+    session::{How, Session, Stem},
+};
+
+/// Folder of the results of `hoid group` in the experiment.
+const GROUP: &str = "group";
+
+/// Pages that were made.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Pages(Vec<(String, String)>);
+
+impl Pages {
+    /// What they are, and where behind the address of the page.
+    pub fn links(&self) -> Vec<(String, String)> {
+        self.0.clone()
+    }
+}
+
+/// The commands of a run, each with the name of its folder.
+const COMMANDS: [&str; 3] = ["identify", "track", "describe"];
+
+/// Makes the pages of all finished runs that have none, then those of the group; `each` hears of
+/// every page.
+pub fn make(program: &Path, out: &Path, folder: &Path, each: &dyn Fn(&Pages)) -> Pages {
+    let Ok(session) = Session::read(folder) else {
+        return Pages::default();
+    };
+    let runs = session
+        .done
+        .iter()
+        .filter(|done| done.how == How::Finished && !done.training);
+    for done in runs {
+        let stem = session.stem(&done.condition, done.number);
+        for name in COMMANDS {
+            let page = stem.reports().join(name).join("report.html");
+            if !page.exists() && stem.file("beh.parquet").exists() {
+                one(program, &session.facts.config, &stem, name);
+                each(&found(folder));
+            }
+        }
+    }
+    if out.join(MANIFEST).exists() {
+        let place = out.join(GROUP);
+        let mut command = hoid(program);
+        command.arg("group").arg(out.join(MANIFEST)).arg("--out").arg(&place);
+        said(&mut command, &place, "group");
+    }
+    found(folder)
+}
+
+fn hoid(program: &Path) -> Command {
+    let mut command = Command::new(program);
+    command.env("RAYON_NUM_THREADS", "1").env("COLUMNS", "100");
+    command
+}
+
+/// One page of a run.
+fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
+    let place = stem.reports().join(name);
+    let mut command = hoid(program);
+    command.arg(name).arg(stem.file("beh.parquet")).args(["--from", "0"]);
+    let begun = crate::session::Begun::read(stem).ok();
+    let course = begun.as_ref().and_then(|begun| begun.condition.course().ok());
+    // Margins belong to one element.
+    let element = course
+        .filter(|course| course.change_s().is_none())
+        .and_then(|course| course.element_at(0.0).ok());
+    match name {
+        "track" => {
+            command.args(["--method", &config.method, "--every", "5"]);
+            command
+                .arg("--out")
+                .arg(place.join("trace.parquet"))
+                .arg("--report")
+                .arg(&place);
+        }
+        "identify" => {
+            command.arg("--report").arg(&place);
+        }
+        _ => {
+            command.arg("--figure").arg(place.join("figure.svg"));
+        }
+    }
+    if let Some(element) = element.filter(|_| name != "track") {
+        command.arg(format!("--controlled-element={element}"));
+    }
+    said(&mut command, &place, name);
+}
+
+/// Runs a command; where it makes no page of its own, what it says becomes one.
+fn said(command: &mut Command, place: &Path, name: &str) {
+    let made = hoid_io::make_directory(place).map_err(LabError::from).and_then(|()| {
+        command
+            .output()
+            .map_err(|error| LabError::Report(format!("hoid {name} cannot be run: {error}")))
+    });
+    let (out, wrong) = match made {
+        Ok(output) => (
+            String::from_utf8_lossy(&output.stdout).into_owned(),
+            String::from_utf8_lossy(&output.stderr).into_owned(),
+        ),
+        Err(error) => (String::new(), error.to_string()),
+    };
+    let page = place.join("report.html");
+    if page.exists() {
+        return;
+    }
+    let figure = if place.join("figure.svg").exists() {
+        "<p><img src=\"figure.svg\" alt=\"Figure\"></p>\n"
+    } else {
+        ""
+    };
+    let html = format!(
+        "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>hoid {name}</title>\n\
+         <style>body{{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:60rem;padding:0 1rem;\
+         color-scheme:light dark}}pre{{overflow-x:auto}}img{{max-width:100%;background:#fff}}</style>\n\
+         <h1>hoid {name}</h1>\n{figure}<pre>{}</pre>\n<pre>{}</pre>\n</html>\n",
+        escaped(&out),
+        escaped(&wrong)
+    );
+    // Without the page its link is not there, which says it.
+    let _ = hoid_io::write_atomically(&page, |file| file.write_all(html.as_bytes()));
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+/// The pages that are there.
+pub fn found(folder: &Path) -> Pages {
+    let mut pages = Vec::new();
+    for (number, stem) in Stem::all(folder).unwrap_or_default() {
+        for name in COMMANDS {
+            if stem.reports().join(name).join("report.html").exists() {
+                pages.push((
+                    format!("run {number}: {name}"),
+                    format!("reports/{}/{name}/report.html", stem.text()),
+                ));
+            }
+        }
+    }
+    let out = folder.parent().and_then(Path::parent);
+    if out.is_some_and(|out| out.join(GROUP).join("report.html").exists()) {
+        pages.push((
+            "all people so far: group".to_owned(),
+            format!("reports/{GROUP}/report.html"),
+        ));
+    }
+    Pages(pages)
+}
+
+/// A file of these pages with its kind; nothing for a name that is none of them. Names are letters,
+/// digits, `-`, `_` and dots that do not lead, so that no name leads out of its folder.
+///
+/// # Errors
+/// Those of files.
+pub fn file(folder: &Path, out: &Path, names: &[&str]) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
+    let sound = |name: &&str| {
+        let known = |b: u8| b.is_ascii_alphanumeric() || b"-_.".contains(&b);
+        !name.is_empty() && !name.starts_with('.') && name.bytes().all(known)
+    };
+    if !names.iter().all(sound) || names.len() > 4 {
+        return Ok(None);
+    }
+    let path: PathBuf = match names {
+        [GROUP, rest @ ..] => rest.iter().fold(out.join(GROUP), |path, name| path.join(name)),
+        _ => names.iter().fold(folder.join("reports"), |path, name| path.join(name)),
+    };
+    let kind = match path.extension().and_then(|end| end.to_str()) {
+        Some("html") => "text/html; charset=utf-8",
+        Some("svg") => "image/svg+xml",
+        Some("csv" | "txt") => "text/plain; charset=utf-8",
+        Some("json") => "application/json",
+        _ => "application/octet-stream",
+    };
+    if !path.is_file() {
+        return Ok(None);
+    }
+    Ok(Some((hoid_io::read_bytes(&path)?, kind)))
+}

@@ -1,0 +1,186 @@
+//! The server of the page: HTTP on 127.0.0.1, and the sockets of its pages.
+//!
+//! It serves one page, its data and the pages of results, and nothing to anybody else: the address
+//! holds a random token, and a request is refused unless its `Host` is the address of the server, its
+//! `Origin`, where it has one, is that too, and it is a GET of bounded length. A socket must have an
+//! origin. Nothing that a page says names a file.
+//!
+//! | refused | status |
+//! |---|---|
+//! | another host or origin, no token or another one | 403 |
+//! | a path that is none | 404 |
+//! | another method than GET | 405 |
+//! | a head of more than 16 KiB | 431 |
+//! | more than 32 connections at once | 503 |
+
+mod http;
+mod socket;
+
+use std::{
+    net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream},
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
+    thread,
+    time::Duration,
+};
+
+use data_encoding::{BASE64, HEXLOWER};
+use sha2::{Digest, Sha256};
+
+use crate::{LabError, lab::Lab};
+use http::{Reply, Request};
+
+/// Most connections at once.
+const CONNECTIONS: usize = 32;
+/// Longest time that a request may take to come.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// The page, built of `page/` by `npm run build`.
+const PAGE: &str = include_str!("../page/dist/lab.html");
+
+/// A server that listens.
+pub struct Server {
+    listener: TcpListener,
+    address: SocketAddr,
+    token: String,
+    policy: String,
+    lab: Arc<Lab>,
+}
+
+impl Server {
+    /// Listens on a port of 127.0.0.1, a free one where none is given.
+    ///
+    /// # Errors
+    /// [`LabError::Server`].
+    pub fn new(lab: Lab, port: Option<u16>) -> Result<Self, LabError> {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port.unwrap_or(0))).map_err(|error| {
+            let asked = port.map_or("no port is free".to_owned(), |port| {
+                format!("port {port} cannot be had")
+            });
+            LabError::Server(format!("{asked}: {error}; leave --port out for any free one"))
+        })?;
+        let address = listener
+            .local_addr()
+            .map_err(|error| LabError::Server(error.to_string()))?;
+        let mut random = [0; 16];
+        getrandom::fill(&mut random)
+            .map_err(|error| LabError::Server(format!("the system gives no random numbers for the token: {error}")))?;
+        Ok(Self {
+            listener,
+            address,
+            token: HEXLOWER.encode(&random),
+            policy: policy(PAGE),
+            lab: Arc::new(lab),
+        })
+    }
+
+    /// The address to open, token included.
+    pub fn address(&self) -> String {
+        format!("http://{}/{}/", self.address, self.token)
+    }
+
+    /// Serves for as long as the program runs.
+    pub fn serve(self) {
+        let server = Arc::new(self);
+        let open = Arc::new(AtomicUsize::new(0));
+        for stream in server.listener.incoming().flatten() {
+            let (server, open) = (Arc::clone(&server), Arc::clone(&open));
+            thread::spawn(move || {
+                let many = open.fetch_add(1, Ordering::Relaxed) >= CONNECTIONS;
+                server.answer(stream, many);
+                open.fetch_sub(1, Ordering::Relaxed);
+            });
+        }
+    }
+
+    fn answer(&self, mut stream: TcpStream, many: bool) {
+        let timed = stream
+            .set_read_timeout(Some(PATIENCE))
+            .and(stream.set_write_timeout(Some(PATIENCE)));
+        if timed.and(stream.set_nodelay(true)).is_err() {
+            return;
+        }
+        let reply = match Request::read(&mut stream) {
+            _ if many => Reply::refused(503, "too many connections"),
+            Ok(request) => match self.routed(&request) {
+                Ok(Route::Socket(key)) => return socket::run(stream, &key, &self.lab),
+                Ok(Route::Reply(reply)) | Err(reply) => reply,
+            },
+            Err(reply) => reply,
+        };
+        // A page that is gone needs no answer.
+        let _ = reply.write(&mut stream);
+    }
+
+    fn routed(&self, request: &Request) -> Result<Route, Reply> {
+        let own = |authority: &str| {
+            let port = self.address.port();
+            authority == format!("127.0.0.1:{port}") || authority == format!("localhost:{port}")
+        };
+        if !request.host.as_deref().is_some_and(own) {
+            return Err(Reply::refused(403, "another host"));
+        }
+        let foreign = |origin: &str| !origin.strip_prefix("http://").is_some_and(own);
+        if request.origin.as_deref().is_some_and(foreign) {
+            return Err(Reply::refused(403, "another origin"));
+        }
+        let (token, rest) = request
+            .path
+            .trim_start_matches('/')
+            .split_once('/')
+            .unwrap_or((&request.path, ""));
+        if !same(token, &self.token) {
+            return Err(Reply::refused(403, "no token: open the address that hoid lab printed"));
+        }
+        if request.method != "GET" {
+            return Err(Reply::refused(405, "only GET"));
+        }
+        let parts: Vec<&str> = rest.split('/').collect();
+        let file = |found: Result<Option<(Vec<u8>, &'static str)>, LabError>| match found {
+            Ok(Some((body, kind))) => Ok(Route::Reply(Reply::file(body, kind))),
+            Ok(None) => Err(Reply::refused(404, "not found")),
+            Err(error) => Err(Reply::refused(500, &error.to_string())),
+        };
+        match parts.as_slice() {
+            [""] | ["experimenter"] => Ok(Route::Reply(Reply::page(PAGE, &self.policy))),
+            ["socket"] => match &request.socket_key {
+                Some(key) if request.origin.is_some() => Ok(Route::Socket(key.clone())),
+                _ => Err(Reply::refused(403, "no socket, or none of this page")),
+            },
+            ["export.zip"] => file(self.lab.export()),
+            ["data", name] => file(self.lab.data(name)),
+            ["reports", names @ ..] => file(self.lab.report(names)),
+            _ => Err(Reply::refused(404, "not found")),
+        }
+    }
+}
+
+enum Route {
+    Socket(String),
+    Reply(Reply),
+}
+
+/// Equal, in a time that does not tell where they differ.
+fn same(a: &str, b: &str) -> bool {
+    a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |differ, (a, b)| differ | (a ^ b)) == 0
+}
+
+/// The policy of the page: its own script and style by their hashes, its own socket and data, nothing
+/// else.
+fn policy(page: &str) -> String {
+    let hash = |tag: &str| {
+        let inside = page
+            .split_once(&format!("<{tag}>"))
+            .and_then(|(_, rest)| rest.split_once(&format!("</{tag}>")));
+        let text = inside.map_or("", |(inside, _)| inside);
+        format!("'sha256-{}'", BASE64.encode(&Sha256::digest(text.as_bytes())))
+    };
+    format!(
+        "default-src 'none'; script-src {}; style-src {}; connect-src 'self'; img-src data:; base-uri 'none'; \
+         form-action 'none'; frame-ancestors 'none'",
+        hash("script"),
+        hash("style")
+    )
+}

@@ -1,0 +1,157 @@
+//! The head of a request, and replies.
+
+use std::{
+    io::{self, Read as _, Write as _},
+    net::TcpStream,
+};
+
+/// Longest head of a request, bytes.
+const LONGEST: usize = 16 * 1024;
+/// Most lines of a head.
+const MOST_LINES: usize = 64;
+
+/// What of a request matters here.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Request {
+    pub method: String,
+    /// Without what is behind a question mark.
+    pub path: String,
+    pub host: Option<String>,
+    pub origin: Option<String>,
+    /// The key of a request for a WebSocket of version 13.
+    pub socket_key: Option<String>,
+}
+
+impl Request {
+    /// Reads a head.
+    pub fn read(stream: &mut TcpStream) -> Result<Self, Reply> {
+        let bad = || Reply::refused(400, "not a request of HTTP");
+        let mut head = Vec::new();
+        let mut part = [0; 2048];
+        while !head.windows(4).any(|four| four == b"\r\n\r\n") {
+            if head.len() > LONGEST {
+                return Err(Reply::refused(431, "the head of the request is too long"));
+            }
+            match stream.read(&mut part) {
+                Ok(n) if n > 0 => head.extend_from_slice(&part[..n]),
+                _ => return Err(bad()),
+            }
+        }
+        Self::parse(&head).ok_or_else(bad)
+    }
+
+    fn parse(head: &[u8]) -> Option<Self> {
+        let mut headers = [httparse::EMPTY_HEADER; MOST_LINES];
+        let mut parsed = httparse::Request::new(&mut headers);
+        if !parsed.parse(head).ok()?.is_complete() {
+            return None;
+        }
+        let path = parsed.path?.split('?').next()?.to_owned();
+        let method = parsed.method?.to_owned();
+        // A header that stands there twice is nobody's honest one.
+        let header = |name: &str| {
+            let mut all = parsed.headers.iter().filter(|h| h.name.eq_ignore_ascii_case(name));
+            let value = std::str::from_utf8(all.next()?.value).ok()?.trim().to_owned();
+            all.next().is_none().then_some(value)
+        };
+        let is = |name: &str, word: &str| header(name).is_some_and(|value| value.eq_ignore_ascii_case(word));
+        let socket = is("upgrade", "websocket") && is("sec-websocket-version", "13");
+        Some(Self {
+            method,
+            path,
+            host: header("host"),
+            origin: header("origin"),
+            socket_key: header("sec-websocket-key").filter(|_| socket),
+        })
+    }
+}
+
+/// An answer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Reply {
+    status: u16,
+    kind: &'static str,
+    policy: String,
+    body: Vec<u8>,
+}
+
+impl Reply {
+    /// The page.
+    pub fn page(html: &str, policy: &str) -> Self {
+        Self {
+            status: 200,
+            kind: "text/html; charset=utf-8",
+            policy: policy.to_owned(),
+            body: html.as_bytes().to_vec(),
+        }
+    }
+
+    /// A file of the session. Pages of results hold their styles and figures and no script.
+    pub fn file(body: Vec<u8>, kind: &'static str) -> Self {
+        Self {
+            status: 200,
+            kind,
+            policy: "default-src 'none'; style-src 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'"
+                .to_owned(),
+            body,
+        }
+    }
+
+    /// A refusal in words.
+    pub fn refused(status: u16, words: &str) -> Self {
+        Self {
+            status,
+            kind: "text/plain; charset=utf-8",
+            policy: "default-src 'none'".to_owned(),
+            body: format!("{words}\n").into_bytes(),
+        }
+    }
+
+    /// Writes it; the connection ends with it.
+    pub fn write(&self, stream: &mut TcpStream) -> io::Result<()> {
+        let reason = match self.status {
+            200 => "OK",
+            400 => "Bad Request",
+            403 => "Forbidden",
+            404 => "Not Found",
+            405 => "Method Not Allowed",
+            431 => "Request Header Fields Too Large",
+            503 => "Service Unavailable",
+            _ => "Internal Server Error",
+        };
+        // Isolation from other origins gives the page the fine clock.
+        let head = format!(
+            "HTTP/1.1 {} {reason}\r\nContent-Type: {}\r\nContent-Length: {}\r\nConnection: close\r\n\
+             Cache-Control: no-store\r\nContent-Security-Policy: {}\r\nCross-Origin-Opener-Policy: same-origin\r\n\
+             Cross-Origin-Embedder-Policy: require-corp\r\nCross-Origin-Resource-Policy: same-origin\r\n\
+             X-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\r\n",
+            self.status,
+            self.kind,
+            self.body.len(),
+            self.policy
+        );
+        stream.write_all(head.as_bytes())?;
+        stream.write_all(&self.body)?;
+        stream.flush()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn heads_are_read_and_doubled_lines_are_not() {
+        let head = b"GET /a/b?c HTTP/1.1\r\nHost: x:1\r\nOrigin: http://x:1\r\nUpgrade: WebSocket\r\n\
+            Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: k\r\n\r\n";
+        let request = Request::parse(head).unwrap();
+        assert_eq!((request.path.as_str(), request.host.as_deref()), ("/a/b", Some("x:1")));
+        assert_eq!(request.socket_key.as_deref(), Some("k"));
+        let doubled = b"GET / HTTP/1.1\r\nHost: x\r\nHost: y\r\n\r\n";
+        assert_eq!(Request::parse(doubled).unwrap().host, None);
+        for bad in [&b"GET\r\n\r\n"[..], b"\x16\x03\x01\r\n\r\n", b"GET / HTTP/1.1\r\nHost"] {
+            assert_eq!(Request::parse(bad), None);
+        }
+    }
+}

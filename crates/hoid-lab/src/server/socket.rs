@@ -1,0 +1,83 @@
+//! The socket of a page: what it says goes to the lab, what the lab says goes to it. One thread does
+//! both: it waits for the page a hundredth of a second at a time.
+
+use std::{
+    io::{ErrorKind, Write as _},
+    net::TcpStream,
+    sync::mpsc::channel,
+    time::Duration,
+};
+
+use tungstenite::{
+    Error, Message, WebSocket,
+    handshake::derive_accept_key,
+    protocol::{Role, WebSocketConfig},
+};
+
+use crate::{
+    LabError,
+    lab::{Lab, Outgoing},
+    wire::{FromPage, LARGEST, ToPage},
+};
+
+const WAIT: Duration = Duration::from_millis(10);
+
+pub fn run(mut stream: TcpStream, key: &str, lab: &Lab) {
+    let accept = derive_accept_key(key.as_bytes());
+    let head = format!(
+        "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: {accept}\r\n\r\n"
+    );
+    if stream
+        .write_all(head.as_bytes())
+        .and(stream.set_read_timeout(Some(WAIT)))
+        .is_err()
+    {
+        return;
+    }
+    let limits = WebSocketConfig::default()
+        .max_message_size(Some(LARGEST))
+        .max_frame_size(Some(LARGEST));
+    let mut socket = WebSocket::from_raw_socket(stream, Role::Server, Some(limits));
+    let (sender, receiver) = channel();
+    let id = lab.join(sender);
+    loop {
+        let mut sent = Ok(());
+        while let (Ok(outgoing), true) = (receiver.try_recv(), sent.is_ok()) {
+            sent = socket.send(match outgoing {
+                Outgoing::Text(text) => Message::text(text),
+                Outgoing::Binary(bytes) => Message::binary(bytes),
+            });
+        }
+        if sent.is_err() {
+            break;
+        }
+        let answer = match socket.read() {
+            Ok(Message::Text(text)) => heard(lab, id, text.as_str()),
+            Ok(Message::Binary(_)) => Err(LabError::Message("a binary frame".to_owned())),
+            Ok(Message::Close(_)) => break,
+            Ok(_) => Ok(()),
+            Err(Error::Io(error)) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => Ok(()),
+            Err(_) => break,
+        };
+        if let Err(error) = answer {
+            let words = ToPage::Refused {
+                words: error.to_string(),
+                elsewhere: false,
+            };
+            let told = serde_json::to_string(&words).map(|text| socket.send(Message::text(text)));
+            // A page that does not keep to the rules is not of this program.
+            if matches!(error, LabError::Message(_)) || !matches!(told, Ok(Ok(()))) {
+                let _ = socket.close(None);
+                let _ = socket.flush();
+                break;
+            }
+        }
+    }
+    lab.leave(id);
+}
+
+fn heard(lab: &Lab, id: u64, text: &str) -> Result<(), LabError> {
+    let message: FromPage =
+        serde_json::from_str(text).map_err(|error| LabError::Message(hoid_io::printable(&error.to_string())))?;
+    lab.hear(id, message)
+}

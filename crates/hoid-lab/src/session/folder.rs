@@ -1,0 +1,78 @@
+//! The names of files and folders of a session, as BIDS has them where it has them.
+
+use std::path::{Path, PathBuf};
+
+use crate::LabError;
+
+/// The folder of a session.
+pub fn session_folder(out: &Path, subject: &str, session: usize) -> PathBuf {
+    out.join(format!("sub-{subject}")).join(format!("ses-{session:02}"))
+}
+
+/// A pseudonym: 1 to 20 letters and digits.
+///
+/// # Errors
+/// [`LabError::Order`].
+pub(super) fn check_subject(subject: &str) -> Result<(), LabError> {
+    let sound = (1..=20).contains(&subject.len()) && subject.bytes().all(|b| b.is_ascii_alphanumeric());
+    if sound {
+        return Ok(());
+    }
+    Err(LabError::Order(format!(
+        "the pseudonym is {:?}, expected 1 to 20 letters and digits, as P01",
+        hoid_io::printable(subject)
+    )))
+}
+
+/// What the names of all files of a run begin with.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Stem {
+    folder: PathBuf,
+    stem: String,
+}
+
+impl Stem {
+    /// Of the run with this number in a session.
+    pub fn new(folder: &Path, subject: &str, session: usize, condition: &str, number: usize) -> Self {
+        Self {
+            folder: folder.to_owned(),
+            stem: format!("sub-{subject}_ses-{session:02}_task-{condition}_run-{number:02}"),
+        }
+    }
+
+    /// The stem itself.
+    pub fn text(&self) -> &str {
+        &self.stem
+    }
+
+    /// One of its files, as `ticks.csv`.
+    pub fn file(&self, end: &str) -> PathBuf {
+        self.folder.join(format!("{}_{end}", self.stem))
+    }
+
+    /// The folder of its pages.
+    pub fn reports(&self) -> PathBuf {
+        self.folder.join("reports").join(&self.stem)
+    }
+
+    /// All runs of a folder that have begun, by their number.
+    ///
+    /// # Errors
+    /// [`LabError::Io`].
+    pub fn all(folder: &Path) -> Result<Vec<(usize, Self)>, LabError> {
+        let mut found: Vec<(usize, Self)> = hoid_io::file_names(folder)?
+            .iter()
+            .filter_map(|name| {
+                let stem = name.strip_suffix("_run.json")?;
+                let number = stem.rsplit_once("_run-")?.1.parse().ok()?;
+                let own = Self {
+                    folder: folder.to_owned(),
+                    stem: stem.to_owned(),
+                };
+                Some((number, own))
+            })
+            .collect();
+        found.sort_by_key(|(number, _)| *number);
+        Ok(found)
+    }
+}

@@ -1,0 +1,40 @@
+//! A session as a folder.
+//!
+//! ```text
+//! OUT/                                     one experiment, any number of people
+//!   README, dataset_description.json, participants.tsv, group.toml
+//!   sub-P01/ses-01/                        one session
+//!     lab.toml                             what was to be, who, with which browser and screen
+//!     runs.csv                             a line for each run that ended, with its verdict
+//!     sub-P01_ses-01_task-rate_run-01_...  the files of a run, one stem each:
+//!       run.json                           the task and its settings, written before the run
+//!       forcing.parquet                    target and disturbance at each tick
+//!       ticks.csv, events.csv, frames.csv  what happened, appended while it runs
+//!       live.csv                           the live estimate
+//!       end.json                           how it ended, and hashes of the three
+//!       beh.parquet                        the record at 100 Hz, for all commands of hoid
+//! ```
+//!
+//! Files that are appended to are handed to the system with each batch of the page and to the disk
+//! each second. What is written at once is whole or not there. A folder therefore shows at any
+//! instant how far the session is: a run without `end.json` was interrupted.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `folder` | the names of files and folders |
+//! | `begun` | [`Begun`]: what is known before a run; [`Ended`]: what is known behind it |
+//! | `log` | [`RunLog`]: what is appended |
+//! | `logged` | [`Logged`]: what was appended, read back |
+//! | `state` | [`Session`]: the session as a whole |
+
+mod begun;
+mod folder;
+mod log;
+mod logged;
+mod state;
+
+pub use begun::{Begun, Ended, How, digest};
+pub use folder::{Stem, session_folder};
+pub use log::{Batch, Event, Frame, RunLog};
+pub use logged::Logged;
+pub use state::{Done, Facts, Session};

@@ -1,0 +1,315 @@
+//! The session as a whole: what is planned, what is done, and how it goes on after whatever ended it.
+
+use std::{
+    collections::BTreeMap,
+    fs::OpenOptions,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    begun::{Begun, Ended, How},
+    folder::{Stem, check_subject, session_folder},
+    log::RunLog,
+};
+use crate::{
+    LabError,
+    config::Config,
+    order::{Planned, plan},
+    utc,
+    verify::{Checked, check},
+};
+
+/// What `lab.toml` of a session holds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Facts {
+    /// Version of hoid.
+    pub hoid: String,
+    /// Pseudonym.
+    pub subject: String,
+    /// Which session of this person, from 1.
+    pub session: usize,
+    /// When it began, in UTC.
+    pub began: String,
+    /// That the consent was confirmed, and when.
+    pub consent: String,
+    /// `CC0-1.0` where the person gives the data away; empty otherwise.
+    pub licence: String,
+    /// Row of the Latin square.
+    pub row: usize,
+    /// True when all runs are done.
+    #[serde(default)]
+    pub finished: bool,
+    /// Browser and screen, as the page tells them.
+    #[serde(default)]
+    pub browser: BTreeMap<String, String>,
+    /// All runs that are to be.
+    pub plan: Vec<Planned>,
+    /// The experiment.
+    pub config: Config,
+}
+
+/// A run that has ended: a line of `runs.csv`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Done {
+    /// Its number.
+    pub number: usize,
+    /// Its place in the plan.
+    pub planned: usize,
+    /// Name of its condition.
+    pub condition: String,
+    /// Whether it was a training run.
+    pub training: bool,
+    /// How it ended.
+    pub how: How,
+    /// When, in UTC.
+    pub utc: String,
+    /// `verified` or `unverified`.
+    pub verdict: String,
+    /// Why not.
+    pub reasons: String,
+    /// What is worth knowing besides.
+    pub notes: String,
+    /// Root mean square of e.
+    pub rms_e: f64,
+    /// 100 for no error, 0 for hands at rest.
+    pub score: f64,
+}
+
+/// A session and its folder.
+#[derive(Debug)]
+pub struct Session {
+    /// The folder.
+    pub folder: PathBuf,
+    /// What its `lab.toml` holds.
+    pub facts: Facts,
+    /// The runs that ended, in their order.
+    pub done: Vec<Done>,
+}
+
+impl Session {
+    /// Begins a session of a person who has confirmed the consent.
+    ///
+    /// # Errors
+    /// [`LabError::Order`] for a pseudonym that is none; those of files.
+    pub fn begin(out: &Path, config: &Config, subject: &str, cc0: bool) -> Result<Self, LabError> {
+        check_subject(subject)?;
+        hoid_io::make_directory(out)?;
+        let row = row_of(out, subject)?;
+        let free = (1..).find(|session| !session_folder(out, subject, *session).exists());
+        let session = free.unwrap_or(1);
+        let folder = session_folder(out, subject, session);
+        hoid_io::make_directory(&folder)?;
+        let now = utc::now();
+        let begun = Self {
+            facts: Facts {
+                hoid: env!("CARGO_PKG_VERSION").to_owned(),
+                subject: subject.to_owned(),
+                session,
+                began: now.clone(),
+                consent: format!("confirmed {now}"),
+                licence: if cc0 { "CC0-1.0".to_owned() } else { String::new() },
+                row,
+                finished: false,
+                browser: BTreeMap::new(),
+                plan: plan(config, row),
+                config: config.clone(),
+            },
+            folder,
+            done: Vec::new(),
+        };
+        begun.save()?;
+        Ok(begun)
+    }
+
+    /// Opens a session; runs that were interrupted by the end of a server are closed.
+    ///
+    /// # Errors
+    /// [`LabError::Damaged`] for a folder that holds no session.
+    pub fn open(folder: &Path) -> Result<Self, LabError> {
+        let mut session = Self::read(folder)?;
+        for (number, stem) in Stem::all(folder)? {
+            if session.done.iter().any(|done| done.number == number) {
+                continue;
+            }
+            if Ended::read(&stem)?.is_none() {
+                session.end(&stem, How::Interrupted, BTreeMap::new())?;
+            } else {
+                session.note(&stem, &check(&stem)?)?;
+            }
+        }
+        Ok(session)
+    }
+
+    /// Reads a session and changes nothing.
+    ///
+    /// # Errors
+    /// [`LabError::Damaged`].
+    pub fn read(folder: &Path) -> Result<Self, LabError> {
+        let path = folder.join("lab.toml");
+        let text = hoid_io::read_text(&path)?;
+        let facts: Facts = toml::from_str(&text)
+            .map_err(|error| LabError::damaged(&path, format!("{}; expected that of a session", error.message())))?;
+        Ok(Self {
+            done: read_runs(&folder.join("runs.csv"))?,
+            folder: folder.to_owned(),
+            facts,
+        })
+    }
+
+    /// Writes `lab.toml`.
+    ///
+    /// # Errors
+    /// [`LabError::Io`].
+    pub fn save(&self) -> Result<(), LabError> {
+        let path = self.folder.join("lab.toml");
+        let text = toml::to_string(&self.facts).map_err(|error| LabError::damaged(&path, error.to_string()))?;
+        hoid_io::write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
+        Ok(())
+    }
+
+    /// The place in the plan of the next run; nothing when all are done.
+    pub fn next(&self) -> Option<usize> {
+        let finished = |place: &usize| {
+            self.done
+                .iter()
+                .any(|done| done.planned == *place && done.how == How::Finished)
+        };
+        (0..self.facts.plan.len()).find(|place| !finished(place))
+    }
+
+    /// The number of a new run.
+    ///
+    /// # Errors
+    /// [`LabError::Io`].
+    pub fn new_number(&self) -> Result<usize, LabError> {
+        Ok(1 + Stem::all(&self.folder)?.last().map_or(0, |(number, _)| *number))
+    }
+
+    /// The names of the files of a run.
+    pub fn stem(&self, condition: &str, number: usize) -> Stem {
+        Stem::new(&self.folder, &self.facts.subject, self.facts.session, condition, number)
+    }
+
+    /// Ends a run: seals its files, checks it and writes down what came out.
+    ///
+    /// # Errors
+    /// Those of files.
+    pub fn end(&mut self, stem: &Stem, how: How, counted: BTreeMap<String, f64>) -> Result<Checked, LabError> {
+        if !stem.file("ticks.csv").exists() {
+            // It was ended before its first tick.
+            drop(RunLog::create(stem, 0)?);
+        }
+        Ended {
+            how,
+            utc: utc::now(),
+            counted,
+            sha256: Ended::hashes(stem)?,
+        }
+        .write(stem)?;
+        let checked = check(stem)?;
+        self.note(stem, &checked)?;
+        if self.next().is_none() {
+            self.facts.finished = true;
+            self.save()?;
+        }
+        Ok(checked)
+    }
+
+    /// Appends a run that has ended to `runs.csv`.
+    fn note(&mut self, stem: &Stem, checked: &Checked) -> Result<(), LabError> {
+        let begun = Begun::read(stem)?;
+        let done = Done {
+            number: begun.number,
+            planned: begun.planned,
+            condition: begun.condition.name.clone(),
+            training: begun.training,
+            how: Ended::read(stem)?.map_or(How::Interrupted, |ended| ended.how),
+            utc: utc::now(),
+            verdict: checked.word().to_owned(),
+            reasons: checked.reasons(),
+            notes: checked.verdict.notes().collect::<Vec<_>>().join("; "),
+            rms_e: checked.measures.rms_e,
+            score: checked.measures.score,
+        };
+        let path = self.folder.join("runs.csv");
+        let unwritable = |error: csv::Error| LabError::damaged(&path, error.to_string());
+        let headed = path.exists();
+        let file = OpenOptions::new().append(true).create(true).open(&path);
+        let file = file.map_err(|source| LabError::file(&path, source))?;
+        let mut writer = csv::WriterBuilder::new().has_headers(!headed).from_writer(&file);
+        writer.serialize(&done).map_err(unwritable)?;
+        writer.flush().map_err(|source| LabError::file(&path, source))?;
+        drop(writer);
+        file.sync_data().map_err(|source| LabError::file(&path, source))?;
+        self.done.push(done);
+        Ok(())
+    }
+
+    /// All sessions of an experiment, in the order of their folders.
+    ///
+    /// # Errors
+    /// [`LabError::Io`].
+    pub fn folders(out: &Path) -> Result<Vec<PathBuf>, LabError> {
+        let mut found = Vec::new();
+        for person in directories(out, "sub-")? {
+            found.extend(
+                directories(&person, "ses-")?
+                    .into_iter()
+                    .filter(|folder| folder.join("lab.toml").exists()),
+            );
+        }
+        Ok(found)
+    }
+}
+
+/// The directories in one whose names begin so, sorted.
+fn directories(of: &Path, prefix: &str) -> Result<Vec<PathBuf>, LabError> {
+    if !of.exists() {
+        return Ok(Vec::new());
+    }
+    let entries = std::fs::read_dir(of).map_err(|source| LabError::file(of, source))?;
+    let mut found: Vec<PathBuf> = (entries.flatten())
+        .filter(|entry| entry.file_name().to_string_lossy().starts_with(prefix))
+        .map(|entry| entry.path())
+        .filter(|path| path.is_dir())
+        .collect();
+    found.sort();
+    Ok(found)
+}
+
+/// The row of a person: that of their first session, else the number of people before.
+fn row_of(out: &Path, subject: &str) -> Result<usize, LabError> {
+    let mut others = 0;
+    for person in directories(out, "sub-")? {
+        let own = person
+            .file_name()
+            .is_some_and(|name| name.to_string_lossy() == format!("sub-{subject}"));
+        let first = directories(&person, "ses-")?
+            .into_iter()
+            .find(|folder| folder.join("lab.toml").exists());
+        match first {
+            Some(first) if own => return Ok(Session::read(&first)?.facts.row),
+            Some(_) => others += 1,
+            None => {}
+        }
+    }
+    Ok(others)
+}
+
+fn read_runs(path: &Path) -> Result<Vec<Done>, LabError> {
+    if !path.exists() {
+        return Ok(Vec::new());
+    }
+    let text = hoid_io::read_text(path)?;
+    // A line that was cut is written again.
+    let whole = text.rfind('\n').map_or(0, |end| end + 1);
+    if whole < text.len() {
+        hoid_io::write_atomically(path, |file| file.write_all(&text.as_bytes()[..whole]))?;
+    }
+    let mut reader = csv::Reader::from_reader(&text.as_bytes()[..whole]);
+    let rows = reader.deserialize().collect::<Result<Vec<Done>, _>>();
+    rows.map_err(|error| LabError::damaged(path, error.to_string()))
+}

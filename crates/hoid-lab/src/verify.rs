@@ -1,0 +1,342 @@
+//! What a run is worth: every tick recomputed from the logged inputs.
+//!
+//! A run is *verified* when nothing of this is found, else *unverified* with the reasons:
+//!
+//! | kind | reason |
+//! |---|---|
+//! | `lab-interrupted` | it did not reach its end |
+//! | `lab-task` | its tables are not those of its condition and seed |
+//! | `lab-ticks` | ticks are missing, twice or out of order |
+//! | `lab-input` | u at a tick is not that of the events |
+//! | `lab-tick` | e at a tick is not that of the plant, by a bit |
+//! | `lab-event` | an event was taken before its time stamp, or too late |
+//! | `lab-frame` | a frame was too late, or did not show the tick that it names |
+//! | `lab-changed` | a file was changed behind the end |
+//!
+//! u and e are compared bit for bit, but for the sign of zero, which text does not keep. e is
+//! recomputed from the u of the log, so that a false event and a false tick are told apart; the tables
+//! are those that the page was given, which are compared with those made anew from the seed to
+//! rounding (sines may differ between computers in the last bit).
+
+use hoid_model::{Finding, Verdict, VerdictLevel};
+use serde::Serialize;
+
+use crate::{
+    LabError,
+    session::{Begun, Ended, How, Logged, Stem},
+    task::{Task, held_inputs},
+};
+
+/// Relative difference that sines of two computers may leave in a table.
+const TABLE: f64 = 1e-9;
+/// A frame is missed when it comes this many times the usual interval after the last.
+const MISSED: f64 = 1.5;
+
+/// What was found of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Checked {
+    /// Trustworthy is verified.
+    pub verdict: Verdict,
+    /// What was measured besides.
+    pub measures: Measures,
+}
+
+/// How the run went, in numbers.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Measures {
+    /// Ticks in the log.
+    pub ticks: usize,
+    /// Frames.
+    pub frames: usize,
+    /// Median time from frame to frame, ms.
+    pub frame_ms: f64,
+    /// Longest time from frame to frame, ms.
+    pub longest_frame_ms: f64,
+    /// Frames that the screen would have had besides.
+    pub missed_frames: usize,
+    /// Input events a second.
+    pub input_hz: f64,
+    /// Median age of an event when the page had it, ms.
+    pub input_age_ms: f64,
+    /// Root mean square of e in the measurement.
+    pub rms_e: f64,
+    /// That of what was to be followed or held off.
+    pub rms_forcing: f64,
+    /// 100 for no error, 0 for as much as hands at rest would leave.
+    pub score: f64,
+}
+
+impl Checked {
+    /// True where nothing speaks against the run.
+    pub fn is_verified(&self) -> bool {
+        self.verdict.level == VerdictLevel::Trustworthy
+    }
+
+    /// `verified` or `unverified`.
+    pub fn word(&self) -> &'static str {
+        if self.is_verified() { "verified" } else { "unverified" }
+    }
+
+    /// Why not, in one line; empty where it is.
+    pub fn reasons(&self) -> String {
+        self.verdict.reasons().collect::<Vec<_>>().join("; ")
+    }
+}
+
+/// Checks a run of a session.
+///
+/// # Errors
+/// [`LabError`] for files that cannot be read; what is wrong inside of them is a finding.
+pub fn check(stem: &Stem) -> Result<Checked, LabError> {
+    let begun = Begun::read(stem)?;
+    let task = begun.task(stem)?;
+    let logged = Logged::read(stem)?;
+    let ended = Ended::read(stem)?;
+    let mut findings = Vec::new();
+    findings.extend(end_of(&begun, ended.as_ref(), &logged));
+    findings.extend(task_of(&begun, &task));
+    findings.extend(ticks_of(&logged));
+    findings.extend(events_of(&begun, &logged));
+    findings.extend(inputs_of(&begun, &logged));
+    findings.extend(errors_of(&task, &logged));
+    findings.extend(frames_of(&begun, &logged));
+    if let Some(ended) = &ended {
+        findings.extend(files_of(stem, ended)?);
+        findings.extend(hands_of(&begun, ended));
+    }
+    let measures = measures(&begun, &task, &logged);
+    if measures.missed_frames > 0 {
+        let words = format!("{} of {} frames were missed", measures.missed_frames, measures.frames);
+        findings.push(Finding::note("lab-missed-frames", words));
+    }
+    Ok(Checked {
+        verdict: Verdict::of(findings),
+        measures,
+    })
+}
+
+fn end_of(begun: &Begun, ended: Option<&Ended>, logged: &Logged) -> Option<Finding> {
+    let finished = ended.is_some_and(|ended| ended.how == How::Finished);
+    let ticks = logged.numbers.len();
+    (!finished || ticks != begun.ticks).then(|| {
+        let words = format!("the run ended after {ticks} of {} ticks", begun.ticks);
+        Finding::doubt("lab-interrupted", words)
+    })
+}
+
+fn task_of(begun: &Begun, task: &Task) -> Option<Finding> {
+    let wrong = |what: &str| {
+        Some(Finding::doubt(
+            "lab-task",
+            format!("{what} is not that of its condition and seed"),
+        ))
+    };
+    let Ok(made) = Task::new(&begun.condition, begun.cell, begun.replication) else {
+        return wrong("the condition cannot be made again: it");
+    };
+    let near = |a: &[f64], b: &[f64]| {
+        let size = b.iter().fold(1e-300, |m: f64, v| m.max(v.abs()));
+        a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= TABLE * size)
+    };
+    if !near(&task.target, &made.target) {
+        return wrong("the target");
+    }
+    if !near(&task.disturbance, &made.disturbance) {
+        return wrong("the disturbance");
+    }
+    let same = task.phases.len() == made.phases.len()
+        && task.phases.iter().zip(&made.phases).all(|(a, b)| {
+            let (p, q) = (&a.plant, &b.plant);
+            a.from == b.from && near(&p.a, &q.a) && near(&p.b, &q.b) && near(&p.c, &q.c) && near(&[p.d], &[q.d])
+        });
+    if same { None } else { wrong("the controlled element") }
+}
+
+fn ticks_of(logged: &Logged) -> Option<Finding> {
+    let wrong = logged.numbers.iter().enumerate().find(|(k, tick)| **tick != *k as f64);
+    wrong.map(|(k, tick)| Finding::doubt("lab-ticks", format!("tick {tick} stands in the place of tick {k}")))
+}
+
+fn events_of(begun: &Begun, logged: &Logged) -> Option<Finding> {
+    let mut last = 0.0;
+    for (k, event) in logged.events.iter().enumerate() {
+        let whole = event.tick >= 0.0 && event.tick.fract() == 0.0 && event.raw.is_finite();
+        let late = event.tick - event.stamp_ms.max(0.0);
+        let words = if !whole || event.tick < last {
+            "has no place among the ticks".to_owned()
+        } else if !((0.0..).contains(&late) && (event.stamp_ms..).contains(&event.handled_ms)) {
+            format!(
+                "was taken at tick {} before its time stamp of {:.3} ms",
+                event.tick, event.stamp_ms
+            )
+        } else if late > begun.limits.input_ms {
+            let limit = begun.limits.input_ms;
+            format!("was taken {late:.1} ms behind its time stamp, expected at most {limit} ms")
+        } else {
+            last = event.tick;
+            continue;
+        };
+        return Some(Finding::doubt("lab-event", format!("input event {} {words}", k + 1)));
+    }
+    None
+}
+
+fn inputs_of(begun: &Begun, logged: &Logged) -> Option<Finding> {
+    let events: Vec<(usize, f64)> = (logged.events.iter())
+        .map(|event| (event.tick as usize, begun.input.u(event.raw)))
+        .collect();
+    let made = held_inputs(&events, logged.signals.u.len());
+    differing(&made, &logged.signals.u).map(|(first, count)| {
+        let words = format!("u of {count} ticks is not that of the input events, first at tick {first}");
+        Finding::doubt("lab-input", words)
+    })
+}
+
+fn errors_of(task: &Task, logged: &Logged) -> Option<Finding> {
+    let made = task.run(&logged.signals.u);
+    differing(&made.e, &logged.signals.e).map(|(first, count)| {
+        let words = format!("e of {count} ticks is not that of the controlled element, first at tick {first}");
+        Finding::doubt("lab-tick", words)
+    })
+}
+
+/// The first place where two signals differ in a bit, and how many there are.
+fn differing(made: &[f64], logged: &[f64]) -> Option<(usize, usize)> {
+    // Minus zero plus zero is zero.
+    let differ = |(a, b): (&f64, &f64)| (a + 0.0).to_bits() != (b + 0.0).to_bits();
+    let mut places = (0..logged.len()).filter(|k| made.get(*k).is_none_or(|made| differ((made, &logged[*k]))));
+    let first = places.next()?;
+    Some((first, 1 + places.count()))
+}
+
+fn frames_of(begun: &Begun, logged: &Logged) -> Option<Finding> {
+    let limit = begun.limits.frame_ms;
+    let wrong = |k: usize, words: String| Some(Finding::doubt("lab-frame", format!("frame {} {words}", k + 1)));
+    let mut last = 0.0;
+    for (k, frame) in logged.frames.iter().enumerate() {
+        let shown = (frame.tick >= 0.0)
+            .then(|| logged.signals.e.get(frame.tick as usize))
+            .flatten();
+        if shown.is_none_or(|e| differing(&[*e], &[frame.e]).is_some()) {
+            return wrong(k, format!("does not show e of tick {}", frame.tick));
+        }
+        let due = frame.drawn_ms.floor().min(begun.ticks as f64 - 1.0);
+        if frame.tick != due {
+            return wrong(
+                k,
+                format!("was drawn at {:.1} ms and shows tick {}", frame.drawn_ms, frame.tick),
+            );
+        }
+        let (interval, age) = (frame.drawn_ms - last, frame.drawn_ms - frame.frame_ms);
+        if !(0.0..=limit).contains(&interval) {
+            return wrong(
+                k,
+                format!("came {interval:.1} ms behind the last one, expected 0 to {limit} ms"),
+            );
+        }
+        if !(0.0..=limit).contains(&age.abs()) {
+            return wrong(
+                k,
+                format!("was drawn {age:.1} ms behind its own time, expected at most {limit} ms"),
+            );
+        }
+        last = frame.drawn_ms;
+    }
+    let end = logged.numbers.len() as f64;
+    if end - last > limit {
+        let words = format!(
+            "the last frame came {:.1} ms before the last tick, expected at most {limit} ms",
+            end - last
+        );
+        return Some(Finding::doubt("lab-frame", words));
+    }
+    None
+}
+
+fn files_of(stem: &Stem, ended: &Ended) -> Result<Option<Finding>, LabError> {
+    let names = ["ticks", "events", "frames"];
+    let changed: Vec<&str> = (Ended::hashes(stem)?.iter().zip(names).enumerate())
+        .filter(|(k, (hash, _))| ended.sha256.get(*k) != Some(hash))
+        .map(|(_, (_, name))| name)
+        .collect();
+    Ok((!changed.is_empty()).then(|| {
+        let words = format!(
+            "the file of {} was changed behind the end of the run",
+            changed.join(" and that of ")
+        );
+        Finding::doubt("lab-changed", words)
+    }))
+}
+
+/// Runs that no hand made are said to be such; they can be as exact as others.
+fn hands_of(begun: &Begun, ended: &Ended) -> Vec<Finding> {
+    let made = ended.counted.get("synthetic_events").copied().unwrap_or(0.0);
+    let mut notes = Vec::new();
+    if made > 0.0 {
+        let words = format!("{made} input events were made by a program, not by a hand");
+        notes.push(Finding::note("lab-simulated", words));
+    }
+    if begun.clock != "browser" {
+        notes.push(Finding::note("lab-clock", format!("the time was {}", begun.clock)));
+    }
+    notes
+}
+
+fn measures(begun: &Begun, task: &Task, logged: &Logged) -> Measures {
+    let intervals: Vec<f64> = logged
+        .frames
+        .windows(2)
+        .map(|pair| pair[1].frame_ms - pair[0].frame_ms)
+        .collect();
+    let frame_ms = median(&intervals);
+    let usual = if begun.refresh_ms > 0.0 {
+        begun.refresh_ms
+    } else {
+        frame_ms
+    };
+    let missed = |interval: &f64| {
+        if *interval > MISSED * usual {
+            (interval / usual).round() as usize - 1
+        } else {
+            0
+        }
+    };
+    let ages: Vec<f64> = logged
+        .events
+        .iter()
+        .map(|event| event.handled_ms - event.stamp_ms)
+        .collect();
+    let e = &logged.signals.e;
+    let measured = begun.run_in.min(e.len())..e.len();
+    let rms_e = rms(&e[measured.clone()]);
+    // What hands at rest would leave.
+    let rest = task.run(&vec![0.0; e.len()]);
+    let rms_forcing = rms(&rest.e[measured]);
+    Measures {
+        ticks: logged.numbers.len(),
+        frames: logged.frames.len(),
+        frame_ms,
+        longest_frame_ms: intervals.iter().copied().fold(0.0, f64::max),
+        missed_frames: intervals.iter().map(missed).sum(),
+        input_hz: logged.events.len() as f64 / (e.len().max(1) as f64 * crate::task::TICK_S),
+        input_age_ms: median(&ages),
+        rms_e,
+        rms_forcing,
+        score: if rms_forcing > 0.0 {
+            (100.0 * (1.0 - rms_e / rms_forcing)).max(0.0)
+        } else {
+            0.0
+        },
+    }
+}
+
+fn rms(values: &[f64]) -> f64 {
+    let sum: f64 = values.iter().map(|v| v * v).sum();
+    (sum / values.len().max(1) as f64).sqrt()
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}

@@ -1,0 +1,16 @@
+//! The page computes what Rust computes, to the last bit. Where there is no node it is said and left
+//! out; `cargo xtask slow lab` does ten thousand runs.
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
+
+#[path = "common/page.rs"]
+mod page;
+
+#[test]
+fn the_page_computes_the_same_bits() {
+    let Some(mut engine) = page::Engine::start() else {
+        eprintln!("skipped: there is no node");
+        return;
+    };
+    let differing: Vec<u32> = (1..=60).filter(|seed| !page::same_bits(&mut engine, *seed)).collect();
+    assert!(differing.is_empty(), "{differing:?}");
+}

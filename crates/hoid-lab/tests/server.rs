@@ -1,0 +1,307 @@
+//! The server as a stranger meets it, and a session as a page that keeps to the rules has it.
+#![allow(clippy::unwrap_used)]
+
+use std::{
+    io::{Read as _, Write as _},
+    net::TcpStream,
+    path::Path,
+    thread,
+    time::Duration,
+};
+
+use hoid_lab::{
+    Config, Lab, Mode, Server,
+    config::{Condition, Signal},
+    plant::InputMap,
+    session::Session,
+};
+use serde_json::{Value, json};
+use tungstenite::{Message, WebSocket, client, handshake::client::generate_key, http::Request};
+
+struct At {
+    host: String,
+    token: String,
+}
+
+fn config() -> Config {
+    Config {
+        condition: vec![Condition {
+            target: Some(Signal::default()),
+            measurement_s: 1.0,
+            run_in_s: 0.5,
+            runs: 2,
+            ..Condition::default()
+        }],
+        ..Config::default()
+    }
+}
+
+fn served(out: &Path, mode: Mode) -> At {
+    let server = Server::new(Lab::open(out, config(), mode, None).unwrap(), None).unwrap();
+    let address = server.address();
+    thread::spawn(move || server.serve());
+    let mut parts = address
+        .strip_prefix("http://")
+        .unwrap()
+        .trim_end_matches('/')
+        .split('/');
+    At {
+        host: parts.next().unwrap().to_owned(),
+        token: parts.next().unwrap().to_owned(),
+    }
+}
+
+impl At {
+    /// The reply to a request as it stands.
+    fn raw(&self, request: &[u8]) -> String {
+        let mut stream = TcpStream::connect(&self.host).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
+        // The server may have refused before all was written.
+        let _ = stream.write_all(request);
+        let mut reply = Vec::new();
+        let _ = stream.read_to_end(&mut reply);
+        String::from_utf8_lossy(&reply).into_owned()
+    }
+
+    fn get(&self, path: &str, headers: &str) -> String {
+        self.raw(format!("GET {path} HTTP/1.1\r\nHost: {}\r\n{headers}\r\n", self.host).as_bytes())
+    }
+
+    fn page(&self) -> Page {
+        let request = Request::builder()
+            .uri(format!("ws://{}/{}/socket", self.host, self.token))
+            .header("Host", &self.host)
+            .header("Origin", format!("http://{}", self.host))
+            .header("Connection", "Upgrade")
+            .header("Upgrade", "websocket")
+            .header("Sec-WebSocket-Version", "13")
+            .header("Sec-WebSocket-Key", generate_key())
+            .body(())
+            .unwrap();
+        let stream = TcpStream::connect(&self.host).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        Page(client(request, stream).unwrap().0)
+    }
+}
+
+fn status(reply: &str) -> &str {
+    reply.split(' ').nth(1).unwrap_or("closed")
+}
+
+#[test]
+fn strangers_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = served(dir.path(), Mode::Sessions);
+    let own = format!("/{}/", at.token);
+    let page = at.get(&own, "");
+    assert_eq!(status(&page), "200");
+    for header in [
+        "Cross-Origin-Opener-Policy: same-origin",
+        "Cross-Origin-Embedder-Policy: require-corp",
+        "Content-Security-Policy: default-src 'none'; script-src 'sha256-",
+    ] {
+        assert!(page.contains(header), "{header}");
+    }
+    let wrong = "0".repeat(at.token.len());
+    let socket =
+        "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: eA==\r\n";
+    for (path, headers, expected) in [
+        ("/", "", "403"),
+        (&format!("/{wrong}/"), "", "403"),
+        (&own, "Origin: http://example.org\r\n", "403"),
+        (&own, "Origin: null\r\n", "403"),
+        (&format!("{own}socket"), socket, "403"),
+        (
+            &format!("{own}socket"),
+            &format!("{socket}Origin: https://example.org\r\n"),
+            "403",
+        ),
+        (&format!("{own}none"), "", "404"),
+        (&format!("{own}export.zip"), "", "404"),
+        (&format!("{own}data/1.json"), "", "404"),
+        (&format!("{own}reports/../lab.toml"), "", "404"),
+        (&format!("{own}reports/%2e%2e/lab.toml"), "", "404"),
+        (&format!("{own}reports/..%2f..%2fetc/passwd"), "", "404"),
+    ] {
+        assert_eq!(status(&at.get(path, headers)), expected, "{path} {headers}");
+    }
+    let other = format!("GET {own} HTTP/1.1\r\nHost: example.org\r\n\r\n");
+    assert_eq!(status(&at.raw(other.as_bytes())), "403");
+    let post = format!("POST {own} HTTP/1.1\r\nHost: {}\r\nContent-Length: 0\r\n\r\n", at.host);
+    assert_eq!(status(&at.raw(post.as_bytes())), "405");
+    let long = format!("GET {own} HTTP/1.1\r\nX: {}\r\n\r\n", "x".repeat(20_000));
+    assert!(["431", "closed"].contains(&status(&at.raw(long.as_bytes()))));
+    assert_eq!(status(&at.raw(b"\x16\x03\x01 not http\r\n\r\n")), "400");
+}
+
+/// A page of the program, without a browser.
+struct Page(WebSocket<TcpStream>);
+
+impl Page {
+    fn say(&mut self, message: &Value) {
+        self.0.send(Message::text(message.to_string())).unwrap();
+    }
+
+    /// The next message of this type; others are passed over.
+    fn hear(&mut self, kind: &str) -> Value {
+        loop {
+            if let Message::Text(text) = self.0.read().unwrap() {
+                let message: Value = serde_json::from_str(text.as_str()).unwrap();
+                if message["type"] == kind {
+                    return message;
+                }
+            }
+        }
+    }
+
+    fn hello(&mut self, role: &str) -> Value {
+        self.say(&json!({"type": "hello", "role": role, "browser": {"user_agent": "test"}}));
+        self.hear("state")
+    }
+
+    fn consent(&mut self) {
+        self.say(&json!({"type": "consent", "subject": "P01", "agreed": true, "cc0": false}));
+        while self.hear("state")["phase"] != "runs" {}
+    }
+
+    /// Begins the next run; its number.
+    fn begin(&mut self) -> u64 {
+        self.say(&json!({"type": "next"}));
+        let number = self.hear("run")["number"].as_u64().unwrap();
+        assert!(matches!(self.0.read().unwrap(), Message::Binary(_)));
+        let map = InputMap {
+            centre: 0.0,
+            span: 1.0,
+            dead: 0.0,
+            gain: 3.0,
+        };
+        self.say(
+            &json!({"type": "begin", "number": number, "input": map, "device": "mouse", "clock": "injected",
+            "refresh_ms": 10.0, "zero_ms": 1.0}),
+        );
+        while self.hear("state")["running"] != number {}
+        number
+    }
+}
+
+/// Ticks of a person who does nothing: e is the target.
+fn batch(number: u64, first: usize, target: &[f64]) -> Value {
+    let e: Vec<f64> = target[first..first + 50].to_vec();
+    let frame = json!([first as f64 + 0.5, first as f64 + 0.5, first, e[0]]);
+    json!({"type": "batch", "number": number, "batch": {"first": first, "u": vec![0.0; 50], "e": e, "events": [],
+        "frames": [frame]}})
+}
+
+#[test]
+fn a_run_goes_through_and_its_live_estimate_is_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = served(dir.path(), Mode::Sessions);
+    let (mut person, mut other) = (at.page(), at.page());
+    assert_eq!(person.hello("person")["phase"], "consent");
+    other.hello("experimenter");
+    person.consent();
+    let number = person.begin();
+    let target = hoid_lab::task::Task::new(&config().condition[0], 0, number)
+        .unwrap()
+        .target;
+    for first in (0..1500).step_by(50) {
+        person.say(&batch(number, first, &target));
+    }
+    let live = other.hear("live");
+    assert_eq!(live["number"], number);
+    person.say(&json!({"type": "finish", "number": number, "counted": {}}));
+    let verdict = person.hear("verdict");
+    assert_eq!(verdict["done"]["verdict"], "verified", "{verdict}");
+    // One second window cannot do what the first does.
+    other.say(&json!({"type": "next"}));
+    assert!(other.hear("refused")["words"].as_str().unwrap().contains("looks on"));
+    let zip = at.get(&format!("/{}/export.zip", at.token), "");
+    assert!(status(&zip) == "200" && zip.contains("sub-P01/ses-01/lab.toml"));
+    let data = at.get(&format!("/{}/data/{number}.json", at.token), "");
+    assert!(data.contains("\"verdict\":\"verified\""));
+    assert!(dir.path().join("group.toml").exists());
+}
+
+#[test]
+fn a_window_that_is_closed_breaks_its_run_off() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = served(dir.path(), Mode::Sessions);
+    let mut person = at.page();
+    person.hello("person");
+    person.consent();
+    let number = person.begin();
+    let target = hoid_lab::task::Task::new(&config().condition[0], 0, number)
+        .unwrap()
+        .target;
+    person.say(&batch(number, 0, &target));
+    // A second window does not take a run that goes on.
+    let mut second = at.page();
+    second.say(&json!({"type": "hello", "role": "person"}));
+    assert!(
+        second.hear("refused")["words"]
+            .as_str()
+            .unwrap()
+            .contains("another window")
+    );
+    drop(person);
+    loop {
+        let state = second.hear("state");
+        if state["running"].is_null() {
+            assert_eq!(state["done"][0]["how"], "interrupted");
+            assert_eq!(state["next"], 0);
+            break;
+        }
+    }
+    let folder = dir.path().join("sub-P01/ses-01");
+    assert!(
+        Session::read(&folder).unwrap().done[0]
+            .reasons
+            .contains("50 of 1500 ticks")
+    );
+}
+
+#[test]
+fn messages_that_are_none_end_the_connection() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = served(dir.path(), Mode::Sessions);
+    let closed = |message: Message| {
+        let mut page = at.page();
+        page.hello("person");
+        page.consent();
+        let number = page.begin();
+        let text = message.to_string().replace("NUMBER", &number.to_string());
+        let message = if message.is_text() {
+            Message::text(text)
+        } else {
+            message
+        };
+        // A message that is too large may be refused while it is sent.
+        let _ = page.0.send(message);
+        loop {
+            match page.0.read() {
+                Ok(Message::Close(_)) | Err(_) => return,
+                Ok(Message::Text(text)) => assert!(!text.contains("\"type\":\"verdict\""), "{text}"),
+                Ok(_) => {}
+            }
+        }
+    };
+    closed(Message::text("no json"));
+    closed(Message::text("{\"type\": \"unknown\"}"));
+    closed(Message::text("{\"type\": \"next\", \"more\": 1}"));
+    closed(Message::binary(vec![1, 2, 3]));
+    closed(Message::text("x".repeat(2 << 20)));
+    closed(Message::text(
+        "{\"type\":\"batch\",\"number\":NUMBER,\"batch\":{\"first\":7,\"u\":[1],\"e\":[1],\"events\":[],\"frames\":[]}}",
+    ));
+    closed(Message::text(
+        "{\"type\":\"batch\",\"number\":NUMBER,\"batch\":{\"first\":0,\"u\":[null],\"e\":[1],\"events\":[],\"frames\":[]}}",
+    ));
+}
+
+#[test]
+fn one_experiment_has_one_server() {
+    let dir = tempfile::tempdir().unwrap();
+    let _at = served(dir.path(), Mode::Sessions);
+    let second = Lab::open(dir.path(), config(), Mode::Sessions, None);
+    assert!(second.is_err_and(|error| error.to_string().contains("another process works on")));
+}

@@ -1,0 +1,273 @@
+//! A session without a page: batches as a page sends them, what becomes of them, and what is found
+//! when something of them is changed.
+#![allow(clippy::unwrap_used)]
+
+use std::{collections::BTreeMap, fs, path::Path};
+
+use hoid_lab::{
+    config::{Condition, Config, Limits, Signal},
+    plant::InputMap,
+    session::{Batch, Begun, Event, Frame, How, RunLog, Session, Stem},
+    task::{Task, held_inputs},
+    verify::{Checked, check},
+};
+
+fn config() -> Config {
+    Config {
+        condition: vec![Condition {
+            target: Some(Signal::default()),
+            disturbance: Some(Signal {
+                rms: 0.2,
+                ..Signal::default()
+            }),
+            controlled_element: "4/(s(0.2s+1))".to_owned(),
+            measurement_s: 3.0,
+            run_in_s: 1.0,
+            runs: 2,
+            ..Condition::default()
+        }],
+        ..Config::default()
+    }
+}
+
+const MAP: InputMap = InputMap {
+    centre: 512.25,
+    span: 300.0,
+    dead: 0.02,
+    gain: 3.0,
+};
+
+fn begun(session: &Session, number: usize) -> (Begun, Task) {
+    let condition = session.facts.config.condition[0].clone();
+    let task = Task::new(&condition, 0, number as u64).unwrap();
+    let begun = Begun {
+        hoid: "test".to_owned(),
+        number,
+        planned: session.next().unwrap(),
+        training: false,
+        utc: String::new(),
+        condition,
+        cell: 0,
+        replication: number as u64,
+        run_in: task.run_in,
+        ticks: task.ticks,
+        input: MAP,
+        device: "mouse".to_owned(),
+        clock: "browser".to_owned(),
+        refresh_ms: 16.7,
+        zero_ms: 1000.0,
+        limits: Limits::default(),
+        phases: task.phases.clone(),
+    };
+    (begun, task)
+}
+
+/// Batches of a run up to a tick: an event each 8 ms, a frame each 16.7 ms.
+fn batches(task: &Task, until: usize) -> Vec<Batch> {
+    let events: Vec<Event> = (0..until / 8)
+        .map(|k| {
+            let stamp = 8.0 * k as f64 + 0.3;
+            let raw = 512.0 + 250.0 * ((k % 97) as f64 / 97.0 - 0.5);
+            Event::from((stamp.ceil(), stamp, stamp + 0.4, raw))
+        })
+        .collect();
+    let inputs: Vec<(usize, f64)> = events.iter().map(|v| (v.tick as usize, MAP.u(v.raw))).collect();
+    let u = held_inputs(&inputs, until);
+    let signals = task.run(&u);
+    let frames: Vec<Frame> = (0..)
+        .map(|k| 16.7 * f64::from(k) + 1.0)
+        .take_while(|drawn| *drawn < until as f64)
+        .map(|drawn| Frame::from((drawn - 0.5, drawn, drawn.floor(), signals.e[drawn as usize])))
+        .collect();
+    let within = |ms: f64, first: usize| (first as f64..(first + 50) as f64).contains(&ms);
+    (0..until)
+        .step_by(50)
+        .map(|first| {
+            let end = (first + 50).min(until);
+            Batch {
+                first,
+                u: u[first..end].to_vec(),
+                e: signals.e[first..end].to_vec(),
+                events: events.iter().filter(|v| within(v.tick, first)).copied().collect(),
+                frames: frames.iter().filter(|f| within(f.drawn_ms, first)).copied().collect(),
+            }
+        })
+        .collect()
+}
+
+fn run(session: &mut Session, until: usize) -> (Stem, RunLog) {
+    let number = session.new_number().unwrap();
+    let (begun, task) = begun(session, number);
+    let stem = session.stem(&begun.condition.name, number);
+    begun.write(&stem, &task).unwrap();
+    let mut log = RunLog::create(&stem, task.ticks).unwrap();
+    for batch in batches(&task, until.min(task.ticks)) {
+        log.append(&batch).unwrap();
+    }
+    (stem, log)
+}
+
+fn finished(out: &Path) -> (Session, Stem, Checked) {
+    let mut session = Session::begin(out, &config(), "P01", false).unwrap();
+    let (stem, log) = run(&mut session, usize::MAX);
+    drop(log);
+    let checked = session.end(&stem, How::Finished, BTreeMap::new()).unwrap();
+    (session, stem, checked)
+}
+
+#[test]
+fn a_run_is_verified_and_its_record_is_read_by_hoid() {
+    let dir = tempfile::tempdir().unwrap();
+    let (session, stem, checked) = finished(dir.path());
+    assert!(checked.is_verified(), "{}", checked.reasons());
+    assert_eq!(session.done.len(), 1);
+    assert_eq!(session.next(), Some(1));
+    assert_eq!(checked.measures.ticks, 4000);
+    assert!((checked.measures.input_hz - 125.0).abs() < 1.0);
+    let begun = Begun::read(&stem).unwrap();
+    let logged = hoid_lab::session::Logged::read(&stem).unwrap();
+    let record = hoid_lab::record::record(&begun, &begun.task(&stem).unwrap(), &logged).unwrap();
+    let path = stem.file("beh.parquet");
+    hoid_io::write_record(&path, &record).unwrap();
+    let read = hoid_io::read(&path).unwrap();
+    assert_eq!((read.len(), read.time_s(0)), (400, -1.0));
+    assert_eq!(read.input(), record.input());
+    for name in ["f_t", "d", "y", "e_shown"] {
+        assert!(read.channel(name).is_some(), "{name}");
+    }
+}
+
+/// Replaces a cell of a line of a file of the run.
+fn corrupt(stem: &Stem, end: &str, line: usize, cell: usize, with: impl Fn(f64) -> f64) {
+    let path = stem.file(end);
+    let text = fs::read_to_string(&path).unwrap();
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let mut cells: Vec<String> = lines[line].split(',').map(str::to_owned).collect();
+    cells[cell] = format!("{:?}", with(cells[cell].parse().unwrap()));
+    lines[line] = cells.join(",");
+    fs::write(&path, lines.join("\n") + "\n").unwrap();
+}
+
+/// What is made of a number.
+type Change<'a> = &'a dyn Fn(f64) -> f64;
+
+#[test]
+fn what_is_changed_makes_a_run_unverified_for_its_own_reason() {
+    let last_bit = |v: f64| f64::from_bits(v.to_bits() ^ 1);
+    let cases: [(&str, usize, Change<'_>, &str); 8] = [
+        ("events.csv", 3, &|raw| raw + 1.0, "lab-input"),
+        ("events.csv", 1, &|stamp| stamp + 5.0, "lab-event"),
+        ("events.csv", 1, &|stamp| stamp - 200.0, "lab-event"),
+        ("ticks.csv", 2, &last_bit, "lab-tick"),
+        ("ticks.csv", 0, &|tick| tick + 1.0, "lab-ticks"),
+        ("frames.csv", 1, &|drawn| drawn + 2.0, "lab-frame"),
+        ("frames.csv", 0, &|time| time - 150.0, "lab-frame"),
+        ("frames.csv", 3, &last_bit, "lab-frame"),
+    ];
+    for (file, cell, with, kind) in cases {
+        let dir = tempfile::tempdir().unwrap();
+        let (_, stem, _) = finished(dir.path());
+        corrupt(&stem, file, 150, cell, with);
+        let checked = check(&stem).unwrap();
+        let kinds: Vec<&str> = checked.verdict.findings().iter().map(|finding| finding.kind).collect();
+        assert!(kinds.contains(&kind), "{file} {cell}: {kinds:?} lacks {kind}");
+        assert!(kinds.contains(&"lab-changed"));
+        // Its own reason, and none of another file's.
+        let others = ["lab-input", "lab-event", "lab-tick", "lab-ticks", "lab-frame"];
+        let own = |other: &&str| *other != kind && kinds.contains(other);
+        assert_eq!(others.iter().find(|other| own(other)), None, "{file} {cell}: {kinds:?}");
+    }
+}
+
+#[test]
+fn another_target_or_element_is_found() {
+    for change in [
+        |begun: &mut Begun| begun.replication += 1,
+        |begun: &mut Begun| begun.phases[0].plant.b[0] *= 1.001,
+    ] {
+        let dir = tempfile::tempdir().unwrap();
+        let (_, stem, _) = finished(dir.path());
+        let mut begun = Begun::read(&stem).unwrap();
+        let task = begun.task(&stem).unwrap();
+        change(&mut begun);
+        begun.write(&stem, &task).unwrap();
+        let checked = check(&stem).unwrap();
+        assert!(
+            checked.verdict.findings().iter().any(|f| f.kind == "lab-task"),
+            "{}",
+            checked.reasons()
+        );
+    }
+}
+
+#[test]
+fn a_session_goes_on_after_its_server_was_killed() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut session = Session::begin(dir.path(), &config(), "P01", true).unwrap();
+    let (stem, log) = run(&mut session, 1234);
+    drop((log, session));
+    // The last line is cut, as by a kill in the middle of it.
+    let path = stem.file("ticks.csv");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, &text[..text.len() - 7]).unwrap();
+    let folder = Session::folders(dir.path()).unwrap();
+    let mut session = Session::open(&folder[0]).unwrap();
+    assert_eq!((session.done.len(), session.next()), (1, Some(0)));
+    let lost = &session.done[0];
+    assert_eq!((lost.how, lost.verdict.as_str()), (How::Interrupted, "unverified"));
+    assert!(
+        lost.reasons.contains("ended after 1233 of 4000 ticks"),
+        "{}",
+        lost.reasons
+    );
+    // Both runs are made, with numbers of their own.
+    for _ in 0..2 {
+        let (stem, log) = run(&mut session, usize::MAX);
+        drop(log);
+        assert!(
+            session
+                .end(&stem, How::Finished, BTreeMap::new())
+                .unwrap()
+                .is_verified()
+        );
+    }
+    assert!(session.facts.finished && session.next().is_none());
+    assert_eq!(Session::read(&folder[0]).unwrap().done, session.done);
+    assert_eq!(
+        session.done.iter().map(|done| done.number).collect::<Vec<_>>(),
+        [1, 2, 3]
+    );
+}
+
+#[test]
+fn batches_that_do_not_continue_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut session = Session::begin(dir.path(), &config(), "P01", false).unwrap();
+    let (_, mut log) = run(&mut session, 100);
+    for (first, u, e) in [
+        (99, 1, 1),
+        (101, 1, 1),
+        (100, 2, 1),
+        (100, 4000, 4000),
+        (usize::MAX, 1, 1),
+    ] {
+        let batch = Batch {
+            first,
+            u: vec![0.0; u],
+            e: vec![0.0; e],
+            ..Batch::default()
+        };
+        assert!(log.append(&batch).is_err(), "{first}");
+    }
+    assert_eq!(log.ticks(), 100);
+}
+
+#[test]
+fn people_have_their_rows_and_pseudonyms_are_checked() {
+    let dir = tempfile::tempdir().unwrap();
+    let row = |subject: &str| Session::begin(dir.path(), &config(), subject, false).unwrap().facts.row;
+    assert_eq!(["A", "B", "A", "C"].map(row), [0, 1, 0, 2]);
+    for bad in ["", "../x", "P 1", "ü", &"x".repeat(21)] {
+        assert!(Session::begin(dir.path(), &config(), bad, false).is_err(), "{bad}");
+    }
+}
