@@ -1,5 +1,7 @@
 """What Python adds: a fit and a step, two threads, and the memory of large arrays.
 
+``python overhead.py [PART]`` makes one PART-th of all runs.
+
 Compare the first lines with those of ``cargo run --release -p hoid --example overhead``, on a
 machine at rest, with a release build of the module (``pip install ./python``).
 """
@@ -8,6 +10,7 @@ from __future__ import annotations
 
 import resource
 import statistics
+import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -17,9 +20,12 @@ import numpy as np
 import pyhoid
 
 
+PART = int(sys.argv[1]) if len(sys.argv) > 1 else 1
+
+
 def times(runs: int, work: Callable[[], object]) -> list[float]:
     found = []
-    for _ in range(runs):
+    for _ in range(max(runs // PART, 1)):
         begun = time.perf_counter()
         work()
         found.append(time.perf_counter() - begun)
@@ -54,7 +60,7 @@ def main() -> None:
         print(f"step {method:8}  {each * 1e6:9.3f} us; by update {many * 1e6:.3f} us")
 
     def fits(_: int) -> None:
-        for _ in range(200):
+        for _ in range(200 // PART):
             pyhoid.identify(record, nk=29, nd=1)
 
     # The best of some: what else runs on the machine takes from two threads more than from one.
@@ -62,10 +68,10 @@ def main() -> None:
     with ThreadPoolExecutor(2) as pool:
         two = best(7, lambda: list(pool.map(fits, range(2))))
     print(
-        f"200 fits in one thread {one:.3f} s, 200 in each of two {two:.3f} s: {two / one:.2f} times"
+        f"{200 // PART} fits in one thread {one:.3f} s, as many in each of two {two:.3f} s: {two / one:.2f} times"
     )
 
-    n = 10_000_000
+    n = 10_000_000 // PART
     e, u = (np.random.default_rng(k).normal(size=n) for k in (0, 1))
     tracker = pyhoid.Tracker("rls", structure="arx", na=1, nb=1, nk=1, start="nothing")
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -30,9 +30,12 @@ pub fn test(arguments: &[String]) -> Result<Counts, String> {
     let wheels = work.join("wheels");
     let _ = fs::remove_dir_all(&wheels);
     pip(&python, &["maturin>=1.9.4,<2"])?;
-    // The same command line as the tests', to compare with; with the tests, because alone it has
+    // The same command line as the tests', to compare with, and the examples that the book runs; with the tests, because alone they have
     // other features and would be compiled again.
-    cargo(&["build", "--quiet", "--workspace", "--bins", "--tests"], &[])?;
+    cargo(
+        &["build", "--quiet", "--workspace", "--bins", "--tests", "--examples"],
+        &[],
+    )?;
     run(Command::new(&python)
         .args(["-m", "maturin", "build", "--profile", "dev"])
         .args(["--features", "as-in-workspace", "--out"])

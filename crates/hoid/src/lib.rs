@@ -93,3 +93,16 @@ pub mod prelude {
     pub use hoid_study::{Plan, RunOptions, run as run_study};
     pub use hoid_track::{Memory, Method, Sample, StartAt, Trace, TrackOptions, Tracker, track};
 }
+
+/// The Rust of the book; its other blocks are run by `python/tests/test_book.py`.
+#[cfg(doctest)]
+mod book {
+    #[doc = include_str!("../../../docs/src/methods/grey-box.md")]
+    struct GreyBox;
+    #[doc = include_str!("../../../docs/src/methods/instruments.md")]
+    struct Instruments;
+    #[doc = include_str!("../../../docs/src/methods/people.md")]
+    struct People;
+    #[doc = include_str!("../../../docs/src/methods/time-varying.md")]
+    struct TimeVarying;
+}

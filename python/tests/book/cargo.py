@@ -1,0 +1,64 @@
+"""`cargo` for the blocks of the book: what they would compile for release is there for the tests.
+
+| block | runs |
+|---|---|
+| `cargo run --release -- ...` | the program of the tests |
+| `cargo run --release -p CRATE --example NAME -- ...` | the example, as the tests have compiled it |
+| `cargo xtask slow NAME ...` | its example, the same |
+| `cargo test -p CRATE ...` | with the features of the whole workspace, as the tests have compiled it |
+| `cargo xtask test` | nothing: that is what runs |
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[3]
+
+
+def command(arguments: list[str]) -> list[str]:
+    program = Path(os.environ["HOID_BINARY"])
+    words = list(arguments)
+    rest = words[words.index("--") + 1 :] if "--" in words else []
+    if words[0] == "run":
+        if "--example" not in words:
+            return [str(program), *rest]
+        return [example(program, words[words.index("--example") + 1]), *rest]
+    if words[:2] == ["xtask", "slow"]:
+        return [example(program, words[2].replace("-", "_")), *words[3:]]
+    if words[:2] == ["xtask", "test"]:
+        return ["true"]
+    if words[0] == "test":
+        if "-p" in words:
+            crate = words.index("-p")
+            words[crate : crate + 2] = ["--workspace"]
+        if "--test" not in words:
+            words.insert(2, "--lib")
+        # Where the configuration of cargo is.
+        os.chdir(ROOT)
+        folder = os.environ.get("CARGO_TARGET_DIR") or str(program.parents[1])
+        target = ["--target-dir", folder]
+        return [real_cargo(), words[0], *target, *words[1:]]
+    sys.exit(f"cargo {' '.join(words)}: the tests of the book do not know this command")
+
+
+def example(program: Path, name: str) -> str:
+    path = program.parent / "examples" / (name + program.suffix)
+    if not path.exists():
+        sys.exit(f"no example {path}; cargo build --workspace --examples makes it")
+    return str(path)
+
+
+def real_cargo() -> str:
+    """The cargo behind this one."""
+    behind = os.environ["PATH"].split(os.pathsep)[1:]
+    return next(
+        str(Path(folder) / "cargo") for folder in behind if (Path(folder) / "cargo").exists()
+    )
+
+
+if __name__ == "__main__":
+    found = command(sys.argv[1:])
+    os.execvp(found[0], found)
