@@ -49,11 +49,16 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
         }
         Err(_) => None,
     };
-    let mut fit = estimator.fit_beside(records, of_lines)?;
+    let mut fit = output::watched("fitting", || estimator.fit_beside(records, of_lines))?;
     let opinion = args
         .faults
         .looks()
-        .then(|| second_opinion::of_family(&estimator, &fit, records, args.controlled_element.as_ref()))
+        .then(|| {
+            let element = args.controlled_element.as_ref();
+            output::watched("a second opinion", || {
+                second_opinion::of_family(&estimator, &fit, records, element)
+            })
+        })
         .flatten();
     fit.verdict = faults::judged(fit.verdict, files, accounts).and(opinion);
     let described = described.ok();
