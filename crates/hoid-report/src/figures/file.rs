@@ -118,7 +118,8 @@ mod converted {
         let family = sans_serif(fonts).ok_or_else(|| {
             failed(&"the system has no font; install one, such as DejaVu (fonts-dejavu), or write it as .svg")
         })?;
-        fonts.set_sans_serif_family(family);
+        fonts.set_sans_serif_family(family.clone());
+        options.font_family = family;
         Tree::from_str(svg, &options).map_err(|e| failed(&e))
     }
 
