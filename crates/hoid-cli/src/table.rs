@@ -19,6 +19,8 @@ const STYLE: TableStyle = {
 };
 /// Blanks to the left and right of a cell.
 const PADDING: usize = 2;
+/// A blank between two columns.
+const BETWEEN: usize = 1;
 /// A blank at which no line is broken.
 const FIXED_BLANK: &str = "\u{a0}";
 
@@ -48,7 +50,8 @@ impl Rows {
             return whole;
         }
         let least = self.least_widths();
-        match least.iter().map(|least| least + PADDING).sum::<usize>() <= width {
+        let blanks = least.len() * PADDING + least.len().saturating_sub(1) * BETWEEN;
+        match least.iter().sum::<usize>() + blanks <= width {
             true => self.drawn(Some((width, &least))),
             false => self.as_lists(),
         }
@@ -141,6 +144,15 @@ mod tests {
         assert!(narrow.lines().all(|l| l.chars().count() <= 38), "{narrow}");
         for kept in ["anna", "13.5\u{a0}±\u{a0}1.9", "margin", "(deg)", "range"] {
             assert!(narrow.contains(kept), "{kept}\n{narrow}");
+        }
+        // No width between, at which a line is longer than the screen.
+        for width in 20..110 {
+            let page = rows().on(Some(width));
+            let is_table = page.contains('─');
+            assert!(
+                !is_table || page.lines().all(|l| l.chars().count() <= width),
+                "{width}\n{page}"
+            );
         }
         let list = rows().on(Some(20));
         assert!(list.starts_with("anna\n  phase margin (deg)  13.5 ± 1.9\n"), "{list}");
