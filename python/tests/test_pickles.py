@@ -78,3 +78,15 @@ def test_damaged_pickles_are_refused(fit: pyhoid.Fit, c1: pyhoid.Record) -> None
     parts["u"] = np.full(len(c1), np.nan)
     with pytest.raises(pyhoid.DataError):
         c1.__reduce__()[0](parts)
+
+
+def test_joblib_spreads_fits_over_processes() -> None:
+    joblib = pytest.importorskip("joblib")
+    records = [pyhoid.simulate("C1", seed=seed).span(0, 40) for seed in (1, 2)]
+    spread = joblib.Parallel(n_jobs=2)(
+        joblib.delayed(pyhoid.identify)(record, "arx", nk=29) for record in records
+    )
+    for found, record in zip(spread, records):
+        same = pyhoid.identify(record, "arx", nk=29)
+        assert found.parameters == same.parameters
+        assert np.array_equal(found.residuals(record).values, same.residuals(record).values)

@@ -5,15 +5,12 @@ They check as the oldest supported Python would read it.
 
 from __future__ import annotations
 
-import doctest
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-
-import pyhoid
 
 PACKAGE = Path(__file__).parents[1]
 
@@ -46,15 +43,3 @@ def test_mypy_accepts_the_package_and_its_use(cache: list[str]) -> None:
 
 def test_pyright_accepts_the_package_and_its_use() -> None:
     check("basedpyright", "--pythonpath", sys.executable)
-
-
-def test_every_public_name_has_an_example_that_parses() -> None:
-    named = [getattr(pyhoid, name) for name in pyhoid.__all__]
-    named += [getattr(pyhoid.plots, name) for name in pyhoid.plots.__all__]
-    for one in named:
-        if not callable(one) or (isinstance(one, type) and issubclass(one, Exception)):
-            continue
-        examples = doctest.DocTestParser().get_examples(one.__doc__ or "")
-        assert examples, one
-        for example in examples:
-            compile(example.source, f"{one.__name__}", "exec")

@@ -31,3 +31,24 @@ def use(e: npt.NDArray[np.float64], u: list[float]) -> float:
         + len(change)
         + (0 if covariance is None else 1)
     )
+
+
+def script(folder: str) -> list[str]:
+    """What a user's script of an evening does."""
+    runs = [pyhoid.read(f"{folder}/run{n}.csv", input="r-y", output="u", start=5) for n in (1, 2)]
+    person = pyhoid.identify_operator(runs, form="lead", controlled_element="1/s")
+    lines = [f"{person.form}: {person.verdict.level}", *person.verdict.reasons]
+    for name, parameter in person.parameters.items():
+        low, high = parameter.interval or (float("nan"), float("nan"))
+        lines.append(f"{name} {parameter.value:.3g}, {low:.3g} to {high:.3g}")
+    described = pyhoid.describing_function(runs)
+    lines.append(f"{len(described.omega)} lines")
+    fits: dict[str, pyhoid.Fit] = {"ARX": pyhoid.identify(runs, "arx", nk=10)}
+    pyhoid.plots.bode(list(fits.values()))
+    for record in runs:
+        trace = pyhoid.track(record, "adaptive", every=10)
+        lines.append(f"{trace['t'][-1]} {trace['K_e'][-1]}")
+    table = pyhoid.study("bias", f"{folder}/bias", replications=1)["fits"].to_dict()
+    lines.extend(table)
+    pages = pyhoid.group(folder, f"{folder}/group").pages
+    return [*lines, *(str(page) for page in pages)]

@@ -1,4 +1,4 @@
-//! What the crates of the workspace may bring with them, by `cargo metadata`: licences, crates that
+//! What the crates of the workspace may bring with them, with all features, by `cargo metadata`: licences, crates that
 //! are not wanted, one version of each, and not more of them than there are reasons for.
 //!
 //! An expression of licences is one of SPDX (Annex D: `OR` binds less than `AND`, that less than
@@ -61,15 +61,19 @@ const TOLERATED: [(&str, &str); 5] = [
 ];
 
 /// Crates of which several versions are here, and what asks for the older ones. Each is built twice.
-const SEVERAL: [(&str, usize, &str); 5] = [
+const SEVERAL: [(&str, usize, &str); 9] = [
+    ("bitflags", 2, "png, of resvg: feature pdf-png"),
     ("getrandom", 3, "const-random and ahash, of parquet"),
     (
         "glam",
         4,
         "options of nalgebra, none of which is on: named by the lock file, not built",
     ),
+    ("kurbo", 2, "usvg and its font reader: feature pdf-png"),
+    ("miniz_oxide", 2, "png, of resvg: feature pdf-png"),
     ("num-bigint", 2, "an option of parquet, not built"),
     ("r-efi", 2, "the versions of getrandom, on UEFI alone"),
+    ("roxmltree", 2, "fontconfig-parser, of usvg: feature pdf-png"),
     ("syn", 2, "zerocopy and windows-core, and the test of imports"),
 ];
 
@@ -80,7 +84,7 @@ const MOST_CRATES: usize = 149;
 /// Checks all of it.
 pub fn check() -> Result<(), String> {
     let mut metadata = cargo_command();
-    metadata.args(["metadata", "--format-version", "1", "--locked"]);
+    metadata.args(["metadata", "--format-version", "1", "--locked", "--all-features"]);
     let metadata: Value = serde_json::from_str(&output(&mut metadata)?)
         .map_err(|error| format!("cargo metadata gives no JSON: {error}"))?;
     let packages = packages(&metadata);

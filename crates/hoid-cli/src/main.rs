@@ -17,6 +17,7 @@ mod output;
 mod recursion;
 #[cfg(test)]
 mod reference;
+mod table;
 mod text;
 
 use std::process::ExitCode;

@@ -8,8 +8,13 @@ use std::{
         Mutex, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
+    time::Duration,
 };
 
+use anstream::{AutoStream, ColorChoice};
+use anstyle::AnsiColor;
+use hoid_ident::progress;
+use hoid_model::VerdictLevel;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::error::CliError;
@@ -27,7 +32,31 @@ pub fn print(text: &str) -> Result<(), CliError> {
 /// # Errors
 /// As [`print`].
 pub fn show(page: &str) -> Result<(), CliError> {
-    print(&width().map_or_else(|| page.to_owned(), |width| wrapped(page, width)))
+    let page = width().map_or_else(|| page.to_owned(), |width| wrapped(page, width));
+    match AutoStream::choice(&io::stdout()) {
+        ColorChoice::Never => print(&page),
+        _ => print(&coloured(&page)),
+    }
+}
+
+/// The page with its verdict in colour: what a terminal shows that takes colours and was not asked
+/// for none (`NO_COLOR`).
+fn coloured(page: &str) -> String {
+    let colour = |level| match level {
+        VerdictLevel::Trustworthy => AnsiColor::Green,
+        VerdictLevel::Doubtful => AnsiColor::Yellow,
+        VerdictLevel::NotDetermined => AnsiColor::Red,
+    };
+    let in_colour = |level: VerdictLevel| {
+        let line = format!("Verdict: {level}");
+        let rest = page.strip_prefix(&line).filter(|rest| rest.starts_with('\n'))?;
+        let style = colour(level).on_default().bold();
+        Some(format!("{style}{line}{style:#}{rest}"))
+    };
+    VerdictLevel::ALL
+        .into_iter()
+        .find_map(in_colour)
+        .unwrap_or_else(|| page.to_owned())
 }
 
 /// Narrowest and widest line of a page: below, words are cut; above, the eye loses the line.
@@ -153,6 +182,34 @@ pub fn progress(total: usize, what: &str) -> ProgressBar {
     bar
 }
 
+/// Does work that may last, with the time since its start on standard error, and a bar with the
+/// time left as soon as it says how far it is; nothing where standard error is no terminal.
+pub fn watched<T>(what: &'static str, work: impl FnOnce() -> T) -> T {
+    let bar = ProgressBar::new_spinner().with_message(what);
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}, {elapsed}") {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(Duration::from_millis(200));
+    let told = bar.clone();
+    let done = progress::watched(
+        move |step| {
+            if told.length() != Some(step.total as u64)
+                && let Ok(style) = ProgressStyle::with_template(&format!(
+                    "{{bar:30}} {{pos}}/{{len}} {}, {{elapsed}}, {{eta}} left",
+                    step.what
+                ))
+            {
+                told.set_style(style);
+                told.set_length(step.total as u64);
+            }
+            told.set_position(step.done as u64);
+        },
+        work,
+    );
+    bar.finish_and_clear();
+    done
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -164,5 +221,17 @@ mod tests {
         assert_eq!(wrapped(page, 12), expected);
         assert_eq!(wrapped("averylongwordthatstays\n", 12), "averylongwordthatstays\n");
         assert_eq!(wrapped("", 12), "");
+    }
+
+    #[test]
+    fn the_verdict_has_a_colour_and_nothing_else_has() {
+        let page = "Verdict: not determined\n- why\nVerdict: doubtful\n";
+        assert_eq!(
+            coloured(page),
+            "\u{1b}[1m\u{1b}[31mVerdict: not determined\u{1b}[0m\n- why\nVerdict: doubtful\n"
+        );
+        for plain in ["", "Verdict: unknown\n", "\nVerdict: doubtful\n"] {
+            assert_eq!(coloured(plain), plain);
+        }
     }
 }

@@ -1,6 +1,5 @@
 //! Results as tables for people.
 
-use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 use hoid_ident::{
     Choice, Fit, GreyBoxFit, MarginEstimates,
     order_selection::Criterion,
@@ -12,35 +11,16 @@ use hoid_model::{
 };
 use hoid_report::numbers;
 
-use crate::{commands::reading::Account, output};
+use crate::{commands::reading::Account, table::Rows};
 
 /// Rows of a search that are printed; all of them are in the JSON.
 const CANDIDATES_SHOWN: usize = 8;
 /// Faults of a record that are shown one by one.
 const FAULTS_SHOWN: usize = 10;
 
-/// Three rules, as in print.
-const STYLE: TableStyle = {
-    let rule = LineStyle::none().fill('─').junction('─');
-    TableStyle::new()
-        .top_border(rule)
-        .header_separator(rule)
-        .bottom_border(rule)
-};
-
-/// A table in the plain style of all output: first column to the left, the others to the right.
-pub fn table(header: &[&str]) -> Table {
-    let mut table = Table::new();
-    table.load_style(STYLE);
-    table.set_header(header.to_vec());
-    if let Some(width) = output::width().and_then(|columns| u16::try_from(columns).ok()) {
-        table.set_content_arrangement(ContentArrangement::Dynamic);
-        table.set_width(width);
-    }
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
+/// A table in the plain style of all output.
+pub fn table(header: &[&str]) -> Rows {
+    Rows::under(header)
 }
 
 /// Value and standard error as two texts with the digits that the error allows.
@@ -260,7 +240,7 @@ pub fn plus_minus(e: &Estimate) -> String {
 }
 
 /// Name, value ± standard error, interval of 95 % and unit of parameters, a row each.
-pub fn estimates<'a>(what: &str, all: impl IntoIterator<Item = (&'a str, String, Estimate)>) -> Table {
+pub fn estimates<'a>(what: &str, all: impl IntoIterator<Item = (&'a str, String, Estimate)>) -> Rows {
     let all: Vec<(&str, String, Estimate)> = all.into_iter().collect();
     let with_units = all.iter().any(|(_, unit, _)| !unit.is_empty());
     let mut header = vec![what, "value", "95 % from", "to"];

@@ -65,6 +65,7 @@
 //! | [`faults`] | faults of recorded data, found and mended before a fit |
 //! | [`frequency`] | describing function, coherence, remnant spectrum and margins by Fourier coefficients |
 //! | [`judgement`] | what speaks for and against a fit: [`Fit::verdict`] |
+//! | [`progress`] | how far a fit is, for whoever waits |
 //! | [`linalg`] | sums of products, least squares by QR, the inverse of an information matrix |
 //!
 //! and inside, each using those before it:
@@ -100,6 +101,7 @@ mod noise_model;
 mod optimize;
 pub mod order_selection;
 mod pem;
+pub mod progress;
 mod registry;
 mod searched_delay;
 pub mod settings;

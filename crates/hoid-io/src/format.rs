@@ -13,6 +13,7 @@ use crate::arrays::{Contents, output_table_of, table_of};
 use crate::output_table::{OutputTable, TableSchema, Values};
 use crate::read_options::ReadOptions;
 use crate::table::Table;
+use crate::time_column::with_time;
 
 /// A file format.
 pub(crate) struct Format {
@@ -85,7 +86,7 @@ impl Format {
         options: &ReadOptions,
     ) -> Result<Table<'a>, IoError> {
         match self.reading {
-            Reading::Table { record, .. } => record(bytes, file),
+            Reading::Table { record, .. } => record(bytes, file).map(with_time),
             Reading::Arrays(read) => table_of(read(std::mem::take(bytes), file)?, options, file),
         }
     }

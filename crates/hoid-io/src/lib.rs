@@ -32,6 +32,7 @@
 //! | `scenario_file` | [`read_scenario`]: scenarios in TOML |
 //! | `formats`, `format` | the formats, and what each says of itself |
 //! | `arrays` | files of named arrays: paths, and the columns among them |
+//! | `time_column` | the time under another name |
 //! | `table`, `table_reader`, `time_grid`, `record_from_table` | the columns of any format, and the record made of them |
 //! | `column_expression`, `read_options` | [`ColumnExpression`], [`ReadOptions`]: what is read and how |
 //! | `preparation` | [`Preparation`]: scale, offset, rate, run-in and trend of channels, and the account of it |
@@ -70,6 +71,7 @@ mod table;
 mod table_file;
 mod table_reader;
 mod table_writer;
+mod time_column;
 mod time_grid;
 mod wording;
 

@@ -15,6 +15,7 @@ use crate::data_quality::{
 use crate::format::Reading;
 use crate::formats::bytes_of;
 use crate::table::{Column, DECIMAL_COMMA, Precision, Table, has_decimal_comma};
+use crate::time_column::with_time;
 use crate::wording::named;
 
 /// Characters of a sketch.
@@ -121,7 +122,7 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
     let file = path.display().to_string();
     let (format, mut bytes) = bytes_of(path)?;
     let (columns, notes) = match format.reading {
-        Reading::Table { record, .. } => of_table(record(&mut bytes, &file)?),
+        Reading::Table { record, .. } => of_table(with_time(record(&mut bytes, &file)?)),
         Reading::Arrays(read) => of_arrays(&read(bytes, &file)?),
     };
     let is_time = |column: &&Read| TIMES.contains(&column.name.as_str()) && column.rows > 1;

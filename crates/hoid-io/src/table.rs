@@ -75,6 +75,14 @@ impl Precision {
         self.significant = self.significant.max(digits(mantissa) - leading_zeros);
     }
 
+    /// That of the same numbers times a power of ten.
+    pub(crate) fn shifted(self, power: i32) -> Self {
+        Self {
+            decimals: self.decimals.map(|decimals| decimals - power),
+            ..self
+        }
+    }
+
     /// One unit of the last printed digit of a value of this size. Fixed decimals give the same
     /// unit everywhere; with a fixed number of significant digits the unit grows with the value.
     pub(crate) fn unit(self, value: f64) -> f64 {

@@ -66,7 +66,13 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
     let of = |asked: &&str| {
         let asked = asked.trim().to_lowercase();
         let score = |name: &str| (strsim::jaro(&asked, &name.trim().to_lowercase()), name.to_owned());
-        let known = names.iter().filter(|name| !name.is_empty()).map(|name| score(name));
+        // A letter or two are within every longer name: what begins with them is meant.
+        let is_near = |name: &&&str| asked.chars().count() > 2 || name.trim().to_lowercase().starts_with(&asked);
+        let known = names
+            .iter()
+            .filter(|name| !name.is_empty())
+            .filter(is_near)
+            .map(|name| score(name));
         let best = known.max_by(|a, b| a.0.total_cmp(&b.0))?;
         (best.0 > NEAR).then(|| format!("\"{}\"", named(&best.1)))
     };
@@ -131,6 +137,7 @@ mod tests {
             "; did you mean \"stick\" and \"error\"?"
         );
         assert_eq!(did_you_mean(&["q"], &names), "");
+        assert_eq!(did_you_mean(&["e"], &["Time [ms]"]), "");
         assert_eq!(did_you_mean(&["q"], &[]), "");
     }
 }

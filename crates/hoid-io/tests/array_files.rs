@@ -197,6 +197,41 @@ fn variables_of_matlab() {
 }
 
 #[test]
+fn hdf5_of_another_program() {
+    let name = "mat/h5py.h5";
+    whole(&read(name, "e", "u"));
+    whole(&read(name, "session.run1.e", "session.run1.u"));
+    // Lines of a matrix are counted as numpy does.
+    close(channel(&read(name, "e", "u"), "u"), &u());
+    let counted = ReadOptions {
+        sampling_hz: Some(80.0),
+        ..options("x[:,1]", "x[:,2]")
+    };
+    let found = read_record(&fixture(name), &counted).unwrap();
+    close(found.record.output(), &times(2.0, &e()));
+}
+
+#[test]
+fn objects_of_matlab_come_with_the_line_that_saves_their_numbers() {
+    let message = refused("mat/h5py_objects_v73.mat", "runs", "stick");
+    assert!(
+        message.contains("runs holds an object of the class timetable") && message.contains("x.Properties.RowTimes"),
+        "{message}"
+    );
+    let message = refused("mat/h5py_objects_v73.mat", "stick", "runs");
+    assert!(
+        message.contains("timeseries") && message.contains("x.Time"),
+        "{message}"
+    );
+    // A name that is not there stands in the object.
+    let message = refused("mat/h5py_objects_v73.mat", "e", "u");
+    assert!(
+        message.contains("runs holds an object of the class timetable"),
+        "{message}"
+    );
+}
+
+#[test]
 fn names_in_the_only_structure() {
     let message = refused("mat/octave_struct.mat", "e", "u");
     assert!(

@@ -586,3 +586,29 @@ fn a_constant_term_of_a_difference_is_no_fault() {
     assert_eq!(found("y", "-r"), ["constant: r is constant: 0"]);
     assert_eq!(found("r-u", "y").len(), 2);
 }
+
+#[test]
+fn the_time_may_have_the_name_that_a_recorder_gives_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let read = |header: &str, factor: f64| {
+        let path = directory.path().join("run.csv");
+        let row = |k: i32| format!("{:.3};{k};{}\n", f64::from(k) / 60.0 * factor, 2 * k);
+        let rows: String = (0..40).map(row).collect();
+        std::fs::write(&path, format!("{header}\n{rows}")).unwrap();
+        read_record(&path, &ReadOptions::default())
+    };
+    // Printed to a microsecond, to a millisecond: the grid is found all the same.
+    let found = read("Time [ms];e;u", 1000.0).unwrap();
+    assert!((found.record.sample_time().s() - 1.0 / 60.0).abs() < 1e-6);
+    assert!(
+        found.notes.iter().any(|note| note == "Time [ms] is taken as t, in s"),
+        "{:?}",
+        found.notes
+    );
+    assert!((read("time;e;u", 1.0).unwrap().record.time_s(39) - 0.65).abs() < 1e-3);
+    // Two times: nobody knows which.
+    let path = directory.path().join("two.csv");
+    std::fs::write(&path, "time,time_ms,e,u\n0,0,1,2\n0.01,10,1,2\n").unwrap();
+    let message = read_record(&path, &ReadOptions::default()).unwrap_err().to_string();
+    assert!(message.contains("has no column t"), "{message}");
+}

@@ -38,6 +38,12 @@ pub enum ReportError {
     /// A study that failed.
     #[error(transparent)]
     Study(Box<StudyError>),
+    /// A figure that cannot be made in the format that was asked for.
+    #[error("the figure cannot be written in this format: {reason}")]
+    Figure {
+        /// Why.
+        reason: String,
+    },
     /// The page template could not be filled: a defect of this crate.
     #[error("the page template could not be filled: {reason}; please report this as a defect")]
     Template {

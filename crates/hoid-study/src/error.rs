@@ -130,10 +130,16 @@ pub enum StudyError {
         reason: String,
     },
     /// A directory without runs.
-    #[error("no file in {directory} matches the pattern: look at the names there, and at --pattern")]
+    #[error(
+        "no file in {directory} is called {pattern}; it has {found}: say by --pattern what their names mean, as {{subject}}_{{run}}.csv"
+    )]
     NoRuns {
         /// The directory.
         directory: String,
+        /// The pattern.
+        pattern: String,
+        /// Some of the files that are there.
+        found: String,
     },
     /// A virtual experiment would be written over another.
     #[error("{directory} already holds an experiment; take another directory")]

@@ -268,10 +268,20 @@ fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
     }
     let empty = tempfile::tempdir().unwrap();
     let pattern = Pattern::new("{run}.csv").unwrap();
-    assert!(matches!(
-        Manifest::of_directory(empty.path(), &pattern),
-        Err(StudyError::NoRuns { .. })
-    ));
+    let said = |pattern: &Pattern| match Manifest::of_directory(empty.path(), pattern) {
+        Err(error @ StudyError::NoRuns { .. }) => error.to_string(),
+        other => panic!("{other:?}"),
+    };
+    assert!(said(&pattern).contains("is called {run}.csv; it has no files"));
+    for n in 1..=4 {
+        std::fs::write(empty.path().join(format!("anna-{n}.csv")), "").unwrap();
+    }
+    let pattern = Pattern::new("{subject}_{run}*.csv").unwrap();
+    let message = said(&pattern);
+    assert!(
+        message.contains("{subject}_{run}*.csv; it has anna-1.csv, anna-2.csv, anna-3.csv and 1 more"),
+        "{message}"
+    );
 }
 
 #[test]

@@ -100,6 +100,8 @@ class DescribingFunction:
         weights : {"coherence", "variance", "uniform"}
         delay : (float, float)
             Smallest and largest tau in s.
+
+        >>> described.gain_lead_delay()
         """
         found = self._native.gain_lead_delay(lead=lead, weights=weights, delay=delay)
         return {
@@ -114,11 +116,16 @@ class DescribingFunction:
 
         `num` is the element as text, such as ``"90/(s(s+6))"``; or `num` and `den` are its
         coefficients by descending powers of s.
+
+        >>> described.margins("90/(s(s+6))")
         """
         return estimates(self._native.margins(_options.controlled_element(num, den)))
 
     def to_pandas(self) -> pd.DataFrame:
-        """The lines as a table."""
+        """The lines as a table.
+
+        >>> described.to_pandas()
+        """
         import pandas as pd
 
         return pd.DataFrame(self.columns)

@@ -276,7 +276,10 @@ class Fit:
         return self.remnant_by("zoh")
 
     def remnant_by(self, discretisation: str) -> Remnant | None:
-        """T_n and K_n by the inverse of ``"zoh"`` or ``"backward-euler"``."""
+        """T_n and K_n by the inverse of ``"zoh"`` or ``"backward-euler"``.
+
+        >>> fit.remnant_by("backward-euler")
+        """
         found = self._native.remnant(discretisation)
         return None if found is None else Remnant(found)
 
@@ -328,26 +331,40 @@ class Fit:
         ------
         DataError
             For a record that is too short or has another sample time.
+
+        >>> fit.predict(record)
         """
         return Series(*self._native.predict(record, horizon))
 
     def simulate(self, record: Record) -> Series:
-        """Response to e alone, from the initial states that fit the record best."""
+        """Response to e alone, from the initial states that fit the record best.
+
+        >>> fit.simulate(record)
+        """
         return Series(*self._native.simulate(record))
 
     def residuals(self, record: Record) -> Series:
-        """One-step prediction errors."""
+        """One-step prediction errors.
+
+        >>> fit.residuals(record).values.std()
+        """
         return Series(*self._native.residuals(record))
 
     def validate(self, record: Record) -> Validation:
-        """Simulation, prediction and residual tests on a record."""
+        """Simulation, prediction and residual tests on a record.
+
+        >>> fit.validate(record).ljung_box["p_value"]
+        """
         found = dict(self._native.validate(record))
         found["autocorrelation"] = Correlation(*found["autocorrelation"])
         found["cross_correlation"] = Correlation(*found["cross_correlation"])
         return Validation(**found)
 
     def quality_on(self, records: Record | Sequence[Record]) -> dict[str, float]:
-        """`quality` on other records."""
+        """`quality` on other records.
+
+        >>> fit.quality_on(record)["vaf_simulation"]
+        """
         return self._native.quality(_options.as_records(records))
 
     def frequency_response(self, omega: Any = None) -> FrequencyResponse:
@@ -357,6 +374,8 @@ class Fit:
         ----------
         omega : array_like, shape (n,), optional
             Frequencies in rad/s; default 200 of them, from 0.1 rad/s to the Nyquist frequency.
+
+        >>> fit.frequency_response([1.0, 2.0]).response
         """
         if omega is None:
             omega = np.geomspace(0.1, np.pi / self.sample_time, 200)
@@ -370,6 +389,8 @@ class Fit:
 
         `num` is the element as text, such as ``"90/(s(s+6))"``; or `num` and `den` are its
         coefficients by descending powers of s.
+
+        >>> fit.margins("90/(s(s+6))")
         """
         return estimates(self._native.margins(_options.controlled_element(num, den)))
 
@@ -380,6 +401,8 @@ class Fit:
         ------
         NotConvertibleError
             For a model without an input.
+
+        >>> fit.to_control()
         """
         import control
 
@@ -398,7 +421,10 @@ class Fit:
         return control.TransferFunction(num, den, self.sample_time)
 
     def to_pandas(self) -> pd.DataFrame:
-        """Parameters, operator and remnant as a table: value, standard_error, unit."""
+        """Parameters, operator and remnant as a table: value, standard_error, unit.
+
+        >>> fit.to_pandas()
+        """
         import pandas as pd
 
         rows = self._all_rows()
@@ -414,7 +440,10 @@ class Fit:
         )
 
     def to_xarray(self) -> xr.Dataset:
-        """Parameters and covariance over the coordinate ``parameter``."""
+        """Parameters and covariance over the coordinate ``parameter``.
+
+        >>> fit.to_xarray()
+        """
         import xarray as xr
 
         names = list(self.parameters)
@@ -432,7 +461,10 @@ class Fit:
         )
 
     def plot(self, record: Record | None = None, ax: Axes | None = None) -> Axes:
-        """Plot the time response on a record, by default the first; see `pyhoid.plots`."""
+        """Plot the time response on a record, by default the first; see `pyhoid.plots`.
+
+        >>> axes = fit.plot(record.span(20, 40))
+        """
         from . import plots
 
         return plots.time_response(self, record or self.records[0], ax=ax)
@@ -467,6 +499,8 @@ class Fit:
         ------
         FileError
             When the page cannot be written.
+
+        >>> page = fit.report("out")
         """
         if not self.records:
             raise DataError(
@@ -503,7 +537,10 @@ class Fit:
         return rows
 
     def summary(self) -> str:
-        """The fit as tables in plain text."""
+        """The fit as tables in plain text.
+
+        >>> print(fit.summary())
+        """
         header = ["parameter", "value", "standard error", "unit"]
         rows = [
             [name, *_text.with_uncertainty(e.value, e.standard_error), UNITS.get(name, "")]

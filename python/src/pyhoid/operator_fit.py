@@ -290,7 +290,10 @@ class OperatorFit:
         return bool(self.termination["converged"])
 
     def to_pandas(self) -> pd.DataFrame:
-        """The parameters as a table."""
+        """The parameters as a table.
+
+        >>> person.to_pandas()
+        """
         import pandas as pd
 
         rows = [
@@ -308,7 +311,10 @@ class OperatorFit:
         return pd.DataFrame(rows, index=pd.Index(list(self.parameters), name="parameter"))
 
     def summary(self) -> str:
-        """Verdict, parameters, and what they rest on, in plain text."""
+        """Verdict, parameters, and what they rest on, in plain text.
+
+        >>> print(person.summary())
+        """
         parts = [repr(self.verdict), self._native.title]
         for k, operator in enumerate(self.operators):
             head = (

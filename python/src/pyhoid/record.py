@@ -300,6 +300,8 @@ class Record:
         ------
         DataError
             When the span has no samples.
+
+        >>> record.span(5, 45)
         """
 
         # A bound that falls on a sample, apart from rounding, takes that sample.
@@ -330,11 +332,17 @@ class Record:
         return record
 
     def detrended(self, how: Detrending = "mean") -> Record:
-        """The record with the ``"mean"`` or the ``"linear"`` trend of input and output removed."""
+        """The record with the ``"mean"`` or the ``"linear"`` trend of input and output removed.
+
+        >>> record.detrended("linear")
+        """
         return Record._of(_pyhoid.detrended(self, how))
 
     def to_pandas(self) -> pd.DataFrame:
-        """All channels as a table with the time in s as index."""
+        """All channels as a table with the time in s as index.
+
+        >>> record.to_pandas()
+        """
         import pandas as pd
 
         return pd.DataFrame(
@@ -344,13 +352,19 @@ class Record:
         )
 
     def to_polars(self) -> pl.DataFrame:
-        """All channels as a table of polars, behind the time in s as column ``t``."""
+        """All channels as a table of polars, behind the time in s as column ``t``.
+
+        >>> record.to_polars()
+        """
         import polars as pl
 
         return pl.DataFrame({"t": self.time, **{name: self[name] for name in self.names}})
 
     def to_xarray(self) -> xr.Dataset:
-        """All channels over the coordinate ``t`` (s), with their units."""
+        """All channels over the coordinate ``t`` (s), with their units.
+
+        >>> record.to_xarray()
+        """
         import xarray as xr
 
         variables = {

@@ -43,7 +43,10 @@ class Table(Mapping[str, Any]):
         self._columns: dict[str, Any] | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """All columns by name."""
+        """All columns by name.
+
+        >>> results["fits"].to_dict()["K_e"]
+        """
         if self._columns is None:
             self._columns = {
                 name: np.asarray(values, dtype=object) if isinstance(values, list) else values
@@ -52,19 +55,28 @@ class Table(Mapping[str, Any]):
         return self._columns
 
     def to_pandas(self) -> pd.DataFrame:
-        """The table as a pandas DataFrame."""
+        """The table as a pandas DataFrame.
+
+        >>> results["fits"].to_pandas()
+        """
         import pandas as pd
 
         return pd.DataFrame(self.to_dict())
 
     def to_polars(self) -> pl.DataFrame:
-        """The table as a polars DataFrame."""
+        """The table as a polars DataFrame.
+
+        >>> results["fits"].to_polars()
+        """
         import polars as pl
 
         return pl.DataFrame({name: _listed(values) for name, values in self.to_dict().items()})
 
     def to_arrow(self) -> pa.Table:
-        """The table as an Arrow table."""
+        """The table as an Arrow table.
+
+        >>> results["fits"].to_arrow()
+        """
         import pyarrow as pa
 
         return pa.table({name: _listed(values) for name, values in self.to_dict().items()})

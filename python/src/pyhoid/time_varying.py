@@ -151,19 +151,30 @@ class TimeVaryingFit:
         """``t`` and what changes at these times in s, with standard errors under ``_se``.
 
         K_e, T_L and K_e_dot of a gain and a lead; K (and K_over_T_I) and T_L of other forms.
+
+        >>> change.gains([20.0, 60.0])
         """
         return self._native.gains([float(t) for t in signal(np.atleast_1d(times), "times")])
 
     def residuals(self, record: Record) -> Series:
-        """One-step prediction errors."""
+        """One-step prediction errors.
+
+        >>> change.residuals(record).values.std()
+        """
         return Series(*self._native.residuals(record))
 
     def simulate(self, record: Record) -> Series:
-        """Response to e alone."""
+        """Response to e alone.
+
+        >>> change.simulate(record)
+        """
         return Series(*self._native.simulate(record))
 
     def to_pandas(self) -> pd.DataFrame:
-        """Parameters as a table: value, standard_error, unit, remark."""
+        """Parameters as a table: value, standard_error, unit, remark.
+
+        >>> change.to_pandas()
+        """
         import pandas as pd
 
         rows = self._native.parameters
@@ -180,7 +191,10 @@ class TimeVaryingFit:
         )
 
     def summary(self) -> str:
-        """The fit as a text table."""
+        """The fit as a text table.
+
+        >>> print(change.summary())
+        """
         rows = [
             [name, *_text.with_uncertainty(*pair), unit, remark or ""]
             for name, pair, unit, remark in self._native.parameters

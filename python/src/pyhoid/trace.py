@@ -184,25 +184,37 @@ class Trace:
         return Fit(native, [self.record], call=self._call and self._call.to("start"))
 
     def operator(self, row: int = -1) -> Operator | None:
-        """The operator of a row, by default the last."""
+        """The operator of a row, by default the last.
+
+        >>> trace.operator()
+        """
         found = self._native.operator(row if row >= 0 else row + len(self))
         return None if found is None else Operator(found)
 
     def to_pandas(self) -> pd.DataFrame:
-        """All columns with the time in s as index."""
+        """All columns with the time in s as index.
+
+        >>> trace.to_pandas()
+        """
         import pandas as pd
 
         columns = {name: values for name, values in self.columns.items() if name != "t"}
         return pd.DataFrame(columns, index=pd.Index(self.time, name="t"), copy=False)
 
     def to_polars(self) -> pl.DataFrame:
-        """All columns."""
+        """All columns.
+
+        >>> trace.to_polars()
+        """
         import polars as pl
 
         return pl.DataFrame(dict(self.columns))
 
     def to_xarray(self) -> xr.Dataset:
-        """All columns over the coordinate ``t`` (s)."""
+        """All columns over the coordinate ``t`` (s).
+
+        >>> trace.to_xarray()
+        """
         import xarray as xr
 
         variables = {
@@ -216,13 +228,19 @@ class Trace:
         )
 
     def write(self, path: str | PathLike[str], comments: Sequence[str] = ()) -> None:
-        """Write the columns as CSV, Parquet, NPZ or .mat, as ``hoid track`` does."""
+        """Write the columns as CSV, Parquet, NPZ or .mat, as ``hoid track`` does.
+
+        >>> trace.write("trace.csv")
+        """
         self._native.write(path, list(comments))
 
     def plot(
         self, names: Sequence[str] | None = None, axes: Sequence[Axes] | None = None
     ) -> Sequence[Axes]:
-        """Plot the parameters over time with their bands; see `pyhoid.plots`."""
+        """Plot the parameters over time with their bands; see `pyhoid.plots`.
+
+        >>> axes = trace.plot(["K_e", "K_e_dot"])
+        """
         from . import plots
 
         return plots.trace(self, names, axes=axes)
@@ -249,6 +267,8 @@ class Trace:
         ------
         FileError
             When the page cannot be written.
+
+        >>> page = trace.report("out")
         """
         label = self.record.label or "(unnamed)"
         facts = [

@@ -96,6 +96,8 @@ class Tracker(_pyhoid.Tracker):
         ndarray, shape (N,)
             Innovations; NaN at faults (values that are not finite or beyond `largest`) and during
             the warm-up.
+
+        >>> innovations = tracker.update(record.e, record.u)
         """
         reference = None if f_t is None else signal(f_t, "f_t")
         return self.take_all(signal(e, "e"), signal(u, "u"), reference, update)
@@ -115,7 +117,10 @@ class Tracker(_pyhoid.Tracker):
         return None if native is None else Fit(native, [])
 
     def operator_estimate(self) -> Operator | None:
-        """The operator with standard errors; None where the structure cannot represent one."""
+        """The operator with standard errors; None where the structure cannot represent one.
+
+        >>> tracker.operator_estimate()
+        """
         found = self.operator
         return None if found is None else Operator(found)
 

@@ -69,6 +69,9 @@ pub struct GroupInitArgs {
     /// it is found by how many samples the control was recorded late
     #[arg(long, value_name = "ELEMENT", value_parser = parse_element, allow_hyphen_values = true)]
     pub controlled_element: Option<(String, ContinuousTransferFunction)>,
+    /// Sampling frequency in Hz; replaces the column t
+    #[arg(long, value_name = "HZ")]
+    pub fs: Option<f64>,
     /// Begin of the span that counts, s [default: whole periods of the excitation]
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub from: Option<f64>,

@@ -1,9 +1,9 @@
-//! Figures as files: which endings there are, and how one is written.
+//! Figures as files: which formats there are, and how one is written.
 
 use std::path::Path;
 
 use hoid_io::write_atomically;
-use hoid_report::figures::with_width_mm;
+use hoid_report::figures::{FigureFormat, with_width_mm};
 
 use crate::{error::CliError, output};
 
@@ -12,30 +12,30 @@ use crate::{error::CliError, output};
 /// # Errors
 /// [`CliError::Usage`].
 pub fn check(path: &Path) -> Result<(), CliError> {
-    match path.extension() {
-        Some(ending) if ending.eq_ignore_ascii_case("svg") => Ok(()),
-        _ => Err(CliError::Usage(format!(
-            "--figure {}: figures are written as .svg; name the file so, and convert it to PDF or PNG with a program such as \
-             Inkscape or a browser",
-            path.display()
-        ))),
+    format_of(path).map(|_| ())
+}
+
+fn format_of(path: &Path) -> Result<FigureFormat, CliError> {
+    let refused = |why: &str| CliError::Usage(format!("--figure {}: {why}", path.display()));
+    let format =
+        FigureFormat::of(path).ok_or_else(|| refused("figures are written as .svg, .pdf or .png; name the file so"))?;
+    if !format.is_built() {
+        return Err(refused(
+            "this hoid was built without PDF and PNG; name the file .svg, or build it with them: \
+             cargo build --release -p hoid-cli --features pdf-png",
+        ));
     }
+    Ok(format)
 }
 
 /// Writes a figure, with a width on paper where one was given.
 ///
 /// # Errors
-/// Those of writing.
+/// Those of the format and of writing.
 pub fn write(path: &Path, svg: &str, width_mm: Option<f64>) -> Result<(), CliError> {
-    let sized;
-    let svg = match width_mm {
-        Some(mm) => {
-            sized = with_width_mm(svg, mm);
-            &sized
-        }
-        None => svg,
-    };
-    write_atomically(path, |file| file.write_all(svg.as_bytes()))?;
+    let sized = width_mm.map(|mm| with_width_mm(svg, mm));
+    let bytes = format_of(path)?.bytes(sized.as_deref().unwrap_or(svg))?;
+    write_atomically(path, |file| file.write_all(&bytes))?;
     output::notice("", format!("figure: {}", path.display()));
     Ok(())
 }

@@ -20,7 +20,7 @@ use crate::{
     IdentError, InitialState, SearchOptions,
     criterion::{Data, Workspace},
     frequency::{DescribingFunction, DescriptionOptions, describe_runs},
-    informative_data,
+    informative_data, progress,
 };
 
 /// Highest order of the noise model.
@@ -158,8 +158,10 @@ impl FamilyEstimator {
             starts.push(self.start(form, lines.as_ref(), &response, sample_time)?);
         }
         let noise = self.noise_orders(&prediction, &starts, &mut workspace)?;
-        let mut tried: Vec<Tried<'_>> = Vec::with_capacity(starts.len());
+        let count = starts.len();
+        let mut tried: Vec<Tried<'_>> = Vec::with_capacity(count);
         for start in starts {
+            progress::step("forms", tried.len(), count);
             let fit = self.best_of(&prediction, &start, noise, &mut workspace);
             tried.push(Tried {
                 form: start.form,
@@ -167,6 +169,7 @@ impl FamilyEstimator {
                 fit,
             });
         }
+        progress::step("forms", count, count);
         let Comparison { chosen, figures } = Comparison::of(&tried, lines.as_ref(), &mut workspace);
         let Some(chosen) = chosen else {
             return Err(tried

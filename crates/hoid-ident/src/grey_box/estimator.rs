@@ -18,6 +18,7 @@ use crate::{
     informative_data,
     linalg::information::inverse_of_free,
     optimize::{Minimum, Objective, lies_in_basin},
+    progress,
 };
 
 /// Relative decrease of the loss, and steps, at which the search of an order ends while orders are
@@ -111,6 +112,7 @@ impl GreyBox {
         let (mut candidates, mut before) = (Vec::new(), None::<GreyBoxFit>);
         let mut best: Option<(usize, GreyBoxFit)> = None;
         for (i, criterion) in criteria.iter().enumerate() {
+            progress::step("remnant orders", i, criteria.len());
             let eta = before.as_ref().map(|fit| fit.eta.as_slice());
             let found = self.fit_order(criterion, &starts, eta, &quick, &mut workspace);
             candidates.push(candidate(criterion, found.as_ref()));

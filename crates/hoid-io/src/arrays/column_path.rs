@@ -5,7 +5,7 @@
 //! counted from 1, `x[:,1]` or `x[1,:]` in Python's, counted from 0. Of a square one the first
 //! index is time.
 
-use super::contents::{Contents, Entry, Indexing, Value};
+use super::contents::{Contents, Entry, Indexing, OBJECT, Value};
 use super::numbers::Numbers;
 use crate::IoError;
 use crate::wording::shown;
@@ -66,6 +66,11 @@ impl ColumnPath {
             found: format!("{} holds {}", shown(&self.path), self.what()),
             remedy: "save the column as an array of real numbers",
         }
+    }
+
+    /// Whether it is an object of MATLAB.
+    pub(super) fn holds_object(&self) -> bool {
+        matches!(&self.holds, Holds::Unread(what) if what.starts_with(OBJECT))
     }
 
     /// What it holds, in words.

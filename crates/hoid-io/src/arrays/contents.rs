@@ -12,6 +12,9 @@ pub(crate) enum Indexing {
 /// The name under which comments are kept as text.
 pub(crate) const COMMENTS: &str = "hoid_comments";
 
+/// How the words on an object of MATLAB begin.
+pub(crate) const OBJECT: &str = "an object of the class";
+
 /// What stands under a path.
 #[derive(Debug, Clone)]
 pub(crate) enum Value {

@@ -25,7 +25,7 @@ mod selection;
 pub(crate) use array::Array;
 pub(crate) use budget::{Budget, MOST_NESTED};
 pub(crate) use column_path::{ColumnPath, Holds};
-pub(crate) use contents::{COMMENTS, Contents, Entry, Indexing, Value};
+pub(crate) use contents::{COMMENTS, Contents, Entry, Indexing, OBJECT, Value};
 pub(crate) use numbers::{Kind, Numbers};
 pub(crate) use results::output_table_of;
 pub(crate) use selection::{TIMES, table_of};

@@ -53,7 +53,12 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
     // Input first, output last.
     let mut used: Vec<usize> = Vec::new();
     for expression in &expressions {
-        let terms = match expression.resolve(&named.names(), file)? {
+        let resolved = expression.resolve(&named.names(), file).map_err(|error| {
+            // Where there is an object, the signals stand in it.
+            let object = column_paths.iter().find(|column_path| column_path.holds_object());
+            object.map_or(error, |object| object.refused(file))
+        });
+        let terms = match resolved? {
             Signal::Column(a) | Signal::Negative(a) => vec![a],
             Signal::Difference(a, b) => vec![a, b],
         };

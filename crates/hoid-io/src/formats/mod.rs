@@ -7,7 +7,7 @@
 //! | `csv` | text with commas, semicolons or tabs |
 //! | `parquet` | Apache Parquet |
 //! | `npz` | NPZ and NPY of numpy |
-//! | `mat` | variables of MATLAB |
+//! | `mat` | variables of MATLAB, HDF5 |
 //! | `xdf` | streams of the Lab Streaming Layer |
 //! | `lookup` | the format of a file by its extension |
 
@@ -32,5 +32,6 @@ const ALL: &[&Format] = &[
     &npz::NPZ,
     &npz::NPY,
     &mat::MAT,
+    &mat::HDF5,
     &xdf::XDF,
 ];

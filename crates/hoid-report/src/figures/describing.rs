@@ -14,6 +14,8 @@ use crate::numbers::Z_95;
 
 /// In the legend; equal names stand there once.
 const NAME: &str = "describing function, bars 95 %";
+/// The same where a bar is not drawn to its end.
+const NAME_OF_CUT: &str = "describing function, bars 95 %, cut at 180 deg";
 /// Frequencies of a model curve.
 const POINTS: usize = 240;
 
@@ -74,6 +76,8 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
     let omega: Vec<f64> = lines.iter().map(|line| line.omega_rad_s).collect();
     let magnitudes: Vec<Estimate> = lines.iter().map(|line| line.magnitude_db()).collect();
     let phases = found.phases_deg();
+    let is_cut = magnitudes.iter().chain(&phases).any(|v| half_bar(v) > LONGEST_BAR);
+    let name = if is_cut { NAME_OF_CUT } else { NAME };
     let points = |values: &[Estimate], name: &str| Curve {
         name: name.to_owned(),
         kind: LineKind::Points,
@@ -102,13 +106,13 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
     let gain_of = |model: &ModelCurve| model.response.iter().map(|h| 20.0 * h.norm().log10()).collect();
     // Models first: the points lie on them.
     let mut magnitude: Vec<Curve> = models.iter().enumerate().map(|m| line(m, gain_of(m.1))).collect();
-    magnitude.push(points(&magnitudes, NAME));
+    magnitude.push(points(&magnitudes, name));
     let mut phase: Vec<Curve> = models
         .iter()
         .enumerate()
         .map(|m| line(m, m.1.phase_deg(&known)))
         .collect();
-    phase.push(points(&phases, NAME));
+    phase.push(points(&phases, name));
     let mut panels = vec![panel("magnitude", "dB", magnitude), panel("phase", "deg", phase)];
     let coherences: Vec<Estimate> = lines.iter().filter_map(|l| l.coherence).map(Estimate::fixed).collect();
     // Without the excitation it is that of u with e, which says little in a loop.
@@ -144,29 +148,16 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
 /// known, and a longer bar would press all others together.
 const LONGEST_BAR: f64 = 180.0;
 
-/// Ends of an error bar; none where there is no error.
-fn bar(v: &Estimate) -> (f64, f64) {
-    let half = v.standard_error.map_or(f64::NAN, |s| (Z_95 * s).min(LONGEST_BAR));
-    (v.value - half, v.value + half)
+/// Half of the error bar, NaN where there is no error.
+fn half_bar(v: &Estimate) -> f64 {
+    v.standard_error.map_or(f64::NAN, |s| Z_95 * s)
 }
 
-/// The same figure in another size: its width in mm, and the height that goes with it. The text
-/// grows with it; it has 7.5 pt at 85 mm.
-pub fn with_width_mm(svg: &str, width_mm: f64) -> String {
-    let size = |name: &str| -> Option<f64> {
-        let (_, rest) = svg.split_once(&format!(" {name}=\""))?;
-        rest.split_once('"')?.0.parse().ok()
-    };
-    let (Some(width), Some(height)) = (size("width"), size("height")) else {
-        return svg.to_owned();
-    };
-    let height_mm = height / width * width_mm;
-    svg.replacen(&format!(" width=\"{width}\""), &format!(" width=\"{width_mm}mm\""), 1)
-        .replacen(
-            &format!(" height=\"{height}\""),
-            &format!(" height=\"{height_mm:.2}mm\""),
-            1,
-        )
+/// Ends of an error bar as it is drawn.
+fn bar(v: &Estimate) -> (f64, f64) {
+    let whole = half_bar(v);
+    let half = if whole > LONGEST_BAR { LONGEST_BAR } else { whole };
+    (v.value - half, v.value + half)
 }
 
 #[cfg(test)]
@@ -176,7 +167,7 @@ mod tests {
     use hoid_ident::frequency::{DescriptionOptions, describe_runs};
     use hoid_model::{Channel, Record, SampleTime};
 
-    use super::{super::draw::tests::has, *};
+    use super::*;
 
     /// `u(t) = 2 e(t - 0.3)` at lines of 1 to 23 times TAU/20 rad/s, with a disturbance of each run.
     fn described(runs: u32) -> Description {
@@ -247,13 +238,11 @@ mod tests {
     }
 
     #[test]
-    fn a_figure_has_the_width_that_is_asked_for() {
-        let svg = describing("d", "t", &described(1), &[]);
-        let wide = with_width_mm(&svg, 85.0);
-        assert!(has(&wide, "svg", &[]) && wide.contains("width=\"85mm\" height=\""));
-        let (_, height) = svg.split_once(" height=\"").unwrap();
-        let height: f64 = height.split_once('"').unwrap().0.parse().unwrap();
-        assert!(wide.contains(&format!("height=\"{:.2}mm\"", height * 85.0 / 420.0)));
-        assert_eq!(with_width_mm("<svg>", 85.0), "<svg>");
+    fn a_bar_that_is_not_drawn_to_its_end_is_told() {
+        let mut found = described(4);
+        assert!(!describing("d", "t", &found, &[]).contains("cut at 180"));
+        let line = &mut found.function.lines[0];
+        line.standard_error = Some(10.0 * line.response.norm());
+        assert!(describing("d", "t", &found, &[]).contains("cut at 180 deg"));
     }
 }

@@ -11,6 +11,7 @@
 //! | [`bode_grid`] | several responses in each of several Bode pairs |
 //! | [`describing`] | a describing function with its errors and coherence, models through it |
 //! | [`curves`] | any other curves, with bands, error bars, markers and stems |
+//! | [`FigureFormat`], [`with_width_mm`] | such a text as SVG, PDF or PNG, in its width on paper |
 //!
 //! Figures are 420 units wide, or 840 where panels stand side by side, with 13-unit text: 7.5 pt in
 //! a column of 85 mm and on a page of 170 mm, subscripts 7.0 pt. Black dashes are the truth, dots
@@ -31,6 +32,7 @@ mod correlation;
 mod curves;
 mod describing;
 mod draw;
+mod file;
 mod frame;
 mod labels;
 mod legend;
@@ -52,7 +54,8 @@ pub use boxes::{BoxGrid, BoxPanel, BoxRange, BoxSeries, box_plots};
 pub use colour_bar::MapColours;
 pub use correlation::{autocorrelation, cross_correlation};
 pub use curves::{Curve, CurveGrid, CurvePanel, LineKind, curves};
-pub use describing::{ModelCurve, describing, with_width_mm};
+pub use describing::{ModelCurve, describing};
+pub use file::{DPI, FigureFormat, with_width_mm};
 pub use maps::{MapGrid, MapPanel, maps};
 pub use palette::{Shade, shade};
 pub use panel::{Beyond, CurveKind, Ordinate, TraceCurve, TracePanel};

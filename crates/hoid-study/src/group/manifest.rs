@@ -210,8 +210,15 @@ impl Manifest {
             }
         }
         if runs.is_empty() {
+            let shown: Vec<&str> = others.iter().take(3).map(String::as_str).collect();
             return Err(StudyError::NoRuns {
                 directory: directory.display().to_string(),
+                pattern: pattern.to_string(),
+                found: match (shown.as_slice(), others.len() - shown.len()) {
+                    ([], _) => "no files".to_owned(),
+                    (shown, 0) => shown.join(", "),
+                    (shown, more) => format!("{} and {more} more", shown.join(", ")),
+                },
             });
         }
         let name = directory

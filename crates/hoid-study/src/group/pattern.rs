@@ -3,6 +3,8 @@
 //! A name in braces stands for one or more characters, as few as possible, `*` for any number of
 //! them; everything else stands for itself.
 
+use std::fmt;
+
 use crate::StudyError;
 
 /// Parts of a file name.
@@ -29,6 +31,16 @@ pub struct FileNameParts {
 }
 
 const NAMES: [&str; 3] = ["subject", "condition", "run"];
+
+impl fmt::Display for Pattern {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|part| match part {
+            Part::Text(text) => f.write_str(text),
+            Part::Name(name) => write!(f, "{{{name}}}"),
+            Part::Any => f.write_str("*"),
+        })
+    }
+}
 
 impl Pattern {
     /// Reads a pattern.

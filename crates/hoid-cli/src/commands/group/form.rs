@@ -49,10 +49,11 @@ impl Finished<'_> {
                 page.push_str(&format!("  {file}\n"));
             }
         } else if let Some(first) = self.pages.first() {
+            let count = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
             page.push_str(&format!(
-                "Report: {first}; {} pages and {} tables beside it, named by -v.\n",
-                self.pages.len() - 1,
-                self.tables.len()
+                "Report: {first}; {} and {} beside it, named by -v.\n",
+                count(self.pages.len() - 1, "page"),
+                count(self.tables.len(), "table")
             ));
         }
         page

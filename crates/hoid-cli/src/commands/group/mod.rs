@@ -120,6 +120,7 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
         output: args.output.clone(),
         excitation: args.excitation.clone(),
         controlled_element: args.controlled_element.clone(),
+        sampling_hz: args.fs,
         from_s: args.from,
         to_s: args.to,
         offset_samples: args.offset,

@@ -266,7 +266,8 @@ fn prediction_error(
             .as_deref()
             .map(|text| orders::theta(orders, text))
             .transpose()?;
-        return Ok((estimator.fit(records)?, None, estimator));
+        let fit = output::watched("fitting", || estimator.fit(records))?;
+        return Ok((fit, None, estimator));
     }
     if args.start.is_some() {
         return Err(CliError::Usage(
@@ -310,7 +311,7 @@ fn grey_box(args: &IdentifyArgs, records: &[Record]) -> Result<Estimated, CliErr
     if !args.individual.is_empty() {
         settings.push(("individual".to_owned(), args.individual.join(", ")));
     }
-    let found = estimator.fit(records)?;
+    let found = output::watched("fitting", || estimator.fit(records))?;
     Ok(Estimated {
         fit: found.polynomial_fit(0).clone(),
         choice: None,

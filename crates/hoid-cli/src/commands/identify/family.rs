@@ -49,11 +49,15 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
         }
         Err(_) => None,
     };
-    let mut fit = estimator.fit_beside(records, of_lines)?;
-    let asked = args.faults.looks();
-    let opinions =
-        asked.then(|| second_opinion::of_family(&estimator, &fit, records, args.controlled_element.as_ref()));
-    fit.verdict = faults::judged(fit.verdict, files, accounts).and(opinions.into_iter().flatten());
+    let mut fit = output::watched("fitting", || estimator.fit_beside(records, of_lines))?;
+    if args.faults.looks() {
+        let element = args.controlled_element.as_ref();
+        let opinions = output::watched("a second opinion", || {
+            second_opinion::of_family(&estimator, &fit, records, element)
+        });
+        fit.verdict = fit.verdict.and(opinions);
+    }
+    fit.verdict = faults::judged(fit.verdict, files, accounts);
     let described = described.ok();
     let validation = match &args.validate {
         Some(path) => {

@@ -44,7 +44,7 @@ pub fn run(
     if let Some(delay) = args.delay {
         estimator.delay_range_s = delay;
     }
-    let fit = estimator.fit(records)?;
+    let fit = output::watched("fitting", || estimator.fit(records))?;
     let (low, high) = estimator.delay_range_s;
     let mut settings = vec![
         ("structure".to_owned(), "time-varying".to_owned()),
@@ -182,12 +182,18 @@ impl Found<'_> {
         } = *self;
         let mut page = text::verdict(verdict);
         let gain = records.first().map(GainUnit::of).unwrap_or_default();
-        let mut rows = text::table(&["parameter", "value", "95 % from", "to", "unit", ""]);
+        let mut rows = text::table(&["parameter", "value", "95 % from", "to", "unit"]);
+        let mut remarks: Vec<(String, Vec<String>)> = Vec::new();
         for p in fit.parameters() {
             let (low, high) = text::interval(&p.estimate);
-            let remark = p.remark.map(|r| r.to_string()).unwrap_or_default();
             let unit = gain.unit(&p.name, p.unit);
-            rows.add_row([p.name.clone(), text::plus_minus(&p.estimate), low, high, unit, remark]);
+            rows.add_row([p.name.clone(), text::plus_minus(&p.estimate), low, high, unit]);
+            if let Some(remark) = p.remark.map(|r| r.to_string()) {
+                match remarks.iter_mut().find(|(known, _)| *known == remark) {
+                    Some((_, names)) => names.push(p.name.clone()),
+                    None => remarks.push((remark, vec![p.name.clone()])),
+                }
+            }
         }
         let of_form = match fit.form() {
             Form::Lead => String::new(),
@@ -196,6 +202,9 @@ impl Found<'_> {
         page.push_str(&format!(
             "Operator{of_form} whose gains change once (sigmoid)\n{rows}\n"
         ));
+        for (remark, names) in &remarks {
+            page.push_str(&format!("{}: {remark}.\n", names.join(", ")));
+        }
         if fit.form() != Form::Lead && fit.change_found() {
             page.push_str(&format!("{}\n", before_and_after(fit)));
         }

@@ -13,6 +13,7 @@
 use super::text::{as_meant, comments, is_aside, open_line, place, reader, row_start, separator, text};
 use crate::IoError;
 use crate::table::{Cell, Column, Source, Table, asides, check_names, check_number};
+use crate::time_column::is_time;
 use crate::wording::shown;
 
 /// The text of the file, asked again when an error needs a line or a cell.
@@ -65,6 +66,7 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
     let mut reader = reader(text.as_bytes(), separator);
     let mut record = csv::ByteRecord::new();
     let mut columns: Vec<Column> = Vec::new();
+    let mut times: Vec<bool> = Vec::new();
     let mut starts = Vec::new();
     let mut notes = Vec::new();
     let mut empty_at_end = 0;
@@ -79,6 +81,7 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
         let mut line = || place(text.as_bytes(), start);
         if columns.is_empty() {
             columns = header(&record, file, &mut line, &mut notes)?;
+            times = columns.iter().map(|column| is_time(&column.name)).collect();
             continue;
         }
         if record.len() < columns.len() && open.is_some_and(|open| start >= open) {
@@ -100,13 +103,13 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
         empty_at_end = if blank { empty_at_end + 1 } else { 0 };
         let row = starts.len();
         starts.push(start);
-        for (column, cell) in columns.iter_mut().zip(&record) {
+        for ((column, &is_time), cell) in columns.iter_mut().zip(&times).zip(&record) {
             // The text is UTF-8 as a whole and the separators are ASCII, so that each cell is as
             // well.
             let cell = std::str::from_utf8(cell).unwrap_or("\u{fffd}");
             column.values.push(match Cell::parse(cell) {
                 Cell::Number(value) => {
-                    if column.name == "t" {
+                    if is_time {
                         column.precision.add(cell);
                     }
                     value

@@ -6,7 +6,8 @@
 //! | `elements` | tags and data of version 5, damaged or not |
 //! | `version5` | versions 5 to 7: arrays, structures, cells, texts |
 //! | `version4` | version 4: matrices |
-//! | `version73` | version 7.3, which is HDF5 |
+//! | `version73` | version 7.3, which is HDF5; any HDF5 |
+//! | `objects` | what to do with a timetable, a table, a timeseries |
 //! | `names` | names of columns and names of variables |
 //! | `write` | version 7, one variable a column |
 //!
@@ -15,12 +16,14 @@
 
 mod elements;
 mod names;
+mod objects;
 mod read;
 mod version4;
 mod version5;
 mod version73;
 mod write;
 
+use crate::arrays::{Contents, Indexing};
 use crate::format::{Format, Reading, Writing};
 
 pub(super) const MAT: Format = Format {
@@ -28,5 +31,16 @@ pub(super) const MAT: Format = Format {
     endings: &["mat"],
     reading: Reading::Arrays(read::read),
     writing: Writing::Columns(write::write),
+    record: None,
+};
+
+/// HDF5 of other programs: datasets in groups, whose sizes stand as numpy counts them.
+pub(super) const HDF5: Format = Format {
+    name: "HDF5",
+    endings: &["h5", "hdf5"],
+    reading: Reading::Arrays(|bytes, file| {
+        version73::read(bytes, file, Indexing::Python).map(|entries| Contents::new(entries, Indexing::Python))
+    }),
+    writing: Writing::ReadOnly("read alone; .npz and .mat hold the same arrays"),
     record: None,
 };

@@ -20,7 +20,8 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Contents, IoError> {
         return Err(wrong(String::from("it is empty")));
     }
     if bytes.starts_with(HDF5) || bytes.get(512..).is_some_and(|rest| rest.starts_with(HDF5)) {
-        return version73::read(bytes, file).map(|entries| Contents::new(entries, Indexing::Matlab));
+        let entries = version73::read(bytes, file, Indexing::Matlab)?;
+        return Ok(Contents::new(entries, Indexing::Matlab));
     }
     let bytes = bytes.as_slice();
     let mut budget = Budget::of(bytes.len());

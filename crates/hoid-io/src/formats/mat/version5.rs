@@ -6,6 +6,7 @@ use std::io::Read;
 use flate2::read::ZlibDecoder;
 
 use super::elements::{Elements, HEADER, data};
+use super::objects::object;
 use crate::IoError;
 use crate::arrays::{Array, Budget, Entry, Kind, MOST_NESTED, Numbers, Value};
 use crate::wording::{shown, told};
@@ -147,7 +148,7 @@ impl Reader<'_> {
             let name = String::from_utf8_lossy(parts.next()?.bytes).into_owned();
             let system = parts.next()?;
             let of = parts.next().unwrap_or(system).bytes;
-            let what = format!("an object of the class {}", shown(&String::from_utf8_lossy(of)));
+            let what = object(&shown(&String::from_utf8_lossy(of)));
             let path = if place.depth == 0 {
                 shown(&name)
             } else {

@@ -1,12 +1,14 @@
-//! Version 7.3: HDF5 in MATLAB's manner. Structures are groups, arrays of structures and cells are
+//! Version 7.3: HDF5 in MATLAB's manner, and HDF5 of other programs. Structures are groups, arrays of structures and cells are
 //! references to what stands under `/#refs#`, sizes stand in the order of C and so read backwards,
-//! and `MATLAB_class` says what a dataset is. Datasets without it, as other programs write them,
-//! are numbers.
+//! `MATLAB_class` says what a dataset is and `MATLAB_object_decode` that it is an object. Datasets
+//! without them, as other programs write them, are numbers; where no MATLAB is expected, sizes stay
+//! in the order of C.
 
 use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group, H5Element, Object};
 
+use super::objects::object;
 use crate::IoError;
-use crate::arrays::{Array, Budget, Entry, Kind, MOST_NESTED, Numbers, Value};
+use crate::arrays::{Array, Budget, Entry, Indexing, Kind, MOST_NESTED, Numbers, Value};
 use crate::guarded::guarded;
 use crate::wording::told;
 
@@ -15,12 +17,13 @@ const VISIT: u64 = 1 << 13;
 /// Arrays of structures and cells of more elements are not columns.
 const MOST_REFERENCES: u64 = 1 << 16;
 
-/// The variables of a file.
-pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Vec<Entry>, IoError> {
+/// The variables of a file, their sizes as MATLAB or numpy counts them.
+pub(super) fn read(bytes: Vec<u8>, file: &str, indexing: Indexing) -> Result<Vec<Entry>, IoError> {
     guarded(file, || {
         let mut reader = Reader {
             entries: Vec::new(),
             budget: Budget::of(bytes.len()),
+            indexing,
             file,
         };
         let opened = File::from_bytes(bytes).map_err(|error| reader.damaged("its head", &error))?;
@@ -32,6 +35,7 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Vec<Entry>, IoError> {
 struct Reader<'a> {
     entries: Vec<Entry>,
     budget: Budget,
+    indexing: Indexing,
     file: &'a str,
 }
 
@@ -99,6 +103,9 @@ impl Reader<'_> {
             _ => "",
         };
         let class = class.trim_end_matches('\0');
+        if attributes.contains_key("MATLAB_object_decode") {
+            return self.push(parent, path, Value::Unread(object(class)));
+        }
         if attributes.contains_key("MATLAB_empty") {
             return match class {
                 "char" => self.push(parent, path, Value::Texts(vec![String::new()])),
@@ -113,7 +120,9 @@ impl Reader<'_> {
             count = count.and_then(|count| count.checked_mul(side));
             dims.push(usize::try_from(side).unwrap_or(usize::MAX));
         }
-        dims.reverse();
+        if self.indexing == Indexing::Matlab {
+            dims.reverse();
+        }
         let size = dataset.element_size().map_err(|e| error(self, e))?;
         let Some((count, bytes)) = count.and_then(|count| Some((count, count.checked_mul(size.max(8))?))) else {
             return self.push(parent, path, Value::Unread(String::from("an array of any size")));
@@ -233,7 +242,7 @@ impl Reader<'_> {
         Ok(Value::Array(Array {
             numbers,
             dims,
-            last_fastest: false,
+            last_fastest: self.indexing == Indexing::Python,
         }))
     }
 }

@@ -13,6 +13,8 @@ pub struct Known {
     pub excitation: Option<String>,
     /// The controlled element, as it was typed, and as it is meant.
     pub controlled_element: Option<(String, ContinuousTransferFunction)>,
+    /// Sampling frequency, Hz; that of the column t where it is left out.
+    pub sampling_hz: Option<f64>,
     /// Begin of the span that counts, s.
     pub from_s: Option<f64>,
     /// End of the span that counts, s.

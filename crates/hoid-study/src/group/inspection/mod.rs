@@ -63,6 +63,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &Known) -> Resu
     evidence.push(Evidence::new("[read]", "input", chosen.input.1));
     evidence.push(Evidence::new("[read]", "output", chosen.output.1));
     (manifest.read.input, manifest.read.output) = (chosen.input.0, chosen.output.0);
+    manifest.read.sampling_hz = known.sampling_hz;
     (manifest.read.from_s, manifest.read.to_s) = (known.from_s, known.to_s);
 
     let mut conditions: Vec<String> = Vec::new();
@@ -163,6 +164,7 @@ fn read_span(manifest: &Manifest, file: &Path, span_s: (Option<f64>, Option<f64>
     let options = ReadOptions {
         input: Some(manifest.read.input.parse()?),
         output: manifest.read.output.parse()?,
+        sampling_hz: manifest.read.sampling_hz,
         span_s,
         ..ReadOptions::default()
     };

@@ -1,0 +1,161 @@
+//! Tables for people: three rules, as in print, and as wide as the screen.
+//!
+//! On a narrow screen cells are wrapped between words, never within a word or a number with its
+//! error. A table that is too wide even so becomes a list for each row.
+
+use std::fmt;
+
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, Table, TableStyle, Width};
+
+use crate::output;
+
+/// Three rules, as in print.
+const STYLE: TableStyle = {
+    let rule = LineStyle::none().fill('─').junction('─');
+    TableStyle::new()
+        .top_border(rule)
+        .header_separator(rule)
+        .bottom_border(rule)
+};
+/// Blanks to the left and right of a cell.
+const PADDING: usize = 2;
+/// A blank between two columns.
+const BETWEEN: usize = 1;
+/// A blank at which no line is broken.
+const FIXED_BLANK: &str = "\u{a0}";
+
+/// Rows under a header: the first column to the left, the others to the right.
+pub struct Rows {
+    header: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Rows {
+    pub fn under(header: &[&str]) -> Self {
+        Self {
+            header: header.iter().map(|&name| name.to_owned()).collect(),
+            rows: Vec::new(),
+        }
+    }
+
+    pub fn add_row<T: Into<String>>(&mut self, cells: impl IntoIterator<Item = T>) {
+        self.rows.push(cells.into_iter().map(Into::into).collect());
+    }
+
+    /// The table on a screen of so many columns; of any width without.
+    fn on(&self, width: Option<usize>) -> String {
+        let whole = self.drawn(None);
+        let Some(width) = width else { return whole };
+        if whole.lines().all(|line| line.chars().count() <= width) {
+            return whole;
+        }
+        let least = self.least_widths();
+        let blanks = least.len() * PADDING + least.len().saturating_sub(1) * BETWEEN;
+        match least.iter().sum::<usize>() + blanks <= width {
+            true => self.drawn(Some((width, &least))),
+            false => self.as_lists(),
+        }
+    }
+
+    fn drawn(&self, on: Option<(usize, &[usize])>) -> String {
+        let mut table = Table::new();
+        table.load_style(STYLE);
+        table.set_header(&self.header);
+        let cell = |text: &String| match on {
+            Some(_) => kept_together(text),
+            None => text.clone(),
+        };
+        for row in &self.rows {
+            table.add_row(row.iter().map(cell));
+        }
+        if let Some((width, least)) = on {
+            table.set_content_arrangement(ContentArrangement::Dynamic);
+            table.set_width(u16::try_from(width).unwrap_or(u16::MAX));
+            for (column, least) in table.column_iter_mut().zip(least) {
+                let least = u16::try_from(least + PADDING).unwrap_or(u16::MAX);
+                column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(least)));
+            }
+        }
+        for column in table.column_iter_mut().skip(1) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+        table.to_string()
+    }
+
+    /// The longest word of each column.
+    fn least_widths(&self) -> Vec<usize> {
+        let longest = |text: &String| kept_together(text).split(' ').map(|word| word.chars().count()).max();
+        let of = |k: usize| {
+            let cells = self.rows.iter().filter_map(|row| row.get(k));
+            cells.chain(self.header.get(k)).filter_map(longest).max().unwrap_or(0)
+        };
+        (0..self.header.len()).map(of).collect()
+    }
+
+    /// Each row as its first cell with the others below, each behind its heading.
+    fn as_lists(&self) -> String {
+        let name = self.header.iter().map(|name| name.chars().count()).max().unwrap_or(0);
+        let mut lines = Vec::new();
+        for row in &self.rows {
+            for (k, (heading, cell)) in self.header.iter().zip(row).enumerate() {
+                if k == 0 {
+                    lines.push(cell.clone());
+                } else if !cell.is_empty() {
+                    lines.push(format!("  {heading:name$}  {cell}"));
+                }
+            }
+        }
+        lines.join("\n")
+    }
+}
+
+impl fmt::Display for Rows {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.on(output::width()))
+    }
+}
+
+/// A number and its error are one word.
+fn kept_together(text: &str) -> String {
+    text.replace(" ± ", &format!("{FIXED_BLANK}±{FIXED_BLANK}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows() -> Rows {
+        let mut rows = Rows::under(&["person", "phase margin (deg)", "what is to be said"]);
+        rows.add_row(["anna", "13.5 ± 1.9", "at the end of its range"]);
+        rows.add_row(["bert", "7 ± 19", ""]);
+        rows
+    }
+
+    #[test]
+    fn a_table_is_wrapped_between_words_and_becomes_a_list_where_that_does_not_do() {
+        let whole = rows().on(None);
+        assert!(
+            whole
+                .lines()
+                .any(|l| l.contains("phase margin (deg)") && l.contains("what is to be said"))
+        );
+        assert_eq!(rows().on(Some(110)), whole);
+        let narrow = rows().on(Some(38));
+        assert!(narrow.lines().all(|l| l.chars().count() <= 38), "{narrow}");
+        for kept in ["anna", "13.5\u{a0}±\u{a0}1.9", "margin", "(deg)", "range"] {
+            assert!(narrow.contains(kept), "{kept}\n{narrow}");
+        }
+        // No width between, at which a line is longer than the screen.
+        for width in 20..110 {
+            let page = rows().on(Some(width));
+            let is_table = page.contains('─');
+            assert!(
+                !is_table || page.lines().all(|l| l.chars().count() <= width),
+                "{width}\n{page}"
+            );
+        }
+        let list = rows().on(Some(20));
+        assert!(list.starts_with("anna\n  phase margin (deg)  13.5 ± 1.9\n"), "{list}");
+        assert!(list.ends_with("bert\n  phase margin (deg)  7 ± 19"), "{list}");
+    }
+}

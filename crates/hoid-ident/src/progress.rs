@@ -1,0 +1,72 @@
+//! How far a fit is, told to whoever waits on the thread that fits.
+//!
+//! A fit of forms or orders, one after the other, lasts seconds on many or long records. It says
+//! before each which one of how many it is; without anybody who watches that costs nothing.
+
+use std::{cell::RefCell, rc::Rc};
+
+/// What is being done now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Step {
+    /// What is counted, in the plural.
+    pub what: &'static str,
+    /// How many are done.
+    pub done: usize,
+    /// Of how many.
+    pub total: usize,
+}
+
+type Watcher = Rc<dyn Fn(Step)>;
+
+thread_local! {
+    static WATCHER: RefCell<Option<Watcher>> = const { RefCell::new(None) };
+}
+
+/// Does the work and tells the watcher each of its steps on this thread.
+pub fn watched<T>(watcher: impl Fn(Step) + 'static, work: impl FnOnce() -> T) -> T {
+    /// Puts back who watched before, whatever happens.
+    struct Before(Option<Watcher>);
+    impl Drop for Before {
+        fn drop(&mut self) {
+            WATCHER.set(self.0.take());
+        }
+    }
+    let _before = Before(WATCHER.replace(Some(Rc::new(watcher))));
+    work()
+}
+
+/// Tells that so many are done.
+pub(crate) fn step(what: &'static str, done: usize, total: usize) {
+    // Taken out of the cell first: the watcher may fit something itself.
+    let watcher = WATCHER.with_borrow(Clone::clone);
+    if let Some(watcher) = watcher {
+        watcher(Step { what, done, total });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_innermost_watcher_is_told_and_the_outer_one_comes_back() {
+        let told = Rc::new(RefCell::new(Vec::new()));
+        let (outer, inner) = (told.clone(), told.clone());
+        step("nobody", 0, 1);
+        watched(
+            move |step| outer.borrow_mut().push(("outer", step.done)),
+            || {
+                step("forms", 0, 2);
+                watched(
+                    move |step| inner.borrow_mut().push(("inner", step.done)),
+                    || {
+                        step("orders", 7, 9);
+                    },
+                );
+                step("forms", 1, 2);
+            },
+        );
+        step("nobody", 1, 1);
+        assert_eq!(*told.borrow(), [("outer", 0), ("inner", 7), ("outer", 1)]);
+    }
+}

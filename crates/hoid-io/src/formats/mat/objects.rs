@@ -1,0 +1,30 @@
+//! Objects of MATLAB: only MATLAB reads what stands in them, and a line there takes their numbers out.
+
+use crate::arrays::OBJECT;
+
+/// An object of a class in words, with the line of MATLAB that saves its numbers.
+pub(super) fn object(class: &str) -> String {
+    let line = match class {
+        "timetable" => "t = seconds(x.Properties.RowTimes - x.Properties.RowTimes(1)); e = x.e; u = x.u;",
+        "table" => "t = x.t; e = x.e; u = x.u;",
+        "timeseries" => "t = x.Time; e = squeeze(x.Data);",
+        "Dataset" | "dataset" => "t = x{1}.Values.Time; e = squeeze(x{1}.Values.Data);",
+        "string" => return format!("{OBJECT} string (in MATLAB, char(x) is text)"),
+        _ => return format!("{OBJECT} {class}"),
+    };
+    format!("{OBJECT} {class} (in MATLAB, with x for its name: {line} save run.mat t e u)")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::object;
+
+    #[test]
+    fn a_class_that_holds_signals_has_a_line() {
+        for class in ["timetable", "table", "timeseries"] {
+            let said = object(class);
+            assert!(said.contains(class) && said.contains("save run.mat"), "{said}");
+        }
+        assert!(object("thing").contains("class thing"));
+    }
+}
