@@ -3,7 +3,7 @@
 
 use hoid_core::{
     population::{
-        DRIFTS, GAINS, PopulationFilter, PopulationPrior, STATES,
+        DRIFTS, GAINS, PopulationFilter, PopulationPrior, RIVALS, STATES,
         basis::{Basis, Point},
         detector::Detection,
         errors_needed,
@@ -37,16 +37,38 @@ fn prior(threshold: f64) -> PopulationPrior {
         hold: 1.0,
         reopen: 6.0,
         jump: 0.3,
+        rivals: rivals(),
         detection: Detection {
             frequency: 2.5,
             recent: 10,
             least: 16,
             most: 80,
-            threshold,
+            thresholds: [threshold, threshold + 4.0],
+            held: [3.3, 0.125, 0.05],
             persistence: 2,
             refractory: 16,
         },
     }
+}
+
+/// The usual person, and others elsewhere.
+fn rivals() -> [Point; RIVALS] {
+    let mut all = [usual(); RIVALS];
+    for (i, tau) in [0.1, 0.15, 0.25, 0.3, 0.35].into_iter().enumerate() {
+        all[1 + i].tau = tau;
+    }
+    for (i, (omega, tau)) in [(7.5, 0.2), (7.5, 0.25), (16.0, 0.2), (16.0, 0.15)]
+        .into_iter()
+        .enumerate()
+    {
+        all[6 + i] = Point {
+            omega,
+            zeta: if omega < 11.0 { 0.45 } else { 0.2 },
+            tau,
+            ..usual()
+        };
+    }
+    all
 }
 
 fn usual() -> Point {
@@ -91,6 +113,8 @@ struct Person {
     past: Vec<f64>,
     e: f64,
     v: [f64; 2],
+    /// What the error of the last sample was answered with.
+    w: f64,
 }
 
 impl Person {
@@ -106,6 +130,7 @@ impl Person {
             basis,
             e: 0.0,
             v: [0.0; 2],
+            w: 0.0,
         }
     }
 
@@ -119,8 +144,8 @@ impl Person {
         let x = self.basis.regressors(&z).x;
         let v = 1.6 * self.v[0] - 0.63 * self.v[1] + remnant * self.stream.normal();
         self.v = [v, self.v[0]];
-        let w: f64 = gains.iter().zip(x).map(|(g, x)| g * x).sum();
-        [self.e, w + v]
+        self.w = gains.iter().zip(x).map(|(g, x)| g * x).sum();
+        [self.e, self.w + v]
     }
 }
 
@@ -200,6 +225,83 @@ fn neuromuscular_system_and_delay_are_found() {
 }
 
 #[test]
+fn one_who_is_far_from_what_is_usual_is_found() {
+    // A delay 100 ms later than what is supposed, and a system of 16 rad/s that acts 60 ms earlier: from
+    // the usual person the corrections end elsewhere.
+    for (point, seed) in [
+        (Point { tau: 0.3, ..usual() }, 400),
+        (
+            Point {
+                tau: 0.14,
+                omega: 16.0,
+                zeta: 0.15,
+                ..usual()
+            },
+            401,
+        ),
+    ] {
+        let (mut person, mut filter) = (Person::at(seed, point), filter(1e9));
+        let (mut left, mut told) = (0, 0);
+        for _ in 0..4000 {
+            let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.02);
+            filter.step(e, u);
+            if let Some(samples) = filter.left_behind() {
+                (left, told) = (left + 1, told + samples);
+            }
+        }
+        let found = filter.held();
+        assert!((found.tau - point.tau).abs() < 0.003, "{seed}: {found:?}");
+        assert!((found.omega / point.omega - 1.0).abs() < 0.06, "{seed}: {found:?}");
+        // What was told before is said to have been wrong: from 1 s to some seconds.
+        assert!(
+            (1..5).contains(&left) && (7.0..40.0).contains(&(told as f64 * TS)),
+            "{left} {told}"
+        );
+    }
+}
+
+#[test]
+fn the_usual_person_is_not_left() {
+    for seed in 500..504 {
+        let (mut person, mut filter) = (Person::new(seed), filter(1e9));
+        for _ in 0..2500 {
+            let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.03);
+            filter.step(e, u);
+            assert!(filter.left_behind().is_none());
+        }
+    }
+}
+
+#[test]
+fn a_change_of_the_delay_is_found_and_told_from_one_of_the_gains() {
+    let later = Point { tau: 0.21, ..usual() };
+    let mut found = 0;
+    for seed in 600..604 {
+        let (mut person, mut filter) = (Person::new(seed), filter(27.0));
+        let mut other = basis(later);
+        let mut past = vec![0.0; other.delay() + 3];
+        for k in 0..3000 {
+            let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.08);
+            past.rotate_right(1);
+            past[0] = e;
+            let l = other.delay();
+            let z = other.step([past[l], past[l + 1], past[l + 2]]);
+            let answers = |x: [f64; GAINS]| -> f64 { GAINS_OF_A_PERSON.iter().zip(x).map(|(g, x)| g * x).sum() };
+            // Within half a second.
+            let part = ((f64::from(k) - 1500.0) / 25.0).clamp(0.0, 1.0);
+            let u = u + part * (answers(other.regressors(&z).x) - person.w);
+            filter.step(e, u);
+            if filter.detector().declared() && (1500..2000).contains(&k) {
+                let told = filter.detector().difference();
+                let (by, error) = (told.value[STATES - 1], told.covariance[STATES - 1][STATES - 1].sqrt());
+                found += u32::from(told.changed[2] && !told.changed[0] && by > 3.0 * error);
+            }
+        }
+    }
+    assert!(found >= 3, "{found} of 4");
+}
+
+#[test]
 fn a_change_is_found_and_followed_and_a_louder_remnant_is_no_change() {
     let mut found = 0;
     for seed in 0..4 {
@@ -247,7 +349,7 @@ fn a_copy_goes_on_with_the_same_digits() {
     for k in 0..1000 {
         let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
         assert_eq!(first.step(e, u), second.step(e, u), "{k}");
-        assert_eq!(first.detector().statistic(), second.detector().statistic());
+        assert_eq!(first.detector().statistics(), second.detector().statistics());
     }
     assert_eq!(estimate(&first, 2.0), estimate(&second, 2.0));
 }

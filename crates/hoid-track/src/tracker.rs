@@ -92,9 +92,12 @@ impl Tracker {
                 u: if u_sound { sample.u } else { f64::NAN },
                 reference: sample.reference.filter(|r| sound(*r)),
             };
+            let before = guard.restarts();
             let guarded = guard.take(&mut *self.recursion, sample, moves);
-            self.counts.restarts = guard.restarts();
-            return self.guarded(guarded, !(e_sound && u_sound));
+            self.counts.restarts += guard.restarts() - before;
+            let outcome = self.guarded(guarded, !(e_sound && u_sound));
+            self.counts.restarts += u64::from(self.left_behind().is_some());
+            return outcome;
         }
         let sample = Sample {
             e: if e_sound { sample.e } else { self.last_e },
@@ -105,6 +108,7 @@ impl Tracker {
         let skipped = !(e_sound && u_sound);
         if !u_sound {
             self.recursion.bridge(sample);
+            self.moved = false;
             self.counts.skipped += 1;
             return Outcome {
                 innovation: None,
@@ -120,6 +124,8 @@ impl Tracker {
         };
         self.counts.skipped += u64::from(skipped);
         self.counts.shortened += u64::from(taken.shortened);
+        self.moved = moves && !skipped;
+        self.counts.restarts += u64::from(self.left_behind().is_some());
         Outcome {
             innovation: (!skipped).then_some(taken.innovation),
             skipped,
@@ -145,9 +151,15 @@ impl Tracker {
         }
     }
 
-    /// What the guard found or did at the last sample.
+    /// What the guard found or did at the last sample, or that the recursion left an estimate that was
+    /// wrong.
     pub fn event(&self) -> Option<GuardEvent> {
-        self.guard.as_ref()?.event()
+        let of_guard = self.guard.as_ref().and_then(|guard| guard.event());
+        of_guard.or_else(|| self.left_behind().map(GuardEvent::left_behind))
+    }
+
+    fn left_behind(&self) -> Option<u64> {
+        self.moved.then(|| self.recursion.left_behind()).flatten()
     }
 
     /// True while the guard lets the estimate stand still.
@@ -226,7 +238,7 @@ impl Tracker {
 
     /// The change that was declared at the last sample, if one was.
     pub fn change(&self) -> Option<Change> {
-        if self.guard.is_some() && !self.moved {
+        if !self.moved {
             return None;
         }
         self.recursion.change()

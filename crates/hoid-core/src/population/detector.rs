@@ -1,35 +1,39 @@
-//! Has the person changed? Y at one frequency, now against before.
+//! Has the person changed? Now against before, over blocks of half a second (`blocks`).
 //!
-//! Blocks of half a second hold the sums of `r r'`, `r y` and `y^2` behind the whitening filter, each
-//! sample over the variance of eps and limited to some standard deviations about its prediction.
 //! Least squares over the last blocks and over those before give `s_1, s_0` with the covariances
-//! `sigma_1^2 A_1^-1`, `sigma_0^2 A_0^-1`, each with a variance of its own. With the responses
-//! `h = [Re, Im]` of the basis at [`Detection::frequency`] the difference `d = h (s_1 - s_0)` has the
-//! covariance C, and
+//! `C_1, C_0`, each with a variance of its own. Two differences are looked at, each with
 //!
-//! `T = d' C^-1 d`
+//! `T = d' C^-1 d`:
 //!
-//! is chi-square with two degrees of freedom where nothing changes and the basis is right. People
-//! vary, and no basis is right: T is divided by the level c at which it has been so far, from the
-//! mean of log T, whose expectation for a chi-square with two degrees of freedom is
-//! `ln 2 - gamma = .116`. A change is declared where T/c is above the threshold in some blocks one
-//! after another.
+//! - of Y at one frequency, what is held known: with the responses `h = [Re, Im]` of the basis at
+//!   [`Detection::frequency`], `d = h (s_1 - s_0)`, chi-square with two degrees of freedom where
+//!   nothing changes and the basis is right;
+//! - of natural frequency, damping and delay, gains not known: three degrees of freedom.
+//!
+//! People vary, and no basis is right: T is divided by the level c at which it has been so far, from
+//! the mean of log T, whose expectation for a chi-square with nu degrees of freedom is
+//! `ln 2 + psi(nu/2)`: .116 and .730. A change is declared where one of T/c is above its threshold in
+//! some blocks one after another. When it was, and what changed, is told by the block that leaves least
+//! where gains and what is held are free before it and behind it (R. E. Quandt, *J. American Statistical
+//! Association* 53 (1958) 873-880).
 //!
 //! Sources: G. C. Chow, *Econometrica* 28 (1960) 591-605; B. L. Welch, *Biometrika* 34 (1947) 28-35;
-//! the mean of the logarithm: M. Abramowitz and I. A. Stegun, 1964, eq. 6.3.3.
+//! the mean of the logarithm: M. Abramowitz and I. A. Stegun, 1964, eq. 6.3.3 and 6.3.4.
 
 use super::{
     basis::Complex,
+    blocks::{Block, EMPTY, Row, Span, WholeSpan},
     cholesky,
-    sizes::{GAINS, LINEAR},
+    difference::Difference,
+    sizes::{GAINS, HELD, LINEAR},
 };
 
 /// Blocks that there is room for.
 pub const BLOCKS: usize = 90;
 /// Length of a block, s.
 pub const BLOCK_S: f64 = 0.5;
-/// Expectation of the logarithm of a chi-square with two degrees of freedom.
-const MEAN_LOG: f64 = 0.115_931_515_658_412_45;
+/// Expectations of the logarithm of a chi-square with two and with three degrees of freedom.
+const MEAN_LOG: [f64; 2] = [0.115_931_515_658_412_45, 0.729_637_157_455_4];
 /// Blocks that the supposed level of T counts for, and the logarithm of that level.
 const SUPPOSED: f64 = 5.0;
 const USUAL: f64 = 0.5;
@@ -37,10 +41,6 @@ const USUAL: f64 = 0.5;
 const LONGEST: f64 = 240.0;
 /// By so much a logarithm raises the level at most: a change is no usual variation.
 const MOST: f64 = 3.0;
-/// Share of the diagonal that is added to it.
-const RIDGE: f64 = 1e-3;
-/// Products of the upper triangle.
-const PRODUCTS: usize = LINEAR * (LINEAR + 1) / 2;
 
 /// What the detector looks at.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,49 +53,54 @@ pub struct Detection {
     pub least: usize,
     /// Largest number of blocks before.
     pub most: usize,
-    /// T/c from which there is a change.
-    pub threshold: f64,
+    /// T/c from which there is a change: of Y, and of what is held.
+    pub thresholds: [f64; 2],
+    /// Standard deviations that are supposed of what is held, in its units.
+    pub held: [f64; HELD],
     /// Blocks in which it must be above.
     pub persistence: u64,
     /// Blocks after a change in which none is declared.
     pub refractory: u64,
 }
 
-/// Sums of a block.
+/// A statistic in units of what it has been.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Block {
-    products: [f64; PRODUCTS],
-    with_output: [f64; LINEAR],
-    square: f64,
-    samples: f64,
-    /// Squares of the innovations as they are.
-    power: f64,
+struct Statistic {
+    mean_log: f64,
+    level: f64,
+    levels: f64,
+    value: f64,
+    above: u64,
 }
 
-crate::state!([] Block { products, with_output, square, samples, power });
+crate::state!([] Statistic { level, levels, value, above });
 
-const EMPTY: Block = Block {
-    products: [0.0; PRODUCTS],
-    with_output: [0.0; LINEAR],
-    square: 0.0,
-    samples: 0.0,
-    power: 0.0,
-};
+impl Statistic {
+    fn new(mean_log: f64) -> Self {
+        Self {
+            mean_log,
+            level: mean_log + USUAL,
+            levels: SUPPOSED,
+            value: 0.0,
+            above: 0,
+        }
+    }
 
-/// Gains of one of the two spans, with their covariance and the variance of eps.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Span {
-    /// Gains and level.
-    pub state: [f64; LINEAR],
-    /// Their covariance.
-    pub covariance: [[f64; LINEAR]; LINEAR],
-    /// Variance of eps.
-    pub variance: f64,
-    /// Samples.
-    pub samples: f64,
+    /// How many times larger than a chi-square it has been.
+    fn usual(&self) -> f64 {
+        libm::exp(self.level - self.mean_log).max(1.0)
+    }
+
+    /// Takes T; true where it has been above the threshold for long enough.
+    fn take(&mut self, t: f64, threshold: f64, persistence: u64) -> bool {
+        self.value = t / self.usual();
+        self.levels = (self.levels + 1.0).min(SUPPOSED + LONGEST);
+        let log = libm::log(t.max(0.05)).min(self.level + MOST);
+        self.level += (log - self.level) / self.levels;
+        self.above = if self.value > threshold { self.above + 1 } else { 0 };
+        self.above >= persistence
+    }
 }
-
-crate::state!([] Span { state, covariance, variance, samples });
 
 /// The blocks and what they say.
 #[derive(Debug, Clone, PartialEq)]
@@ -106,17 +111,17 @@ pub struct Detector {
     block: Block,
     blocks: [Block; BLOCKS],
     count: usize,
-    level: f64,
-    levels: f64,
-    statistic: f64,
-    above: u64,
+    statistics: [Statistic; 2],
     since: u64,
     spans: [Span; 2],
+    whole: [WholeSpan; 2],
     declared: bool,
+    difference: Difference,
+    ago: usize,
 }
 
 crate::state!([] Detector {
-    response, block, blocks, count, level, levels, statistic, above, since, spans, declared,
+    response, block, blocks, count, statistics, since, spans, whole, declared, difference, ago,
 });
 
 impl Detector {
@@ -124,50 +129,37 @@ impl Detector {
     /// is no room for the blocks.
     pub fn new(what: Detection, response: [Complex; GAINS], ts: f64) -> Option<Self> {
         let room = what.recent > 0 && what.least > 0 && what.least <= what.most && what.recent + what.most <= BLOCKS;
-        room.then_some(Self {
+        let sound = what.held.iter().all(|d| *d > 0.0 && d.is_finite());
+        (room && sound).then_some(Self {
             what,
             response,
             samples_of_block: libm::round(BLOCK_S / ts).max(1.0) as u64,
             block: EMPTY,
             blocks: [EMPTY; BLOCKS],
             count: 0,
-            level: MEAN_LOG + USUAL,
-            levels: SUPPOSED,
-            statistic: 0.0,
-            above: 0,
+            statistics: MEAN_LOG.map(Statistic::new),
             since: u64::MAX >> 12,
             spans: [Span::default(); 2],
+            whole: [WholeSpan::default(); 2],
             declared: false,
+            difference: Difference::default(),
+            ago: 0,
         })
     }
 
-    /// Takes a sample: regressors and limited output behind the whitening filter, the innovation, and
-    /// the variance of eps. True where a change is declared.
+    /// Takes a sample. True where a change is declared.
     #[inline]
-    pub fn update(&mut self, r: &[f64; LINEAR], y: f64, innovation: f64, variance: f64) -> bool {
+    pub(super) fn update(&mut self, row: &Row) -> bool {
         self.declared = false;
-        let weight = 1.0 / variance;
-        let block = &mut self.block;
-        let mut k = 0;
-        for i in 0..LINEAR {
-            let a = weight * r[i];
-            for r in &r[i..] {
-                block.products[k] += a * r;
-                k += 1;
-            }
-            block.with_output[i] += a * y;
-        }
-        block.square += weight * y * y;
-        block.samples += 1.0;
-        block.power += innovation * innovation;
-        if block.samples >= self.samples_of_block as f64 {
-            self.close();
+        self.block.add(row);
+        if self.block.samples >= self.samples_of_block as f64 {
+            self.close(row.p);
         }
         self.declared
     }
 
-    /// Ends a block.
-    fn close(&mut self) {
+    /// Ends a block; `held` is where what is held is now.
+    fn close(&mut self, held: [f64; HELD]) {
         if self.count == self.what.recent + self.what.most {
             self.blocks.copy_within(1..self.count, 0);
             self.count -= 1;
@@ -176,35 +168,74 @@ impl Detector {
         self.count += 1;
         self.block = EMPTY;
         self.since += 1;
-        self.statistic = 0.0;
+        self.statistics.iter_mut().for_each(|s| s.value = 0.0);
         let before = self.count.saturating_sub(self.what.recent);
         if before < self.what.least {
-            self.above = 0;
+            self.statistics.iter_mut().for_each(|s| s.above = 0);
             return;
         }
-        let (Some(past), Some(present)) = (fit(&self.blocks[..before]), fit(&self.blocks[before..self.count])) else {
+        let sums = [
+            Block::of(&self.blocks[..before]),
+            Block::of(&self.blocks[before..self.count]),
+        ];
+        let [Some(past), Some(present)] = sums.each_ref().map(Block::fit) else {
             return;
         };
         self.spans = [past, present];
-        let Some(t) = self.distance() else { return };
-        let c = libm::exp(self.level - MEAN_LOG).max(1.0);
-        self.statistic = t / c;
-        self.levels = (self.levels + 1.0).min(SUPPOSED + LONGEST);
-        let log = libm::log(t.max(0.05)).min(self.level + MOST);
-        self.level += (log - self.level) / self.levels;
-        self.above = if self.statistic > self.what.threshold {
-            self.above + 1
-        } else {
-            0
-        };
-        if self.above >= self.what.persistence && self.since > self.what.refractory {
+        let whole = sums.each_ref().map(|sum| sum.fit_whole(held, self.what.held));
+        if let [Some(past), Some(present)] = whole {
+            self.whole = [past, present];
+        }
+        let Some(t) = self.of_response() else { return };
+        let Detection {
+            thresholds,
+            persistence,
+            ..
+        } = self.what;
+        let of_response = self.statistics[0].take(t, thresholds[0], persistence);
+        let of_held = self
+            .of_held()
+            .is_some_and(|t| self.statistics[1].take(t, thresholds[1], persistence));
+        if (of_response || of_held) && self.since > self.what.refractory {
             self.declared = true;
             self.since = 0;
-            self.above = 0;
+            self.statistics.iter_mut().for_each(|s| s.above = 0);
+            self.split(held);
             // What was before is no measure of what comes.
-            self.blocks.copy_within(before..self.count, 0);
-            self.count = self.what.recent;
+            self.blocks.copy_within(self.count - self.ago..self.count, 0);
+            self.count = self.ago;
         }
+    }
+
+    /// The spans before and after the block that leave least when the change is supposed to be there.
+    fn split(&mut self, held: [f64; HELD]) {
+        let mut least = f64::MAX;
+        self.ago = self.what.recent;
+        for after in 1..=self.what.recent {
+            let sums = [
+                Block::of(&self.blocks[..self.count - after]),
+                Block::of(&self.blocks[self.count - after..self.count]),
+            ];
+            let [Some(past), Some(present)] = sums.each_ref().map(|sum| sum.fit_whole(held, self.what.held)) else {
+                continue;
+            };
+            let [Some(before), Some(now)] = sums.each_ref().map(Block::fit) else {
+                continue;
+            };
+            if past.left + present.left < least {
+                least = past.left + present.left;
+                (self.whole, self.spans) = ([past, present], [before, now]);
+                self.ago = after;
+            }
+        }
+        let [before, after] = &self.whole;
+        let level = self.statistics[1].usual();
+        self.difference = Difference::of(before, after, level).unwrap_or_default();
+    }
+
+    /// How long ago the change that was declared last had been, when it was declared, s.
+    pub fn ago_s(&self) -> f64 {
+        self.ago as f64 * BLOCK_S
     }
 
     /// The response of the gains at the frequency is this from now on.
@@ -212,8 +243,8 @@ impl Detector {
         self.response = response;
     }
 
-    /// T; `None` where the spans say nothing of the frequency.
-    fn distance(&self) -> Option<f64> {
+    /// T of Y; `None` where the spans say nothing of the frequency.
+    fn of_response(&self) -> Option<f64> {
         let [past, present] = &self.spans;
         let (mut d, mut c) = ([0.0; 2], [[0.0; 2]; 2]);
         for i in 0..GAINS {
@@ -229,29 +260,55 @@ impl Detector {
                 }
             }
         }
-        let determinant = c[0][0] * c[1][1] - c[0][1] * c[1][0];
-        let t = (d[0] * d[0] * c[1][1] - 2.0 * d[0] * d[1] * c[0][1] + d[1] * d[1] * c[0][0]) / determinant;
-        (determinant > 0.0 && t.is_finite()).then_some(t)
+        distance(c, d)
     }
 
-    /// T/c of the last block; zero while there is too little to compare.
-    pub fn statistic(&self) -> f64 {
-        self.statistic
+    /// T of what is held.
+    fn of_held(&self) -> Option<f64> {
+        let [past, present] = &self.whole;
+        let d = core::array::from_fn(|i| present.state[LINEAR + i] - past.state[LINEAR + i]);
+        let of = |span: &WholeSpan, i: usize, j: usize| span.covariance[LINEAR + i][LINEAR + j];
+        let c = core::array::from_fn(|i| core::array::from_fn(|j| of(past, i, j) + of(present, i, j)));
+        distance::<HELD>(c, d)
     }
 
-    /// How many times larger than a chi-square T has been without a change.
-    pub fn usual_level(&self) -> f64 {
-        libm::exp(self.level - MEAN_LOG).max(1.0)
+    /// T/c of the last block, of Y and of what is held; zero while there is too little to compare.
+    pub fn statistics(&self) -> [f64; 2] {
+        self.statistics.map(|s| s.value)
     }
 
-    /// Before and now, at the last block.
+    /// How many times larger than a chi-square T of Y and T of what is held have been without a change.
+    pub fn usual_levels(&self) -> [f64; 2] {
+        self.statistics.map(|s| s.usual())
+    }
+
+    /// Before and now, at the last block; before and after the change where one was declared at it.
     pub fn spans(&self) -> &[Span; 2] {
         &self.spans
+    }
+
+    /// The same where what is held is not known.
+    pub fn whole_spans(&self) -> &[WholeSpan; 2] {
+        &self.whole
     }
 
     /// True where a change was declared at the last sample.
     pub fn declared(&self) -> bool {
         self.declared
+    }
+
+    /// What changed at the change that was declared last.
+    pub fn difference(&self) -> &Difference {
+        &self.difference
+    }
+
+    /// Begins anew, but for how much this person varies: what was kept is not in the gains of now.
+    pub fn forget(&mut self) {
+        (self.block, self.count) = (EMPTY, 0);
+        for statistic in &mut self.statistics {
+            (statistic.value, statistic.above) = (0.0, 0);
+        }
+        self.declared = false;
     }
 
     /// No change is declared at a sample that is not taken.
@@ -260,49 +317,13 @@ impl Detector {
     }
 }
 
-/// Least squares over blocks.
-fn fit(blocks: &[Block]) -> Option<Span> {
-    let mut sum = EMPTY;
-    for block in blocks {
-        for (s, p) in sum.products.iter_mut().zip(block.products) {
-            *s += p;
-        }
-        for (s, b) in sum.with_output.iter_mut().zip(block.with_output) {
-            *s += b;
-        }
-        sum.square += block.square;
-        sum.samples += block.samples;
-        sum.power += block.power;
-    }
-    let n = sum.samples;
-    if n <= LINEAR as f64 {
+/// `d' C^-1 d`; `None` where C is not positive.
+fn distance<const N: usize>(mut c: [[f64; N]; N], d: [f64; N]) -> Option<f64> {
+    let mut solved = d;
+    if !cholesky::factor(&mut c, N) {
         return None;
     }
-    let mut matrix = [[0.0; LINEAR]; LINEAR];
-    let mut k = 0;
-    for i in 0..LINEAR {
-        for j in i..LINEAR {
-            (matrix[i][j], matrix[j][i]) = (sum.products[k], sum.products[k]);
-            k += 1;
-        }
-        matrix[i][i] *= 1.0 + RIDGE / n;
-    }
-    if !cholesky::factor(&mut matrix, LINEAR) {
-        return None;
-    }
-    let mut state = sum.with_output;
-    cholesky::solve(&matrix, LINEAR, &mut state);
-    let explained: f64 = state.iter().zip(sum.with_output).map(|(s, b)| s * b).sum();
-    let variance = ((sum.square - explained) / (n - LINEAR as f64)).max(1e-12);
-    let mut covariance = [[0.0; LINEAR]; LINEAR];
-    for (i, row) in covariance.iter_mut().enumerate() {
-        row[i] = variance;
-        cholesky::solve(&matrix, LINEAR, row);
-    }
-    Some(Span {
-        state,
-        covariance,
-        variance: sum.power / n,
-        samples: n,
-    })
+    cholesky::solve(&c, N, &mut solved);
+    let t: f64 = solved.iter().zip(d).map(|(s, d)| s * d).sum();
+    t.is_finite().then_some(t)
 }

@@ -59,6 +59,12 @@ pub struct GainPrior {
 }
 
 impl GainPrior {
+    /// Standard deviations of what is held, in its units.
+    fn held_at(&self, point: Point) -> [f64; HELD] {
+        let [omega, zeta, tau] = self.held;
+        [omega * point.omega, zeta * point.zeta, tau]
+    }
+
     fn is_sound(&self) -> bool {
         let sizes = self.drifts.iter().chain(&self.newborn).chain(&self.held);
         sizes.into_iter().all(|d| *d >= 0.0)
@@ -146,8 +152,7 @@ impl Gains {
     /// Goes on from the gains of now, as if nothing were known of how good they are, and lets what is
     /// held be corrected from here on.
     pub fn reopen(&mut self, gain: f64, level: f64, point: Point) {
-        let [omega, zeta, tau] = self.prior.held;
-        let held = [omega * point.omega, zeta * point.zeta, tau];
+        let held = self.prior.held_at(point);
         for (filters, shape) in self.filters.iter_mut().zip(&self.shapes) {
             filters.iter_mut().for_each(|f| f.reopen(shape, gain, level, held));
         }
@@ -157,6 +162,15 @@ impl Gains {
     pub fn open(&mut self, gain: f64) {
         for (filters, shape) in self.filters.iter_mut().zip(&self.shapes) {
             filters.iter_mut().for_each(|f| f.open_gains(shape, gain * gain));
+        }
+    }
+
+    /// Lets what is held be anything that is supposed of people.
+    pub fn open_held(&mut self, point: Point) {
+        for filter in self.filters.iter_mut().flatten() {
+            for (i, deviation) in (LINEAR..STATES).zip(self.prior.held_at(point)) {
+                filter.covariance[i][i] += deviation * deviation;
+            }
         }
     }
 
@@ -172,8 +186,9 @@ impl Gains {
     }
 
     /// Takes a sample behind the whitening filter; `level` is D(1), `point` that of the basis. Returns
-    /// the innovation of the mixture.
-    pub fn update(&mut self, y: f64, regressors: &Regressors, level: f64, point: Point, around: &Around) -> f64 {
+    /// the innovation of the mixture, and the logarithm of the density that it gave to the sample, but
+    /// for a constant.
+    pub fn update(&mut self, y: f64, regressors: &Regressors, level: f64, point: Point, around: &Around) -> (f64, f64) {
         let prior = self.prior;
         let ts = prior.sample_time;
         let seen = Seen {
@@ -191,6 +206,7 @@ impl Gains {
         let [among_forms, among_drifts] = prior.forgotten;
         let supposed: [f64; FILTERS] = core::array::from_fn(|k| self.supposed(k));
         let (mut innovation, mut total) = (0.0, 0.0);
+        let before = log_sum(&self.log_weights);
         for form in 0..FORMS {
             let share = exp(self.log_weights[form]);
             let filters = &mut self.filters[form];
@@ -214,7 +230,7 @@ impl Gains {
         self.log_weights.iter_mut().for_each(|l| *l -= log_sum);
         self.samples += 1;
         self.renew(around.unit);
-        innovation / total
+        (innovation / total, log_sum - before)
     }
 
     /// Filters that are out of the question start again, and the newborns whose life is over are born

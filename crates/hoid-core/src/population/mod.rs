@@ -35,15 +35,21 @@
 //! output to error gives the scale of the gains' prior. [`PopulationFilter`] is the recursion.
 
 pub mod basis;
+pub mod blocks;
 pub mod detector;
+pub mod difference;
 pub mod gains;
 pub mod noise;
 
 mod cholesky;
+mod contest;
 mod filter;
+mod follower;
 mod kalman;
 mod place;
+mod prior;
 mod sizes;
 
-pub use filter::{PopulationFilter, PopulationPrior, errors_needed};
-pub use sizes::{DRIFTS, FORMS, GAINS, HELD, LARGEST_ORDER, LINEAR, STATES};
+pub use filter::{PopulationFilter, errors_needed};
+pub use prior::PopulationPrior;
+pub use sizes::{DRIFTS, FORMS, GAINS, HELD, LARGEST_ORDER, LINEAR, RIVALS, STATES};

@@ -20,3 +20,5 @@ pub const NEWBORNS: usize = 2;
 pub const FILTERS: usize = DRIFTS + NEWBORNS;
 /// Largest order of the noise model.
 pub const LARGEST_ORDER: usize = 24;
+/// Those who are followed beside.
+pub const RIVALS: usize = 10;

@@ -1,0 +1,163 @@
+//! What changed: the difference of two spans, with its full covariance.
+//!
+//! Two spans have gains, level and what is held `s_0, s_1` with the covariances `C_0, C_1`. Of the
+//! difference `d = s_1 - s_0`, `W = (C_0 + C_1)^-1`, nobody asks for all at once: a delay that grows looks
+//! like gains that turn, and seconds hardly tell them apart. So each group (the gains; natural frequency
+//! and damping; the delay) is supposed to have changed or not, the level always; what is in the set S is
+//! then
+//!
+//! `d_S = (W_SS)^-1 (W d)_S`, with the covariance `(W_SS)^-1`,
+//!
+//! and `chi_S^2 = d' W d - d_S' (W d)_S` is what the others would have to have changed by chance. The set with
+//! the least `chi_S^2 + 4 |S|` is told: between the 2 of Akaike and the logarithm of the number of samples
+//! of Schwarz (G. Schwarz, *Annals of Statistics* 6 (1978) 461-464).
+
+use super::{
+    blocks::WholeSpan,
+    cholesky,
+    sizes::{GAINS, LINEAR, STATES},
+};
+
+/// What another parameter has to be worth.
+const PRICE: f64 = 4.0;
+/// Groups that change together, by the bits of a set: gains, neuromuscular system, delay.
+const SETS: usize = 8;
+const GAINS_BIT: usize = 1;
+const SYSTEM_BIT: usize = 2;
+const DELAY_BIT: usize = 4;
+
+/// What changed, by how much.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Difference {
+    /// Gains, level, natural frequency, damping, delay: zero for what did not change.
+    pub value: [f64; STATES],
+    /// Its covariance.
+    pub covariance: [[f64; STATES]; STATES],
+    /// Whether the gains changed, natural frequency and damping, and the delay.
+    pub changed: [bool; 3],
+}
+
+crate::state!([] Difference { value, covariance, changed });
+
+impl Difference {
+    /// Between two spans, whose covariances are this many times larger than they say. `None` where they
+    /// do not determine it.
+    pub(super) fn of(before: &WholeSpan, after: &WholeSpan, level: f64) -> Option<Self> {
+        let d: [f64; STATES] = core::array::from_fn(|i| after.state[i] - before.state[i]);
+        let sum = |i: usize, j: usize| level * (before.covariance[i][j] + after.covariance[i][j]);
+        let mut factor: [[f64; STATES]; STATES] = core::array::from_fn(|i| core::array::from_fn(|j| sum(i, j)));
+        if !cholesky::factor(&mut factor, STATES) {
+            return None;
+        }
+        let mut w = [[0.0; STATES]; STATES];
+        for (i, row) in w.iter_mut().enumerate() {
+            row[i] = 1.0;
+            cholesky::solve(&factor, STATES, row);
+        }
+        let mut best = None;
+        let mut least = f64::MAX;
+        // Each set but the empty one.
+        for set in 1..SETS {
+            let is_in = |i: usize| match i {
+                0..GAINS => set & GAINS_BIT > 0,
+                GAINS => true,
+                LINEAR | 5 => set & SYSTEM_BIT > 0,
+                _ => set & DELAY_BIT > 0,
+            };
+            let (mut places, mut n) = ([0; STATES], 0);
+            for i in (0..STATES).filter(|i| is_in(*i)) {
+                places[n] = i;
+                n += 1;
+            }
+            let mut own = [[0.0; STATES]; STATES];
+            let mut of_d = [0.0; STATES];
+            for (a, i) in places[..n].iter().enumerate() {
+                for (b, j) in places[..n].iter().enumerate() {
+                    own[a][b] = w[*i][*j];
+                }
+                of_d[a] = (0..STATES).map(|j| w[*i][j] * d[j]).sum();
+            }
+            if !cholesky::factor(&mut own, n) {
+                continue;
+            }
+            let mut of_set = of_d;
+            cholesky::solve(&own, n, &mut of_set);
+            let explained: f64 = of_set[..n].iter().zip(of_d).map(|(s, b)| s * b).sum();
+            let cost = PRICE * n as f64 - explained;
+            if cost < least {
+                least = cost;
+                let mut difference = Self {
+                    changed: [GAINS_BIT, SYSTEM_BIT, DELAY_BIT].map(|bit| set & bit > 0),
+                    ..Self::default()
+                };
+                for (a, i) in places[..n].iter().enumerate() {
+                    difference.value[*i] = of_set[a];
+                    let mut column = [0.0; STATES];
+                    column[a] = 1.0;
+                    cholesky::solve(&own, n, &mut column);
+                    for (b, j) in places[..n].iter().enumerate() {
+                        difference.covariance[*i][*j] = column[b];
+                    }
+                }
+                best = Some(difference);
+            }
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// Spans whose delay is told only together with the gains.
+    fn span(state: [f64; STATES], size: f64) -> WholeSpan {
+        let mut covariance = [[0.0; STATES]; STATES];
+        for (i, row) in covariance.iter_mut().enumerate() {
+            row[i] = size;
+        }
+        for i in [0, 6] {
+            for j in [0, 6] {
+                covariance[i][j] += if i == j { 0.9 } else { 0.899 };
+            }
+        }
+        WholeSpan {
+            state,
+            covariance,
+            left: 0.0,
+        }
+    }
+
+    #[test]
+    fn the_simplest_set_that_explains_is_told() {
+        let before = span([1.0, 2.0, 3.0, 0.0, 11.0, 0.25, 0.2], 0.01);
+        // Along the delay alone: neither gains nor delay differ by much beside their own errors.
+        let mut state = before.state;
+        state[6] += 1.5;
+        let told = Difference::of(&before, &span(state, 0.01), 1.0).unwrap();
+        assert_eq!(told.changed, [false, false, true]);
+        assert!((told.value[6] - 1.5).abs() < 1e-9 && told.value[0] == 0.0);
+        // What is known of the delay once the gains are: far less than its marginal variance, 1.82.
+        assert!(told.covariance[6][6] < 0.1, "{}", told.covariance[6][6]);
+        state = before.state;
+        state[1] += 1.5;
+        state[4] += 2.0;
+        let told = Difference::of(&before, &span(state, 0.01), 1.0).unwrap();
+        assert_eq!(told.changed, [true, true, false]);
+        // All together are what the difference is.
+        state = before.state.map(|s| s + 2.0);
+        state[6] -= 14.0;
+        let told = Difference::of(&before, &span(state, 0.01), 1.0).unwrap();
+        assert_eq!(told.changed, [true; 3]);
+        for (i, value) in told.value.iter().enumerate() {
+            assert!((value - state[i] + before.state[i]).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn spans_that_say_nothing_have_no_difference() {
+        let nothing = WholeSpan::default();
+        assert!(Difference::of(&nothing, &nothing, 1.0).is_none());
+    }
+}

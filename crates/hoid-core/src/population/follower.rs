@@ -1,0 +1,336 @@
+//! Someone who is followed from one basis: basis, noise model and gains. The errors and outputs of
+//! the past are shared with others who are followed beside ([`super::contest`]).
+
+use super::{
+    basis::{Basis, Complex, Point, REFERENCE, Regressors, Signals},
+    gains::{Around, Gains},
+    noise::NoiseModel,
+    place::Place,
+    prior::PopulationPrior,
+    sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, STATES},
+};
+
+/// Magnitude beyond which the filters are brought to rest.
+pub(super) const LARGEST: f64 = 1e100;
+/// Squares of innovations count up to so many variances, and what a normal innovation loses by that.
+const CLIPPED: f64 = 9.0;
+const LOST: f64 = 1.05;
+/// Time constant with which |Y| at the reference is followed, and time between two solutions of the
+/// noise model, s.
+const UNIT_S: f64 = 5.0;
+const SOLVE_S: f64 = 0.13;
+/// Corrections of omega and zeta (shares of theirs) and tau (s) from which the basis moves; the
+/// farthest it moves at once; and where it may be: omega in rad/s, zeta, tau in s.
+const NEAR: [f64; HELD] = [0.04, 0.1, 0.006];
+const FAR: [f64; HELD] = [0.4, 0.6, 0.04];
+const RANGE: [[f64; 2]; HELD] = [[3.0, 40.0], [0.05, 1.5], [0.0, LATEST_S]];
+/// Longest delay, s.
+pub(super) const LATEST_S: f64 = 0.9;
+/// Time between two looks at whether it should, and time that a move takes, s.
+const LOOK_S: f64 = 1.0;
+const MOVE_S: f64 = 4.0;
+
+/// What was, for all: errors with the newest, and outputs, the newest first.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Past<'a> {
+    pub errors: &'a [f64],
+    pub newest: usize,
+    pub u: &'a [f64; LARGEST_ORDER],
+}
+
+impl Past<'_> {
+    /// The error of so many samples ago.
+    #[inline(always)]
+    pub fn error(&self, age: usize) -> f64 {
+        let n = self.errors.len();
+        let age = age.min(n - 1);
+        self.errors[if age <= self.newest {
+            self.newest - age
+        } else {
+            self.newest + n - age
+        }]
+    }
+}
+
+/// A sample behind the whitening filter.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Whitened {
+    pub y: f64,
+    pub regressors: Regressors,
+    pub level: f64,
+}
+
+/// What a sample was worth.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Learnt {
+    pub white: Whitened,
+    pub innovation: f64,
+    /// Logarithm of the density that it was given before it was seen.
+    pub log_density: f64,
+    /// The state before the noise model saw it; none before the estimate has begun.
+    pub state: Option<[f64; STATES]>,
+}
+
+/// Basis, noise model and gains.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Follower {
+    pub place: Place,
+    pub noise: NoiseModel,
+    pub gains: Gains,
+    pub samples: u64,
+    pub began: bool,
+    reopened: bool,
+    powers: [f64; 2],
+    pub variance: [f64; 2],
+    pub unit: f64,
+}
+
+crate::state!([] Follower { place, noise, gains, samples, began, reopened, powers, variance, unit });
+
+impl Follower {
+    /// At rest; `None` for numbers that make no sense.
+    pub fn new(basis: Basis, prior: &PopulationPrior) -> Option<Self> {
+        Some(Self {
+            noise: NoiseModel::new(prior.order, prior.noise_memory, prior.gains.sample_time)?,
+            gains: Gains::new(prior.gains, &basis)?,
+            place: Place::new(basis),
+            samples: 0,
+            began: false,
+            reopened: false,
+            powers: [0.0; 2],
+            variance: [0.0; 2],
+            unit: 0.0,
+        })
+    }
+
+    /// Somebody else from now on, with the noise model of this one and nothing known of the gains.
+    pub fn beside(&self, basis: Basis, prior: &PopulationPrior) -> Option<Self> {
+        let noise = self.noise.clone();
+        Self::new(basis, prior).map(|other| Self { noise, ..other })
+    }
+
+    /// The signals of a sample, before [`Follower::whitened`].
+    #[inline(always)]
+    pub fn respond(&mut self, past: &Past) {
+        self.place.step(|age| past.error(age));
+    }
+
+    /// `D u`, D times the responses, and D at zero.
+    #[inline(always)]
+    pub fn whitened(&self, past: &Past, u: f64) -> Whitened {
+        let (mut y, mut z): (f64, Signals) = (u, *self.place.signals());
+        for ((d, u), past) in self.noise.d().iter().zip(past.u).zip(self.place.past()) {
+            y += d * u;
+            for (z, past) in z.iter_mut().zip(past) {
+                *z += d * past;
+            }
+        }
+        Whitened {
+            y,
+            regressors: self.place.basis().regressors(&z),
+            level: self.noise.sum(),
+        }
+    }
+
+    /// Takes a sample whose signals are there; `None` where one has overflowed. `past` is that of
+    /// before it but for the error.
+    #[inline(always)]
+    pub fn step(&mut self, prior: &PopulationPrior, past: &Past, u: f64) -> Option<Learnt> {
+        let white = self.whitened(past, u);
+        let sound = |x: &f64| x.abs() < LARGEST;
+        let Regressors { x, by } = &white.regressors;
+        if !(sound(&white.y) && x.iter().chain(by.iter().flatten()).all(sound)) {
+            return None;
+        }
+        self.samples += 1;
+        let e = past.error(0);
+        self.powers[0] += e * e;
+        self.powers[1] += u * u;
+        Some(match self.began {
+            true => self.learn(prior, past, u, white),
+            false => {
+                self.begin(prior);
+                Learnt {
+                    white,
+                    innovation: white.y,
+                    log_density: 0.0,
+                    state: None,
+                }
+            }
+        })
+    }
+
+    /// Counts the first samples, and begins when they are enough and not all zero.
+    fn begin(&mut self, prior: &PopulationPrior) {
+        let seconds = self.samples as f64 * prior.gains.sample_time;
+        let [e, u] = self.powers;
+        if seconds >= prior.hold && e > 0.0 && u > 0.0 {
+            let n = self.samples as f64;
+            self.unit = libm::sqrt(u / e);
+            self.gains.begin(self.unit, libm::sqrt(u / n));
+            self.variance = [0.01 * u / n; 2];
+            self.began = true;
+        }
+    }
+
+    fn learn(&mut self, p: &PopulationPrior, past: &Past, u: f64, white: Whitened) -> Learnt {
+        let (ts, n) = (p.gains.sample_time, self.samples as f64);
+        let power = self.powers[1] / n;
+        let point = self.place.basis().point();
+        if !self.reopened && n * ts >= p.reopen {
+            self.reopened = true;
+            self.gains.reopen(self.unit, libm::sqrt(power), point);
+        }
+        let around = Around {
+            variance: self.variance[0],
+            unit: self.unit,
+            level: p.offset_drift.map(|drift| drift * drift * power),
+        };
+        let (eps, log_density) = self
+            .gains
+            .update(white.y, &white.regressors, white.level, point, &around);
+        for (variance, memory) in self.variance.iter_mut().zip(p.level_memory) {
+            let share = ts / memory.min(n * ts).max(4.0 * ts);
+            let square = LOST * (eps * eps).min(CLIPPED * *variance);
+            // What is foretold without an error leaves a level that is still positive.
+            *variance = (*variance + share * (square - *variance)).max(1e-20 * power);
+        }
+        let state = self.gains.state();
+        self.follow_noise(past, u, eps, &state);
+        let every = |seconds: f64| libm::round(seconds / ts).max(1.0) as u64;
+        if self.samples.is_multiple_of(every(SOLVE_S)) {
+            self.noise.solve();
+            let [re, im] = self.response(REFERENCE);
+            let share = (every(SOLVE_S) as f64 * ts / UNIT_S).min(1.0);
+            self.unit += share * (libm::hypot(re, im) - self.unit);
+        }
+        if self.reopened && self.samples.is_multiple_of(every(LOOK_S)) {
+            self.look(past, &state, every(MOVE_S));
+        }
+        Learnt {
+            white,
+            innovation: eps,
+            log_density,
+            state: Some(state),
+        }
+    }
+
+    /// True at the samples at which the noise model is solved anew.
+    pub fn is_renewed(&self, ts: f64) -> bool {
+        self.samples.is_multiple_of(libm::round(SOLVE_S / ts).max(1.0) as u64)
+    }
+
+    /// v with all its lags by the gains of now.
+    fn follow_noise(&mut self, past: &Past, u: f64, eps: f64, state: &[f64; STATES]) {
+        let order = self.noise.order();
+        if self.samples <= order as u64 {
+            return;
+        }
+        let weights = self.place.basis().weights(state);
+        let left = |u: f64, z: &Signals| {
+            let response: f64 = weights.iter().zip(z).map(|(w, z)| w * z).sum();
+            u - state[GAINS] - response
+        };
+        let mut v = [0.0; LARGEST_ORDER + 1];
+        v[0] = left(u, self.place.signals());
+        for ((v, u), z) in v[1..=order].iter_mut().zip(past.u).zip(self.place.past()) {
+            *v = left(*u, z);
+        }
+        let variance = self.variance[0];
+        let excess = (eps * eps / (CLIPPED * variance)).max(1.0);
+        self.noise.update(&v, 1.0 / (variance * excess));
+    }
+
+    /// Moves the basis where the corrections have grown.
+    fn look(&mut self, past: &Past, state: &[f64; STATES], after: u64) {
+        let Point { tau, omega, zeta, lag } = self.place.basis().point();
+        let (of, mut to) = ([omega, zeta, 1.0], [omega, zeta, tau]);
+        let mut is_far = false;
+        for (i, to) in to.iter_mut().enumerate() {
+            let correction = state[LINEAR + i];
+            is_far |= correction.abs() > NEAR[i] * of[i];
+            let most = FAR[i] * of[i];
+            let [low, high] = RANGE[i];
+            *to = (*to + correction.max(-most).min(most)).max(low).min(high);
+        }
+        if is_far && !self.place.is_moving() {
+            let [omega, zeta, tau] = to;
+            let delayed = self.delayed(past);
+            self.place
+                .begin_to_move(Point { tau, omega, zeta, lag }, delayed, after);
+        }
+    }
+
+    /// The delayed error of now.
+    pub fn delayed(&self, past: &Past) -> f64 {
+        let basis = self.place.basis();
+        let l = basis.delay();
+        basis.delayed([past.error(l), past.error(l + 1)])
+    }
+
+    /// Ends a sample.
+    #[inline(always)]
+    pub fn remember(&mut self) {
+        if let Some(by) = self.place.remember() {
+            self.gains.moved(by);
+        }
+    }
+
+    /// Where what is held is by a state: never outside of where the basis may be.
+    pub fn corrected(&self, state: &[f64; STATES]) -> Point {
+        let at = self.place.basis().point();
+        let Point { tau, omega, zeta, lag } = at.moved([state[LINEAR], state[LINEAR + 1], state[LINEAR + 2]]);
+        let within = |x: f64, [low, high]: [f64; 2]| x.max(low).min(high);
+        Point {
+            omega: within(omega, RANGE[0]),
+            zeta: within(zeta, RANGE[1]),
+            tau: within(tau, RANGE[2]),
+            lag,
+        }
+    }
+
+    /// The response of each gain at a frequency in rad/s, for what is held now.
+    pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAINS] {
+        self.responses_at(&self.gains.state(), omega_rad_s)
+    }
+
+    fn responses_at(&self, state: &[f64; STATES], omega_rad_s: f64) -> [Complex; GAINS] {
+        self.place.basis().response(omega_rad_s, self.corrected(state))
+    }
+
+    /// Y at a frequency in rad/s.
+    pub fn response(&self, omega_rad_s: f64) -> Complex {
+        let state = self.gains.state();
+        let h = self.responses_at(&state, omega_rad_s);
+        [0, 1].map(|part| (0..GAINS).map(|i| state[i] * h[i][part]).sum())
+    }
+
+    /// As [`Follower::response`], with the derivatives of its real and its imaginary part by gains,
+    /// level and corrections: exact by the gains, differences by the corrections.
+    pub fn response_with_derivatives(&self, omega_rad_s: f64) -> (Complex, [[f64; STATES]; 2]) {
+        let state = self.gains.state();
+        let point = self.corrected(&state);
+        let basis = self.place.basis();
+        let h = basis.response(omega_rad_s, point);
+        let of = |h: &[Complex; GAINS]| [0, 1].map(|part| (0..GAINS).map(|i| state[i] * h[i][part]).sum::<f64>());
+        let mut by = [[0.0; STATES]; 2];
+        for part in 0..2 {
+            for i in 0..GAINS {
+                by[part][i] = h[i][part];
+            }
+        }
+        for (j, size) in [point.omega, point.zeta, 0.1].into_iter().enumerate() {
+            let step = 1e-5 * size;
+            let at = |sign: f64| {
+                let mut by = [0.0; HELD];
+                by[j] = sign * step;
+                of(&basis.response(omega_rad_s, point.moved(by)))
+            };
+            let (up, down) = (at(1.0), at(-1.0));
+            for part in 0..2 {
+                by[part][LINEAR + j] = (up[part] - down[part]) / (2.0 * step);
+            }
+        }
+        (of(&h), by)
+    }
+}
