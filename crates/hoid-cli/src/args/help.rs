@@ -84,7 +84,7 @@ const HELP: [Help; 15] = [
         command: "track",
         examples: &[
             "hoid track run.csv --out trace.csv",
-            "hoid track run.csv --method rpem --nk 0.28s --out trace.parquet --report out",
+            "hoid track run.csv --at 1,2.5 --controlled-element '90/(s(s+6))' --out trace.csv --report out",
         ],
         shown: &[
             "input",
@@ -97,6 +97,9 @@ const HELP: [Help; 15] = [
             "structure",
             "orders",
             "nk",
+            "prior",
+            "at",
+            "controlled_element",
             "memory",
             "start_span",
             "out",
@@ -120,6 +123,9 @@ const HELP: [Help; 15] = [
             "structure",
             "orders",
             "nk",
+            "prior",
+            "at",
+            "controlled_element",
             "memory",
             "warm_up",
             "every",

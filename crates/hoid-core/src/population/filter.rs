@@ -4,6 +4,7 @@ use super::{
     basis::{Basis, Complex, Point, REFERENCE, Regressors, Signals},
     detector::{Detection, Detector},
     gains::{Around, GainPrior, Gains},
+    known::Known,
     noise::NoiseModel,
     place::Place,
     sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, STATES},
@@ -79,6 +80,8 @@ pub struct PopulationFilter<E> {
     variance: [f64; 2],
     unit: f64,
     restarts: u64,
+    /// True where a fit stood at the beginning.
+    known: bool,
 }
 
 impl<E: AsMut<[f64]>> State for PopulationFilter<E> {
@@ -99,6 +102,7 @@ impl<E: AsMut<[f64]>> State for PopulationFilter<E> {
                 &mut self.variance,
                 &mut self.unit,
                 &mut self.restarts,
+                &mut self.known,
             ],
             each,
         );
@@ -145,7 +149,19 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
             variance: [0.0; 2],
             unit: 0.0,
             restarts: 0,
+            known: false,
         })
+    }
+
+    /// Begins at once, at what is known of the person. `None` for numbers that make no sense.
+    pub fn knowing(mut self, known: &Known) -> Option<Self> {
+        let ts = self.prior.gains.sample_time;
+        if !known.place_in(&mut self.gains, &mut self.noise, ts) {
+            return None;
+        }
+        (self.variance, self.unit) = ([known.variance; 2], known.unit);
+        (self.began, self.reopened, self.known) = (true, true, true);
+        Some(self)
     }
 
     /// Takes a sample. Both must be finite.
@@ -266,6 +282,10 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
             self.reopened = true;
             self.gains.reopen(self.unit, libm::sqrt(power), point);
         }
+        if self.known && self.samples == libm::ceil(p.hold / ts) as u64 {
+            // The level of u is another in each run, and the fit does not say of what size u is.
+            self.gains.open_level(libm::sqrt(power));
+        }
         let around = Around {
             variance: self.variance[0],
             unit: self.unit,
@@ -275,7 +295,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
             .gains
             .update(white.y, &white.regressors, white.level, point, &around);
         for (variance, memory) in self.variance.iter_mut().zip(p.level_memory) {
-            let share = ts / memory.min(n * ts).max(4.0 * ts);
+            let learnt = if self.known { memory } else { memory.min(n * ts) };
+            let share = ts / learnt.max(4.0 * ts);
             let square = LOST * (eps * eps).min(CLIPPED * *variance);
             // What is foretold without an error leaves a level that is still positive.
             *variance = (*variance + share * (square - *variance)).max(1e-20 * power);
@@ -378,6 +399,11 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
     /// True from when on there is an estimate.
     pub fn began(&self) -> bool {
         self.began
+    }
+
+    /// True from when on neuromuscular system and delay are corrected.
+    pub fn corrects(&self) -> bool {
+        self.reopened
     }
 
     /// The basis.
