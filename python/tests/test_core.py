@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -240,6 +241,79 @@ def test_fits_and_traces_say_what_they_are_worth(c1: pyhoid.Record, c4: pyhoid.R
     assert start is not None
     with pytest.raises(pyhoid.DataError, match="no records"):
         _ = start.verdict
+
+
+def test_a_person_is_tracked_with_the_loop_that_they_close(c4: pyhoid.Record) -> None:
+    element = ([90.0], [1.0, 6.0, 0.0])
+    keywords: Any = {"at": (1, 2.5), "controlled_element": element}
+    trace = pyhoid.track(c4, every=50, **keywords)
+    assert trace.method == "population" and trace.start is None
+    assert trace.response_names == [
+        *("gain_db@1", "phase_deg@1", "gain_db@2.5", "phase_deg@2.5"),
+        *("crossover_rad_s", "phase_margin_deg"),
+    ]
+    tracker = pyhoid.Tracker(sample_time=0.01, **keywords)
+    assert tracker.ready and tracker.responses == {} and tracker.crossover is None
+    assert tracker.no_crossover == "there is no estimate yet"
+    tracker.update(c4.e, c4.u)
+    gain, phase = tracker.responses[2.5]
+    assert gain.value == pytest.approx(trace["gain_db@2.5"][-1], abs=1e-9)
+    assert phase.standard_error == pytest.approx(trace["phase_deg@2.5_se"][-1], abs=1e-9)
+    assert tracker.crossover is not None and tracker.phase_margin is not None
+    assert tracker.crossover.value == pytest.approx(trace["crossover_rad_s"][-1], abs=1e-9)
+    assert tracker.phase_margin.value == pytest.approx(trace["phase_margin_deg"][-1], abs=1e-9)
+    assert tracker.determined["K_e_dot"] is bool(trace["K_e_dot_determined"][-1])
+    assert tracker.at == [1, 2.5] and "6" in (tracker.controlled_element or "")
+    assert tracker.settings["at"] == [1, 2.5] and tracker.settings["method"] == "population"
+    lost = np.isnan(trace["crossover_rad_s"]).sum()
+    assert trace.no_crossover is not None and trace.no_crossover[0] == lost
+    assert all(change["changed"] == list(change["changed"]) for change in trace.changes)
+    again = pickle.loads(pickle.dumps(tracker))
+    assert again.responses == tracker.responses and again.settings == tracker.settings
+
+
+def test_a_person_is_tracked_from_an_earlier_fit(c1: pyhoid.Record, tmp_path: Path) -> None:
+    fit = pyhoid.identify_operator(c1, form="lead", nd=2, excitation="none")
+    file = tmp_path / "person.json"
+    file.write_text(fit.to_json())
+    later = pyhoid.simulate("C1", seed=9)
+    by_fit = pyhoid.track(later, prior=fit, at=[2.5], every=50)
+    by_file = pyhoid.track(later, prior=file, at=[2.5], every=50)
+    usual = pyhoid.track(later, at=[2.5], every=50)
+    np.testing.assert_array_equal(by_fit["gain_db@2.5"], by_file["gain_db@2.5"])
+    # Before the first sample it is the fit.
+    tracker = pyhoid.Tracker(prior=str(file), at=[2.5], sample_time=0.01)
+    gain, _ = tracker.responses[2.5]
+    assert gain.value == pytest.approx(20 * np.log10(abs(np.squeeze(fit.fit.frequency_response([2.5])))), abs=0.2)
+    assert tracker.settings["prior"] == str(file)
+    file.unlink()
+    assert pickle.loads(pickle.dumps(tracker)).responses == tracker.responses
+    assert np.isfinite(by_fit["gain_db@2.5_se"][:2]).all() and np.isnan(usual["gain_db@2.5_se"][0])
+    assert (by_fit["gain_db@2.5_se"][3:15] < usual["gain_db@2.5_se"][3:15]).all()
+    for prior in ("none", {"omega_nm": (9, 0.2)}, "omega_nm=9:0.2,T_I=5:0.5"):
+        assert len(pyhoid.track(later, prior=prior, every=500)) == 17
+    with pytest.raises(pyhoid.OptionError, match="no such file|No such file"):
+        pyhoid.track(later, prior="absent.json")
+    with pytest.raises(pyhoid.Error, match="identify --json"):
+        file.write_text("{}")
+        pyhoid.track(later, prior=file)
+    slow = pyhoid.simulate("C1", sample_time=0.02)
+    with pytest.raises(pyhoid.Error, match="100.000000 Hz"):
+        pyhoid.track(slow, prior=fit)
+    with pytest.raises(pyhoid.OptionError, match="population"):
+        pyhoid.track(later, "physical", prior="none")
+
+
+def test_units_of_gains_are_those_of_the_record(c1: pyhoid.Record) -> None:
+    assert pyhoid.estimates.unit_of("K_e_dot", [c1]) == "s"
+    bare = pyhoid.Record(e=c1.e, u=c1.u, sample_time=c1.sample_time)
+    fit = pyhoid.identify(bare, nk=29, nd=1)
+    assert "deg/deg" not in fit.summary() and fit.to_pandas().loc["K_e", "unit"] == ""
+    mixed = pyhoid.Record(
+        e=c1.e, u=c1.u, sample_time=c1.sample_time, units={"e": "mm", "u": "N"}
+    )
+    assert pyhoid.estimates.unit_of("K_e", [mixed]) == "N/mm"
+    assert pyhoid.estimates.unit_of("K_e_dot", [mixed]) == "N s/mm"
 
 
 def test_a_description_with_its_verdict(c1: pyhoid.Record) -> None:

@@ -132,7 +132,7 @@ def test_track_and_tracker_have_the_same_keywords() -> None:
     track = inspect.signature(pyhoid.track).parameters
     tracker = inspect.signature(pyhoid.Tracker.__new__).parameters
     for name in KEYWORDS:
-        usual = "physical" if name == "method" else track[name].default
+        usual = "population" if name == "method" else track[name].default
         assert tracker[name].default == usual, name
         assert track[name].annotation == tracker[name].annotation, name
     shared = [name for name in track if name in tracker]

@@ -70,12 +70,25 @@ def test_traces(c4: pyhoid.Record, tmp_path: Path) -> None:
     assert len(both["rpem"].plot()) == 5
 
 
+def test_a_trace_of_a_person(c4: pyhoid.Record, tmp_path: Path) -> None:
+    trace = pyhoid.track(c4, at=[2.5], controlled_element="90/(s(s+6))", every=20)
+    axes = trace.plot()
+    labels = [ax.get_ylabel() for ax in axes]
+    assert len(axes) == len(trace.response_names) == 4
+    assert "at 2.5 rad/s (dB)" in labels[0] and "rad/s" in labels[2] and "deg" in labels[3]
+    # A line for each change that was declared, beside those of the trace.
+    assert len(trace.changes) >= 1 and all(
+        len(ax.lines) == 1 + len(trace.changes) for ax in axes
+    )
+    drawn(axes[0], tmp_path)
+
+
 def test_boxes(tmp_path: Path) -> None:
     samples = np.random.default_rng(0).normal(0.09, 0.002, size=(2, 100))
     samples[1, :3] = np.nan
     ax = plots.box_plots({"ARX": samples[0], "BJ": samples[1]}, truth=0.09, label="K_e")
     assert [text.get_text() for text in ax.get_xticklabels()] == ["ARX", "BJ\n(3 without value)"]
-    assert "deg/deg" in ax.get_ylabel()
+    assert ax.get_ylabel() == "$K_e$", "a gain has a unit only where its record says so"
     drawn(ax, tmp_path)
 
 

@@ -10,7 +10,7 @@ use hoid_model::{
     margins::Margins,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
-use hoid_track::{Change, Response, TrackFault};
+use hoid_track::{Change, Determined, NoCrossover, OpenLoop, Response, TrackFault};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -40,6 +40,29 @@ pub fn responses(at_rad_s: &[f64], of: impl Fn(usize, f64) -> Option<Response>) 
         })
     });
     Value::Array(each.collect())
+}
+
+/// Crossover and phase margin of a recursion, or why there are none.
+pub fn open_loop(found: &Result<OpenLoop, NoCrossover>) -> Value {
+    match found {
+        Ok(found) => json!({
+            "crossover_rad_s": estimate(&found.crossover_rad_s),
+            "phase_margin_deg": estimate(&found.phase_margin_deg),
+        }),
+        Err(reason) => json!({"crossover_rad_s": null, "phase_margin_deg": null, "reason": reason.words()}),
+    }
+}
+
+/// The operator of a recursion, which says of each parameter whether the data determine it.
+pub fn tracked_operator(
+    found: &Result<OperatorEstimate, NotConvertible>,
+    determined: impl Fn(&OperatorEstimate) -> Vec<Determined>,
+) -> Value {
+    let mut whole = operator(found);
+    for (name, yes) in found.as_ref().map(determined).unwrap_or_default() {
+        whole[name]["determined"] = json!(yes);
+    }
+    whole
 }
 
 /// The same with its interval of 95 %, null where there is none.
@@ -369,6 +392,10 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> Va
             "file": file,
             "samples": r.len(),
             "sample_time": number(r.sample_time().s()),
+            "units": {
+                "input": r.input_channel().map_or("", |channel| &channel.unit),
+                "output": r.output_channel().unit,
+            },
             "preparation": list(&account.steps),
             "trouble": list(&account.quality_issues),
         });

@@ -1,6 +1,9 @@
 //! From the options of `hoid track` and `hoid stream` to those of the library.
 
+use std::path::Path;
+
 use hoid_ident::{Choice, IdentError, OrderRanges};
+use hoid_io::{is_fit_file, read_fit};
 use hoid_model::{Record, SampleTime, Structure};
 use hoid_track::{Method, StartAt, TrackOptions, TrackPlan, narrowed};
 
@@ -9,6 +12,9 @@ use crate::{
     error::CliError,
     orders, output,
 };
+
+/// The option that may be a file.
+const PRIOR: &str = "prior";
 
 /// A recursion as it was typed, its options checked against each other; of the orders some may
 /// still be ranges.
@@ -40,11 +46,27 @@ fn method(args: &RecursionArgs) -> Result<Method, CliError> {
         if !method.settings().list().iter().any(|setting| setting.name == name) {
             return Err(usage(name, &format!("belongs to --method {of}")));
         }
+        if name == PRIOR && is_fit_file(text) {
+            let fit = read_fit(Path::new(text))?.operator()?;
+            method
+                .start_from(fit)
+                .map_err(|error| usage(name, &error.to_string()))?;
+            continue;
+        }
         method
             .set(name, text)
             .map_err(|error| usage(name, &format!("{text}: {error}")))?;
     }
     Ok(method)
+}
+
+/// The file of `--prior`, where it is one.
+pub fn prior_file(args: &RecursionArgs) -> Option<&Path> {
+    let prior = args.settings.given().find(|(name, _)| *name == PRIOR);
+    prior
+        .map(|(_, text)| text)
+        .filter(|text| is_fit_file(text))
+        .map(Path::new)
 }
 
 impl Plan {
@@ -72,6 +94,7 @@ impl Plan {
             start,
             largest: args.largest,
             at_rad_s: args.at.clone(),
+            controlled_element: args.controlled_element.clone(),
             ..TrackOptions::new(method, structure, largest)
         };
         let plan =
@@ -134,6 +157,13 @@ impl Plan {
                 "limit of innovations",
                 format!("{} standard deviations", options.method.limit()),
             ));
+        }
+        if !options.at_rad_s.is_empty() {
+            let each: Vec<String> = options.at_rad_s.iter().map(f64::to_string).collect();
+            list.push(setting("response at", format!("{} rad/s", each.join(", "))));
+        }
+        if let Some(element) = &options.controlled_element {
+            list.push(setting("controlled element", element.to_string()));
         }
         list.push(setting(
             "fault",

@@ -24,6 +24,7 @@ fn kind_in_words(kind: Kind) -> String {
             .collect::<Vec<_>>()
             .join(", "),
         Kind::Channel => "name of a channel".to_owned(),
+        Kind::Prior => "`population`, `none`, `NAME=CENTRE:SPREAD,...`, or a file of `identify --json`".to_owned(),
         Kind::Named(of) => format!("`NAME=VALUE,...`, each {}", kind_in_words(*of)),
     }
 }
@@ -82,6 +83,7 @@ fn python_type(kind: Kind) -> String {
         Kind::OpenSpan => "tuple[float | None, float | None]".to_owned(),
         Kind::Choice(words) => format!("Literal[{}]", quoted(words)),
         Kind::Channel => "str".to_owned(),
+        Kind::Prior => "str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit".to_owned(),
         Kind::Named(of) => format!("Mapping[str, {}]", python_type(*of)),
     }
 }
@@ -139,8 +141,9 @@ fn python_settings(methods: &[MethodSpec]) -> String {
     let mut text = format!(
         "\"\"\"The recursive methods and their options, made from the registry of the library.\n\n\
          `HOID_UPDATE_DOCS=1 cargo test -p hoid-cli` renews this file; it is not edited by hand.\n\"\"\"\n\n\
-         from __future__ import annotations\n\nfrom collections.abc import Mapping\n\
-         from typing import Literal, TypedDict\n\n\
+         from __future__ import annotations\n\nfrom collections.abc import Mapping\nfrom os import PathLike\n\
+         from typing import TYPE_CHECKING, Literal, TypedDict\n\n\
+         if TYPE_CHECKING:\n    from .operator_fit import OperatorFit\n\n\
          __all__ = [\"METHODS\", \"SETTINGS\", \"MethodSettings\", \"RecursiveMethod\", \"Structure\"]\n\n\
          #: A recursive method.\nRecursiveMethod = Literal[\n{}]\n\n\
          #: A polynomial structure.\nStructure = Literal[\n{}]\n\n\n\

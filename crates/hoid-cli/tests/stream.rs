@@ -16,7 +16,7 @@ use std::{
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{bad, good, json};
+use common::{bad, good, json, physical};
 
 /// Far beyond what a line takes, so that a slow machine fails no test and a line that never comes
 /// does not hang.
@@ -36,7 +36,7 @@ impl Stream {
     fn new(arguments: &[&str]) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))
             .args(["stream", "--fs", "100"])
-            .args(arguments)
+            .args(physical(arguments))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -171,7 +171,7 @@ fn simulate_into_stream_is_track() {
         .spawn()
         .unwrap();
     let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
-        .args(["stream", "--fs", "100"])
+        .args(["stream", "--fs", "100", "--method", "physical"])
         .stdin(simulate.stdout.take().unwrap())
         .output()
         .unwrap();
@@ -190,6 +190,8 @@ fn simulate_into_stream_is_track() {
         &[
             "track",
             "c.csv",
+            "--method",
+            "physical",
             "--start-span",
             "0..20",
             "--out",
@@ -201,6 +203,41 @@ fn simulate_into_stream_is_track() {
     assert_eq!(last["parameters"], tracked["last"]["parameters"]);
     assert_eq!(last["operator"], tracked["last"]["operator"]);
     assert_eq!(last["innovation"], tracked["last"]["innovation"]);
+}
+
+#[test]
+fn the_default_speaks_from_the_second_second_on() {
+    let directory = TempDir::new().unwrap();
+    let text = simulated(directory.path(), "7");
+    let rows = text.lines().filter(|l| !l.starts_with(['#', 't']));
+    let run: Vec<String> = rows
+        .map(|row| row.split(',').skip(2).take(2).collect::<Vec<_>>().join(","))
+        .collect();
+    let arguments = [
+        "--method",
+        "population",
+        "--at",
+        "2.5",
+        "--controlled-element",
+        "90/(s(s+6))",
+    ];
+    let (lines, said) = answers(&arguments, &(run.join("\n") + "\n"));
+    assert!(
+        said.contains("started at once") && said.contains("method: population"),
+        "{said}"
+    );
+    assert!(lines.iter().all(|line| line.get("warm_up").is_none()));
+    assert!(lines[50]["response"][0]["gain_db"].is_null());
+    assert_eq!(lines[50]["open_loop"]["reason"], "there is no estimate yet");
+    let error = |k: usize| lines[k]["response"][0]["gain_db"]["standard_error"].as_f64().unwrap();
+    assert!(error(105) > error(1000) && error(1000) > error(8000));
+    assert_eq!(lines[105]["operator"]["omega_nm"]["determined"], false);
+    let last = lines.last().unwrap();
+    assert!(
+        last["open_loop"]["crossover_rad_s"]["standard_error"].is_f64(),
+        "{last}"
+    );
+    assert!(last["open_loop"]["phase_margin_deg"]["value"].is_f64(), "{last}");
 }
 
 #[test]
@@ -516,8 +553,22 @@ fn wrong_usage_and_wrong_headers() {
         &["stream", "--fs", "100", "--memory-of", "x=1000"],
         &["stream", "--fs", "100", "--memory", "0.001s"],
     ] {
-        let (code, message) = bad(d, arguments);
+        let arguments = if arguments.len() > 3 {
+            physical(arguments)
+        } else {
+            arguments.to_vec()
+        };
+        let (code, message) = bad(d, &arguments);
         assert_eq!(code, 2, "{arguments:?}: {message}");
+    }
+    for (more, expected) in [
+        (&["--warm-up", "5"][..], "speaks at once"),
+        (&["--start", "nothing", "--nk", "29"], "--prior"),
+        (&["--prior", "omega_nm=1"], "CENTRE:SPREAD"),
+    ] {
+        let arguments: Vec<&str> = ["stream", "--fs", "100"].iter().chain(more).copied().collect();
+        let (code, message) = bad(d, &arguments);
+        assert!(code == 2 && message.contains(expected), "{arguments:?}: {message}");
     }
     let mut stream = Stream::new(&[]);
     stream.write("t,x,y\n0,1,2\n");

@@ -8,7 +8,7 @@ use std::{fs, path::Path};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{bad, good, json};
+use common::{bad, good, json, physical};
 
 const KNOWN_ORDERS: [&str; 4] = ["--nk", "29", "--orders", "nd=1"];
 
@@ -23,7 +23,7 @@ fn simulated(condition: &str) -> TempDir {
 fn tracked(directory: &Path, more: &[&str]) -> Value {
     let mut arguments = vec!["track", "c.csv", "--out", "trace.csv", "--json"];
     arguments.extend(more);
-    json(directory, &arguments)
+    json(directory, &physical(&arguments))
 }
 
 /// Header and rows of a trace; an empty cell is NaN.
@@ -47,7 +47,7 @@ fn column(trace: &(Vec<String>, Vec<Vec<f64>>), name: &str) -> Vec<f64> {
 }
 
 #[test]
-fn defaults_find_the_operator_and_its_change() {
+fn a_start_fit_finds_the_operator_and_its_change() {
     let directory = simulated("C4");
     let d = directory.path();
     let found = tracked(d, &[]);
@@ -170,7 +170,7 @@ fn the_page_reads_well() {
     let d = directory.path();
     let mut arguments = vec!["track", "c.csv", "--out", "trace.csv"];
     arguments.extend(KNOWN_ORDERS);
-    arguments.push("-v");
+    arguments.extend(["--method", "physical", "-v"]);
     let page = good(d, &arguments);
     for part in [
         "8192 samples of 0.01 s",
@@ -262,6 +262,148 @@ fn every_method_structure_and_way_of_forgetting_runs() {
     assert!(column(&trace(d), "tau_e_se").iter().all(|e| *e > 0.0));
 }
 
+/// The response columns of the last row: value and standard error by name.
+fn last_of(trace: &(Vec<String>, Vec<Vec<f64>>), name: &str) -> (f64, f64) {
+    let of = |name: &str| *column(trace, name).last().unwrap();
+    (of(name), of(&format!("{name}_se")))
+}
+
+#[test]
+fn the_default_needs_nothing_and_tells_the_loop() {
+    let directory = simulated("C4");
+    let d = directory.path();
+    let arguments = [
+        "track",
+        "c.csv",
+        "--out",
+        "trace.csv",
+        "--json",
+        "--at",
+        "1,2.5",
+        "--controlled-element",
+        "90/(s(s+6))",
+    ];
+    let found = json(d, &arguments);
+    assert_eq!(found["method"], "population");
+    assert!(found["start"].is_null());
+    assert_eq!(found["settings"]["start"], "what is usual of people");
+    assert_eq!(found["settings"]["response at"], "1, 2.5 rad/s");
+    let trace = trace(d);
+    // The first second gives the scale of the gains; then there are bands, which become narrower.
+    let errors = column(&trace, "gain_db@2.5_se");
+    assert!(errors[..98].iter().all(|e| e.is_nan()) && errors[102] > 2.0 * errors[3000]);
+    let crossover = column(&trace, "crossover_rad_s");
+    // The controlled element is that of the time before the change.
+    assert!(crossover[3000..4000].iter().all(|w| (w - 1.56).abs() < 0.5));
+    for name in ["crossover_rad_s", "phase_margin_deg"] {
+        let (value, error) = last_of(&trace, name);
+        let told = &found["last"]["open_loop"][name];
+        assert_eq!(told["value"].as_f64().unwrap(), value);
+        assert_eq!(told["standard_error"].as_f64().unwrap(), error);
+    }
+    let without = column(&trace, "crossover_rad_s").iter().filter(|w| w.is_nan()).count();
+    assert_eq!(found["rows_without_crossover"], without);
+    assert!(without == 0 || found["no_crossover_reason"].is_string());
+    // Before the data say something of the neuromuscular system, that is said.
+    let determined = column(&trace, "omega_nm_determined");
+    assert!(determined[..500].iter().all(|v| *v == 0.0));
+    assert_eq!(
+        found["last"]["operator"]["K_e"]["determined"],
+        column(&trace, "K_e_determined").last() == Some(&1.0)
+    );
+    let page = good(
+        d,
+        &[
+            "track",
+            "c.csv",
+            "--out",
+            "trace.csv",
+            "--controlled-element",
+            "90/(s(s+6))",
+        ],
+    );
+    assert!(page.contains("Open loop at 81.91 s: crossover"), "{page}");
+}
+
+#[test]
+fn a_person_is_followed_from_an_earlier_fit_of_them() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    for (seed, file) in [("1", "earlier.csv"), ("2", "c.csv")] {
+        good(d, &["simulate", "--condition", "C1", "--seed", seed, "--out", file]);
+    }
+    let fit = json(d, &["identify", "earlier.csv", "--form", "lead", "--json"]);
+    fs::write(d.join("fit.json"), fit.to_string()).unwrap();
+    let with = [
+        "track",
+        "c.csv",
+        "--out",
+        "trace.csv",
+        "--json",
+        "--at",
+        "2.5",
+        "--prior",
+        "fit.json",
+    ];
+    let found = json(d, &with);
+    let start = found["settings"]["start"].as_str().unwrap();
+    assert!(start.contains("fit.json") && start.contains("form lead"), "{start}");
+    assert_eq!(found["settings"]["prior"], "fit.json");
+    let known = trace(d);
+    json(d, &["track", "c.csv", "--out", "trace.csv", "--json", "--at", "2.5"]);
+    let usual = trace(d);
+    // There from the first sample on, and for the first seconds known better than without.
+    let (of_known, of_usual) = (column(&known, "gain_db@2.5_se"), column(&usual, "gain_db@2.5_se"));
+    assert!(of_known[0].is_finite() && of_usual[0].is_nan());
+    assert!(
+        (150..800).all(|k| of_known[k] < of_usual[k]),
+        "{} {}",
+        of_known[150],
+        of_usual[150]
+    );
+    // K_e_dot is .036 s; the fit of the other run is near, and stays so.
+    let gain = column(&known, "K_e_dot");
+    assert!(
+        gain.iter().all(|k| (k - 0.036).abs() < 0.012),
+        "{} {}",
+        gain[0],
+        gain[8191]
+    );
+    // What does not fit together is told before the work.
+    good(
+        d,
+        &[
+            "simulate",
+            "--condition",
+            "C1",
+            "--sample-time",
+            "0.02",
+            "--out",
+            "slow.csv",
+        ],
+    );
+    fs::write(d.join("no.json"), "{}").unwrap();
+    for (file, prior, expected) in [
+        ("slow.csv", "fit.json", "100.000000 Hz"),
+        ("c.csv", "no.json", "hoid identify --json"),
+        ("c.csv", "T_L=1:0.2", "T_L"),
+        ("c.csv", "absent.json", "cannot be read"),
+    ] {
+        let (_, message) = bad(d, &["track", file, "--out", "trace.csv", "--prior", prior]);
+        assert!(message.contains(expected), "{prior}: {message}");
+    }
+    let (code, message) = bad(
+        d,
+        &[
+            "track", "c.csv", "--out", "t.csv", "--method", "physical", "--prior", "none",
+        ],
+    );
+    assert!(code == 2 && message.contains("--method population"), "{message}");
+    let (code, message) = bad(d, &["track", "c.csv", "--out", "fit.json", "--prior", "fit.json"]);
+    assert!(code != 0 && !message.is_empty());
+    assert!(fs::read_to_string(d.join("fit.json")).unwrap().contains("covariance"));
+}
+
 #[test]
 fn memories_are_the_same_in_every_unit() {
     let directory = simulated("C1");
@@ -307,7 +449,8 @@ fn a_report_with_the_batch_fits() {
     let (code, message) = bad(
         d,
         &[
-            "track", "c.csv", "--out", "x.csv", "--nk", "29", "--report", "r", "--batch", "90..95",
+            "track", "c.csv", "--out", "x.csv", "--method", "physical", "--nk", "29", "--report", "r", "--batch",
+            "90..95",
         ],
     );
     assert!(code == 1 && message.contains("90"), "{message}");
@@ -367,7 +510,7 @@ fn what_does_not_fit_together_ends_with_two() {
     ] {
         let mut all = vec!["track", "c.csv", "--out", "trace.csv"];
         all.extend(arguments);
-        let (code, message) = bad(d, &all);
+        let (code, message) = bad(d, &physical(&all));
         assert_eq!(code, 2, "{arguments:?}: {message}");
         assert!(message.contains(expected), "{arguments:?}: {message}");
     }
@@ -395,7 +538,7 @@ fn what_gives_no_result_ends_with_one() {
     ] {
         let mut all = vec!["track", "--out", "trace.csv"];
         all.extend(arguments);
-        let (code, message) = bad(d, &all);
+        let (code, message) = bad(d, &physical(&all));
         assert_eq!(code, 1, "{arguments:?}: {message}");
         assert!(message.contains(expected), "{arguments:?}: {message}");
     }

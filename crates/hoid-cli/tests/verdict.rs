@@ -137,7 +137,18 @@ fn what_is_not_determined_is_printed_and_ends_with_one() {
 fn a_trace_has_the_findings_of_its_start() {
     let directory = simulated("C4");
     let d = directory.path();
-    let physical = ["track", "c.csv", "--nk", "29", "--orders", "nd=1", "--out", "trace.csv"];
+    let physical = [
+        "track",
+        "c.csv",
+        "--method",
+        "physical",
+        "--nk",
+        "29",
+        "--orders",
+        "nd=1",
+        "--out",
+        "trace.csv",
+    ];
     let page = good(d, &physical);
     assert!(page.starts_with("Verdict: trustworthy\n"), "{page}");
     let rls = json(
@@ -167,7 +178,7 @@ fn a_trace_has_the_findings_of_its_start() {
 fn streamed(directory: &Path, more: &[&str]) -> (Vec<Value>, Option<i32>) {
     let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args([
-            "stream", "--fs", "100", "--nk", "29", "--orders", "nd=1", "--every", "500",
+            "stream", "--fs", "100", "--method", "physical", "--nk", "29", "--orders", "nd=1", "--every", "500",
         ])
         .args(more)
         .stdin(fs::File::open(directory.join("c.csv")).unwrap())

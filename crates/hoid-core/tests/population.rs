@@ -3,11 +3,13 @@
 
 use hoid_core::{
     population::{
-        DRIFTS, GAINS, PopulationFilter, PopulationPrior, RIVALS, STATES,
+        DRIFTS, GAINS, LARGEST_ORDER, PopulationFilter, PopulationPrior, RIVALS, STATES,
         basis::{Basis, Point},
         detector::Detection,
         errors_needed,
         gains::GainPrior,
+        known::Known,
+        noise::Lags,
     },
     state::State,
 };
@@ -440,5 +442,64 @@ fn what_makes_no_sense_is_refused() {
             PopulationFilter::new(basis(usual()), wrong, errors()).is_none(),
             "{wrong:?}"
         );
+    }
+}
+
+#[test]
+fn what_is_known_stands_at_the_beginning() {
+    let mut state = [0.0; STATES];
+    state[..GAINS].copy_from_slice(&GAINS_OF_A_PERSON);
+    let mut covariance = [[0.0; STATES]; STATES];
+    for (i, row) in covariance.iter_mut().enumerate() {
+        row[i] = 1e-3;
+    }
+    let (pole, other_pole) = (0.9_f64, 0.7_f64);
+    // v = 1.6 v(k-1) - .63 v(k-2) + eps, of the poles .9 and .7.
+    let lags: Lags = std::array::from_fn(|k| {
+        let of = |a: f64, b: f64| a.powi(k as i32 + 1) / ((a - b) * (1.0 - a * b) * (1.0 - a * a));
+        of(pole, other_pole) + of(other_pole, pole)
+    });
+    let known = Known {
+        state,
+        covariance,
+        variance: 0.05 * 0.05,
+        unit: 1.5,
+        remnant: Some((lags, 20.0)),
+    };
+    let mut told = filter(1e9).knowing(&known).expect("a sound estimate");
+    assert!(told.began() && (told.d()[0] + 1.6).abs() < 0.01 && (told.d()[1] - 0.63).abs() < 0.01);
+    let (mean, spread) = (told.gains().state(), told.gains().covariance());
+    for i in 0..STATES {
+        assert!((mean[i] - state[i]).abs() < 1e-12);
+        for j in 0..STATES {
+            assert!((spread[i][j] - covariance[i][j]).abs() < 1e-12);
+        }
+    }
+    // Beside one who begins with nothing, over ten seconds.
+    let (mut person, mut other) = (Person::new(3), filter(1e9));
+    let mut errors = [0.0; 2];
+    for k in 0..500 {
+        let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+        told.step(e, u);
+        other.step(e, u);
+        let truth = response(&person.basis, GAINS_OF_A_PERSON, 2.0);
+        for (sum, filter) in errors.iter_mut().zip([&told, &other]).filter(|_| k >= 60) {
+            let (value, _) = estimate(filter, 2.0);
+            *sum += (value[0] - truth[0]).powi(2) + (value[1] - truth[1]).powi(2);
+        }
+    }
+    assert!(errors[0] < 0.25 * errors[1], "{errors:?}");
+    for wrong in [
+        Known { unit: 0.0, ..known },
+        Known {
+            variance: f64::NAN,
+            ..known
+        },
+        Known {
+            remnant: Some(([0.0; LARGEST_ORDER + 1], 1.0)),
+            ..known
+        },
+    ] {
+        assert!(filter(1e9).knowing(&wrong).is_none());
     }
 }

@@ -187,7 +187,7 @@ fn neuromuscular() -> Setting {
 fn operator_prior() -> Setting {
     setting(
         "prior",
-        Kind::Channel,
+        Kind::Prior,
         "population; of time-varying none",
         "What is known of the person before the data: population (published people), none, a JSON result of another fit, or \
          NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L, T_I, as omega_nm=10.5:0.3 (the spread is relative)",

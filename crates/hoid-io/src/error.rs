@@ -45,6 +45,14 @@ pub enum IoError {
         /// What is read.
         input: String,
     },
+    /// A file that holds no fit.
+    #[error("{file}: {reason}; give the output of `hoid identify --json`")]
+    NoFit {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        reason: String,
+    },
     /// A second process on one directory.
     #[error("another process works on {directory}: wait for its end, or take another directory")]
     InUse {

@@ -30,6 +30,7 @@
 //! | `survey` | [`survey()`]: what is inside of a file |
 //! | `segments` | [`read_segments`]: the records between faults of the recording |
 //! | `scenario_file` | [`read_scenario`]: scenarios in TOML |
+//! | `fit_file` | [`read_fit`]: what `hoid identify --json` has printed |
 //! | `formats`, `format` | the formats, and what each says of itself |
 //! | `arrays` | files of named arrays: paths, and the columns among them |
 //! | `time_column` | the time under another name |
@@ -51,6 +52,7 @@ mod column_expression;
 mod data_quality;
 mod directory_lock;
 mod error;
+mod fit_file;
 mod format;
 mod formats;
 mod guarded;
@@ -80,6 +82,7 @@ pub use column_expression::ColumnExpression;
 pub use data_quality::{Place, QualityIssue, QualityIssueKind};
 pub use directory_lock::DirectoryLock;
 pub use error::IoError;
+pub use fit_file::{FitFile, FitParameter, is_fit_file, parse_fit, read_fit};
 pub use formats::{readable_endings, writable_endings};
 pub use output_place::{check_output, check_output_directory, is_same_file};
 pub use output_table::{ColumnKind, ColumnSchema, ColumnValues, OutputColumn, OutputTable, TableSchema};

@@ -102,7 +102,7 @@ pub use gain_unit::GainUnit;
 pub use named_choice::{NamedChoice, UnknownName};
 pub use num_complex::Complex64;
 pub use operator::{DiscreteOperator, OperatorParameters};
-pub use operator_family::{FamilyOperator, Form};
+pub use operator_family::{FamilyOperator, FittedOperator, Form};
 pub use polynomial_model::PolynomialModel;
 pub use record::{Channel, Detrend, Record};
 pub use sample_time::SampleTime;

@@ -3,11 +3,13 @@
 use std::collections::BTreeMap;
 
 use hoid_ident::{IdentError, order_selection::default_operator_ranges, settings::MethodSpec};
+use hoid_io::{FitFile, parse_fit};
 use hoid_model::SampleTime;
 use hoid_track::{Method, StartAt, TrackOptions, TrackPlan, narrowed};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
+    controlled_element::ControlledElement,
     errors::{Failure, Outcome, bad_option},
     names,
 };
@@ -64,6 +66,9 @@ pub fn plan(options: &Bound<'_, PyDict>, sample_time: SampleTime) -> Outcome<Tra
         start,
         largest: get(options, "largest")?.unwrap_or(defaults.largest),
         at_rad_s: get(options, "at")?.unwrap_or_default(),
+        controlled_element: get::<ControlledElement>(options, "controlled_element")?
+            .map(|element| element.transfer_function())
+            .transpose()?,
         ..defaults
     };
     let criterion = names::criterion(&text("criterion")?.unwrap_or_else(|| "bic".to_owned()))?;
@@ -77,7 +82,7 @@ fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
             let words = Method::all().into_iter().map(|method| (method.name(), method));
             names::word("method", &name, &words.collect::<Vec<_>>())?
         }
-        None => Method::physical(),
+        None => Method::default(),
     };
     let mut given: BTreeMap<String, String> = get(options, "settings")?.unwrap_or_default();
     // In the order of the registry: what belongs to a way of forgetting comes after it.
@@ -97,6 +102,11 @@ fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
         }
         let wrong = |error: IdentError| bad_option(format!("{keyword}: {error}"));
         method.set(setting.name, &text).map_err(wrong)?;
+    }
+    // An earlier fit of the person, and where its text is from.
+    if let Some((text, source)) = get::<(String, String)>(options, "fit")? {
+        let fit = parse_fit(&text, &source).and_then(FitFile::operator)?;
+        method.start_from(fit)?;
     }
     Ok(method)
 }

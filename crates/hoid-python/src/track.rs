@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use hoid_ident::{Choice, IdentError};
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 use hoid_report::{BatchLine, TraceSection, TrackReport, default_batch_fits, write_report};
-use hoid_track::{StartAt, Trace, TrackOptions, track as track_record, usual_start_span};
+use hoid_track::{NoCrossover, StartAt, Trace, TrackOptions, track as track_record, usual_start_span};
 use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyDict};
 
@@ -127,6 +127,7 @@ impl PyTrace {
             all.set_item("t", t)?;
             all.set_item("seconds_ago", c.seconds_ago)?;
             all.set_item("log_odds", c.odds)?;
+            all.set_item("changed", c.changed())?;
             all.set_item("K_e", c.k_e.map(figures::pair))?;
             all.set_item("K_e_dot", c.k_e_dot.map(figures::pair))?;
             all.set_item("omega_nm", c.omega_nm_rad_s.map(figures::pair))?;
@@ -160,17 +161,36 @@ impl PyTrace {
         Ok(figures::verdict(&found))
     }
 
+    /// Why most of the rows without a crossover have none, and how many there are; None without a
+    /// controlled element.
+    #[getter]
+    fn no_crossover(&self) -> Option<(usize, Option<&'static str>)> {
+        self.trace.options().controlled_element.as_ref()?;
+        let all: Vec<NoCrossover> = (0..self.trace.len())
+            .filter_map(|row| self.trace.open_loop(row)?.err())
+            .collect();
+        let count = |reason: &NoCrossover| all.iter().filter(|one| *one == reason).count();
+        Some((
+            all.len(),
+            all.iter().max_by_key(|one| count(one)).map(|one| one.words()),
+        ))
+    }
+
     /// All columns by name, as in a trace file; whole numbers stay whole.
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let trace = &self.trace;
-        let (columns, convertible) = py.detach(|| {
+        let (columns, determined, convertible) = py.detach(|| {
             let operators = trace.operators();
             let convertible: Vec<u64> = operators.iter().map(|o| u64::from(o.is_ok())).collect();
-            (trace.estimate_columns(&operators), convertible)
+            let determined = trace.determined_columns(&operators);
+            (trace.estimate_columns(&operators), determined, convertible)
         });
         let all = PyDict::new(py);
         for (name, values) in columns {
             all.set_item(name, array(py, values))?;
+        }
+        for (name, values) in determined {
+            all.set_item(name, PyArray1::from_vec(py, values))?;
         }
         all.set_item("convertible", PyArray1::from_vec(py, convertible))?;
         all.set_item("innovation", PyArray1::from_slice(py, trace.innovation()))?;
@@ -251,6 +271,9 @@ impl PyTrace {
                 .into_iter()
                 .map(|(name, values)| column(&name, ColumnValues::Real(values)))
                 .collect();
+            for (name, values) in trace.determined_columns(&operators) {
+                columns.push(column(&name, ColumnValues::Whole(values)));
+            }
             let convertible = operators.iter().map(|o| u64::from(o.is_ok())).collect();
             columns.push(column("convertible", ColumnValues::Whole(convertible)));
             columns.push(column("innovation", ColumnValues::Real(trace.innovation().to_vec())));

@@ -20,6 +20,9 @@ const LONGEST_WARM_UP: usize = 10_000_000;
 /// The state of a tracker, to restore it: orders, numbers of the tracker, numbers of the warm-up.
 type Saved<'py> = (Option<Bound<'py, PyDict>>, Bound<'py, PyArray1<f64>>);
 
+/// Crossover and margin, or the reason why not.
+type OpenLoopParts = (Option<(figures::Pair, figures::Pair)>, Option<&'static str>);
+
 /// The package derives `pyhoid.Tracker` from it.
 #[pyclass(name = "Tracker", module = "pyhoid._pyhoid", subclass)]
 pub struct PyTracker {
@@ -233,6 +236,50 @@ impl PyTracker {
     #[getter]
     fn operator<'py>(&self, py: Python<'py>) -> Outcome<Option<Bound<'py, PyDict>>> {
         Ok(figures::operator(py, &self.tracker()?.operator())?)
+    }
+
+    /// The settings of responses: frequencies in rad/s.
+    #[getter]
+    fn at(&self) -> Vec<f64> {
+        self.plan.options().at_rad_s.clone()
+    }
+
+    /// What the person controls.
+    #[getter]
+    fn controlled_element(&self) -> Option<String> {
+        let element = self.plan.options().controlled_element.as_ref();
+        element.map(ToString::to_string)
+    }
+
+    /// Gain in dB and phase in deg at a frequency in rad/s, each with its standard error.
+    fn response(&self, omega: f64) -> Outcome<Option<(figures::Pair, figures::Pair)>> {
+        let found = self.tracker()?.response(omega);
+        Ok(found.map(|r| (figures::pair(r.gain_db()), figures::pair(r.phase_deg()))))
+    }
+
+    /// Crossover in rad/s and phase margin in deg, or why there are none; None without a controlled
+    /// element.
+    #[getter]
+    fn open_loop(&self) -> Outcome<Option<OpenLoopParts>> {
+        let found = self.tracker()?.open_loop();
+        Ok(found.map(|found| match found {
+            Ok(found) => (
+                Some((
+                    figures::pair(found.crossover_rad_s),
+                    figures::pair(found.phase_margin_deg),
+                )),
+                None,
+            ),
+            Err(reason) => (None, Some(reason.words())),
+        }))
+    }
+
+    /// Whether the data determine each parameter of the operator.
+    #[getter]
+    fn determined(&self) -> Outcome<std::collections::BTreeMap<&'static str, bool>> {
+        let tracker = self.tracker()?;
+        let found = tracker.operator().map(|operator| tracker.determined(&operator));
+        Ok(found.unwrap_or_default().into_iter().collect())
     }
 
     #[getter]

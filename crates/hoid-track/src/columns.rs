@@ -5,7 +5,7 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate},
 };
 
-use crate::{OPERATOR_COLUMNS, Response, Trace};
+use crate::{OPERATOR_COLUMNS, OpenLoop, Response, Trace};
 
 /// Named columns of one length.
 pub type Columns = Vec<(String, Vec<f64>)>;
@@ -19,15 +19,17 @@ impl Trace {
     /// Names of the operator's columns: those of every trace, and the delay where it is tracked.
     pub fn operator_columns(&self) -> Vec<&'static str> {
         let mut names = OPERATOR_COLUMNS.to_vec();
-        if self.options().method.track_delay_s().is_some() {
+        let method = &self.options().method;
+        if method.track_delay_s().is_some() || method.starts_itself() {
             names.push("tau_e");
         }
         names
     }
 
     /// `t`, each coefficient, each parameter of the operator, and gain in dB and phase in degrees at the
-    /// frequencies of the options (`gain_db@2.5`, `phase_deg@2.5`), with their standard errors behind
-    /// each (`_se`). NaN stands where a row has no operator, or a value no standard error.
+    /// frequencies of the options (`gain_db@2.5`, `phase_deg@2.5`), and with a controlled element
+    /// `crossover_rad_s` and `phase_margin_deg`, with their standard errors behind each (`_se`). NaN
+    /// stands where a row has no operator or no crossover, or a value no standard error.
     /// `operators` are those of [`Trace::operators`].
     pub fn estimate_columns(&self, operators: &[Result<OperatorEstimate, NotConvertible>]) -> Columns {
         let mut columns: Columns = vec![("t".to_owned(), self.times_s().to_vec())];
@@ -53,6 +55,14 @@ impl Trace {
             };
             add(&format!("gain_db@{omega}"), &each(Response::gain_db));
             add(&format!("phase_deg@{omega}"), &each(Response::phase_deg));
+        }
+        if self.options().controlled_element.is_some() {
+            let loops: Vec<Option<OpenLoop>> = (0..self.len()).map(|row| self.open_loop(row)?.ok()).collect();
+            let each = |of: fn(&OpenLoop) -> Estimate| -> Vec<Option<Estimate>> {
+                loops.iter().map(|found| found.as_ref().map(of)).collect()
+            };
+            add("crossover_rad_s", &each(|found| found.crossover_rad_s));
+            add("phase_margin_deg", &each(|found| found.phase_margin_deg));
         }
         columns
     }

@@ -48,12 +48,14 @@ impl TrackOptions {
 
     /// Where the recursion starts.
     pub fn start_in_words(&self) -> String {
+        if let Some(prior) = self.method.person_prior() {
+            return prior.in_words();
+        }
         let covariance = match self.method.covariance() {
             None => "its covariance".to_owned(),
             Some(p) => format!("P = {p} I"),
         };
         match &self.start {
-            _ if self.method.starts_itself() => "what is usual of people".to_owned(),
             StartAt::Span(Some((from, to))) => format!("batch fit of {from:.2} to {to:.2} s, {covariance}"),
             StartAt::Span(None) => format!("batch fit of the first third, {covariance}"),
             StartAt::Theta(_) => "from coefficients that were given".to_owned(),

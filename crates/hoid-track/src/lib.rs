@@ -28,11 +28,13 @@
 //! |---|---|
 //! | `methods`, `method` | [`Method`]: the recursive methods, a file or folder each; what each says of itself |
 //! | `options`, `shared_options`, `memory`, `forgetting` | [`TrackOptions`]: what is to be tracked, and how |
+//! | `person_prior` | [`PersonPrior`]: what is known of a person before the first sample |
 //! | `plan` | [`TrackPlan`]: orders that are still open, searched on the start span |
 //! | `setup`, `start`, `start_noise`, `gain` | what a recursion is built of: structure, start, way of forgetting |
 //! | `kernel`, `recursion` | RLS, RPEM and the physical recursion of the real-time kernel; what every recursion does |
 //! | `predictor`, `past`, `reported` | signals and reports for methods that are not of the kernel |
 //! | `response` | [`Response`]: gain and phase of an estimate at a frequency |
+//! | `open_loop` | [`OpenLoop`]: crossover and phase margin of an estimate with the controlled element |
 //! | `tracker`, `outcome`, `saved` | [`Tracker`]: one sample at a time; a tracker as numbers, to go on elsewhere |
 //! | `live` | [`Live`]: the warm-up of a stream, then its tracker |
 //! | `guard` | samples and spans that no tracking makes, kept from the recursion |
@@ -40,6 +42,7 @@
 //! | `over_record`, `smoother` | [`track()`]: a record; the two-sided estimate of a recorded run |
 //! | `trace`, `columns`, `summary`, `in_words` | [`Trace`]: the estimate at every sample, as columns and in words |
 //! | `judgement` | what a trace, and the estimate of a moment, is worth: [`Trace::verdict`] |
+//! | `determined` | which parameters the data determine |
 //! | `change` | [`Change`]: when a person changed |
 //!
 //! **A recursion starts with what is known.** By default it is the batch fit of the first third of
@@ -55,6 +58,7 @@
 
 mod change;
 mod columns;
+mod determined;
 mod forgetting;
 mod gain;
 mod guard;
@@ -66,10 +70,12 @@ mod live;
 mod memory;
 mod method;
 mod methods;
+mod open_loop;
 mod options;
 mod outcome;
 mod over_record;
 mod past;
+mod person_prior;
 mod plan;
 mod predictor;
 mod recursion;
@@ -88,15 +94,18 @@ mod tracker;
 
 pub use change::{Change, ErrorThreshold};
 pub use columns::{Columns, value_of};
+pub use determined::Determined;
 pub use forgetting::ForgettingRule;
 pub use guard::{GuardAction, GuardChannel, GuardChoice, GuardEvent, GuardKind, GuardOptions, TrackFault};
 pub use idle::{idle_head, usual_start_span};
 pub use live::{Choose, Live, LiveOutcome, WarmUp};
 pub use memory::{CommonMemory, Memory, MemoryOptions};
 pub use methods::*;
+pub use open_loop::{NoCrossover, OpenLoop};
 pub use options::TrackOptions;
 pub use outcome::{Counts, Outcome};
 pub use over_record::{track, track_from};
+pub use person_prior::PersonPrior;
 pub use plan::{TrackPlan, narrowed};
 pub use recursion::Sample;
 pub use response::Response;

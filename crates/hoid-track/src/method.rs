@@ -16,6 +16,7 @@ use hoid_model::{Orders, Record, SampleTime, Structure};
 use crate::{
     forgetting::ForgettingRule,
     memory::{Memory, MemoryOptions},
+    person_prior::PersonPrior,
     recursion::Recursion,
     setup::Setup,
     start::StartState,
@@ -141,6 +142,22 @@ pub(crate) trait RecursiveMethod: Settings {
     /// Channel of the signal from outside the loop that it takes.
     fn reference_channel(&self) -> Option<&str> {
         None
+    }
+
+    /// What is known of the person before the first sample, where that is an option.
+    fn person_prior(&self) -> Option<&PersonPrior> {
+        None
+    }
+
+    /// Standard deviations of omega_nm in rad/s, zeta_nm and tau_e in s before the first sample, where
+    /// the method supposes some.
+    fn spread_before(&self) -> Option<[f64; 3]> {
+        None
+    }
+
+    /// Takes what is known of the person; false where that is no option.
+    fn set_person_prior(&mut self, _prior: PersonPrior) -> bool {
+        false
     }
 
     /// Takes from a record what has a default there.

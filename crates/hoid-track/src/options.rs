@@ -1,7 +1,7 @@
 //! What is to be tracked, and how.
 
 use hoid_ident::{Estimator, IdentError, SearchOptions};
-use hoid_model::{Orders, Record, Structure};
+use hoid_model::{ContinuousTransferFunction, Orders, Record, Structure};
 
 use crate::{
     idle::usual_start_span,
@@ -31,6 +31,8 @@ pub struct TrackOptions {
     pub largest: f64,
     /// Frequencies at which a trace tells gain and phase, rad/s. Default none.
     pub at_rad_s: Vec<f64>,
+    /// What the person controls, for crossover and phase margin. Default none.
+    pub controlled_element: Option<ContinuousTransferFunction>,
 }
 
 impl TrackOptions {
@@ -45,6 +47,7 @@ impl TrackOptions {
             search: SearchOptions::default(),
             largest: 1e6,
             at_rad_s: Vec::new(),
+            controlled_element: None,
         }
     }
 

@@ -5,6 +5,7 @@ use hoid_model::Record;
 
 use crate::{
     idle::idle_head,
+    open_loop::OpenLoop,
     options::TrackOptions,
     recursion::Sample,
     response::Response,
@@ -40,6 +41,10 @@ pub fn track_from(
             structure: options.structure.label(),
             label: record.label().to_owned(),
         });
+    }
+    if let Some(prior) = options.method.person_prior() {
+        let input = record.input_channel().map_or("", |channel| &channel.unit);
+        prior.check(sample_time, [input, &record.output_channel().unit])?;
     }
     let (span, end_s) = match options.start_span(record) {
         Some((from, to)) => (Some(record.span(from, to)?), to),
@@ -92,6 +97,10 @@ pub fn track_from(
             for omega in &options.at_rad_s {
                 let told = tracker.response(*omega).map(|response| response.packed());
                 trace.responses.extend(told.unwrap_or([f64::NAN; Response::NUMBERS]));
+            }
+            if let Some(found) = tracker.open_loop() {
+                trace.no_crossover.push(found.err());
+                trace.open_loops.extend(OpenLoop::packed(found));
             }
         }
         trace.innovation.push(outcome.innovation.unwrap_or(f64::NAN));

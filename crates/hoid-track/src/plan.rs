@@ -5,7 +5,9 @@ use std::{collections::BTreeMap, ops::RangeInclusive};
 
 use hoid_model::{Orders, Record, SampleTime};
 
-use crate::{forgetting::ForgettingRule, methods::Method, options::TrackOptions, setup::StartAt};
+use crate::{
+    forgetting::ForgettingRule, methods::Method, options::TrackOptions, person_prior::PersonPrior, setup::StartAt,
+};
 use hoid_ident::{
     Choice, IdentError, OrderRanges,
     order_selection::{Criterion, choose_orders_with},
@@ -108,7 +110,8 @@ impl TrackPlan {
 
 /// Ranges of a method that searches none: the orders that are usual, as near as the ranges allow.
 fn usual_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime) -> OrderRanges {
-    let nk = (USUAL_DELAY_S / sample_time.s()).round() as usize + 1;
+    let known = method.person_prior().and_then(PersonPrior::delay_s);
+    let nk = (known.unwrap_or(USUAL_DELAY_S) / sample_time.s()).round() as usize + 1;
     let usual = method.usual_orders(nk);
     let only = |usual: usize, range: &RangeInclusive<usize>| {
         let one = usual.clamp(*range.start(), (*range.end()).max(*range.start()));
@@ -158,6 +161,9 @@ pub fn narrowed(
 /// What the recursion checks when it starts, before anything is read or searched.
 fn check(options: &TrackOptions, sample_time: SampleTime) -> Result<(), IdentError> {
     options.check()?;
+    if let Some(prior) = options.method.person_prior() {
+        prior.check(sample_time, ["", ""])?;
+    }
     for memory in options.memories()? {
         memory.lambda(sample_time)?;
     }

@@ -69,6 +69,10 @@ pub(crate) trait Recursion: State + Send + Sync {
     fn response(&self, _omega_rad_s: f64) -> Option<Response> {
         None
     }
+    /// Its real and imaginary part alone.
+    fn response_value(&self, _omega_rad_s: f64) -> Option<[f64; 2]> {
+        None
+    }
     /// The operator, where it is what the recursion estimates.
     fn operator(&self) -> Option<OperatorEstimate> {
         None

@@ -62,6 +62,35 @@ impl Response {
         (a * a * c[0][0] + 2.0 * a * b * c[0][1] + b * b * c[1][1]) / (square * square)
     }
 
+    /// Real and imaginary part of polynomials theta with these orders.
+    pub(crate) fn value_of_polynomials(
+        orders: &Orders,
+        theta: &[f64],
+        omega_rad_s: f64,
+        sample_time: SampleTime,
+    ) -> [f64; 2] {
+        let o = orders;
+        let (sin, cos) = (-omega_rad_s * sample_time.s()).sin_cos();
+        let sum = |first: [f64; 2], of: &[f64]| {
+            // Horner in q^-1, with the constant `first`.
+            let inner = of.iter().rev().fold([0.0; 2], |sum, c| {
+                let [re, im] = times(sum, [cos, sin]);
+                [re + c, im]
+            });
+            let [re, im] = times(inner, [cos, sin]);
+            [first[0] + re, first[1] + im]
+        };
+        let (first_b, first_f) = (o.na, o.na + o.nb + o.nc + o.nd);
+        let (a, f) = (
+            sum([1.0, 0.0], &theta[..o.na]),
+            sum([1.0, 0.0], &theta[first_f..first_f + o.nf]),
+        );
+        // B has no constant of its own: b_0 stands at the delay.
+        let b = sum([0.0; 2], &theta[first_b..first_b + o.nb]);
+        let (sin, cos) = (-omega_rad_s * sample_time.s() * (o.nk as f64 - 1.0)).sin_cos();
+        over(times(b, [cos, sin]), times(a, f))
+    }
+
     /// Of polynomials theta with these orders; `covariance` is that of theta by rows.
     pub(crate) fn of_polynomials(
         orders: &Orders,
@@ -183,6 +212,16 @@ mod tests {
                 assert!((exact.covariance[a][b] - expected).abs() < 1e-6 * size);
             }
         }
+    }
+
+    #[test]
+    fn the_value_alone_is_the_same() {
+        let whole = at(&THETA, None).value;
+        let alone = Response::value_of_polynomials(&ORDERS, &THETA, 4.0, SampleTime::HUNDREDTH);
+        assert!(
+            (0..2).all(|i| (whole[i] - alone[i]).abs() < 1e-14),
+            "{whole:?} {alone:?}"
+        );
     }
 
     #[test]

@@ -5,7 +5,12 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate, operator_estimate},
 };
 
-use crate::{Change, Counts, TrackFault, options::TrackOptions, response::Response};
+use crate::{
+    Change, Counts, TrackFault,
+    open_loop::{NoCrossover, OpenLoop},
+    options::TrackOptions,
+    response::Response,
+};
 use hoid_ident::{Fit, IdentError};
 
 /// The estimate at every sample that was kept, with its uncertainty.
@@ -23,6 +28,9 @@ pub struct Trace {
     pub(crate) operator: Vec<OperatorEstimate>,
     /// The responses that are not those of the polynomials, at each frequency of the options.
     pub(crate) responses: Vec<f64>,
+    /// Crossover and margin of such a recursion, and why there are none.
+    pub(crate) open_loops: Vec<f64>,
+    pub(crate) no_crossover: Vec<Option<NoCrossover>>,
     pub(crate) innovation: Vec<f64>,
     pub(crate) innovation_variance: Vec<f64>,
     pub(crate) shortened: Vec<u64>,
@@ -65,6 +73,8 @@ impl Trace {
             covariance: Vec::with_capacity(rows * packed_len(p)),
             operator: Vec::new(),
             responses: Vec::new(),
+            open_loops: Vec::new(),
+            no_crossover: Vec::new(),
             innovation: Vec::with_capacity(rows),
             innovation_variance: Vec::with_capacity(rows),
             shortened: Vec::with_capacity(rows),
@@ -211,6 +221,25 @@ impl Trace {
         Response::unpacked(&self.responses[from..from + Response::NUMBERS])
     }
 
+    /// Crossover and phase margin of a row with the controlled element of the options; `None` without
+    /// one.
+    pub fn open_loop(&self, row: usize) -> Option<Result<OpenLoop, NoCrossover>> {
+        let element = self.options.controlled_element.as_ref()?;
+        if !self.open_loops.is_empty() {
+            let from = row * OpenLoop::NUMBERS;
+            let found = OpenLoop::unpacked(&self.open_loops[from..from + OpenLoop::NUMBERS]);
+            return Some(found.ok_or(self.no_crossover[row].unwrap_or(NoCrossover::NotDetermined)));
+        }
+        let (orders, theta, ts) = (self.options.polynomial_orders(), self.theta(row), self.sample_time);
+        let value = |omega: f64| Some(Response::value_of_polynomials(&orders, theta, omega, ts));
+        let whole = |omega: f64| {
+            let covariance = self.covariance(row);
+            let found = Response::of_polynomials(&orders, theta, covariance.as_deref(), omega, ts);
+            Some(found)
+        };
+        Some(OpenLoop::of(value, whole, element, ts))
+    }
+
     /// A-priori innovation of each row.
     pub fn innovation(&self) -> &[f64] {
         &self.innovation
@@ -311,6 +340,9 @@ impl Trace {
         let width = Response::NUMBERS * self.options.at_rad_s.len();
         if !self.responses.is_empty() {
             self.responses = causal_mean(&self.responses, width, rows);
+        }
+        if !self.open_loops.is_empty() {
+            self.open_loops = causal_mean(&self.open_loops, OpenLoop::NUMBERS, rows);
         }
         let numbers: Vec<f64> = self
             .operator

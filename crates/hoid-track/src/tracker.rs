@@ -10,6 +10,7 @@ use hoid_model::{
 use crate::{
     change::Change,
     guard::{Guard, GuardEvent, Guarded},
+    open_loop::{NoCrossover, OpenLoop},
     options::TrackOptions,
     outcome::{Counts, Outcome},
     recursion::{Recursion, Sample},
@@ -60,6 +61,9 @@ impl Tracker {
         sample_time: SampleTime,
     ) -> Result<Self, IdentError> {
         options.check()?;
+        if let Some(prior) = options.method.person_prior() {
+            prior.check(sample_time, ["", ""])?;
+        }
         let setup = options.setup()?;
         let start = StartState::new(&setup, span, known, sample_time)?;
         let mut recursion = options.method.inner().build(&setup, &start, sample_time)?;
@@ -228,6 +232,22 @@ impl Tracker {
         let (theta, ts) = (self.theta(), self.sample_time);
         let whole = covariance.as_deref();
         Some(Response::of_polynomials(&orders, theta, whole, omega_rad_s, ts))
+    }
+
+    /// Crossover and phase margin with the controlled element of the options; `None` without one.
+    pub fn open_loop(&self) -> Option<Result<OpenLoop, NoCrossover>> {
+        let element = self.options.controlled_element.as_ref()?;
+        let whole = |omega: f64| self.response(omega);
+        if self.options.method.starts_itself() {
+            let value = |omega: f64| self.recursion.response_value(omega);
+            return Some(OpenLoop::of(value, whole, element, self.sample_time));
+        }
+        let orders = self.options.polynomial_orders();
+        let value = |omega: f64| {
+            let alone = Response::value_of_polynomials(&orders, self.theta(), omega, self.sample_time);
+            Some(alone)
+        };
+        Some(OpenLoop::of(value, whole, element, self.sample_time))
     }
 
     /// Logarithm of the odds that the person changed within the last four seconds, by

@@ -279,6 +279,10 @@ class Trace:
     @property
     def failures(self) -> tuple[int, str] | None: ...
     @property
+    def no_crossover(self) -> tuple[int, str | None] | None:
+        """How many rows have no crossover, and why most of them."""
+
+    @property
     def start(self) -> Fit | None: ...
     @property
     def innovation_variance(self) -> _Array: ...
@@ -326,6 +330,25 @@ class Tracker:
     def parameters(self) -> list[tuple[str, _Pair]]: ...
     @property
     def operator(self) -> dict[str, Any] | None: ...
+    @property
+    def at(self) -> list[float]:
+        """Frequencies in rad/s at which gain and phase are told."""
+
+    @property
+    def controlled_element(self) -> str | None:
+        """What the person controls."""
+
+    def response(self, omega: float) -> tuple[_Pair, _Pair] | None:
+        """Gain in dB and phase in deg at a frequency in rad/s, each with its standard error."""
+
+    @property
+    def open_loop(self) -> tuple[tuple[_Pair, _Pair] | None, str | None] | None:
+        """Crossover in rad/s and phase margin in deg, or why there are none."""
+
+    @property
+    def determined(self) -> dict[str, bool]:
+        """Whether the data determine each parameter of the operator."""
+
     @property
     def innovation_variance(self) -> float: ...
     @property

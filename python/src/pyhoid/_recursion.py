@@ -7,10 +7,13 @@ The options of the methods are not listed here: they are those of the registry o
 from __future__ import annotations
 
 from collections.abc import Mapping
+from os import PathLike, fspath
+from pathlib import Path
 from typing import Any
 
 from . import _options, _pyhoid
-from .errors import OptionError
+from .errors import FormatError, OptionError
+from .operator_fit import OperatorFit
 
 __all__ = ["KEYWORDS", "plain"]
 
@@ -22,6 +25,8 @@ KEYWORDS = (
     "criterion",
     "start",
     "largest",
+    "at",
+    "controlled_element",
 )
 
 #: Keywords of the methods.
@@ -42,6 +47,10 @@ def plain(arguments: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str
         for order in ("na", "nb", "nc", "nd", "nf", "nk")
         if (value := given[order]) is not None
     }
+    settings = dict(settings)
+    fit = None
+    if settings.get("prior") is not None:
+        settings["prior"], fit = _person(settings["prior"])
     texts = {name: _options.text(name, value) for name, value in settings.items()}
     return {
         "method": given["method"],
@@ -53,8 +62,11 @@ def plain(arguments: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str
         else _options.numbers("start", start),
         "from_nothing": start == "nothing",
         "largest": float(given["largest"]),
-        # What is said of a row, so that a tracker has none.
-        "at": [float(omega) for omega in arguments.get("at", ())],
+        "at": [float(omega) for omega in given["at"]],
+        "controlled_element": None
+        if given["controlled_element"] is None
+        else _options.controlled_element(given["controlled_element"]),
+        "fit": fit,
         "settings": {
             # Python keeps the word lambda for itself.
             "lambda" if name == "forgetting_factor" else name: text
@@ -62,3 +74,36 @@ def plain(arguments: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str
             if text is not None
         },
     }
+
+
+def _person(prior: Any) -> tuple[str | None, tuple[str, str] | None]:
+    """What is known of a person: as text, or the text of a fit with the name of its file.
+
+    >>> _person({"omega_nm": (9, 0.2)})
+    ('omega_nm=9.0:0.2', None)
+    """
+    if isinstance(prior, OperatorFit):
+        return None, (prior.to_json(), "the fit")
+    if isinstance(prior, Mapping):
+        try:
+            pairs = [f"{name}={float(c)!r}:{float(s)!r}" for name, (c, s) in prior.items()]
+        except (TypeError, ValueError):
+            raise OptionError(
+                f"prior is {prior!r}, expected (centre, spread) by name, "
+                'such as {"omega_nm": (10.5, 0.3)}'
+            ) from None
+        return ",".join(pairs), None
+    if not isinstance(prior, (str, PathLike)):
+        raise OptionError(
+            f'prior is {prior!r}, expected "population", "none", text such as "omega_nm=10.5:0.3", '
+            "(centre, spread) by name, a JSON result, or an OperatorFit"
+        )
+    path = fspath(prior)
+    if isinstance(prior, str) and not path.lower().endswith(".json"):
+        return path, None
+    try:
+        return None, (Path(path).read_text(encoding="utf-8"), path)
+    except OSError as error:
+        raise OptionError(f"prior {path}: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise FormatError(f"prior {path}: it is no text in UTF-8") from None

@@ -6,7 +6,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal, TypedDict
+from os import PathLike
+from typing import TYPE_CHECKING, Literal, TypedDict
+
+if TYPE_CHECKING:
+    from .operator_fit import OperatorFit
 
 __all__ = ["METHODS", "SETTINGS", "MethodSettings", "RecursiveMethod", "Structure"]
 
@@ -123,6 +127,11 @@ class MethodSettings(TypedDict, total=False):
     # population.
     false_alarms: float | None
 
+    # What is known of the person before the first sample: population, none, NAME=CENTRE:SPREAD
+    # of omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an earlier fit of them, a
+    # file that hoid identify --json has printed. For population.
+    prior: str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit | None
+
 
 #: The methods, as the documentation of `track` lists them.
 METHODS = """``"rls"``: recursive least squares;
@@ -192,4 +201,8 @@ SETTINGS = """covariance : float
             ends, in place of what the past alone says. For adaptive.
         false_alarms : float
             False alarms in an hour that are accepted: a lower number finds fewer changes,
-            later. For population."""
+            later. For population.
+        prior : str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit
+            What is known of the person before the first sample: population, none,
+            NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an
+            earlier fit of them, a file that hoid identify --json has printed. For population."""

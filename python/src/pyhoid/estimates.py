@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from . import _text
 from .errors import NotConvertibleError
+
+if TYPE_CHECKING:
+    from .record import Record
 
 __all__ = ["Estimate", "Operator", "Remnant"]
 
 _T = TypeVar("_T")
 
-#: Units of parameters that have one.
+#: Units of parameters, those of gains beside the units of u and e.
 UNITS: Mapping[str, str] = {
-    "K_e": "deg/deg",
+    "K_e": "",
     "T_L": "s",
     "K_e_dot": "s",
     "omega_nm": "rad/s",
@@ -27,6 +30,28 @@ UNITS: Mapping[str, str] = {
     "phase_margin_deg": "deg",
     "gain_margin_db": "dB",
 }
+
+
+#: Parameters that are a ratio of u and e.
+_GAINS = ("K_e", "K_e_dot")
+
+
+def unit_of(name: str, records: Sequence[Record] = ()) -> str:
+    """The unit of a parameter; of a gain only where the records declare those of e and u.
+
+    >>> unit_of("T_L"), unit_of("K_e")
+    ('s', '')
+    """
+    own = UNITS.get(name, "")
+    if name not in _GAINS:
+        return own
+    units = records[0].units if records else {}
+    e, u = units.get("e", "").strip(), units.get("u", "").strip()
+    if not e or not u:
+        return ""
+    if own and e == u:
+        return own
+    return f"{u} {own}/{e}" if own else f"{u}/{e}"
 
 
 class Estimate(NamedTuple):
@@ -86,8 +111,11 @@ class _Converted(Named[Estimate]):
     """Estimates by name, or the reason why there are none."""
 
     _what = "the model"
+    #: The records that it is of, for the units of gains.
+    _records: Sequence[Record] = ()
 
-    def __init__(self, found: Mapping[str, Any]) -> None:
+    def __init__(self, found: Mapping[str, Any], records: Sequence[Record] = ()) -> None:
+        self._records = records
         self.convertible: bool = bool(found["convertible"])
         self.reason: str | None = found.get("reason")
         self._all: dict[str, Estimate] = {
@@ -112,7 +140,7 @@ class _Converted(Named[Estimate]):
             [
                 name,
                 *_text.with_uncertainty(estimate.value, estimate.standard_error),
-                UNITS.get(name, ""),
+                unit_of(name, self._records),
             ]
             for name, estimate in self._all.items()
         ]
@@ -135,7 +163,8 @@ class _Converted(Named[Estimate]):
 class Operator(_Converted):
     """The human operator of a model.
 
-    The parameters are K_e (deg/deg), T_L (s), K_e_dot (s), omega_nm (rad/s), zeta_nm, tau_e (s).
+    The parameters are K_e (unit of u by that of e), T_L (s), K_e_dot (that of K_e times s),
+    omega_nm (rad/s), zeta_nm, tau_e (s).
 
     A mapping from names to `Estimate`; the entries are also attributes (``operator.K_e.value``).
     Where the coefficients do not represent a continuous operator, `convertible` is False, `reason`
@@ -156,8 +185,8 @@ class Operator(_Converted):
     _what = "the operator"
     _owner = "Operator"
 
-    def __init__(self, found: Mapping[str, Any]) -> None:
-        super().__init__(found)
+    def __init__(self, found: Mapping[str, Any], records: Sequence[Record] = ()) -> None:
+        super().__init__(found, records)
         self.stable: bool = bool(found.get("stable", False))
 
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from . import _faults, _options, _pyhoid, _text
 from ._arrays import FloatArray, signal
 from .errors import DataError, NotConvertibleError
-from .estimates import UNITS, Estimate, Operator, Remnant, estimates
+from .estimates import Estimate, Operator, Remnant, estimates, unit_of
 from .record import Record
 from ._pickling import Call, recalled, state_of
 from .verdict import Verdict
@@ -247,7 +247,7 @@ class Fit:
     def operator(self) -> Operator | None:
         """The human operator; None where the structure cannot represent one."""
         found = self._native.operator
-        return None if found is None else Operator(found)
+        return None if found is None else Operator(found, self.records)
 
     @property
     def operators(self) -> list[Operator | None]:
@@ -255,7 +255,7 @@ class Fit:
 
         Empty for other fits.
         """
-        return [None if found is None else Operator(found) for found in self._native.operators]
+        return [None if found is None else Operator(found, self.records) for found in self._native.operators]
 
     @property
     def levels(self) -> list[Estimate | None]:
@@ -434,7 +434,7 @@ class Fit:
                 "standard_error": [
                     np.nan if e.standard_error is None else e.standard_error for _, e in rows
                 ],
-                "unit": [UNITS.get(name, "") for name, _ in rows],
+                "unit": [unit_of(name, self.records) for name, _ in rows],
             },
             index=pd.Index([name for name, _ in rows], name="parameter"),
         )
@@ -543,7 +543,7 @@ class Fit:
         """
         header = ["parameter", "value", "standard error", "unit"]
         rows = [
-            [name, *_text.with_uncertainty(e.value, e.standard_error), UNITS.get(name, "")]
+            [name, *_text.with_uncertainty(e.value, e.standard_error), unit_of(name, self.records)]
             for name, e in self.estimates.items()
         ]
         parts = [self._headline(), _text.plain_table(header, rows)]
@@ -575,7 +575,7 @@ class Fit:
 
         header = ["", "value", "standard error", "unit"]
         rows = [
-            [name, *_text.with_uncertainty(e.value, e.standard_error), UNITS.get(name, "")]
+            [name, *_text.with_uncertainty(e.value, e.standard_error), unit_of(name, self.records)]
             for name, e in self.estimates.items()
         ]
         parts = [_text.html_table(self._headline(), header, rows)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
 from pathlib import Path
@@ -288,6 +289,61 @@ class OperatorFit:
     def converged(self) -> bool:
         """Whether the search converged."""
         return bool(self.termination["converged"])
+
+    def to_json(self) -> str:
+        """The fit as text for a file that is a prior elsewhere.
+
+        ``pyhoid.track(record, prior=fit)`` takes the fit itself; a file of this text is read by
+        ``hoid track --prior``, ``hoid stream --prior`` and ``hoid identify --prior``. The keys are
+        those of ``hoid identify --json``, not all of them.
+
+        Examples
+        --------
+        >>> Path("person.json").write_text(fit.to_json())
+        """
+        units = self.records[0].units if self.records else {}
+
+        def number(value: float | None) -> float | None:
+            return value if value is not None and math.isfinite(value) else None
+
+        return json.dumps(
+            {
+                "structure": "grey-box",
+                "form": self.form,
+                "neuromuscular": self.neuromuscular,
+                "verdict": {
+                    "level": self.verdict.level,
+                    "reasons": list(self.verdict.reasons),
+                },
+                "records": [
+                    {
+                        "sample_time": self.sample_time,
+                        "units": {
+                            "input": units.get("e", ""),
+                            "output": units.get("u", ""),
+                        },
+                    }
+                ],
+                "parameters": [
+                    {
+                        "name": name,
+                        "value": number(p.value),
+                        "standard_error": number(p.standard_error),
+                        "determined": p.determined,
+                    }
+                    for name, p in self.parameters.items()
+                ],
+                "noise": {name: values.tolist() for name, values in self.noise.items()},
+                "innovation_variance": self.innovation_variance,
+                "covariance": None
+                if self.covariance is None
+                else {
+                    "coordinates": list(self.coordinates),
+                    "values": list(self.coordinates.values()),
+                    "matrix": self.covariance.tolist(),
+                },
+            }
+        )
 
     def to_pandas(self) -> pd.DataFrame:
         """The parameters as a table.

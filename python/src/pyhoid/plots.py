@@ -20,7 +20,7 @@ from matplotlib.axes import Axes
 
 from .description import DescribingFunction
 from .errors import OptionError
-from .estimates import UNITS
+from .estimates import unit_of
 from .fit import Fit
 from .record import Record
 from .trace import Trace
@@ -78,6 +78,10 @@ SYMBOLS: Mapping[str, str] = {
     "tau_e": r"$\tau_e$",
     "T_n": r"$T_n$",
     "K_n": r"$K_n$",
+    "gain_db": r"$|H|$",
+    "phase_deg": r"$\angle H$",
+    "crossover_rad_s": r"$\omega_c$",
+    "phase_margin_deg": r"$\varphi_m$",
 }
 
 
@@ -109,8 +113,11 @@ def _axes(ax: Axes | None, size: tuple[float, float] = (5.6, 3.2)) -> Axes:
 
 
 def _label(name: str, unit: str | None = None) -> str:
-    unit = UNITS.get(name, "") if unit is None else unit
-    symbol = SYMBOLS.get(name, name)
+    unit = unit_of(name) if unit is None else unit
+    quantity, _, omega = name.partition("@")
+    symbol = SYMBOLS.get(quantity, quantity)
+    if omega:
+        symbol += f" at {omega} rad/s"
     return f"{symbol} ({unit})" if unit else symbol
 
 
@@ -342,7 +349,7 @@ def trace(
     else:
         named = {one.method: one for one in traces}
     first = next(iter(named.values()))
-    shown = list(names or first.operator_names)
+    shown = list(names or first.response_names or first.operator_names)
     with style():
         if axes is None:
             _, made = plt.subplots(
@@ -381,11 +388,28 @@ def trace(
                 )
                 extent.append(known)
             _limits(ax, extent)
-            ax.set_ylabel(_label(name))
+            ax.set_ylabel(_label(name, first._unit(name)))
             ax.margins(x=0)
+            _mark_changes(ax, named.values(), words=ax is axes[0])
         axes[-1].set_xlabel("t (s)")
         _legend(axes[0])
     return axes
+
+
+def _mark_changes(ax: Axes, traces: Iterable[Trace], *, words: bool) -> None:
+    """A dashed line where a change was declared, with what changed."""
+    for change in (change for one in traces for change in one.changes):
+        ax.axvline(change["t"], color="#444444", linestyle=(0, (6, 3)), linewidth=0.9)
+        if words:
+            what = [SYMBOLS.get(name, name) for name in change["changed"]]
+            ax.annotate(
+                ", ".join(what) or "the response",
+                (change["t"], 1.0),
+                xycoords=("data", "axes fraction"),
+                xytext=(2, 2),
+                textcoords="offset points",
+                fontsize=7,
+            )
 
 
 def _limits(ax: Axes, extent: Iterable[Any]) -> None:

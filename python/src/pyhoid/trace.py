@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
-from .estimates import UNITS, Estimate, Operator
+from .estimates import Estimate, Operator, unit_of
 from ._pickling import Call, recalled, state_of
 from .fit import Fit
 from .record import Record
@@ -40,6 +40,7 @@ _ANSWERS = (
     "faults",
     "changes",
     "failures",
+    "no_crossover",
     "innovation_variance",
 )
 
@@ -48,7 +49,10 @@ class Trace:
     """The estimate at every sample that was kept, with its uncertainty. `track` makes it.
 
     Columns are read by name: ``trace["K_e"]``, and ``trace["K_e_se"]`` for its standard errors. All
-    have shape (N,), and NaN where a row has no operator.
+    have shape (N,), and NaN where a row has no operator. With `at` and `controlled_element` there
+    are ``trace["gain_db@2.5"]``, ``trace["phase_deg@2.5"]``, ``trace["crossover_rad_s"]`` and
+    ``trace["phase_margin_deg"]``; ``"population"`` adds ``trace["omega_nm_determined"]`` and the
+    like, 1 where the data determine a parameter.
 
     Attributes
     ----------
@@ -137,6 +141,19 @@ class Trace:
         return self._native.operator_names
 
     @property
+    def response_names(self) -> list[str]:
+        """Names of gain and phase at the frequencies of `at`, crossover and margin: of those
+        that were asked for, without their errors."""
+        starts = ("gain_db@", "phase_deg@", "crossover_rad_s", "phase_margin_deg")
+        return [n for n in self.columns if n.startswith(starts) and not n.endswith("_se")]
+
+    @property
+    def no_crossover(self) -> tuple[int, str | None] | None:
+        """How many rows have no crossover, and why most of them; None without a controlled
+        element."""
+        return self._native.no_crossover
+
+    @property
     def updated_from(self) -> float:
         """Time in s from which the estimate was updated."""
         return self._native.updated_from
@@ -163,10 +180,10 @@ class Trace:
 
     @property
     def changes(self) -> list[dict[str, Any]]:
-        """The changes that ``"adaptive"`` declared.
+        """The changes that ``"population"`` or ``"adaptive"`` declared.
 
-        Each has its time, how long ago it was, the odds, and the gains before and after with their
-        standard errors.
+        Each has its time `t`, how long ago it was, the odds, what changed (`changed`), and the
+        gains before and after with their standard errors.
         """
         return self._native.changes
 
@@ -189,7 +206,7 @@ class Trace:
         >>> trace.operator()
         """
         found = self._native.operator(row if row >= 0 else row + len(self))
-        return None if found is None else Operator(found)
+        return None if found is None else Operator(found, [self.record])
 
     def to_pandas(self) -> pd.DataFrame:
         """All columns with the time in s as index.
@@ -210,6 +227,12 @@ class Trace:
 
         return pl.DataFrame(dict(self.columns))
 
+    def _unit(self, name: str) -> str:
+        """The unit of a column."""
+        base = name.removesuffix("_se")
+        of_response = {"gain_db": "dB", "phase_deg": "deg"}.get(base.partition("@")[0])
+        return of_response or unit_of(base, [self.record])
+
     def to_xarray(self) -> xr.Dataset:
         """All columns over the coordinate ``t`` (s).
 
@@ -218,7 +241,7 @@ class Trace:
         import xarray as xr
 
         variables = {
-            name: ("t", values, {"units": UNITS.get(name.removesuffix("_se"), "")})
+            name: ("t", values, {"units": self._unit(name)})
             for name, values in self.columns.items()
             if name != "t"
         }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from . import _pyhoid, _recursion, _text
@@ -24,8 +24,9 @@ __all__ = ["Tracker"]
 class Tracker(_pyhoid.Tracker):
     """A recursive estimate that takes one sample at a time.
 
-    Without a start it collects `warm_up` seconds, fits them, and goes on from there; until then
-    `ready` is False. It can be pickled, and goes on with the same digits.
+    The default, ``"population"``, speaks at once. Other methods without a start collect `warm_up`
+    seconds, fit them, and go on from there; until then `ready` is False. It can be pickled, and
+    goes on with the same digits.
 
     Parameters
     ----------
@@ -35,6 +36,10 @@ class Tracker(_pyhoid.Tracker):
         Ts in s.
     warm_up : float, default 20
         Seconds collected before the start fit.
+    at : sequence of float
+        Frequencies in rad/s that `responses` tells.
+    controlled_element : str or (sequence of float, sequence of float), optional
+        What the person controls, as in `track`: then `crossover` and `phase_margin` are told.
     record : Record, optional
         A record to start from, instead of the warm-up: its fit is the start, and the filters have
         run over it.
@@ -50,7 +55,7 @@ class Tracker(_pyhoid.Tracker):
 
     def __new__(
         cls,
-        method: RecursiveMethod = "physical",
+        method: RecursiveMethod = "population",
         *,
         sample_time: float = 0.01,
         warm_up: float = 20.0,
@@ -65,6 +70,8 @@ class Tracker(_pyhoid.Tracker):
         criterion: Criterion = "bic",
         start: Mapping[str, float] | str | None = None,
         largest: float = 1e6,
+        at: Sequence[float] = (),
+        controlled_element: str | tuple[Sequence[float], Sequence[float]] | None = None,
         **settings: Unpack[MethodSettings],
     ) -> Tracker:
         """See the class."""
@@ -108,6 +115,43 @@ class Tracker(_pyhoid.Tracker):
         return {name: Estimate(*pair) for name, pair in self.parameters}
 
     @property
+    def responses(self) -> dict[float, tuple[Estimate, Estimate]]:
+        """Gain in dB and phase in degrees at the frequencies of `at`; empty before the first estimate.
+
+        Examples
+        --------
+        >>> tracker = pyhoid.Tracker("population", at=(1, 2.5), sample_time=0.01)
+        >>> gain, phase = tracker.responses[2.5]
+        """
+        told = {omega: self.response(omega) for omega in self.at}
+        return {
+            omega: (Estimate(*found[0]), Estimate(*found[1]))
+            for omega, found in told.items()
+            if found is not None
+        }
+
+    @property
+    def crossover(self) -> Estimate | None:
+        """Crossover frequency in rad/s.
+
+        None without a controlled element, and where there is none; then `no_crossover` says why.
+        """
+        found = self.open_loop
+        return None if found is None or found[0] is None else Estimate(*found[0][0])
+
+    @property
+    def phase_margin(self) -> Estimate | None:
+        """Phase margin in degrees; None as `crossover`."""
+        found = self.open_loop
+        return None if found is None or found[0] is None else Estimate(*found[0][1])
+
+    @property
+    def no_crossover(self) -> str | None:
+        """Why there is no crossover now."""
+        found = self.open_loop
+        return None if found is None else found[1]
+
+    @property
     def start_fit(self) -> Fit | None:
         """The batch fit that the tracker started from.
 
@@ -115,6 +159,15 @@ class Tracker(_pyhoid.Tracker):
         """
         native = self.start
         return None if native is None else Fit(native, [])
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The keywords that it was made with, defaults included; a prior from a fit by its source."""
+        shared = {name: self._options[name] for name in _recursion.KEYWORDS if name in self._options}
+        settings = shared | self._options["orders"] | self._options["settings"]
+        if self._options["fit"] is not None:
+            settings["prior"] = self._options["fit"][1]
+        return settings
 
     def operator_estimate(self) -> Operator | None:
         """The operator with standard errors; None where the structure cannot represent one.

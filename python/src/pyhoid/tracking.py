@@ -26,7 +26,7 @@ __all__ = ["track"]
 
 def track(
     record: Record,
-    method: RecursiveMethod = "physical",
+    method: RecursiveMethod = "population",
     *,
     structure: Structure | None = None,
     na: Order | None = None,
@@ -39,6 +39,7 @@ def track(
     start: Mapping[str, float] | str | None = None,
     largest: float = 1e6,
     at: Sequence[float] = (),
+    controlled_element: str | tuple[Sequence[float], Sequence[float]] | None = None,
     start_span: tuple[float, float] | None = None,
     update_from: float | None = None,
     moving_average: float | None = None,
@@ -48,8 +49,9 @@ def track(
 ) -> Trace:
     """Track a model and the operator's parameters over a record, sample by sample.
 
-    Without options this is the physical recursion, started from a Box-Jenkins fit of the first
-    third of the record.
+    Without options this is ``"population"``: gains in a basis that people share. It needs no start
+    fit, speaks from the second second on, and is made for recorded people. Where the form of the
+    operator and its delay are known, ``"adaptive"`` is more precise.
 
     Parameters
     ----------
@@ -63,12 +65,17 @@ def track(
     criterion : str
         The criterion that chooses between candidates.
     start : mapping of str to float, or "nothing", optional
-        All coefficients; default a batch fit of the start span.
+        All coefficients; default a batch fit of the start span. ``"population"`` has `prior` in
+        its place.
     largest : float
         Magnitude of e or u beyond which a sample is a fault.
     at : sequence of float
         Frequencies in rad/s at which gain in dB and phase in degrees are columns of the trace
         (``gain_db@2.5``, ``phase_deg@2.5``), with standard errors.
+    controlled_element : str or (sequence of float, sequence of float), optional
+        What the person controls, as ``"90/(s(s+6))"`` or numerator and denominator by descending
+        powers of s: adds the columns ``crossover_rad_s`` and ``phase_margin_deg``, with standard
+        errors.
     start_span : (float, float), optional
         Span of the start fit in s; default the first third.
     update_from : float, optional
@@ -94,6 +101,12 @@ def track(
     --------
     >>> trace = pyhoid.track(record, "rpem", nk=29, nd=1)
     >>> trace["T_L"]
+
+    A person, from an earlier fit of them, with the loop that they closed:
+
+    >>> fit = pyhoid.identify_operator(earlier)
+    >>> trace = pyhoid.track(record, at=(1, 2.5), controlled_element="90/(s(s+6))", prior=fit)
+    >>> trace["phase_margin_deg"], trace["phase_margin_deg_se"]
     """
     shared = {
         name: value

@@ -89,7 +89,7 @@ const HELP: [Help; 16] = [
         command: "track",
         examples: &[
             "hoid track run.csv --out trace.csv",
-            "hoid track run.csv --method rpem --nk 0.28s --out trace.parquet --report out",
+            "hoid track run.csv --at 1,2.5 --controlled-element '90/(s(s+6))' --out trace.csv --report out",
         ],
         shown: &[
             "input",
@@ -102,6 +102,9 @@ const HELP: [Help; 16] = [
             "structure",
             "orders",
             "nk",
+            "prior",
+            "at",
+            "controlled_element",
             "memory",
             "start_span",
             "out",
@@ -125,6 +128,9 @@ const HELP: [Help; 16] = [
             "structure",
             "orders",
             "nk",
+            "prior",
+            "at",
+            "controlled_element",
             "memory",
             "warm_up",
             "every",

@@ -8,7 +8,7 @@ use clap::{
 };
 use hoid_ident::{order_selection::Criterion, settings::MethodSpec};
 use hoid_io::{Scaling, readable_endings, writable_endings};
-use hoid_model::Structure;
+use hoid_model::{ContinuousTransferFunction, Structure};
 use hoid_track::Method;
 
 use super::{ReadArgs, choices::choice_of, figure::FigureArgs, parse_span, settings::SettingArgs, show::ShowArgs};
@@ -18,24 +18,26 @@ use crate::orders::{DelayRange, parse_delay};
 #[derive(Debug, Args)]
 pub struct RecursionArgs {
     /// The recursion
-    #[arg(long, value_name = "NAME", default_value = "physical", value_parser = method_names())]
+    #[arg(long, value_name = "NAME", default_value_t = Method::default().name().to_owned(), value_parser = method_names())]
     pub method: String,
     /// Polynomial structure [default: arx for rls, else bj]
     #[arg(long, value_name = "NAME", value_parser = choice_of(&Structure::ALL))]
     pub structure: Option<Structure>,
     /// Orders, each a number or a range to search on the start span, as nb=2,nc=0,nd=1..4,nf=2
-    /// [default: the operator's: bj nb=2,nd=1..4,nf=2, for adaptive nd=6; arx na=2,nb=2]
+    /// [default: the operator's: bj nb=2,nd=1..4,nf=2, for population nd=16, for adaptive nd=6; arx
+    /// na=2,nb=2]
     #[arg(long, value_name = "LIST")]
     pub orders: Option<String>,
     /// Delay of b0 in samples (29), or dead time in s (0.28s); a number or a range (20..40,
-    /// 0.1s..0.4s) to search on the start span [default: 0.05 to 0.6 s]
+    /// 0.1s..0.4s) to search on the start span [default: 0.05 to 0.6 s; population begins at 0.2 s and
+    /// follows the delay]
     #[arg(long, value_name = "N|Ss|LO..HI", value_parser = parse_delay)]
     pub nk: Option<DelayRange>,
     /// What decides between candidates when something is searched
     #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_of(&Criterion::ALL))]
     pub criterion: Criterion,
     /// Where the recursion starts: all coefficients as f1=-1.9,f2=.92,b0=.04,... or `nothing`
-    /// [default: a batch fit of the start span, or of the warm-up]
+    /// [default: a batch fit of the start span, or of the warm-up; population starts from --prior]
     #[arg(long, value_name = "LIST|nothing", allow_hyphen_values = true)]
     pub start: Option<String>,
     #[command(flatten)]
@@ -46,6 +48,10 @@ pub struct RecursionArgs {
     /// Frequencies in rad/s at which gain and phase are told, with errors, as 0.5,1,2.5
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub at: Vec<f64>,
+    /// Controlled element in s, as 90/(s(s+6)), or NUM/DEN by descending powers of s, as 90/1,6,0:
+    /// adds crossover frequency and phase margin, with errors
+    #[arg(long, value_name = "ELEMENT", allow_hyphen_values = true)]
+    pub controlled_element: Option<ContinuousTransferFunction>,
 }
 
 #[derive(Debug, Args)]
@@ -57,7 +63,7 @@ pub struct TrackArgs {
     pub read: ReadArgs,
     #[command(flatten)]
     pub recursion: RecursionArgs,
-    /// Span of the start fit, s [default: the first third of the record]
+    /// Span of the start fit, s, for methods that have one [default: the first third of the record]
     #[arg(long, value_name = "S..S", value_parser = parse_span, allow_hyphen_values = true)]
     pub start_span: Option<(f64, f64)>,
     /// Time from which the estimate moves, s; before it only the filters follow
@@ -97,7 +103,8 @@ pub struct StreamArgs {
     pub fs: f64,
     #[command(flatten)]
     pub recursion: RecursionArgs,
-    /// Seconds that are collected before the start fit [default: 20; none with --start]
+    /// Seconds that are collected before the start fit, for methods that have one [default: 20; none
+    /// with --start]
     #[arg(long, value_name = "S", conflicts_with = "start")]
     pub warm_up: Option<f64>,
     /// Print a line for every N-th sample only

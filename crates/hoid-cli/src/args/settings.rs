@@ -60,6 +60,7 @@ fn argument(setting: &Setting, methods: &[MethodSpec]) -> Arg {
         Kind::Memory => arg.value_name("N|Ss|inf"),
         Kind::Span | Kind::OpenSpan => arg.value_name("LO..HI"),
         Kind::Channel => arg.value_name("CHANNEL"),
+        Kind::Prior => arg.value_name("PRIOR"),
         Kind::Named(_) => arg.value_name("LIST"),
     }
 }

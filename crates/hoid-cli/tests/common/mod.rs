@@ -60,3 +60,13 @@ pub fn bad(directory: &Path, arguments: &[&str]) -> (i32, String) {
     assert!(!message.contains("panicked"), "{message}");
     (output.status.code().unwrap(), message)
 }
+
+/// Arguments of `track` or `stream` with the method in physical parameters, which starts with a fit,
+/// where none is named.
+pub fn physical<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
+    let mut all = arguments.to_vec();
+    if !all.contains(&"--method") {
+        all.extend(["--method", "physical"]);
+    }
+    all
+}

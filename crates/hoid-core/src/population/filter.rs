@@ -7,6 +7,7 @@ use super::{
     detector::Detector,
     follower::{Follower, LARGEST, LATEST_S, Learnt, Past},
     gains::Gains,
+    known::Known,
     noise::NoiseModel,
     prior::PopulationPrior,
     sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, STATES},
@@ -90,6 +91,14 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
             age: 0,
             left: 0,
         })
+    }
+
+    /// Begins at once, at what is known of the person, without rivals until a change is declared. `None`
+    /// for numbers that make no sense.
+    pub fn knowing(mut self, known: &Known) -> Option<Self> {
+        let sound = self.believed.knowing(known, self.prior.gains.sample_time);
+        self.contest.end();
+        sound.then_some(self)
     }
 
     /// Takes a sample. Both must be finite.
@@ -261,6 +270,11 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
     /// True from when on there is an estimate.
     pub fn began(&self) -> bool {
         self.believed.began
+    }
+
+    /// True from when on neuromuscular system and delay are corrected.
+    pub fn corrects(&self) -> bool {
+        self.believed.reopened
     }
 
     /// The basis.

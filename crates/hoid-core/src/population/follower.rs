@@ -4,6 +4,7 @@
 use super::{
     basis::{Basis, Complex, Point, REFERENCE, Regressors, Signals},
     gains::{Around, Gains},
+    known::Known,
     noise::NoiseModel,
     place::Place,
     prior::PopulationPrior,
@@ -79,13 +80,15 @@ pub(super) struct Follower {
     pub gains: Gains,
     pub samples: u64,
     pub began: bool,
-    reopened: bool,
+    pub reopened: bool,
+    /// True where a fit stood at the beginning.
+    known: bool,
     powers: [f64; 2],
     pub variance: [f64; 2],
     pub unit: f64,
 }
 
-crate::state!([] Follower { place, noise, gains, samples, began, reopened, powers, variance, unit });
+crate::state!([] Follower { place, noise, gains, samples, began, reopened, known, powers, variance, unit });
 
 impl Follower {
     /// At rest; `None` for numbers that make no sense.
@@ -97,6 +100,7 @@ impl Follower {
             samples: 0,
             began: false,
             reopened: false,
+            known: false,
             powers: [0.0; 2],
             variance: [0.0; 2],
             unit: 0.0,
@@ -107,6 +111,16 @@ impl Follower {
     pub fn beside(&self, basis: Basis, prior: &PopulationPrior) -> Option<Self> {
         let noise = self.noise.clone();
         Self::new(basis, prior).map(|other| Self { noise, ..other })
+    }
+
+    /// Begins at once, at what is known of the person; false for numbers that make no sense.
+    pub fn knowing(&mut self, known: &Known, sample_time: f64) -> bool {
+        if !known.place_in(&mut self.gains, &mut self.noise, sample_time) {
+            return false;
+        }
+        (self.variance, self.unit) = ([known.variance; 2], known.unit);
+        (self.began, self.reopened, self.known) = (true, true, true);
+        true
     }
 
     /// The signals of a sample, before [`Follower::whitened`].
@@ -181,6 +195,10 @@ impl Follower {
             self.reopened = true;
             self.gains.reopen(self.unit, libm::sqrt(power), point);
         }
+        if self.known && self.samples == libm::ceil(p.hold / ts) as u64 {
+            // The level of u is another in each run, and the fit does not say of what size u is.
+            self.gains.open_level(libm::sqrt(power));
+        }
         let around = Around {
             variance: self.variance[0],
             unit: self.unit,
@@ -190,7 +208,8 @@ impl Follower {
             .gains
             .update(white.y, &white.regressors, white.level, point, &around);
         for (variance, memory) in self.variance.iter_mut().zip(p.level_memory) {
-            let share = ts / memory.min(n * ts).max(4.0 * ts);
+            let learnt = if self.known { memory } else { memory.min(n * ts) };
+            let share = ts / learnt.max(4.0 * ts);
             let square = LOST * (eps * eps).min(CLIPPED * *variance);
             // What is foretold without an error leaves a level that is still positive.
             *variance = (*variance + share * (square - *variance)).max(1e-20 * power);

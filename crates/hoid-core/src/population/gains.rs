@@ -149,6 +149,21 @@ impl Gains {
         self.weigh_anew();
     }
 
+    /// Begins with an estimate of gains, level and corrections, and its covariance.
+    pub(super) fn begin_at(&mut self, state: &[f64; STATES], covariance: &[[f64; STATES]; STATES]) {
+        for filter in self.filters.iter_mut().flatten() {
+            (filter.state, filter.covariance) = (*state, *covariance);
+        }
+        self.weigh_anew();
+    }
+
+    /// Lets the level be anything within this standard deviation.
+    pub(super) fn open_level(&mut self, level: f64) {
+        for filter in self.filters.iter_mut().flatten() {
+            filter.covariance[GAINS][GAINS] += level * level;
+        }
+    }
+
     /// Goes on from the gains of now, as if nothing were known of how good they are, and lets what is
     /// held be corrected from here on.
     pub fn reopen(&mut self, gain: f64, level: f64, point: Point) {

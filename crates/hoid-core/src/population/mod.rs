@@ -32,13 +32,15 @@
 //!   28-35), in units of how much the same person varies without a change.
 //!
 //! Nothing has to be fitted before: the estimate begins with the first second, whose ratio of
-//! output to error gives the scale of the gains' prior. [`PopulationFilter`] is the recursion.
+//! output to error gives the scale of the gains' prior. Where an earlier fit of the person is at hand
+//! ([`known`]), it begins there. [`PopulationFilter`] is the recursion.
 
 pub mod basis;
 pub mod blocks;
 pub mod detector;
 pub mod difference;
 pub mod gains;
+pub mod known;
 pub mod noise;
 
 mod cholesky;

@@ -12,6 +12,8 @@
 use super::{cholesky, sizes::LARGEST_ORDER};
 
 const WIDTH: usize = LARGEST_ORDER + 1;
+/// A number for each lag from zero on.
+pub type Lags = [f64; WIDTH];
 /// Time constants of the remnant that is supposed before anything is known, s.
 const USUAL: [f64; 2] = [0.3, 0.06];
 /// Weight of that supposition: a share of the power of v, in samples.
@@ -56,6 +58,25 @@ impl NoiseModel {
             samples: 0.0,
             d,
         })
+    }
+
+    /// Begins as if so many samples of a v with these autocovariances had been seen, which are over the
+    /// variance of eps; false where they are none.
+    pub(super) fn suppose(&mut self, lags: &Lags, samples: f64) -> bool {
+        if !(lags[0] > 0.0 && lags.iter().all(|c| c.is_finite()) && samples > 0.0 && samples.is_finite()) {
+            return false;
+        }
+        // The memory is half of the samples that were taken.
+        let weight = samples.min(self.longest);
+        self.samples = 2.0 * weight;
+        self.weight = weight;
+        for i in 0..=self.order {
+            for j in i..=self.order {
+                self.products[i][j] = weight * lags[j - i];
+            }
+        }
+        self.solve();
+        true
     }
 
     /// Coefficients behind the 1.
@@ -194,6 +215,30 @@ mod tests {
             assert!((0.58..1.42).contains(&squares), "{memory}: {squares}");
         }
         assert!(NoiseModel::new(4, 40.0, 0.01).unwrap().covariance().is_none());
+    }
+
+    #[test]
+    fn a_remnant_that_is_known_is_there_at_once_and_left_as_data_come() {
+        // An autoregression of order 1 with the pole .9: its autocovariances are .9^k/(1 - .81).
+        let (mut model, mut seed) = (NoiseModel::new(6, 40.0, 0.01).unwrap(), 5);
+        let lags: Lags = core::array::from_fn(|k| 0.9_f64.powi(k as i32) / 0.19);
+        assert!(model.suppose(&lags, 2000.0));
+        assert!(
+            (model.d()[0] + 0.9).abs() < 1e-3 && model.d()[1].abs() < 1e-3,
+            "{:?}",
+            model.d()
+        );
+        let mut v = [0.0; WIDTH];
+        for _ in 0..40_000 {
+            v.copy_within(0..WIDTH - 1, 1);
+            v[0] = 0.5 * v[1] + stream(&mut seed);
+            model.update(&v, 12.0);
+        }
+        model.solve();
+        // Ten memories of 4000 samples: what was supposed is gone, d1 has a standard error of .01.
+        assert!((model.d()[0] + 0.5).abs() < 0.05, "{:?}", model.d());
+        let mut other = NoiseModel::new(6, 40.0, 0.01).unwrap();
+        assert!(!other.suppose(&[0.0; WIDTH], 2000.0) && !other.suppose(&lags, f64::NAN));
     }
 
     #[test]

@@ -20,7 +20,7 @@ const RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
 /// Quantile of the normal distribution for 95 %.
 const NORMAL: f64 = 1.959_963_984_540_054;
 /// Points of the scan.
-const POINTS: usize = 400;
+const POINTS: usize = 150;
 
 /// Crossover and phase margin with their errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,6 +50,80 @@ impl LoopMeasures {
     }
 }
 
+/// Where the gain of an open loop falls through one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossover {
+    /// Crossover frequency, rad/s.
+    pub omega_rad_s: f64,
+    /// Phase margin, deg, between -180 and 180.
+    pub margin_deg: f64,
+    /// `d ln L/d omega`.
+    slope: Complex64,
+}
+
+impl Crossover {
+    /// The lowest one of an open loop that is sampled; `None` where `|L|` does not fall through one.
+    pub fn lowest(open_loop: impl Fn(f64) -> Complex64, sample_time: SampleTime) -> Option<Self> {
+        let highest = RANGE_RAD_S.1.min(0.9 * sample_time.nyquist_rad_s());
+        let at = |i: usize| RANGE_RAD_S.0 * (highest / RANGE_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0));
+        let gain = |omega: f64| open_loop(omega).norm_sqr().ln();
+        let mut low = (at(0), gain(at(0)));
+        let mut bracket = None;
+        for i in 1..POINTS {
+            let high = (at(i), gain(at(i)));
+            if low.1 >= 0.0 && high.1 < 0.0 {
+                bracket = Some((low, high));
+                break;
+            }
+            low = high;
+        }
+        let (low, high) = bracket?;
+        let omega_rad_s = zero_between(gain, low, high);
+        // d ln L / d omega by a central difference of a smooth function.
+        let h = 1e-5 * omega_rad_s;
+        Some(Self {
+            omega_rad_s,
+            margin_deg: (-open_loop(omega_rad_s)).arg().to_degrees(),
+            slope: (open_loop(omega_rad_s + h) / open_loop(omega_rad_s - h)).ln() / (2.0 * h),
+        })
+    }
+
+    /// How crossover in rad/s and margin in deg move with a relative change `dL/L` there.
+    pub fn moved_by(&self, relative: Complex64) -> [f64; 2] {
+        let by_crossover = -relative.re / self.slope.re;
+        [by_crossover, (relative.im + self.slope.im * by_crossover).to_degrees()]
+    }
+}
+
+/// Where a function that is positive at `low` and negative at `high` is zero, to rounding, by false
+/// position that halves an end which stays (M. Dowell and P. Jarratt, *BIT* 11 (1971) 168-174).
+fn zero_between(of: impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f64)) -> f64 {
+    let (mut last, mut was_positive) = (low.0, None);
+    for _ in 0..80 {
+        let chord = (high.0 * low.1 - low.0 * high.1) / (low.1 - high.1);
+        let x = if chord > low.0 && chord < high.0 {
+            chord
+        } else {
+            0.5 * (low.0 + high.0)
+        };
+        if (x - last).abs() < 4.0 * f64::EPSILON * x {
+            break;
+        }
+        let y = of(x);
+        let positive = y >= 0.0;
+        let stays = was_positive == Some(positive);
+        if positive {
+            low = (x, y);
+            high.1 *= if stays { 0.5 } else { 1.0 };
+        } else {
+            high = (x, y);
+            low.1 *= if stays { 0.5 } else { 1.0 };
+        }
+        (last, was_positive) = (x, Some(positive));
+    }
+    last
+}
+
 /// The measures of an operator whose coordinates have this covariance; `None` where `|L|` does not
 /// fall through one.
 pub fn loop_measures(
@@ -59,39 +133,21 @@ pub fn loop_measures(
     sample_time: SampleTime,
 ) -> Option<LoopMeasures> {
     let open_loop = |omega: f64| operator.response(omega) * hold(omega, sample_time) * element.response(omega);
-    let highest = RANGE_RAD_S.1.min(0.9 * sample_time.nyquist_rad_s());
-    let at = |i: usize| RANGE_RAD_S.0 * (highest / RANGE_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0));
-    let falls = |i: &usize| open_loop(at(*i)).norm() >= 1.0 && open_loop(at(i + 1)).norm() < 1.0;
-    let bracket = (0..POINTS - 1).find(falls)?;
-    let (mut low, mut high) = (at(bracket), at(bracket + 1));
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if open_loop(middle).norm() >= 1.0 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    let omega = 0.5 * (low + high);
-    let margin = (-open_loop(omega)).arg().to_degrees();
-    // d ln L / d omega by a central difference of a smooth function.
-    let h = 1e-5 * omega;
-    let slope: Complex64 = (open_loop(omega + h) / open_loop(omega - h)).ln() / (2.0 * h);
-    let response = operator.response_and_gradient(omega);
-    let relative: Vec<Complex64> = response.gradient.iter().map(|g| g / response.value).collect();
-    let by_crossover: Vec<f64> = relative.iter().map(|r| -r.re / slope.re).collect();
-    let by_margin: Vec<f64> = relative
-        .iter()
-        .zip(&by_crossover)
-        .map(|(r, d)| (r.im + slope.im * d).to_degrees())
+    let found = Crossover::lowest(open_loop, sample_time)?;
+    let response = operator.response_and_gradient(found.omega_rad_s);
+    let moved: Vec<[f64; 2]> = (response.gradient.iter())
+        .map(|g| found.moved_by(g / response.value))
         .collect();
-    let estimate = |value: f64, gradient: &[f64]| match covariance {
-        Some(c) => Estimate::with_variance(value, variance_along(gradient, c)),
+    let estimate = |value: f64, of: usize| match covariance {
+        Some(c) => {
+            let gradient: Vec<f64> = moved.iter().map(|m| m[of]).collect();
+            Estimate::with_variance(value, variance_along(&gradient, c))
+        }
         None => Estimate::fixed(value),
     };
     Some(LoopMeasures {
-        crossover_rad_s: estimate(omega, &by_crossover),
-        phase_margin_deg: estimate(margin, &by_margin),
+        crossover_rad_s: estimate(found.omega_rad_s, 0),
+        phase_margin_deg: estimate(found.margin_deg, 1),
         quantile: NORMAL,
     })
 }
@@ -142,6 +198,23 @@ mod tests {
                 "{i}"
             );
         }
+    }
+
+    #[test]
+    fn the_gain_is_one_at_the_crossover() {
+        let element = ContinuousTransferFunction::new(&[90.0], &[1.0, 6.0, 0.0]).unwrap();
+        for scale in [0.02, 0.1, 0.5] {
+            let of = FamilyOperator::new(Form::LeadLag, true, &[scale * X[0], X[1], X[2], X[3], X[4], X[5]]).unwrap();
+            let open_loop = |w: f64| of.response(w) * hold(w, SampleTime::HUNDREDTH) * element.response(w);
+            let found = Crossover::lowest(open_loop, SampleTime::HUNDREDTH).unwrap();
+            assert!(
+                (open_loop(found.omega_rad_s).norm() - 1.0).abs() < 1e-12,
+                "{scale}: {found:?}"
+            );
+        }
+        // A step: still between the ends.
+        let step = zero_between(|x| if x < 0.3 { 1.0 } else { -3.0 }, (0.0, 1.0), (1.0, -3.0));
+        assert!((step - 0.3).abs() < 1e-6, "{step}");
     }
 
     #[test]

@@ -21,6 +21,8 @@ pub enum Kind {
     Choice(&'static [&'static str]),
     /// Name of a channel.
     Channel,
+    /// What is known of a person: `population`, `none`, `NAME=CENTRE:SPREAD,..`, or a file of a fit.
+    Prior,
     /// Values of a type by name, as `b0=256,f=inf`.
     Named(&'static Kind),
 }

@@ -14,6 +14,7 @@
 //! |---|---|
 //! | `form` | [`Form`], [`Coordinate`] |
 //! | `operator` | [`FamilyOperator`]: one operator, its response, its named parameters |
+//! | `fitted` | [`FittedOperator`]: an operator as a fit left it |
 //! | `hold` | its exact discrete model for a held input, with the derivatives |
 //! | `interpolate` | the same for an error that is smooth between samples |
 //! | `matrices` | the matrix exponential |
@@ -22,6 +23,7 @@
 mod dual;
 #[cfg(test)]
 mod examples;
+mod fitted;
 mod form;
 mod hold;
 mod interpolate;
@@ -29,6 +31,7 @@ mod matrices;
 mod operator;
 
 pub use dual::PARTIALS;
+pub use fitted::FittedOperator;
 pub use form::{Coordinate, Form};
 pub use hold::HeldFamily;
 pub use operator::{FamilyOperator, FamilyResponse, NamedParameter, PARAMETERS};

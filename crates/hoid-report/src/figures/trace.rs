@@ -25,6 +25,8 @@ use super::{
 const HEIGHT: f64 = 84.0;
 
 const DOTS: &str = "#444444";
+/// Changes whose names the legend has.
+const CHANGES_NAMED: usize = 6;
 
 /// Panels with a common time axis.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -45,6 +47,9 @@ pub struct TraceGrid {
     pub shaded_s: Vec<(f64, f64)>,
     /// Times with a dotted line, s.
     pub marks_s: Vec<f64>,
+    /// Changes that were declared: when, s, and what changed. Each has a dashed line, with its number
+    /// in the first panel.
+    pub changes: Vec<(f64, String)>,
     /// True when panels of a row have one ordinate, which is labelled once.
     pub shared_ordinates: bool,
 }
@@ -73,7 +78,7 @@ pub fn trace_panels(id: &str, title: &str, grid: &TraceGrid) -> String {
         let layout = frame.fitted(i, layout);
         (
             panel.plots(ranges[i], grid.levels.len(), frame.area(i).parts()),
-            grid.marked(layout, time),
+            grid.marked(layout, time, i == 0),
         )
     };
     let cells = grid.panels.iter().enumerate().map(cell).collect();
@@ -95,7 +100,12 @@ impl TraceGrid {
         }
     }
 
-    fn marked(&self, mut layout: kuva::prelude::Layout, (from, to): (f64, f64)) -> kuva::prelude::Layout {
+    fn marked(
+        &self,
+        mut layout: kuva::prelude::Layout,
+        (from, to): (f64, f64),
+        numbered: bool,
+    ) -> kuva::prelude::Layout {
         for &(begin, end) in &self.shaded_s {
             let (begin, end) = (begin.clamp(from, to), end.clamp(from, to));
             if begin < end {
@@ -108,6 +118,17 @@ impl TraceGrid {
                 .with_color("#666666")
                 .with_stroke_width(1.1);
             layout = layout.with_reference_line(line.with_dasharray("1.5 2.5"));
+        }
+        let inside = |(at, _): &&(f64, String)| (from..=to).contains(at);
+        for (number, (at, _)) in self.changes.iter().filter(inside).enumerate() {
+            let mut line = ReferenceLine::vertical(*at)
+                .with_color(DOTS)
+                .with_stroke_width(1.2)
+                .with_dasharray("6 3");
+            if numbered {
+                line = line.with_label((number + 1).to_string());
+            }
+            layout = layout.with_reference_line(line);
         }
         layout
     }
@@ -135,6 +156,13 @@ impl TraceGrid {
         }
         if has(CurveKind::Truth) {
             entries.push(Entry::new("truth", BLACK, Sample::Dashed));
+        }
+        for (number, (at, what)) in self.changes.iter().enumerate().take(CHANGES_NAMED) {
+            let name = format!("change {}, {at:.1} s: {what}", number + 1);
+            entries.push(Entry::new(&name, DOTS, Sample::Dashed));
+        }
+        if let Some(more) = self.changes.len().checked_sub(CHANGES_NAMED).filter(|more| *more > 0) {
+            entries.push(Entry::new(&format!("{more} changes more"), DOTS, Sample::Dashed));
         }
         add_legend_by(scene, &entries, self.levels.len());
     }
@@ -292,6 +320,20 @@ mod tests {
             assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>") && !svg.contains("NaN"));
             assert_eq!(svg.matches("<tspan").count(), svg.matches("</tspan>").count());
         }
+    }
+
+    #[test]
+    fn changes_have_a_number_and_a_name() {
+        let one = || panel(vec![curve(CurveKind::Estimate, vec![1.0, 2.0, 1.5])]);
+        let with = |n: usize| TraceGrid {
+            panels: vec![one(), one()],
+            changes: (0..n).map(|k| (0.005, format!("K_e {k}"))).collect(),
+            ..TraceGrid::default()
+        };
+        let dashes = |n: usize| trace_panels("g", "t", &with(n)).matches("dasharray=\"6 3\"").count();
+        assert!(dashes(0) == 0 && dashes(2) >= 4, "{}", dashes(2));
+        let many = trace_panels("g", "t", &with(8));
+        assert!(many.contains("change 6, 0.0 s") && !many.contains("change 7") && many.contains("2 changes more"));
     }
 
     #[test]

@@ -14,13 +14,14 @@ use crate::{
 /// Recursions in the order of the colours: as everywhere, RLS blue and RPEM vermillion.
 const METHODS: [(&str, &str); 3] = [("RLS", "ARX (RLS)"), ("RPEM", "BJ (RPEM)"), ("PHYSICAL", "physical")];
 
-/// A figure: panels by name and unit, and the columns of RLS and of the others.
+/// A figure: panels by name and unit, and the columns of RLS and of the others. The runs of a group do not
+/// say the units of e and u, so that gains have none.
 type Row = (&'static str, &'static str, &'static str, &'static str);
 
 const OPERATOR: [Row; 5] = [
-    ("K_e", "deg/deg", "K_e", "K_e"),
+    ("K_e", "", "K_e", "K_e"),
     ("T_L", "s", "T_L", "T_L"),
-    ("K_e_dot", "s", "K_e_dot", "K_e_dot"),
+    ("K_e_dot", "", "K_e_dot", "K_e_dot"),
     ("omega_nm", "rad/s", "omega_nm", "omega_nm"),
     ("zeta_nm", "", "zeta_nm", "zeta_nm"),
 ];
@@ -240,6 +241,7 @@ impl GroupReport<'_> {
             levels: Vec::new(),
             shaded_s: self.manifest.analysis.windows_s.iter().flatten().copied().collect(),
             marks_s: self.change_s(condition).into_iter().collect(),
+            changes: Vec::new(),
             shared_ordinates: false,
         };
         trace_panels(id, &format!("Estimates over time, condition {condition}"), &grid)

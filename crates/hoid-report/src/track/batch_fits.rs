@@ -47,13 +47,18 @@ pub fn batch_fit(trace: &Trace, record: &Record, (from, to): (f64, f64)) -> Resu
 }
 
 /// The batch fits that a page compares a trace with, where none are named: that of the start, and
-/// one of the last third of the record; with the reason where the last third cannot be fitted.
+/// one of the last third of the record; none for a method that starts itself; with the reason where the
+/// last third cannot be fitted.
 pub fn default_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Option<IdentError>) {
     let mut all = Vec::new();
     if let (Some(start), StartAt::Span(Some((from, to)))) = (trace.start(), &trace.options().start)
         && let Ok(span) = record.span(*from, *to)
     {
         all.push(((span.time_s(0), span.time_s(span.len())), start.clone()));
+    }
+    if trace.options().method.starts_itself() {
+        // It has no orders to fit with: its noise model is long and its delay is its own.
+        return (all, None);
     }
     let last_third = (
         record.time_s(record.len() - record.len() / 3),

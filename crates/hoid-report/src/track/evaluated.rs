@@ -34,7 +34,7 @@ pub fn operator_names(traces: &[Evaluated<'_>]) -> Vec<&'static str> {
     let mut names = OPERATOR_COLUMNS.to_vec();
     if traces
         .iter()
-        .any(|t| t.section.trace.options().method.track_delay_s().is_some())
+        .any(|t| t.section.trace.operator_columns().contains(&"tau_e"))
     {
         names.push("tau_e");
     }

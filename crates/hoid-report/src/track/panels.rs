@@ -6,7 +6,7 @@ use hoid_model::{
     GainUnit, Record,
     uncertainty::{Estimate, OperatorEstimate},
 };
-use hoid_track::StartAt;
+use hoid_track::{StartAt, Trace};
 
 use super::{
     coefficients::{Coefficient, joined, of_fit, of_trace},
@@ -73,6 +73,17 @@ fn truth_curve(record: &Record, values: Vec<f64>) -> TraceCurve {
     }
 }
 
+/// The name of what changed with its subscript.
+fn in_legend(name: &str) -> &str {
+    match name {
+        "K_e_dot" => "K_\u{117}",
+        "omega_nm" => "\u{3c9}_{nm}",
+        "zeta_nm" => "\u{3b6}_{nm}",
+        "tau_e" => "\u{3c4}_e",
+        other => other,
+    }
+}
+
 /// The panels with legend, shaded start spans and the times from which the estimates move.
 fn grid(traces: &[Evaluated<'_>], record: &Record, panels: Vec<TracePanel>) -> TraceGrid {
     let mut shaded_s: Vec<(f64, f64)> = Vec::new();
@@ -91,7 +102,16 @@ fn grid(traces: &[Evaluated<'_>], record: &Record, panels: Vec<TracePanel>) -> T
             marks_s.push(from);
         }
     }
+    let mut changes: Vec<(f64, String)> = Vec::new();
+    for (t, change) in traces.iter().flat_map(|t| t.section.trace.changes()) {
+        let what = change.changed();
+        let what: Vec<&str> = what.into_iter().map(in_legend).collect();
+        let what = if what.is_empty() { vec!["the response"] } else { what };
+        changes.push((*t, what.join(", ")));
+    }
+    changes.sort_by(|a, b| a.0.total_cmp(&b.0));
     TraceGrid {
+        changes,
         panels,
         columns: 1,
         methods: traces.iter().map(|t| t.section.name.clone()).collect(),
@@ -99,6 +119,85 @@ fn grid(traces: &[Evaluated<'_>], record: &Record, panels: Vec<TracePanel>) -> T
         marks_s,
         ..TraceGrid::default()
     }
+}
+
+/// What people determine: gain and phase at the frequencies of the traces, crossover and phase margin
+/// with the controlled element, and the level of the remnant; `None` where neither was asked for.
+pub fn response_grid(traces: &[Evaluated<'_>], record: &Record) -> Option<TraceGrid> {
+    let mut panels = Vec::new();
+    let mut add = |name: String, unit: &str, of: &dyn Fn(&Trace, usize) -> Option<Estimate>| {
+        let curves: Vec<TraceCurve> = (traces.iter().enumerate())
+            .map(|(method, t)| {
+                let trace = t.section.trace;
+                let estimates: Vec<Option<Estimate>> = (0..trace.len()).map(|row| of(trace, row)).collect();
+                curve(method, trace.times_s(), &estimates, Shown::Value)
+            })
+            .collect();
+        panels.push(TracePanel {
+            name,
+            unit: unit.to_owned(),
+            curves,
+            ordinate: Ordinate::Robust,
+        });
+    };
+    let mut frequencies: Vec<f64> = Vec::new();
+    for omega in traces.iter().flat_map(|t| &t.section.trace.options().at_rad_s) {
+        if !frequencies.contains(omega) {
+            frequencies.push(*omega);
+        }
+    }
+    for omega in &frequencies {
+        let response = |trace: &Trace, row: usize| {
+            let place = trace.options().at_rad_s.iter().position(|w| w == omega)?;
+            trace.response(row, place)
+        };
+        add(format!("|H({omega})|"), "dB", &|trace, row| {
+            Some(response(trace, row)?.gain_db())
+        });
+        add(format!("\u{2220}H({omega})"), "deg", &|trace, row| {
+            Some(response(trace, row)?.phase_deg())
+        });
+    }
+    let with_element = traces
+        .iter()
+        .any(|t| t.section.trace.options().controlled_element.is_some());
+    if with_element {
+        add("\u{3c9}_c".to_owned(), "rad/s", &|trace, row| {
+            Some(trace.open_loop(row)?.ok()?.crossover_rad_s)
+        });
+        add("\u{3c6}_m".to_owned(), "deg", &|trace, row| {
+            Some(trace.open_loop(row)?.ok()?.phase_margin_deg)
+        });
+    }
+    if panels.is_empty() {
+        return None;
+    }
+    panels.push(remnant_panel(traces, record));
+    Some(grid(traces, record, panels))
+}
+
+/// Standard deviation of the innovations, as it is tracked.
+fn remnant_panel(traces: &[Evaluated<'_>], record: &Record) -> TracePanel {
+    let level = |(method, t): (usize, &Evaluated<'_>)| TraceCurve {
+        kind: CurveKind::Estimate,
+        method,
+        level: 0,
+        times_s: t.section.trace.times_s().to_vec(),
+        values: sigmas(t),
+        band: Vec::new(),
+    };
+    TracePanel {
+        name: "\u{3c3}_\u{3b5}".to_owned(),
+        unit: record.output_channel().unit.clone(),
+        curves: traces.iter().enumerate().map(level).collect(),
+        ordinate: Ordinate::Robust,
+    }
+}
+
+/// Standard deviation of the innovations of each row.
+fn sigmas(t: &Evaluated<'_>) -> Vec<f64> {
+    let variances = t.section.trace.innovation_variance().iter();
+    variances.map(|v| if *v >= 0.0 { v.sqrt() } else { f64::NAN }).collect()
 }
 
 /// The parameters of the operator, one panel each.
@@ -204,10 +303,6 @@ fn coefficient_panels(traces: &[Evaluated<'_>], record: &Record, shown: Shown) -
 
 /// Innovations with twice their standard deviation to either side, one panel for each method.
 pub fn innovation_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
-    let sigmas = |t: &Evaluated<'_>| -> Vec<f64> {
-        let variances = t.section.trace.innovation_variance().iter();
-        variances.map(|v| if *v >= 0.0 { v.sqrt() } else { f64::NAN }).collect()
-    };
     let panel = |(method, t): (usize, &Evaluated<'_>)| {
         let trace = t.section.trace;
         let sigma = sigmas(t);

@@ -43,6 +43,7 @@ impl TrackReport<'_> {
         let traces: Vec<Evaluated<'_>> = self.traces.iter().map(Evaluated::new).collect();
         let sections: Vec<Value> = traces.iter().enumerate().map(|(i, t)| self.section(i, t)).collect();
         let operator = panels::operator_grid(&traces, self.record);
+        let response = panels::response_grid(&traces, self.record);
         let coefficients = panels::coefficient_grid(&traces, self.record);
         let innovation = panels::innovation_grid(&traces, self.record);
         let errors = panels::error_grid(&traces, self.record);
@@ -57,10 +58,13 @@ impl TrackReport<'_> {
             names => self.traces.iter().map(|t| t.name.clone()).collect::<Vec<_>>(),
             has_start => self.traces.iter().any(|t| t.trace.start().is_some()),
             has_batch => self.traces.iter().any(|t| !t.batch.is_empty()),
+            has_changes => self.traces.iter().any(|t| !t.trace.changes().is_empty()),
             has_truth => self.record.channel("K_e").is_some(),
             methods => tables::methods(&traces, self.record),
             counts => tables::counts(&traces),
             errors => tables::errors(&traces, self.record),
+            response => response.as_ref().map(|grid| draw("response", "Response over time", grid)),
+            response_beyond => response.as_ref().map(beyond),
             operator => draw("operator", "Parameters of the operator over time", &operator),
             operator_beyond => beyond(&operator),
             coefficients => draw("coefficients", "Coefficients over time", &coefficients),
@@ -83,6 +87,17 @@ impl TrackReport<'_> {
         self.check()?;
         let traces: Vec<Evaluated<'_>> = self.traces.iter().map(Evaluated::new).collect();
         Ok(panels::operator_grid(&traces, self.record))
+    }
+
+    /// Gain and phase, crossover and margin over time, as [`TrackReport::operator_grid`]; `None` where
+    /// the traces have none of them.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn response_grid(&self) -> Result<Option<TraceGrid>, ReportError> {
+        self.check()?;
+        let traces: Vec<Evaluated<'_>> = self.traces.iter().map(Evaluated::new).collect();
+        Ok(panels::response_grid(&traces, self.record))
     }
 
     /// The coefficients over time, as [`TrackReport::operator_grid`].
@@ -123,6 +138,9 @@ impl TrackReport<'_> {
             }),
             watched => !trace.section.trace.change_odds().is_empty(),
             changes => tables::changes(trace),
+            begins => Some(trace.section.trace.options())
+                .filter(|options| options.method.starts_itself())
+                .map(hoid_track::TrackOptions::start_in_words),
             batch => tables::batch(trace, self.record),
         }
     }

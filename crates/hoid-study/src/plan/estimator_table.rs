@@ -245,6 +245,11 @@ impl EstimatorTable {
                 continue;
             };
             let text = text_of(value, setting.kind).map_err(|reason| at(&key, reason))?;
+            if setting.kind == Kind::Prior && hoid_io::is_fit_file(&text) {
+                let reason =
+                    "is a file, and a plan holds all that it needs; name the parameters, as \"omega_nm=9:0.2\"";
+                return Err(at(&key, reason.to_owned()));
+            }
             if !method.settings().list().iter().any(|own| own.name == setting.name) {
                 let of = methods_with(&key).join(", ");
                 return Err(at(&key, format!("has no effect here: it belongs to {of}")));
@@ -318,7 +323,7 @@ fn in_words(kind: Kind) -> &'static str {
         Kind::Number => "a number",
         Kind::Memory => "a number of samples, or a text such as \"2.56s\" or \"inf\"",
         Kind::Span | Kind::OpenSpan => "two numbers",
-        Kind::Choice(_) | Kind::Channel => "a text",
+        Kind::Choice(_) | Kind::Channel | Kind::Prior => "a text",
         Kind::Named(_) => "a table of values by name",
     }
 }

@@ -83,7 +83,7 @@ fn of_kind(kind: Kind) -> Value {
         Kind::Number => json!({ "type": "number" }),
         Kind::Memory => json!({ "type": ["number", "string"] }),
         Kind::Span => json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 }),
-        Kind::OpenSpan | Kind::Channel => json!({ "type": "string" }),
+        Kind::OpenSpan | Kind::Channel | Kind::Prior => json!({ "type": "string" }),
         Kind::Choice(words) => json!({ "enum": words }),
         Kind::Named(of) => {
             // `name` labels a table among others.

@@ -86,6 +86,7 @@ fn make(item: &Item, results: &Results, condition: &str, rows: &[Row]) -> ItemOu
         levels: ["median", "average"].map(str::to_owned).to_vec(),
         shaded_s: Vec::new(),
         marks_s: Vec::new(),
+        changes: Vec::new(),
         shared_ordinates: false,
     };
     ItemOutput {

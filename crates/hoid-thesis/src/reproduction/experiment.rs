@@ -247,6 +247,7 @@ fn draw(item: &Item, runs: &[EvaluatedRun], condition: Condition, rows: &[Row]) 
         levels: ["median", "mean"].map(str::to_owned).to_vec(),
         shaded_s: Vec::new(),
         marks_s: Vec::new(),
+        changes: Vec::new(),
         shared_ordinates: false,
     };
     ItemOutput {

@@ -213,6 +213,7 @@ fn make(
         levels: levels.iter().map(|level| level_name(*level)).collect(),
         shaded_s: Vec::new(),
         marks_s: Vec::new(),
+        changes: Vec::new(),
         shared_ordinates: false,
     };
     ItemOutput {

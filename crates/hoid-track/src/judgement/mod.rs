@@ -1,7 +1,8 @@
 //! What speaks for and against a trace, and what the estimate of one sample is worth.
 //!
 //! A trace is as good as its start and as its rows. Of the start fit all findings of
-//! [`hoid_ident::judgement`] count, none as more than a doubt: the recursion may leave it. Of the
+//! [`hoid_ident::judgement`] count, none as more than a doubt: the recursion may leave it. A change
+//! inside the start span is a note for methods that forget, a doubt for those that do not. Of the
 //! rows from which the estimate moves on, at most [`ROWS`] are looked at, evenly apart:
 //!
 //! | kind | what was observed |
@@ -23,6 +24,7 @@
 //! | `gain-sign` | K_e is significantly positive in some rows and negative in others |
 //! | `negative-lead` | K_e and K_e_dot have significantly opposite signs in more than a tenth of the rows |
 //! | `idle-head` | a head in which neither e nor u moves: left out of the start span (a note), or in it (a doubt) |
+//! | `supposed` | omega_nm, zeta_nm or tau_e of the last row are what was supposed before the record (a note) |
 //! | `not-followed` | what the last seconds of the record say against the last row |
 //! | `not-finite` | an estimate that is no number |
 //!
@@ -73,6 +75,7 @@ impl Trace {
         all.extend(self.count_findings());
         all.extend(self.guard_findings());
         all.extend(self.idle_finding(record));
+        all.extend(self.supposed_finding());
         all.extend(self.not_followed(record));
         Ok(Verdict::of(all))
     }
@@ -85,8 +88,9 @@ impl Trace {
         let span = [record.span(from, to)?];
         let of_start = |finding: &Finding| Finding {
             severity: match finding.kind {
-                // A tracker is there to follow it.
-                "not-constant" => Severity::Note,
+                // One that forgets is there to follow it; one that weighs the start against all that
+                // comes begins between the two.
+                "not-constant" if !self.options().method.is_model_of_change() => Severity::Note,
                 _ => finding.severity.min(Severity::Doubt),
             },
             words: format!("start fit: {}", finding.words),
@@ -108,10 +112,36 @@ impl Trace {
         Ok(all)
     }
 
-    /// Rows from which the estimate moves on, evenly apart, the last among them.
+    /// Parameters of the last row that are what was supposed before the first sample.
+    fn supposed_finding(&self) -> Option<Finding> {
+        let row = self.len().checked_sub(1)?;
+        let operator = self
+            .operator(row)
+            .ok()
+            .filter(|_| self.options().method.starts_itself())?;
+        let open: Vec<&str> = (self.determined(&operator).into_iter())
+            .filter(|(name, yes)| !yes && ["omega_nm", "zeta_nm", "tau_e"].contains(name))
+            .map(|(name, _)| name)
+            .collect();
+        (!open.is_empty()).then(|| {
+            Finding::note(
+                "supposed",
+                format!(
+                    "{} at the end: not determined by the record, what stands there is what was supposed before it",
+                    open.join(", ")
+                ),
+            )
+        })
+    }
+
+    /// Rows from which the estimate moves on, evenly apart, the last among them. A method that starts
+    /// itself has nothing before its first estimate.
     fn rows_judged(&self) -> Vec<usize> {
         let from = self.updated_from_s() - self.sample_time().s() / 2.0;
-        let first = self.times_s().partition_point(|t| *t < from);
+        let mut first = self.times_s().partition_point(|t| *t < from);
+        while self.options().method.starts_itself() && first + 1 < self.len() && self.covariance(first).is_none() {
+            first += 1;
+        }
         let count = self.len().saturating_sub(first);
         let step = count.div_ceil(ROWS).max(1);
         let mut rows: Vec<usize> = (first..self.len()).rev().step_by(step).collect();

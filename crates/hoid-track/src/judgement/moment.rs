@@ -29,6 +29,9 @@ impl Tracker {
     }
 
     fn level_of_estimate(&self, operator: &Result<OperatorEstimate, NotConvertible>) -> VerdictLevel {
+        if self.options().method.starts_itself() && self.covariance().is_none() {
+            return VerdictLevel::NotDetermined;
+        }
         // Without an error of any of them, nothing says that they are known.
         let known = |e: &Estimate| e.standard_error.is_some_and(|s| s > 0.0);
         if !self.parameters().iter().any(known) {

@@ -32,6 +32,41 @@ fn a_clean_run_is_trustworthy_and_a_wrong_start_is_named() {
 }
 
 #[test]
+fn a_change_inside_the_start_span_is_told() {
+    // C4 changes at 40.96 s.
+    let record = simulated(Condition::C4);
+    for (span, changes) in [((10.0, 36.0), false), ((25.0, 60.0), true)] {
+        for (method, severity) in [
+            (Method::adaptive(), Severity::Doubt),
+            (Method::physical(), Severity::Note),
+        ] {
+            let options = TrackOptions {
+                start: StartAt::Span(Some(span)),
+                ..TrackOptions::usual(method, 29)
+            };
+            let verdict = judged(&record, &options);
+            let found = verdict.findings().iter().find(|f| f.kind == "not-constant");
+            assert_eq!(found.map(|f| f.severity), changes.then_some(severity), "{verdict}");
+        }
+    }
+}
+
+#[test]
+fn a_method_that_starts_itself_says_what_it_supposes() {
+    let record = simulated(Condition::C1);
+    let options = TrackOptions::usual(Method::population(), 29);
+    let short = judged(&record.span(0.0, 8.0).unwrap(), &options);
+    assert!(kinds(&short).contains(&"supposed"), "{short}");
+    assert!(!kinds(&short).contains(&"not-convertible"), "{short}");
+    let mut tracker = Tracker::new(&options, None, record.sample_time()).unwrap();
+    assert_eq!(tracker.level(&tracker.operator()), VerdictLevel::NotDetermined);
+    for (e, u) in record.input().iter().zip(record.output()) {
+        tracker.step(*e, *u);
+    }
+    assert_eq!(tracker.level(&tracker.operator()), VerdictLevel::Trustworthy);
+}
+
+#[test]
 fn an_output_without_a_response_is_not_determined() {
     let record = simulated(Condition::C1);
     let mut state = 3_u64;

@@ -16,11 +16,12 @@ use hoid_ident::{
     IdentError,
     settings::{MethodSpec, Settings},
 };
-use hoid_model::{Orders, Structure};
+use hoid_model::{FittedOperator, Orders, Structure};
 
 use crate::{
     memory::{Memory, MemoryOptions},
     method::{RecursiveMethod, bad, spec},
+    person_prior::PersonPrior,
 };
 
 pub use adaptive::AdaptiveOptions;
@@ -162,6 +163,27 @@ impl Method {
         Ok(self)
     }
 
+    /// Begins with an earlier fit of the person.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] for a method that begins with the record.
+    pub fn start_from(&mut self, fit: FittedOperator) -> Result<(), IdentError> {
+        let source = fit.source.clone();
+        match self.inner_mut().set_person_prior(PersonPrior::Fit(Box::new(fit))) {
+            true => Ok(()),
+            false => Err(bad(
+                "prior",
+                source,
+                "the method population, which alone begins with a fit",
+            )),
+        }
+    }
+
+    /// What is known of the person before the first sample, where that is an option.
+    pub fn person_prior(&self) -> Option<&PersonPrior> {
+        self.inner().person_prior()
+    }
+
     /// True for a method that estimates physical parameters.
     pub fn is_physical(&self) -> bool {
         self.inner().is_physical()
@@ -232,6 +254,13 @@ impl Method {
     /// Memory of a parameter when none is given.
     pub fn usual_memory(&self, parameter: &str) -> Memory {
         self.inner().usual_memory(parameter)
+    }
+}
+
+/// [`Method::population`]: it needs nothing to begin with, and holds on recorded people.
+impl Default for Method {
+    fn default() -> Self {
+        Self::population()
     }
 }
 

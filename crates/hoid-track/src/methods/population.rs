@@ -8,12 +8,19 @@
 //! number of samples, and whose remnant is an autoregression with a level that may change, and those of
 //! the conditions C1 to C6, seed 9000; none on recorded people.
 //!
+//! **What is known of the person** before the first sample is `prior`: what is usual, next to nothing,
+//! some parameters, or an earlier fit, whose estimate and covariance it begins with
+//! (`beginning`).
+//!
 //! **What it reports.** Gains of the basis are no parameters of an operator. K_e and K_e_dot are those
 //! of the gain and lead that are nearest to it at [`NEAR_RAD_S`], by least squares in
 //! `K_e + K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`;
 //! exactly those of a person who has a gain and a lead. The polynomials are the hold of that, with the
 //! delay of nk.
 
+mod beginning;
+
+use beginning::{Beginning, OMEGA_RAD_S, SPREAD, ZETA, known};
 use hoid_core::{
     adaptive::prior::OPERATOR,
     population::{
@@ -36,6 +43,7 @@ use crate::{
     guard::GuardOptions,
     memory::Memory,
     method::{About, RecursiveMethod, bad as bad_option, check_delay, check_operator_orders},
+    person_prior::PersonPrior,
     recursion::{Recursion, Sample, StepOutcome},
     reported::Reported,
     response::Response,
@@ -43,12 +51,6 @@ use crate::{
     start::StartState,
 };
 
-/// Lag T_I in s, natural frequency in rad/s and damping of the usual person.
-const LAG_S: f64 = 3.0;
-const OMEGA_RAD_S: f64 = 11.0;
-const ZETA: f64 = 0.25;
-/// How far people are from that: shares of omega and zeta, and s for the delay.
-const SPREAD: [f64; HELD] = [0.3, 0.5, 0.02];
 /// Standard deviations of the gains' drift in one second, over |Y| at 2 rad/s, and what is supposed
 /// of their weights.
 const DRIFT: [f64; DRIFTS] = [0.0005, 0.07, 0.3];
@@ -123,6 +125,11 @@ settings! {
         /// Standard deviations beyond which an innovation moves the estimate no further
         #[setting(bounds(Bounds::Positive), default("3.5"))]
         pub limit: Option<f64> = None,
+        /// What is known of the person before the first sample: population, none, NAME=CENTRE:SPREAD of
+        /// omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an earlier fit of them, a file that
+        /// hoid identify --json has printed
+        #[setting(default("population"))]
+        pub prior: PersonPrior = PersonPrior::Population,
     }
     groups {
         /// The guard.
@@ -167,11 +174,17 @@ impl RecursiveMethod for PopulationOptions {
                 "nc = 0 and nd of at most 24",
             ));
         }
-        if matches!(setup.start, StartAt::Theta(_)) {
+        let start = match setup.start {
+            StartAt::Theta(_) => Some("coefficients"),
+            StartAt::Nothing => Some("nothing"),
+            StartAt::Span(_) => None,
+        };
+        if let Some(start) = start {
             return Err(bad_option(
                 "the start of population",
-                "coefficients".to_owned(),
-                "none: it starts from what is usual of people",
+                start.to_owned(),
+                "a prior in its place: it starts from what is usual of people, from next to nothing (prior = none) or from an \
+                 earlier fit of the person; rpem, physical and rls take a start",
             ));
         }
         Ok(())
@@ -208,10 +221,27 @@ impl RecursiveMethod for PopulationOptions {
     fn limit(&self) -> f64 {
         self.limit.unwrap_or(LIMIT)
     }
+
+    fn spread_before(&self) -> Option<[f64; HELD]> {
+        // What a fit determined is known, whatever the data say.
+        let known = self.prior.fit().is_some();
+        let Beginning { point, spread } = Beginning::of(&self.prior, 0.0, SampleTime::HUNDREDTH).ok()?;
+        (!known).then_some([spread[0] * point.omega, spread[1] * point.zeta, spread[2]])
+    }
+
+    fn person_prior(&self) -> Option<&PersonPrior> {
+        Some(&self.prior)
+    }
+
+    fn set_person_prior(&mut self, prior: PersonPrior) -> bool {
+        self.prior = prior;
+        true
+    }
 }
 
 /// What is supposed of people, in samples.
-fn prior(options: &PopulationOptions, setup: &Setup, at: Point, ts: f64) -> PopulationPrior {
+fn prior(options: &PopulationOptions, setup: &Setup, beginning: &Beginning, ts: f64) -> PopulationPrior {
+    let Beginning { point: at, spread } = *beginning;
     let blocks = |seconds: f64| (seconds / BLOCK_S).round() as usize;
     PopulationPrior {
         gains: GainPrior {
@@ -223,7 +253,7 @@ fn prior(options: &PopulationOptions, setup: &Setup, at: Point, ts: f64) -> Popu
             freedom: FREEDOM,
             limit: options.limit(),
             forgotten: [FORM_MEMORY_S, DRIFT_MEMORY_S].map(|memory| (ts / memory).min(1.0)),
-            held: SPREAD,
+            held: spread,
             sample_time: ts,
         },
         // A structure without a noise model, or with one pole, does not say how it is coloured.
@@ -262,6 +292,8 @@ const TOLD: usize = OPERATOR + 1;
 /// The filter with its report.
 struct PopulationRecursion {
     model: Box<PopulationFilter<Vec<f64>>>,
+    /// How far people are from the basis at the beginning.
+    spread: [f64; HELD],
     reported: Reported,
 }
 
@@ -274,19 +306,27 @@ impl PopulationRecursion {
     ) -> Result<Self, IdentError> {
         let ts = sample_time.s();
         let nk = setup.orders.nk;
-        let point = Point {
-            tau: (nk as f64 - 0.5) * ts,
-            omega: OMEGA_RAD_S,
-            zeta: ZETA,
-            lag: LAG_S,
-        };
+        let beginning = Beginning::of(&options.prior, (nk as f64 - 0.5) * ts, sample_time)?;
+        let Beginning { point, spread } = beginning;
         let basis = Basis::new(point, ts).ok_or_else(|| unusable(&format!("a delay of {} s", point.tau)))?;
-        let model = PopulationFilter::new(basis, prior(options, setup, point, ts), vec![0.0; errors_needed(ts)])
-            .ok_or_else(|| unusable("its delay, sample time or options"))?;
-        Ok(Self {
+        let fit = options.prior.fit();
+        let known = fit.map(|fit| known(fit, &basis, sample_time)).transpose()?;
+        let supposed = prior(options, setup, &beginning, ts);
+        let model = PopulationFilter::new(basis, supposed, vec![0.0; errors_needed(ts)]);
+        let model = match &known {
+            Some(known) => model.and_then(|model| model.knowing(known)),
+            None => model,
+        };
+        let model = model.ok_or_else(|| unusable("its delay, sample time, prior or options"))?;
+        let mut made = Self {
             model: Box::new(model),
+            spread,
             reported: Reported::new(from, nk, sample_time),
-        })
+        };
+        if known.is_some() {
+            made.report();
+        }
+        Ok(made)
     }
 
     /// K_e, K_e_dot, omega_nm, zeta_nm, tau_e.
@@ -302,12 +342,27 @@ impl PopulationRecursion {
         [gain(0), gain(1), held.omega, held.zeta, (held.tau - hold).max(0.0)]
     }
 
+    /// True for a response of an estimate: that of no gains at all has no size in dB and no phase.
+    fn answers(&self, [re, im]: [f64; 2]) -> bool {
+        self.model.began() && (re != 0.0 || im != 0.0)
+    }
+
+    /// Covariance of gains, level and corrections. Before the corrections are estimated they are as
+    /// uncertain as before the first sample.
+    fn state_covariance(&self) -> [[f64; STATES]; STATES] {
+        let mut c = self.model.gains().covariance();
+        if !self.model.corrects() {
+            let point = self.model.basis().point();
+            for (j, of) in [point.omega, point.zeta, 1.0].into_iter().enumerate() {
+                c[LINEAR + j][LINEAR + j] += (of * self.spread[j]).powi(2);
+            }
+        }
+        c
+    }
+
     /// Their covariance.
     fn spread(&self) -> [[f64; TOLD]; TOLD] {
-        let (map, c) = (
-            self.model.basis().gain_and_lead(&NEAR_RAD_S),
-            self.model.gains().covariance(),
-        );
+        let (map, c) = (self.model.basis().gain_and_lead(&NEAR_RAD_S), self.state_covariance());
         let mut rows = [[0.0; STATES]; TOLD];
         for (row, gains) in rows.iter_mut().zip(map) {
             row[..GAINS].copy_from_slice(&gains);
@@ -492,14 +547,16 @@ impl Recursion for PopulationRecursion {
     }
 
     fn response(&self, omega_rad_s: f64) -> Option<Response> {
-        if !self.model.began() {
-            return None;
-        }
         let (value, by) = self.model.response_with_derivatives(omega_rad_s);
-        Some(Response {
+        self.answers(value).then(|| Response {
             value,
-            covariance: through(&by, &self.model.gains().covariance()),
+            covariance: through(&by, &self.state_covariance()),
         })
+    }
+
+    fn response_value(&self, omega_rad_s: f64) -> Option<[f64; 2]> {
+        let value = self.model.response(omega_rad_s);
+        self.answers(value).then_some(value)
     }
 }
 

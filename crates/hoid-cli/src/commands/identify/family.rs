@@ -8,14 +8,13 @@ use hoid_ident::{
     frequency::Description,
     judgement::second_opinion,
 };
-use hoid_io::read_text;
-use hoid_model::{Detrend, Record, VerdictLevel, operator_family::Coordinate, uncertainty::Estimate};
+use hoid_io::{IoError, is_fit_file, read_fit};
+use hoid_model::{Detrend, Record, VerdictLevel, operator_family::Coordinate};
 use hoid_report::{
     ModelSection, Picture, Report,
     figures::{ModelCurve, describing},
     write_report,
 };
-use serde_json::Value;
 
 use super::{
     family_form::Found,
@@ -188,38 +187,22 @@ fn coordinate(name: &str) -> Result<Coordinate, CliError> {
 
 /// `population`, `none`, `NAME=CENTRE:SPREAD,...`, or the JSON of another fit.
 pub(super) fn prior(text: &str) -> Result<OperatorPrior, CliError> {
-    let path = Path::new(text);
-    if path
-        .extension()
-        .is_none_or(|ending| !ending.eq_ignore_ascii_case("json"))
-    {
-        return text
-            .parse()
-            .map_err(|error: IdentError| CliError::Usage(format!("--prior: {error}")));
+    let usage = |reason: String| CliError::Usage(format!("--prior: {reason}"));
+    if !is_fit_file(text) {
+        return text.parse().map_err(|error: IdentError| usage(error.to_string()));
     }
-    let wrong = |why: &str| {
-        CliError::Usage(format!(
-            "--prior {text}: {why}; give the output of `hoid identify --json`"
-        ))
-    };
-    let result: Value = serde_json::from_str(&read_text(path)?).map_err(|error| wrong(&error.to_string()))?;
-    let parameters = result["parameters"]
-        .as_array()
-        .ok_or_else(|| wrong("it has no parameters"))?;
-    let prior = OperatorPrior::of_parameters(parameters.iter().filter_map(parameter), text)?;
+    let found = read_fit(Path::new(text)).map_err(|error| match error {
+        unreadable @ IoError::Unreadable { .. } => unreadable.into(),
+        other => usage(other.to_string()),
+    })?;
+    let parameters = found.parameters.iter();
+    let prior = OperatorPrior::of_parameters(parameters.map(|p| (p.name.as_str(), p.estimate, p.determined)), text)?;
     if prior.entries().is_empty() {
-        return Err(wrong("no parameter in it is determined and has an error"));
+        return Err(usage(format!(
+            "{text}: no parameter in it is determined and has an error"
+        )));
     }
     Ok(prior)
-}
-
-/// Name, estimate and `determined` of a parameter; `None` without a value.
-fn parameter(p: &Value) -> Option<(&str, Estimate, bool)> {
-    let found = Estimate {
-        value: p["value"].as_f64()?,
-        standard_error: p["standard_error"].as_f64(),
-    };
-    Some((p["name"].as_str()?, found, p["determined"].as_bool()?))
 }
 
 fn settings(args: &IdentifyArgs, estimator: &FamilyEstimator) -> Vec<(String, String)> {

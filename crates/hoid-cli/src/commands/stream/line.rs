@@ -1,11 +1,8 @@
 //! One line of the output.
 
-use hoid_model::{
-    Finding, NotConvertible, VerdictLevel,
-    uncertainty::{Estimate, OperatorEstimate},
-};
+use hoid_model::{Finding, VerdictLevel, uncertainty::Estimate};
 use hoid_track::{Change, Live, TrackFault, Tracker};
-use serde::{Serialize, Serializer, ser::SerializeMap};
+use serde::{Serialize, Serializer};
 use serde_json::Value;
 
 use crate::json;
@@ -35,9 +32,11 @@ pub struct Counts {
 struct Line<'a> {
     t: Option<f64>,
     parameters: Option<Parameters<'a>>,
-    operator: Option<Operator>,
+    operator: Option<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     response: Option<Value>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    open_loop: Option<Value>,
     level: &'static str,
     innovation: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -99,28 +98,6 @@ impl From<&Estimate> for Number {
     }
 }
 
-struct Operator(Result<OperatorEstimate, NotConvertible>);
-
-impl Serialize for Operator {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(None)?;
-        match &self.0 {
-            Ok(operator) => {
-                map.serialize_entry("convertible", &true)?;
-                map.serialize_entry("stable", &operator.parameters().is_stable())?;
-                for (name, _, e) in operator.rows() {
-                    map.serialize_entry(name, &Number::from(&e))?;
-                }
-            }
-            Err(reason) => {
-                map.serialize_entry("convertible", &false)?;
-                map.serialize_entry("reason", &reason.to_string())?;
-            }
-        }
-        map.end()
-    }
-}
-
 /// Where the recursion stands after a line of the input.
 pub struct Standing<'a> {
     /// Time of the last sample, s.
@@ -166,14 +143,14 @@ impl Standing<'_> {
                 estimates: t.parameters(),
             }),
             // Other orders have no meaning as an operator at all.
-            operator: operator.and_then(|o| match o {
-                Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. }) => None,
-                other => Some(Operator(other)),
-            }),
+            operator: (operator.zip(tracker))
+                .map(|(o, t)| json::tracked_operator(&o, |o| t.determined(o)))
+                .filter(|o| !o.is_null()),
             response: tracker.filter(|t| !t.options().at_rad_s.is_empty()).map(|t| {
                 let at = &t.options().at_rad_s;
                 json::responses(at, |_, omega_rad_s| t.response(omega_rad_s))
             }),
+            open_loop: tracker.and_then(Tracker::open_loop).as_ref().map(json::open_loop),
             innovation: self.innovation,
             change: tracker.and_then(Tracker::change_odds).map(|odds| ChangeLine {
                 // Before the first birth there are no odds.

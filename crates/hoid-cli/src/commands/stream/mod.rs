@@ -43,6 +43,12 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
             "--smooth belongs to hoid track: what is still to come cannot say anything of a stream".to_owned(),
         ));
     }
+    if args.warm_up.is_some() && plan.options().method.starts_itself() {
+        return Err(CliError::Usage(format!(
+            "--warm-up is for a start fit, and {} has none: it speaks at once; drop it, or name --method physical",
+            plan.options().method
+        )));
+    }
     if args.recursion.start.is_some() && !plan.is_settled() {
         return Err(CliError::Usage(
             "--start leaves no warm-up to search nk and orders on; give --nk and --orders as single numbers, as --nk 29 \

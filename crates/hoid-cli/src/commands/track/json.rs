@@ -2,6 +2,7 @@
 
 use hoid_ident::Fit;
 use hoid_model::{Record, remnant::RemnantDiscretisation};
+use hoid_track::NoCrossover;
 use serde_json::{Map, Value, json};
 
 use super::result::Tracked;
@@ -60,6 +61,10 @@ impl Tracked<'_> {
         let none = self.not_converted();
         set("rows_not_convertible", json!(none.rows));
         set("not_convertible_reason", json!(none.reason));
+        if let Some((rows, reason)) = self.without_crossover() {
+            set("rows_without_crossover", json!(rows));
+            set("no_crossover_reason", json!(reason.map(NoCrossover::words)));
+        }
         let errors: Map<String, Value> = self
             .relative_errors()
             .into_iter()
@@ -114,13 +119,17 @@ impl Tracked<'_> {
             .zip(trace.parameters(row))
             .map(|(name, e)| (name, json::estimate(&e)))
             .collect();
-        json!({
+        let mut last = json!({
             "t": number(trace.times_s()[row]),
             "parameters": parameters,
-            "operator": json::operator(&self.operators[row]),
+            "operator": json::tracked_operator(&self.operators[row], |o| trace.determined(o)),
             "response": json::responses(&trace.options().at_rad_s, |place, _| trace.response(row, place)),
             "innovation": number(trace.innovation()[row]),
             "innovation_variance": number(trace.innovation_variance()[row]),
-        })
+        });
+        if let Some(found) = trace.open_loop(row) {
+            last["open_loop"] = json::open_loop(&found);
+        }
+        last
     }
 }

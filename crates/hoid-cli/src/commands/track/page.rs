@@ -33,6 +33,7 @@ impl Tracked<'_> {
                 each.join(", ")
             ));
         }
+        page.push_str(&self.open_loop());
         page.push_str(&self.changes());
         page.push_str(&self.counts());
         if let Some(choice) = self.choice {
@@ -90,6 +91,8 @@ impl Tracked<'_> {
         let with_operator = self.has_operator();
         let gain = GainUnit::of(self.record);
         let units = ["", "s", "s", "rad/s", "", "s"];
+        let suppose = self.trace.options().method.starts_itself();
+        let mut bracketed = false;
         let mut header = vec!["t in s".to_owned()];
         if with_operator {
             let named = self.trace.operator_columns().into_iter().zip(units);
@@ -105,18 +108,55 @@ impl Tracked<'_> {
             let mut cells = vec![format!("{:.2}", trace.times_s()[row])];
             if with_operator {
                 let of = |name| value_of(&self.operators[row], name);
-                cells.extend(self.trace.operator_columns().into_iter().map(|n| plus_minus(of(n))));
+                let determined = self.operators[row].as_ref().map(|o| trace.determined(o));
+                let determined = determined.unwrap_or_default();
+                cells.extend(self.trace.operator_columns().into_iter().map(|n| {
+                    let open = suppose && determined.iter().any(|(name, yes)| *name == n && !yes);
+                    bracketed |= open;
+                    match open {
+                        true => format!("({})", plus_minus(of(n))),
+                        false => plus_minus(of(n)),
+                    }
+                }));
             } else {
                 let all = trace.parameters(row);
                 cells.extend(all.into_iter().take(COEFFICIENTS_SHOWN).map(|e| plus_minus(Some(e))));
             }
             rows.add_row(cells);
         }
+        let open = match bracketed {
+            true => "In brackets: not determined by the data so far.\n",
+            false => "",
+        };
         format!(
-            "Estimate by {} with one standard error; the trace has all {} rows.\n{rows}\n",
+            "Estimate by {} with one standard error; the trace has all {} rows.\n{rows}\n{open}",
             trace.options().method.name(),
             trace.len()
         )
+    }
+
+    /// Crossover and phase margin at the end, with a controlled element.
+    fn open_loop(&self) -> String {
+        let (Some(row), Some((rows, reason))) = (self.trace.len().checked_sub(1), self.without_crossover()) else {
+            return String::new();
+        };
+        let mut words = match self.trace.open_loop(row) {
+            Some(Ok(found)) => format!(
+                "Open loop at {:.2} s: crossover {} rad/s, phase margin {} deg.\n",
+                self.trace.times_s()[row],
+                text::plus_minus(&found.crossover_rad_s),
+                text::plus_minus(&found.phase_margin_deg)
+            ),
+            _ => String::new(),
+        };
+        if let Some(reason) = reason {
+            words.push_str(&format!(
+                "{rows} of {} rows have no crossover; most often {}.\n",
+                self.trace.len(),
+                reason.words()
+            ));
+        }
+        words
     }
 
     /// The changes that were declared.

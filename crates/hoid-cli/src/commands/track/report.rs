@@ -45,10 +45,10 @@ pub fn write(args: &TrackArgs, tracked: &Tracked<'_>, batch: &[BatchFit]) -> Res
         notes: Vec::new(),
     };
     if let Some(path) = &args.picture.figure {
-        let grid = if tracked.has_operator() {
-            report.operator_grid()?
-        } else {
-            report.coefficient_grid()?
+        let grid = match report.response_grid()? {
+            Some(grid) => grid,
+            None if tracked.has_operator() => report.operator_grid()?,
+            None => report.coefficient_grid()?,
         };
         figure::write(path, &trace_panels("tracked", &report.title, &grid), args.picture.width)?;
     }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use hoid_ident::{Choice, Fit};
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 use hoid_model::{NotConvertible, Record, Verdict, uncertainty::OperatorEstimate};
-use hoid_track::Trace;
+use hoid_track::{NoCrossover, Trace};
 
 use super::errors::relative_errors;
 use crate::commands::reading::Account;
@@ -42,6 +42,9 @@ impl Tracked<'_> {
         for (name, values) in trace.estimate_columns(&self.operators) {
             add(name, ColumnValues::Real(values));
         }
+        for (name, values) in trace.determined_columns(&self.operators) {
+            add(name, ColumnValues::Whole(values));
+        }
         let convertible = self.operators.iter().map(|o| u64::from(o.is_ok())).collect();
         add("convertible".to_owned(), ColumnValues::Whole(convertible));
         add("innovation".to_owned(), ColumnValues::Real(trace.innovation().to_vec()));
@@ -60,7 +63,8 @@ impl Tracked<'_> {
         );
         let mut comments = vec![
             format!("hoid {} track {}", env!("CARGO_PKG_VERSION"), self.file),
-            "units: t s, T_L s, omega_nm rad/s; gains are u by e; _se are standard errors".to_owned(),
+            "units: t s, T_L s, omega_nm rad/s; gains are u by e; gain_db@W dB and phase_deg@W deg at W rad/s; _se are standard errors"
+                .to_owned(),
         ];
         comments.extend(self.settings.iter().map(|(k, v)| format!("{k}: {v}")));
         comments.extend(
@@ -96,13 +100,24 @@ impl Tracked<'_> {
         // Half a sample, so that rounding of the times does not decide.
         let from = self.trace.updated_from_s() - self.record.sample_time().s() / 2.0;
         let first = self.trace.times_s().partition_point(|t| *t < from);
+        let first = first
+            + (first..self.trace.len())
+                .take_while(|row| self.is_before_the_first(*row))
+                .count();
         first.min(self.trace.len().saturating_sub(1))
+    }
+
+    /// True for a row before the first estimate of a method that starts itself.
+    fn is_before_the_first(&self, row: usize) -> bool {
+        self.trace.options().method.starts_itself() && self.trace.covariance(row).is_none()
     }
 
     pub(super) fn not_converted(&self) -> NotConverted {
         let mut kinds: BTreeMap<&'static str, (usize, String)> = BTreeMap::new();
-        for reason in self.operators.iter().filter_map(|o| o.as_ref().err()) {
+        let rows = self.operators.iter().enumerate();
+        for (row, reason) in rows.filter_map(|(row, o)| Some((row, o.as_ref().err()?))) {
             let (kind, example) = match reason {
+                _ if self.is_before_the_first(row) => ("none yet", "there is no estimate yet".to_owned()),
                 NotConvertible::NegativeRealPole { .. } => (
                     "pole",
                     "a pole lies on the closed negative real axis, so that no real continuous system has it".to_owned(),
@@ -119,6 +134,17 @@ impl Tracked<'_> {
             rows: kinds.values().map(|(n, _)| n).sum(),
             reason: kinds.into_values().max_by_key(|(n, _)| *n).map(|(_, text)| text),
         }
+    }
+
+    /// Rows without a crossover and their most frequent reason; `None` without a controlled element.
+    pub(super) fn without_crossover(&self) -> Option<(usize, Option<NoCrossover>)> {
+        self.trace.options().controlled_element.as_ref()?;
+        let mut kinds: BTreeMap<NoCrossover, usize> = BTreeMap::new();
+        for reason in (0..self.trace.len()).filter_map(|row| self.trace.open_loop(row)?.err()) {
+            *kinds.entry(reason).or_default() += 1;
+        }
+        let most = kinds.iter().max_by_key(|(_, rows)| **rows).map(|(reason, _)| *reason);
+        Some((kinds.values().sum(), most))
     }
 
     pub(super) fn relative_errors(&self) -> Vec<(&'static str, f64)> {

@@ -1,5 +1,7 @@
 //! The run of the command: start fit, recursion, files.
 
+use std::path::Path;
+
 use hoid_io::{check_table_path, write_table};
 use hoid_model::Record;
 use hoid_track::{StartAt, TrackOptions, track, usual_start_span};
@@ -21,8 +23,12 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     if let Some(path) = &args.picture.figure {
         figure::check(path)?;
     }
+    let inputs: Vec<&Path> = [Some(args.record.as_path()), recursion::prior_file(&args.recursion)]
+        .into_iter()
+        .flatten()
+        .collect();
     places::check(
-        &[&args.record],
+        &inputs,
         &[Some(&args.out), args.picture.figure.as_deref()],
         &[args.report.as_deref()],
     )?;
@@ -53,7 +59,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     settings.push((
         "start".to_owned(),
         match &options.start {
-            _ if options.method.starts_itself() => "what is usual of people".to_owned(),
+            _ if options.method.starts_itself() => options.start_in_words(),
             StartAt::Span(Some((from, to))) => format!("batch fit of {from:.2} to {to:.2} s"),
             StartAt::Span(None) => "batch fit of the first third".to_owned(),
             StartAt::Theta(_) => "given".to_owned(),
@@ -111,6 +117,12 @@ fn start_span(args: &TrackArgs, plan: &Plan, record: &Record) -> Result<(f64, f6
         return Err(CliError::Usage(
             "--start-span is the span of the start fit, and --start gives the start itself; drop one".to_owned(),
         ));
+    }
+    if args.start_span.is_some() && plan.options().method.starts_itself() {
+        return Err(CliError::Usage(format!(
+            "--start-span is the span of a start fit, and {} has none; drop it, or name --method physical",
+            plan.options().method
+        )));
     }
     Ok(args.start_span.unwrap_or_else(|| usual_start_span(record)))
 }

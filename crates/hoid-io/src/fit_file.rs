@@ -1,0 +1,237 @@
+//! A fit of a person as `hoid identify --json` prints it: read again as a prior or a start.
+//!
+//! The object has more than what is read here; keys that are not known are left alone, so that a file
+//! of a later version is read too.
+
+use std::path::Path;
+
+use hoid_model::{FamilyOperator, FittedOperator, Form, NamedChoice, SampleTime, uncertainty::Estimate};
+use serde::Deserialize;
+
+use crate::{IoError, read_text};
+
+/// A parameter of a fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitParameter {
+    /// Its name.
+    pub name: String,
+    /// Its value with its standard error.
+    pub estimate: Estimate,
+    /// True where the data determine it.
+    pub determined: bool,
+}
+
+/// What a file of a fit holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitFile {
+    /// The parameters that have a value.
+    pub parameters: Vec<FitParameter>,
+    operator: Result<FittedOperator, String>,
+    source: String,
+}
+
+impl FitFile {
+    /// The operator with its covariance.
+    ///
+    /// # Errors
+    /// [`IoError::NoFit`] for a fit of another structure, one without covariance, and one of which
+    /// nothing is determined.
+    pub fn operator(self) -> Result<FittedOperator, IoError> {
+        self.operator.map_err(|reason| no_fit(&self.source, reason))
+    }
+}
+
+/// True for a name that ends as that of a fit does.
+pub fn is_fit_file(name: &str) -> bool {
+    Path::new(name)
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("json"))
+}
+
+/// Reads a fit.
+///
+/// # Errors
+/// [`IoError::Unreadable`]; [`IoError::NoFit`].
+pub fn read_fit(path: &Path) -> Result<FitFile, IoError> {
+    parse_fit(&read_text(path)?, &path.display().to_string())
+}
+
+/// Reads a fit from the text of its file.
+///
+/// # Errors
+/// [`IoError::NoFit`] for what is no such object.
+pub fn parse_fit(text: &str, source: &str) -> Result<FitFile, IoError> {
+    let found: FitObject = serde_json::from_str(text).map_err(|error| no_fit(source, error.to_string()))?;
+    let of = |p: &ParameterObject| {
+        Some(FitParameter {
+            name: p.name.clone(),
+            estimate: Estimate {
+                value: p.value?,
+                standard_error: p.standard_error,
+            },
+            determined: p.determined?,
+        })
+    };
+    Ok(FitFile {
+        parameters: found.parameters.iter().filter_map(of).collect(),
+        operator: found.operator(source),
+        source: source.to_owned(),
+    })
+}
+
+fn no_fit(source: &str, reason: String) -> IoError {
+    IoError::NoFit {
+        file: source.to_owned(),
+        reason,
+    }
+}
+
+#[derive(Deserialize)]
+struct FitObject {
+    parameters: Vec<ParameterObject>,
+    #[serde(default)]
+    verdict: VerdictObject,
+    #[serde(default)]
+    records: Vec<RecordObject>,
+    structure: Option<String>,
+    form: Option<String>,
+    neuromuscular: Option<bool>,
+    innovation_variance: Option<f64>,
+    covariance: Option<CovarianceObject>,
+    noise: Option<NoiseObject>,
+}
+
+#[derive(Deserialize)]
+struct ParameterObject {
+    name: String,
+    value: Option<f64>,
+    standard_error: Option<f64>,
+    determined: Option<bool>,
+}
+
+#[derive(Default, Deserialize)]
+struct VerdictObject {
+    level: String,
+    #[serde(default)]
+    reasons: Vec<String>,
+}
+
+#[derive(Deserialize)]
+struct RecordObject {
+    sample_time: Option<f64>,
+    #[serde(default)]
+    units: UnitsObject,
+}
+
+#[derive(Default, Deserialize)]
+struct UnitsObject {
+    input: String,
+    output: String,
+}
+
+#[derive(Deserialize)]
+struct CovarianceObject {
+    coordinates: Vec<String>,
+    values: Vec<f64>,
+    matrix: Vec<Vec<f64>>,
+}
+
+#[derive(Deserialize)]
+struct NoiseObject {
+    c: Vec<f64>,
+    d: Vec<f64>,
+}
+
+impl FitObject {
+    fn operator(self, source: &str) -> Result<FittedOperator, String> {
+        let Some(form) = self.form else {
+            return Err(format!(
+                "it is a fit of the structure {}, which has no form of an operator",
+                self.structure.as_deref().unwrap_or("?")
+            ));
+        };
+        if self.verdict.level == "not determined" {
+            return Err(format!(
+                "its operator is not determined: {}",
+                self.verdict.reasons.join("; ")
+            ));
+        }
+        let form = Form::of_name(&form).map_err(|error| error.to_string())?;
+        let covariance = self.covariance.ok_or("it has no covariance")?;
+        let neuromuscular = self.neuromuscular.ok_or("neuromuscular is lacking")?;
+        let names: Vec<&str> = form.coordinates(neuromuscular).iter().map(|c| c.name()).collect();
+        if covariance.coordinates != names {
+            return Err(format!(
+                "its covariance is of {}, expected {} for the form {form}",
+                covariance.coordinates.join(", "),
+                names.join(", ")
+            ));
+        }
+        let record = self.records.first().ok_or("it names no record")?;
+        let sample_time = record.sample_time.ok_or("its record has no sample_time")?;
+        let operator = FamilyOperator::new(form, neuromuscular, &covariance.values).map_err(|e| e.to_string())?;
+        let noise = self.noise.ok_or("it has no noise model")?;
+        let fitted = FittedOperator {
+            operator,
+            covariance: covariance.matrix.into_iter().flatten().collect(),
+            noise: (noise.c, noise.d),
+            innovation_variance: self.innovation_variance.ok_or("it has no innovation_variance")?,
+            sample_time: SampleTime::new(sample_time).map_err(|e| e.to_string())?,
+            units: [record.units.input.clone(), record.units.output.clone()],
+            source: source.to_owned(),
+        };
+        fitted.checked().map_err(|e| e.to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    const FIT: &str = r#"{"hoid": "0.1.0", "structure": "grey-box", "form": "gain", "neuromuscular": true,
+        "verdict": {"level": "doubtful", "reasons": ["few seconds"]},
+        "records": [{"file": "a.csv", "sample_time": 0.01, "units": {"input": "deg", "output": "mm"}}],
+        "parameters": [{"name": "K", "value": 2.0, "standard_error": 0.1, "determined": true},
+                       {"name": "T_I", "value": null, "standard_error": null, "determined": false}],
+        "noise": {"c": [], "d": [-0.9]}, "innovation_variance": 0.1,
+        "covariance": {"coordinates": ["gain", "ln omega_nm", "ln zeta_nm", "tau_e"], "values": [2.0, 2.4, -1.2, 0.2],
+                       "matrix": [[0.01, 0, 0, 0], [0, 0.01, 0, 0], [0, 0, 0.01, 0], [0, 0, 0, 0.0001]]}}"#;
+
+    fn why(text: &str) -> String {
+        let found = parse_fit(text, "fit.json").and_then(FitFile::operator);
+        found.unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_fit_is_read_with_its_covariance_and_units() {
+        let found = parse_fit(FIT, "fit.json").unwrap();
+        assert_eq!(found.parameters.len(), 1);
+        assert!(found.parameters[0].determined);
+        let fit = found.operator().unwrap();
+        assert_eq!(fit.operator.form(), Form::Gain);
+        assert_eq!((fit.covariance.len(), fit.covariance[15]), (16, 0.0001));
+        assert_eq!((fit.noise.1[0], fit.sample_time), (-0.9, SampleTime::HUNDREDTH));
+        assert_eq!(fit.units, ["deg", "mm"]);
+    }
+
+    #[test]
+    fn what_is_no_fit_of_a_person_says_why() {
+        assert!(why("{}").contains("parameters") && why("[1").contains("hoid identify --json"));
+        for (from, to, expected) in [
+            (r#""form": "gain", "#, "", "structure grey-box"),
+            ("doubtful", "not determined", "few seconds"),
+            (
+                r#""gain", "ln omega_nm""#,
+                r#""ln omega_nm", "gain""#,
+                "covariance is of",
+            ),
+            (r#""sample_time": 0.01, "#, "", "sample_time"),
+            ("[0.01, 0, 0, 0]", "[0.01, 0, 0]", "expected 16"),
+            ("\"gain\", \"neuro", "\"curve\", \"neuro", "curve"),
+        ] {
+            let reason = why(&FIT.replace(from, to));
+            assert!(reason.contains(expected), "{expected}: {reason}");
+        }
+    }
+}

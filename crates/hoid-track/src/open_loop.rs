@@ -1,0 +1,197 @@
+//! Crossover frequency and phase margin of an estimate with the controlled element that the person
+//! had.
+//!
+//! `L(omega) = Y(omega) Y_c(j omega)`, Y the sampled response of the estimate. Where the crossover is
+//! and how it moves with `dL/L` is that of batch fits ([`Crossover`]); `dL/L = dY/Y`, whose covariance is
+//! that of the real and imaginary part of the response at the crossover.
+//!
+//! Nothing is said where |L| does not fall through one, and where the standard error of the crossover
+//! is more than half of it: to first order it says nothing then.
+
+use hoid_ident::family::Crossover;
+use hoid_model::{Complex64, ContinuousTransferFunction, SampleTime, uncertainty::Estimate};
+
+use crate::response::Response;
+
+/// Share of the crossover that its standard error may be.
+const MOST: f64 = 0.5;
+
+/// Crossover frequency and phase margin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OpenLoop {
+    /// Crossover frequency, rad/s.
+    pub crossover_rad_s: Estimate,
+    /// Phase margin, deg, between -180 and 180.
+    pub phase_margin_deg: Estimate,
+}
+
+/// Why there is no crossover of an estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum NoCrossover {
+    /// There is no estimate yet.
+    NoEstimate,
+    /// The gain of the open loop does not fall through one.
+    NeverFalls,
+    /// The standard error is more than half of the crossover.
+    NotDetermined,
+}
+
+impl NoCrossover {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::NoEstimate => "there is no estimate yet",
+            Self::NeverFalls => "the gain of the open loop does not fall through one between .05 and 60 rad/s",
+            Self::NotDetermined => "the standard error of the crossover is more than half of it",
+        }
+    }
+}
+
+impl OpenLoop {
+    /// Numbers of it.
+    pub(crate) const NUMBERS: usize = 4;
+
+    /// Of an estimate whose response is `value`, and with its covariance `whole`.
+    pub(crate) fn of(
+        value: impl Fn(f64) -> Option<[f64; 2]>,
+        whole: impl Fn(f64) -> Option<Response>,
+        element: &ContinuousTransferFunction,
+        sample_time: SampleTime,
+    ) -> Result<Self, NoCrossover> {
+        let response = |omega: f64| {
+            let [re, im] = value(omega).unwrap_or([f64::NAN; 2]);
+            Complex64::new(re, im)
+        };
+        if !response(1.0).is_finite() {
+            return Err(NoCrossover::NoEstimate);
+        }
+        let open_loop = |omega: f64| response(omega) * element.response(omega);
+        let found = Crossover::lowest(open_loop, sample_time).ok_or(NoCrossover::NeverFalls)?;
+        let there = whole(found.omega_rad_s).ok_or(NoCrossover::NoEstimate)?;
+        let [re, im] = there.value;
+        // dY/Y of a change of the real and of the imaginary part.
+        let moved =
+            [Complex64::new(1.0, 0.0), Complex64::new(0.0, 1.0)].map(|d| found.moved_by(d / Complex64::new(re, im)));
+        let estimate = |value: f64, of: usize| {
+            let [a, b] = [moved[0][of], moved[1][of]];
+            let c = &there.covariance;
+            Estimate::with_variance(value, a * a * c[0][0] + 2.0 * a * b * c[0][1] + b * b * c[1][1])
+        };
+        let crossover_rad_s = estimate(found.omega_rad_s, 0);
+        match crossover_rad_s.standard_error {
+            Some(error) if error > MOST * found.omega_rad_s => Err(NoCrossover::NotDetermined),
+            _ => Ok(Self {
+                crossover_rad_s,
+                phase_margin_deg: estimate(found.margin_deg, 1),
+            }),
+        }
+    }
+
+    /// Values and variances, for means; NaN where there is none.
+    pub(crate) fn packed(found: Result<Self, NoCrossover>) -> [f64; Self::NUMBERS] {
+        let Ok(found) = found else {
+            return [f64::NAN; Self::NUMBERS];
+        };
+        let pair = |e: Estimate| [e.value, e.standard_error.map_or(f64::NAN, |s| s * s)];
+        let ([a, b], [c, d]) = (pair(found.crossover_rad_s), pair(found.phase_margin_deg));
+        [a, b, c, d]
+    }
+
+    /// Of the numbers of [`OpenLoop::packed`].
+    pub(crate) fn unpacked(numbers: &[f64]) -> Option<Self> {
+        let &[a, b, c, d] = numbers else { return None };
+        a.is_finite().then_some(Self {
+            crossover_rad_s: Estimate::with_variance(a, b),
+            phase_margin_deg: Estimate::with_variance(c, d),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_ident::family::loop_measures;
+    use hoid_model::{FamilyOperator, Form, uncertainty::variance_along};
+
+    use super::*;
+
+    const TS: SampleTime = SampleTime::HUNDREDTH;
+
+    fn held(operator: &FamilyOperator, omega: f64) -> Complex64 {
+        let half = 0.5 * omega * TS.s();
+        operator.response(omega) * Complex64::from_polar(half.sin() / half, -half)
+    }
+
+    /// The same operator and covariance as a batch fit of the family gives the same measures.
+    #[test]
+    fn measures_are_those_of_a_batch_fit() {
+        let element = ContinuousTransferFunction::new(&[90.0], &[1.0, 6.0, 0.0]).unwrap();
+        let operator = FamilyOperator::new(Form::LeadLag, true, &[0.4, 0.5, 0.25, 2.4, -1.4, 0.15]).unwrap();
+        let sizes = [0.02, 0.03, 0.02, 0.05, 0.1, 0.01];
+        let covariance: Vec<f64> = (0..36)
+            .map(|k| sizes[k / 6] * sizes[k % 6] * if k / 6 == k % 6 { 1.0 } else { 0.3 })
+            .collect();
+        let expected = loop_measures(&operator, Some(&covariance), &element, TS).unwrap();
+        let parts = |h: Complex64| [h.re, h.im];
+        let whole = |omega: f64| {
+            let found = operator.response_and_gradient(omega);
+            let hold = held(&operator, omega) / found.value;
+            let rows = [0, 1].map(|part| -> Vec<f64> {
+                let along = found.gradient.iter().map(|g| parts(g * hold)[part]);
+                along.collect()
+            });
+            let sum: Vec<f64> = rows[0].iter().zip(&rows[1]).map(|(a, b)| a + b).collect();
+            let [a, b, both] = [&rows[0], &rows[1], &sum].map(|row| variance_along(row, &covariance));
+            let cross = 0.5 * (both - a - b);
+            Some(Response {
+                value: parts(held(&operator, omega)),
+                covariance: [[a, cross], [cross, b]],
+            })
+        };
+        let value = |omega: f64| Some(parts(held(&operator, omega)));
+        let found = OpenLoop::of(value, whole, &element, TS).unwrap();
+        for (found, expected) in [
+            (found.crossover_rad_s, expected.crossover_rad_s),
+            (found.phase_margin_deg, expected.phase_margin_deg),
+        ] {
+            assert!((found.value - expected.value).abs() < 1e-10 * expected.value.abs());
+            let (a, b) = (found.standard_error.unwrap(), expected.standard_error.unwrap());
+            assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");
+        }
+        assert_eq!(
+            OpenLoop::unpacked(&OpenLoop::packed(Ok(found)))
+                .unwrap()
+                .crossover_rad_s
+                .value,
+            found.crossover_rad_s.value
+        );
+    }
+
+    #[test]
+    fn what_is_not_there_has_a_reason() {
+        let element = ContinuousTransferFunction::new(&[1.0], &[1.0, 0.0]).unwrap();
+        let with = |gain: f64, variance: f64| {
+            let whole = |_: f64| {
+                Some(Response {
+                    value: [gain, 0.0],
+                    covariance: [[variance, 0.0], [0.0, variance]],
+                })
+            };
+            OpenLoop::of(|_| Some([gain, 0.0]), whole, &element, TS)
+        };
+        // A gain over an integrator crosses at the gain, whose error is that of the crossover.
+        let found = with(2.0, 0.01).unwrap();
+        assert!((found.crossover_rad_s.value - 2.0).abs() < 1e-9);
+        assert!((found.crossover_rad_s.standard_error.unwrap() - 0.1).abs() < 1e-6);
+        assert!((found.phase_margin_deg.value - 90.0).abs() < 1e-6);
+        assert_eq!(with(2.0, 1.1), Err(NoCrossover::NotDetermined));
+        assert_eq!(with(0.01, 0.0), Err(NoCrossover::NeverFalls));
+        assert_eq!(
+            OpenLoop::of(|_| None, |_| None, &element, TS),
+            Err(NoCrossover::NoEstimate)
+        );
+        assert!(OpenLoop::unpacked(&OpenLoop::packed(Err(NoCrossover::NeverFalls))).is_none());
+        // Without a covariance there is a value without an error.
+        assert_eq!(with(2.0, f64::NAN).unwrap().crossover_rad_s.standard_error, None);
+    }
+}
