@@ -21,7 +21,7 @@ from typing import Any
 from .pages import ROOT, Block
 
 #: No block takes longer than this, in s.
-PATIENCE = 120
+PATIENCE = 400
 
 
 class Reader:
