@@ -26,10 +26,13 @@
 //!   likelihood, forgotten slowly. While nothing changes the one that hardly drifts wins, and the
 //!   precision grows. (D. T. Magill, IEEE Trans. Automatic Control 10 (1965) 434-439.) The likelihood
 //!   and the gain are those of a Student distribution, so that an outlier says little.
-//! - **Changes** ([`detector`]). Declared from the difference of Y at one frequency between the last
-//!   seconds and the time before, each fitted by least squares with a variance of its own (G. C.
-//!   Chow, Econometrica 28 (1960) 591-605; unequal variances: B. L. Welch, Biometrika 34 (1947)
-//!   28-35), in units of how much the same person varies without a change.
+//! - **Rivals** (`contest`). Others begin at other delays and poles, at the start and after each
+//!   change; the one that foretells best is believed.
+//! - **Changes** ([`detector`]). Declared from the difference of Y at one frequency, or of what is
+//!   held, between the last seconds and the time before ([`blocks`]), each fitted by least squares with
+//!   a variance of its own (G. C. Chow, Econometrica 28 (1960) 591-605; unequal variances: B. L. Welch,
+//!   Biometrika 34 (1947) 28-35), in units of how much the same person varies without a change. What
+//!   changed is told by [`difference`].
 //!
 //! Nothing has to be fitted before: the estimate begins with the first second, whose ratio of
 //! output to error gives the scale of the gains' prior. Where an earlier fit of the person is at hand
