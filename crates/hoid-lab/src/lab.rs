@@ -275,7 +275,7 @@ impl Lab {
         Ok(Some((replay::data(&stem)?, "application/json")))
     }
 
-    /// A file of the pages of results, by the names that [`State::reports`] has.
+    /// A file of the pages of results, by the names that [`State::reports`](crate::wire::State::reports) has.
     ///
     /// # Errors
     /// Those of files.
