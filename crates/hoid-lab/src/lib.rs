@@ -6,7 +6,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`config`] | [`Config`](config::Config): the experiment, `lab.toml` |
+//! | [`config`] | [`Config`]: the experiment, `lab.toml` |
 //! | [`course`] | [`Course`](course::Course): what is controlled at each time |
 //! | [`order`] | the order of the runs, by Latin squares |
 //! | [`task`] | [`Task`](task::Task): a run as tables, and its recomputation |
