@@ -6,7 +6,8 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`config`] | [`Config`](config::Config): the experiment, `lab.toml` |
+//! | [`config`] | [`Config`]: the experiment, `lab.toml` |
+//! | [`course`] | [`Course`](course::Course): what is controlled at each time |
 //! | [`order`] | the order of the runs, by Latin squares |
 //! | [`task`] | [`Task`](task::Task): a run as tables, and its recomputation |
 //! | [`plant`] | the arithmetic of a tick, twin of the page's |
@@ -22,6 +23,7 @@
 
 pub mod calibrate;
 pub mod config;
+pub mod course;
 mod error;
 mod experiment;
 mod export;

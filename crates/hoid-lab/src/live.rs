@@ -24,7 +24,7 @@ use serde::Serialize;
 
 use crate::{
     LabError,
-    config::Course,
+    course::Course,
     session::Stem,
     task::{TICK_S, TICKS_PER_SAMPLE},
 };

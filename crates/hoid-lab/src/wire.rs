@@ -27,7 +27,7 @@ pub enum Role {
     Experimenter,
 }
 
-/// What a page says.
+/// What a page says. Variants without fields have braces, so that they take no unknown ones.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 #[allow(missing_docs)]
@@ -43,7 +43,7 @@ pub enum FromPage {
     /// The person goes on with a session.
     Resume { session: String },
     /// The next run is asked for.
-    Next,
+    Next {},
     /// Tick 0 of the run that was sent.
     Begin {
         number: usize,
@@ -64,7 +64,7 @@ pub enum FromPage {
     /// The run was broken off.
     Abort { number: usize },
     /// The pages about the session are asked for.
-    Reports,
+    Reports {},
 }
 
 /// What the server says.

@@ -279,6 +279,9 @@ fn messages_that_are_none_end_the_connection() {
         let _ = page.0.send(message);
         loop {
             match page.0.read() {
+                Err(tungstenite::Error::Io(error)) if error.kind() == std::io::ErrorKind::WouldBlock => {
+                    panic!("the connection is still there")
+                }
                 Ok(Message::Close(_)) | Err(_) => return,
                 Ok(Message::Text(text)) => assert!(!text.contains("\"type\":\"verdict\""), "{text}"),
                 Ok(_) => {}

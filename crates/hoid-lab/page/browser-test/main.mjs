@@ -224,6 +224,9 @@ const steps = {
       return [bytes.length, bytes[0], bytes[1]];
     });
     assert.deepEqual(head.slice(1), [0x50, 0x4b]);
+    // What the page still asks for would be refused by nobody.
+    await page.close();
+    await experimenter.close();
     await server.end();
   },
 
@@ -262,6 +265,7 @@ const steps = {
     const told = await page.getByRole("row", { name: /Latency/ }).innerText();
     console.log(`  ${told.replace(/\s+/g, " ")}`);
     assert.match(told, /-?\d+\.\d ± \d+\.\d ms/);
+    await page.close();
     await server.end();
   },
 };

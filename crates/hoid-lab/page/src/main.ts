@@ -4,7 +4,9 @@ import { Surface } from "./display";
 import { button, h, show } from "./dom";
 import { inputOf } from "./engine";
 import { DEVICES, type Device, type Settings, keep, listen, mapOf, settings } from "./input";
+import { data, digits, facts, percent, runsTable } from "./parts";
 import { Plots, linesOf } from "./plots";
+import { play } from "./replay";
 import { type Given, start } from "./session";
 import { time } from "./time";
 import { type Condition, type Done, type FromServer, type LiveLine, type Measures, type RunMessage, type State, Wire } from "./wire";
@@ -221,19 +223,6 @@ function ready(): void {
   );
 }
 
-const percent = (v: number) => `${Math.round(v)} of 100`;
-
-function worth(done: Done): HTMLElement {
-  const good = done.verdict === "verified";
-  return h(
-    "span",
-    {},
-    h("span", { class: good ? "good" : "bad" }, done.verdict),
-    done.reasons ? `: ${done.reasons}` : "",
-    done.notes ? ` (${done.notes})` : "",
-  );
-}
-
 let rest = 0;
 
 function result(): void {
@@ -273,40 +262,6 @@ function result(): void {
   if (state.live !== "never") void estimate(done.number);
 }
 
-function facts(done: Done, measures: Measures): HTMLElement[] {
-  return [
-    h("p", {}, "This run is ", worth(done), "."),
-    h(
-      "p",
-      { class: "soft" },
-      `Frames of ${measures.frame_ms.toFixed(1)} ms, the longest ${measures.longest_frame_ms.toFixed(1)} ms, ${measures.missed_frames} missed; ` +
-        `${measures.input_hz.toFixed(0)} events a second, ${measures.input_age_ms.toFixed(1)} ms old when they came.`,
-    ),
-  ];
-}
-
-interface RunData {
-  number: number;
-  condition: Condition;
-  start_s: number;
-  step_s: number;
-  e: number[];
-  u: number[];
-  y: number[];
-  f: number[] | null;
-  live: (number | null)[][];
-  verdict: string;
-  reasons: string;
-}
-
-async function data(number: number): Promise<RunData | null> {
-  const base = location.pathname.replace(/experimenter$/, "");
-  const answer = await fetch(`${base}data/${number}.json`);
-  return answer.ok ? answer.json() : null;
-}
-
-const digits = (v: number) => v.toFixed(Math.abs(v) < 1 ? 3 : Math.abs(v) < 10 ? 2 : 0);
-
 /** The last live estimate of a run, for the person. */
 async function estimate(number: number): Promise<void> {
   const place = document.getElementById("person");
@@ -328,20 +283,6 @@ async function estimate(number: number): Promise<void> {
       cell("Phase margin", last.phase_margin_deg, "deg"),
     ),
   );
-}
-
-function runsTable(done: Done[], pick?: (number: number) => void): HTMLElement {
-  const row = (d: Done) =>
-    h(
-      "tr",
-      {},
-      h("td", {}, pick ? button(`Run ${d.number}`, () => pick(d.number), { class: "quiet" }) : String(d.number)),
-      h("td", {}, d.condition + (d.training ? " (training)" : "")),
-      h("td", {}, d.how === "finished" ? percent(d.score) : "ended early"),
-      h("td", {}, worth(d)),
-    );
-  const head = ["Run", "Task", "Score", "Worth"].map((text) => h("th", { scope: "col" }, text));
-  return h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ...head)), h("tbody", {}, ...done.map(row))));
 }
 
 function links(): HTMLElement {
@@ -418,8 +359,6 @@ function live(number: number, line: LiveLine): void {
 
 // --- A session shown again ---
 
-let stopReplay = () => {};
-
 function replay(): void {
   const s = state as State;
   if (document.getElementById("replay")) return;
@@ -427,65 +366,4 @@ function replay(): void {
   show("wide", h("h1", {}, `${s.name}: ${s.session}`), runsTable(s.done, (number) => void play(number, place)), place, links());
   const first = s.done.find((d) => d.how === "finished") ?? s.done[0];
   if (first) void play(first.number, place);
-}
-
-async function play(number: number, place: HTMLElement): Promise<void> {
-  stopReplay();
-  const run = await data(number);
-  if (!run) {
-    place.replaceChildren(h("p", {}, "This run has no data."));
-    return;
-  }
-  const canvas = h("canvas", { class: "replay", role: "img", "aria-label": "The task as it was shown" });
-  const curves = h("canvas", { class: "plots", role: "img", "aria-label": "The estimate over time" });
-  const slider = h("input", { type: "range", min: "0", max: String(run.e.length - 1), step: "1", value: "0", "aria-label": "Time" });
-  const speed = h("select", { "aria-label": "Speed" });
-  for (const factor of ["1", "2", "5", "10"]) speed.append(h("option", { value: factor, selected: factor === "2" }, `${factor} times as fast`));
-  const clock = h("p", { class: "soft" });
-  const toggle = button("Pause", () => {
-    going = !going;
-    toggle.textContent = going ? "Pause" : "Play";
-  });
-  place.replaceChildren(
-    h("h2", {}, `Run ${number}: ${run.condition.name}`),
-    h("p", {}, "Recomputed now: ", h("span", { class: run.verdict === "verified" ? "good" : "bad" }, run.verdict), run.reasons ? `: ${run.reasons}` : "."),
-    canvas,
-    slider,
-    clock,
-    toggle,
-    speed,
-    curves,
-  );
-  const surface = new Surface(canvas);
-  const estimates = new Plots(curves);
-  estimates.set(linesOf(run.live), run.start_s, run.start_s + run.e.length * run.step_s);
-  let going = true;
-  let over = false;
-  let at = 0;
-  let before = performance.now();
-  let drawn = 0;
-  let shownWidth = canvas.clientWidth;
-  slider.addEventListener("input", () => (at = Number(slider.value)));
-  stopReplay = () => (over = true);
-  const frame = (now: number) => {
-    if (over) return;
-    if (canvas.clientWidth !== shownWidth) {
-      shownWidth = canvas.clientWidth;
-      surface.fit();
-    }
-    requestAnimationFrame(frame);
-    if (going) at = Math.min(run.e.length - 1, at + ((now - before) / 1000 / run.step_s) * Number(speed.value));
-    before = now;
-    const k = Math.floor(at);
-    const f = (i: number) => run.f?.[Math.min(i, run.e.length - 1)] ?? 0;
-    surface.task(run.condition, { e: run.e[k], y: run.y[k], f: f(k), ahead: (ticks) => f(k + Math.round(ticks / 10)) });
-    slider.value = String(k);
-    const t = run.start_s + k * run.step_s;
-    clock.textContent = `${t.toFixed(1)} s${t < 0 ? " (run-in)" : ""}`;
-    if (now - drawn > 100) {
-      drawn = now;
-      estimates.draw(t);
-    }
-  };
-  requestAnimationFrame(frame);
 }

@@ -1,0 +1,69 @@
+// A run shown again: the task as it was on the screen, and the estimate beside it.
+
+import { Surface } from "./display";
+import { button, h } from "./dom";
+import { data } from "./parts";
+import { Plots, linesOf } from "./plots";
+
+let stopReplay = () => {};
+
+export async function play(number: number, place: HTMLElement): Promise<void> {
+  stopReplay();
+  const run = await data(number);
+  if (!run) {
+    place.replaceChildren(h("p", {}, "This run has no data."));
+    return;
+  }
+  const canvas = h("canvas", { class: "replay", role: "img", "aria-label": "The task as it was shown" });
+  const curves = h("canvas", { class: "plots", role: "img", "aria-label": "The estimate over time" });
+  const slider = h("input", { type: "range", min: "0", max: String(run.e.length - 1), step: "1", value: "0", "aria-label": "Time" });
+  const speed = h("select", { "aria-label": "Speed" });
+  for (const factor of ["1", "2", "5", "10"]) speed.append(h("option", { value: factor, selected: factor === "2" }, `${factor} times as fast`));
+  const clock = h("p", { class: "soft" });
+  const toggle = button("Pause", () => {
+    going = !going;
+    toggle.textContent = going ? "Pause" : "Play";
+  });
+  place.replaceChildren(
+    h("h2", {}, `Run ${number}: ${run.condition.name}`),
+    h("p", {}, "Recomputed now: ", h("span", { class: run.verdict === "verified" ? "good" : "bad" }, run.verdict), run.reasons ? `: ${run.reasons}` : "."),
+    canvas,
+    slider,
+    clock,
+    toggle,
+    speed,
+    curves,
+  );
+  const surface = new Surface(canvas);
+  const estimates = new Plots(curves);
+  estimates.set(linesOf(run.live), run.start_s, run.start_s + run.e.length * run.step_s);
+  let going = true;
+  let over = false;
+  let at = 0;
+  let before = performance.now();
+  let drawn = 0;
+  let shownWidth = canvas.clientWidth;
+  slider.addEventListener("input", () => (at = Number(slider.value)));
+  stopReplay = () => (over = true);
+  const frame = (now: number) => {
+    if (over) return;
+    if (canvas.clientWidth !== shownWidth) {
+      shownWidth = canvas.clientWidth;
+      surface.fit();
+    }
+    requestAnimationFrame(frame);
+    if (going) at = Math.min(run.e.length - 1, at + ((now - before) / 1000 / run.step_s) * Number(speed.value));
+    before = now;
+    const k = Math.floor(at);
+    const f = (i: number) => run.f?.[Math.min(i, run.e.length - 1)] ?? 0;
+    surface.task(run.condition, { e: run.e[k], y: run.y[k], f: f(k), ahead: (ticks) => f(k + Math.round(ticks / 10)) });
+    slider.value = String(k);
+    const t = run.start_s + k * run.step_s;
+    clock.textContent = `${t.toFixed(1)} s${t < 0 ? " (run-in)" : ""}`;
+    if (now - drawn > 100) {
+      drawn = now;
+      estimates.draw(t);
+    }
+  };
+  requestAnimationFrame(frame);
+}

@@ -1,0 +1,123 @@
+//! The task of a condition: what is controlled at each time, and what excites the loop.
+
+use hoid_model::{
+    ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, SampleTime,
+    family_scenario::{Excitation, MultiSine},
+    forcing::ForcingFunction,
+    schedule::Schedule,
+};
+
+use crate::{
+    LabError,
+    config::{Condition, Signal},
+};
+
+/// The task of a condition: what of a scenario is not the person.
+#[derive(Debug, Clone)]
+pub enum Course {
+    /// Of one of the conditions C1 to C6, or near one.
+    Reference(Box<hoid_model::scenario::ResolvedScenario>),
+    /// Of any controlled element.
+    Family(Box<hoid_model::family_scenario::ResolvedFamilyScenario>),
+}
+
+impl Signal {
+    fn excitation(&self) -> Result<Excitation, ModelError> {
+        MultiSine {
+            period_s: self.period_s,
+            largest: self.largest,
+            rms: self.rms,
+        }
+        .excitation()
+    }
+}
+
+impl Condition {
+    /// Its task.
+    ///
+    /// # Errors
+    /// [`LabError::Scenario`], [`LabError::Model`].
+    pub fn course(&self) -> Result<Course, LabError> {
+        if let Some(text) = &self.scenario_text {
+            let name = self.scenario.as_deref().unwrap_or(&self.name);
+            return Ok(match hoid_io::parse_any_scenario(text, name, &self.name)? {
+                hoid_io::AnyScenario::Reference(scenario) => Course::Reference(Box::new(scenario.resolve()?)),
+                hoid_io::AnyScenario::Family(scenario) => Course::Family(Box::new(scenario.resolve()?)),
+            });
+        }
+        let element: ContinuousTransferFunction = self.controlled_element.parse()?;
+        let state = |controlled_element| -> Result<FamilyState, ModelError> {
+            Ok(FamilyState {
+                // The person sits before the screen; the scenario asks for someone.
+                operator: FamilyOperator::new(Form::Gain, false, &[1.0, 0.2])?,
+                controlled_element,
+            })
+        };
+        let mut scenario = FamilyScenario::new(state(element)?, SampleTime::HUNDREDTH);
+        scenario.name.clone_from(&self.name);
+        (scenario.measurement_s, scenario.run_in_s) = (self.measurement_s, self.run_in_s);
+        if let Some(last) = &self.last_element {
+            scenario.last = state(last.parse()?)?;
+            let (rate_per_s, midpoint_s) = (self.rate_per_s, self.change_s.unwrap_or(self.measurement_s / 2.0));
+            scenario.schedule = match self.interval_s {
+                Some(interval_s) => Schedule::Alternating {
+                    rate_per_s,
+                    midpoint_s,
+                    interval_s,
+                },
+                None => Schedule::Sigmoid { rate_per_s, midpoint_s },
+            };
+        }
+        let excitation =
+            |signal: &Option<Signal>| signal.as_ref().map_or(Ok(Excitation::default()), Signal::excitation);
+        scenario.target = excitation(&self.target)?;
+        scenario.disturbance = excitation(&self.disturbance)?;
+        Ok(Course::Family(Box::new(scenario.resolve()?)))
+    }
+}
+
+impl Course {
+    /// Run-in and measurement, s.
+    pub fn times_s(&self) -> (f64, f64) {
+        match self {
+            Self::Reference(course) => (course.scenario().run_in_s, course.scenario().measurement_s),
+            Self::Family(course) => (course.scenario().run_in_s, course.scenario().measurement_s),
+        }
+    }
+
+    /// What is controlled at a time from the start of the measurement.
+    pub fn element_at(&self, t_s: f64) -> Result<ContinuousTransferFunction, ModelError> {
+        match self {
+            Self::Reference(course) => course.parameters_at(t_s).controlled_element.transfer_function(),
+            Self::Family(course) => Ok(course.state_at(t_s)?.controlled_element),
+        }
+    }
+
+    /// Target and disturbance.
+    pub fn excitations(&self) -> [Excitation; 2] {
+        let fixed = |function: &ForcingFunction| Excitation {
+            function: function.clone(),
+            random_phases: false,
+        };
+        match self {
+            Self::Reference(course) => [fixed(&course.scenario().forcing), Excitation::default()],
+            Self::Family(course) => [course.scenario().target.clone(), course.scenario().disturbance.clone()],
+        }
+    }
+
+    /// Where the leading gain stands.
+    pub fn realisation(&self) -> hoid_model::scenario::Realisation {
+        match self {
+            Self::Reference(course) => course.scenario().realisation,
+            Self::Family(course) => course.scenario().realisation,
+        }
+    }
+
+    /// The time of the change, s, where there is one.
+    pub fn change_s(&self) -> Option<f64> {
+        match self {
+            Self::Reference(course) => course.scenario().schedule.change_s(),
+            Self::Family(course) => course.scenario().schedule.change_s(),
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! A run as the server has it: sent, begun, taken batch by batch, ended.
+
+use std::{collections::BTreeMap, sync::Arc, thread};
+
+use hoid_track::Sample;
+
+use super::{Current, Mode, Outgoing, Ready, Running, Shared};
+use crate::{
+    LabError, calibrate, experiment,
+    live::{LiveRun, Samples, start},
+    record::record,
+    reports,
+    session::{Batch, Begun, How, Logged, RunLog, Session},
+    task::{TICKS_PER_SAMPLE, Task},
+    utc,
+    wire::{FromPage, ToPage},
+};
+
+impl Shared {
+    pub(super) fn send_run(&self, state: &mut Current, id: u64) -> Result<(), LabError> {
+        if state.run.is_some() {
+            return Err(LabError::Order("a run goes on".to_owned()));
+        }
+        let session = session_of(state)?;
+        let Some(planned) = session.next() else {
+            return Err(LabError::Order("all runs of the session are done".to_owned()));
+        };
+        let plan = &session.facts.plan[planned];
+        let condition = session.facts.config.condition[plan.condition].clone();
+        let number = session.new_number()?;
+        let training = plan.training;
+        let task = Task::new(&condition, plan.condition as u64, number as u64)?;
+        let simulated = (self.mode == Mode::Calibrate)
+            .then(|| calibrate::operator(&task, number as u64))
+            .transpose()?;
+        let noise = simulated.as_ref().map_or(&[][..], |(_, noise)| noise);
+        let run = ToPage::Run {
+            number,
+            condition: &condition,
+            training,
+            run_in: task.run_in,
+            ticks: task.ticks,
+            phases: &task.phases,
+            tables: vec![task.target.len(), task.disturbance.len(), noise.len()],
+            operator: simulated.as_ref().map(|(operator, _)| operator),
+        };
+        self.tell(&run, |page, _| page == id);
+        let numbers = task.target.iter().chain(&task.disturbance).chain(noise);
+        let bytes: Vec<u8> = numbers.flat_map(|v| v.to_le_bytes()).collect();
+        if let Some(page) = self.pages().get(&id) {
+            let _ = page.sender.send(Outgoing::Binary(bytes));
+        }
+        state.ready = Some(Ready { planned, number, task });
+        Ok(())
+    }
+
+    pub(super) fn begin(self: &Arc<Self>, state: &mut Current, message: FromPage) -> Result<(), LabError> {
+        let FromPage::Begin {
+            number,
+            input,
+            device,
+            clock,
+            refresh_ms,
+            zero_ms,
+        } = message
+        else {
+            return Ok(());
+        };
+        if let Some(fault) = input.fault() {
+            return Err(LabError::Message(fault));
+        }
+        let known = ["mouse", "pen", "touch", "gamepad"].contains(&device.as_str());
+        let timed = ["browser", "injected"].contains(&clock.as_str()) && refresh_ms >= 0.0 && zero_ms.is_finite();
+        if !known || !timed {
+            return Err(LabError::Message(format!(
+                "device {device:?}, clock {clock:?}, refresh {refresh_ms} ms"
+            )));
+        }
+        let ready = state
+            .ready
+            .take()
+            .filter(|ready| ready.number == number && state.run.is_none());
+        let Some(Ready { planned, task, .. }) = ready else {
+            return Err(LabError::Order(format!("run {number} was not asked for")));
+        };
+        let session = session_of(state)?;
+        let plan = &session.facts.plan[planned];
+        let condition = session.facts.config.condition[plan.condition].clone();
+        let stem = session.stem(&condition.name, number);
+        let begun = Begun {
+            hoid: env!("CARGO_PKG_VERSION").to_owned(),
+            number,
+            planned,
+            training: plan.training,
+            utc: utc::now(),
+            cell: plan.condition as u64,
+            replication: number as u64,
+            run_in: task.run_in,
+            ticks: task.ticks,
+            input,
+            device,
+            clock,
+            refresh_ms,
+            zero_ms,
+            limits: session.facts.config.limits,
+            phases: task.phases.clone(),
+            condition,
+        };
+        begun.write(&stem, &task)?;
+        let live = LiveRun::new(&session.facts.config.method, begun.condition.course()?)?;
+        let teller = Arc::downgrade(self);
+        let live = start(live, &stem, move |line| {
+            if let Some(shared) = teller.upgrade() {
+                shared.tell_live(number, line);
+            }
+        });
+        state.run = Some(Running {
+            log: RunLog::create(&stem, task.ticks)?,
+            begun,
+            stem,
+            task,
+            live: Some(live),
+        });
+        Ok(())
+    }
+
+    pub(super) fn take(&self, state: &mut Current, number: usize, batch: &Batch) -> Result<(), LabError> {
+        state.running(number)?;
+        let Some(run) = &mut state.run else { return Ok(()) };
+        // First the estimate, which is waited for; the disk may take its time.
+        let first = batch.first.next_multiple_of(TICKS_PER_SAMPLE) - batch.first;
+        let samples = (first..batch.u.len().min(batch.e.len()))
+            .step_by(TICKS_PER_SAMPLE)
+            .map(|k| Sample {
+                e: batch.e[k],
+                u: batch.u[k],
+                reference: run.task.target.get(batch.first + k).copied(),
+            });
+        let samples: Samples = samples.collect();
+        if let (Some(live), false) = (&run.live, samples.is_empty()) {
+            // An estimate that ended early is seen by the lines that lack.
+            let _ = live.send(samples);
+        }
+        run.log.append(batch)
+    }
+
+    /// Ends the run that goes on, if one does.
+    pub(super) fn end_run(
+        &self,
+        state: &mut Current,
+        how: How,
+        counted: BTreeMap<String, f64>,
+    ) -> Result<(), LabError> {
+        let Some(mut run) = state.run.take() else { return Ok(()) };
+        run.live = None;
+        run.log.sync()?;
+        drop(run.log);
+        let Some(session) = &mut state.session else {
+            return Ok(());
+        };
+        let checked = session.end(&run.stem, how, counted)?;
+        let logged = Logged::read(&run.stem)?;
+        if logged.signals.e.len() > 2 * TICKS_PER_SAMPLE {
+            let record = record(&run.begun, &run.task, &logged)?;
+            hoid_io::write_record(&run.stem.file("beh.parquet"), &record)?;
+            if self.mode == Mode::Calibrate && how == How::Finished {
+                state.calibration = Some(calibrate::judge(&self.out, &record, &logged)?);
+            }
+        }
+        if self.mode == Mode::Sessions {
+            experiment::manifest(&self.out)?;
+        }
+        if let Some(done) = session.done.last() {
+            let measures = &checked.measures;
+            self.tell(&ToPage::Verdict { done, measures }, |_, page| page.role.is_some());
+        }
+        Ok(())
+    }
+
+    /// Makes the pages about the session, on a thread of its own.
+    pub(super) fn report(self: &Arc<Self>, state: &mut Current) {
+        let (Some(program), Some(session)) = (&self.program, &state.session) else {
+            return;
+        };
+        if state.reporting || self.mode != Mode::Sessions {
+            return;
+        }
+        state.reporting = true;
+        let (program, out, folder) = (program.clone(), self.out.clone(), session.folder.clone());
+        let shared = Arc::clone(self);
+        thread::spawn(move || {
+            let pages = reports::make(&program, &out, &folder, &|pages| {
+                shared.state().pages = pages.clone();
+                shared.tell_state();
+            });
+            let mut state = shared.state();
+            state.reporting = false;
+            state.pages = pages;
+            drop(state);
+            shared.tell_state();
+        });
+    }
+}
+
+fn session_of(state: &Current) -> Result<&Session, LabError> {
+    state
+        .session
+        .as_ref()
+        .ok_or_else(|| LabError::Order("there is no session yet".to_owned()))
+}

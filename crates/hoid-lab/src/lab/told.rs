@@ -1,0 +1,125 @@
+//! What the pages are told: how the session stands, and the live estimate.
+
+use std::path::{Path, PathBuf};
+
+use super::{Mode, Outgoing, Page, Shared};
+use crate::{
+    calibrate::Calibration,
+    config::LiveFor,
+    live::LiveLine,
+    session::{Done, Session},
+    verify::check,
+    wire::{Role, State, ToPage},
+};
+
+impl Shared {
+    /// Sends to the pages that `wants` picks.
+    pub(super) fn tell(&self, message: &ToPage<'_>, wants: impl Fn(u64, &Page) -> bool) {
+        // Everything that is said can be written as JSON.
+        let Ok(text) = serde_json::to_string(message) else {
+            return;
+        };
+        for (id, page) in &*self.pages() {
+            if wants(*id, page) {
+                // A page that is gone leaves by itself.
+                let _ = page.sender.send(Outgoing::Text(text.clone()));
+            }
+        }
+    }
+
+    pub(super) fn tell_live(&self, number: usize, line: &LiveLine) {
+        let person = self.config.live == LiveFor::During;
+        self.tell(&ToPage::Live { number, line }, |_, page| match page.role {
+            Some(Role::Experimenter) => true,
+            Some(Role::Person) => person,
+            None => false,
+        });
+    }
+
+    /// Sessions that can go on, as `sub-P01/ses-01`.
+    pub(super) fn open_sessions(&self) -> Vec<String> {
+        if self.mode != Mode::Sessions {
+            return Vec::new();
+        }
+        let unfinished = |folder: &PathBuf| Session::read(folder).is_ok_and(|session| !session.facts.finished);
+        let folders = Session::folders(&self.out).unwrap_or_default();
+        folders
+            .iter()
+            .filter(|folder| unfinished(folder))
+            .map(|folder| name_of(folder))
+            .collect()
+    }
+
+    pub(super) fn tell_state(&self) {
+        let state = self.state();
+        let session = state.session.as_ref();
+        let facts = session.map(|session| &session.facts);
+        let next = session.and_then(Session::next);
+        let plan = |k: usize| facts.and_then(|facts| facts.plan.get(k));
+        let condition_of = |k: usize| facts.map(|facts| &facts.config.condition[facts.plan[k].condition]);
+        let done = match (&self.mode, session) {
+            (Mode::Replay(_), Some(session)) => judged_again(session),
+            (_, Some(session)) => session.done.clone(),
+            _ => Vec::new(),
+        };
+        let message = State {
+            phase: match (&self.mode, session) {
+                (Mode::Replay(_), _) => "replay",
+                (_, None) => "consent",
+                (_, Some(session)) if session.next().is_some() => "runs",
+                _ => "finished",
+            },
+            name: self.config.name.clone(),
+            consent: self.config.consent.clone(),
+            live: self.config.live,
+            calibrate: self.mode == Mode::Calibrate,
+            session: session.map(|session| name_of(&session.folder)),
+            open: if session.is_none() {
+                self.open_sessions()
+            } else {
+                Vec::new()
+            },
+            done,
+            planned: (0..facts.map_or(0, |facts| facts.plan.len()))
+                .filter_map(|k| condition_of(k).map(|condition| condition.name.clone()))
+                .collect(),
+            next,
+            condition: next.and_then(condition_of).cloned(),
+            training: next.and_then(plan).is_some_and(|plan| plan.training),
+            running: state.run.as_ref().map(|run| run.begun.number),
+            reporting: state.reporting,
+            reports: state.pages.links(),
+            calibration: state.calibration.as_ref().map(Calibration::rows).unwrap_or_default(),
+        };
+        drop(state);
+        self.tell(&ToPage::State(Box::new(message)), |_, page| page.role.is_some());
+    }
+}
+
+/// The runs with the verdicts that their files deserve now.
+fn judged_again(session: &Session) -> Vec<Done> {
+    let again = |done: &Done| {
+        let checked = check(&session.stem(&done.condition, done.number));
+        let (verdict, reasons) = match &checked {
+            Ok(checked) => (checked.word(), checked.reasons()),
+            Err(error) => ("unverified", error.to_string()),
+        };
+        Done {
+            verdict: verdict.to_owned(),
+            reasons,
+            ..done.clone()
+        }
+    };
+    session.done.iter().map(again).collect()
+}
+
+/// `sub-P01/ses-01`.
+fn name_of(folder: &Path) -> String {
+    let last = |path: &Path| {
+        path.file_name()
+            .map(|name| name.to_string_lossy().into_owned())
+            .unwrap_or_default()
+    };
+    let person = folder.parent().map(last).unwrap_or_default();
+    format!("{person}/{}", last(folder))
+}
