@@ -272,6 +272,11 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
         self.believed.began
     }
 
+    /// Samples that the estimate of now has seen.
+    pub fn samples(&self) -> u64 {
+        self.believed.samples
+    }
+
     /// True from when on neuromuscular system and delay are corrected.
     pub fn corrects(&self) -> bool {
         self.believed.reopened

@@ -93,6 +93,10 @@ const ELSEWHERE: [[f64; 3]; RIVALS] = [
 ];
 /// Shortest delay of them, s.
 const EARLIEST_S: f64 = 0.03;
+/// In the first seconds the noise model has not been seen for long, and the errors of what it whitens are
+/// too small: they are told `1 + UNLEARNT_S/t` times as large after t seconds. Set on virtual people of
+/// another seed than those of the test (`tests/first_seconds.rs`).
+const UNLEARNT_S: f64 = 4.0;
 /// What a declared change adds to the gains, over |Y| at 2 rad/s.
 const JUMP: f64 = 0.3;
 /// Frequency in which changes are looked for, rad/s; seconds that are now, and seconds before, at
@@ -294,6 +298,8 @@ struct PopulationRecursion {
     model: Box<PopulationFilter<Vec<f64>>>,
     /// How far people are from the basis at the beginning.
     spread: [f64; HELD],
+    /// True where a fit stands at the beginning.
+    known: bool,
     reported: Reported,
 }
 
@@ -321,6 +327,7 @@ impl PopulationRecursion {
         let mut made = Self {
             model: Box::new(model),
             spread,
+            known: known.is_some(),
             reported: Reported::new(from, nk, sample_time),
         };
         if known.is_some() {
@@ -351,6 +358,11 @@ impl PopulationRecursion {
     /// uncertain as before the first sample.
     fn state_covariance(&self) -> [[f64; STATES]; STATES] {
         let mut c = self.model.gains().covariance();
+        if !self.known {
+            let seconds = self.model.samples() as f64 * self.reported.sample_time_s();
+            let wider = (1.0 + UNLEARNT_S / seconds.max(HOLD_S)).powi(2);
+            c.iter_mut().flatten().for_each(|c| *c *= wider);
+        }
         if !self.model.corrects() {
             let point = self.model.basis().point();
             for (j, of) in [point.omega, point.zeta, 1.0].into_iter().enumerate() {
