@@ -563,7 +563,7 @@ fn wrong_usage_and_wrong_headers() {
     }
     for (more, expected) in [
         (&["--warm-up", "5"][..], "speaks at once"),
-        (&["--start", "nothing", "--nk", "29"], "--prior"),
+        (&["--start", "nothing", "--nk", "29"], "a prior in its place"),
         (&["--prior", "omega_nm=1"], "CENTRE:SPREAD"),
     ] {
         let arguments: Vec<&str> = ["stream", "--fs", "100"].iter().chain(more).copied().collect();

@@ -362,13 +362,10 @@ fn a_person_is_followed_from_an_earlier_fit_of_them() {
         of_usual[150]
     );
     // K_e_dot is .036 s; the fit of the other run is near, and stays so.
-    let gain = column(&known, "K_e_dot");
-    assert!(
-        gain.iter().all(|k| (k - 0.036).abs() < 0.012),
-        "{} {}",
-        gain[0],
-        gain[8191]
-    );
+    let (gain, error) = (column(&known, "K_e_dot"), column(&known, "K_e_dot_se"));
+    let off = |k: usize| (gain[k] - 0.036).abs();
+    assert!((0..gain.len()).all(|k| off(k) < 2.0 * error[k] && off(k) < 0.02));
+    assert!(off(8191) < 0.003, "{}", gain[8191]);
     // What does not fit together is told before the work.
     good(
         d,

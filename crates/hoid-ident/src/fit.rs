@@ -5,13 +5,13 @@ use hoid_model::{
     polynomial::product,
     polynomial_model::monic,
     remnant::RemnantDiscretisation,
-    uncertainty::{Estimate, OperatorEstimate, RemnantEstimate, operator_estimate, remnant_estimate},
+    uncertainty::{Estimate, OperatorEstimate, RemnantEstimate, operator_estimate, remnant_estimate, variance_along},
 };
 
 use crate::{
     IdentError, InitialState, Termination,
     criterion::{Criterion, Data, Workspace, first_residual},
-    searched_delay::SearchedDelay,
+    linalg::least_squares::dot,
 };
 
 /// A fitted model.
@@ -51,6 +51,15 @@ pub(crate) struct Physical {
     pub free: usize,
     pub operator: Result<OperatorEstimate, NotConvertible>,
     pub remnant: Option<RemnantEstimate>,
+}
+
+/// How a searched delay is known, and how theta moves with it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SearchedDelay {
+    /// Variance of the delay, s^2.
+    pub variance_s2: f64,
+    /// `d theta/d tau`, 1/s.
+    pub slope: Vec<f64>,
 }
 
 /// Values on the time axis of a record, from sample `first` on.
@@ -311,6 +320,18 @@ impl Fit {
         }
         let (orders, theta) = output_error_form(&self.model);
         Ok(output_less(record, self.errors_of(orders, &theta, record)?))
+    }
+
+    /// Variance of what has the gradient `by_theta` and changes with the delay by `by_delay` (1/s);
+    /// `None` without a covariance.
+    pub(crate) fn variance_of(&self, by_theta: &[f64], by_delay: f64) -> Option<f64> {
+        let covariance = self.covariance.as_ref()?;
+        // The covariance holds (g's)^2 var tau already.
+        let with_delay = self.searched_delay.as_ref().map_or(0.0, |delay| {
+            let moved = dot(by_theta, &delay.slope);
+            delay.variance_s2 * by_delay * (2.0 * moved + by_delay)
+        });
+        Some(variance_along(by_theta, covariance) + with_delay)
     }
 
     fn errors_of(&self, orders: Orders, theta: &[f64], record: &Record) -> Result<Series, IdentError> {

@@ -19,23 +19,15 @@
 //! The two parts of `g' s + h` work against each other in the frequency response: a longer delay goes
 //! with faster muscles.
 
-use hoid_model::{Record, uncertainty::variance_along};
+use hoid_model::Record;
 use nalgebra::{DMatrix, DVector};
 
 use crate::{
     Fit,
     criterion::{Criterion, Data, Workspace, first_residual},
+    fit::SearchedDelay,
     linalg::least_squares::dot,
 };
-
-/// How a searched delay is known, and how theta moves with it.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct SearchedDelay {
-    /// Variance of the delay, s^2.
-    pub variance_s2: f64,
-    /// `d theta/d tau`, 1/s.
-    pub slope: Vec<f64>,
-}
 
 impl Fit {
     /// The same fit with the delay counted as estimated over a range of `delays` values of nk. Models
@@ -104,18 +96,6 @@ impl Fit {
         }
         let finite = variance_s2.is_finite() && slope.iter().all(|s| s.is_finite());
         finite.then_some(SearchedDelay { variance_s2, slope })
-    }
-
-    /// Variance of what has the gradient `by_theta` and changes with the delay by `by_delay` (1/s);
-    /// `None` without a covariance.
-    pub(crate) fn variance_of(&self, by_theta: &[f64], by_delay: f64) -> Option<f64> {
-        let covariance = self.covariance.as_ref()?;
-        // The covariance holds (g's)^2 var tau already.
-        let with_delay = self.searched_delay.as_ref().map_or(0.0, |delay| {
-            let moved = dot(by_theta, &delay.slope);
-            delay.variance_s2 * by_delay * (2.0 * moved + by_delay)
-        });
-        Some(variance_along(by_theta, covariance) + with_delay)
     }
 }
 

@@ -105,7 +105,6 @@ const HELP: [Help; 16] = [
             "prior",
             "at",
             "controlled_element",
-            "memory",
             "start_span",
             "out",
             "figure",

@@ -20,6 +20,9 @@ const LOST: f64 = 1.05;
 /// noise model, s.
 const UNIT_S: f64 = 5.0;
 const SOLVE_S: f64 = 0.13;
+/// Time in which signals that began at rest say little, s: an estimate that is known from before stands
+/// still in it.
+const FILLING_S: f64 = 2.0;
 /// Corrections of omega and zeta (shares of theirs) and tau (s) from which the basis moves; the
 /// farthest it moves at once; and where it may be: omega in rad/s, zeta, tau in s.
 const NEAR: [f64; HELD] = [0.04, 0.1, 0.006];
@@ -160,7 +163,14 @@ impl Follower {
         let e = past.error(0);
         self.powers[0] += e * e;
         self.powers[1] += u * u;
+        let filling = self.known && self.samples < self.filled(prior);
         Some(match self.began {
+            true if filling => Learnt {
+                white,
+                innovation: self.gains.innovation(white.y, &white.regressors, white.level),
+                log_density: 0.0,
+                state: None,
+            },
             true => self.learn(prior, past, u, white),
             false => {
                 self.begin(prior);
@@ -172,6 +182,10 @@ impl Follower {
                 }
             }
         })
+    }
+
+    fn filled(&self, prior: &PopulationPrior) -> u64 {
+        libm::ceil(FILLING_S / prior.gains.sample_time) as u64
     }
 
     /// Counts the first samples, and begins when they are enough and not all zero.
@@ -195,7 +209,7 @@ impl Follower {
             self.reopened = true;
             self.gains.reopen(self.unit, libm::sqrt(power), point);
         }
-        if self.known && self.samples == libm::ceil(p.hold / ts) as u64 {
+        if self.known && self.samples == self.filled(p) {
             // The level of u is another in each run, and the fit does not say of what size u is.
             self.gains.open_level(libm::sqrt(power));
         }
