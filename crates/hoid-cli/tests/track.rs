@@ -547,3 +547,37 @@ fn what_gives_no_result_ends_with_one() {
         1
     );
 }
+
+#[test]
+fn other_rates_need_no_other_options() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    for sample_time in ["0.004", "0.001"] {
+        let run = [
+            "simulate",
+            "--condition",
+            "C1",
+            "--seed",
+            "3",
+            "--sample-time",
+            sample_time,
+            "--out",
+            "c.csv",
+        ];
+        good(d, &run);
+        let with = ["--nk", "0.28s", "--every", "100", "--controlled-element", "90/(s(s+6))"];
+        let track = ["track", "c.csv", "--out", "trace.csv", "--json"];
+        json(d, &[&track[..], &with[..]].concat());
+        let found = trace(d);
+        for (name, truth) in [
+            ("K_e", 0.09),
+            ("omega_nm", 11.25),
+            ("tau_e", 0.28),
+            ("crossover_rad_s", 1.5635),
+        ] {
+            let last = |name: &str| *column(&found, name).last().unwrap();
+            let off = (last(name) - truth) / last(&format!("{name}_se"));
+            assert!(off.abs() < 3.0, "{name} at {sample_time} s: {off} standard errors");
+        }
+    }
+}
