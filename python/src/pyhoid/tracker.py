@@ -167,7 +167,8 @@ class Tracker(_pyhoid.Tracker):
         settings = shared | self._options["orders"] | self._options["settings"]
         if self._options["fit"] is not None:
             settings["prior"] = self._options["fit"][1]
-        return settings
+        told: dict[str, Any] = settings
+        return told
 
     def operator_estimate(self) -> Operator | None:
         """The operator with standard errors; None where the structure cannot represent one.
