@@ -70,7 +70,8 @@ def test_every_method_has_an_example_that_runs(
         for name, method in methods(one):
             found = examples(method.__doc__)
             assert found, f"{one.__name__}.{name}"
+            known = dict(names)
             for example in found:
-                exec(compile(example.source, f"{one.__name__}.{name}", "exec"), dict(names))
+                exec(compile(example.source, f"{one.__name__}.{name}", "exec"), known)
             count += 1
     assert count > 40, count

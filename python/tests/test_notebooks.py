@@ -20,14 +20,15 @@ MOST = 250_000
 
 
 def texts(notebook: Any) -> list[str]:
-    """What the cells print, without their pictures."""
+    """What the cells print, without their pictures: a text for each, however it came in parts."""
     found = []
     for cell in notebook.cells:
+        parts = []
         for output in cell.get("outputs", []):
             data = output.get("data", {})
             if not any(kind.startswith("image/") for kind in data):
-                text = output.get("text") or data.get("text/plain", "")
-                found.append(" ".join(text.split()))
+                parts += (output.get("text") or data.get("text/plain", "")).split()
+        found.append(" ".join(parts))
     return found
 
 

@@ -299,7 +299,8 @@ class OperatorFit:
 
         Examples
         --------
-        >>> Path("person.json").write_text(fit.to_json())
+        >>> from pathlib import Path
+        >>> Path("person.json").write_text(person.to_json())
         """
         units = self.records[0].units if self.records else {}
 
