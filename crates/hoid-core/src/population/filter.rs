@@ -282,6 +282,22 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
         self.believed.reopened
     }
 
+    /// True where an earlier fit of the person stood at the beginning of the estimate of now.
+    pub fn is_known(&self) -> bool {
+        self.believed.is_known()
+    }
+
+    /// How far people are from the basis before the first sample: shares of omega and zeta, and s for the
+    /// delay.
+    pub fn spread(&self) -> [f64; HELD] {
+        self.prior.gains.held
+    }
+
+    /// s.
+    pub fn sample_time(&self) -> f64 {
+        self.prior.gains.sample_time
+    }
+
     /// The basis.
     pub fn basis(&self) -> &Basis {
         self.believed.place.basis()

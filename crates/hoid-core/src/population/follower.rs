@@ -126,6 +126,11 @@ impl Follower {
         true
     }
 
+    /// True where a fit stood at the beginning.
+    pub fn is_known(&self) -> bool {
+        self.known
+    }
+
     /// The signals of a sample, before [`Follower::whitened`].
     #[inline(always)]
     pub fn respond(&mut self, past: &Past) {

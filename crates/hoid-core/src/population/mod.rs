@@ -45,16 +45,19 @@ pub mod difference;
 pub mod gains;
 pub mod known;
 pub mod noise;
+pub mod usual;
 
 mod cholesky;
 mod contest;
 mod filter;
 mod follower;
 mod kalman;
+mod operator;
 mod place;
 mod prior;
 mod sizes;
 
 pub use filter::{PopulationFilter, errors_needed};
+pub use operator::through;
 pub use prior::PopulationPrior;
-pub use sizes::{DRIFTS, FORMS, GAINS, HELD, LARGEST_ORDER, LINEAR, RIVALS, STATES};
+pub use sizes::{DRIFTS, FORMS, GAINS, HELD, LARGEST_ORDER, LINEAR, PARAMETERS, RIVALS, STATES};

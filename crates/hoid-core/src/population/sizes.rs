@@ -8,6 +8,8 @@ pub const HELD: usize = 3;
 pub const LINEAR: usize = GAINS + 1;
 /// Gains, level and corrections.
 pub const STATES: usize = LINEAR + HELD;
+/// Parameters of the operator that is told: K_e, K_e_dot and what is held.
+pub const PARAMETERS: usize = 2 + HELD;
 /// Signals of the basis: the states of its filter and their derivative.
 pub const SIGNALS: usize = 6;
 /// Forms of the numerator: any, and a gain with a lead.

@@ -18,18 +18,12 @@ use hoid_core::population::{
     basis::{Basis, Point, REFERENCE},
     known::Known,
     noise::Lags,
+    usual::{LAG_S, Usual},
 };
 use hoid_ident::IdentError;
 use hoid_model::{Complex64, FittedOperator, SampleTime, operator_family::Coordinate, uncertainty::variance_along};
 
 use crate::person_prior::PersonPrior;
-
-/// Lag T_I in s, natural frequency in rad/s and damping of the usual person.
-const LAG_S: f64 = 3.0;
-pub(super) const OMEGA_RAD_S: f64 = 11.0;
-pub(super) const ZETA: f64 = 0.25;
-/// How far people are from that: shares of omega and zeta, and s for the delay.
-pub(super) const SPREAD: [f64; HELD] = [0.3, 0.5, 0.02];
 
 /// Spread of what is held where nothing is known: shares of omega and zeta, and s for the delay. With a
 /// wider one the corrections, which are of first order, end at another person: with 60 %, 100 % and 80 ms
@@ -60,13 +54,9 @@ impl Beginning {
     /// Of what is known; `tau_s` is the delay that is usual, for an error that is straight between
     /// samples.
     pub fn of(prior: &PersonPrior, tau_s: f64, sample_time: SampleTime) -> Result<Self, IdentError> {
-        let mut point = Point {
-            tau: tau_s,
-            omega: OMEGA_RAD_S,
-            zeta: ZETA,
-            lag: LAG_S,
-        };
-        let mut spread = SPREAD;
+        let Usual {
+            mut point, mut spread, ..
+        } = Usual::with_delay(tau_s);
         // An error that is held comes half a sample later than one that is straight.
         let hold = 0.5 * sample_time.s();
         match prior {
@@ -318,6 +308,7 @@ fn solved(a: [[f64; GAINS]; GAINS], b: [f64; GAINS]) -> [f64; GAINS] {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use hoid_core::population::usual;
     use hoid_model::{FamilyOperator, Form, uncertainty::variance_along};
 
     use super::*;
@@ -435,11 +426,11 @@ mod tests {
         let found = Beginning::of(prior, 0.205, SampleTime::HUNDREDTH).unwrap();
         assert_eq!(
             (found.point.omega, found.point.zeta, found.point.lag),
-            (9.0, ZETA, LAG_S)
+            (9.0, usual::ZETA, LAG_S)
         );
         assert!((found.point.tau - 0.255).abs() < 1e-12);
-        assert_eq!(found.spread, [0.2, SPREAD[1], 0.025]);
+        assert_eq!(found.spread, [0.2, usual::SPREAD[1], 0.025]);
         let wide = Beginning::of(&PersonPrior::Nothing, 0.205, SampleTime::HUNDREDTH).unwrap();
-        assert!(wide.spread.iter().zip(SPREAD).all(|(a, b)| *a > b));
+        assert!(wide.spread.iter().zip(usual::SPREAD).all(|(a, b)| *a > b));
     }
 }

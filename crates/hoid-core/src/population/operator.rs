@@ -1,0 +1,76 @@
+//! The operator that is told: parameters and their covariance from gains and corrections.
+//!
+//! Gains of the basis are no parameters of an operator. K_e and K_e_dot are those of the gain and lead
+//! that are nearest to it at [`NEAR_RAD_S`], by least squares in
+//! `K_e + K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`;
+//! exactly those of a person who has a gain and a lead. They are linear in the state s, so that their
+//! covariance is `M C M'`.
+
+use super::{
+    PopulationFilter,
+    sizes::{GAINS, HELD, LINEAR, PARAMETERS, STATES},
+    usual::HOLD_S,
+};
+
+/// Frequencies at which gain and lead are nearest, rad/s.
+const NEAR_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
+/// In the first seconds the noise model has not been seen for long, and the errors of what it whitens are
+/// too small: they are told `1 + UNLEARNT_S/t` times as large after t seconds. Set on virtual people of
+/// another seed than those of the test (`tests/first_seconds.rs` of `hoid-track`).
+const UNLEARNT_S: f64 = 4.0;
+
+impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
+    /// K_e, K_e_dot, omega_nm in rad/s, zeta_nm, and tau_e in s.
+    pub fn operator(&self) -> [f64; PARAMETERS] {
+        let (map, state, held) = (self.gain_and_lead(), self.gains().state(), self.held());
+        let gain = |i: usize| (0..GAINS).map(|k| map[i][k] * state[k]).sum();
+        // The error of a sample is held: half a sample of the delay is the hold's.
+        let hold = 0.5 * self.sample_time();
+        [gain(0), gain(1), held.omega, held.zeta, (held.tau - hold).max(0.0)]
+    }
+
+    /// Their covariance.
+    pub fn operator_covariance(&self) -> [[f64; PARAMETERS]; PARAMETERS] {
+        let mut rows = [[0.0; STATES]; PARAMETERS];
+        for (row, gains) in rows.iter_mut().zip(self.gain_and_lead()) {
+            row[..GAINS].copy_from_slice(&gains);
+        }
+        for j in 0..HELD {
+            rows[2 + j][LINEAR + j] = 1.0;
+        }
+        through(&rows, &self.state_covariance())
+    }
+
+    /// K_e and K_e_dot by the gains.
+    pub fn gain_and_lead(&self) -> [[f64; GAINS]; 2] {
+        self.basis().gain_and_lead(&NEAR_RAD_S)
+    }
+
+    /// Covariance of gains, level and corrections, as it is told. Before the corrections are estimated
+    /// they are as uncertain as before the first sample.
+    pub fn state_covariance(&self) -> [[f64; STATES]; STATES] {
+        let mut c = self.gains().covariance();
+        if !self.is_known() {
+            let seconds = self.samples() as f64 * self.sample_time();
+            let wider = 1.0 + UNLEARNT_S / seconds.max(HOLD_S);
+            c.iter_mut().flatten().for_each(|c| *c *= wider * wider);
+        }
+        if !self.corrects() {
+            let point = self.basis().point();
+            for (j, of) in [point.omega, point.zeta, 1.0].into_iter().enumerate() {
+                let spread = of * self.spread()[j];
+                c[LINEAR + j][LINEAR + j] += spread * spread;
+            }
+        }
+        c
+    }
+}
+
+/// `M C M'`.
+pub fn through<const K: usize>(rows: &[[f64; STATES]; K], c: &[[f64; STATES]; STATES]) -> [[f64; K]; K] {
+    let of = |a: &[f64; STATES], b: &[f64; STATES]| -> f64 {
+        let each = (0..STATES).map(|i| a[i] * (0..STATES).map(|j| c[i][j] * b[j]).sum::<f64>());
+        each.sum()
+    };
+    core::array::from_fn(|i| core::array::from_fn(|j| of(&rows[i], &rows[j])))
+}
