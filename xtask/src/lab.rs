@@ -8,7 +8,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-use crate::process::{cargo, run};
+use crate::process::{cargo, run, target_directory};
 
 /// Checks the built page, then drives it in a browser.
 pub fn lab() -> Result<(), String> {
@@ -35,7 +35,7 @@ pub fn lab() -> Result<(), String> {
 
 /// The program that was built.
 fn program() -> PathBuf {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), |named| root.join(named));
-    target.join("debug").join(format!("hoid{}", env::consts::EXE_SUFFIX))
+    target_directory()
+        .join("debug")
+        .join(format!("hoid{}", env::consts::EXE_SUFFIX))
 }

@@ -3,6 +3,7 @@
 use std::{
     env,
     io::{BufRead, BufReader},
+    path::{Path, PathBuf},
     process::{Command, ExitStatus, Stdio},
 };
 
@@ -46,4 +47,10 @@ pub fn output(command: &mut Command) -> Result<String, String> {
         Ok(output) => Err(format!("failed ({}): {shown}", output.status)),
         Err(error) => Err(format!("cannot run {shown}: {error}")),
     }
+}
+
+/// Where cargo builds.
+pub fn target_directory() -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), |named| root.join(named))
 }

@@ -12,7 +12,7 @@ use std::{
 
 use crate::{
     counts::Counts,
-    process::{cargo, each_line, run},
+    process::{cargo, each_line, run, target_directory},
 };
 
 /// Oldest Python that the package supports.
@@ -23,7 +23,7 @@ pub fn test(arguments: &[String]) -> Result<Counts, String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .ok_or("the folder of xtask has no parent")?;
-    let (package, target) = (root.join("python"), target_directory(root));
+    let (package, target) = (root.join("python"), target_directory());
     let work = target.join("python");
     let environment = work.join("venv");
     let python = fresh_environment(&environment)?;
@@ -66,13 +66,6 @@ pub fn test(arguments: &[String]) -> Result<Counts, String> {
         return Err(format!("failed ({status}): {shown}"));
     }
     Ok(counts)
-}
-
-fn target_directory(root: &Path) -> PathBuf {
-    match env::var_os("CARGO_TARGET_DIR") {
-        Some(named) => root.join(named),
-        None => root.join("target"),
-    }
 }
 
 /// A virtual environment with nothing in it; returns its interpreter.

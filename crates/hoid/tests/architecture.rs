@@ -6,8 +6,9 @@ use std::{collections::BTreeMap, process::Command};
 use serde_json::Value;
 
 /// What each crate may depend on within the workspace.
-const ALLOWED: [(&str, &[&str]); 15] = [
+const ALLOWED: [(&str, &[&str]); 16] = [
     ("hoid-core", &[]),
+    ("hoid-embedded", &["hoid-core"]),
     ("hoid-model", &["hoid-core"]),
     ("hoid-ident", &["hoid-core", "hoid-lanes", "hoid-model"]),
     ("hoid-lanes", &[]),

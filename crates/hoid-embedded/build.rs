@@ -1,0 +1,14 @@
+//! The memory of the board for the linker, where there is a board.
+
+use std::{env, error::Error, fs, path::PathBuf};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    println!("cargo:rerun-if-changed=memory.x");
+    if env::var("CARGO_CFG_TARGET_OS")? == "none" {
+        let out = PathBuf::from(env::var("OUT_DIR")?);
+        fs::copy("memory.x", out.join("memory.x"))?;
+        println!("cargo:rustc-link-search={}", out.display());
+        println!("cargo:rustc-link-arg-bins=-Tlink.x");
+    }
+    Ok(())
+}

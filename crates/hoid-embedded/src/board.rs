@@ -1,0 +1,55 @@
+//! A processor without an operating system: entry, the file and the output by semihosting, and how much of
+//! the stack was used.
+#![allow(unsafe_code)]
+
+use cortex_m_rt::entry;
+use semihosting::{fs::File, io::Read, println, process};
+
+use crate::run;
+
+unsafe extern "C" {
+    /// Ends of the stack, by the linker.
+    static _stack_start: u32;
+    static _stack_end: u32;
+}
+
+/// What the stack is painted with before it is used (`cortex-m-rt`, `paint-stack`).
+const PAINT: u32 = 0xcccc_cccc;
+
+#[entry]
+fn main() -> ! {
+    match work() {
+        Ok(()) => {
+            println!("# state {} bytes, stack {} bytes", run::STATE_BYTES, used());
+            process::exit(0)
+        }
+        Err(message) => {
+            println!("# {message}");
+            process::exit(1)
+        }
+    }
+}
+
+#[inline(never)]
+fn work() -> Result<(), &'static str> {
+    let mut file = File::open(run::FILE).map_err(|_| run::UNREADABLE)?;
+    run::run(
+        |bytes| file.read(bytes).map_err(|_| run::UNREADABLE),
+        |line| {
+            println!("{line}");
+            Ok(())
+        },
+    )
+}
+
+/// Bytes of the stack that were ever written to.
+fn used() -> usize {
+    let (top, bottom) = (&raw const _stack_start, &raw const _stack_end);
+    let words = (top as usize - bottom as usize) / size_of::<u32>();
+    // SAFETY: both are ends of one region of the board's memory, which holds `words` aligned words. They are read
+    // volatile, since the stack above is in use; what is in use is not read, as the first used word ends it.
+    let painted = (0..words)
+        .take_while(|i| unsafe { bottom.add(*i).read_volatile() } == PAINT)
+        .count();
+    (words - painted) * size_of::<u32>()
+}

@@ -1,0 +1,29 @@
+//! The tracker on a bare processor: samples of e and u in the file `run.csv`, and the estimate of each
+//! second on standard output.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `run.rs` | what is the same everywhere: lines, filter, estimates |
+//! | `board.rs` | entry, files and output of a processor without an operating system, by semihosting |
+//!
+//! On the host it is an ordinary program, so that the digits of both can be compared (`cargo xtask
+//! embedded`). No memory is allocated; the filter stands on the stack.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(target_os = "none")]
+mod board;
+mod run;
+
+#[cfg(not(target_os = "none"))]
+fn main() -> Result<(), String> {
+    use std::io::{Read, Write, stdout};
+
+    let path = run::FILE.to_string_lossy();
+    let mut file = std::fs::File::open(&*path).map_err(|e| format!("{path}: {e}"))?;
+    let mut out = stdout().lock();
+    run::run(
+        |bytes| file.read(bytes).map_err(|_| run::UNREADABLE),
+        |line| writeln!(out, "{line}").map_err(|_| "standard output takes no more"),
+    )?;
+    writeln!(out, "# state {} bytes", run::STATE_BYTES).map_err(|e| e.to_string())
+}

@@ -1,0 +1,159 @@
+//! Samples in, estimates out.
+//!
+//! A line of input is `e,u`, at [`SAMPLE_TIME_S`]. A line of output is one of the trace of `hoid track`, with
+//! the columns [`HEADER`]: t, then K_e, K_e_dot, omega_nm, zeta_nm and tau_e, each with its standard error.
+
+use core::{ffi::CStr, fmt::Arguments};
+
+use hoid_core::population::{PARAMETERS, PopulationFilter, basis::Basis, usual::Usual};
+
+/// The file of the samples.
+pub const FILE: &CStr = c"run.csv";
+/// What is said where it cannot be read.
+pub const UNREADABLE: &str = "run.csv cannot be read";
+/// Columns of the output.
+const HEADER: &str = "t,K_e,K_e_se,K_e_dot,K_e_dot_se,omega_nm,omega_nm_se,zeta_nm,zeta_nm_se,tau_e,tau_e_se";
+/// s.
+const SAMPLE_TIME_S: f64 = 0.01;
+/// nk of the textbook's operator, whose delay the filter begins with.
+const NK: f64 = 29.0;
+/// Samples from one line of output to the next.
+const EVERY: u32 = 100;
+/// Errors that the filter keeps: more than `errors_needed(SAMPLE_TIME_S)`.
+const ERRORS: usize = 128;
+/// Longest line of input.
+const LONGEST: usize = 80;
+
+/// The recursion, with memory of its own.
+type Filter = PopulationFilter<[f64; ERRORS]>;
+
+/// Bytes that the recursion takes.
+pub const STATE_BYTES: usize = size_of::<Filter>();
+
+/// Reads samples to their end and writes estimates.
+///
+/// # Errors
+/// A sentence about what cannot be read or written.
+pub fn run(
+    read: impl FnMut(&mut [u8]) -> Result<usize, &'static str>,
+    mut write: impl FnMut(Arguments<'_>) -> Result<(), &'static str>,
+) -> Result<(), &'static str> {
+    let supposed = Usual::with_delay((NK - 0.5) * SAMPLE_TIME_S);
+    let basis = Basis::new(supposed.point, SAMPLE_TIME_S).ok_or("there is no basis for this delay")?;
+    let mut filter =
+        Filter::new(basis, supposed.prior(SAMPLE_TIME_S), [0.0; ERRORS]).ok_or("there is no filter for this prior")?;
+    let mut lines = Lines::new(read);
+    write(format_args!("{HEADER}"))?;
+    let mut samples = 0_u32;
+    while let Some((e, u)) = lines.next()? {
+        filter.step(e, u);
+        samples += 1;
+        if samples.is_multiple_of(EVERY) && filter.began() {
+            let (values, covariance) = (filter.operator(), filter.operator_covariance());
+            let [a, b, c, d, t]: [f64; PARAMETERS] = values;
+            let se = |i: usize| libm::sqrt(covariance[i][i]);
+            let at = f64::from(samples - 1) * SAMPLE_TIME_S;
+            let of = [se(0), se(1), se(2), se(3), se(4)];
+            write(format_args!(
+                "{at:?},{a:?},{:?},{b:?},{:?},{c:?},{:?},{d:?},{:?},{t:?},{:?}",
+                of[0], of[1], of[2], of[3], of[4]
+            ))?;
+        }
+    }
+    Ok(())
+}
+
+/// Lines of two numbers.
+struct Lines<R> {
+    read: R,
+    chunk: [u8; 256],
+    at: usize,
+    end: usize,
+}
+
+impl<R: FnMut(&mut [u8]) -> Result<usize, &'static str>> Lines<R> {
+    fn new(read: R) -> Self {
+        Self {
+            read,
+            chunk: [0; 256],
+            at: 0,
+            end: 0,
+        }
+    }
+
+    /// e and u of the next line; `None` at the end.
+    fn next(&mut self) -> Result<Option<(f64, f64)>, &'static str> {
+        let (mut line, mut length) = ([0_u8; LONGEST], 0);
+        loop {
+            let byte = self.byte()?;
+            match byte {
+                None | Some(b'\n') if length > 0 => break,
+                None => return Ok(None),
+                Some(b'\n' | b'\r') => {}
+                Some(byte) => {
+                    *line
+                        .get_mut(length)
+                        .ok_or("a line of run.csv is longer than 80 characters")? = byte;
+                    length += 1;
+                }
+            }
+        }
+        let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+        let sample = core::str::from_utf8(&line[..length]).ok().and_then(|line| {
+            let (e, u) = line.split_once(',')?;
+            Some((number(e)?, number(u)?))
+        });
+        sample.map(Some).ok_or("a line of run.csv is not two numbers, e,u")
+    }
+
+    fn byte(&mut self) -> Result<Option<u8>, &'static str> {
+        if self.at == self.end {
+            (self.at, self.end) = (0, (self.read)(&mut self.chunk)?);
+        }
+        let byte = (self.at < self.end).then(|| self.chunk[self.at]);
+        self.at += usize::from(byte.is_some());
+        Ok(byte)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(text: &str) -> Result<Vec<String>, &'static str> {
+        let (mut rest, mut lines) = (text.as_bytes(), Vec::new());
+        let read = |bytes: &mut [u8]| {
+            // In small parts, as they may come.
+            let n = rest.len().min(bytes.len()).min(7);
+            bytes[..n].copy_from_slice(&rest[..n]);
+            rest = &rest[n..];
+            Ok(n)
+        };
+        run(read, |line| {
+            lines.push(line.to_string());
+            Ok(())
+        })?;
+        Ok(lines)
+    }
+
+    #[test]
+    fn a_line_each_second() {
+        let samples: String = (0..350)
+            .map(|k| format!("{},{}\n", f64::from(k % 40) - 20.0, 0.1))
+            .collect();
+        let lines = of(&samples).unwrap();
+        assert_eq!(lines[0], HEADER);
+        assert_eq!(lines.len(), 4, "{lines:?}");
+        assert!(lines[3].starts_with("2.99,"));
+        assert!(lines.iter().all(|line| line.split(',').count() == 11));
+    }
+
+    #[test]
+    fn what_is_no_sample_is_said() {
+        assert!(of("1,2\nx,3\n").unwrap_err().contains("two numbers"));
+        assert!(of("1,inf\n").is_err() && of("1\n").is_err());
+        assert!(of(&"1".repeat(90)).unwrap_err().contains("80"));
+        assert_eq!(of("").unwrap(), [HEADER]);
+        assert_eq!(of("\r\n1,2\r\n3,4").unwrap(), [HEADER]);
+    }
+}

@@ -1,0 +1,161 @@
+//! The kernel on bare processors: built for Cortex-M4F and RISC-V, run under QEMU, and its digits beside those of
+//! the host and of `hoid track`.
+//!
+//! What is not installed is said and left out, with what installs it.
+
+use std::{
+    env, fs,
+    path::Path,
+    process::{Command, Stdio},
+};
+
+use crate::process::{cargo, output, target_directory};
+
+/// The processor that is run, and the one that is built for.
+const CORTEX: &str = "thumbv7em-none-eabihf";
+const RISC_V: &str = "riscv32imac-unknown-none-elf";
+/// Seconds of the run that QEMU is given where the whole is not asked for: it runs at a fiftieth of the host's speed.
+const SHORT_S: usize = 15;
+const RATE_HZ: usize = 100;
+
+/// Builds, runs and compares; `--all` runs the whole 82 s under QEMU too.
+pub fn embedded(arguments: &[String]) -> Result<(), String> {
+    let all = match arguments {
+        [] => false,
+        [one] if one == "--all" => true,
+        _ => return Err("usage: cargo xtask embedded [--all]".to_owned()),
+    };
+    let installed = output(Command::new("rustup").args(["target", "list", "--installed"])).unwrap_or_default();
+    for target in [CORTEX, RISC_V] {
+        if !installed.lines().any(|line| line == target) {
+            println!("skipped: hoid on {target} (rustup target add {target})");
+            continue;
+        }
+        cargo(&["build", "--release", "-p", "hoid-core", "--target", target], &[])?;
+    }
+    let target = target_directory();
+    let directory = target.join("embedded");
+    fs::create_dir_all(&directory).map_err(|e| format!("{}: {e}", directory.display()))?;
+    let track = tracked(&target, &directory)?;
+    let host = output(Command::new(target.join("debug").join(name("hoid-embedded"))).current_dir(&directory))?;
+    compared("the host", &host, &track)?;
+
+    if !installed.lines().any(|line| line == CORTEX) {
+        return Ok(());
+    }
+    cargo(&["build", "--release", "-p", "hoid-embedded", "--target", CORTEX], &[])?;
+    let program = target.join(CORTEX).join("release/hoid-embedded");
+    let emulator = "qemu-system-arm";
+    let there = Command::new(emulator).arg("--version").stdout(Stdio::null()).status();
+    if !there.is_ok_and(|status| status.success()) {
+        println!("skipped: hoid on {CORTEX} under QEMU (apt-get install {emulator})");
+        return Ok(());
+    }
+    if !all {
+        shorten(&directory.join("run.csv"))?;
+    }
+    let board = output(
+        Command::new(emulator)
+            .args([
+                "-M",
+                "mps2-an386",
+                "-nographic",
+                "-semihosting-config",
+                "enable=on,target=native",
+            ])
+            .arg("-kernel")
+            .arg(&program)
+            .current_dir(&directory),
+    )?;
+    compared(CORTEX, &board, &track)?;
+    if let Ok(size) = output(Command::new("size").arg(&program)) {
+        print!("{size}");
+    }
+    Ok(())
+}
+
+/// The trace of `hoid track` for a run of C4, whose e and u are left in `run.csv`.
+fn tracked(target: &Path, directory: &Path) -> Result<String, String> {
+    cargo(&["build", "-p", "hoid-cli", "-p", "hoid-embedded"], &[])?;
+    let hoid = || {
+        let mut command = Command::new(target.join("debug").join(name("hoid")));
+        command.current_dir(directory).stdout(Stdio::null());
+        command
+    };
+    output(hoid().args(["simulate", "--condition", "C4", "--seed", "1", "--out", "c4.csv"]))?;
+    output(hoid().args([
+        "track",
+        "c4.csv",
+        "--nk",
+        "29",
+        "--guard",
+        "no",
+        "--every",
+        "1",
+        "--out",
+        "trace.csv",
+    ]))?;
+    let read = |file: &str| fs::read_to_string(directory.join(file)).map_err(|e| format!("{file}: {e}"));
+    let samples = columns(&read("c4.csv")?, &["e", "u"])?;
+    let samples: String = samples.iter().map(|row| format!("{}\n", row.join(","))).collect();
+    fs::write(directory.join("run.csv"), samples).map_err(|e| format!("run.csv: {e}"))?;
+    read("trace.csv")
+}
+
+/// Keeps the first seconds of the samples.
+fn shorten(file: &Path) -> Result<(), String> {
+    let said = |e: std::io::Error| format!("{}: {e}", file.display());
+    let text = fs::read_to_string(file).map_err(said)?;
+    let kept: String = text
+        .lines()
+        .take(SHORT_S * RATE_HZ)
+        .map(|line| format!("{line}\n"))
+        .collect();
+    fs::write(file, kept).map_err(said)
+}
+
+/// The named columns of a table whose comments begin with `#`.
+fn columns(table: &str, names: &[&str]) -> Result<Vec<Vec<String>>, String> {
+    let mut lines = table.lines().filter(|line| !line.starts_with('#'));
+    let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+    let places = names.iter().map(|name| {
+        let place = header.iter().position(|column| column == name);
+        place.ok_or_else(|| format!("there is no column {name}"))
+    });
+    let places: Vec<usize> = places.collect::<Result<_, String>>()?;
+    let row = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        places
+            .iter()
+            .map(|place| cells.get(*place).copied().unwrap_or_default().to_owned())
+            .collect()
+    };
+    Ok(lines.map(row).collect())
+}
+
+/// Each line that was told must be one of the trace, to the last digit.
+fn compared(place: &str, told: &str, track: &str) -> Result<(), String> {
+    let table: Vec<&str> = told.lines().filter(|line| !line.starts_with('#')).collect();
+    let names: Vec<&str> = table.first().copied().unwrap_or_default().split(',').collect();
+    let rows = columns(track, &names)?;
+    for line in &table[1..] {
+        let cells: Vec<&str> = line.split(',').collect();
+        let row = rows.iter().find(|row| row[0] == cells[0]);
+        let row = row.ok_or_else(|| format!("{place}: hoid track has no row at t = {}", cells[0]))?;
+        if row.iter().zip(&cells).any(|(a, b)| a != b) {
+            return Err(format!("{place}: {line}\nhoid track: {}", row.join(",")));
+        }
+    }
+    if table.len() < SHORT_S {
+        return Err(format!("{place} told {} lines only", table.len()));
+    }
+    println!("{place}: {} lines, the digits of hoid track", table.len() - 1);
+    told.lines()
+        .filter(|line| line.starts_with('#'))
+        .for_each(|line| println!("{line}"));
+    Ok(())
+}
+
+fn name(program: &str) -> String {
+    format!("{program}{}", env::consts::EXE_SUFFIX)
+}
