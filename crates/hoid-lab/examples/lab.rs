@@ -1,7 +1,7 @@
 //! `cargo xtask slow lab [RUNS] [SEEDS]`: the page's plant against Rust over 10 000 runs, and
 //! simulated operators who track through the page's engine in injected time and are identified.
 //!
-//! Three operators: those of C1 and C2, and one with a lag before 4/s, each with a remnant of first
+//! Three operators: those of C1 and C2, and a gain with a lag before 4/s, each with a remnant of first
 //! order whose variance is a tenth of that of u. The operator sees e at each tick; the record has every
 //! tenth, which estimators take for held: their delay is half a sample shorter. Told: bias of each
 //! parameter in percent with its standard error, and the part of the intervals of 95 % that hold the
@@ -40,6 +40,7 @@ const SHARE: f64 = 0.1;
 struct Person {
     name: &'static str,
     form: Form,
+    neuromuscular: bool,
     /// Parameters in the order of the form, tau last.
     coordinates: Vec<f64>,
     element: String,
@@ -51,6 +52,7 @@ fn people() -> Vec<Person> {
         Person {
             name,
             form: Form::Lead,
+            neuromuscular: true,
             coordinates: vec![o.k_e, o.t_l_s, o.omega_nm_rad_s.ln(), o.zeta_nm.ln(), o.tau_e_s],
             element: c.transfer_function().unwrap().to_string(),
         }
@@ -61,8 +63,10 @@ fn people() -> Vec<Person> {
         Person {
             name: "4/s, lag",
             form: Form::Lag,
-            // K/T_I = 1.2, 1/T_I = 1.
-            coordinates: vec![1.2, 1.0, 12f64.ln(), 0.4f64.ln(), 0.18],
+            neuromuscular: false,
+            // K = .4 and T_I = 1 s: crossover 1.1 rad/s, margin 32 deg. A bandwidth at which no neuromuscular
+            // system shows, and so one without.
+            coordinates: vec![0.4, 1.0, 0.18],
             element: "4/s".to_owned(),
         },
     ]
@@ -93,7 +97,7 @@ fn tracked(engine: &mut page::Engine, person: &Person, seed: u64, remnant: f64) 
         ..Condition::default()
     };
     let task = Task::new(&condition, 0, seed).unwrap();
-    let operator = FamilyOperator::new(person.form, true, &person.coordinates).unwrap();
+    let operator = FamilyOperator::new(person.form, person.neuromuscular, &person.coordinates).unwrap();
     let transfer: ContinuousTransferFunction = operator.transfer_function().unwrap();
     let held = HeldSystem::new(transfer.num(), transfer.den(), 0.0, SampleTime::new(TICK_S).unwrap()).unwrap();
     let plant = Plant {
@@ -140,7 +144,7 @@ fn main() -> ExitCode {
     for person in people() {
         let quiet = tracked(&mut engine, &person, 0, 0.0).1;
         let remnant = (SHARE * variance(&quiet[10_000..])).sqrt();
-        let kinds = person.form.coordinates(true);
+        let kinds = person.form.coordinates(person.neuromuscular);
         let mut found: Vec<Vec<(f64, f64)>> = vec![Vec::new(); kinds.len()];
         for seed in 1..=u64::from(seeds) {
             let (task, u, e) = tracked(&mut engine, &person, seed, remnant);
@@ -149,6 +153,7 @@ fn main() -> ExitCode {
             let record = Record::new(SampleTime::HUNDREDTH, channel("e", &e), channel("u", &u)).unwrap();
             let estimator = FamilyEstimator {
                 forms: vec![person.form],
+                neuromuscular: person.neuromuscular,
                 prior: OperatorPrior::none(),
                 run_to_run: 0.0,
                 ..FamilyEstimator::default()
