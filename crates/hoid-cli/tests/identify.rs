@@ -66,6 +66,28 @@ fn identify_prints_the_json_of_the_contract() {
     assert_eq!(found["candidates"], serde_json::json!([]));
 }
 
+/// The bytes with which a file begins say what it is, and it has the width that was asked for.
+#[test]
+#[cfg(feature = "pdf-png")]
+fn a_figure_is_a_page_or_a_picture_as_its_name_says() {
+    let directory = simulated();
+    let d = directory.path();
+    let draw = |name: &str| {
+        let fit = ["identify", "c1.csv", "--nk", "29", "--orders", "nd=1"];
+        good(d, &[&fit[..], &["--figure", name, "--width", "85mm"]].concat());
+        fs::read(d.join(name)).unwrap()
+    };
+    let pdf = draw("bode.pdf");
+    let text = String::from_utf8_lossy(&pdf);
+    // 85 mm are 240.9 pt.
+    assert!(pdf.starts_with(b"%PDF-") && text.contains("/MediaBox [0 0 240.9") && text.contains("/Font"));
+    let png = draw("bode.png");
+    assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"));
+    // At 300 dots an inch; the width stands in the first chunk.
+    let width = u32::from_be_bytes(png[16..20].try_into().unwrap());
+    assert!(width.abs_diff(1004) <= 4, "{width}");
+}
+
 #[test]
 fn a_range_is_searched_and_its_table_is_part_of_the_result() {
     let directory = simulated();
